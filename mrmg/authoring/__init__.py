@@ -1,0 +1,1 @@
+"""Making scenes: import of foreign maps, placing of robots, goals and stations."""

@@ -1,0 +1,55 @@
+"""The one way this package compiles kernels with numba.
+
+numba's cache does not notice edits in other files: a cached caller keeps the old callee.
+The cache folder is therefore named after a digest of all sources that feed kernels, and is
+set before numba is imported anywhere.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_PACKAGE = Path(__file__).resolve().parent
+_SOURCES = ("compilation.py", "energy.py", "motion/dynamics.py")
+
+
+def kernel_sources() -> list[Path]:
+    """Return every source file whose code is compiled into a kernel."""
+    return sorted(
+        {*_PACKAGE.rglob("*_kernels.py"), *(_PACKAGE / name for name in _SOURCES)}
+    )
+
+
+def cache_folder() -> Path:
+    """Return the folder of compiled kernels that belongs to the present sources."""
+    state = hashlib.sha256()
+    for path in kernel_sources():
+        state.update(path.read_bytes())
+    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "mrmg" / "kernels" / state.hexdigest()[:16]
+
+
+os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))
+
+import numba  # noqa: E402  (must follow the cache setting)
+
+
+def kernel(function: F) -> F:
+    """Compile `function` ahead of use: cached, releasing the GIL, without fast-math.
+
+    Fast-math and parallel reductions would let a branch of the search depend on the
+    order of additions, which would end reproducibility.
+    """
+    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
+
+
+def kernels_are_compiled() -> bool:
+    """Tell whether this machine already holds compiled kernels of these sources."""
+    folder = Path(os.environ["NUMBA_CACHE_DIR"])
+    return folder.is_dir() and any(folder.rglob("*.nbc"))

@@ -1,0 +1,76 @@
+"""Every error a user can meet, each with the exit code it ends a command with.
+
+The command line prints the message alone; the Python API raises the exception.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+
+class ExitCode(IntEnum):
+    """What a command's exit status says."""
+
+    OK = 0
+    USAGE = 2
+    INVALID_FILE = 3
+    INFEASIBLE = 4
+    OUT_OF_BUDGET = 5
+    MISSION_FAILED = 6
+    MACHINE = 7
+
+
+class MrmgError(Exception):
+    """Root of all errors raised on purpose by this package."""
+
+    exit_code = ExitCode.USAGE
+
+
+class UsageError(MrmgError):
+    """A command or function was called in a way it does not allow."""
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One fault of a file: where it is, what is wrong, and what is allowed."""
+
+    path: str
+    message: str
+
+    def __str__(self) -> str:
+        return f"{self.path}: {self.message}" if self.path else self.message
+
+
+class FileError(MrmgError):
+    """A file cannot be used; carries every fault found, not only the first."""
+
+    exit_code = ExitCode.INVALID_FILE
+
+    def __init__(self, source: str, faults: Sequence[Fault]) -> None:
+        self.source = source
+        self.faults = tuple(faults)
+        count = "1 fault" if len(self.faults) == 1 else f"{len(self.faults)} faults"
+        lines = [f"{source}: {count}", *(f"  {fault}" for fault in self.faults)]
+        super().__init__("\n".join(lines))
+
+
+class SceneError(FileError):
+    """A scene file is malformed or describes an impossible scene."""
+
+
+class RunFolderError(FileError):
+    """A run folder lacks or contradicts what a step needs."""
+
+
+class InfeasibleError(MrmgError):
+    """The mission has no solution, and the message names the proof."""
+
+    exit_code = ExitCode.INFEASIBLE
+
+
+class MachineError(MrmgError):
+    """Something the command needs is missing on this machine; names the cure."""
+
+    exit_code = ExitCode.MACHINE

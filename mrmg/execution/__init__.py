@@ -1,0 +1,1 @@
+"""From a plan to a log: the MuJoCo world, controllers, simulation."""

@@ -1,0 +1,127 @@
+"""What was recorded while a plan was driven in MuJoCo."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrmg import storage
+from mrmg.errors import Fault, RunFolderError
+
+LOG_FORMAT = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """The beginning of a touch that should not have happened.
+
+    Attributes:
+        time_s: when it began.
+        robot: id of the robot.
+        other: id of the robot or obstacle it touched, or "bounds".
+        x_m, y_m: where.
+    """
+
+    time_s: float
+    robot: str
+    other: str
+    x_m: float
+    y_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExecutionLog:
+    """Everything recorded at the control rate; n ticks, R robots.
+
+    Attributes:
+        scene_digest, plan_digest, model_digest: what was driven, in which MJCF world.
+        controller: name of the tracking controller.
+        control_period_s: time between ticks.
+        completed: False where the simulation was ended early.
+        robots: ids in the scene's order.
+        versions: of the packages that decide the result.
+        time_s: simulated time, shape (n,).
+        clock_s: plan time the fleet's shared clock had reached, shape (n,).
+        state: true (x, y, theta, v, psi), shape (R, n, 5).
+        reference: the plan at clock_s, shape (R, n, 5).
+        command: set-points (v [m/s], psi [rad]) given at each tick, shape (R, n, 2).
+        multiplier: terrain under the rear axle, shape (R, n).
+        force_N: drive force held over the tick, shape (R, n - 1).
+        work_J: work at the wheels over the tick, driving (>= 0) and braking (<= 0),
+            shape (R, n - 1, 2).
+        qpos: MuJoCo's positions, shape (n, nq); what a video is drawn from.
+        contacts: every contact other than wheel and floor.
+        timing: wall-clock figures: wall_s, realtime_factor, controller_ms
+            {median, p99}. Kept apart: all else is equal between equal runs.
+    """
+
+    scene_digest: str
+    plan_digest: str
+    model_digest: str
+    controller: str
+    control_period_s: float
+    completed: bool
+    robots: tuple[str, ...]
+    versions: Mapping[str, str]
+    time_s: np.ndarray
+    clock_s: np.ndarray
+    state: np.ndarray
+    reference: np.ndarray
+    command: np.ndarray
+    multiplier: np.ndarray
+    force_N: np.ndarray
+    work_J: np.ndarray
+    qpos: np.ndarray
+    contacts: tuple[Contact, ...]
+    timing: Mapping[str, Any]
+
+    def save(self, folder: Path) -> None:
+        """Write `log.npz`, `timing.json`, then `log.json` (its presence ends the step)."""
+        storage.write_arrays(folder / "log.npz", self._arrays())
+        storage.write_json(folder / "timing.json", dict(self.timing))
+        header = {
+            field.name: getattr(self, field.name)
+            for field in fields(self)
+            if field.name not in {*self._arrays(), "contacts", "timing"}
+        }
+        header["robots"] = list(self.robots)
+        header["versions"] = dict(self.versions)
+        header["contacts"] = [
+            {name: getattr(contact, name) for name in Contact.__slots__}
+            for contact in self.contacts
+        ]
+        storage.write_json(folder / "log.json", {"format": LOG_FORMAT, **header})
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {
+            name: value
+            for name, value in values.items()
+            if isinstance(value, np.ndarray)
+        }
+
+    @staticmethod
+    def load(folder: Path) -> ExecutionLog:
+        """Read a log that `save` wrote.
+
+        Raises:
+            RunFolderError: if a file is missing or not a log of this format.
+        """
+        try:
+            header = storage.read_json(folder / "log.json")
+            if header.pop("format") != LOG_FORMAT:
+                raise ValueError(f"this version reads format {LOG_FORMAT} only")
+            header["robots"] = tuple(header["robots"])
+            header["contacts"] = tuple(Contact(**row) for row in header["contacts"])
+            return ExecutionLog(
+                **header,
+                **storage.read_arrays(folder / "log.npz"),
+                timing=storage.read_json(folder / "timing.json"),
+            )
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            fault = Fault("log.json", f"no readable log ({error}); run 'mrmg execute'")
+            raise RunFolderError(str(folder), [fault]) from error

@@ -1,0 +1,68 @@
+"""Energy accounts: joules by robot, leg and part."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class LedgerEntry:
+    """Energy drawn from one battery on one leg of a tour, for one part of the model.
+
+    Attributes:
+        robot: id of the robot.
+        leg: number of the leg, from 0; a leg ends where its target is visited.
+        target: id of the goal or station the leg leads to; "" after the last one.
+        part: one of `energy.PARTS`, or "drive" for the work of MuJoCo's actuators.
+        energy_J: drawn from the battery; negative where it was fed back.
+    """
+
+    robot: str
+    leg: int
+    target: str
+    part: str
+    energy_J: float
+
+
+@dataclass(frozen=True, slots=True)
+class EnergyLedger:
+    """The account of a whole mission."""
+
+    entries: tuple[LedgerEntry, ...] = ()
+
+    def total_J(self, *, robot: str | None = None, part: str | None = None) -> float:
+        """Return the energy of all entries, or of one robot's, one part's, or both."""
+        return sum(
+            entry.energy_J
+            for entry in self.entries
+            if (robot is None or entry.robot == robot)
+            and (part is None or entry.part == part)
+        )
+
+    def robots(self) -> tuple[str, ...]:
+        """Return the robots that have an entry, in order of appearance."""
+        return tuple(dict.fromkeys(entry.robot for entry in self.entries))
+
+    def parts(self) -> tuple[str, ...]:
+        """Return the parts that have an entry, in order of appearance."""
+        return tuple(dict.fromkeys(entry.part for entry in self.entries))
+
+    def to_rows(self) -> list[dict[str, Any]]:
+        """Return the entries as JSON rows."""
+        return [
+            {
+                "robot": entry.robot,
+                "leg": entry.leg,
+                "target": entry.target,
+                "part": entry.part,
+                "energy_J": entry.energy_J,
+            }
+            for entry in self.entries
+        ]
+
+    @staticmethod
+    def from_rows(rows: Iterable[dict[str, Any]]) -> EnergyLedger:
+        """Rebuild a ledger from `to_rows`."""
+        return EnergyLedger(tuple(LedgerEntry(**row) for row in rows))

@@ -1,0 +1,219 @@
+"""What the planner produces: trajectories, tours, visits and a status."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrmg import storage
+from mrmg.errors import ExitCode, Fault, RunFolderError
+from mrmg.ledger import EnergyLedger
+
+PLAN_FORMAT = 1
+
+
+class PlanStatus(Enum):
+    """How planning ended."""
+
+    SOLVED = "solved"
+    INFEASIBLE = "infeasible"
+    TIMEOUT = "timeout"
+    INVALID_SCENE = "invalid_scene"
+    CANCELLED = "cancelled"
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """The exit code of a command that ends with this status."""
+        return {
+            PlanStatus.SOLVED: ExitCode.OK,
+            PlanStatus.INFEASIBLE: ExitCode.INFEASIBLE,
+            PlanStatus.TIMEOUT: ExitCode.OUT_OF_BUDGET,
+            PlanStatus.INVALID_SCENE: ExitCode.INVALID_FILE,
+            PlanStatus.CANCELLED: ExitCode.OUT_OF_BUDGET,
+        }[self]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trajectory:
+    """The motion of one robot under piecewise constant controls.
+
+    Attributes:
+        robot: id of the robot.
+        dt_s: length of one step; state i holds at time i * dt_s.
+        state: (x [m], y [m], theta [rad], v [m/s], psi [rad]), shape (n + 1, 5).
+        control: (u1 [m/s^2], u2 [rad/s]) held over each step, shape (n, 2).
+    """
+
+    robot: str
+    dt_s: float
+    state: np.ndarray
+    control: np.ndarray
+
+    def __post_init__(self) -> None:
+        self.state.setflags(write=False)
+        self.control.setflags(write=False)
+
+    @property
+    def time_s(self) -> np.ndarray:
+        """Time of each state, shape (n + 1,)."""
+        return np.arange(len(self.state)) * self.dt_s
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the last state."""
+        return (len(self.state) - 1) * self.dt_s
+
+
+@dataclass(frozen=True, slots=True)
+class Visit:
+    """A robot's entering of a goal or station.
+
+    Attributes:
+        robot: id of the robot.
+        target: id of the goal or station.
+        kind: "goal" or "station".
+        step: index of the first trajectory state inside the region.
+        time_s: its time.
+        energy_J: battery content on arrival, before any recharge.
+    """
+
+    robot: str
+    target: str
+    kind: str
+    step: int
+    time_s: float
+    energy_J: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """A solved mission; all trajectories have the same number of steps.
+
+    Attributes:
+        scene_name, scene_digest: the scene it was made for.
+        seed, profile, parameters_digest, versions: how it was made.
+        dt_s: step length of all trajectories.
+        trajectories: one per robot, in the scene's order.
+        tours: targets of each robot in the order of its visits.
+        visits: in order of time.
+        ledger: predicted energy.
+    """
+
+    scene_name: str
+    scene_digest: str
+    seed: int
+    profile: str
+    parameters_digest: str
+    versions: Mapping[str, str]
+    dt_s: float
+    trajectories: tuple[Trajectory, ...]
+    tours: Mapping[str, tuple[str, ...]]
+    visits: tuple[Visit, ...]
+    ledger: EnergyLedger
+
+    @property
+    def cost_J(self) -> float:
+        """Energy of the whole fleet."""
+        return self.ledger.total_J()
+
+    @property
+    def makespan_s(self) -> float:
+        """Time at which the last robot has come to rest."""
+        return max(trajectory.duration_s for trajectory in self.trajectories)
+
+    def trajectory(self, robot_id: str) -> Trajectory:
+        """Return one robot's trajectory."""
+        return next(item for item in self.trajectories if item.robot == robot_id)
+
+    def save(self, folder: Path) -> None:
+        """Write `plan.npz`, then `plan.json`; equal plans give equal bytes."""
+        arrays = {}
+        for trajectory in self.trajectories:
+            arrays[f"{trajectory.robot}.state"] = trajectory.state
+            arrays[f"{trajectory.robot}.control"] = trajectory.control
+        storage.write_arrays(folder / "plan.npz", arrays)
+        storage.write_json(folder / "plan.json", self._header())
+
+    def _header(self) -> dict[str, Any]:
+        return {
+            "format": PLAN_FORMAT,
+            "scene_name": self.scene_name,
+            "scene_digest": self.scene_digest,
+            "seed": self.seed,
+            "profile": self.profile,
+            "parameters_digest": self.parameters_digest,
+            "versions": dict(self.versions),
+            "dt_s": self.dt_s,
+            "robots": [trajectory.robot for trajectory in self.trajectories],
+            "tours": {robot: list(tour) for robot, tour in self.tours.items()},
+            "visits": [
+                {name: getattr(visit, name) for name in Visit.__slots__}
+                for visit in self.visits
+            ],
+            "ledger": self.ledger.to_rows(),
+        }
+
+    @staticmethod
+    def load(folder: Path) -> Plan:
+        """Read a plan that `save` wrote.
+
+        Raises:
+            RunFolderError: if a file is missing or not a plan of this format.
+        """
+        try:
+            header = storage.read_json(folder / "plan.json")
+            arrays = storage.read_arrays(folder / "plan.npz")
+            if header["format"] != PLAN_FORMAT:
+                raise ValueError(
+                    f"format is {header['format']}, this version reads {PLAN_FORMAT}"
+                )
+            return _plan_from(header, arrays)
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            fault = Fault("plan.json", f"no readable plan ({error}); run 'mrmg plan'")
+            raise RunFolderError(str(folder), [fault]) from error
+
+
+def _plan_from(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Plan:
+    return Plan(
+        scene_name=header["scene_name"],
+        scene_digest=header["scene_digest"],
+        seed=header["seed"],
+        profile=header["profile"],
+        parameters_digest=header["parameters_digest"],
+        versions=header["versions"],
+        dt_s=header["dt_s"],
+        trajectories=tuple(
+            Trajectory(
+                robot=robot,
+                dt_s=header["dt_s"],
+                state=arrays[f"{robot}.state"],
+                control=arrays[f"{robot}.control"],
+            )
+            for robot in header["robots"]
+        ),
+        tours={robot: tuple(tour) for robot, tour in header["tours"].items()},
+        visits=tuple(Visit(**visit) for visit in header["visits"]),
+        ledger=EnergyLedger.from_rows(header["ledger"]),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanResult:
+    """The answer of the planner: a status, and a plan exactly when it is SOLVED.
+
+    Attributes:
+        status: how planning ended.
+        plan: the plan, or None.
+        reason: one sentence for a status other than SOLVED; names the proof.
+        statistics: counts and times (`vertices`, `groups`, `router_calls`, `time_s`).
+    """
+
+    status: PlanStatus
+    plan: Plan | None
+    reason: str
+    statistics: Mapping[str, Any]

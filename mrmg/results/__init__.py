@@ -1,0 +1,1 @@
+"""Judging and showing: verification, audit, summary, pictures, report."""

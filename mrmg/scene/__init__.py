@@ -1,0 +1,1 @@
+"""The problem statement: types, loading, robot models."""

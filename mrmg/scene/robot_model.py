@@ -1,0 +1,140 @@
+"""One kind of robot: its shape, motion, limits, tyres and battery.
+
+A model is a folder in `models/` with `robot.yaml` (this module's fields) and an MJCF file;
+`scene.loading` reads the YAML, `execution` compiles the MJCF.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mrmg.energy import GRAVITY_M_S2, EnergyModel
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Bounds of state and control of a motion model.
+
+    Attributes:
+        v_min_m_s: fastest reverse speed, negative or zero.
+        v_max_m_s: fastest forward speed.
+        w_max: bound of |psi| [rad] (car) or |omega| [rad/s] (unicycle).
+        u1_max_m_s2: bound of the acceleration |u1|.
+        u2_max: bound of |u2|: steering rate [rad/s] or angular acceleration [rad/s^2].
+    """
+
+    v_min_m_s: float
+    v_max_m_s: float
+    w_max: float
+    u1_max_m_s2: float
+    u2_max: float
+
+    def scaled(self, share: float) -> Limits:
+        """Return the limits times `share`; the planner leaves the rest to control."""
+        return Limits(
+            v_min_m_s=self.v_min_m_s * share,
+            v_max_m_s=self.v_max_m_s * share,
+            w_max=self.w_max * share,
+            u1_max_m_s2=self.u1_max_m_s2 * share,
+            u2_max=self.u2_max * share,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotModel:
+    """Everything the planner and the physics must agree on about one kind of robot.
+
+    Attributes:
+        name: folder name of the model.
+        motion_model: key of `motion.dynamics.DERIVATIVES`.
+        footprint_m: convex outline in the robot's frame, counter-clockwise, shape (m, 2).
+            The frame's origin is the reference point (x, y): the middle of the rear axle.
+        height_m: height of the body.
+        wheelbase_m: distance L of the axles.
+        track_m: distance of the wheels of one axle.
+        limits: what the robot can do.
+        planning_share: share of the limits the planner uses; the controller keeps the rest.
+        mass_kg: whole robot, wheels included.
+        wheel_radius_m: rolling radius.
+        wheel_inertia_kg_m2: spin inertia of one wheel, armature included.
+        wheel_count: number of wheels.
+        rolling_coefficient: C_rr on plain ground.
+        turning_coefficient: C_turn of the energy model.
+        friction_coefficient: tyre on ground.
+        drive_efficiency: battery to wheel.
+        regeneration_efficiency: wheel to battery.
+        idle_power_W: electronics.
+        battery_capacity_J: of the standard battery.
+        mjcf: path of the MJCF file.
+    """
+
+    name: str
+    motion_model: str
+    footprint_m: np.ndarray
+    height_m: float
+    wheelbase_m: float
+    track_m: float
+    limits: Limits
+    planning_share: float
+    mass_kg: float
+    wheel_radius_m: float
+    wheel_inertia_kg_m2: float
+    wheel_count: int
+    rolling_coefficient: float
+    turning_coefficient: float
+    friction_coefficient: float
+    drive_efficiency: float
+    regeneration_efficiency: float
+    idle_power_W: float
+    battery_capacity_J: float
+    mjcf: Path
+
+    @property
+    def effective_mass_kg(self) -> float:
+        """Mass that resists acceleration along the road: m + n I_w / r^2."""
+        spin = self.wheel_count * self.wheel_inertia_kg_m2 / self.wheel_radius_m**2
+        return self.mass_kg + spin
+
+    @property
+    def energy_model(self) -> EnergyModel:
+        """The energy model with this robot's coefficients."""
+        weight_N = self.mass_kg * GRAVITY_M_S2
+        return EnergyModel(
+            rolling_force_N=self.rolling_coefficient * weight_N,
+            turning_force_N=self.turning_coefficient * weight_N,
+            effective_mass_kg=self.effective_mass_kg,
+            drive_efficiency=self.drive_efficiency,
+            regeneration_efficiency=self.regeneration_efficiency,
+            idle_power_W=self.idle_power_W,
+        )
+
+    @property
+    def inscribed_radius_m(self) -> float:
+        """Radius of the largest circle about the reference point inside the footprint."""
+        start = self.footprint_m
+        edge = np.roll(start, -1, axis=0) - start
+        normal_distance = (
+            edge[:, 0] * -start[:, 1] - edge[:, 1] * -start[:, 0]
+        ) / np.hypot(edge[:, 0], edge[:, 1])
+        return float(normal_distance.min())
+
+    @property
+    def half_width_m(self) -> float:
+        """Half the footprint's extent across the driving direction."""
+        return float(np.abs(self.footprint_m[:, 1]).max())
+
+    @property
+    def circumscribed_radius_m(self) -> float:
+        """Radius of the circle about the reference point that holds the footprint."""
+        return float(np.hypot(self.footprint_m[:, 0], self.footprint_m[:, 1]).max())
+
+    @property
+    def turning_radius_m(self) -> float:
+        """Smallest turning radius of the reference point within the planner's limits."""
+        if self.motion_model == "unicycle":
+            return 0.0
+        return self.wheelbase_m / math.tan(self.planning_share * self.limits.w_max)

@@ -1,0 +1,169 @@
+"""The problem statement as immutable values; SI units throughout."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from shapely.geometry import Polygon
+
+from mrmg.scene.robot_model import RobotModel
+
+
+@dataclass(frozen=True, kw_only=True)
+class Obstacle:
+    """Ground no robot may touch, or only some robots may.
+
+    Attributes:
+        id: unique name.
+        shape: outline with holes [m].
+        height_m: height of the obstacle in the simulated world.
+        blocks: ids of the robots it stops; None stops all.
+    """
+
+    id: str
+    shape: Polygon
+    height_m: float
+    blocks: tuple[str, ...] | None = None
+
+    def stops(self, robot_id: str) -> bool:
+        """Tell whether `robot_id` must keep off this obstacle."""
+        return self.blocks is None or robot_id in self.blocks
+
+
+@dataclass(frozen=True, kw_only=True)
+class TerrainArea:
+    """Ground on which driving costs `multiplier` times as much as on plain ground."""
+
+    id: str
+    shape: Polygon
+    multiplier: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Region:
+    """A convex set of positions: a circle or a convex polygon.
+
+    Attributes:
+        center: [m], shape (2,): the circle's centre or the polygon's centroid.
+        radius_m: of the circle; 0 for a polygon.
+        corners: counter-clockwise [m], shape (n, 2); shape (0, 2) for a circle.
+    """
+
+    center: np.ndarray
+    radius_m: float
+    corners: np.ndarray
+
+    @cached_property
+    def shape(self) -> Polygon:
+        """The region as a polygon (a circle with 64 sides, from within)."""
+        if len(self.corners):
+            return Polygon(self.corners)
+        angle = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+        ring = np.stack([np.cos(angle), np.sin(angle)], axis=1) * self.radius_m
+        return Polygon(ring + self.center)
+
+    def depth(self, points: np.ndarray) -> np.ndarray:
+        """Return how far points lie inside [m]; negative outside. Shape (n, 2) -> (n,).
+
+        The depth is the distance to the nearest side's line (or to the circle), so a
+        point is in the region exactly when its depth is not negative.
+        """
+        points = np.atleast_2d(points)
+        if not len(self.corners):
+            offset = points - self.center
+            return self.radius_m - np.hypot(offset[:, 0], offset[:, 1])
+        start = self.corners
+        edge = np.roll(start, -1, axis=0) - start
+        edge = edge / np.hypot(edge[:, 0], edge[:, 1])[:, None]
+        offset = points[:, None, :] - start[None]
+        inside = edge[None, :, 0] * offset[..., 1] - edge[None, :, 1] * offset[..., 0]
+        return np.asarray(inside.min(axis=1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Goal:
+    """A region that some robot's reference point must enter once."""
+
+    id: str
+    region: Region
+
+
+@dataclass(frozen=True, kw_only=True)
+class Station:
+    """A region in which a robot's battery is reset to full on entering."""
+
+    id: str
+    region: Region
+
+
+@dataclass(frozen=True, kw_only=True)
+class Battery:
+    """Energy store of one robot.
+
+    Attributes:
+        capacity_J: energy when full.
+        start_J: energy at the start of the mission.
+        reserve_fraction: share of the capacity that must always remain.
+    """
+
+    capacity_J: float
+    start_J: float
+    reserve_fraction: float
+
+    @property
+    def reserve_J(self) -> float:
+        """Energy that must always remain."""
+        return self.capacity_J * self.reserve_fraction
+
+
+@dataclass(frozen=True, kw_only=True)
+class Robot:
+    """One robot of the fleet: a model, where it starts and with what energy.
+
+    Attributes:
+        id: unique name.
+        model: its kind.
+        pose: start (x [m], y [m], yaw [rad]) of the reference point, at rest.
+        battery: its energy store.
+    """
+
+    id: str
+    model: RobotModel
+    pose: tuple[float, float, float]
+    battery: Battery
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """A mission: map, terrain, goals, stations and the fleet.
+
+    Attributes:
+        name: short name.
+        bounds: (x_min, y_min, x_max, y_max) [m].
+        obstacles, terrain, goals, stations, robots: in the order of the file; where
+            terrain areas overlap, the later one counts.
+        document: the scene file's content with defaults filled in, as plain data: what
+            `scene.loading.scene_from_document` turns back into an equal scene.
+        digest: fingerprint of the content, models included.
+    """
+
+    name: str
+    bounds: tuple[float, float, float, float]
+    obstacles: tuple[Obstacle, ...]
+    terrain: tuple[TerrainArea, ...]
+    goals: tuple[Goal, ...]
+    stations: tuple[Station, ...]
+    robots: tuple[Robot, ...]
+    document: dict[str, Any]
+    digest: str
+
+    def robot(self, robot_id: str) -> Robot:
+        """Return the robot of that id."""
+        return next(robot for robot in self.robots if robot.id == robot_id)
+
+    def targets(self) -> tuple[Goal | Station, ...]:
+        """Return all goals, then all stations: the numbering the planner uses."""
+        return (*self.goals, *self.stations)
