@@ -1,0 +1,217 @@
+"""What a motion costs: visits, battery content and ledger of planned or logged motion.
+
+The planner's predicted ledger, the verifier's recomputation and the audit's metered
+account all come from here, so that they differ by the motion alone. Each interval
+between two states is charged at its midpoint: speed and steering are the means of both
+ends, the multiplier is that of the middle between both positions, and the acceleration
+is the difference quotient of the speed, so that inertia adds up to differences of
+kinetic energy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from mrmg.energy import PARTS
+from mrmg.ledger import EnergyLedger, LedgerEntry
+from mrmg.mission import Visit
+from mrmg.scene.types import Scene, Station
+from mrmg.world.terrain import multiplier_at
+
+
+class Motion(Protocol):
+    """Timed states of one robot; `mission.Trajectory` is one."""
+
+    @property
+    def robot(self) -> str:
+        """Id of the robot."""
+
+    @property
+    def time_s(self) -> np.ndarray:
+        """Time of each state, increasing, shape (n + 1,)."""
+
+    @property
+    def state(self) -> np.ndarray:
+        """(x, y, theta, v, psi) at each time, shape (n + 1, 5)."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LoggedMotion:
+    """A motion that was recorded rather than planned.
+
+    Attributes:
+        robot: id of the robot.
+        time_s: shape (n + 1,).
+        state: (x [m], y [m], theta [rad], v [m/s], psi [rad]), shape (n + 1, 5).
+    """
+
+    robot: str
+    time_s: np.ndarray
+    state: np.ndarray
+
+
+def step_power_parts(scene: Scene, motion: Motion) -> np.ndarray:
+    """Return the battery power of each interval by part [W], shape (n, len(PARTS))."""
+    robot = scene.robot(motion.robot)
+    before, after = motion.state[:-1], motion.state[1:]
+    middle = 0.5 * (before + after)
+    acceleration_m_s2 = (after[:, 3] - before[:, 3]) / np.diff(motion.time_s)
+    # The fifth state of a unicycle is a yaw rate: its wheels roll without scrub.
+    unsteered = robot.model.motion_model == "unicycle"
+    tan_steer = np.zeros(len(middle)) if unsteered else np.tan(middle[:, 4])
+    return robot.model.energy_model.power_parts(
+        middle[:, 3], acceleration_m_s2, tan_steer, multiplier_at(scene, middle[:, :2])
+    )
+
+
+def step_energy_parts(scene: Scene, motion: Motion) -> np.ndarray:
+    """Return the battery energy of each interval by part [J], shape (n, len(PARTS))."""
+    duration_s = np.diff(motion.time_s)
+    return step_power_parts(scene, motion) * duration_s[:, None]
+
+
+def find_visits(scene: Scene, motion: Motion, tour: Sequence[str]) -> tuple[Visit, ...]:
+    """Return when `motion` enters the targets of `tour`, in the tour's order.
+
+    A visit is the first state, not before the previous visit's, whose reference point
+    lies in the target's region; one state may serve several targets in turn. The result
+    ends before the first target that is not reached.
+
+    Args:
+        scene: names the targets.
+        motion: planned or logged states of one robot.
+        tour: ids of goals and stations.
+
+    Raises:
+        KeyError: if the tour names a target that the scene does not have.
+    """
+    visits: list[Visit] = []
+    targets = {target.id: target for target in scene.targets()}
+    step = 0
+    for name in tour:
+        target = targets[name]
+        inside = target.region.depth(motion.state[step:, :2]) >= 0.0
+        if not inside.any():
+            break
+        step += int(inside.argmax())
+        visits.append(
+            Visit(
+                robot=motion.robot,
+                target=name,
+                kind="station" if isinstance(target, Station) else "goal",
+                step=step,
+                time_s=float(motion.time_s[step]),
+                energy_J=0.0,
+            )
+        )
+    arrival_J = _battery(scene, motion, visits)[1]
+    return tuple(
+        replace(visit, energy_J=energy_J)
+        for visit, energy_J in zip(visits, arrival_J, strict=True)
+    )
+
+
+def battery_profile(
+    scene: Scene, motion: Motion, visits: Iterable[Visit]
+) -> np.ndarray:
+    """Return the battery content at each state [J], shape (n + 1,).
+
+    At a station visit's step it is the content after the recharge; `Visit.energy_J`
+    keeps that on arrival. Energy fed back beyond a full battery is lost.
+
+    Args:
+        scene: gives the battery and the terrain.
+        motion: planned or logged states of one robot.
+        visits: those of this robot count, others are passed over.
+    """
+    return _battery(scene, motion, own_visits(motion, visits))[0]
+
+
+def _battery(
+    scene: Scene, motion: Motion, visits: Sequence[Visit]
+) -> tuple[np.ndarray, list[float]]:
+    draw_J = step_energy_parts(scene, motion).sum(axis=1)
+    return battery_content(scene, motion.robot, draw_J, visits)
+
+
+def battery_content(
+    scene: Scene, robot: str, draw_J: np.ndarray, visits: Sequence[Visit]
+) -> tuple[np.ndarray, list[float]]:
+    """Return the battery content under any meter's draws, and that on each arrival.
+
+    Args:
+        scene: gives the battery.
+        robot: id of the robot.
+        draw_J: energy drawn over each interval, shape (n,).
+        visits: of this robot, in order of steps.
+
+    Returns:
+        Content at each state [J], shape (n + 1,), and content on arrival at each of the
+        visits [J].
+    """
+    battery = scene.robot(robot).battery
+    recharges = {visit.step for visit in visits if visit.kind == "station"}
+    arrivals = [battery.start_J]
+    contents = []
+    for step in range(len(draw_J) + 1):
+        recharged = step in recharges
+        contents.append(battery.capacity_J if recharged else arrivals[step])
+        if step < len(draw_J):
+            rest_J = contents[step] - float(draw_J[step])
+            arrivals.append(min(rest_J, battery.capacity_J))
+    return np.array(contents), [arrivals[visit.step] for visit in visits]
+
+
+def own_visits(motion: Motion, visits: Iterable[Visit]) -> list[Visit]:
+    """Return the visits of the motion's robot, in order of steps."""
+    own = [visit for visit in visits if visit.robot == motion.robot]
+    return sorted(own, key=lambda visit: visit.step)
+
+
+def plan_ledger(
+    scene: Scene, motions: Iterable[Motion], visits: Iterable[Visit]
+) -> EnergyLedger:
+    """Return the account of motions under the energy model, by robot, leg and part.
+
+    Args:
+        scene: gives energy models and terrain.
+        motions: one per robot, planned or logged.
+        visits: of all robots; each ends a leg of its robot.
+    """
+    visits = tuple(visits)
+    entries: list[LedgerEntry] = []
+    for motion in motions:
+        energy_J = step_energy_parts(scene, motion)
+        entries += leg_entries(
+            motion.robot, energy_J, PARTS, own_visits(motion, visits)
+        )
+    return EnergyLedger(tuple(entries))
+
+
+def leg_entries(
+    robot: str, energy_J: np.ndarray, parts: Sequence[str], visits: Sequence[Visit]
+) -> list[LedgerEntry]:
+    """Return the ledger entries of one robot: each interval belongs to one leg.
+
+    Args:
+        robot: id of the robot.
+        energy_J: by interval and part, shape (n, len(parts)).
+        parts: names of the columns.
+        visits: of this robot, in order of steps; the way after the last one is a leg
+            without target.
+    """
+    ends = [(visit.step, visit.target) for visit in visits] + [(len(energy_J), "")]
+    entries = []
+    start = 0
+    for leg, (end, target) in enumerate(ends):
+        sums_J = energy_J[start:end].sum(axis=0)
+        entries += [
+            LedgerEntry(robot, leg, target, part, float(part_J))
+            for part, part_J in zip(parts, sums_J, strict=True)
+        ]
+        start = end
+    return entries
