@@ -1,3 +1,58 @@
-"""mrmg: mission planning for fleets of energy-limited robots, executed in MuJoCo."""
+"""mrmg: mission planning for fleets of energy-limited robots, executed in MuJoCo.
+
+The verbs of the command line are the functions of this package:
+
+    scene = mrmg.load_scene("quickstart")
+    result = mrmg.plan(scene, seed=0)
+    verdict = mrmg.verify(scene, result.plan)
+    log = mrmg.execute(scene, result.plan)
+    account = mrmg.audit(scene, result.plan, log)
+    mrmg.render(scene, result.plan, log, Path("mission.mp4"))
+
+or all of it, with a run folder: `mrmg.run("quickstart", out=Path("runs/first"))`.
+Everything is imported on first use, so that importing the package stays cheap.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mrmg.execution import simulate as execute
+    from mrmg.pipeline import run
+    from mrmg.planning import plan_mission as plan
+    from mrmg.results.audit import audit
+    from mrmg.results.verify import verify
+    from mrmg.results.video import render_video as render
+    from mrmg.scene.loading import load_scene
 
 __version__ = "0.1.0"
+
+__all__ = [
+    "__version__",
+    "audit",
+    "execute",
+    "load_scene",
+    "plan",
+    "render",
+    "run",
+    "verify",
+]
+
+_HOME = {
+    "audit": ("mrmg.results.audit", "audit"),
+    "execute": ("mrmg.execution", "simulate"),
+    "load_scene": ("mrmg.scene.loading", "load_scene"),
+    "plan": ("mrmg.planning", "plan_mission"),
+    "render": ("mrmg.results.video", "render_video"),
+    "run": ("mrmg.pipeline", "run"),
+    "verify": ("mrmg.results.verify", "verify"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'mrmg' has no attribute {name!r}")
+    module, attribute = _HOME[name]
+    return getattr(importlib.import_module(module), attribute)
