@@ -1,0 +1,239 @@
+"""Entries that are well-formed each by themselves become one consistent scene.
+
+Faults of meaning (an id given twice, a robot on an obstacle) are looked for among all
+well-formed entries, also when others are malformed: a user sees everything at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import shapely
+from pydantic import BaseModel, ValidationError
+from shapely.geometry import Polygon
+
+from mrmg import storage
+from mrmg.errors import Fault, SceneError
+from mrmg.scene.loading.batteries import battery_of
+from mrmg.scene.loading.faults import nearest
+from mrmg.scene.loading.geometry import footprint_at, region_of, shape_of
+from mrmg.scene.loading.models import load_model, model_folder
+from mrmg.scene.loading.schema import SECTIONS, BatteryEntry, SceneDocument
+from mrmg.scene.robot_model import RobotModel
+from mrmg.scene.types import (
+    Goal,
+    Obstacle,
+    Region,
+    Robot,
+    Scene,
+    Station,
+    TerrainArea,
+)
+
+RESERVED_IDS = ("bounds", "floor", "world")
+"""Names that logs and the simulated world use for other things."""
+
+
+class Assembly:
+    """Collects the parts of a scene and their faults."""
+
+    def __init__(self, document: dict[str, Any], base: Path | None) -> None:
+        """Read all well-formed entries of `document`; see `scene_from_document`."""
+        self.faults: list[Fault] = []
+        self._document = document
+        self._base = base
+        self._models: dict[str, tuple[RobotModel, dict[str, Any]]] = {}
+        self._references: dict[str, str] = {}
+        self.ids = self._unique_ids()
+        self.bounds = self._bounds()
+        self.robots = list(self._robots())
+        self.obstacles = list(self._obstacles())
+        self.terrain = list(self._terrain())
+        self.goals = [Goal(id=i, region=r) for i, r in self._regions("goals")]
+        self.stations = [Station(id=i, region=r) for i, r in self._regions("stations")]
+        self._check_starts()
+
+    def scene(self) -> Scene:
+        """Return the scene; call it only when there are no faults."""
+        document = SceneDocument.model_validate(self._document).model_dump(
+            mode="json", exclude_none=True
+        )
+        for robot in document["robots"]:
+            robot["model"] = self._references[robot["id"]]
+        # What a model says counts, not the folder it lies in.
+        parameters = {robot.id: self._models[robot.id][1] for robot in self.robots}
+        content = {**document, "robots": []}
+        for robot in document["robots"]:
+            content["robots"].append({**robot, "model": parameters[robot["id"]]})
+        assert self.bounds is not None
+        return Scene(
+            name=document["name"],
+            bounds=self.bounds,
+            obstacles=tuple(self.obstacles),
+            terrain=tuple(self.terrain),
+            goals=tuple(self.goals),
+            stations=tuple(self.stations),
+            robots=tuple(self.robots),
+            document=document,
+            digest=storage.digest(storage.canonical_json(content)),
+        )
+
+    def _fault(self, path: str, message: str) -> None:
+        self.faults.append(Fault(path, message))
+
+    def _entries(self, section: str) -> Iterator[tuple[int, str, Any]]:
+        """Yield (index, path, entry) of the well-formed entries of one list."""
+        for index, item in enumerate(self._items(section)):
+            entry = _parsed(SECTIONS[section], item)
+            if entry is not None:
+                yield index, f"{section}.{index}", entry
+
+    def _items(self, section: str) -> list[Any]:
+        raw = self._document.get(section)
+        return raw if isinstance(raw, list) else []
+
+    def _unique_ids(self) -> dict[str, str]:
+        """Return the path of every id; a second use of one is a fault."""
+        seen: dict[str, str] = {}
+        for section in SECTIONS:
+            for index, item in enumerate(self._items(section)):
+                path = f"{section}.{index}"
+                given = item.get("id") if isinstance(item, dict) else None
+                name = _default_id(section, index) if given is None else str(given)
+                where = path if given is None else f"{path}.id"
+                if name in RESERVED_IDS:
+                    self._fault(where, f"the id '{name}' is reserved; choose another")
+                elif name in seen:
+                    message = f"the id '{name}' is already used by {seen[name]}"
+                    self._fault(where, message)
+                seen.setdefault(name, path)
+        return seen
+
+    def _bounds(self) -> tuple[float, float, float, float] | None:
+        raw = self._document.get("bounds")
+        header = _parsed(SceneDocument, {"format": 1, "name": "map", "bounds": raw})
+        if not isinstance(header, SceneDocument):
+            return None
+        x_min, y_min, x_max, y_max = header.bounds
+        if x_min >= x_max or y_min >= y_max:
+            message = f"got {raw}; expected x_min < x_max and y_min < y_max"
+            self._fault("bounds", message)
+            return None
+        return x_min, y_min, x_max, y_max
+
+    def _robots(self) -> Iterator[Robot]:
+        fleet = self._document.get("battery", {})
+        default = _parsed(BatteryEntry, fleet) or BatteryEntry()
+        for _, path, entry in self._entries("robots"):
+            model = self._model(entry.id, entry.model, path)
+            if model is None:
+                continue
+            battery = battery_of(entry, default, model, path)
+            if isinstance(battery, list):
+                self.faults += battery
+                continue
+            x, y, yaw = entry.pose
+            yield Robot(id=entry.id, model=model, pose=(x, y, yaw), battery=battery)
+
+    def _model(self, robot_id: str, reference: str, path: str) -> RobotModel | None:
+        folder = model_folder(reference, self._base)
+        if isinstance(folder, str):
+            self._fault(f"{path}.model", folder)
+            return None
+        try:
+            self._models[robot_id] = load_model(folder)
+        except SceneError as error:
+            for fault in error.faults:
+                self._fault(f"{path}.model", f"{error.source}: {fault}")
+            return None
+        is_path = "/" in reference
+        self._references[robot_id] = str(folder) if is_path else reference
+        return self._models[robot_id][0]
+
+    def _obstacles(self) -> Iterator[Obstacle]:
+        items = self._items("robots")
+        robots = [str(item.get("id")) for item in items if isinstance(item, dict)]
+        for index, path, entry in self._entries("obstacles"):
+            for place, name in enumerate(entry.blocks or []):
+                if name not in robots:
+                    known = ", ".join(robots) if robots else "none"
+                    self._fault(
+                        f"{path}.blocks.{place}",
+                        f"no robot '{name}'{nearest(name, robots)}; robots: {known}",
+                    )
+            shape = self._shape(entry, path)
+            if shape is not None:
+                yield Obstacle(
+                    id=entry.id or _default_id("obstacles", index),
+                    shape=shape,
+                    height_m=entry.height,
+                    blocks=None if entry.blocks is None else tuple(entry.blocks),
+                )
+
+    def _terrain(self) -> Iterator[TerrainArea]:
+        for index, path, entry in self._entries("terrain"):
+            shape = self._shape(entry, path)
+            if shape is not None:
+                yield TerrainArea(
+                    id=entry.id or _default_id("terrain", index),
+                    shape=shape,
+                    multiplier=entry.multiplier,
+                )
+
+    def _shape(self, entry: Any, path: str) -> Polygon | None:
+        shape = shape_of(entry, path)
+        if isinstance(shape, list):
+            self.faults += shape
+            return None
+        return shape
+
+    def _regions(self, section: str) -> Iterator[tuple[str, Region]]:
+        walls = [wall.shape for wall in self.obstacles if wall.blocks is None]
+        blocked = shapely.union_all(walls)
+        for _, path, entry in self._entries(section):
+            region = region_of(entry, path)
+            if isinstance(region, list):
+                self.faults += region
+                continue
+            if self.bounds and not region.shape.intersects(shapely.box(*self.bounds)):
+                self._fault(path, f"lies outside the bounds {list(self.bounds)}")
+            elif blocked.covers(region.shape):
+                names = [
+                    wall.id
+                    for wall in self.obstacles
+                    if wall.blocks is None and wall.shape.intersects(region.shape)
+                ]
+                self._fault(path, f"lies wholly inside {', '.join(names)}")
+            yield entry.id, region
+
+    def _check_starts(self) -> None:
+        """Every robot must stand inside the bounds, clear of obstacles and others."""
+        shapes = {robot.id: footprint_at(robot) for robot in self.robots}
+        for robot in self.robots:
+            where = f"{self.ids[robot.id]}.pose"
+            shape = shapes[robot.id]
+            if self.bounds and not shapely.box(*self.bounds).covers(shape):
+                message = f"{robot.id} starts outside the bounds {list(self.bounds)}"
+                self._fault(where, message)
+            for wall in self.obstacles:
+                if wall.stops(robot.id) and wall.shape.intersects(shape):
+                    self._fault(where, f"{robot.id} starts on the obstacle '{wall.id}'")
+        for first, second in combinations(self.robots, 2):
+            if shapes[first.id].intersects(shapes[second.id]):
+                message = f"{second.id} starts where {first.id} stands"
+                self._fault(f"{self.ids[second.id]}.pose", message)
+
+
+def _parsed(model: type[BaseModel], item: Any) -> Any:
+    """Return `item` as an entry, or None: its faults are reported with the file's."""
+    try:
+        return model.model_validate(item)
+    except ValidationError:
+        return None
+
+
+def _default_id(section: str, index: int) -> str:
+    return f"{section.removesuffix('s')}_{index}"

@@ -1,0 +1,127 @@
+"""From pydantic's errors to faults a user can act on."""
+
+from __future__ import annotations
+
+import difflib
+import types
+import typing
+from collections.abc import Iterable
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+from mrmg.errors import Fault
+
+_KINDS = {
+    "float_type": "expected a number",
+    "float_parsing": "expected a number",
+    "int_type": "expected a whole number",
+    "string_type": "expected text (put it in quotes)",
+    "bool_type": "expected true or false",
+    "list_type": "expected a list",
+    "finite_number": "expected a finite number",
+    "string_pattern_mismatch": "ids are made of letters, digits, '_', '.' and '-'",
+    "recursion_loop": "contains itself",
+}
+
+
+def faults_of(error: ValidationError, model: type[BaseModel]) -> list[Fault]:
+    """Return one fault per error: its path, the value, and what is allowed there."""
+    return [_fault(dict(detail), model) for detail in error.errors()]
+
+
+def _fault(detail: dict[str, Any], model: type[BaseModel]) -> Fault:
+    loc: tuple[str | int, ...] = detail["loc"]
+    kind: str = detail["type"]
+    value = detail["input"]
+    path = ".".join(str(part) for part in loc)
+    if kind == "extra_forbidden":
+        return Fault(path, unknown_key(str(loc[-1]), _known_keys(model, loc[:-1])))
+    wanted = _description(model, loc)
+    if kind == "missing":
+        return Fault(path, "missing" + (f"; expected {wanted}" if wanted else ""))
+    if kind in ("too_short", "too_long"):
+        count = len(value)
+        items = "1 item" if count == 1 else f"{count} items"
+        allowed = wanted or f"{_allowed(detail)} items"
+        return Fault(path, f"got {items}, {shown(value)}; expected {allowed}")
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        keys = ", ".join(_known_keys(model, loc))
+        return Fault(path, f"got {shown(value)}; expected a mapping with keys {keys}")
+    rule = _KINDS.get(kind) or f"must be {_allowed(detail)}"
+    about = f" ({wanted})" if wanted else ""
+    return Fault(path, f"got {shown(value)}; {rule}{about}")
+
+
+def _allowed(detail: dict[str, Any]) -> str:
+    """Return the bound a value broke, in the words of the error's context."""
+    signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+    context = detail.get("ctx", {})
+    for key, sign in signs.items():
+        if key in context:
+            return f"{sign} {context[key]:g}"
+    if "expected" in context:
+        return str(context["expected"])
+    if "min_length" in context:
+        return f"at least {context['min_length']}"
+    if "max_length" in context:
+        return f"at most {context['max_length']}"
+    return str(detail["msg"]).removeprefix("Input should be ")
+
+
+def unknown_key(key: str, known: Iterable[str]) -> str:
+    """Return the message for a key that is not in the format."""
+    names = sorted(known)
+    return f"unknown key{nearest(key, names)} (known keys: {', '.join(names)})"
+
+
+def nearest(name: str, names: Iterable[str]) -> str:
+    """Return ", did you mean '...'?" for the most similar of `names`, or nothing."""
+    match = difflib.get_close_matches(name, list(names), n=1, cutoff=0.5)
+    return f", did you mean '{match[0]}'?" if match else ""
+
+
+def shown(value: Any) -> str:
+    """Return a value as the file might spell it, cut to a readable length."""
+    if value is None:
+        return "nothing"
+    text = repr(value) if not isinstance(value, bool) else str(value).lower()
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _known_keys(model: type[BaseModel], loc: tuple[str | int, ...]) -> list[str]:
+    inner, _ = _walk(model, loc)
+    return [] if inner is None else list(inner.model_fields)
+
+
+def _description(model: type[BaseModel], loc: tuple[str | int, ...]) -> str | None:
+    _, field = _walk(model, loc)
+    return None if field is None else field.description
+
+
+def _walk(
+    model: type[BaseModel], loc: tuple[str | int, ...]
+) -> tuple[type[BaseModel] | None, FieldInfo | None]:
+    """Return the model that a path leads to, and the field if it ends on one."""
+    inner: type[BaseModel] | None = model
+    field: FieldInfo | None = None
+    for part in loc:
+        if isinstance(part, int):
+            field = None
+            continue
+        if inner is None or part not in inner.model_fields:
+            return None, None
+        field = inner.model_fields[part]
+        inner = _model_in(field.annotation)
+    return inner, field
+
+
+def _model_in(annotation: Any) -> type[BaseModel] | None:
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    origin = typing.get_origin(annotation)
+    if origin in (list, typing.Union, types.UnionType, typing.Annotated):
+        found = (_model_in(argument) for argument in typing.get_args(annotation))
+        return next((model for model in found if model is not None), None)
+    return None

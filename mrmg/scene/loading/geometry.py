@@ -1,0 +1,100 @@
+"""Shapes of scene entries, and what can be wrong with them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+
+from mrmg.errors import Fault
+from mrmg.scene.loading.schema import RegionEntry, ShapedEntry
+from mrmg.scene.types import Region, Robot
+
+CIRCLE_SIDES = 32
+
+
+def circle_around(center: list[float], radius_m: float) -> Polygon:
+    """Return the regular polygon that touches a circle from outside."""
+    half = math.pi / CIRCLE_SIDES
+    angle = 2.0 * half * np.arange(CIRCLE_SIDES) + half
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1) * radius_m / math.cos(half)
+    return Polygon(ring + np.asarray(center))
+
+
+def box_at(center: list[float], size: list[float], yaw_rad: float) -> Polygon:
+    """Return a rectangle [length, width] about its centre, turned by `yaw_rad`."""
+    half = 0.5 * np.asarray(size)
+    corners = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * half
+    c, s = math.cos(yaw_rad), math.sin(yaw_rad)
+    return Polygon(corners @ np.array([[c, s], [-s, c]]) + np.asarray(center))
+
+
+def shape_of(entry: ShapedEntry, path: str) -> Polygon | list[Fault]:
+    """Return the outline of an obstacle or terrain area, or its faults."""
+    given = [key for key in ("polygon", "box", "circle") if getattr(entry, key)]
+    if len(given) != 1:
+        return [_not_one_of(path, "polygon, box, circle", given)]
+    if entry.holes and not entry.polygon:
+        return [Fault(f"{path}.holes", f"only a polygon has holes, not a {given[0]}")]
+    if entry.box:
+        return box_at(entry.box.center, entry.box.size, entry.box.yaw)
+    if entry.circle:
+        return circle_around(entry.circle.center, entry.circle.radius)
+    assert entry.polygon is not None
+    shape = Polygon(entry.polygon, entry.holes or [])
+    reason = _ring_fault(shape)
+    if reason:
+        return [Fault(f"{path}.polygon", reason)]
+    return shapely.orient_polygons(shape)
+
+
+def region_of(entry: RegionEntry, path: str) -> Region | list[Fault]:
+    """Return the convex region of a goal or station, or its faults."""
+    given = [key for key in ("circle", "polygon") if getattr(entry, key)]
+    if len(given) != 1:
+        return [_not_one_of(path, "circle, polygon", given)]
+    if entry.circle:
+        center = np.array(entry.circle.center, dtype=float)
+        return _region(center, entry.circle.radius, np.zeros((0, 2)))
+    assert entry.polygon is not None
+    shape = Polygon(entry.polygon)
+    reason = _ring_fault(shape)
+    if reason is None and shape.area < (1.0 - 1e-9) * shape.convex_hull.area:
+        reason = (
+            f"not convex: it covers {shape.area:.4g} m2 of its hull's "
+            f"{shape.convex_hull.area:.4g} m2; expected a convex polygon"
+        )
+    if reason:
+        return [Fault(f"{path}.polygon", reason)]
+    # The hull drops corners that lie on a straight side.
+    hull = shapely.orient_polygons(shape.convex_hull)
+    corners = np.array(hull.exterior.coords[:-1])
+    return _region(np.array(shape.centroid.coords[0]), 0.0, corners)
+
+
+def footprint_at(robot: Robot) -> Polygon:
+    """Return the ground a robot covers at its start."""
+    x, y, yaw = robot.pose
+    c, s = math.cos(yaw), math.sin(yaw)
+    return Polygon(robot.model.footprint_m @ np.array([[c, s], [-s, c]]) + [x, y])
+
+
+def _region(center: np.ndarray, radius_m: float, corners: np.ndarray) -> Region:
+    center.setflags(write=False)
+    corners.setflags(write=False)
+    return Region(center=center, radius_m=radius_m, corners=corners)
+
+
+def _ring_fault(shape: Polygon) -> str | None:
+    if not shape.is_valid:
+        return f"no simple polygon: {shapely.is_valid_reason(shape)}"
+    if shape.area == 0.0:
+        return "its area is zero; expected corners that are not on one line"
+    return None
+
+
+def _not_one_of(path: str, allowed: str, given: list[str]) -> Fault:
+    found = " and ".join(given) if given else "none of them"
+    return Fault(path, f"has {found}; expected exactly one of {allowed}")

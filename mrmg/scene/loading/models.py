@@ -1,0 +1,155 @@
+"""Robot models: `robot.yaml` to `RobotModel`.
+
+A model is a folder with `robot.yaml`, whose keys are those of `ModelDocument`, and the
+MJCF file it names. Units: m, kg, s, rad, J.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import shapely
+from pydantic import Field, ValidationError
+
+from mrmg import shipped
+from mrmg.errors import Fault, SceneError
+from mrmg.scene.loading.faults import faults_of, nearest
+from mrmg.scene.loading.schema import Positive, Ring, Strict
+from mrmg.scene.loading.yaml_text import read_yaml
+from mrmg.scene.robot_model import Limits, RobotModel
+
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Share = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
+
+
+class WheelEntry(Strict):
+    """One wheel."""
+
+    radius: Positive
+    inertia: NotNegative
+    count: Annotated[int, Field(ge=1)]
+    mass: Positive
+
+
+class LimitsEntry(Strict):
+    """Bounds of state and control."""
+
+    v_min: Annotated[float, Field(le=0, allow_inf_nan=False)]
+    v_max: Positive
+    w_max: Positive
+    u1_max: Positive
+    u2_max: Positive
+
+
+class ModelDocument(Strict):
+    """The content of `robot.yaml`."""
+
+    format: Literal[1]
+    motion_model: Literal["car", "unicycle"]
+    footprint: Ring
+    height: Positive
+    wheelbase: Positive
+    track: Positive
+    mass: Positive
+    wheel: WheelEntry
+    limits: LimitsEntry
+    planning_share: Share
+    rolling_coefficient: Positive
+    turning_coefficient: NotNegative
+    friction_coefficient: Positive
+    drive_efficiency: Share
+    regeneration_efficiency: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+    idle_power: NotNegative
+    battery_capacity: Positive
+    mjcf: Annotated[str, Field(min_length=1)]
+
+
+def model_folder(reference: str, base: Path | None) -> Path | str:
+    """Return the folder a scene's `model` names, or why there is none."""
+    if "/" in reference:
+        folder = Path(reference)
+        if not folder.is_absolute():
+            folder = (base or Path.cwd()) / folder
+        if (folder / "robot.yaml").is_file():
+            return folder.resolve()
+        return f"got '{reference}'; no such folder with a robot.yaml"
+    names = shipped.model_names()
+    if reference in names:
+        return shipped.models_folder() / reference
+    return (
+        f"unknown model '{reference}'{nearest(reference, names)}; shipped models: "
+        f"{', '.join(names)}; or give the path of a folder, with a '/' in it"
+    )
+
+
+def load_model(folder: Path) -> tuple[RobotModel, dict[str, Any]]:
+    """Read the model in `folder`.
+
+    Returns:
+        The model, and its parameters as plain data (what a digest is taken of).
+
+    Raises:
+        SceneError: naming every fault of its `robot.yaml`.
+    """
+    source = str(folder / "robot.yaml")
+    document = read_yaml(folder / "robot.yaml", source=source)
+    try:
+        entry = ModelDocument.model_validate(document)
+    except ValidationError as error:
+        raise SceneError(source, faults_of(error, ModelDocument)) from error
+    faults = _geometry_faults(entry)
+    if faults:
+        raise SceneError(source, faults)
+    return _model(folder, entry), entry.model_dump(mode="json")
+
+
+def _geometry_faults(entry: ModelDocument) -> list[Fault]:
+    outline = shapely.Polygon(entry.footprint)
+    if not outline.is_valid:
+        return [Fault("footprint", "crosses itself; expected a convex outline")]
+    faults = []
+    if outline.area < (1.0 - 1e-9) * outline.convex_hull.area or not outline.area:
+        faults.append(Fault("footprint", "not convex; expected a convex outline"))
+    if not outline.contains(shapely.Point(0.0, 0.0)):
+        message = "must hold (0, 0), the middle of the rear axle, inside"
+        faults.append(Fault("footprint", message))
+    if entry.motion_model == "car" and entry.limits.w_max >= np.pi / 2:
+        message = f"got {entry.limits.w_max}; a car's steering angle must be < pi/2"
+        faults.append(Fault("limits.w_max", message))
+    return faults
+
+
+def _model(folder: Path, entry: ModelDocument) -> RobotModel:
+    outline = shapely.orient_polygons(shapely.Polygon(entry.footprint))
+    footprint = np.array(outline.exterior.coords[:-1])
+    footprint.setflags(write=False)
+    return RobotModel(
+        name=folder.name,
+        motion_model=entry.motion_model,
+        footprint_m=footprint,
+        height_m=entry.height,
+        wheelbase_m=entry.wheelbase,
+        track_m=entry.track,
+        limits=Limits(
+            v_min_m_s=entry.limits.v_min,
+            v_max_m_s=entry.limits.v_max,
+            w_max=entry.limits.w_max,
+            u1_max_m_s2=entry.limits.u1_max,
+            u2_max=entry.limits.u2_max,
+        ),
+        planning_share=entry.planning_share,
+        mass_kg=entry.mass,
+        wheel_radius_m=entry.wheel.radius,
+        wheel_inertia_kg_m2=entry.wheel.inertia,
+        wheel_count=entry.wheel.count,
+        rolling_coefficient=entry.rolling_coefficient,
+        turning_coefficient=entry.turning_coefficient,
+        friction_coefficient=entry.friction_coefficient,
+        drive_efficiency=entry.drive_efficiency,
+        regeneration_efficiency=entry.regeneration_efficiency,
+        idle_power_W=entry.idle_power,
+        battery_capacity_J=entry.battery_capacity,
+        mjcf=folder / entry.mjcf,
+    )

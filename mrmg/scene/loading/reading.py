@@ -1,0 +1,105 @@
+"""From a file or document to a `Scene`, or to the list of everything wrong with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+from mrmg import shipped
+from mrmg.errors import Fault, SceneError
+from mrmg.scene.loading.assembly import Assembly
+from mrmg.scene.loading.faults import faults_of, nearest, shown
+from mrmg.scene.loading.schema import SCENE_FORMAT, SceneDocument
+from mrmg.scene.loading.yaml_text import dump_yaml, read_yaml
+from mrmg.scene.types import Scene
+
+
+def load_scene(source: str | Path) -> Scene:
+    """Load a scene from a file, or a shipped scene by its name.
+
+    Args:
+        source: path of a scene file, or one of `shipped.scene_names()`.
+
+    Raises:
+        SceneError: naming every fault of the file.
+    """
+    path = _path_of(source)
+    document = read_yaml(path, source=str(source))
+    if isinstance(document, dict):
+        document.setdefault("name", path.stem)
+    return scene_from_document(document, source=str(source), base=path.parent)
+
+
+def scene_from_document(
+    document: dict[str, Any], *, source: str, base: Path | None = None
+) -> Scene:
+    """Build a scene from the content of a scene file.
+
+    Args:
+        document: plain data in scene format 1.
+        source: what error messages call it.
+        base: folder that relative paths of robot models start from; default the
+            working directory.
+
+    Raises:
+        SceneError: naming every fault of the document.
+    """
+    _require_format(document, source)
+    faults: list[Fault] = []
+    try:
+        SceneDocument.model_validate(document)
+    except ValidationError as error:
+        faults = faults_of(error, SceneDocument)
+    assembly = Assembly(document, base)
+    faults += assembly.faults
+    if faults:
+        raise SceneError(source, sorted(faults, key=_place_in(document)))
+    return assembly.scene()
+
+
+def dump_scene(scene: Scene) -> str:
+    """Return a scene as YAML text that loads as an equal scene from any folder."""
+    return dump_yaml(scene.document)
+
+
+def _path_of(source: str | Path) -> Path:
+    names = shipped.scene_names()
+    if str(source) in names:
+        return shipped.scenes_folder() / f"{source}.yaml"
+    path = Path(source)
+    if path.is_dir():
+        raise SceneError(str(source), [Fault("", "is a folder; expected a scene file")])
+    if not path.exists():
+        guess = nearest(path.stem, names)
+        message = (
+            f"no such file, and no shipped scene of that name{guess}; "
+            f"shipped scenes: {', '.join(names)}"
+        )
+        raise SceneError(str(source), [Fault("", message)])
+    return path
+
+
+def _require_format(document: Any, source: str) -> None:
+    """Refuse what is no scene at all, before looking for faults of a scene."""
+    if not isinstance(document, dict):
+        message = f"got {shown(document)}; expected a scene: a mapping of keys"
+        raise SceneError(source, [Fault("", message)])
+    found = document.get("format")
+    if "format" in document and (isinstance(found, bool) or found != SCENE_FORMAT):
+        message = f"got {shown(found)}; this version reads format {SCENE_FORMAT}"
+        raise SceneError(source, [Fault("format", message)])
+
+
+def _place_in(document: dict[str, Any]) -> Callable[[Fault], tuple[int, int]]:
+    """Return a key that sorts faults as the sections and entries of the file."""
+    order = {key: place for place, key in enumerate(document)}
+
+    def place(fault: Fault) -> tuple[int, int]:
+        section, _, rest = fault.path.partition(".")
+        entry = rest.partition(".")[0]
+        return order.get(section, -1), int(entry) if entry.isdigit() else -1
+
+    return place

@@ -1,0 +1,229 @@
+"""Scene format 1: what a scene file may say.
+
+A scene is one YAML file (scalars as in YAML 1.2; metres, radians, joules):
+
+    format: 1
+    name: depot                       # default: the file's name
+    bounds: [0, 0, 100, 100]          # x_min, y_min, x_max, y_max; robots stay inside
+    obstacles:                        # one of polygon (with holes), box, circle each
+      - {id: hall, polygon: [[10, 10], [30, 10], [30, 20]], holes: [], height: 1.0}
+      - {box: {center: [50, 50], size: [8, 4], yaw: 0.3}, blocks: [r1]}
+      - {circle: {center: [70, 30], radius: 3}}
+    terrain:                          # where areas overlap, the later entry counts
+      - {id: mud, polygon: [[0, 0], [20, 0], [20, 20]], multiplier: 2.5}
+    goals:                            # convex: circle or polygon; each visited once
+      - {id: g1, circle: {center: [20, 30], radius: 1.5}}
+    stations:                         # convex; entering one fills the battery
+      - {id: s1, polygon: [[40, 40], [43, 40], [43, 43], [40, 43]]}
+    battery: {capacity_m: 240, reserve: 0.05}
+    robots:
+      - {id: r1, model: car, pose: [5, 5, 0]}
+      - {id: r2, model: ../my_robot, pose: [5, 9, 0], start_energy: 0.8,
+         battery: {capacity_Wh: 12}}
+
+Details:
+
+- Shapes: a polygon needs at least three corners in either orientation and must not
+  cross itself; it is closed implicitly. A box is [length, width] about its centre,
+  turned by yaw. A circle becomes the regular polygon of 32 sides around it, so that no
+  robot is let into it; circles of goals and stations stay exact.
+- Ids are letters, digits, `_`, `.` and `-`, unique in the whole file (they name bodies,
+  arrays and tour targets); an obstacle or terrain area without one is named after its
+  place in the list, `obstacle_0`, `terrain_0`.
+- `blocks` lists the robots an obstacle stops; without it, it stops all.
+- A capacity is given in one of J, Wh or metres of plain ground (`capacity_m`: the way a
+  full battery drives straight on at constant speed). A robot's own `battery` replaces
+  what it names; without any capacity the model's standard battery counts.
+- `start_energy` is a share of the capacity (0..1), or one of {J: }, {Wh: }, {m: }.
+- `model` is the name of a shipped model, or a folder (with a `/` in it), relative to
+  the scene file, that holds a `robot.yaml`.
+- A map without robots, goals or stations is a valid scene; nothing can be planned on it
+  until it is populated.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+
+SCENE_FORMAT = 1
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Identifier = Annotated[
+    str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$", max_length=64)
+]
+Point = Annotated[
+    list[Number], Field(min_length=2, max_length=2, description="[x, y] in m")
+]
+Ring = Annotated[
+    list[Point], Field(min_length=3, description="at least 3 corners [x, y] in m")
+]
+
+
+class Strict(BaseModel):
+    """No key that is not named, no text for numbers."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+class BoxEntry(Strict):
+    """A rectangle about its centre."""
+
+    center: Point
+    size: Annotated[list[Positive], Field(min_length=2, max_length=2)] = Field(
+        description="[length, width] in m"
+    )
+    yaw: Number = Field(default=0.0, description="turn in rad")
+
+
+class CircleEntry(Strict):
+    """A disc."""
+
+    center: Point
+    radius: Positive = Field(description="radius in m")
+
+
+class ShapedEntry(Strict):
+    """Exactly one of polygon, box, circle."""
+
+    polygon: Ring | None = Field(default=None, description="corners [x, y] in m")
+    holes: list[Ring] | None = Field(
+        default=None, description="a list of rings in the polygon"
+    )
+    box: BoxEntry | None = None
+    circle: CircleEntry | None = None
+
+
+class ObstacleEntry(ShapedEntry):
+    """Ground that robots must keep off."""
+
+    id: Identifier | None = None
+    height: Positive = Field(default=1.0, description="height in m")
+    blocks: Annotated[list[Identifier], Field(min_length=1)] | None = Field(
+        default=None, description="a list of ids of robots"
+    )
+
+
+class TerrainEntry(ShapedEntry):
+    """Ground that costs more energy, or less."""
+
+    id: Identifier | None = None
+    multiplier: Positive = Field(description="energy relative to plain ground")
+
+
+class RegionEntry(Strict):
+    """A goal or station: exactly one of circle, polygon; convex."""
+
+    id: Identifier
+    circle: CircleEntry | None = None
+    polygon: Ring | None = Field(default=None, description="corners [x, y] in m")
+
+
+class BatteryEntry(Strict):
+    """At most one capacity, and the reserve."""
+
+    capacity_J: Positive | None = Field(default=None, description="capacity in J")
+    capacity_Wh: Positive | None = Field(default=None, description="capacity in Wh")
+    capacity_m: Positive | None = Field(
+        default=None, description="capacity in metres of plain ground"
+    )
+    reserve: Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)] | None = Field(
+        default=None,
+        description="share of the capacity that must always remain, in [0, 1)",
+    )
+
+
+class StartEnergyEntry(Strict):
+    """Exactly one of the four."""
+
+    fraction: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = Field(
+        default=None, description="share of the capacity, in [0, 1]"
+    )
+    J: Positive | None = None
+    Wh: Positive | None = None
+    m: Positive | None = Field(default=None, description="metres of plain ground")
+
+
+def _share_to_mapping(value: Any) -> Any:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return {"fraction": value} if is_number else value
+
+
+StartEnergy = Annotated[
+    StartEnergyEntry,
+    BeforeValidator(_share_to_mapping),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "minimum": 0, "maximum": 1},
+                {
+                    "type": "object",
+                    "properties": {
+                        "fraction": {"type": "number", "minimum": 0, "maximum": 1},
+                        **{
+                            unit: {"type": "number", "exclusiveMinimum": 0}
+                            for unit in ("J", "Wh", "m")
+                        },
+                    },
+                    "minProperties": 1,
+                    "maxProperties": 1,
+                    "additionalProperties": False,
+                },
+            ]
+        }
+    ),
+]
+
+
+class RobotEntry(Strict):
+    """One robot of the fleet."""
+
+    id: Identifier
+    model: Annotated[str, Field(min_length=1)] = Field(
+        description="the name of a shipped model, or a folder relative to the scene"
+    )
+    pose: Annotated[list[Number], Field(min_length=3, max_length=3)] = Field(
+        description="[x in m, y in m, yaw in rad]"
+    )
+    start_energy: StartEnergy = Field(
+        default=StartEnergyEntry(fraction=1.0),
+        description="a share of the capacity, 0..1",
+    )
+    battery: BatteryEntry | None = None
+
+
+class SceneDocument(Strict):
+    """A whole scene file."""
+
+    format: Literal[1] = Field(description="format: 1")
+    name: Annotated[str, Field(min_length=1, max_length=200)]
+    bounds: Annotated[list[Number], Field(min_length=4, max_length=4)] = Field(
+        description="[x_min, y_min, x_max, y_max] in m"
+    )
+    obstacles: list[ObstacleEntry] = []
+    terrain: list[TerrainEntry] = []
+    goals: list[RegionEntry] = []
+    stations: list[RegionEntry] = []
+    battery: BatteryEntry = BatteryEntry()
+    robots: list[RobotEntry] = []
+
+
+SECTIONS: dict[str, type[Strict]] = {
+    "obstacles": ObstacleEntry,
+    "terrain": TerrainEntry,
+    "goals": RegionEntry,
+    "stations": RegionEntry,
+    "robots": RobotEntry,
+}
+"""The lists of a scene file and the model of their entries."""
+
+
+def scene_schema() -> dict[str, Any]:
+    """Return the scene format as a JSON Schema, for editors and other tools."""
+    schema = SceneDocument.model_json_schema()
+    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    # A file may leave its name out: it is then called after the file.
+    schema["required"] = [key for key in schema["required"] if key != "name"]
+    return schema

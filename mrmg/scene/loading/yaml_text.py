@@ -1,0 +1,140 @@
+"""YAML text to plain data and back, without PyYAML's traps.
+
+PyYAML follows YAML 1.1: `1e3` is a string, `no` is False, `010` is 8, `1:30` is 90, and
+a key given twice silently keeps the last value. Here scalars follow the core schema of
+YAML 1.2, and a repeated key is refused.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from mrmg.errors import Fault, SceneError
+
+
+class _CoreLoader(yaml.SafeLoader):  # type: ignore[misc]
+    """A safe loader with the scalars of YAML 1.2's core schema."""
+
+    yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}
+
+    def construct_mapping(
+        self, node: yaml.MappingNode, deep: bool = False
+    ) -> dict[Any, Any]:
+        mapping: dict[Any, Any] = {}
+        for key_node, value_node in node.value:
+            key = self.construct_object(key_node, deep=True)
+            if not isinstance(key, str):
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"the key {key!r} is not text", key_node.start_mark
+                )
+            if key in mapping:
+                raise yaml.constructor.ConstructorError(
+                    None, None, f"the key '{key}' is given twice", key_node.start_mark
+                )
+            mapping[key] = self.construct_object(value_node, deep=deep)
+        return mapping
+
+
+def _construct_core_int(loader: _CoreLoader, node: yaml.ScalarNode) -> int:
+    text = str(loader.construct_scalar(node))
+    return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
+
+
+def _construct_core_float(loader: _CoreLoader, node: yaml.ScalarNode) -> float:
+    text = str(loader.construct_scalar(node)).lower()
+    return float(text.replace(".inf", "inf").replace(".nan", "nan"))
+
+
+_CORE_SCALARS = (
+    ("tag:yaml.org,2002:null", r"~|null|Null|NULL|", ["~", "n", "N", ""]),
+    ("tag:yaml.org,2002:bool", r"true|True|TRUE|false|False|FALSE", list("tTfF")),
+    (
+        "tag:yaml.org,2002:int",
+        r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+",
+        list("-+0123456789"),
+    ),
+    (
+        "tag:yaml.org,2002:float",
+        r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?"
+        r"|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)",
+        list("-+.0123456789"),
+    ),
+)
+for _tag, _pattern, _first in _CORE_SCALARS:
+    _CoreLoader.add_implicit_resolver(_tag, re.compile(f"^(?:{_pattern})$"), _first)
+_CoreLoader.add_constructor("tag:yaml.org,2002:int", _construct_core_int)
+_CoreLoader.add_constructor("tag:yaml.org,2002:float", _construct_core_float)
+
+
+def read_yaml(path: Path, *, source: str) -> Any:
+    """Read a YAML file as plain data.
+
+    Raises:
+        SceneError: if it cannot be read or is no YAML; names the line.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        message = f"not a text file in UTF-8 (byte {error.start})"
+        raise SceneError(source, [Fault("", message)]) from error
+    except OSError as error:
+        message = f"cannot be read ({error.strerror})"
+        raise SceneError(source, [Fault("", message)]) from error
+    return parse_yaml(text, source=source)
+
+
+def parse_yaml(text: str, *, source: str) -> Any:
+    """Turn YAML text into plain data.
+
+    Raises:
+        SceneError: if it is no YAML; names the line and column.
+    """
+    try:
+        return yaml.load(text, Loader=_CoreLoader)  # noqa: S506 (a safe loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        place = f"line {mark.line + 1}, column {mark.column + 1}" if mark else ""
+        problem = error.problem or error.context or "no YAML"
+        if not isinstance(error, yaml.constructor.ConstructorError):
+            problem = f"no valid YAML: {problem}"
+        raise SceneError(source, [Fault(place, problem)]) from error
+    except yaml.YAMLError as error:
+        raise SceneError(source, [Fault("", f"no valid YAML: {error}")]) from error
+    except RecursionError as error:
+        raise SceneError(source, [Fault("", "nested too deeply")]) from error
+
+
+class _Dumper(yaml.SafeDumper):  # type: ignore[misc]
+    """Writes lists of plain values on one line, and never an alias."""
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
+
+def _represent_list(dumper: _Dumper, data: list[Any]) -> yaml.SequenceNode:
+    short = not any(isinstance(item, dict) for item in data)
+    return dumper.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=short)
+
+
+def _represent_float(dumper: _Dumper, data: float) -> yaml.ScalarNode:
+    # A point in the mantissa, since readers of YAML 1.1 take "1e+16" for text.
+    text = repr(data)
+    if "e" in text and "." not in text:
+        text = text.replace("e", ".0e")
+    return dumper.represent_scalar("tag:yaml.org,2002:float", text)
+
+
+_Dumper.add_representer(list, _represent_list)
+_Dumper.add_representer(float, _represent_float)
+
+
+def dump_yaml(document: Any) -> str:
+    """Return plain data as YAML text; `parse_yaml` gives equal data back."""
+    text: str = yaml.dump(
+        document, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=88
+    )
+    return text
