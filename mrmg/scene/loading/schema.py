@@ -90,7 +90,7 @@ class ShapedEntry(Strict):
 
     polygon: Ring | None = Field(default=None, description="corners [x, y] in m")
     holes: list[Ring] | None = Field(
-        default=None, description="a list of rings in the polygon"
+        default=None, description="rings inside the polygon"
     )
     box: BoxEntry | None = None
     circle: CircleEntry | None = None
