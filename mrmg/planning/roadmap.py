@@ -1,0 +1,230 @@
+"""ConstructPRM: a probabilistic roadmap with energy-weighted edges.
+
+Vertices are goals, stations, robot starts, points around obstacle corners and terrain
+borders, and free samples. An edge's weight is the integral of the terrain multiplier along
+it, in metres of plain ground (a robot's energy is that times its J/m on plain ground);
+dynamics are neglected, obstacles and clearance are not. One Dijkstra per target gives the
+cost-to-go fields the steering descends and the distance matrix the router needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import networkx as nx
+import numpy as np
+import shapely
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
+from scipy.stats import qmc
+
+from mrmg.planning import _roadmap_kernels
+from mrmg.planning.fleet import travel_classes
+from mrmg.scene.types import Scene
+from mrmg.world.world import World
+
+BUCKET_M = 4.0
+
+
+class RoadmapArrays(NamedTuple):
+    """The roadmap as the kernels see it; V vertices, T targets, F travel classes.
+
+    Attributes:
+        vertex: positions [m], shape (V, 2); the first T are the targets' centres.
+        cost_to_go: weighted length to each target [m], shape (F, T, V); inf where cut off.
+        successor: next vertex on the way to each target, -1 at the end, shape (F, T, V).
+        x_min, y_min, bucket, columns, rows, bucket_start, bucket_vertex: a coarse grid of
+            the vertices.
+    """
+
+    vertex: np.ndarray
+    cost_to_go: np.ndarray
+    successor: np.ndarray
+    x_min: float
+    y_min: float
+    bucket: float
+    columns: int
+    rows: int
+    bucket_start: np.ndarray
+    bucket_vertex: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Roadmap:
+    """A roadmap per travel class over common vertices.
+
+    Attributes:
+        arrays: what the kernels use.
+        distance: the distance matrix: weighted length from target to target,
+            shape (F, T, T).
+        start_distance: from each robot's start to each target, shape (R, T).
+        edges: (first, second) vertex and weighted length of each class's edges.
+    """
+
+    arrays: RoadmapArrays
+    distance: np.ndarray
+    start_distance: np.ndarray
+    edges: tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...]
+
+    def graph(self, travel_class: int = 0) -> nx.Graph:
+        """Return one class's roadmap as a networkx graph for analysis and export.
+
+        Nodes have `pos` [m]; edges have `weight`, metres of plain ground.
+        """
+        graph = nx.Graph()
+        for i, (x, y) in enumerate(self.arrays.vertex):
+            graph.add_node(i, pos=(float(x), float(y)))
+        first, second, weight = self.edges[travel_class]
+        graph.add_weighted_edges_from(
+            zip(first.tolist(), second.tolist(), weight.tolist(), strict=True)
+        )
+        return graph
+
+
+def build_roadmap(
+    scene: Scene, world: World, *, samples: int, neighbours: int, rng: np.random.Generator
+) -> Roadmap:
+    """Build the roadmap of a scene.
+
+    Args:
+        scene: the scene.
+        world: its geometry.
+        samples: number of free samples tried.
+        neighbours: number of nearest vertices each vertex is joined to.
+        rng: source of the samples.
+    """
+    classes, class_of_robot = travel_classes(scene, world)
+    vertex = _vertices(scene, world, classes, samples, rng)
+    first, second = _candidate_edges(vertex, neighbours)
+    targets = len(scene.targets())
+    cost_to_go, successor, edges = [], [], []
+    for space, passage in classes:
+        weight = _roadmap_kernels.edge_costs(
+            world.spaces[space], world.terrain, vertex, first, second, passage
+        )
+        usable = np.isfinite(weight)
+        edges.append((first[usable], second[usable], weight[usable]))
+        graph = csr_array(
+            (weight[usable], (first[usable], second[usable])), shape=(len(vertex),) * 2
+        )
+        cost, previous = dijkstra(
+            graph, directed=False, indices=np.arange(targets), return_predecessors=True
+        )
+        cost_to_go.append(cost)
+        successor.append(np.where(previous < 0, -1, previous).astype(np.int32))
+    fields = np.stack(cost_to_go).reshape(len(classes), targets, len(vertex))
+    starts = targets + np.arange(len(scene.robots))
+    return Roadmap(
+        arrays=_with_buckets(
+            scene,
+            vertex,
+            fields,
+            np.stack(successor).reshape(len(classes), targets, len(vertex)),
+        ),
+        distance=np.ascontiguousarray(fields[:, :, :targets]),
+        start_distance=np.stack(
+            [fields[c, :, v] for c, v in zip(class_of_robot, starts, strict=True)]
+        ),
+        edges=tuple(edges),
+    )
+
+
+def _vertices(
+    scene: Scene,
+    world: World,
+    classes: Sequence[tuple[int, float]],
+    samples: int,
+    rng: np.random.Generator,
+) -> np.ndarray:
+    x_min, y_min, x_max, y_max = scene.bounds
+    fixed = [_anchor(scene, world, classes, target.region) for target in scene.targets()]
+    fixed += [np.array(robot.pose[:2]) for robot in scene.robots]
+    unit = qmc.Halton(d=2, rng=rng).random(samples)
+    spread = unit * (x_max - x_min, y_max - y_min) + (x_min, y_min)
+    passage = min(passage for _, passage in classes)
+    rings = [
+        *(union.simplify(0.05).buffer(passage + 0.15, quad_segs=2) for union in world.obstacles),
+        *(area.shape.buffer(0.3, quad_segs=1) for area in scene.terrain),
+        *(area.shape.buffer(-0.3, quad_segs=1) for area in scene.terrain),
+    ]
+    corners = shapely.get_coordinates(
+        [shapely.segmentize(ring, 8.0) for ring in rings if not ring.is_empty]
+    )
+    loose = np.concatenate([spread, corners.reshape(-1, 2)])
+    inside = (
+        (loose[:, 0] > x_min)
+        & (loose[:, 1] > y_min)
+        & (loose[:, 0] < x_max)
+        & (loose[:, 1] < y_max)
+    )
+    loose = loose[inside]
+    widest = np.max(
+        [_field_at(world.spaces[space], loose) for space, _ in classes], axis=0
+    )
+    return np.concatenate([np.array(fixed).reshape(-1, 2), loose[widest >= passage]])
+
+
+def _anchor(
+    scene: Scene, world: World, classes: Sequence[tuple[int, float]], region
+) -> np.ndarray:  # type: ignore[no-untyped-def]
+    """Return the centre of a region, or its clearest point where the centre is tight."""
+    space, passage = classes[0]
+    centre = np.asarray(region.center, dtype=float)
+    if _field_at(world.spaces[space], centre[None])[0] >= passage:
+        return centre
+    x0, y0, x1, y1 = region.shape.bounds
+    grid = np.stack(
+        np.meshgrid(np.linspace(x0, x1, 21), np.linspace(y0, y1, 21)), axis=-1
+    ).reshape(-1, 2)
+    grid = grid[region.depth(grid) >= 0.0]
+    return np.asarray(grid[np.argmax(_field_at(world.spaces[space], grid))])
+
+
+def _field_at(space, points: np.ndarray) -> np.ndarray:  # type: ignore[no-untyped-def]
+    """Return the distance field at the cells of points; -inf outside."""
+    rows, columns = space.distance.shape
+    column = np.floor((points[:, 0] - space.x_min) / space.cell).astype(int)
+    row = np.floor((points[:, 1] - space.y_min) / space.cell).astype(int)
+    valid = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
+    value = np.full(len(points), -np.inf)
+    value[valid] = space.distance[row[valid], column[valid]]
+    return value
+
+
+def _candidate_edges(
+    vertex: np.ndarray, neighbours: int
+) -> tuple[np.ndarray, np.ndarray]:
+    k = min(neighbours + 1, len(vertex))
+    _, index = cKDTree(vertex).query(vertex, k=k)
+    first = np.repeat(np.arange(len(vertex)), k)
+    second = index.reshape(-1)
+    pair = np.stack([np.minimum(first, second), np.maximum(first, second)], axis=1)
+    pair = np.unique(pair[pair[:, 0] != pair[:, 1]], axis=0)
+    return np.ascontiguousarray(pair[:, 0]), np.ascontiguousarray(pair[:, 1])
+
+
+def _with_buckets(
+    scene: Scene, vertex: np.ndarray, cost_to_go: np.ndarray, successor: np.ndarray
+) -> RoadmapArrays:
+    x_min, y_min, x_max, y_max = scene.bounds
+    columns = int(np.ceil((x_max - x_min) / BUCKET_M))
+    rows = int(np.ceil((y_max - y_min) / BUCKET_M))
+    column = np.clip(((vertex[:, 0] - x_min) / BUCKET_M).astype(int), 0, columns - 1)
+    row = np.clip(((vertex[:, 1] - y_min) / BUCKET_M).astype(int), 0, rows - 1)
+    key = row * columns + column
+    count = np.bincount(key, minlength=rows * columns)
+    return RoadmapArrays(
+        vertex=vertex,
+        cost_to_go=cost_to_go,
+        successor=successor,
+        x_min=float(x_min),
+        y_min=float(y_min),
+        bucket=BUCKET_M,
+        columns=columns,
+        rows=rows,
+        bucket_start=np.concatenate([[0], np.cumsum(count)]),
+        bucket_vertex=np.argsort(key, kind="stable"),
+    )

@@ -1,0 +1,399 @@
+"""Compiled geometry: distance field, footprint against obstacles, line of sight.
+
+Obstacles are stored as edges (the bounds' four sides included), bucketed on a coarse grid,
+and as a signed distance field on a fine one. The field answers the clear cases, since
+distance is 1-Lipschitz: d(p) >= d(cell centre) - |p - cell centre|. The edges answer the
+close ones exactly.
+"""
+
+from __future__ import annotations
+
+from math import ceil, cos, floor, hypot, sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.compilation import kernel
+
+
+class FreeSpace(NamedTuple):
+    """Free space of one set of obstacles as flat arrays.
+
+    Attributes:
+        x_min, y_min: corner of all grids [m].
+        cell: side of a field cell [m].
+        distance: signed distance at cell centres [m], negative inside obstacles and
+            outside the bounds, shape (ny, nx).
+        bucket: side of a bucket [m].
+        bucket_columns, bucket_rows: number of buckets.
+        bucket_start: first edge of each bucket in `bucket_edge`, shape (rows*cols + 1,).
+        bucket_edge: indices of the edges within `reach` of the bucket.
+        reach: every edge within this distance of a point is in the point's bucket [m].
+        edge: (x0, y0, x1, y1) [m], shape (n, 4).
+    """
+
+    x_min: float
+    y_min: float
+    cell: float
+    distance: np.ndarray
+    bucket: float
+    bucket_columns: int
+    bucket_rows: int
+    bucket_start: np.ndarray
+    bucket_edge: np.ndarray
+    reach: float
+    edge: np.ndarray
+
+
+class TerrainGrid(NamedTuple):
+    """Energy multiplier at cell centres, shape (ny, nx)."""
+
+    x_min: float
+    y_min: float
+    cell: float
+    multiplier: np.ndarray
+
+
+@kernel
+def point_segment_distance(px, py, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+    """Return the distance of a point from a segment."""
+    dx = bx - ax
+    dy = by - ay
+    length2 = dx * dx + dy * dy
+    t = 0.0
+    if length2 > 0.0:
+        t = ((px - ax) * dx + (py - ay) * dy) / length2
+        t = min(1.0, max(0.0, t))
+    return hypot(px - ax - t * dx, py - ay - t * dy)
+
+
+@kernel
+def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):  # type: ignore[no-untyped-def]
+    """Tell whether segments ab and cd properly cross."""
+    d1 = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+    d2 = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
+    d3 = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
+    d4 = (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
+    return (d1 > 0.0) != (d2 > 0.0) and (d3 > 0.0) != (d4 > 0.0)
+
+
+@kernel
+def point_in_convex(px, py, corners):  # type: ignore[no-untyped-def]
+    """Tell whether a point lies in a convex counter-clockwise polygon."""
+    n = len(corners)
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        ex = corners[j, 0] - corners[i, 0]
+        ey = corners[j, 1] - corners[i, 1]
+        if ex * (py - corners[i, 1]) - ey * (px - corners[i, 0]) < 0.0:
+            return False
+    return True
+
+
+@kernel
+def convex_segment_distance(corners, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+    """Return the distance of a convex polygon from a segment; 0 where they meet."""
+    if point_in_convex(ax, ay, corners):
+        return 0.0
+    best = np.inf
+    n = len(corners)
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        px, py = corners[i, 0], corners[i, 1]
+        qx, qy = corners[j, 0], corners[j, 1]
+        if segments_cross(px, py, qx, qy, ax, ay, bx, by):
+            return 0.0
+        best = min(best, point_segment_distance(px, py, ax, ay, bx, by))
+        best = min(best, point_segment_distance(ax, ay, px, py, qx, qy))
+        best = min(best, point_segment_distance(bx, by, px, py, qx, qy))
+    return best
+
+
+@kernel
+def convex_convex_distance(first, second):  # type: ignore[no-untyped-def]
+    """Return the distance of two convex polygons; 0 where they meet."""
+    if point_in_convex(second[0, 0], second[0, 1], first):
+        return 0.0
+    if point_in_convex(first[0, 0], first[0, 1], second):
+        return 0.0
+    best = np.inf
+    n = len(second)
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        best = min(
+            best,
+            convex_segment_distance(
+                first, second[i, 0], second[i, 1], second[j, 0], second[j, 1]
+            ),
+        )
+        if best == 0.0:
+            return 0.0
+    return best
+
+
+@kernel
+def place_footprint(footprint, x, y, theta, out):  # type: ignore[no-untyped-def]
+    """Write the footprint's corners at a pose into `out`, shape (m, 2)."""
+    c = cos(theta)
+    s = sin(theta)
+    for i in range(len(footprint)):
+        out[i, 0] = x + c * footprint[i, 0] - s * footprint[i, 1]
+        out[i, 1] = y + s * footprint[i, 0] + c * footprint[i, 1]
+
+
+@kernel
+def clearance_at_least(space, x, y):  # type: ignore[no-untyped-def]
+    """Return a lower bound of the signed distance of a point from obstacles [m]."""
+    rows, columns = space.distance.shape
+    column = int(floor((x - space.x_min) / space.cell))
+    row = int(floor((y - space.y_min) / space.cell))
+    if column < 0 or row < 0 or column >= columns or row >= rows:
+        return -space.cell
+    dx = x - space.x_min - (column + 0.5) * space.cell
+    dy = y - space.y_min - (row + 0.5) * space.cell
+    return space.distance[row, column] - sqrt(dx * dx + dy * dy)
+
+
+@kernel
+def clearance_estimate(space, x, y):  # type: ignore[no-untyped-def]
+    """Return the signed distance of a point from obstacles [m], bilinear in the field."""
+    rows, columns = space.distance.shape
+    fx = (x - space.x_min) / space.cell - 0.5
+    fy = (y - space.y_min) / space.cell - 0.5
+    column = min(max(int(floor(fx)), 0), columns - 2)
+    row = min(max(int(floor(fy)), 0), rows - 2)
+    fx = min(1.0, max(0.0, fx - column))
+    fy = min(1.0, max(0.0, fy - row))
+    d = space.distance
+    low = d[row, column] * (1.0 - fx) + d[row, column + 1] * fx
+    high = d[row + 1, column] * (1.0 - fx) + d[row + 1, column + 1] * fx
+    return low * (1.0 - fy) + high * fy
+
+
+@kernel
+def footprint_is_clear(space, placed, cx, cy, radius, margin):  # type: ignore[no-untyped-def]
+    """Tell whether a placed footprint keeps `margin` [m] from every obstacle; exact.
+
+    Args:
+        space: the free space; its `reach` is at least radius + margin.
+        placed: corners in the world, shape (m, 2).
+        cx, cy: middle of the footprint in the world.
+        radius: distance of the farthest corner from the middle.
+        margin: required distance.
+    """
+    bound = clearance_at_least(space, cx, cy)
+    if bound > radius + margin:
+        return True
+    if bound + 1.5 * space.cell < 0.0:
+        return False
+    column = int(floor((cx - space.x_min) / space.bucket))
+    row = int(floor((cy - space.y_min) / space.bucket))
+    if (
+        column < 0
+        or row < 0
+        or column >= space.bucket_columns
+        or row >= space.bucket_rows
+    ):
+        return False
+    b = row * space.bucket_columns + column
+    for i in range(space.bucket_start[b], space.bucket_start[b + 1]):
+        e = space.bucket_edge[i]
+        ax, ay = space.edge[e, 0], space.edge[e, 1]
+        bx, by = space.edge[e, 2], space.edge[e, 3]
+        if (
+            point_segment_distance(cx, cy, ax, ay, bx, by) <= radius + margin
+            and convex_segment_distance(placed, ax, ay, bx, by) < margin
+        ):
+            return False
+    # No edge is near, so the footprint lies wholly inside or wholly outside.
+    return clearance_estimate(space, cx, cy) > 0.0
+
+
+@kernel
+def multiplier_in(terrain, x, y):  # type: ignore[no-untyped-def]
+    """Return the terrain's energy multiplier of the cell that holds a point."""
+    rows, columns = terrain.multiplier.shape
+    column = int(floor((x - terrain.x_min) / terrain.cell))
+    row = int(floor((y - terrain.y_min) / terrain.cell))
+    column = min(max(column, 0), columns - 1)
+    row = min(max(row, 0), rows - 1)
+    return terrain.multiplier[row, column]
+
+
+@kernel
+def segment_clearance(space, ax, ay, bx, by, enough):  # type: ignore[no-untyped-def]
+    """Return the smallest clearance [m] along a segment, capped at `enough`.
+
+    Steps by the clearance found (no obstacle can be nearer), at least half a cell.
+    """
+    length = hypot(bx - ax, by - ay)
+    best = min(enough, clearance_estimate(space, bx, by))
+    travelled = 0.0
+    while travelled < length:
+        t = travelled / length
+        here = clearance_estimate(space, ax + t * (bx - ax), ay + t * (by - ay))
+        best = min(best, here)
+        if best <= 0.0:
+            return best
+        travelled += max(here - best, 0.5 * space.cell)
+    return best
+
+
+@kernel
+def segment_is_clear(space, ax, ay, bx, by, needed):  # type: ignore[no-untyped-def]
+    """Tell whether a segment keeps `needed` clearance [m]."""
+    length = hypot(bx - ax, by - ay)
+    travelled = 0.0
+    if clearance_estimate(space, bx, by) < needed:
+        return False
+    while travelled < length:
+        t = travelled / length
+        here = clearance_estimate(space, ax + t * (bx - ax), ay + t * (by - ay))
+        if here < needed:
+            return False
+        travelled += max(here - needed, 0.5 * space.cell)
+    return True
+
+
+@kernel
+def segment_weighted_length(terrain, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+    """Return the integral of the multiplier along a segment [m], by midpoints."""
+    length = hypot(bx - ax, by - ay)
+    n = max(1, int(ceil(length / (2.0 * terrain.cell))))
+    total = 0.0
+    for i in range(n):
+        t = (i + 0.5) / n
+        total += multiplier_in(terrain, ax + t * (bx - ax), ay + t * (by - ay))
+    return total * length / n
+
+
+@kernel
+def bucket_edges(edge, x_min, y_min, bucket, columns, rows, reach):  # type: ignore[no-untyped-def]
+    """Return (bucket_start, bucket_edge): for each bucket the edges within `reach`."""
+    count = np.zeros(columns * rows + 1, np.int64)
+    half = 0.5 * bucket * sqrt(2.0)
+    for sweep in range(2):
+        if sweep == 1:
+            start = np.zeros(columns * rows + 1, np.int64)
+            for b in range(columns * rows):
+                start[b + 1] = start[b] + count[b]
+            index = np.zeros(start[-1], np.int64)
+            fill = start.copy()
+        for e in range(len(edge)):
+            x0 = min(edge[e, 0], edge[e, 2]) - reach - x_min
+            x1 = max(edge[e, 0], edge[e, 2]) + reach - x_min
+            y0 = min(edge[e, 1], edge[e, 3]) - reach - y_min
+            y1 = max(edge[e, 1], edge[e, 3]) + reach - y_min
+            for row in range(
+                max(0, int(floor(y0 / bucket))), min(rows, int(floor(y1 / bucket)) + 1)
+            ):
+                for column in range(
+                    max(0, int(floor(x0 / bucket))),
+                    min(columns, int(floor(x1 / bucket)) + 1),
+                ):
+                    cx = x_min + (column + 0.5) * bucket
+                    cy = y_min + (row + 0.5) * bucket
+                    d = point_segment_distance(
+                        cx, cy, edge[e, 0], edge[e, 1], edge[e, 2], edge[e, 3]
+                    )
+                    if d <= reach + half:
+                        b = row * columns + column
+                        if sweep == 0:
+                            count[b] += 1
+                        else:
+                            index[fill[b]] = e
+                            fill[b] += 1
+    return start, index
+
+
+@kernel
+def fill_rings(ring_start, point, x_min, y_min, cell, rows, columns):  # type: ignore[no-untyped-def]
+    """Return which cell centres lie inside the rings, by the even-odd rule."""
+    inside = np.zeros((rows, columns), np.bool_)
+    crossing = np.zeros(len(point), np.float64)
+    for row in range(rows):
+        y = y_min + (row + 0.5) * cell
+        n = 0
+        for ring in range(len(ring_start) - 1):
+            first, last = ring_start[ring], ring_start[ring + 1]
+            for i in range(first, last):
+                j = i + 1 if i + 1 < last else first
+                y0, y1 = point[i, 1], point[j, 1]
+                if (y0 <= y) != (y1 <= y):
+                    t = (y - y0) / (y1 - y0)
+                    crossing[n] = point[i, 0] + t * (point[j, 0] - point[i, 0])
+                    n += 1
+        crossing[:n].sort()
+        for pair in range(0, n - 1, 2):
+            low = int(ceil((crossing[pair] - x_min) / cell - 0.5))
+            high = int(floor((crossing[pair + 1] - x_min) / cell - 0.5))
+            for column in range(max(low, 0), min(high, columns - 1) + 1):
+                inside[row, column] = True
+    return inside
+
+
+@kernel
+def edge_distance_field(edge, x_min, y_min, cell, rows, columns):  # type: ignore[no-untyped-def]
+    """Return the distance of each cell centre from the nearest edge [m].
+
+    Cells crossed by an edge know it exactly; sweeps in four directions hand the index of
+    the nearest edge on to the neighbours, which measure their own distance from it.
+    """
+    nearest = np.full((rows, columns), -1, np.int64)
+    distance = np.full((rows, columns), np.inf)
+    for e in range(len(edge)):
+        length = hypot(edge[e, 2] - edge[e, 0], edge[e, 3] - edge[e, 1])
+        n = int(ceil(length / (0.5 * cell))) + 1
+        for i in range(n + 1):
+            t = i / n
+            x = edge[e, 0] + t * (edge[e, 2] - edge[e, 0])
+            y = edge[e, 1] + t * (edge[e, 3] - edge[e, 1])
+            c0 = int(floor((x - x_min) / cell))
+            r0 = int(floor((y - y_min) / cell))
+            for r in range(max(0, r0 - 1), min(rows, r0 + 2)):
+                for c in range(max(0, c0 - 1), min(columns, c0 + 2)):
+                    _offer(edge, e, r, c, x_min, y_min, cell, nearest, distance)
+    for _ in range(2):
+        for direction in range(4):
+            down = direction & 1
+            left = direction >> 1
+            for i in range(rows):
+                r = rows - 1 - i if down else i
+                for j in range(columns):
+                    c = columns - 1 - j if left else j
+                    for dr in range(-1, 2):
+                        for dc in range(-1, 2):
+                            rr, cc = r + dr, c + dc
+                            if (
+                                0 <= rr < rows
+                                and 0 <= cc < columns
+                                and nearest[rr, cc] >= 0
+                                and nearest[rr, cc] != nearest[r, c]
+                            ):
+                                _offer(
+                                    edge,
+                                    nearest[rr, cc],
+                                    r,
+                                    c,
+                                    x_min,
+                                    y_min,
+                                    cell,
+                                    nearest,
+                                    distance,
+                                )
+    return distance
+
+
+@kernel
+def _offer(edge, e, r, c, x_min, y_min, cell, nearest, distance):  # type: ignore[no-untyped-def]
+    d = point_segment_distance(
+        x_min + (c + 0.5) * cell,
+        y_min + (r + 0.5) * cell,
+        edge[e, 0],
+        edge[e, 1],
+        edge[e, 2],
+        edge[e, 3],
+    )
+    if d < distance[r, c]:
+        distance[r, c] = d
+        nearest[r, c] = e
