@@ -1,0 +1,188 @@
+"""Battery content over time: planned against simulated, one panel per robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from mrmg.accounting import LoggedMotion, battery_profile, find_visits
+from mrmg.execution.log import ExecutionLog
+from mrmg.mission import Plan, Visit
+from mrmg.results import scene_drawing, style
+from mrmg.scene.types import Robot, Scene
+
+_PANEL_INCHES = (9.5, 2.5)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BatteryCurve:
+    """Battery content of one robot over time.
+
+    Attributes:
+        robot: id of the robot.
+        time_s: shape (n,).
+        energy_J: content at each time, after a recharge, shape (n,).
+        visits: of this robot; their `energy_J` is the content on arrival.
+    """
+
+    robot: str
+    time_s: np.ndarray
+    energy_J: np.ndarray
+    visits: tuple[Visit, ...]
+
+
+def planned_curves(scene: Scene, plan: Plan) -> tuple[BatteryCurve, ...]:
+    """Return the battery content the plan predicts, one curve per robot."""
+    return tuple(
+        BatteryCurve(
+            robot=trajectory.robot,
+            time_s=trajectory.time_s,
+            energy_J=battery_profile(scene, trajectory, plan.visits),
+            visits=tuple(v for v in plan.visits if v.robot == trajectory.robot),
+        )
+        for trajectory in plan.trajectories
+    )
+
+
+def simulated_curves(
+    scene: Scene, plan: Plan, log: ExecutionLog
+) -> tuple[BatteryCurve, ...]:
+    """Return the battery content of the simulated motion, one curve per robot."""
+    curves = []
+    for robot, state in zip(log.robots, log.state, strict=True):
+        motion = LoggedMotion(robot=robot, time_s=log.time_s, state=state)
+        visits = find_visits(scene, motion, plan.tours.get(robot, ()))
+        curves.append(
+            BatteryCurve(
+                robot=robot,
+                time_s=log.time_s,
+                energy_J=battery_profile(scene, motion, visits),
+                visits=visits,
+            )
+        )
+    return tuple(curves)
+
+
+def draw_energy(
+    scene: Scene, plan: Plan, log: ExecutionLog | None = None, *, path: Path
+) -> None:
+    """Draw battery content over time, one panel per robot, to a picture file.
+
+    Args:
+        scene: gives capacity and reserve.
+        plan: what was predicted.
+        log: adds the content under the simulated motion.
+        path: picture to write (PNG, SVG or PDF by its suffix).
+    """
+    planned = {curve.robot: curve for curve in planned_curves(scene, plan)}
+    simulated = {
+        curve.robot: curve
+        for curve in (simulated_curves(scene, plan, log) if log is not None else ())
+    }
+    width_in, panel_in = _PANEL_INCHES
+    figure = Figure(
+        figsize=(width_in, panel_in * len(planned) + 0.7),
+        dpi=scene_drawing.DPI,
+        layout="constrained",
+        facecolor="white",
+    )
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(len(planned), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, robot_id in zip(panels, planned, strict=True):
+        robot = scene.robot(robot_id)
+        draw_battery(axes, scene, robot, planned[robot_id], simulated.get(robot_id))
+    panels[-1].set_xlabel("time [s]")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(
+        handles,
+        labels,
+        loc="outside upper right",
+        ncols=len(handles),
+        frameon=False,
+        fontsize=9.5,
+    )
+    scene_drawing.write_figure(figure, path)
+
+
+def draw_battery(
+    axes: Axes,
+    scene: Scene,
+    robot: Robot,
+    planned: BatteryCurve,
+    simulated: BatteryCurve | None,
+) -> None:
+    """Draw one robot's battery content, its reserve, recharges and goals."""
+    color = style.scene_robot_colors(scene)[robot.id]
+    capacity_kJ = robot.battery.capacity_J / 1000.0
+    reserve_kJ = robot.battery.reserve_J / 1000.0
+    _plot(axes, planned, color=color, linewidth=5.0, alpha=0.3, label="planned")
+    if simulated is not None:
+        _plot(axes, simulated, color=color, linewidth=1.3, label="simulated")
+    axes.axhline(
+        reserve_kJ, color=style.RESERVE, linewidth=1.2, linestyle="--", label="reserve"
+    )
+    axes.axhspan(0.0, reserve_kJ, color=style.RESERVE, alpha=0.08, linewidth=0)
+    _mark_visits(axes, scene, (simulated or planned).visits)
+    axes.set_ylim(0.0, 1.22 * capacity_kJ)
+    axes.set_xlim(left=0.0)
+    axes.set_ylabel("battery [kJ]")
+    axes.set_title(robot.id, loc="left", fontsize=11, fontweight="bold", color=color)
+    axes.grid(color="#E4E6EA", linewidth=0.7)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    percent = axes.secondary_yaxis(
+        "right",
+        functions=(
+            lambda energy_kJ: 100.0 * energy_kJ / capacity_kJ,
+            lambda share: share * capacity_kJ / 100.0,
+        ),
+    )
+    percent.set_yticks([0, 25, 50, 75, 100])
+    percent.set_ylabel("charge [%]")
+
+
+def with_recharge_jumps(curve: BatteryCurve) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and contents [J] with the content on arrival before each recharge."""
+    stations = [visit for visit in curve.visits if visit.kind == "station"]
+    steps = np.array([visit.step for visit in stations], dtype=int)
+    time_s = np.insert(curve.time_s, steps, curve.time_s[steps])
+    arrival_J = np.array([visit.energy_J for visit in stations])
+    return time_s, np.insert(curve.energy_J, steps, arrival_J)
+
+
+def _plot(axes: Axes, curve: BatteryCurve, **look: object) -> None:
+    time_s, energy_J = with_recharge_jumps(curve)
+    axes.plot(time_s, energy_J / 1000.0, solid_joinstyle="round", **look)
+
+
+def _mark_visits(axes: Axes, scene: Scene, visits: tuple[Visit, ...]) -> None:
+    labels = {**style.goal_labels(scene), **style.station_labels(scene)}
+    below_axis_top = axes.get_xaxis_transform()
+    for visit in visits:
+        station = visit.kind == "station"
+        axes.axvline(
+            visit.time_s,
+            color=style.STATION_EDGE if station else "#B9BEC7",
+            linewidth=1.0 if station else 0.7,
+            linestyle="-" if station else ":",
+            zorder=0.5,
+        )
+        axes.text(
+            visit.time_s,
+            0.985 if station else 0.90,
+            f"⚡{labels[visit.target]}" if station else labels[visit.target],
+            transform=below_axis_top,
+            fontsize=8.5,
+            fontweight="bold" if station else "normal",
+            color=style.STATION_EDGE if station else style.MUTED,
+            ha="center",
+            va="top",
+            backgroundcolor="white",
+            bbox={"fc": "white", "ec": "none", "pad": 0.8},
+        )

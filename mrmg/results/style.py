@@ -1,0 +1,115 @@
+"""One visual language for every picture: colours, hatches and names of what is shown.
+
+The colours are those of the simulated world (`execution.palette`), made darker where
+they must carry lines and text on a light page and paler where they lie below others.
+Terrain is hatched as well, and targets are labelled: nothing depends on colour alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from mrmg.execution import palette
+from mrmg.scene.types import Scene
+
+INK = "#1F2328"
+MUTED = "#5F6773"
+GROUND = "#F7F7F3"
+OBSTACLE = "#5B6068"
+OBSTACLE_EDGE = "#33373D"
+GOAL_OPEN = "#FFFFFF"
+GOAL_EDGE = "#1F2328"
+STATION = "#7FD6CF"
+STATION_EDGE = "#06504C"
+RESERVE = "#B00020"
+
+_HATCHES = ("..", "//", "xx", "\\\\", "++")
+_PALENESS = 0.45
+_DARKEST_LUMINANCE = 0.26
+
+
+@dataclass(frozen=True, slots=True)
+class TerrainClass:
+    """All terrain areas of one multiplier, drawn alike.
+
+    Attributes:
+        multiplier: energy multiplier of the class.
+        color: fill.
+        hatch: matplotlib hatch pattern.
+    """
+
+    multiplier: float
+    color: str
+    hatch: str
+
+    @property
+    def label(self) -> str:
+        """What legends call the class."""
+        return f"terrain ×{self.multiplier:g}"
+
+
+def terrain_classes(scene: Scene) -> dict[float, TerrainClass]:
+    """Return the terrain classes of a scene by multiplier, from easy to hard."""
+    multipliers = sorted({area.multiplier for area in scene.terrain} - {1.0})
+    classes = {
+        value: TerrainClass(
+            value,
+            _mixed(palette.terrain_colour(value), (1.0, 1.0, 1.0), _PALENESS),
+            _HATCHES[rank % len(_HATCHES)],
+        )
+        for rank, value in enumerate(multipliers)
+    }
+    if any(area.multiplier == 1.0 for area in scene.terrain):
+        classes[1.0] = TerrainClass(1.0, GROUND, "")
+    return classes
+
+
+def robot_colors(robots: Sequence[str]) -> dict[str, str]:
+    """Return a colour by robot id (scene's order) that is dark enough for lines."""
+    return {robot: _ink(palette.robot_colour(at)) for at, robot in enumerate(robots)}
+
+
+def scene_robot_colors(scene: Scene) -> dict[str, str]:
+    """Return the colour of each robot of a scene."""
+    return robot_colors([robot.id for robot in scene.robots])
+
+
+def goal_labels(scene: Scene) -> dict[str, str]:
+    """Return a short text for each goal: its id if all are short, else a number."""
+    return _labels([goal.id for goal in scene.goals], "")
+
+
+def station_labels(scene: Scene) -> dict[str, str]:
+    """Return a short text for each station."""
+    return _labels([station.id for station in scene.stations], "S")
+
+
+def _labels(ids: Sequence[str], prefix: str) -> dict[str, str]:
+    if all(len(name) <= 3 for name in ids):
+        return {name: name for name in ids}
+    return {name: f"{prefix}{number}" for number, name in enumerate(ids, start=1)}
+
+
+def rgb(color: str) -> tuple[int, int, int]:
+    """Return a `#RRGGBB` colour as three integers of 0..255."""
+    return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
+
+
+def _ink(color: palette.Rgb) -> str:
+    red, green, blue = color
+    # Relative luminance after WCAG 2.2; 0.26 gives a contrast of 3.4 on white.
+    luminance = 0.2126 * red**2.2 + 0.7152 * green**2.2 + 0.0722 * blue**2.2
+    scale = min(1.0, (_DARKEST_LUMINANCE / luminance) ** (1 / 2.2))
+    return _hex((red * scale, green * scale, blue * scale))
+
+
+def _mixed(color: palette.Rgb, other: palette.Rgb, share: float) -> str:
+    red, green, blue = (
+        (1.0 - share) * a + share * b for a, b in zip(color, other, strict=True)
+    )
+    return _hex((red, green, blue))
+
+
+def _hex(color: palette.Rgb) -> str:
+    return "#" + "".join(f"{round(255 * part):02X}" for part in color)
