@@ -1,0 +1,205 @@
+"""Reading foreign polygon maps as bare shapes in the file's own units.
+
+Two text formats are read:
+
+- sectioned: `[SCALE]` (metres per unit), `[BORDER]`, any number of `[OBSTACLE]`, with
+  one `x y` per line; or `[MAP_POINTS]` (`id x y` in cm) with `[MAP_BORDER]` and
+  `[MAP_OBSTACLE]` that list point ids. Tags may carry blanks; other tags are derived
+  data. Polygons are closed implicitly and may run either way.
+- rows: 6 numbers are an obstacle triangle, 4 a segment, 2 a point. The border, if there
+  is one, is drawn with thin triangles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from mrmg.errors import Fault, SceneError
+
+M_PER_CM = 0.01
+_POINTS_TAG = "MAP_POINTS"
+_BORDER_TAGS = ("BORDER", "MAP_BORDER")
+_OBSTACLE_TAGS = ("OBSTACLE", "MAP_OBSTACLE")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RawMap:
+    """A map as drawn.
+
+    Attributes:
+        border: the ground inside it may be driven on; None where none is drawn.
+        obstacles: polygons, segments and points.
+        unit_m: metres per unit.
+    """
+
+    border: Polygon | None
+    obstacles: tuple[BaseGeometry, ...]
+    unit_m: float
+
+
+@dataclass(frozen=True)
+class _Section:
+    tag: str
+    line: int
+    rows: list[tuple[int, list[float]]]
+
+
+def read_map(path: Path) -> RawMap:
+    """Read a map file of either format.
+
+    Raises:
+        SceneError: naming every line that cannot be used.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise SceneError(str(path), [Fault("", "not a text file in UTF-8")]) from error
+    except OSError as error:
+        message = f"cannot be read ({error.strerror})"
+        raise SceneError(str(path), [Fault("", message)]) from error
+    lines = [(n + 1, line.strip()) for n, line in enumerate(text.splitlines())]
+    lines = [(number, line) for number, line in lines if line]
+    if not lines:
+        message = "empty; expected a sectioned map or rows of 6, 4 or 2 numbers"
+        raise SceneError(str(path), [Fault("", message)])
+    reader = _Reader(str(path))
+    if any(line.startswith("[") for _, line in lines):
+        result = reader.sectioned(lines)
+    else:
+        result = reader.rows(lines)
+    if reader.faults:
+        raise SceneError(str(path), reader.faults)
+    assert result is not None
+    return result
+
+
+class _Reader:
+    """Turns lines into shapes and collects the faults of the lines."""
+
+    def __init__(self, source: str) -> None:
+        self.source = source
+        self.faults: list[Fault] = []
+
+    def rows(self, lines: list[tuple[int, str]]) -> RawMap:
+        shapes: list[BaseGeometry] = []
+        for number, line in lines:
+            values = self._numbers(number, line)
+            if values is None:
+                continue
+            if len(values) not in (2, 4, 6):
+                message = f"has {len(values)} numbers; expected 6, 4 or 2"
+                self._fault(number, message)
+                continue
+            points = np.reshape(values, (-1, 2))
+            shapes.append((Point, LineString, Polygon)[len(points) - 1](points))
+        border = _drawn_border(shapes)
+        return RawMap(border=border, obstacles=tuple(shapes), unit_m=1.0)
+
+    def sectioned(self, lines: list[tuple[int, str]]) -> RawMap | None:
+        sections = list(self._sections(lines))
+        points = self._points(sections)
+        unit_m = 1.0 if points is None else M_PER_CM
+        border: Polygon | None = None
+        obstacles: list[BaseGeometry] = []
+        for section in sections:
+            if section.tag == "SCALE":
+                unit_m = self._scale(section)
+            elif section.tag in _BORDER_TAGS:
+                border = self._polygon(section, points)
+            elif section.tag in _OBSTACLE_TAGS:
+                shape = self._polygon(section, points)
+                if shape is not None:
+                    obstacles.append(shape)
+        if border is None and not self.faults:
+            self.faults.append(Fault("", "has no [BORDER] section; expected one"))
+        return RawMap(border=border, obstacles=tuple(obstacles), unit_m=unit_m)
+
+    def _sections(self, lines: list[tuple[int, str]]) -> Iterator[_Section]:
+        known = ("SCALE", _POINTS_TAG, *_BORDER_TAGS, *_OBSTACLE_TAGS)
+        section: _Section | None = None
+        for number, line in lines:
+            if line.startswith("["):
+                if section is not None:
+                    yield section
+                section = _Section(line.strip("[] \t").upper(), number, [])
+            elif section is None:
+                self._fault(number, f"'{line[:30]}' stands before the first [TAG]")
+            elif section.tag in known:
+                values = self._numbers(number, line)
+                if values is not None:
+                    section.rows.append((number, values))
+        if section is not None:
+            yield section
+
+    def _points(self, sections: list[_Section]) -> dict[int, list[float]] | None:
+        tables = [section for section in sections if section.tag == _POINTS_TAG]
+        if not tables:
+            return None
+        points: dict[int, list[float]] = {}
+        for number, values in (row for table in tables for row in table.rows):
+            if len(values) == 3:
+                points[int(values[0])] = values[1:]
+            else:
+                self._fault(number, f"has {len(values)} numbers; expected id x y")
+        return points
+
+    def _scale(self, section: _Section) -> float:
+        values = [value for _, row in section.rows for value in row]
+        if len(values) == 1 and values[0] > 0.0:
+            return values[0]
+        self._fault(section.line, "expected one positive number after [SCALE]")
+        return 1.0
+
+    def _polygon(
+        self, section: _Section, points: dict[int, list[float]] | None
+    ) -> Polygon | None:
+        corners: list[list[float]] = []
+        for number, values in section.rows:
+            if points is not None and section.tag.startswith("MAP_"):
+                missing = [int(value) for value in values if int(value) not in points]
+                if missing:
+                    self._fault(number, f"names the unknown point {missing[0]}")
+                corners += [points[int(v)] for v in values if int(v) in points]
+            elif len(values) == 2:
+                corners.append(values)
+            else:
+                self._fault(number, f"has {len(values)} numbers; expected x y")
+        if len(corners) < 3:
+            message = f"[{section.tag}] has {len(corners)} corners; expected 3 or more"
+            self._fault(section.line, message)
+            return None
+        return Polygon(corners)
+
+    def _numbers(self, number: int, line: str) -> list[float] | None:
+        try:
+            values = [float(word) for word in line.split()]
+        except ValueError:
+            self._fault(number, f"got '{line[:30]}'; expected numbers")
+            return None
+        if not np.isfinite(values).all():
+            self._fault(number, f"got '{line[:30]}'; expected finite numbers")
+            return None
+        return values
+
+    def _fault(self, line: int, message: str) -> None:
+        self.faults.append(Fault(f"line {line}", message))
+
+
+def _drawn_border(shapes: list[BaseGeometry]) -> Polygon | None:
+    """Return the hole of the frame that thin triangles draw around a map, if any."""
+    solid = shapely.union_all([shape for shape in shapes if shape.area > 0.0])
+    holes = [
+        Polygon(ring)
+        for part in shapely.get_parts(solid)
+        for ring in getattr(part, "interiors", [])
+    ]
+    extent = shapely.box(*shapely.total_bounds(shapes))
+    frame = max(holes, key=lambda hole: hole.area, default=None)
+    return frame if frame is not None and frame.area > 0.5 * extent.area else None
