@@ -78,8 +78,8 @@ def find_visits(scene: Scene, motion: Motion, tour: Sequence[str]) -> tuple[Visi
     """Return when `motion` enters the targets of `tour`, in the tour's order.
 
     A visit is the first state, not before the previous visit's, whose reference point
-    lies in the target's region; one state may serve several targets in turn. The result
-    ends before the first target that is not reached.
+    lies in the target's region; one state may serve several targets in turn. A target
+    that is not entered any more is left out.
 
     Args:
         scene: names the targets.
@@ -96,7 +96,7 @@ def find_visits(scene: Scene, motion: Motion, tour: Sequence[str]) -> tuple[Visi
         target = targets[name]
         inside = target.region.depth(motion.state[step:, :2]) >= 0.0
         if not inside.any():
-            break
+            continue
         step += int(inside.argmax())
         visits.append(
             Visit(

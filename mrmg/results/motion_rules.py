@@ -1,0 +1,173 @@
+"""Rules of one robot's motion: where it starts, how it moves, within which limits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mrmg.mission import Trajectory
+from mrmg.motion.dynamics import DERIVATIVES, rk4_step
+from mrmg.results.verdict import Violation, ViolationKind
+from mrmg.scene.robot_model import RobotModel
+from mrmg.scene.types import Robot
+
+REST_TOLERANCE = 1e-6
+"""Largest speed [m/s] or yaw rate [rad/s] of a robot that counts as resting."""
+
+LIMIT_TOLERANCE = 1e-9
+"""Rounding that is forgiven at a limit, in the unit of the component."""
+
+_COMPONENTS = {
+    "car": ("x", "y", "theta", "v", "psi"),
+    "unicycle": ("x", "y", "theta", "v", "omega"),
+}
+
+
+def check_motion(robot: Robot, trajectory: Trajectory) -> list[Violation]:
+    """Return every broken rule of start, end, dynamics and limits."""
+    return [
+        *_check_start(robot, trajectory),
+        *_check_final_rest(robot, trajectory),
+        *_check_dynamics(robot.model, trajectory),
+        *_check_state_limits(robot.model, trajectory),
+        *_check_control_limits(robot.model, trajectory),
+    ]
+
+
+def worst_of_runs(amount: np.ndarray, broken: np.ndarray) -> list[int]:
+    """Return the index of the largest amount in each run of consecutive broken ones."""
+    indices = np.flatnonzero(broken)
+    runs = np.split(indices, np.flatnonzero(np.diff(indices) > 1) + 1)
+    return [int(run[amount[run].argmax()]) for run in runs if len(run)]
+
+
+def violation_at(
+    trajectory: Trajectory,
+    step: int,
+    kind: ViolationKind,
+    message: str,
+    *,
+    amount: float,
+    other: str = "",
+) -> Violation:
+    """Return a violation at one state of a trajectory."""
+    x_m, y_m = trajectory.state[step, :2].tolist()
+    return Violation(
+        kind=kind,
+        robot=trajectory.robot,
+        other=other,
+        time_s=step * trajectory.dt_s,
+        x_m=x_m,
+        y_m=y_m,
+        amount=amount,
+        message=f"{trajectory.robot}: {message}",
+    )
+
+
+def _check_start(robot: Robot, trajectory: Trajectory) -> list[Violation]:
+    expected = np.array([*robot.pose, 0.0, 0.0])
+    error = np.abs(trajectory.state[0] - expected)
+    worst = int(error.argmax())
+    if error[worst] == 0.0:
+        return []
+    name = _COMPONENTS[robot.model.motion_model][worst]
+    message = (
+        f"the plan starts with {name} = {trajectory.state[0, worst]:.6g}, "
+        f"the scene with {expected[worst]:.6g}"
+    )
+    amount = float(error[worst])
+    return [violation_at(trajectory, 0, ViolationKind.START, message, amount=amount)]
+
+
+def _check_final_rest(robot: Robot, trajectory: Trajectory) -> list[Violation]:
+    rates = {"v": 3, "omega": 4} if _is_unicycle(robot.model) else {"v": 3}
+    last = len(trajectory.state) - 1
+    return [
+        violation_at(
+            trajectory,
+            last,
+            ViolationKind.FINAL_REST,
+            f"the plan ends in motion, {name} = {trajectory.state[last, column]:.3g}",
+            amount=abs(float(trajectory.state[last, column])),
+        )
+        for name, column in rates.items()
+        if abs(trajectory.state[last, column]) > REST_TOLERANCE
+    ]
+
+
+def _is_unicycle(model: RobotModel) -> bool:
+    return model.motion_model == "unicycle"
+
+
+def replay(model: RobotModel, trajectory: Trajectory) -> np.ndarray:
+    """Return the state after each step, from the state before it, shape (n, 5).
+
+    Runs the plain Python form of the motion model, one step at a time, so that a valid
+    plan is met bit for bit and a defect stays in its own step.
+    """
+    derivative = DERIVATIVES[model.motion_model](math.sin, math.cos, math.tan)
+    step = rk4_step(derivative)
+    length_m, dt_s = float(model.wheelbase_m), float(trajectory.dt_s)
+    states, controls = trajectory.state[:-1].tolist(), trajectory.control.tolist()
+    return np.array(
+        [
+            step(*state, *control, length_m, dt_s)
+            for state, control in zip(states, controls, strict=True)
+        ]
+    ).reshape(len(states), 5)
+
+
+def _check_dynamics(model: RobotModel, trajectory: Trajectory) -> list[Violation]:
+    defect = np.abs(replay(model, trajectory) - trajectory.state[1:]).max(axis=1)
+    return [
+        violation_at(
+            trajectory,
+            step + 1,
+            ViolationKind.DYNAMICS,
+            f"the controls of step {step} do not lead to the next state, "
+            f"which is {defect[step]:.3g} off",
+            amount=float(defect[step]),
+        )
+        for step in worst_of_runs(defect, defect != 0.0)
+    ]
+
+
+def _check_state_limits(model: RobotModel, trajectory: Trajectory) -> list[Violation]:
+    limits = model.limits
+    v, w = trajectory.state[:, 3], trajectory.state[:, 4]
+    name = "omega" if _is_unicycle(model) else "psi"
+    rules = (
+        ("v", v, v - limits.v_max_m_s, limits.v_max_m_s),
+        ("v", v, limits.v_min_m_s - v, limits.v_min_m_s),
+        (f"|{name}|", np.abs(w), np.abs(w) - limits.w_max, limits.w_max),
+    )
+    return _limit_violations(trajectory, ViolationKind.STATE_LIMIT, rules)
+
+
+def _check_control_limits(model: RobotModel, trajectory: Trajectory) -> list[Violation]:
+    limits = model.limits
+    u1, u2 = np.abs(trajectory.control).T
+    rules = (
+        ("|u1|", u1, u1 - limits.u1_max_m_s2, limits.u1_max_m_s2),
+        ("|u2|", u2, u2 - limits.u2_max, limits.u2_max),
+    )
+    return _limit_violations(trajectory, ViolationKind.CONTROL_LIMIT, rules)
+
+
+def _limit_violations(
+    trajectory: Trajectory,
+    kind: ViolationKind,
+    rules: tuple[tuple[str, np.ndarray, np.ndarray, float], ...],
+) -> list[Violation]:
+    return [
+        violation_at(
+            trajectory,
+            step,
+            kind,
+            f"{name} is {value[step]:.6g}, the limit is {limit:.6g}",
+            amount=float(excess[step]),
+        )
+        for name, value, excess, limit in rules
+        for step in worst_of_runs(excess, excess > LIMIT_TOLERANCE)
+    ]

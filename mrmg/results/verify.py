@@ -1,0 +1,105 @@
+"""Judge a plan by the scene alone, with nothing taken from the planner.
+
+The controls are replayed through the plain Python form of the motion model, contacts
+are decided by exact polygons at all times, between steps too, and energies are
+recomputed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrmg.mission import Plan
+from mrmg.motion.dynamics import NU, NX
+from mrmg.results.contact_rules import check_obstacles, check_robots
+from mrmg.results.mission_rules import check_mission
+from mrmg.results.motion_rules import check_motion
+from mrmg.results.verdict import Verdict, Violation, ViolationKind
+from mrmg.scene.types import Scene
+
+
+def verify(scene: Scene, plan: Plan) -> Verdict:
+    """Return the verdict on `plan`: every violation found, and certified clearances.
+
+    Args:
+        scene: what the plan must hold in.
+        plan: from any planner. A malformed one (other robots, unequal lengths, numbers
+            that are not finite) is judged by that alone.
+    """
+    mismatch = _check_digest(scene, plan)
+    malformed = _check_form(scene, plan)
+    if malformed:
+        return Verdict(
+            ok=False,
+            violations=(*mismatch, *malformed),
+            min_obstacle_clearance_m=None,
+            min_robot_distance_m=None,
+        )
+    own = [(scene.robot(item.robot), item) for item in plan.trajectories]
+    motion = [found for pair in own for found in check_motion(*pair)]
+    space = [found for pair in own for found in check_obstacles(scene, *pair)]
+    pairs = check_robots(scene, plan.trajectories)
+    contacts = [found for check in (*space, *pairs) for found in check.violations]
+    violations = (*mismatch, *motion, *contacts, *check_mission(scene, plan))
+    return Verdict(
+        ok=not violations,
+        violations=violations,
+        min_obstacle_clearance_m=min(check.clearance_m for check in space),
+        min_robot_distance_m=min((check.clearance_m for check in pairs), default=None),
+    )
+
+
+def _check_digest(scene: Scene, plan: Plan) -> list[Violation]:
+    if plan.scene_digest == scene.digest:
+        return []
+    message = (
+        f"the plan was made for scene {plan.scene_name} ({plan.scene_digest}), "
+        f"this is {scene.name} ({scene.digest}); plan again"
+    )
+    return [Violation(kind=ViolationKind.SCENE_MISMATCH, message=message)]
+
+
+def _check_form(scene: Scene, plan: Plan) -> list[Violation]:
+    """Check what all other rules take for granted."""
+    faults = []
+    expected = [robot.id for robot in scene.robots]
+    planned = [trajectory.robot for trajectory in plan.trajectories]
+    if planned != expected:
+        faults.append(
+            ("", f"the plan moves robots {planned}, the scene has {expected}")
+        )
+    if not np.isfinite(plan.dt_s) or plan.dt_s <= 0.0:
+        faults.append(("", f"the step length is {plan.dt_s} s, it must be positive"))
+    steps = {len(trajectory.control) for trajectory in plan.trajectories}
+    if len(steps) > 1 or 0 in steps:
+        counts = sorted(steps)
+        faults.append(("", f"trajectories have {counts} steps, not one equal number"))
+    for trajectory in plan.trajectories:
+        n = len(trajectory.control)
+        shapes = (trajectory.state.shape, trajectory.control.shape)
+        if shapes != ((n + 1, NX), (n, NU)):
+            faults.append(
+                (trajectory.robot, f"states and controls have shapes {shapes}")
+            )
+        elif not all(
+            np.isfinite(a).all() for a in (trajectory.state, trajectory.control)
+        ):
+            faults.append(
+                (trajectory.robot, "a state or control is not a finite number")
+            )
+        if trajectory.dt_s != plan.dt_s:
+            faults.append((trajectory.robot, f"its step is {trajectory.dt_s} s long"))
+        if trajectory.robot not in plan.tours:
+            faults.append((trajectory.robot, "the plan has no tour for it"))
+    strangers = {visit.robot for visit in plan.visits} - set(planned)
+    faults += [
+        (robot, "visits are stated but no motion") for robot in sorted(strangers)
+    ]
+    return [
+        Violation(
+            kind=ViolationKind.MALFORMED,
+            robot=robot,
+            message=f"{robot}: {text}" if robot else text,
+        )
+        for robot, text in faults
+    ]
