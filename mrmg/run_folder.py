@@ -1,10 +1,10 @@
 """The run folder: names of its files, and which steps of a run are done.
 
-`run.json` keeps a fingerprint for every finished step: a digest of all that decides the
-step's outcome, the fingerprints of the steps it needs included. A step whose outputs exist
-under the present fingerprint need not be done again; any difference makes it, and all
-steps that need it, stale. The mark is written after the outputs, and every file
-is put in place by renaming, so a killed run can be taken up at any moment.
+`run.json` keeps a fingerprint for every finished step: a digest of all that decides
+the step's outcome, the fingerprints of the steps it needs included. A step whose
+outputs exist under the present fingerprint need not be done again; any difference makes
+it, and all steps that need it, stale. The mark is written after the outputs, and every
+file is put in place by renaming, so a killed run can be taken up at any moment.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ class RunFolder:
         return dict(self._record().get("finished", {}))
 
     def is_done(self, step: Step, fingerprint: str) -> bool:
-        """Tell whether `step` was finished under `fingerprint` and left its last file."""
+        """Tell whether the outcome of `step` under `fingerprint` is there."""
         done = self.marks().get(step) == fingerprint
         return done and self.file(OUTPUTS[step][-1]).exists()
 

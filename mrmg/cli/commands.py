@@ -1,0 +1,173 @@
+"""The verbs that make, judge and show a run."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mrmg.cli import terminal
+from mrmg.errors import ExitCode
+
+if TYPE_CHECKING:
+    from mrmg.steps import Run
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do the whole mission."""
+    from mrmg import pipeline
+    from mrmg.steps import DEFAULT_VIDEO
+
+    terminal.announce_compilation()
+    with terminal.progress() as told:
+        result = pipeline.run(
+            options.scene,
+            seed=options.seed,
+            out=options.out,
+            budget_s=options.budget,
+            profile=options.profile,
+            video=None if options.no_video else DEFAULT_VIDEO,
+            on_progress=told,
+        )
+    if options.json:
+        terminal.print_json(result.summary)
+    else:
+        terminal.print_summary(result.summary, result.reason)
+        print(f"  report     {result.folder / 'report.html'}")
+    return result.exit_code
+
+
+def plan(options: argparse.Namespace) -> int:
+    """Plan, and start a run folder."""
+    from mrmg.pipeline import default_folder
+    from mrmg.run_folder import RunFolder, Step
+    from mrmg.scene.loading import load_scene
+    from mrmg.steps import Run, RunArguments
+
+    terminal.announce_compilation()
+    scene = load_scene(options.scene)
+    folder = RunFolder(options.out or default_folder(scene, options.seed))
+    arguments = RunArguments(
+        seed=options.seed, profile=options.profile, budget_s=options.budget
+    )
+    with folder.opened_for_writing(), terminal.progress() as told:
+        folder.record_arguments(arguments.to_json())
+        work = Run(scene=scene, arguments=arguments, folder=folder, on_progress=told)
+        work.make(Step.PLAN)
+    outcome = work.planning()
+    text = f"{scene.name}: {outcome['status']}"
+    text += f"; {outcome['reason']}" if outcome["reason"] else ""
+    _print(options, outcome, f"{text}\n  in {folder.path}")
+    return work.status().exit_code
+
+
+def verify(options: argparse.Namespace) -> int:
+    """Judge the plan of a run folder."""
+    from mrmg.run_folder import Step
+
+    work = _make(options.run, Step.VERIFY)
+    verdict = work.folder.read_json("verdict.json", cure="mrmg verify")
+    lines = ["valid" if verdict["ok"] else "not valid:"]
+    lines += [f"  {violation['message']}" for violation in verdict["violations"]]
+    _print(options, verdict, "\n".join(lines))
+    return ExitCode.OK if verdict["ok"] else ExitCode.MISSION_FAILED
+
+
+def execute(options: argparse.Namespace) -> int:
+    """Drive the plan of a run folder in MuJoCo."""
+    from mrmg.run_folder import Step
+
+    work = _make(options.run, Step.EXECUTE, controller=options.controller)
+    log = work.folder.read_json("log.json", cure="mrmg execute")
+    ended = "driven to the end" if log["completed"] else "given up on the way"
+    touches = [
+        f"  {touch['robot']} touched {touch['other']} at {touch['time_s']:.2f} s"
+        for touch in log["contacts"]
+    ]
+    _print(options, log, "\n".join([f"{ended}, {len(touches)} contacts", *touches]))
+    went_well = log["completed"] and not touches
+    return ExitCode.OK if went_well else ExitCode.MISSION_FAILED
+
+
+def audit(options: argparse.Namespace) -> int:
+    """Compare planned, metered and measured energy of a run folder."""
+    from mrmg.run_folder import Step
+
+    work = _make(options.run, Step.AUDIT)
+    account = work.folder.read_json("audit.json", cure="mrmg audit")
+    lines = ["mission done" if account["mission_ok"] else "mission failed:"]
+    lines += [f"  {reason}" for reason in account["reasons"]]
+    _print(options, account, "\n".join(lines))
+    return ExitCode.OK if account["mission_ok"] else ExitCode.MISSION_FAILED
+
+
+def render(options: argparse.Namespace) -> int:
+    """Make the pictures, the video and the report of a run folder."""
+    from mrmg.run_folder import Step
+
+    wanted = {
+        name: getattr(options, name)
+        for name in ("view", "speed", "size", "fps")
+        if getattr(options, name) is not None
+    }
+    work = _make(options.run, Step.DRAW, Step.RENDER, Step.REPORT, video=wanted)
+    for name in ("overview.png", "energy.png", "mission.mp4", "report.html"):
+        print(work.folder.file(name))
+    return ExitCode.OK
+
+
+def report(options: argparse.Namespace) -> int:
+    """Write the summary and the report of a run folder anew."""
+    from mrmg.run_folder import Step
+
+    work = _make(options.run, Step.REPORT)
+    _print(options, work.summary(), str(work.folder.file("report.html")))
+    return work.exit_code()
+
+
+def doctor(options: argparse.Namespace) -> int:
+    """Tell what this machine has and lacks."""
+    from mrmg.doctor import examine
+
+    findings = examine()
+    if options.json:
+        terminal.print_json([finding.to_json() for finding in findings])
+    else:
+        for finding in findings:
+            mark = "ok     " if finding.ok else "MISSING"
+            print(f"{mark} {finding.name:<14} {finding.found}")
+            if finding.cure:
+                print(f"{'':22} cure: {finding.cure}")
+    return ExitCode.OK if all(item.ok for item in findings) else ExitCode.MACHINE
+
+
+def _make(
+    path: Path,
+    *steps: Any,
+    controller: str | None = None,
+    video: dict[str, Any] | None = None,
+) -> Run:
+    """Make steps of the run in `path` anew, with some of its arguments changed."""
+    from mrmg.run_folder import existing
+    from mrmg.steps import taken_up
+
+    with existing(path).opened_for_writing() as folder, terminal.progress() as told:
+        work = taken_up(folder, told)
+        changed = replace(
+            work.arguments,
+            controller=controller or work.arguments.controller,
+            video=replace(work.arguments.video, **(video or {})),
+        )
+        folder.record_arguments(changed.to_json())
+        work = replace(work, arguments=changed)
+        for step in steps:
+            work.make(step)
+    return work
+
+
+def _print(options: argparse.Namespace, value: Any, text: str) -> None:
+    if options.json:
+        terminal.print_json(value)
+    else:
+        print(text)

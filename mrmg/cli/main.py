@@ -1,0 +1,40 @@
+"""Entry point: run a command, and turn every way it can end into an exit code."""
+
+from __future__ import annotations
+
+import errno
+import os
+import sys
+from collections.abc import Sequence
+
+from mrmg.cli.parser import make_parser
+from mrmg.errors import ExitCode, MrmgError
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as shells have it."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line `arguments` (those of the process if None).
+
+    Returns:
+        The exit code; errors are told on stderr, by their message alone.
+    """
+    options = make_parser().parse_args(arguments)
+    try:
+        code = options.command(options)
+        sys.stdout.flush()
+        return int(code)
+    except MrmgError as error:
+        print(f"mrmg: {error}", file=sys.stderr)
+        return int(error.exit_code)
+    except KeyboardInterrupt:
+        print("mrmg: stopped; the same command takes it up again", file=sys.stderr)
+        return INTERRUPTED
+    except OSError as error:
+        if error.errno == errno.EPIPE:
+            # The reader of our output has gone; nothing is left to be told.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return int(ExitCode.OK)
+        print(f"mrmg: {error}", file=sys.stderr)
+        return int(ExitCode.MACHINE)

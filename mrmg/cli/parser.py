@@ -1,0 +1,212 @@
+"""The arguments of every command. Imports nothing heavy: `mrmg --help` is instant."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+
+from mrmg import __version__
+from mrmg.cli import commands, scene_commands
+
+EXIT_CODES = """\
+exit codes:
+  0  the mission is feasible end to end       5  out of budget
+  2  the command was used wrongly             6  executed, but the mission failed
+  3  a scene or file is invalid               7  something on the machine is missing
+  4  infeasible; the proof is named         130  stopped by Ctrl-C
+"""
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """Return the parser of the `mrmg` command."""
+    parser = argparse.ArgumentParser(
+        prog="mrmg",
+        description="Plan missions for fleets of energy-limited cars, drive them in "
+        "MuJoCo, and account for the energy.",
+        epilog=EXIT_CODES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"mrmg {__version__}")
+    verbs = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    _add_run(verbs)
+    _add_plan(verbs)
+    _add_steps(verbs)
+    _add_render(verbs)
+    _add_scene(verbs)
+    doctor = verbs.add_parser("doctor", help="check this machine, with cures")
+    _add_json(doctor, "the findings")
+    doctor.set_defaults(command=commands.doctor)
+    return parser
+
+
+_Verbs = argparse._SubParsersAction
+
+
+def _add_run(verbs: _Verbs) -> None:  # type: ignore[type-arg]
+    run = verbs.add_parser("run", help="the whole mission, from scene to report")
+    _add_planning(run)
+    run.add_argument("--no-video", action="store_true", help="leave out the video")
+    run.set_defaults(command=commands.run)
+
+
+def _add_plan(verbs: _Verbs) -> None:  # type: ignore[type-arg]
+    plan = verbs.add_parser("plan", help="plan only")
+    _add_planning(plan)
+    plan.set_defaults(command=commands.plan)
+
+
+def _add_planning(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument("scene", metavar="SCENE", help="path, or name of a shipped scene")
+    verb.add_argument("--seed", type=_seed, default=0, metavar="N", help="default 0")
+    verb.add_argument(
+        "--out", type=Path, metavar="DIR", help="run folder; default runs/SCENE-sN"
+    )
+    verb.add_argument(
+        "--budget",
+        type=_positive,
+        metavar="SECONDS",
+        help="wall-clock limit of planning",
+    )
+    verb.add_argument(
+        "--profile",
+        choices=("default", "paper"),
+        default="default",
+        help="'paper' follows the published algorithms to the letter",
+    )
+    _add_json(verb, "summary.json" if verb.prog.endswith("run") else "planning.json")
+
+
+def _add_steps(verbs: _Verbs) -> None:  # type: ignore[type-arg]
+    steps = {
+        "verify": ("judge the plan of a run folder", commands.verify, "verdict.json"),
+        "execute": ("drive the plan in MuJoCo", commands.execute, "log.json"),
+        "audit": ("compare planned and driven energy", commands.audit, "audit.json"),
+        "report": ("write summary and report anew", commands.report, "summary.json"),
+    }
+    for name, (what, command, output) in steps.items():
+        verb = verbs.add_parser(name, help=what)
+        verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
+        if name == "execute":
+            verb.add_argument(
+                "--controller", metavar="NAME", help="tracking controller; default mpc"
+            )
+        _add_json(verb, output)
+        verb.set_defaults(command=command)
+
+
+def _add_render(verbs: _Verbs) -> None:  # type: ignore[type-arg]
+    render = verbs.add_parser("render", help="make the pictures and the video")
+    render.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    render.add_argument("--view", choices=("top", "chase", "split"))
+    render.add_argument(
+        "--speed",
+        type=_positive,
+        metavar="FACTOR",
+        help="simulated seconds shown per second",
+    )
+    render.add_argument("--size", type=_size, metavar="WxH", help="such as 1280x720")
+    render.add_argument("--fps", type=_fps, metavar="N", help="frames per second")
+    render.set_defaults(command=commands.render)
+
+
+def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
+    scene = verbs.add_parser("scene", help="check, draw, import or populate scenes")
+    acts = scene.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    check = acts.add_parser("check", help="report every fault of a scene")
+    check.add_argument("scene", metavar="SCENE")
+    check.set_defaults(command=scene_commands.check)
+
+    draw = acts.add_parser("draw", help="draw a scene")
+    draw.add_argument("scene", metavar="SCENE")
+    draw.add_argument(
+        "-o", "--out", type=Path, metavar="PICTURE.png", help="default NAME.png"
+    )
+    draw.set_defaults(command=scene_commands.draw)
+
+    imported = acts.add_parser("import", help="read a polygon or triangle map")
+    imported.add_argument("map", type=Path, metavar="MAP")
+    imported.add_argument(
+        "--longest-side",
+        type=_positive,
+        default=100.0,
+        metavar="METRES",
+        help="scale the map so that its longest side measures this; default 100",
+    )
+    _add_scene_out(imported)
+    imported.set_defaults(command=scene_commands.import_)
+
+    populate = acts.add_parser("populate", help="place robots, goals and stations")
+    populate.add_argument("scene", metavar="SCENE")
+    for name, count in (("robots", 2), ("goals", 14), ("stations", 5)):
+        populate.add_argument(
+            f"--{name}",
+            type=_count,
+            default=count,
+            metavar="N",
+            help=f"default {count}",
+        )
+    populate.add_argument("--seed", type=_seed, default=0, metavar="N")
+    _add_scene_out(populate)
+    populate.set_defaults(command=scene_commands.populate)
+
+
+def _add_scene_out(verb: argparse.ArgumentParser) -> None:
+    verb.add_argument(
+        "-o",
+        "--out",
+        type=Path,
+        metavar="OUT.yaml",
+        help="file to write; without it the scene goes to stdout",
+    )
+
+
+def _add_json(verb: argparse.ArgumentParser, what: str) -> None:
+    verb.add_argument("--json", action="store_true", help=f"print {what} alone")
+
+
+def _seed(text: str) -> int:
+    return _whole(text, at_least=0)
+
+
+def _count(text: str) -> int:
+    return _whole(text, at_least=1)
+
+
+def _fps(text: str) -> int:
+    return _whole(text, at_least=1)
+
+
+def _whole(text: str, *, at_least: int) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = at_least - 1
+    if value < at_least:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a whole number of at least {at_least}"
+        )
+    return value
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a positive number")
+    return value
+
+
+def _size(text: str) -> tuple[int, int]:
+    try:
+        width, height = (int(part) for part in text.lower().split("x"))
+    except ValueError:
+        width = height = 0
+    if min(width, height) < 64 or max(width, height) > 4096:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a size such as 1280x720 (64 to 4096 pixels a side)"
+        )
+    return width, height

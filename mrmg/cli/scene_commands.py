@@ -1,0 +1,72 @@
+"""The verbs that check, draw, import and populate scenes."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from mrmg import storage
+from mrmg.errors import ExitCode
+
+
+def check(options: argparse.Namespace) -> int:
+    """Load a scene; every fault of it is in the error that loading raises."""
+    from mrmg.scene.loading import load_scene
+
+    scene = load_scene(options.scene)
+    print(
+        f"{scene.name}: valid; {len(scene.robots)} robots, {len(scene.goals)} goals, "
+        f"{len(scene.stations)} stations, {len(scene.obstacles)} obstacles, "
+        f"{len(scene.terrain)} terrain areas"
+    )
+    return ExitCode.OK
+
+
+def draw(options: argparse.Namespace) -> int:
+    """Draw a scene into a picture."""
+    from mrmg.results.scene_drawing import draw_scene
+    from mrmg.scene.loading import load_scene
+
+    scene = load_scene(options.scene)
+    picture = options.out or Path(f"{scene.name}.png")
+    draw_scene(scene, picture)
+    print(picture)
+    return ExitCode.OK
+
+
+def import_(options: argparse.Namespace) -> int:
+    """Read a map drawn elsewhere into a scene without robots and goals."""
+    from mrmg.authoring import import_map
+
+    document = import_map(options.map, longest_side_m=options.longest_side)
+    _write(document, options.out)
+    return ExitCode.OK
+
+
+def populate(options: argparse.Namespace) -> int:
+    """Place robots, goals and stations in a scene."""
+    from mrmg.authoring import populate as populated
+    from mrmg.scene.loading import load_scene
+
+    document = populated(
+        load_scene(options.scene).document,
+        robots=options.robots,
+        goals=options.goals,
+        stations=options.stations,
+        seed=options.seed,
+    )
+    _write(document, options.out)
+    return ExitCode.OK
+
+
+def _write(document: dict[str, Any], out: Path | None) -> None:
+    from mrmg.scene.loading import dump_scene, scene_from_document
+
+    text = dump_scene(scene_from_document(document, source=document["name"]))
+    if out is None:
+        sys.stdout.write(text)
+    else:
+        storage.write_text(out, text)
+        print(out)

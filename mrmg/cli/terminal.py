@@ -1,0 +1,118 @@
+"""What a person at a terminal sees: progress on stderr, results on stdout."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from mrmg import storage
+
+if TYPE_CHECKING:
+    from mrmg.run_folder import Step
+    from mrmg.steps import StepProgress
+
+_DOING = {
+    "plan": "planning",
+    "verify": "verifying",
+    "execute": "driving",
+    "audit": "auditing",
+    "draw": "drawing",
+    "render": "filming",
+    "report": "reporting",
+}
+
+
+@contextmanager
+def progress() -> Iterator[StepProgress | None]:
+    """Yield a callback that draws one bar per step; None away from a terminal."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("{task.description:>10}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[note]}", markup=False),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+        tasks: dict[Step, Any] = {}
+
+        def told(step: Step, fraction: float, text: str) -> None:
+            if step not in tasks:
+                tasks[step] = bars.add_task(_DOING[step], total=1.0, note="")
+            bars.update(tasks[step], completed=fraction, note=text)
+
+        yield told
+
+
+def announce_compilation() -> None:
+    """Tell a person who waits for it that kernels are being compiled."""
+    if not sys.stderr.isatty():
+        return
+    from mrmg.compilation import kernels_are_compiled
+
+    if not kernels_are_compiled():
+        print("compiling kernels (once per machine) ...", file=sys.stderr)
+
+
+def print_json(value: Any) -> None:
+    """Print `value` on stdout in the form of the run folder's files."""
+    sys.stdout.write(storage.canonical_json(value))
+
+
+def print_summary(summary: dict[str, Any], reason: str) -> None:
+    """Print the outcome of a run in a few lines."""
+    outcome = "done" if summary["mission_ok"] else f"not done ({summary['status']})"
+    print(f"{summary['scene']}, seed {summary['seed']}: mission {outcome}")
+    if reason:
+        print(f"  reason     {reason}")
+    for line in _summary_lines(summary):
+        print(f"  {line}")
+
+
+def _summary_lines(summary: dict[str, Any]) -> Iterator[str]:
+    plan, verdict = summary.get("plan"), summary.get("verdict")
+    execution, energy = summary.get("execution"), summary.get("energy")
+    if plan and plan.get("cost_J") is not None:
+        yield (
+            f"plan       {plan['cost_J'] / 1000:.1f} kJ in {plan['makespan_s']:.0f} s, "
+            f"planned in {plan['time_s']['total']:.2f} s"
+        )
+    if verdict:
+        yield (
+            f"verdict    {_verdict_word(verdict)}; clearance to obstacles "
+            f"{_metres(verdict['min_obstacle_clearance_m'])}, between robots "
+            f"{_metres(verdict['min_robot_distance_m'])}"
+        )
+    if execution:
+        tracking = execution["tracking"]
+        yield (
+            f"driven     {_count(execution['goals_visited'])} of {summary['goals']} "
+            f"goals, {_count(execution['contacts'])} contacts, tracking "
+            f"{tracking['rms_m']:.3f} m rms, {tracking['max_m']:.3f} m max, "
+            f"{execution['realtime_factor']:.0f} x real time"
+        )
+    if energy:
+        yield (
+            f"energy     metered {energy['metered_error_pct']:+.2f} %, measured "
+            f"{energy['measured_error_pct']:+.2f} % against the plan; charge never "
+            f"below {energy['min_charge_fraction']:.0%}, "
+            f"{energy['recharges']} recharges"
+        )
+
+
+def _verdict_word(verdict: dict[str, Any]) -> str:
+    return "valid" if verdict["ok"] else f"{_count(verdict['violations'])} violations"
+
+
+def _count(value: Any) -> int:
+    return value if isinstance(value, int) else len(value)
+
+
+def _metres(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f} m"

@@ -1,0 +1,152 @@
+"""Examining the machine: what mrmg needs, what is there, and how to get the rest."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
+from typing import Any
+
+from mrmg import __version__, shipped
+from mrmg.errors import MachineError
+
+_BUNDLE = ("mujoco", "mujoco-core", "mujoco-studio")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One thing that was looked at.
+
+    Attributes:
+        name: of the thing.
+        found: what is there.
+        ok: False where something that is needed is missing.
+        cure: what to do about it; "" where nothing is to be done.
+    """
+
+    name: str
+    found: str
+    ok: bool = True
+    cure: str = ""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the finding as JSON data."""
+        return asdict(self)
+
+
+def examine() -> list[Finding]:
+    """Look at everything mrmg needs on this machine."""
+    packages = list(_packages())
+    findings = [_python(), _cpu(), *packages, _bundle(), _shipped_files()]
+    if all(finding.ok for finding in packages):
+        findings += [_kernel_cache(), _offscreen_drawing()]
+    return findings
+
+
+def required_packages() -> list[str]:
+    """Return the names of the packages mrmg needs at run time."""
+    wanted = [line for line in requires("mrmg") or [] if "extra ==" not in line]
+    return sorted(_name(line) for line in wanted)
+
+
+def _name(requirement: str) -> str:
+    end = next(
+        (i for i, char in enumerate(requirement) if char in "<>=!~;[ ("),
+        len(requirement),
+    )
+    return requirement[:end]
+
+
+def _python() -> Finding:
+    found = f"mrmg {__version__} on Python {platform.python_version()}"
+    good = sys.version_info >= (3, 11)
+    return Finding(
+        name="python", found=found, ok=good, cure="" if good else "use Python >= 3.11"
+    )
+
+
+def _cpu() -> Finding:
+    model = platform.processor() or platform.machine()
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    for line in lines:
+        if line.startswith("model name"):
+            model = line.partition(":")[2].strip()
+            break
+    return Finding(name="cpu", found=f"{os.cpu_count()} x {model}")
+
+
+def _packages() -> Iterator[Finding]:
+    for name in required_packages():
+        try:
+            yield Finding(name=name, found=version(name))
+        except PackageNotFoundError:
+            yield Finding(
+                name=name,
+                found="not installed",
+                ok=False,
+                cure=f"pip install {name}",
+            )
+
+
+def _bundle() -> Finding:
+    found = {}
+    for name in _BUNDLE:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    if len(set(found.values())) == 1:
+        return Finding(name="mujoco parts", found="agree in version")
+    wanted = " ".join(f"{name}=={found['mujoco']}" for name in _BUNDLE)
+    return Finding(
+        name="mujoco parts",
+        found=", ".join(f"{name} {value}" for name, value in found.items()),
+        ok=False,
+        cure=f"pip install {wanted}",
+    )
+
+
+def _shipped_files() -> Finding:
+    scenes, models = shipped.scene_names(), shipped.model_names()
+    complete = bool(scenes and models)
+    return Finding(
+        name="shipped files",
+        found=f"{len(scenes)} scenes, {len(models)} robot models",
+        ok=complete,
+        cure="" if complete else "install mrmg again: its scenes or models are gone",
+    )
+
+
+def _kernel_cache() -> Finding:
+    from mrmg.compilation import kernels_are_compiled
+
+    folder = Path(os.environ["NUMBA_CACHE_DIR"])
+    nearest = next(path for path in (folder, *folder.parents) if path.exists())
+    if not os.access(nearest, os.W_OK):
+        return Finding(
+            name="kernel cache",
+            found=f"{nearest} cannot be written",
+            ok=False,
+            cure="set NUMBA_CACHE_DIR to a folder that can be written",
+        )
+    state = "filled" if kernels_are_compiled() else "empty; the first run compiles"
+    return Finding(name="kernel cache", found=f"{folder} ({state})")
+
+
+def _offscreen_drawing() -> Finding:
+    from mrmg.results.gl_backend import choose_backend
+
+    try:
+        return Finding(name="offscreen GL", found=choose_backend())
+    except MachineError as error:
+        found, _, cure = str(error).partition("\n")
+        return Finding(
+            name="offscreen GL", found=found, ok=False, cure=cure.replace("\n", "; ")
+        )

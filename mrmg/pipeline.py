@@ -1,0 +1,97 @@
+"""The whole mission: plan, verify, execute, audit, show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mrmg.errors import ExitCode
+from mrmg.mission import PlanStatus
+from mrmg.results.gl_backend import choose_backend
+from mrmg.run_folder import RunFolder, Step
+from mrmg.scene.loading import load_scene
+from mrmg.scene.types import Scene
+from mrmg.steps import DEFAULT_VIDEO, Run, RunArguments, StepProgress, VideoArguments
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunResult:
+    """How a run ended.
+
+    Attributes:
+        folder: where everything lies.
+        summary: content of `summary.json`.
+        reason: one sentence where planning ended without a plan.
+        exit_code: what the command line would end with.
+    """
+
+    folder: Path
+    summary: dict[str, Any]
+    reason: str
+    exit_code: ExitCode
+
+
+def run(
+    source: str | Path | Scene,
+    *,
+    seed: int = 0,
+    out: Path | None = None,
+    budget_s: float | None = None,
+    profile: str = "default",
+    controller: str = "mpc",
+    video: VideoArguments | None = DEFAULT_VIDEO,
+    on_progress: StepProgress | None = None,
+) -> RunResult:
+    """Do the whole mission and leave a run folder; take up a run that was stopped.
+
+    Args:
+        source: a scene, the path of a scene file, or the name of a shipped scene.
+        seed: of all random streams.
+        out: the run folder; `default_folder` if None.
+        budget_s: wall-clock limit of planning; None for none.
+        profile: "default" or "paper".
+        controller: name of the tracking controller.
+        video: how the video is made; None for no video.
+        on_progress: told (step, fraction, text).
+
+    Raises:
+        MrmgError: for everything that keeps the run from starting. A mission that
+            cannot be planned, or fails, is a result and not an error.
+    """
+    scene = source if isinstance(source, Scene) else load_scene(source)
+    arguments = RunArguments(
+        seed=seed,
+        profile=profile,
+        budget_s=budget_s,
+        controller=controller,
+        video=video or DEFAULT_VIDEO,
+    )
+    folder = RunFolder(out or default_folder(scene, seed))
+    with folder.opened_for_writing():
+        folder.record_arguments(arguments.to_json())
+        work = Run(
+            scene=scene, arguments=arguments, folder=folder, on_progress=on_progress
+        )
+        if video is not None and not work.is_done(Step.RENDER):
+            choose_backend()  # better told now than after minutes of driving
+        work.ensure(Step.PLAN)
+        if work.status() is PlanStatus.SOLVED:
+            work.ensure(Step.VERIFY)
+            work.ensure(Step.EXECUTE)
+            work.ensure(Step.AUDIT)
+            if video is not None:
+                work.ensure(Step.RENDER)
+        work.ensure(Step.DRAW)
+        work.make(Step.REPORT)
+        return RunResult(
+            folder=folder.path,
+            summary=work.summary(),
+            reason=work.planning()["reason"],
+            exit_code=work.exit_code(),
+        )
+
+
+def default_folder(scene: Scene, seed: int) -> Path:
+    """Return the run folder used when none is named."""
+    return Path("runs") / f"{scene.name}-s{seed}"

@@ -1,0 +1,281 @@
+"""The steps of a run, each from files of the run folder to files of the run folder.
+
+A step reads what earlier steps left and never takes their results from memory, so that
+a run taken up later goes through exactly the same doors as one that was never stopped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import mrmg
+from mrmg import storage
+from mrmg.errors import ExitCode
+from mrmg.execution.log import ExecutionLog
+from mrmg.mission import Plan, PlanStatus
+from mrmg.run_folder import NEEDS, RunFolder, Step
+from mrmg.scene.loading import dump_scene, load_scene
+from mrmg.scene.types import Scene
+from mrmg.shipped import models_folder
+
+StepProgress = Callable[[Step, float, str], None]
+"""Told (step, fraction 0..1, text) while a step is under way."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VideoArguments:
+    """How the video is made.
+
+    Attributes:
+        view: "top", "chase" or "split".
+        speed: simulated seconds shown per second; None fits the mission to half a
+            minute.
+        size: width and height in pixels.
+        fps: frames per second.
+    """
+
+    view: str = "top"
+    speed: float | None = None
+    size: tuple[int, int] = (1280, 720)
+    fps: int = 30
+
+
+DEFAULT_VIDEO = VideoArguments()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunArguments:
+    """Everything but the scene that decides what a run leaves.
+
+    Attributes:
+        seed: of all random streams.
+        profile: "default" or "paper".
+        budget_s: wall-clock limit of planning; None for none.
+        controller: name of the tracking controller.
+        video: how the video is made.
+    """
+
+    seed: int = 0
+    profile: str = "default"
+    budget_s: float | None = None
+    controller: str = "mpc"
+    video: VideoArguments = DEFAULT_VIDEO
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the arguments as JSON data."""
+        return asdict(self)
+
+    @staticmethod
+    def from_json(data: dict[str, Any]) -> RunArguments:
+        """Rebuild arguments from `to_json`."""
+        video = data.get("video", {})
+        if "size" in video:
+            video = {**video, "size": tuple(video["size"])}
+        return RunArguments(**{**data, "video": VideoArguments(**video)})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """A run being made: the scene, the arguments, and the folder they fill."""
+
+    scene: Scene
+    arguments: RunArguments
+    folder: RunFolder
+    on_progress: StepProgress | None = None
+
+    def ensure(self, step: Step) -> None:
+        """Make `step` unless the folder already holds its outcome."""
+        if not self.is_done(step):
+            self.make(step)
+
+    def is_done(self, step: Step) -> bool:
+        """Tell whether the folder holds the outcome of `step`."""
+        return self.folder.is_done(step, self.fingerprint(step))
+
+    def make(self, step: Step) -> None:
+        """Make `step`, and make everything that came of its last outcome stale."""
+        self.folder.begin(step)
+        self._told(step, 0.0)
+        finished = _MAKERS[step](self)
+        self._told(step, 1.0)
+        if finished:
+            self.folder.finish(step, self.fingerprint(step))
+
+    def fingerprint(self, step: Step) -> str:
+        """Return the digest of all that decides the outcome of `step`."""
+        deciding: dict[Step, Any] = {
+            Step.PLAN: [
+                self.scene.digest,
+                self.arguments.seed,
+                self.arguments.profile,
+                self.arguments.budget_s,
+            ],
+            Step.EXECUTE: [self.arguments.controller],
+            Step.RENDER: asdict(self.arguments.video),
+        }
+        needs = [self.fingerprint(need) for need in NEEDS[step]]
+        own = [str(step), deciding.get(step), needs, _code_digest()]
+        return storage.digest(storage.canonical_json(own))
+
+    def planning(self) -> dict[str, Any]:
+        """Return how planning ended: status, reason, statistics."""
+        return dict(self.folder.read_json("planning.json", cure="mrmg plan"))
+
+    def status(self) -> PlanStatus:
+        """Return the status planning ended with."""
+        return PlanStatus(self.planning()["status"])
+
+    def plan(self) -> Plan:
+        """Return the plan."""
+        return Plan.load(self.folder.path)
+
+    def log(self) -> ExecutionLog:
+        """Return the log of the simulation."""
+        return ExecutionLog.load(self.folder.path)
+
+    def summary(self) -> dict[str, Any]:
+        """Return the content of `summary.json`."""
+        return dict(self.folder.read_json("summary.json", cure="mrmg report"))
+
+    def exit_code(self) -> ExitCode:
+        """Return the exit code the whole run ends with."""
+        status = self.status()
+        if status is not PlanStatus.SOLVED:
+            return status.exit_code
+        return ExitCode.OK if self.summary()["mission_ok"] else ExitCode.MISSION_FAILED
+
+    def progress_of(self, step: Step) -> Callable[[float, str], None]:
+        """Return the callback that tells the progress of one step."""
+        return lambda fraction, text: self._told(step, fraction, text)
+
+    def _told(self, step: Step, fraction: float, text: str = "") -> None:
+        if self.on_progress is not None:
+            self.on_progress(step, fraction, text)
+
+
+def taken_up(folder: RunFolder, on_progress: StepProgress | None = None) -> Run:
+    """Return the run that `folder` holds, with the arguments it was started with."""
+    return Run(
+        scene=load_scene(folder.file("scene.yaml")),
+        arguments=RunArguments.from_json(folder.arguments()),
+        folder=folder,
+        on_progress=on_progress,
+    )
+
+
+@cache
+def _code_digest() -> str:
+    # The version alone would keep results of code that has been edited since.
+    package = Path(mrmg.__file__).parent
+    sources = [*package.rglob("*.py"), *models_folder().glob("*/*.xml")]
+    code = [storage.digest(path.read_text()) for path in sorted(sources)]
+    return storage.digest("".join([mrmg.__version__, version("mujoco"), *code]))
+
+
+def _plan(run: Run) -> bool:
+    from mrmg.planning import PlannerParams, plan_mission
+
+    params = PlannerParams(
+        profile=run.arguments.profile, budget_s=run.arguments.budget_s
+    )
+    result = plan_mission(
+        run.scene,
+        seed=run.arguments.seed,
+        params=params,
+        on_progress=run.progress_of(Step.PLAN),
+    )
+    storage.write_text(run.folder.file("scene.yaml"), dump_scene(run.scene))
+    if result.plan is not None:
+        result.plan.save(run.folder.path)
+    outcome = {
+        "status": result.status.value,
+        "reason": result.reason,
+        "statistics": dict(result.statistics),
+    }
+    storage.write_json(run.folder.file("planning.json"), outcome)
+    return result.status in {PlanStatus.SOLVED, PlanStatus.INFEASIBLE}
+
+
+def _verify(run: Run) -> bool:
+    from mrmg.results.verify import verify
+
+    verify(run.scene, run.plan()).save(run.folder.path)
+    return True
+
+
+def _execute(run: Run) -> bool:
+    from mrmg.execution import simulate
+
+    log = simulate(
+        run.scene,
+        run.plan(),
+        controller=run.arguments.controller,
+        on_progress=run.progress_of(Step.EXECUTE),
+    )
+    log.save(run.folder.path)
+    return True
+
+
+def _audit(run: Run) -> bool:
+    from mrmg.results.audit import audit
+
+    audit(run.scene, run.plan(), run.log()).save(run.folder.path)
+    return True
+
+
+def _draw(run: Run) -> bool:
+    from mrmg.results.energy_plot import draw_energy
+    from mrmg.results.overview import draw_overview
+
+    overview = run.folder.file("overview.png")
+    if run.status() is not PlanStatus.SOLVED:
+        draw_overview(run.scene, path=overview)
+        return True
+    plan, log = run.plan(), run.log()
+    draw_overview(run.scene, plan, log, path=overview)
+    draw_energy(run.scene, plan, log, path=run.folder.file("energy.png"))
+    return True
+
+
+def _render(run: Run) -> bool:
+    from mrmg.results.video import render_video
+
+    video = run.arguments.video
+    render_video(
+        run.scene,
+        run.plan(),
+        run.log(),
+        run.folder.file("mission.mp4"),
+        view=video.view,
+        speed=video.speed,
+        size=video.size,
+        fps=video.fps,
+        on_progress=run.progress_of(Step.RENDER),
+    )
+    return True
+
+
+def _report(run: Run) -> bool:
+    from mrmg.results.report import write_report
+    from mrmg.results.summary import summarize
+
+    summary = summarize(run.scene, run.folder.path)
+    storage.write_json(run.folder.file("summary.json"), summary)
+    write_report(run.folder.path)
+    return True
+
+
+_MAKERS: dict[Step, Callable[[Run], bool]] = {
+    Step.PLAN: _plan,
+    Step.VERIFY: _verify,
+    Step.EXECUTE: _execute,
+    Step.AUDIT: _audit,
+    Step.DRAW: _draw,
+    Step.RENDER: _render,
+    Step.REPORT: _report,
+}
