@@ -126,6 +126,16 @@ class Plan:
         """Time at which the last robot has come to rest."""
         return max(trajectory.duration_s for trajectory in self.trajectories)
 
+    @property
+    def digest(self) -> str:
+        """Fingerprint of the header, all states and all controls."""
+        arrays = [
+            array.tobytes().hex()
+            for trajectory in self.trajectories
+            for array in (trajectory.state, trajectory.control)
+        ]
+        return storage.digest("".join([storage.canonical_json(self._header()), *arrays]))
+
     def trajectory(self, robot_id: str) -> Trajectory:
         """Return one robot's trajectory."""
         return next(item for item in self.trajectories if item.robot == robot_id)
