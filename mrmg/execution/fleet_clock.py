@@ -1,0 +1,70 @@
+"""One clock for the whole fleet: it slows down while any robot lags behind its plan.
+
+Robots that each kept their own time would lose the separation the planner gave them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, slots=True)
+class ClockParams:
+    """How the clock's rate follows the worst lag.
+
+    Attributes:
+        tolerated_lag_s: lag that leaves the rate at 1.
+        gain_per_s: loss of rate per second of further lag.
+        slowing_per_s: fastest fall of the rate.
+        recovery_per_s: fastest rise of the rate.
+        least_speed_m_s: speed below which lag is measured as if at this speed.
+    """
+
+    tolerated_lag_s: float = 0.1
+    gain_per_s: float = 1.2
+    slowing_per_s: float = 4.0
+    recovery_per_s: float = 1.5
+    least_speed_m_s: float = 0.5
+
+
+class FleetClock:
+    """Plan time as a function of simulated time.
+
+    Attributes:
+        time_s: plan time reached.
+        rate: plan seconds per simulated second, in [0, 1].
+    """
+
+    def __init__(self, params: ClockParams | None = None) -> None:
+        self.time_s = 0.0
+        self.rate = 1.0
+        self._params = params or ClockParams()
+
+    def pace(
+        self, state: np.ndarray, reference: np.ndarray, period_s: float
+    ) -> None:
+        """Set the rate from where the robots are and should be, both of shape (R, 5)."""
+        params = self._params
+        worst_s = float(lag_s(state, reference, params.least_speed_m_s).max())
+        target = 1.0 - params.gain_per_s * max(worst_s - params.tolerated_lag_s, 0.0)
+        lowest = self.rate - params.slowing_per_s * period_s
+        highest = self.rate + params.recovery_per_s * period_s
+        self.rate = min(max(target, lowest, 0.0), highest, 1.0)
+
+    def advance(self, period_s: float) -> None:
+        """Let `period_s` of simulated time pass."""
+        self.time_s += self.rate * period_s
+
+
+def lag_s(
+    state: np.ndarray, reference: np.ndarray, least_speed_m_s: float
+) -> np.ndarray:
+    """Return how late each robot is along its planned way [s], shape (R,)."""
+    heading = np.stack([np.cos(reference[:, 2]), np.sin(reference[:, 2])], axis=1)
+    ahead_m = ((reference[:, :2] - state[:, :2]) * heading).sum(axis=1)
+    speed = reference[:, 3]
+    return np.asarray(
+        np.sign(speed) * ahead_m / np.maximum(np.abs(speed), least_speed_m_s)
+    )

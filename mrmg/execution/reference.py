@@ -1,0 +1,76 @@
+"""The plan as a function of continuous plan time, for all robots at once."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import PPoly
+
+from mrmg.mission import Plan, Trajectory
+from mrmg.motion.dynamics import DERIVATIVES, NX
+from mrmg.scene.types import Scene
+
+
+class FleetReference:
+    """States of the fleet's plan at any plan time; at rest after its end.
+
+    Between the states of the plan v and psi are linear, as their controls are held, and
+    x, y, theta are the cubics through both ends with the motion model's slopes: within
+    0.1 mm of the exact motion at steps of 0.1 s.
+
+    Attributes:
+        duration_s: plan time of the last state.
+    """
+
+    def __init__(self, scene: Scene, plan: Plan) -> None:
+        pieces = [
+            _pieces(scene.robot(item.robot).model.motion_model, item, wheelbase_m)
+            for item in plan.trajectories
+            for wheelbase_m in (scene.robot(item.robot).model.wheelbase_m,)
+        ]
+        steps = pieces[0].shape[1]
+        self.duration_s = steps * plan.dt_s
+        self._plan = PPoly(
+            np.stack(pieces, axis=2).reshape(4, steps, -1),
+            np.arange(steps + 1) * plan.dt_s,
+            extrapolate=False,
+        )
+
+    def at(self, plan_time_s: np.ndarray) -> np.ndarray:
+        """Return the states at the given plan times, shape (n,) -> (n, R, 5)."""
+        states = self._plan(np.minimum(plan_time_s, self.duration_s))
+        return np.asarray(states.reshape(len(plan_time_s), -1, NX))
+
+    def paced(
+        self, clock_s: float, rate: float, period_s: float, count: int
+    ) -> np.ndarray:
+        """Return `count` states `period_s` of real time apart, shape (count, R, 5).
+
+        The plan is run at `rate` times its speed from `clock_s`, so that speeds are
+        multiplied by it.
+        """
+        states = self.at(clock_s + rate * period_s * np.arange(count))
+        states[:, :, 3] *= rate
+        return states
+
+
+def _pieces(motion_model: str, item: Trajectory, wheelbase_m: float) -> np.ndarray:
+    """Return the cubics of one trajectory, highest power first, shape (4, n, 5)."""
+    derivative = DERIVATIVES[motion_model](np.sin, np.cos, np.tan)
+    state, dt_s = item.state, item.dt_s
+    zero = np.zeros(len(state))
+    slope = np.stack(
+        derivative(state[:, 2], state[:, 3], state[:, 4], zero, zero, wheelbase_m), 1
+    )
+    start, chord = state[:-1], np.diff(state, axis=0) / dt_s
+    before, after = slope[:-1], slope[1:]
+    cubic = np.stack(
+        [
+            (before + after - 2.0 * chord) / dt_s**2,
+            (3.0 * chord - 2.0 * before - after) / dt_s,
+            before,
+            start,
+        ]
+    )
+    cubic[:2, :, 3:] = 0.0
+    cubic[2, :, 3:] = chord[:, 3:]
+    return cubic

@@ -1,0 +1,197 @@
+"""The world around the robots: floor, obstacles, walls, goals and stations.
+
+Collision bits: floor 1, hull of a robot 2, obstacle and wall 4. A tyre takes bit 1 only,
+a hull bits 2 and 4, everything here takes none, so that static things never test each
+other. Groups: 1 drawn, 3 hidden solids.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import shapely
+import trimesh
+from shapely.geometry import Polygon
+
+from mrmg.execution import palette
+from mrmg.execution.convex import convex_pieces, triangles
+from mrmg.scene.types import Obstacle, Region, Scene
+from mrmg.world.terrain import multiplier_at
+
+FLOOR_BIT, HULL_BIT, OBSTACLE_BIT = 1, 2, 4
+DRAWN_GROUP, SOLID_GROUP = 1, 3
+
+FLOOR = "floor"
+BOUNDS = "bounds"
+_FLOOR_MARGIN_M = 4.0
+_TEXTURE_PIXELS = 1536
+_GRID_M = 10.0
+_WALL_HEIGHT_M = 0.5
+_WALL_THICKNESS_M = 0.4
+_TARGET_THICKNESS_M = 0.03
+
+
+def add_floor(spec: mujoco.MjSpec, scene: Scene) -> None:
+    """Add the ground plane, coloured by the terrain's multiplier."""
+    x_min, y_min, x_max, y_max = scene.bounds
+    half = np.array([x_max - x_min, y_max - y_min]) / 2 + _FLOOR_MARGIN_M
+    center = np.array([x_min + x_max, y_min + y_max]) / 2
+    image = _floor_image(scene, center, half)
+    texture = spec.add_texture(
+        name=FLOOR,
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        colorspace=mujoco.mjtColorSpace.mjCOLORSPACE_SRGB,
+        height=image.shape[0],
+        width=image.shape[1],
+        nchannel=3,
+    )
+    texture.data = image.tobytes()
+    material = spec.add_material(name=FLOOR, specular=0.0, shininess=0.0)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = FLOOR
+    spec.worldbody.add_geom(
+        name=FLOOR,
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        pos=[*center, 0.0],
+        size=[*half, 1.0],
+        material=FLOOR,
+        contype=FLOOR_BIT,
+        conaffinity=0,
+        castshadow=False,
+    )
+
+
+def _floor_image(scene: Scene, center: np.ndarray, half: np.ndarray) -> np.ndarray:
+    """Return the ground seen from above, north up, shape (h, w, 3) of bytes."""
+    pixel_m = 2.0 * half.max() / _TEXTURE_PIXELS
+    columns, rows = np.maximum(np.round(2.0 * half / pixel_m), 1).astype(int)
+    x = center[0] - half[0] + (np.arange(columns) + 0.5) * 2.0 * half[0] / columns
+    y = center[1] + half[1] - (np.arange(rows) + 0.5) * 2.0 * half[1] / rows
+    grid_x, grid_y = np.meshgrid(x, y)
+    points = np.stack([grid_x.ravel(), grid_y.ravel()], axis=1)
+    classes, of_pixel = np.unique(multiplier_at(scene, points), return_inverse=True)
+    colours = np.array([palette.terrain_colour(multiplier) for multiplier in classes])
+    image = colours[of_pixel].reshape(rows, columns, 3)
+    image[:, np.abs((x + _GRID_M / 2) % _GRID_M - _GRID_M / 2) < pixel_m] *= 0.94
+    image[np.abs((y + _GRID_M / 2) % _GRID_M - _GRID_M / 2) < pixel_m] *= 0.94
+    return np.asarray(np.round(255.0 * image), dtype=np.uint8)
+
+
+def add_obstacle(spec: mujoco.MjSpec, obstacle: Obstacle) -> mujoco.MjsBody:
+    """Add one obstacle as a body: hidden convex solids and one drawn mesh.
+
+    Obstacles stay bodies of their own, even where they overlap, so that a contact can
+    name what was touched and so that an exclusion can let single robots through.
+    """
+    body = spec.worldbody.add_body(name=f"obstacle:{obstacle.id}")
+    for number, ring in enumerate(convex_pieces(obstacle.shape)):
+        name = f"solid:{obstacle.id}:{number}"
+        spec.add_mesh(name=name, uservert=_prism(ring, obstacle.height_m).ravel())
+        body.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=name,
+            contype=OBSTACLE_BIT,
+            conaffinity=0,
+            group=SOLID_GROUP,
+        )
+    colour = palette.OBSTACLE if obstacle.blocks is None else palette.PARTIAL_OBSTACLE
+    name = f"obstacle:{obstacle.id}"
+    _add_drawn_mesh(spec, name, obstacle.shape, obstacle.height_m)
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname=name,
+        contype=0,
+        conaffinity=0,
+        group=DRAWN_GROUP,
+        rgba=[*colour, 1.0],
+    )
+    return body
+
+
+def add_bounds(spec: mujoco.MjSpec, scene: Scene) -> None:
+    """Add four low walls whose inner faces are the scene's bounds."""
+    x_min, y_min, x_max, y_max = scene.bounds
+    center = np.array([x_min + x_max, y_min + y_max]) / 2
+    half = np.array([x_max - x_min, y_max - y_min]) / 2
+    thick = _WALL_THICKNESS_M / 2
+    body = spec.worldbody.add_body(name=BOUNDS)
+    for axis in (0, 1):
+        for side in (-1.0, 1.0):
+            at, size = center.copy(), half + 2 * thick
+            at[axis] += side * (half[axis] + thick)
+            size[axis] = thick
+            body.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_BOX,
+                pos=[*at, _WALL_HEIGHT_M / 2],
+                size=[*size, _WALL_HEIGHT_M / 2],
+                contype=OBSTACLE_BIT,
+                conaffinity=0,
+                group=DRAWN_GROUP,
+                rgba=[*palette.WALL, 1.0],
+            )
+
+
+def add_targets(spec: mujoco.MjSpec, scene: Scene) -> None:
+    """Add goals and stations as flat marks named `goal:<id>` and `station:<id>`."""
+    for station in scene.stations:
+        _add_mark(spec, f"station:{station.id}", station.region, palette.STATION)
+    for goal in scene.goals:
+        _add_mark(spec, f"goal:{goal.id}", goal.region, palette.GOAL)
+
+
+def _add_mark(
+    spec: mujoco.MjSpec, name: str, region: Region, colour: palette.Rgb
+) -> None:
+    options = {
+        "name": name,
+        "contype": 0,
+        "conaffinity": 0,
+        "group": DRAWN_GROUP,
+        "rgba": [*colour, 0.8],
+        "castshadow": False,
+    }
+    if len(region.corners):
+        _add_drawn_mesh(spec, name, region.shape, _TARGET_THICKNESS_M)
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **options
+        )
+        return
+    half = _TARGET_THICKNESS_M / 2
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        pos=[*region.center, half],
+        size=[region.radius_m, half, 0.0],
+        **options,
+    )
+
+
+def _prism(ring: np.ndarray, height_m: float) -> np.ndarray:
+    """Return the corners of the upright prism over a convex ring, shape (2 k, 3)."""
+    return np.concatenate(
+        [np.insert(ring, 2, level, axis=1) for level in (0.0, height_m)]
+    )
+
+
+def _add_drawn_mesh(
+    spec: mujoco.MjSpec, name: str, polygon: Polygon, height_m: float
+) -> None:
+    """Add the polygon's extrusion as a mesh with flat faces."""
+    corners = np.concatenate(
+        [
+            shapely.get_coordinates(shapely.orient_polygons(part).exterior)[:3]
+            for part in triangles(polygon)
+        ]
+    )
+    vertices, faces = np.unique(corners, axis=0, return_inverse=True)
+    solid = trimesh.creation.extrude_triangulation(
+        vertices, faces.reshape(-1, 3), height_m
+    )
+    # Shared corners would make MuJoCo smooth the edges away.
+    solid.unmerge_vertices()
+    spec.add_mesh(
+        name=name,
+        uservert=solid.vertices.ravel(),
+        userface=solid.faces.ravel(),
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+    )

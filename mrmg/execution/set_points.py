@@ -1,0 +1,78 @@
+"""From the plan and the controllers' corrections to ramps of speed and steering."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrmg.execution.controller import HORIZON, HORIZON_STEP_S, Controller
+from mrmg.execution.reference import FleetReference
+from mrmg.scene.types import Scene
+
+_STALL_M_S = 0.3
+
+
+class SetPoints:
+    """Commanded (v [m/s], psi [rad]) of all robots; between ticks they are ramps.
+
+    The plan's own controls are fed forward tick by tick, exactly as they switch; the
+    controllers, called less often, only add to them.
+
+    Attributes:
+        now: set-points at the present tick, shape (R, 2).
+        following: set-points at the next tick, shape (R, 2).
+    """
+
+    def __init__(
+        self, scene: Scene, reference: FleetReference, controllers: list[Controller]
+    ) -> None:
+        limits = [robot.model.limits for robot in scene.robots]
+        self._lower = np.array([[item.v_min_m_s, -item.w_max] for item in limits])
+        self._upper = np.array([[item.v_max_m_s, item.w_max] for item in limits])
+        self._control_bound = np.array(
+            [[item.u1_max_m_s2, item.u2_max] for item in limits]
+        )
+        self._reference, self._controllers = reference, controllers
+        self._correction = np.zeros((len(limits), 2))
+        self._planned = reference.at(np.zeros(1))[0, :, 3:]
+        self.now = self._planned.copy()
+        self.following = self._planned.copy()
+
+    def correct(self, state: np.ndarray, clock_s: float, rate: float) -> None:
+        """Let every controller look ahead from the true states, shape (R, 5)."""
+        horizon = self._reference.paced(clock_s, rate, HORIZON_STEP_S, HORIZON + 1)
+        for index, controller in enumerate(self._controllers):
+            start = np.concatenate([state[index, :3], self.now[index]])
+            self._correction[index] = controller.correct(start, horizon[:, index])
+
+    def advance(
+        self, axle_speed_m_s: np.ndarray, clock_s: float, rate: float, period_s: float
+    ) -> None:
+        """Make the ramps of the coming tick.
+
+        Args:
+            axle_speed_m_s: speed of each robot now, shape (R,).
+            clock_s: plan time now.
+            rate: plan seconds per second.
+            period_s: length of the tick.
+        """
+        self.now = self.following.copy()
+        # A robot that cannot follow must not pile up speed for later.
+        self.now[:, 0] = np.clip(
+            self.now[:, 0], axle_speed_m_s - _STALL_M_S, axle_speed_m_s + _STALL_M_S
+        )
+        planned = self._reference.paced(clock_s + rate * period_s, rate, 0.0, 1)
+        fed_forward = (planned[0, :, 3:] - self._planned) / period_s
+        self._planned = planned[0, :, 3:]
+        control = np.clip(
+            fed_forward + self._correction, -self._control_bound, self._control_bound
+        )
+        self.following = np.clip(
+            self.now + period_s * control, self._lower, self._upper
+        )
+
+    def brake(self, period_s: float) -> None:
+        """Make the ramps of the coming tick those of stopping, steering held."""
+        self.now = self.following.copy()
+        change = period_s * self._control_bound[:, 0]
+        self.following = self.now.copy()
+        self.following[:, 0] -= np.clip(self.now[:, 0], -change, change)

@@ -1,0 +1,228 @@
+"""Driving a plan in MuJoCo: the loop of clock, controllers, drive and physics."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from importlib.metadata import version
+
+import mujoco
+import numpy as np
+
+from mrmg import storage
+from mrmg.errors import UsageError
+from mrmg.execution.contacts import ContactWatch
+from mrmg.execution.controller import Controller, controller_maker
+from mrmg.execution.drive import DriveControl
+from mrmg.execution.fleet import Fleet
+from mrmg.execution.fleet_clock import FleetClock
+from mrmg.execution.log import ExecutionLog
+from mrmg.execution.recording import Recording, held_force_work_J
+from mrmg.execution.reference import FleetReference
+from mrmg.execution.set_points import SetPoints
+from mrmg.execution.world_model import MujocoWorld, build_world
+from mrmg.mission import Plan
+from mrmg.scene.types import Scene
+from mrmg.world.terrain import multiplier_at
+
+STEPS_PER_TICK = 5
+"""Physics steps for which a drive force is held: 20 ms, a fifth of a plan's step."""
+
+TICKS_PER_CORRECTION = 2
+"""Ticks between two calls of the tracking controllers: 25 Hz."""
+
+_LOST_M = 2.0
+_SETTLING_STEPS = 50
+_REST_S = 1.0
+_LONGEST_REST_S = 5.0
+_AT_REST_M_S = 0.005
+_LONGEST_SLOWDOWN = 3.0
+_PROGRESS_TICKS = 50
+_VERSIONED = ("mujoco", "casadi", "numpy", "scipy", "shapely")
+
+Progress = Callable[[float, str], None]
+
+
+def simulate(
+    scene: Scene,
+    plan: Plan,
+    *,
+    controller: str = "mpc",
+    on_progress: Progress | None = None,
+) -> ExecutionLog:
+    """Drive `plan` in the MuJoCo world of `scene` until the fleet is at rest.
+
+    Equal arguments give equal logs, timing apart. The run ends early, with `completed`
+    False, when a robot is more than 2 m from its reference, when the physics diverge,
+    or when the fleet does not get on.
+
+    Args:
+        scene: the scene the plan was made for.
+        plan: what to drive.
+        controller: name of the tracking controller.
+        on_progress: called with the fraction done and a text.
+
+    Raises:
+        UsageError: if the controller is unknown or the plan is of another scene.
+    """
+    maker = controller_maker(controller)
+    if plan.scene_digest != scene.digest:
+        raise UsageError(
+            f"the plan was made for scene {plan.scene_digest}, but '{scene.name}' is "
+            f"{scene.digest}; plan this scene anew"
+        )
+    run = _Run(build_world(scene), plan, [maker(robot.model) for robot in scene.robots])
+    started = time.perf_counter()
+    while not run.ended():
+        run.tick()
+        if on_progress is not None and run.ticks % _PROGRESS_TICKS == 0:
+            on_progress(run.fraction(), f"driven {run.data.time:.0f} s")
+    return run.log(controller, time.perf_counter() - started)
+
+
+class _Run:
+    """One simulation in progress."""
+
+    def __init__(
+        self, world: MujocoWorld, plan: Plan, controllers: list[Controller]
+    ) -> None:
+        self.ticks = 0
+        self.data = mujoco.MjData(world.model)
+        self._world, self._plan = world, plan
+        self._period_s = STEPS_PER_TICK * world.model.opt.timestep
+        self._reference = FleetReference(world.scene, plan)
+        self._clock = FleetClock()
+        self._set_points = SetPoints(world.scene, self._reference, controllers)
+        self._drive = DriveControl(world.scene)
+        self._contacts = ContactWatch(world)
+        self._recording = Recording()
+        self._controller_s: list[float] = []
+        self._finished_s = np.inf
+        self._fleet = Fleet(world, self.data)
+        self._settle()
+        self._observe()
+
+    def tick(self) -> None:
+        """Advance the simulation by one control period."""
+        self._command()
+        now, following = self._set_points.now, self._set_points.following
+        resistance = self._resistance_N(following[:, 1])
+        speed, rolled = self._fleet.axle_speed_m_s(), self._fleet.rolled_m()
+        force = self._drive.force_N(
+            speed, now[:, 0], following[:, 0], resistance, self._period_s
+        )
+        self._fleet.set_resistance(resistance)
+        self._fleet.drive(force, now[:, 1], following[:, 1], STEPS_PER_TICK)
+        self._clock.advance(self._period_s)
+        self.ticks += 1
+        work = held_force_work_J(
+            force,
+            self._fleet.rolled_m() - rolled,
+            self._fleet.axle_speed_m_s() - speed,
+            self._world.model.opt.timestep,
+        )
+        self._recording.add(force_N=force, work_J=work)
+        self._contacts.look(self.data)
+        self._observe()
+
+    def ended(self) -> bool:
+        """Tell whether the fleet is at rest after its plan, or is past helping."""
+        return self._completed() or self._hopeless()
+
+    def fraction(self) -> float:
+        """Return the share of the plan's time that is done."""
+        return min(self._clock.time_s / max(self._reference.duration_s, 1e-9), 1.0)
+
+    def log(self, controller: str, wall_s: float) -> ExecutionLog:
+        """Return everything recorded."""
+        scene, recording = self._world.scene, self._recording
+        robots = len(scene.robots)
+        per_call_ms = 1e3 * np.array(self._controller_s or [0.0]) / robots
+        return ExecutionLog(
+            scene_digest=scene.digest,
+            plan_digest=self._plan.digest,
+            model_digest=self._world.digest,
+            controller=controller,
+            control_period_s=self._period_s,
+            completed=self._completed(),
+            robots=tuple(robot.id for robot in scene.robots),
+            versions={name: version(name) for name in _VERSIONED},
+            time_s=recording.in_time("time_s"),
+            clock_s=recording.in_time("clock_s"),
+            state=recording.by_robot("state", robots),
+            reference=recording.by_robot("reference", robots),
+            command=recording.by_robot("command", robots),
+            multiplier=recording.by_robot("multiplier", robots),
+            force_N=recording.by_robot("force_N", robots),
+            work_J=recording.by_robot("work_J", robots),
+            qpos=recording.in_time("qpos"),
+            contacts=tuple(self._contacts.contacts),
+            timing={
+                "wall_s": wall_s,
+                "realtime_factor": self.data.time / wall_s,
+                "controller_ms": {
+                    "median": float(np.median(per_call_ms)),
+                    "p99": float(np.percentile(per_call_ms, 99)),
+                },
+            },
+        )
+
+    def _settle(self) -> None:
+        """Let the tyres take the weight, then start the time."""
+        still = np.zeros(len(self._world.scene.robots))
+        self._fleet.set_resistance(self._drive.resistance_N(still + 1.0, still))
+        self._fleet.drive(still, still, still, _SETTLING_STEPS)
+        self.data.time = 0.0
+
+    def _command(self) -> None:
+        """Set the clock's pace and the ramps of the coming tick."""
+        if self._finished_s < np.inf:
+            self._set_points.brake(self._period_s)
+            return
+        clock = self._clock
+        clock.pace(self._state, self._planned, self._period_s)
+        if self.ticks % TICKS_PER_CORRECTION == 0:
+            started = time.perf_counter()
+            self._set_points.correct(self._state, clock.time_s, clock.rate)
+            self._controller_s.append(time.perf_counter() - started)
+        self._set_points.advance(
+            self._fleet.axle_speed_m_s(), clock.time_s, clock.rate, self._period_s
+        )
+
+    def _resistance_N(self, steer: np.ndarray) -> np.ndarray:
+        """Return the ground's force on each robot in the middle of the coming tick."""
+        _, _, heading, speed, steer_now = self._state.T
+        way = 0.5 * self._period_s * speed
+        middle = self._state[:, :2] + np.stack(
+            [way * np.cos(heading), way * np.sin(heading)], axis=1
+        )
+        multiplier = multiplier_at(self._world.scene, middle)
+        return self._drive.resistance_N(multiplier, 0.5 * (steer_now + steer))
+
+    def _observe(self) -> None:
+        self._state = self._fleet.state()
+        self._planned = self._reference.at(np.array([self._clock.time_s]))[0]
+        if self._clock.time_s >= self._reference.duration_s - 1e-9:
+            self._finished_s = min(self._finished_s, self.data.time)
+        self._recording.add(
+            time_s=self.data.time,
+            clock_s=min(self._clock.time_s, self._reference.duration_s),
+            state=self._state,
+            reference=self._planned,
+            command=self._set_points.following,
+            multiplier=multiplier_at(self._world.scene, self._state[:, :2]),
+            qpos=self.data.qpos,
+        )
+
+    def _completed(self) -> bool:
+        rested_s = self.data.time - self._finished_s
+        at_rest = (np.abs(self._state[:, 3]) < _AT_REST_M_S).all()
+        return bool(rested_s >= _REST_S and at_rest)
+
+    def _hopeless(self) -> bool:
+        off_m = np.hypot(*(self._state - self._planned)[:, :2].T)
+        longest_s = _LONGEST_SLOWDOWN * self._reference.duration_s + _LONGEST_REST_S
+        overdue = self.data.time > longest_s
+        restless = self.data.time - self._finished_s > _LONGEST_REST_S
+        # Written so that a state that is not a number counts as lost.
+        return not (off_m <= _LOST_M).all() or overdue or restless
