@@ -1,0 +1,234 @@
+"""Compare what a mission was planned to cost with what its simulation cost.
+
+Three meters: *planned* is the energy model over the plan, *metered* the same model over
+the simulated motion, *measured* the work done at the simulated wheels,
+
+    E = W_driving / eta + regeneration * W_braking + P_idle t.
+
+Planned to metered shows what tracking changed, metered to measured what the energy
+model misses of the physics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrmg.accounting import (
+    LoggedMotion,
+    battery_content,
+    find_visits,
+    leg_entries,
+    plan_ledger,
+)
+from mrmg.errors import Fault, RunFolderError
+from mrmg.execution.log import ExecutionLog
+from mrmg.ledger import EnergyLedger, LedgerEntry
+from mrmg.mission import Plan, Visit
+from mrmg.results.energy_audit import EnergyAudit, RobotAudit, SimulatedVisit
+from mrmg.scene.types import Scene
+
+MEASURED_PARTS = ("drive", "idle")
+"""The parts that work at the wheels can be split into."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Measured:
+    """What the simulation says of one robot.
+
+    Attributes:
+        motion: its logged states.
+        visits: of its tour's targets, in order; steps are control ticks.
+        energy_J: measured over each tick by part, shape (n - 1, 2).
+        content_J: measured battery content at each tick, shape (n,).
+        arrival_J: content on arrival at each visit.
+    """
+
+    motion: LoggedMotion
+    visits: tuple[Visit, ...]
+    energy_J: np.ndarray
+    content_J: np.ndarray
+    arrival_J: list[float]
+
+    @property
+    def least_J(self) -> float:
+        """Least battery content, arrivals included."""
+        return min([float(self.content_J.min()), *self.arrival_J])
+
+
+def audit(scene: Scene, plan: Plan, log: ExecutionLog) -> EnergyAudit:
+    """Return the account of a mission that was planned and then simulated.
+
+    Args:
+        scene: what both were made for.
+        plan: what was to be driven.
+        log: what was driven.
+
+    Raises:
+        RunFolderError: if the log is of another scene, plan or fleet.
+    """
+    _check_same_mission(scene, plan, log)
+    measured = [_measure(scene, plan, log, index) for index in range(len(log.robots))]
+    planned_ledger = plan.ledger
+    metered_ledger = plan_ledger(
+        scene,
+        [item.motion for item in measured],
+        [visit for item in measured for visit in item.visits],
+    )
+    measured_ledger = EnergyLedger(
+        tuple(entry for item in measured for entry in _measured_entries(item))
+    )
+    goals_visited = _goals_visited(scene, log)
+    reasons = (
+        *_unfinished(log),
+        *_goals_missed(scene, goals_visited),
+        *_contacts(log),
+        *_below_reserve(scene, measured),
+    )
+    return EnergyAudit(
+        mission_ok=not reasons,
+        reasons=reasons,
+        robots=tuple(
+            _robot_audit(
+                scene,
+                log,
+                item,
+                planned_J=planned_ledger.total_J(robot=item.motion.robot),
+                metered_J=metered_ledger.total_J(robot=item.motion.robot),
+            )
+            for item in measured
+        ),
+        visits=_simulated_visits(measured),
+        goals_visited=goals_visited,
+        planned=planned_ledger,
+        metered=metered_ledger,
+        measured=measured_ledger,
+    )
+
+
+def _check_same_mission(scene: Scene, plan: Plan, log: ExecutionLog) -> None:
+    expected = tuple(robot.id for robot in scene.robots)
+    faults = []
+    if plan.scene_digest != scene.digest:
+        faults.append(Fault("plan.json", "plan of another scene; run 'mrmg plan'"))
+    if log.scene_digest != scene.digest:
+        faults.append(Fault("log.json", "log of another scene; run 'mrmg execute'"))
+    if log.plan_digest != plan.digest:
+        faults.append(Fault("log.json", "log of another plan; run 'mrmg execute'"))
+    if log.robots != expected:
+        text = f"log of robots {list(log.robots)}, the scene has {list(expected)}"
+        faults.append(Fault("log.json", f"{text}; run 'mrmg execute'"))
+    if faults:
+        raise RunFolderError(scene.name, faults)
+
+
+def _measure(scene: Scene, plan: Plan, log: ExecutionLog, index: int) -> _Measured:
+    robot = scene.robots[index]
+    motion = LoggedMotion(robot=robot.id, time_s=log.time_s, state=log.state[index])
+    visits = find_visits(scene, motion, plan.tours[robot.id])
+    model = robot.model.energy_model
+    driving_J, braking_J = log.work_J[index].T
+    drive_J = (
+        driving_J / model.drive_efficiency + braking_J * model.regeneration_efficiency
+    )
+    idle_J = model.idle_power_W * np.diff(log.time_s)
+    energy_J = np.stack([drive_J, idle_J], axis=-1)
+    content_J, arrival_J = battery_content(
+        scene, robot.id, energy_J.sum(axis=1), visits
+    )
+    return _Measured(
+        motion=motion,
+        visits=visits,
+        energy_J=energy_J,
+        content_J=content_J,
+        arrival_J=arrival_J,
+    )
+
+
+def _measured_entries(item: _Measured) -> list[LedgerEntry]:
+    return leg_entries(item.motion.robot, item.energy_J, MEASURED_PARTS, item.visits)
+
+
+def _robot_audit(
+    scene: Scene,
+    log: ExecutionLog,
+    item: _Measured,
+    *,
+    planned_J: float,
+    metered_J: float,
+) -> RobotAudit:
+    robot = scene.robot(item.motion.robot)
+    measured_J = float(item.energy_J.sum())
+    base_J = max(planned_J, robot.model.energy_model.plain_ground_J_per_m())
+    offset_m = (
+        item.motion.state[:, :2] - log.reference[log.robots.index(robot.id), :, :2]
+    )
+    error_m = np.hypot(offset_m[:, 0], offset_m[:, 1])
+    return RobotAudit(
+        robot=robot.id,
+        planned_J=planned_J,
+        metered_J=metered_J,
+        measured_J=measured_J,
+        metered_error_pct=100.0 * (metered_J - planned_J) / base_J,
+        measured_error_pct=100.0 * (measured_J - planned_J) / base_J,
+        min_charge_fraction=item.least_J / robot.battery.capacity_J,
+        tracking_rms_m=float(np.sqrt(np.mean(error_m**2))),
+        tracking_max_m=float(error_m.max()),
+    )
+
+
+def _simulated_visits(measured: list[_Measured]) -> tuple[SimulatedVisit, ...]:
+    visits = [
+        SimulatedVisit(
+            robot=visit.robot,
+            target=visit.target,
+            kind=visit.kind,
+            time_s=visit.time_s,
+            energy_J=energy_J,
+        )
+        for item in measured
+        for visit, energy_J in zip(item.visits, item.arrival_J, strict=True)
+    ]
+    return tuple(sorted(visits, key=lambda visit: visit.time_s))
+
+
+def _goals_visited(scene: Scene, log: ExecutionLog) -> tuple[str, ...]:
+    points = log.state[:, :, :2].reshape(-1, 2)
+    return tuple(
+        goal.id for goal in scene.goals if (goal.region.depth(points) >= 0.0).any()
+    )
+
+
+def _unfinished(log: ExecutionLog) -> list[str]:
+    if log.completed:
+        return []
+    return [f"the simulation was ended early, at {log.time_s[-1]:.1f} s"]
+
+
+def _goals_missed(scene: Scene, visited: tuple[str, ...]) -> list[str]:
+    return [
+        f"goal {goal.id} was entered by no robot"
+        for goal in scene.goals
+        if goal.id not in visited
+    ]
+
+
+def _contacts(log: ExecutionLog) -> list[str]:
+    return [
+        f"{contact.robot} touched {contact.other} at {contact.time_s:.2f} s "
+        f"near ({contact.x_m:.2f}, {contact.y_m:.2f})"
+        for contact in log.contacts
+    ]
+
+
+def _below_reserve(scene: Scene, measured: list[_Measured]) -> list[str]:
+    reasons = []
+    for item in measured:
+        battery = scene.robot(item.motion.robot).battery
+        if item.least_J < battery.reserve_J:
+            reasons.append(
+                f"{item.motion.robot}'s battery fell to {item.least_J:.0f} J, "
+                f"below its reserve of {battery.reserve_J:.0f} J"
+            )
+    return reasons
