@@ -86,7 +86,10 @@ class RunFolder:
             UsageError: if the folder holds something other than a run.
             RunFolderError: if another process is working in it.
         """
-        self.path.mkdir(parents=True, exist_ok=True)
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except (FileExistsError, NotADirectoryError) as error:
+            raise UsageError(f"{error.filename} is a file; choose a folder") from error
         with _exclusive(self.path):
             if any(self.path.iterdir()) and not self.file("run.json").exists():
                 self._refuse_foreign_files()

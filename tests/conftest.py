@@ -1,4 +1,4 @@
-"""What all tests share: a kernel cache that survives, and quick tests before slow ones."""
+"""What all tests share: the quick ones run before the slow ones."""
 
 from __future__ import annotations
 

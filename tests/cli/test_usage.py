@@ -1,0 +1,137 @@
+"""Mistakes of a user end with the documented code and one message on stderr."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mrmg.cli import main
+from mrmg.errors import ExitCode
+
+BAD_SCENE = """\
+format: 1
+name: bad
+bounds: [0, 0, 30, 20]
+robots:
+  - {id: r1, model: car, pose: [5, 5]}
+  - {id: r2, model: kar, pose: [15, 5, 0]}
+goals:
+  - {id: g1, cirle: {center: [1, 2], radius: 1}}
+"""
+
+
+def run(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "mrmg", *arguments],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        check=False,
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        ([], "COMMAND"),
+        (["fly"], "fly"),
+        (["run"], "SCENE"),
+        (["run", "quickstart", "--seed", "-1"], "--seed"),
+        (["run", "quickstart", "--seed", "x"], "--seed"),
+        (["run", "quickstart", "--budget", "0"], "--budget"),
+        (["run", "quickstart", "--budget", "nan"], "--budget"),
+        (["run", "quickstart", "--profile", "fast"], "paper"),
+        (["render", "runs/x", "--size", "huge"], "1280x720"),
+        (["render", "runs/x", "--size", "1x1"], "1280x720"),
+        (["render", "runs/x", "--fps", "0"], "--fps"),
+        (["render", "runs/x", "--view", "side"], "chase"),
+        (["scene"], "COMMAND"),
+        (["scene", "populate", "s.yaml", "--goals", "0"], "--goals"),
+        (["scene", "import", "m.txt", "--longest-side", "-3"], "--longest-side"),
+    ],
+)
+def test_wrong_usage_names_the_argument(
+    arguments: list[str], named: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(arguments)
+    told = capsys.readouterr()
+    assert ended.value.code == ExitCode.USAGE
+    assert named in told.err
+    assert told.out == ""
+
+
+@pytest.mark.parametrize("verb", ["run", "plan"])
+def test_an_invalid_scene_tells_every_fault_and_writes_nothing(
+    verb: str, tmp_path: Path
+) -> None:
+    (tmp_path / "bad.yaml").write_text(BAD_SCENE)
+    ended = run(verb, "bad.yaml", cwd=tmp_path)
+    assert ended.returncode == ExitCode.INVALID_FILE
+    assert ended.stdout == ""
+    assert "Traceback" not in ended.stderr
+    for path in ("robots.0.pose", "robots.1.model", "goals.0"):
+        assert path in ended.stderr
+    assert [item.name for item in tmp_path.iterdir()] == ["bad.yaml"]
+
+
+def test_an_unknown_scene_is_answered_with_the_known_ones(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["scene", "check", "quikstart"]) == ExitCode.INVALID_FILE
+    assert "quickstart" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("verb", ["verify", "execute", "audit", "render", "report"])
+def test_steps_ask_for_a_run_folder(
+    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([verb, str(tmp_path / "none")]) == ExitCode.INVALID_FILE
+    told = capsys.readouterr()
+    assert "not a run folder" in told.err
+    assert told.out == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_of_something_else_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "thesis.tex").write_text("precious")
+    code = main(["run", "quickstart", "--no-video", "--out", str(tmp_path)])
+    assert code == ExitCode.USAGE
+    assert "thesis.tex" in capsys.readouterr().err
+    assert [item.name for item in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_a_file_in_place_of_the_folder_is_told_without_traceback(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "out").write_text("a file")
+    out = str(tmp_path / "out")
+    assert main(["run", "quickstart", "--no-video", "--out", out]) == ExitCode.USAGE
+    assert "out" in capsys.readouterr().err
+
+
+def test_help_tells_the_exit_codes() -> None:
+    ended = run("--help")
+    assert ended.returncode == ExitCode.OK
+    for code in ("0 ", "2 ", "3 ", "4 ", "5 ", "6 ", "7 ", "130 "):
+        assert f" {code}" in ended.stdout
+    for verb in ("run", "plan", "verify", "execute", "audit", "render", "doctor"):
+        assert verb in ended.stdout
+
+
+def test_a_closed_pipe_is_no_error() -> None:
+    ended = subprocess.run(
+        f"{sys.executable} -m mrmg scene import missing.txt | true; "
+        f"{sys.executable} -m mrmg doctor --json | head -c 1",
+        shell=True,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "Traceback" not in ended.stderr
+    assert "Exception" not in ended.stderr

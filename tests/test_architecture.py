@@ -1,0 +1,94 @@
+"""Rules of the house that no other tool checks."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import pkgutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import mrmg
+
+PACKAGE = Path(mrmg.__file__).parent
+MODULES = sorted(PACKAGE.rglob("*.py"))
+LONGEST_MODULE = 400
+DRAWERS = {"utils", "util", "common", "helpers", "helper", "misc", "tools"}
+HEAVY = {"av", "casadi", "matplotlib", "mujoco", "numba", "pydantic", "rich", "scipy"}
+
+FACADES = [
+    name
+    for _, name, is_package in pkgutil.walk_packages([str(PACKAGE)], "mrmg.")
+    if is_package
+]
+
+
+def relative(path: Path) -> str:
+    return str(path.relative_to(PACKAGE))
+
+
+@pytest.mark.parametrize("path", MODULES, ids=relative)
+def test_modules_stay_readable(path: Path) -> None:
+    assert len(path.read_text().splitlines()) <= LONGEST_MODULE
+    assert path.stem not in DRAWERS, "name a module after its subject"
+
+
+@pytest.mark.parametrize("name", ["mrmg", *FACADES])
+def test_every_exported_name_exists(name: str) -> None:
+    module = importlib.import_module(name)
+    exported = getattr(module, "__all__", [])
+    assert [item for item in exported if not hasattr(module, item)] == []
+    assert list(exported) == sorted(exported)
+
+
+def test_unknown_names_of_the_package_are_refused() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = mrmg.nonsense
+
+
+@pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*_kernels.py")), ids=relative)
+def test_kernels_import_only_what_can_be_compiled(path: Path) -> None:
+    """The cache of compiled kernels is keyed by these files and sees no others."""
+    allowed = {"__future__", "collections", "math", "numba", "numpy", "typing"}
+    for name in imported_names(path):
+        inside = name.startswith("mrmg.")
+        feeds_cache = name.endswith("_kernels") or name in {
+            "mrmg.compilation",
+            "mrmg.energy",
+            "mrmg.motion.dynamics",
+        }
+        assert feeds_cache if inside else name.split(".")[0] in allowed, name
+
+
+def imported_names(path: Path) -> list[str]:
+    names = []
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            within = [f"{node.module}.{alias.name}" for alias in node.names]
+            is_module = [
+                (PACKAGE.parent / (name.replace(".", "/") + ".py")).exists()
+                for name in within
+            ]
+            names += [
+                full if is_one else str(node.module)
+                for full, is_one in zip(within, is_module, strict=True)
+            ]
+    return names
+
+
+@pytest.mark.parametrize(
+    "statement",
+    ["import mrmg", "from mrmg.cli.parser import make_parser; make_parser()"],
+)
+def test_nothing_heavy_is_imported_before_a_command_runs(statement: str) -> None:
+    code = f"import sys; {statement}; print(*sys.modules)"
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    loaded = {name.split(".")[0] for name in answer.stdout.split()}
+    assert sorted(loaded & HEAVY) == []

@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from mrmg import doctor
+from mrmg.cli import main
+from mrmg.errors import ExitCode
+
+
+def test_everything_needed_is_looked_at() -> None:
+    names = {finding.name for finding in doctor.examine()}
+    assert {"python", "cpu", "kernel cache", "offscreen GL", "mujoco parts"} <= names
+    assert {"mujoco", "casadi", "numba", "shapely", "trimesh", "networkx"} <= names
+    assert not {"pytest", "ruff", "mypy"} & names
+
+
+def test_the_command_tells_the_findings_as_json(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    code = main(["doctor", "--json"])
+    findings = json.loads(capsys.readouterr().out)
+    missing = [finding for finding in findings if not finding["ok"]]
+    assert code == (ExitCode.MACHINE if missing else ExitCode.OK)
+    assert all(finding["cure"] for finding in missing)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_cache_that_cannot_be_written_is_told_with_its_cure(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    tmp_path.chmod(0o500)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    finding = doctor._kernel_cache()
+    assert not finding.ok
+    assert "NUMBA_CACHE_DIR" in finding.cure
+
+
+@pytest.mark.parametrize("name", ["shapely", "mujoco"])
+def test_a_missing_package_is_told_with_its_cure(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    """The package's record is hidden; all else that is looked at is real."""
+    real = doctor.version
+
+    def hidden(asked: str) -> str:
+        if asked == name:
+            raise doctor.PackageNotFoundError(asked)
+        return real(asked)
+
+    monkeypatch.setattr(doctor, "version", hidden)
+    assert main(["doctor"]) == ExitCode.MACHINE
+    told = capsys.readouterr().out
+    assert "MISSING" in told
+    assert f"pip install {name}" in told
