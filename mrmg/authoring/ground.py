@@ -130,6 +130,8 @@ class Ground:
 
     def road_to_nearest(self, targets: np.ndarray) -> np.ndarray:
         """Return the cost from every point to the nearest of `targets` [m]."""
+        if not len(targets):
+            return np.full(len(self.points_m), np.inf)
         cost = dijkstra(self.roads, directed=False, indices=targets, min_only=True)
         return np.asarray(cost)
 

@@ -147,12 +147,12 @@ def _candidates(
     connected = _largest(ground)
     turning_m = model.turning_radius_m + model.half_width_m
     wide = np.flatnonzero(connected & (ground.clearance_m >= turning_m))
-    near_wide = connected.copy()
-    if len(wide):
-        to_wide = ground.road_to_nearest(wide)
-        near_wide &= to_wide <= 4.0 * model.turning_radius_m
-    for clearance_m in (2.0, 1.5, ground.margin_m):
-        good = np.flatnonzero(near_wide & (ground.clearance_m >= clearance_m))
+    near_wide = connected & (
+        ground.road_to_nearest(wide) <= 4.0 * model.turning_radius_m
+    )
+    turnable = near_wide if near_wide.sum() >= 0.5 * connected.sum() else connected
+    for clearance_m in (2.6, 2.0, 1.5, ground.margin_m):
+        good = np.flatnonzero(turnable & (ground.clearance_m >= clearance_m))
         if len(good) >= 0.25 * connected.sum():
             break
     spacing_m = math.sqrt(len(good) * ground.cell_m**2 / _CANDIDATES) * 0.8
