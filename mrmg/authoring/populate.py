@@ -1,24 +1,19 @@
 """Missions on bare maps: where robots, goals and stations go, and how much energy.
 
 Everything is placed on roads a car can really drive: points of one connected area of
-the free ground shrunk by a margin, near places wide enough to turn round. Stations are
-spread by k-medoids over the road distances, goals by farthest-point sampling, and the
-robots start near each other at one end of the map. The capacity is then chosen between
-two bounds: large enough that every goal and station can be reached from another
-station, and so small that no plan can do without recharging.
+the free ground shrunk by a margin, near places wide enough to turn round.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from mrmg import shipped
 from mrmg.authoring.ground import Ground
+from mrmg.authoring.placement import RESERVE, Placement, place_mission
 from mrmg.errors import UsageError
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.loading.models import load_model
@@ -28,26 +23,14 @@ from mrmg.seeding import stream
 
 GOAL_RADIUS_M = 1.5
 STATION_RADIUS_M = 2.0
-RESERVE = 0.05
 
 _MARGINS_M = (1.3, 0.9, 0.6, 0.4)
 """Added to half the robot's width: the widest roads that span the map are used."""
 
-_START_GAP_M = 5.0
-"""Least distance of two robots at the start: either can leave first."""
+_LEAST_SHARE = 0.4
+"""Share of the free ground that must hang together, or the map is too narrow."""
 
-_ATTEMPTS = 40
 _CANDIDATES = 150
-
-
-@dataclass(frozen=True)
-class _Placement:
-    """Indices of candidates, and the capacity that suits them [m of plain ground]."""
-
-    robots: list[int]
-    goals: list[int]
-    stations: list[int]
-    capacity_m: float
 
 
 def populate(
@@ -85,7 +68,7 @@ def populate(
     kept = ("format", "name", "bounds", "obstacles", "terrain")
     bare = {key: document[key] for key in kept if key in document}
     for obstacle in bare.get("obstacles", []):
-        if "blocks" in obstacle:
+        if isinstance(obstacle, dict) and "blocks" in obstacle:
             message = (
                 "an obstacle with 'blocks' names robots that populate replaces; "
                 "remove 'blocks' from the map first"
@@ -104,7 +87,9 @@ def populate(
         )
         raise UsageError(message)
     road_m = ground.distances(places)[:, places]
-    placement = _place(road_m, ground.points_m[places], robots, goals, stations, rng)
+    placement = place_mission(
+        road_m, ground.points_m[places], robots, goals, stations, rng
+    )
     return _document(bare, ground, places, placement, model, robot_model)
 
 
@@ -120,6 +105,13 @@ def _drivable(scene: Scene, model: RobotModel) -> Ground:
         for margin_m in _MARGINS_M
     ]
     sizes = [_largest(ground).sum() for ground in grounds]
+    share = max(sizes) / max(1, (grounds[0].clearance_m > 0.0).sum())
+    if share < _LEAST_SHARE:
+        message = (
+            f"roads wide enough for this robot join only {100 * share:.0f} % of the "
+            "map's free ground; scale the map up"
+        )
+        raise UsageError(message)
     # Wide margins lose a seam along every wall; lost rooms lose much more.
     return next(
         ground
@@ -132,8 +124,7 @@ def _largest(ground: Ground) -> np.ndarray:
     """Return the mask of the largest connected free area."""
     labels = ground.component[ground.free]
     if not len(labels):
-        message = "no robot of this model fits on the map; scale the map up"
-        raise UsageError(message)
+        return np.zeros(len(ground.free), dtype=bool)
     return np.asarray(ground.component == np.bincount(labels).argmax())
 
 
@@ -166,127 +157,11 @@ def _candidates(
     return chosen
 
 
-def _place(
-    road_m: np.ndarray,
-    points_m: np.ndarray,
-    robots: int,
-    goals: int,
-    stations: int,
-    rng: np.random.Generator,
-) -> _Placement:
-    """Return the first placement whose two bounds on the capacity leave room."""
-    for _ in range(_ATTEMPTS):
-        starts = _depot(road_m, points_m, robots, rng)
-        if len(starts) < robots:
-            continue
-        free = [i for i in range(len(road_m)) if i not in starts]
-        posts = [free[i] for i in _medoids(road_m[np.ix_(free, free)], stations, rng)]
-        rest = [i for i in free if i not in posts]
-        sites = _spread(road_m, rest, [*starts, *posts], goals)
-        least = _least_capacity_m(road_m, starts, sites, posts)
-        most = _most_capacity_m(road_m, starts, sites)
-        if least <= most:
-            capacity_m = max(least, 0.8 * most)
-            return _Placement(starts, sites, posts, math.ceil(capacity_m))
-    message = (
-        f"found no mission of {robots} robots, {goals} goals and {stations} stations "
-        "that needs recharging and stays feasible; ask for more stations"
-    )
-    raise UsageError(message)
-
-
-def _depot(
-    road_m: np.ndarray, points_m: np.ndarray, robots: int, rng: np.random.Generator
-) -> list[int]:
-    """Return places near each other at one end of the map, one for each robot."""
-    eccentricity = road_m.max(axis=1)
-    ends = np.flatnonzero(eccentricity >= np.quantile(eccentricity, 0.7))
-    first = int(rng.choice(ends))
-    starts: list[int] = []
-    for index in np.argsort(road_m[first], kind="stable"):
-        gap = points_m[starts] - points_m[index]
-        if len(starts) < robots and (np.hypot(*gap.T) >= _START_GAP_M).all():
-            starts.append(int(index))
-    return starts
-
-
-def _medoids(road_m: np.ndarray, count: int, rng: np.random.Generator) -> list[int]:
-    """Return `count` places that serve all others well (k-medoids)."""
-    medoids = [int(rng.integers(len(road_m)))]
-    while len(medoids) < count:
-        medoids.append(int(road_m[medoids].min(axis=0).argmax()))
-    for _ in range(20):
-        owner = road_m[medoids].argmin(axis=0)
-        moved = [
-            # The centre of a cluster: least worst distance to its members.
-            int(members[road_m[np.ix_(members, members)].max(axis=1).argmin()])
-            for members in (np.flatnonzero(owner == k) for k in range(count))
-        ]
-        if moved == medoids:
-            break
-        medoids = moved
-    return medoids
-
-
-def _spread(
-    road_m: np.ndarray, allowed: Sequence[int], taken: Sequence[int], count: int
-) -> list[int]:
-    """Return `count` of the allowed places, far from the taken ones and each other."""
-    sites: list[int] = []
-    pool = np.array(allowed)
-    for _ in range(count):
-        near = road_m[[*taken, *sites]][:, pool].min(axis=0)
-        best = int(near.argmax())
-        sites.append(int(pool[best]))
-        pool = np.delete(pool, best)
-    return sites
-
-
-def _least_capacity_m(
-    road_m: np.ndarray, starts: list[int], sites: list[int], posts: list[int]
-) -> float:
-    """Return a capacity with which every goal can be served, with room to spare."""
-    to_post = road_m[np.ix_(sites, posts)].min(axis=1).max()
-    from_start = road_m[np.ix_(starts, posts)].min(axis=1).max()
-    return float(
-        max(to_post / 0.38, from_start / 0.6, _widest_gap(road_m, posts) / 0.7)
-    )
-
-
-def _widest_gap(road_m: np.ndarray, posts: list[int]) -> float:
-    """Return the longest leg one must drive to get from any station to any other."""
-    between = road_m[np.ix_(posts, posts)]
-    joined, widest = [0], 0.0
-    while len(joined) < len(posts):
-        apart = [k for k in range(len(posts)) if k not in joined]
-        legs = between[np.ix_(joined, apart)]
-        widest = max(widest, float(legs.min()))
-        joined.append(apart[int(legs.min(axis=0).argmin())])
-    return widest
-
-
-def _most_capacity_m(road_m: np.ndarray, starts: list[int], sites: list[int]) -> float:
-    """Return a capacity with which no plan does without recharging.
-
-    Either some goal is out of reach of every robot, or all batteries together fall
-    short of the spanning forest of the goals, rooted at the robots.
-    """
-    reach = road_m[np.ix_(starts, sites)].min(axis=0)
-    away, forest_m = list(range(len(sites))), 0.0
-    near = reach.copy()
-    while away:
-        closest = min(away, key=lambda k: near[k])
-        forest_m += near[closest]
-        away.remove(closest)
-        near = np.minimum(near, road_m[sites[closest], sites])
-    return 0.9 * max(float(reach.max()), forest_m / len(starts)) / (1.0 - RESERVE)
-
-
 def _document(
     bare: dict[str, Any],
     ground: Ground,
     places: list[int],
-    placement: _Placement,
+    placement: Placement,
     model: str,
     robot_model: RobotModel,
 ) -> dict[str, Any]:
