@@ -178,11 +178,10 @@ def _code_digest() -> str:
 
 
 def _plan(run: Run) -> bool:
-    from mrmg.planning import PlannerParams, plan_mission
+    from mrmg.planning import plan_mission
+    from mrmg.planning.parameters import profile_params
 
-    params = PlannerParams(
-        profile=run.arguments.profile, budget_s=run.arguments.budget_s
-    )
+    params = profile_params(run.arguments.profile, budget_s=run.arguments.budget_s)
     result = plan_mission(
         run.scene,
         seed=run.arguments.seed,

@@ -76,24 +76,24 @@ def print_summary(summary: dict[str, Any], reason: str) -> None:
 
 
 def _summary_lines(summary: dict[str, Any]) -> Iterator[str]:
-    plan, verdict = summary.get("plan"), summary.get("verdict")
-    execution, energy = summary.get("execution"), summary.get("energy")
-    if plan and plan.get("cost_J") is not None:
+    plan, verdict = summary["plan"], summary["verdict"]
+    execution, energy = summary["execution"], summary["energy"]
+    if plan:
         yield (
             f"plan       {plan['cost_J'] / 1000:.1f} kJ in {plan['makespan_s']:.0f} s, "
             f"planned in {plan['time_s']['total']:.2f} s"
         )
     if verdict:
         yield (
-            f"verdict    {_verdict_word(verdict)}; clearance to obstacles "
+            f"verdict    {verdict['violations']} violations; clearance to obstacles "
             f"{_metres(verdict['min_obstacle_clearance_m'])}, between robots "
             f"{_metres(verdict['min_robot_distance_m'])}"
         )
     if execution:
         tracking = execution["tracking"]
         yield (
-            f"driven     {_count(execution['goals_visited'])} of {summary['goals']} "
-            f"goals, {_count(execution['contacts'])} contacts, tracking "
+            f"driven     {execution['goals_visited']} of {summary['goals']} "
+            f"goals, {execution['contacts']} contacts, tracking "
             f"{tracking['rms_m']:.3f} m rms, {tracking['max_m']:.3f} m max, "
             f"{execution['realtime_factor']:.0f} x real time"
         )
@@ -104,14 +104,6 @@ def _summary_lines(summary: dict[str, Any]) -> Iterator[str]:
             f"below {energy['min_charge_fraction']:.0%}, "
             f"{energy['recharges']} recharges"
         )
-
-
-def _verdict_word(verdict: dict[str, Any]) -> str:
-    return "valid" if verdict["ok"] else f"{_count(verdict['violations'])} violations"
-
-
-def _count(value: Any) -> int:
-    return value if isinstance(value, int) else len(value)
 
 
 def _metres(value: float | None) -> str:

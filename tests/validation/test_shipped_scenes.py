@@ -1,0 +1,108 @@
+"""Every shipped scene: planned, judged, driven, and planned against simulated energy.
+
+The quickstart is driven in every test run, the scenes of the table in continuous
+integration (CI=true), where all of them are.
+"""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+
+import pytest
+
+import mrmg
+from mrmg.energy import PARTS
+from mrmg.execution.log import ExecutionLog
+from mrmg.mission import Plan, PlanStatus
+from mrmg.results.energy_audit import EnergyAudit
+from mrmg.results.verdict import Verdict
+from mrmg.scene.types import Scene
+from mrmg.shipped import scene_names
+
+METERED_PCT = 3.0
+MEASURED_PCT = 5.0
+TRACKING_RMS_M = 0.05
+TRACKING_MAX_M = 0.25
+
+in_ci = pytest.mark.skipif(
+    os.environ.get("CI") != "true", reason="all scenes are driven where CI=true"
+)
+MISSIONS = [
+    pytest.param("quickstart", 0),
+    *(
+        pytest.param(name, 0, marks=[pytest.mark.slow, in_ci])
+        for name in scene_names()
+        if name != "quickstart"
+    ),
+]
+missions = pytest.mark.parametrize(("name", "seed"), MISSIONS)
+
+
+@cache
+def driven(
+    name: str, seed: int
+) -> tuple[Scene, Plan, Verdict, ExecutionLog, EnergyAudit]:
+    scene = mrmg.load_scene(name)
+    result = mrmg.plan(scene, seed=seed)
+    assert result.status is PlanStatus.SOLVED, result.reason
+    assert result.plan is not None
+    verdict = mrmg.verify(scene, result.plan)
+    log = mrmg.execute(scene, result.plan)
+    return scene, result.plan, verdict, log, mrmg.audit(scene, result.plan, log)
+
+
+@missions
+def test_the_plan_passes_the_independent_verifier(name: str, seed: int) -> None:
+    _, _, verdict, _, _ = driven(name, seed)
+    assert [violation.message for violation in verdict.violations] == []
+
+
+@missions
+def test_the_fleet_does_the_mission_in_simulation(name: str, seed: int) -> None:
+    scene, _, _, log, account = driven(name, seed)
+    assert log.completed
+    assert log.contacts == ()
+    assert account.reasons == ()
+    assert set(account.goals_visited) == {goal.id for goal in scene.goals}
+
+
+@missions
+def test_the_cars_stay_near_their_reference(name: str, seed: int) -> None:
+    _, _, _, _, account = driven(name, seed)
+    for robot in account.robots:
+        assert robot.tracking_rms_m <= TRACKING_RMS_M
+        assert robot.tracking_max_m <= TRACKING_MAX_M
+
+
+@missions
+def test_the_charge_never_falls_below_the_reserve(name: str, seed: int) -> None:
+    scene, _, _, _, account = driven(name, seed)
+    for robot in account.robots:
+        reserve = scene.robot(robot.robot).battery.reserve_fraction
+        assert robot.min_charge_fraction >= reserve
+
+
+@missions
+def test_simulated_energy_is_near_the_plan_per_robot(name: str, seed: int) -> None:
+    _, plan, _, _, account = driven(name, seed)
+    for robot in plan.tours:
+        planned = plan.ledger.total_J(robot=robot)
+        assert account.metered.total_J(robot=robot) == pytest.approx(
+            planned, rel=METERED_PCT / 100.0
+        )
+        assert account.measured.total_J(robot=robot) == pytest.approx(
+            planned, rel=MEASURED_PCT / 100.0
+        )
+
+
+@missions
+def test_simulated_energy_is_near_the_plan_per_part(name: str, seed: int) -> None:
+    """Each part is held to the same share of the robot's whole energy."""
+    _, plan, _, _, account = driven(name, seed)
+    for robot in plan.tours:
+        whole = plan.ledger.total_J(robot=robot)
+        for part in PARTS:
+            planned = plan.ledger.total_J(robot=robot, part=part)
+            metered = account.metered.total_J(robot=robot, part=part)
+            assert abs(metered - planned) <= METERED_PCT / 100.0 * whole, part
