@@ -1,1 +1,14 @@
 """From a scene to a plan: roadmap, router, motion tree."""
+
+from mrmg.planning.parameters import (
+    PROFILES as PROFILES,
+)
+from mrmg.planning.parameters import (
+    PlannerParams as PlannerParams,
+)
+from mrmg.planning.parameters import (
+    profile_params as profile_params,
+)
+from mrmg.planning.planner import plan_mission as plan_mission
+
+__all__ = ["PROFILES", "PlannerParams", "plan_mission", "profile_params"]

@@ -72,7 +72,9 @@ def find_waypoint(  # type: ignore[no-untyped-def]
     for reach in range(1, 4):
         n = 0
         for r in range(max(0, row - reach), min(roadmap.rows, row + reach + 1)):
-            for c in range(max(0, column - reach), min(roadmap.columns, column + reach + 1)):
+            for c in range(
+                max(0, column - reach), min(roadmap.columns, column + reach + 1)
+            ):
                 b = r * roadmap.columns + c
                 for i in range(roadmap.bucket_start[b], roadmap.bucket_start[b + 1]):
                     v = roadmap.bucket_vertex[i]

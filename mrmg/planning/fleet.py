@@ -103,7 +103,9 @@ def stack_spaces(world: World) -> Spaces:
     )
 
 
-def travel_classes(scene: Scene, world: World) -> tuple[list[tuple[int, float]], list[int]]:
+def travel_classes(
+    scene: Scene, world: World
+) -> tuple[list[tuple[int, float]], list[int]]:
     """Return the distinct (free space, passage clearance) pairs, and each robot's index.
 
     Robots of one class share a roadmap and its cost-to-go fields.

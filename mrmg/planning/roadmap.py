@@ -85,7 +85,12 @@ class Roadmap:
 
 
 def build_roadmap(
-    scene: Scene, world: World, *, samples: int, neighbours: int, rng: np.random.Generator
+    scene: Scene,
+    world: World,
+    *,
+    samples: int,
+    neighbours: int,
+    rng: np.random.Generator,
 ) -> Roadmap:
     """Build the roadmap of a scene.
 
@@ -140,13 +145,18 @@ def _vertices(
     rng: np.random.Generator,
 ) -> np.ndarray:
     x_min, y_min, x_max, y_max = scene.bounds
-    fixed = [_anchor(scene, world, classes, target.region) for target in scene.targets()]
+    fixed = [
+        _anchor(scene, world, classes, target.region) for target in scene.targets()
+    ]
     fixed += [np.array(robot.pose[:2]) for robot in scene.robots]
     unit = qmc.Halton(d=2, rng=rng).random(samples)
     spread = unit * (x_max - x_min, y_max - y_min) + (x_min, y_min)
     passage = min(passage for _, passage in classes)
     rings = [
-        *(union.simplify(0.05).buffer(passage + 0.15, quad_segs=2) for union in world.obstacles),
+        *(
+            union.simplify(0.05).buffer(passage + 0.15, quad_segs=2)
+            for union in world.obstacles
+        ),
         *(area.shape.buffer(0.3, quad_segs=1) for area in scene.terrain),
         *(area.shape.buffer(-0.3, quad_segs=1) for area in scene.terrain),
     ]

@@ -1,0 +1,231 @@
+"""Committed braking: what keeps every state of the motion tree safe.
+
+Each robot carries a committed motion: the states it will go through if it brakes from now
+on, steering held, until it stands. All committed motions keep clear of obstacles and, step
+by step, of each other. A robot may replace its commitment by "one step under a new control,
+then brake" only if that keeps clear too; otherwise it follows the one it has. So braking is
+always possible, no expansion ever dies, and a mission may end at any time.
+"""
+
+from __future__ import annotations
+
+from math import ceil, cos, hypot, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.compilation import kernel
+from mrmg.motion._kernels import UNICYCLE, step
+from mrmg.planning.fleet import PLANNING_MARGIN_M, ROBOT_MARGIN_M
+from mrmg.world._kernels import (
+    FreeSpace,
+    convex_convex_distance,
+    footprint_is_clear,
+    place_footprint,
+)
+
+REST = 1e-9
+"""Speed below which a robot counts as standing [m/s]."""
+
+
+class Commitment(NamedTuple):
+    """Committed motions; two slots a robot, one active and one for a proposal.
+
+    Attributes:
+        state: shape (R, 2, K, 5).
+        corner: placed footprints, shape (R, 2, K, M, 2).
+        middle: middles of the footprints, shape (R, 2, K, 2).
+        count: number of states in each slot, shape (R, 2).
+        active: slot in force, shape (R,).
+        now: index of the present state in the active slot, shape (R,).
+    """
+
+    state: np.ndarray
+    corner: np.ndarray
+    middle: np.ndarray
+    count: np.ndarray
+    active: np.ndarray
+    now: np.ndarray
+
+
+@kernel
+def new_commitment(fleet, dt):  # type: ignore[no-untyped-def]
+    """Return an empty commitment large enough for the fleet's longest braking."""
+    robots, corners, _ = fleet.corner.shape
+    longest = 0
+    for r in range(robots):
+        fastest = max(fleet.limit[r, 1], -fleet.limit[r, 0]) / fleet.limit[r, 3]
+        if fleet.model[r] == UNICYCLE:
+            fastest = max(fastest, fleet.limit[r, 2] / fleet.limit[r, 4])
+        longest = max(longest, int(ceil(fastest / dt)) + 3)
+    return Commitment(
+        np.zeros((robots, 2, longest, 5)),
+        np.zeros((robots, 2, longest, corners, 2)),
+        np.zeros((robots, 2, longest, 2)),
+        np.zeros((robots, 2), np.int64),
+        np.zeros(robots, np.int64),
+        np.zeros(robots, np.int64),
+    )
+
+
+@kernel
+def toward_zero(value, bound, dt):  # type: ignore[no-untyped-def]
+    """Return the rate that brings `value` to 0 as fast as `bound` allows."""
+    if abs(value) < REST:
+        return 0.0
+    return max(-bound, min(bound, -value / dt))
+
+
+@kernel
+def braking_control(fleet, r, state, dt):  # type: ignore[no-untyped-def]
+    """Return the control (u1, u2) of full braking; a car holds its steering."""
+    u1 = toward_zero(state[3], fleet.limit[r, 3], dt)
+    u2 = 0.0
+    if fleet.model[r] == UNICYCLE:
+        u2 = toward_zero(state[4], fleet.limit[r, 4], dt)
+    return u1, u2
+
+
+@kernel
+def stands(fleet, r, state):  # type: ignore[no-untyped-def]
+    """Tell whether a robot is at rest."""
+    return abs(state[3]) < REST and (fleet.model[r] != UNICYCLE or abs(state[4]) < REST)
+
+
+@kernel
+def write_braking(fleet, r, first, dt, commitment, slot):  # type: ignore[no-untyped-def]
+    """Fill a slot with `first` and the braking that follows it."""
+    states = commitment.state[r, slot]
+    states[0] = first
+    n = 1
+    while n < len(states) and not stands(fleet, r, states[n - 1]):
+        u1, u2 = braking_control(fleet, r, states[n - 1], dt)
+        step(fleet.model[r], states[n - 1], u1, u2, fleet.wheelbase[r], dt, states[n])
+        n += 1
+    outline = fleet.corner[r, : fleet.corners[r]]
+    mx, my = fleet.middle[r, 0], fleet.middle[r, 1]
+    for k in range(n):
+        x, y, theta = states[k, 0], states[k, 1], states[k, 2]
+        place_footprint(outline, x, y, theta, commitment.corner[r, slot, k])
+        c, s = cos(theta), sin(theta)
+        commitment.middle[r, slot, k, 0] = x + c * mx - s * my
+        commitment.middle[r, slot, k, 1] = y + s * mx + c * my
+    commitment.count[r, slot] = n
+
+
+@kernel
+def space_of(spaces, index):  # type: ignore[no-untyped-def]
+    """Return one free space of the stack."""
+    return FreeSpace(
+        spaces.x_min,
+        spaces.y_min,
+        spaces.cell,
+        spaces.distance[index],
+        spaces.bucket,
+        spaces.bucket_columns,
+        spaces.bucket_rows,
+        spaces.bucket_start[index],
+        spaces.bucket_edge,
+        spaces.reach,
+        spaces.edge,
+    )
+
+
+@kernel
+def clear_of_obstacles(fleet, spaces, commitment, r, slot, first):  # type: ignore[no-untyped-def]
+    """Tell whether a slot's states from `first` on keep the margin from obstacles."""
+    space = space_of(spaces, fleet.space[r])
+    for k in range(first, commitment.count[r, slot]):
+        if not footprint_is_clear(
+            space,
+            commitment.corner[r, slot, k, : fleet.corners[r]],
+            commitment.middle[r, slot, k, 0],
+            commitment.middle[r, slot, k, 1],
+            fleet.radius[r],
+            PLANNING_MARGIN_M,
+        ):
+            return False
+    return True
+
+
+@kernel
+def clear_of_robot(fleet, commitment, r, slot, first, other, other_first, margin):  # type: ignore[no-untyped-def]
+    """Tell whether two committed motions keep `margin`, step by step.
+
+    State `first + k` of robot r is compared with state `other_first + k` of the other;
+    a robot that stands stays.
+    """
+    other_slot = commitment.active[other]
+    last = commitment.count[r, slot] - 1
+    other_last = commitment.count[other, other_slot] - 1
+    reach = fleet.radius[r] + fleet.radius[other] + margin
+    span = max(last - first, other_last - other_first)
+    for k in range(max(span, 0) + 1):
+        i = min(first + k, last)
+        j = min(other_first + k, other_last)
+        apart = hypot(
+            commitment.middle[r, slot, i, 0]
+            - commitment.middle[other, other_slot, j, 0],
+            commitment.middle[r, slot, i, 1]
+            - commitment.middle[other, other_slot, j, 1],
+        )
+        if (
+            apart < reach
+            and convex_convex_distance(
+                commitment.corner[r, slot, i, : fleet.corners[r]],
+                commitment.corner[other, other_slot, j, : fleet.corners[other]],
+            )
+            < margin
+        ):
+            return False
+    return True
+
+
+@kernel
+def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):  # type: ignore[no-untyped-def]
+    """Replace robot r's commitment by one step of a control and braking, if it is safe.
+
+    Args:
+        fleet, spaces: the fleet and its free spaces.
+        commitment: changed in place on success.
+        decided: which robots have already made this step, shape (R,).
+        r: robot.
+        u1, u2: control.
+        dt: step [s].
+
+    Returns:
+        0 on success, 1 if an obstacle forbids it, 2 if another robot does.
+    """
+    active = commitment.active[r]
+    slot = 1 - active
+    state = commitment.state[r, active, commitment.now[r]]
+    after = np.empty(5)
+    step(fleet.model[r], state, u1, u2, fleet.wheelbase[r], dt, after)
+    write_braking(fleet, r, after, dt, commitment, slot)
+    if not clear_of_obstacles(fleet, spaces, commitment, r, slot, 0):
+        return 1
+    for other in range(len(fleet.model)):
+        if other == r:
+            continue
+        # A robot that has not moved yet is met where its braking takes it.
+        other_first = commitment.now[other] + (0 if decided[other] else 1)
+        if not clear_of_robot(
+            fleet, commitment, r, slot, 0, other, other_first, ROBOT_MARGIN_M
+        ):
+            return 2
+    commitment.active[r] = slot
+    commitment.now[r] = 0
+    return 0
+
+
+@kernel
+def follow_braking(commitment, r):  # type: ignore[no-untyped-def]
+    """Advance robot r one step along its commitment."""
+    last = commitment.count[r, commitment.active[r]] - 1
+    commitment.now[r] = min(commitment.now[r] + 1, last)
+
+
+@kernel
+def present_state(commitment, r):  # type: ignore[no-untyped-def]
+    """Return robot r's present state, a view of shape (5,)."""
+    return commitment.state[r, commitment.active[r], commitment.now[r]]

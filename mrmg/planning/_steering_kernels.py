@@ -1,0 +1,136 @@
+"""Steering: where a robot wants to go next, as a speed and a steering angle.
+
+A robot descends the roadmap's cost-to-go field: it drives at the farthest point of the way
+that it can see. Gears are chosen so that narrow places are left the way they were entered
+and open ground is used to turn round; a point inside the turning circle is approached by
+backing off first.
+"""
+
+from __future__ import annotations
+
+from math import atan, atan2, cos, hypot, pi, sin
+
+from mrmg.compilation import kernel
+from mrmg.motion._kernels import UNICYCLE
+from mrmg.world._kernels import clearance_estimate, segment_is_clear
+
+AUTO, FORWARD, REVERSE, SWAP, RANDOM, WAIT = range(6)
+"""What a robot does during one expansion of the tree."""
+
+LOOKAHEAD_M = 3.5
+"""Distance at which pure pursuit aims."""
+
+SIGHT_M = 9.0
+"""Distance within which other robots are steered round."""
+
+
+@kernel
+def wrap(angle):  # type: ignore[no-untyped-def]
+    """Return the angle in (-pi, pi]."""
+    while angle > pi:
+        angle -= 2.0 * pi
+    while angle <= -pi:
+        angle += 2.0 * pi
+    return angle
+
+
+@kernel
+def choose_gear(fleet, r, state, space, wx, wy, to_go, gear):  # type: ignore[no-untyped-def]
+    """Return the gear (+1, -1) for the way to a waypoint, given the present one."""
+    if fleet.model[r] == UNICYCLE:
+        return 1
+    bearing = abs(wrap(atan2(wy - state[1], wx - state[0]) - state[2]))
+    room = clearance_estimate(space, state[0], state[1])
+    roomy = room > 2.0 * fleet.turning_radius[r] + 1.2
+    if gear > 0:
+        if bearing > 1.9 and not (roomy and to_go > 4.0):
+            return -1
+        return 1
+    if bearing < 1.2 or (roomy and to_go > 6.0):
+        return 1
+    return -1
+
+
+@kernel
+def pursue(fleet, r, state, wx, wy, gear):  # type: ignore[no-untyped-def]
+    """Return the wanted (v, w) to drive at a waypoint in a gear by pure pursuit."""
+    dx = wx - state[0]
+    dy = wy - state[1]
+    distance = hypot(dx, dy)
+    bearing = wrap(atan2(dy, dx) - state[2])
+    v_min, v_max, w_max = fleet.limit[r, 0], fleet.limit[r, 1], fleet.limit[r, 2]
+    if fleet.model[r] == UNICYCLE:
+        # Slow enough for the turn; on the spot when the point is abeam.
+        w = max(-w_max, min(w_max, 1.5 * bearing))
+        return v_max * max(0.0, cos(bearing)) ** 3, w
+    off = bearing if gear > 0 else wrap(bearing - pi)
+    radius = fleet.turning_radius[r]
+    if distance < 2.0 * radius and abs(off) > 0.35:
+        needed = distance / (2.0 * max(sin(abs(off)), 1e-6))
+        if abs(off) > 0.5 * pi or needed < radius:
+            # Inside the turning circle: back off, turning the nose (or tail) at it.
+            turn = w_max if off > 0.0 else -w_max
+            if gear > 0:
+                return 0.6 * v_min, -turn
+            return 0.5 * v_max, turn
+    ahead = max(1.0, min(distance, LOOKAHEAD_M))
+    lateral = sin(bearing)
+    if abs(off) > 0.5 * pi:
+        lateral = 1.0 if bearing > 0.0 else -1.0
+    psi = atan(2.0 * fleet.wheelbase[r] * lateral / ahead)
+    psi = max(-w_max, min(w_max, psi))
+    fastest = v_max if gear > 0 else v_min
+    error = abs(psi - state[4])
+    return fastest * max(0.35, 1.0 - error / 0.8), psi
+
+
+@kernel
+def sidestep(fleet, r, state, space, others, wx, wy, out):  # type: ignore[no-untyped-def]
+    """Move a waypoint aside where a slower or oncoming robot is in the way.
+
+    Passes on the right when meeting head on, else on the side the other leaves free;
+    keeps the waypoint where neither side is clear. `others` holds the present states of
+    all robots, shape (R, 5).
+    """
+    out[0], out[1] = wx, wy
+    dx = wx - state[0]
+    dy = wy - state[1]
+    distance = hypot(dx, dy)
+    if distance < 1e-6:
+        return
+    dx /= distance
+    dy /= distance
+    nearest = min(SIGHT_M, distance + fleet.radius[r])
+    for other in range(len(others)):
+        if other == r:
+            continue
+        c, s = cos(others[other, 2]), sin(others[other, 2])
+        ox = others[other, 0] + c * fleet.middle[other, 0] - s * fleet.middle[other, 1]
+        oy = others[other, 1] + s * fleet.middle[other, 0] + c * fleet.middle[other, 1]
+        along = (ox - state[0]) * dx + (oy - state[1]) * dy
+        lateral = (oy - state[1]) * dx - (ox - state[0]) * dy
+        wide = fleet.radius[r] + fleet.radius[other] + 0.8
+        if along <= 0.0 or along >= nearest or abs(lateral) > wide:
+            continue
+        speed = others[other, 3] * (c * dx + s * dy)
+        if speed > 0.5 * fleet.limit[r, 1]:
+            continue
+        nearest = along
+        side = -1.0 if lateral > -0.3 else 1.0
+        for _ in range(2):
+            px = ox - side * dy * (wide + 0.3)
+            py = oy + side * dx * (wide + 0.3)
+            if segment_is_clear(space, state[0], state[1], px, py, fleet.passage[r]):
+                out[0], out[1] = px, py
+                break
+            side = -side
+
+
+@kernel
+def control_towards(fleet, r, state, v, w, dt):  # type: ignore[no-untyped-def]
+    """Return the control (u1, u2) that brings speed and steering to (v, w)."""
+    v = max(fleet.limit[r, 0], min(fleet.limit[r, 1], v))
+    w = max(-fleet.limit[r, 2], min(fleet.limit[r, 2], w))
+    u1 = max(-fleet.limit[r, 3], min(fleet.limit[r, 3], (v - state[3]) / dt))
+    u2 = max(-fleet.limit[r, 4], min(fleet.limit[r, 4], (w - state[4]) / dt))
+    return u1, u2

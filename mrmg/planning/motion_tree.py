@@ -1,0 +1,277 @@
+"""Growing one motion tree, and reading the mission it found.
+
+The work is done in `_tree_kernels`; this module turns scenes into its arrays and a solved
+tree back into trajectories and tours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrmg import seeding
+from mrmg.motion._kernels import step as motion_step
+from mrmg.mission import Trajectory
+from mrmg.planning import _tree_kernels
+from mrmg.planning._routing_kernels import RoutingArrays
+from mrmg.planning._tree_kernels import SOLVED, Targets, Tree, TreeParams
+from mrmg.planning.fleet import Fleet, Spaces, fleet_arrays, stack_spaces
+from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.roadmap import Roadmap
+from mrmg.planning.routing import Routing, routing_arrays
+from mrmg.scene.types import Scene
+from mrmg.world.world import World
+
+TARGET_MARGIN_M = 0.2
+"""How deep inside a region the planner drives, so that a tracked path enters it too."""
+
+TOUR_ROWS = 2000
+"""Most tours one tree may hold."""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A scene as the arrays the kernels work on."""
+
+    scene: Scene
+    fleet: Fleet
+    spaces: Spaces
+    world: World
+    roadmap: Roadmap
+    targets: Targets
+    routing: RoutingArrays
+    start: np.ndarray
+    start_energy: np.ndarray
+
+
+def state_problem(
+    scene: Scene, world: World, roadmap: Roadmap, params: PlannerParams
+) -> Problem:
+    """Return the scene's problem; routing costs include the route margin."""
+    fleet = fleet_arrays(scene, world)
+    energy = np.array([robot.battery.start_J for robot in scene.robots])
+    start = np.zeros((len(scene.robots), 5))
+    start[:, :3] = [robot.pose for robot in scene.robots]
+    plain = fleet.plain * (1.0 + params.route_margin)
+    return Problem(
+        scene=scene,
+        fleet=fleet,
+        spaces=stack_spaces(world),
+        world=world,
+        roadmap=roadmap,
+        targets=_target_arrays(scene),
+        routing=routing_arrays(
+            goals=len(scene.goals),
+            distance=roadmap.distance[fleet.field],
+            start_distance=roadmap.start_distance,
+            plain=plain,
+            energy=energy,
+            capacity=fleet.capacity,
+            reserve=fleet.reserve,
+        ),
+        start=start,
+        start_energy=energy,
+    )
+
+
+def _target_arrays(scene: Scene) -> Targets:
+    regions = [target.region for target in scene.targets()]
+    shrunk = []
+    for region in regions:
+        corners = region.corners
+        if len(corners):
+            smaller = region.shape.buffer(-TARGET_MARGIN_M, join_style="mitre")
+            if not smaller.is_empty and smaller.geom_type == "Polygon":
+                corners = np.asarray(smaller.normalize().exterior.coords)[:-1][::-1]
+        shrunk.append(corners)
+    most = max([3, *(len(corners) for corners in shrunk)])
+    corner = np.zeros((len(regions), most, 2))
+    reach = np.zeros(len(regions))
+    for i, (region, corners) in enumerate(zip(regions, shrunk, strict=True)):
+        corner[i, : len(corners)] = corners
+        if len(corners):
+            reach[i] = np.hypot(*(corners - region.center).T).max()
+        else:
+            reach[i] = max(region.radius_m - TARGET_MARGIN_M, 0.5 * region.radius_m)
+    return Targets(
+        goals=len(scene.goals),
+        center=np.array([region.center for region in regions], float).reshape(-1, 2),
+        reach=reach,
+        corner=corner,
+        corners=np.array([len(corners) for corners in shrunk], np.int64),
+    )
+
+
+def tree_params(params: PlannerParams) -> TreeParams:
+    """Return the numbers the kernels need."""
+    router = params.router
+    paper = params.profile == "paper"
+    return TreeParams(
+        dt=params.dt_s,
+        steps=params.steps,
+        max_vertices=params.max_vertices,
+        group_alpha=params.group_alpha,
+        group_beta=params.group_beta,
+        group_lambda=params.group_lambda,
+        group_bias=params.group_bias,
+        steer_start=params.steer_start,
+        steer_decay=params.steer_decay,
+        steer_least=params.steer_least,
+        region=params.region_m,
+        route_margin=params.route_margin,
+        reroute_always=paper,
+        hold_control=paper,
+        levels=router.levels,
+        iterations=router.iterations,
+        alpha=router.alpha,
+        kicks=router.kicks,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Growth:
+    """What growing a tree gave.
+
+    Attributes:
+        trajectories: of all robots, or empty if the tree found no solution.
+        tours: targets each robot visited, in order.
+        counts: vertices, groups, router_calls, expansions.
+    """
+
+    trajectories: tuple[Trajectory, ...]
+    tours: Mapping[str, tuple[str, ...]]
+    counts: Mapping[str, int]
+
+    @property
+    def solved(self) -> bool:
+        """Whether the tree reached all goals."""
+        return bool(self.trajectories)
+
+
+def grow_tree(
+    problem: Problem, params: PlannerParams, routing: Routing, seed: int
+) -> Growth:
+    """Grow one motion tree along given tours (Algorithms 1-3)."""
+    robots = len(problem.scene.robots)
+    numbers = tree_params(params)
+    tree = _tree_kernels.new_tree(
+        params.max_vertices, robots, problem.targets.goals, params.steps
+    )
+    width = 3 * problem.targets.goals + 3
+    tours = np.zeros((TOUR_ROWS, robots, width), np.int64)
+    lengths = np.zeros((TOUR_ROWS, robots), np.int64)
+    first = np.zeros((robots, width), np.int64)
+    for r, tour in enumerate(routing.tours):
+        first[r, : len(tour)] = tour
+    counts = np.zeros(4, np.int64)
+    random = np.array([seeding.stream_seed(seed, "tree")], np.uint64)
+    ended, leaf = _tree_kernels.grow(
+        problem.fleet,
+        problem.spaces,
+        problem.world.terrain,
+        problem.roadmap.arrays,
+        problem.targets,
+        problem.routing,
+        numbers,
+        problem.start,
+        problem.start_energy,
+        random,
+        tree,
+        tours,
+        lengths,
+        counts,
+        first,
+        np.array([len(tour) for tour in routing.tours]),
+    )
+    names = ("vertices", "groups", "router_calls", "expansions")
+    statistics = {name: int(n) for name, n in zip(names, counts, strict=True)}
+    if ended != SOLVED:
+        return Growth((), {}, statistics)
+    branch = _branch(tree, leaf)
+    control = _controls(problem, params, tree, branch)
+    return Growth(
+        _replay(problem, params, control),
+        _visited_tours(problem, tree, tours, branch),
+        statistics,
+    )
+
+
+def _branch(tree: Tree, leaf: int) -> list[int]:
+    """Return the vertices from the root to a leaf."""
+    branch = [leaf]
+    while tree.parent[branch[-1]] >= 0:
+        branch.append(int(tree.parent[branch[-1]]))
+    return branch[::-1]
+
+
+def _controls(
+    problem: Problem, params: PlannerParams, tree: Tree, branch: list[int]
+) -> np.ndarray:
+    """Return the controls along a branch and the braking after it, shape (n, R, 2)."""
+    stop = np.zeros((200, len(problem.start), 2))
+    n = _tree_kernels.stop_all(problem.fleet, tree.state[branch[-1]], params.dt_s, stop)
+    pieces = [tree.control[v, : tree.steps[v]] for v in branch[1:]]
+    return np.concatenate([*pieces, stop[:n]])
+
+
+def _replay(
+    problem: Problem, params: PlannerParams, control: np.ndarray
+) -> tuple[Trajectory, ...]:
+    trajectories = []
+    fleet = problem.fleet
+    for r, robot in enumerate(problem.scene.robots):
+        state = np.zeros((len(control) + 1, 5))
+        state[0] = problem.start[r]
+        for k, (u1, u2) in enumerate(control[:, r]):
+            motion_step(
+                fleet.model[r],
+                state[k],
+                u1,
+                u2,
+                fleet.wheelbase[r],
+                params.dt_s,
+                state[k + 1],
+            )
+        trajectories.append(
+            Trajectory(
+                robot=robot.id,
+                dt_s=params.dt_s,
+                state=state,
+                control=np.ascontiguousarray(control[:, r]),
+            )
+        )
+    return tuple(trajectories)
+
+
+def _visited_tours(
+    problem: Problem, tree: Tree, tours: np.ndarray, branch: list[int]
+) -> dict[str, tuple[str, ...]]:
+    """Return what each robot visited: goals it entered first, stations it drove to."""
+    targets = problem.targets
+    robots = problem.scene.robots
+    found: list[list[int]] = [[] for _ in robots]
+    seen = np.zeros(targets.goals, bool)
+    for v in branch:
+        parent = int(tree.parent[v])
+        for r in range(len(robots)):
+            x, y = tree.state[v, r, :2]
+            for g in np.flatnonzero(tree.visited[v] & ~seen):
+                if _tree_kernels.in_target(targets, g, x, y):
+                    found[r].append(int(g))
+                    seen[g] = True
+            if parent < 0:
+                continue
+            position = tree.position[parent, r]
+            target = tours[tree.tour[parent], r, position]
+            # The place in the tour moves past a station only by entering it.
+            if target >= targets.goals and _tree_kernels.in_target(
+                targets, target, x, y
+            ):
+                if tree.energy[v, r] == problem.fleet.capacity[r]:
+                    found[r].append(int(target))
+    names = [target.id for target in problem.scene.targets()]
+    return {
+        robot.id: tuple(names[t] for t in found[r]) for r, robot in enumerate(robots)
+    }
