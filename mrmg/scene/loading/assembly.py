@@ -144,7 +144,9 @@ class Assembly:
             self._fault(f"{path}.model", folder)
             return None
         try:
-            self._models[robot_id] = load_model(folder)
+            self._models[robot_id] = load_model(
+                folder, source=f"{reference}/robot.yaml"
+            )
         except SceneError as error:
             for fault in error.faults:
                 self._fault(f"{path}.model", f"{error.source}: {fault}")

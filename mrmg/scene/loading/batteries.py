@@ -35,6 +35,12 @@ def battery_of(
     start_J = _start_J(robot.start_energy, capacity_J, model, f"{path}.start_energy")
     if isinstance(start_J, Fault):
         return [start_J]
+    if start_J < reserve * capacity_J:
+        message = (
+            f"got {start_J:g} J; must not be below the reserve, "
+            f"{reserve * capacity_J:g} J"
+        )
+        return [Fault(f"{path}.start_energy", message)]
     return Battery(capacity_J=capacity_J, start_J=start_J, reserve_fraction=reserve)
 
 
@@ -65,7 +71,7 @@ def _start_J(
 ) -> float | Fault:
     given = [key for key in ("fraction", *_UNITS) if getattr(entry, key) is not None]
     if len(given) != 1:
-        found = " and ".join(given) if given else "none of them"
+        found = " and ".join(given) if given else "no amount"
         return Fault(path, f"has {found}; expected exactly one of fraction, J, Wh, m")
     if given[0] == "fraction":
         assert entry.fraction is not None

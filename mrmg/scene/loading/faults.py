@@ -35,7 +35,8 @@ def _fault(detail: dict[str, Any], model: type[BaseModel]) -> Fault:
     loc: tuple[str | int, ...] = detail["loc"]
     kind: str = detail["type"]
     value = detail["input"]
-    path = ".".join(str(part) for part in loc)
+    # A start energy is mostly spelt as a bare number, which means a fraction.
+    path = ".".join(str(part) for part in loc).removesuffix(".fraction")
     if kind == "extra_forbidden":
         return Fault(path, unknown_key(str(loc[-1]), _known_keys(model, loc[:-1])))
     wanted = _description(model, loc)
@@ -73,13 +74,13 @@ def _allowed(detail: dict[str, Any]) -> str:
 def unknown_key(key: str, known: Iterable[str]) -> str:
     """Return the message for a key that is not in the format."""
     names = sorted(known)
-    return f"unknown key{nearest(key, names)} (known keys: {', '.join(names)})"
+    return f"unknown key{nearest(key, names)}; known keys: {', '.join(names)}"
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
-    """Return ", did you mean '...'?" for the most similar of `names`, or nothing."""
+    """Return " (did you mean '...'?)" for the most similar of `names`, or nothing."""
     match = difflib.get_close_matches(name, list(names), n=1, cutoff=0.5)
-    return f", did you mean '{match[0]}'?" if match else ""
+    return f" (did you mean '{match[0]}'?)" if match else ""
 
 
 def shown(value: Any) -> str:

@@ -88,13 +88,13 @@ def _region(center: np.ndarray, radius_m: float, corners: np.ndarray) -> Region:
 
 
 def _ring_fault(shape: Polygon) -> str | None:
+    if shape.convex_hull.area == 0.0:
+        return "its area is zero; expected corners that are not on one line"
     if not shape.is_valid:
         return f"no simple polygon: {shapely.is_valid_reason(shape)}"
-    if shape.area == 0.0:
-        return "its area is zero; expected corners that are not on one line"
     return None
 
 
 def _not_one_of(path: str, allowed: str, given: list[str]) -> Fault:
-    found = " and ".join(given) if given else "none of them"
+    found = " and ".join(given) if given else "no shape"
     return Fault(path, f"has {found}; expected exactly one of {allowed}")

@@ -84,8 +84,14 @@ def model_folder(reference: str, base: Path | None) -> Path | str:
     )
 
 
-def load_model(folder: Path) -> tuple[RobotModel, dict[str, Any]]:
+def load_model(
+    folder: Path, *, source: str | None = None
+) -> tuple[RobotModel, dict[str, Any]]:
     """Read the model in `folder`.
+
+    Args:
+        folder: holds `robot.yaml`.
+        source: what error messages call the file; default its path.
 
     Returns:
         The model, and its parameters as plain data (what a digest is taken of).
@@ -93,7 +99,7 @@ def load_model(folder: Path) -> tuple[RobotModel, dict[str, Any]]:
     Raises:
         SceneError: naming every fault of its `robot.yaml`.
     """
-    source = str(folder / "robot.yaml")
+    source = source or str(folder / "robot.yaml")
     document = read_yaml(folder / "robot.yaml", source=source)
     try:
         entry = ModelDocument.model_validate(document)

@@ -88,7 +88,9 @@ class CircleEntry(Strict):
 class ShapedEntry(Strict):
     """Exactly one of polygon, box, circle."""
 
-    polygon: Ring | None = Field(default=None, description="corners [x, y] in m")
+    polygon: Ring | None = Field(
+        default=None, description="at least 3 corners [x, y] in m"
+    )
     holes: list[Ring] | None = Field(
         default=None, description="rings inside the polygon"
     )
@@ -102,7 +104,7 @@ class ObstacleEntry(ShapedEntry):
     id: Identifier | None = None
     height: Positive = Field(default=1.0, description="height in m")
     blocks: Annotated[list[Identifier], Field(min_length=1)] | None = Field(
-        default=None, description="a list of ids of robots"
+        default=None, description="at least one id of a robot"
     )
 
 
@@ -118,7 +120,9 @@ class RegionEntry(Strict):
 
     id: Identifier
     circle: CircleEntry | None = None
-    polygon: Ring | None = Field(default=None, description="corners [x, y] in m")
+    polygon: Ring | None = Field(
+        default=None, description="at least 3 corners [x, y] in m"
+    )
 
 
 class BatteryEntry(Strict):

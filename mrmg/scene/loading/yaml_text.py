@@ -98,7 +98,7 @@ def parse_yaml(text: str, *, source: str) -> Any:
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = f"line {mark.line + 1}, column {mark.column + 1}" if mark else ""
-        problem = error.problem or error.context or "no YAML"
+        problem = ", ".join(part for part in (error.context, error.problem) if part)
         if not isinstance(error, yaml.constructor.ConstructorError):
             problem = f"no valid YAML: {problem}"
         raise SceneError(source, [Fault(place, problem)]) from error
