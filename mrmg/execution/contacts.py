@@ -16,6 +16,7 @@ class ContactWatch:
     """
 
     def __init__(self, world: MujocoWorld) -> None:
+        """Watch the robots of `world`."""
         self.contacts: list[Contact] = []
         self._owner, self._label = world.hull_owner, world.geom_label
         self._robots = [robot.id for robot in world.scene.robots]

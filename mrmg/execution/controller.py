@@ -22,7 +22,7 @@ class Controller(Protocol):
     """Keeps one robot on its reference; one object per robot and run."""
 
     def correct(self, state: np.ndarray, reference: np.ndarray) -> np.ndarray:
-        """Return what to add to the plan's controls (u1 [m/s^2], u2 [rad/s]), shape (2,).
+        """Return what to add to the plan's (u1 [m/s^2], u2 [rad/s]), shape (2,).
 
         Args:
             state: measured x, y, theta and *commanded* v, psi, shape (5,). Measured

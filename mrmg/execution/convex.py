@@ -16,8 +16,8 @@ _REFLEX_TOLERANCE = 1e-12
 def triangles(polygon: Polygon) -> list[Polygon]:
     """Return a constrained Delaunay triangulation of a polygon with holes.
 
-    Vertices within 1 um of the line through their neighbours are dropped first; triangles
-    too thin for a solid are left out.
+    Vertices within 1 um of the line through their neighbours are dropped first;
+    triangles too thin for a solid are left out.
     """
     clean = shapely.simplify(polygon, _COLLINEAR_M)
     parts = shapely.get_parts(shapely.constrained_delaunay_triangles(clean))

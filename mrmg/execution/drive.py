@@ -27,8 +27,8 @@ class DriveParams:
         standstill_m_s: mean speed of a ramp below which no direction is assumed.
     """
 
-    proportional_per_s: float = 8.0
-    integral_per_s2: float = 30.0
+    proportional_per_s: float = 4.0
+    integral_per_s2: float = 6.0
     integral_limit_m_s2: float = 3.0
     grip_share: float = 0.8
     standstill_m_s: float = 1e-4
@@ -38,6 +38,7 @@ class DriveControl:
     """Speed control of all robots."""
 
     def __init__(self, scene: Scene, params: DriveParams | None = None) -> None:
+        """Control the robots of `scene`, all at rest."""
         self._params = params or DriveParams()
         models = [robot.model for robot in scene.robots]
         energy = [model.energy_model for model in models]
@@ -55,7 +56,8 @@ class DriveControl:
 
     def resistance_N(self, multiplier: np.ndarray, steer: np.ndarray) -> np.ndarray:
         """Return the force the ground takes, by the energy model's law, shape (R,)."""
-        return self._rolling_N * multiplier + self._turning_N * np.abs(np.tan(steer))
+        turning = self._turning_N * np.abs(np.tan(steer))
+        return np.asarray(self._rolling_N * multiplier + turning)
 
     def force_N(
         self,
@@ -89,4 +91,6 @@ class DriveControl:
         direction = np.where(
             np.abs(middle) > params.standstill_m_s, np.sign(middle), 0.0
         )
-        return direction * resistance_N + np.clip(inertial_N, -limit_N, limit_N)
+        return np.asarray(
+            direction * resistance_N + np.clip(inertial_N, -limit_N, limit_N)
+        )

@@ -1,8 +1,8 @@
 """The cars inside the simulation: reading their states, steering and driving them.
 
-All robots are handled as arrays in the scene's order. A car's MJCF names its parts: joints
-`root`, `steer_fl`, `steer_fr`, `spin_rl`, `spin_rr`; actuators `steer_l`, `steer_r`,
-`drive`; geom `hull`; body `chassis`.
+All robots are handled as arrays in the scene's order. A car's MJCF names its parts:
+joints `root`, `steer_fl`, `steer_fr`, `spin_rl`, `spin_rr`; actuators `steer_l`,
+`steer_r`, `drive`; geom `hull`; body `chassis`.
 """
 
 from __future__ import annotations
@@ -22,6 +22,11 @@ class Fleet:
     """
 
     def __init__(self, world: MujocoWorld, data: mujoco.MjData) -> None:
+        """Find the parts of every robot of `world`.
+
+        Raises:
+            UsageError: if a robot is of a kind that cannot be executed.
+        """
         robots = world.scene.robots
         for robot in robots:
             if robot.model.motion_model != "car":
@@ -59,9 +64,9 @@ class Fleet:
         self._drive_ctrl = np.array([model.actuator(f"{n}/drive").id for n in names])
         # A servo with stiffness kp and damping kv follows a ramp kv / kp late.
         servo = self._steer_ctrl[:, 0]
-        self._servo_lag_s = model.actuator_biasprm[servo, 2] / model.actuator_biasprm[
-            servo, 1
-        ]
+        self._servo_lag_s = (
+            model.actuator_biasprm[servo, 2] / model.actuator_biasprm[servo, 1]
+        )
         self._yaw = np.array([robot.pose[2] for robot in robots])
         self.force_N = np.zeros(len(robots))
 
@@ -78,14 +83,14 @@ class Fleet:
 
     def axle_speed_m_s(self) -> np.ndarray:
         """Return the speed the rear axle rolls at, shape (R,)."""
-        return self._radius_m * np.asarray(self._data.qvel[self._spin_v]).mean(axis=1)
+        return self._mean_over_axle(self._data.qvel[self._spin_v])
 
     def rolled_m(self) -> np.ndarray:
-        """Return the way the rear axle has rolled, reverse counting back, shape (R,)."""
-        return self._radius_m * np.asarray(self._data.qpos[self._spin_q]).mean(axis=1)
+        """Return the way the rear axle has rolled, forward less back, shape (R,)."""
+        return self._mean_over_axle(self._data.qpos[self._spin_q])
 
     def set_resistance(self, resistance_N: np.ndarray) -> None:
-        """Let driving cost `resistance_N`, shape (R,), as dry friction of the rear axle."""
+        """Let driving cost `resistance_N`, shape (R,): dry friction of the axle."""
         torque = 0.5 * self._radius_m * resistance_N
         self._model.dof_frictionloss[self._spin_v] = torque[:, None]
 
@@ -100,7 +105,8 @@ class Fleet:
 
         Args:
             force_N: traction force at the rear axle, shape (R,).
-            steer_from, steer_to: psi at the start and the end [rad], shape (R,).
+            steer_from: psi at the start [rad], shape (R,).
+            steer_to: psi at the end [rad], shape (R,).
             steps: number of physics steps.
         """
         model, data = self._model, self._data
@@ -115,20 +121,21 @@ class Fleet:
             data.ctrl[self._steer_ctrl] = angle
             mujoco.mj_step(model, data)
 
+    def _mean_over_axle(self, wheels: np.ndarray) -> np.ndarray:
+        """Return the axle's motion from that of its wheels, shape (R, 2) -> (R,)."""
+        return np.asarray(0.5 * self._radius_m * (wheels[:, 0] + wheels[:, 1]))
+
     def _wheel_angles(self, steer: np.ndarray) -> np.ndarray:
-        """Return left and right angles by Ackermann's law, shape (n, R) -> (n, R, 2)."""
+        """Return left and right Ackermann angles, shape (n, R) -> (n, R, 2)."""
         way = self._wheelbase_m * np.tan(steer)
         swing = self._half_track_m / self._wheelbase_m * way
-        return np.arctan(
-            np.stack(
-                [way / (self._wheelbase_m - swing), way / (self._wheelbase_m + swing)],
-                axis=-1,
-            )
-        )
+        left = np.arctan(way / (self._wheelbase_m - swing))
+        right = np.arctan(way / (self._wheelbase_m + swing))
+        return np.stack([left, right], axis=-1)
 
     def _tan_steer(self, tan_wheel: np.ndarray) -> np.ndarray:
         """Return tan psi from the tangents of both wheels' angles, (R, 2) -> (R,)."""
         ratio = self._half_track_m / self._wheelbase_m
         left = tan_wheel[:, 0] / (1.0 + ratio * tan_wheel[:, 0])
         right = tan_wheel[:, 1] / (1.0 - ratio * tan_wheel[:, 1])
-        return 0.5 * (left + right)
+        return np.asarray(0.5 * (left + right))

@@ -38,14 +38,13 @@ class FleetClock:
     """
 
     def __init__(self, params: ClockParams | None = None) -> None:
+        """Start at plan time 0, at full rate."""
         self.time_s = 0.0
         self.rate = 1.0
         self._params = params or ClockParams()
 
-    def pace(
-        self, state: np.ndarray, reference: np.ndarray, period_s: float
-    ) -> None:
-        """Set the rate from where the robots are and should be, both of shape (R, 5)."""
+    def pace(self, state: np.ndarray, reference: np.ndarray, period_s: float) -> None:
+        """Set the rate from where the robots are and should be, both (R, 5)."""
         params = self._params
         worst_s = float(lag_s(state, reference, params.least_speed_m_s).max())
         target = 1.0 - params.gain_per_s * max(worst_s - params.tolerated_lag_s, 0.0)

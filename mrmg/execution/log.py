@@ -80,7 +80,7 @@ class ExecutionLog:
     timing: Mapping[str, Any]
 
     def save(self, folder: Path) -> None:
-        """Write `log.npz`, `timing.json`, then `log.json` (its presence ends the step)."""
+        """Write `log.npz`, `timing.json`, then `log.json`, whose presence says done."""
         storage.write_arrays(folder / "log.npz", self._arrays())
         storage.write_json(folder / "timing.json", dict(self.timing))
         header = {
@@ -117,11 +117,9 @@ class ExecutionLog:
                 raise ValueError(f"this version reads format {LOG_FORMAT} only")
             header["robots"] = tuple(header["robots"])
             header["contacts"] = tuple(Contact(**row) for row in header["contacts"])
-            return ExecutionLog(
-                **header,
-                **storage.read_arrays(folder / "log.npz"),
-                timing=storage.read_json(folder / "timing.json"),
-            )
+            arrays: dict[str, Any] = storage.read_arrays(folder / "log.npz")
+            timing = storage.read_json(folder / "timing.json")
+            return ExecutionLog(**header, **arrays, timing=timing)
         except (OSError, ValueError, KeyError, TypeError) as error:
             fault = Fault("log.json", f"no readable log ({error}); run 'mrmg execute'")
             raise RunFolderError(str(folder), [fault]) from error

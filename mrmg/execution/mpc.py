@@ -1,11 +1,11 @@
-"""Tracking model predictive control: one Gauss-Newton QP per call (real-time iteration).
+"""Tracking model predictive control: one Gauss-Newton QP a call (real-time iteration).
 
     min  sum_k |x_k - r_k|^2_Q + |u_k - w_k|^2_R + |x_N - r_N|^2_(q_N Q)
     s.t. x_{k+1} = f(x_k, u_k) linearised about the previous solution,
          v, psi, u1, u2 within the robot's limits,
 
-with r the reference and w its mean controls (Diehl et al. 2005; Gros et al. 2020). v and
-psi are pure integrals of u, so that u = 0 is feasible and no slack is needed.
+with r the reference and w its mean controls (Diehl et al. 2005; Gros et al. 2020). v
+and psi are pure integrals of u, so that u = 0 is feasible and no slack is needed.
 """
 
 from __future__ import annotations
@@ -43,20 +43,20 @@ class TrackingMpc:
     """Model predictive tracking of one robot."""
 
     def __init__(self, model: RobotModel, params: MpcParams | None = None) -> None:
-        self._solver = _solver(
-            model.motion_model, model.wheelbase_m, params or MpcParams()
-        )
+        """Set up the problem for a robot of `model`."""
+        solver = _solver(model.motion_model, model.wheelbase_m, params or MpcParams())
         self._lower, self._upper = _bounds(model.limits)
         self._limits = model.limits
         self._deviation = np.zeros(_SIZE)
         self._guess = np.zeros(_SIZE)
         self._target = np.zeros(_SIZE)
         self._solution = np.zeros(_SIZE)
-        self._buffer, self._call = self._solver.buffer()
+        # The buffer must outlive the call that works on it.
+        self._buffer, self._call = solver.buffer()
         arguments = (self._guess, self._target, self._lower, self._upper)
         for index, array in enumerate(arguments):
-            self._buffer.set_arg(index, memoryview(array))
-        self._buffer.set_res(0, memoryview(self._solution))
+            self._buffer.set_arg(index, memoryview(array))  # type: ignore
+        self._buffer.set_res(0, memoryview(self._solution))  # type: ignore
 
     def correct(self, state: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """Return the first control of the optimum less the reference's."""

@@ -1,7 +1,8 @@
 """Colours of the simulated world, chosen to stay apart for colour-blind eyes.
 
-Robots take the Okabe-Ito palette (Okabe and Ito 2008), lightened in later rounds; terrain
-takes steps of Tol's YlOrBr (Tol 2021), whose lightness falls as driving gets harder.
+Robots take the Okabe-Ito palette (Okabe and Ito 2008), lightened in later rounds;
+terrain takes steps after Tol's YlOrBr (Tol 2021), softened, whose lightness falls as
+driving gets harder.
 """
 
 from __future__ import annotations
@@ -25,11 +26,11 @@ _OKABE_ITO: tuple[Rgb, ...] = (
 _HARDER = np.array(
     [
         (0.886, 0.894, 0.843),  # plain ground
-        (0.992, 0.890, 0.569),
-        (0.996, 0.769, 0.310),
-        (0.925, 0.439, 0.078),
-        (0.800, 0.298, 0.008),
-        (0.600, 0.204, 0.016),
+        (0.980, 0.900, 0.640),
+        (0.973, 0.800, 0.450),
+        (0.900, 0.600, 0.300),
+        (0.780, 0.430, 0.190),
+        (0.600, 0.280, 0.120),
     ]
 )
 _EASIER: Rgb = (0.72, 0.84, 0.90)
@@ -38,7 +39,7 @@ _DARKEST_MULTIPLIER = 8.0
 OBSTACLE: Rgb = (0.42, 0.45, 0.50)
 PARTIAL_OBSTACLE: Rgb = (0.62, 0.55, 0.68)
 WALL: Rgb = (0.30, 0.32, 0.36)
-GOAL: Rgb = (0.85, 0.14, 0.35)
+GOAL: Rgb = (0.47, 0.15, 0.62)
 STATION: Rgb = (0.06, 0.52, 0.50)
 
 
@@ -46,9 +47,7 @@ def robot_colour(index: int) -> Rgb:
     """Return the colour of the robot at `index` in the scene's order."""
     turn, place = divmod(index, len(_OKABE_ITO))
     lightness = 1.0 - 0.6**turn
-    red, green, blue = (
-        part + (1.0 - part) * lightness for part in _OKABE_ITO[place]
-    )
+    red, green, blue = (part + (1.0 - part) * lightness for part in _OKABE_ITO[place])
     return red, green, blue
 
 

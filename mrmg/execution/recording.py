@@ -11,6 +11,7 @@ class Recording:
     """Rows of named quantities, one row a tick."""
 
     def __init__(self) -> None:
+        """Start without rows."""
         self._rows: defaultdict[str, list[np.ndarray]] = defaultdict(list)
 
     def add(self, **values: np.ndarray | float) -> None:
@@ -43,8 +44,9 @@ def held_force_work_J(
 ) -> np.ndarray:
     """Return the work of a force held over several physics steps, shape (R, 2).
 
-    The integrator moves the wheels at the speed of each step's end; taken at the mean of
-    both ends, as kinetic energy is, the way is shorter by dt / 2 times the gain of speed.
+    The integrator moves the wheels at the speed of each step's end; taken at the mean
+    of both ends, as kinetic energy is, the way is shorter by dt / 2 times the gain of
+    speed.
 
     Args:
         force_N: the force, shape (R,).

@@ -7,6 +7,7 @@ from scipy.interpolate import PPoly
 
 from mrmg.mission import Plan, Trajectory
 from mrmg.motion.dynamics import DERIVATIVES, NX
+from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
 
 
@@ -22,10 +23,9 @@ class FleetReference:
     """
 
     def __init__(self, scene: Scene, plan: Plan) -> None:
+        """Interpolate the trajectories of `plan`, in the scene's order of robots."""
         pieces = [
-            _pieces(scene.robot(item.robot).model.motion_model, item, wheelbase_m)
-            for item in plan.trajectories
-            for wheelbase_m in (scene.robot(item.robot).model.wheelbase_m,)
+            _pieces(robot.model, plan.trajectory(robot.id)) for robot in scene.robots
         ]
         steps = pieces[0].shape[1]
         self.duration_s = steps * plan.dt_s
@@ -53,13 +53,16 @@ class FleetReference:
         return states
 
 
-def _pieces(motion_model: str, item: Trajectory, wheelbase_m: float) -> np.ndarray:
+def _pieces(model: RobotModel, item: Trajectory) -> np.ndarray:
     """Return the cubics of one trajectory, highest power first, shape (4, n, 5)."""
-    derivative = DERIVATIVES[motion_model](np.sin, np.cos, np.tan)
+    derivative = DERIVATIVES[model.motion_model](np.sin, np.cos, np.tan)
     state, dt_s = item.state, item.dt_s
     zero = np.zeros(len(state))
     slope = np.stack(
-        derivative(state[:, 2], state[:, 3], state[:, 4], zero, zero, wheelbase_m), 1
+        derivative(
+            state[:, 2], state[:, 3], state[:, 4], zero, zero, model.wheelbase_m
+        ),
+        axis=1,
     )
     start, chord = state[:-1], np.diff(state, axis=0) / dt_s
     before, after = slope[:-1], slope[1:]

@@ -1,8 +1,8 @@
 """The world around the robots: floor, obstacles, walls, goals and stations.
 
-Collision bits: floor 1, hull of a robot 2, obstacle and wall 4. A tyre takes bit 1 only,
-a hull bits 2 and 4, everything here takes none, so that static things never test each
-other. Groups: 1 drawn, 3 hidden solids.
+Collision bits: floor 1, hull of a robot 2, obstacle and wall 4. A tyre takes bit 1
+only, a hull bits 2 and 4, everything here takes none, so that static things never test
+each other. Groups: 1 drawn, 3 hidden solids.
 """
 
 from __future__ import annotations
@@ -18,14 +18,15 @@ from mrmg.execution.convex import convex_pieces, triangles
 from mrmg.scene.types import Obstacle, Region, Scene
 from mrmg.world.terrain import multiplier_at
 
-FLOOR_BIT, HULL_BIT, OBSTACLE_BIT = 1, 2, 4
-DRAWN_GROUP, SOLID_GROUP = 1, 3
+_FLOOR_BIT, _OBSTACLE_BIT = 1, 4
+_DRAWN_GROUP, _SOLID_GROUP = 1, 3
 
 FLOOR = "floor"
 BOUNDS = "bounds"
 _FLOOR_MARGIN_M = 4.0
 _TEXTURE_PIXELS = 1536
 _GRID_M = 10.0
+_GRID_SHADE = 0.94
 _WALL_HEIGHT_M = 0.5
 _WALL_THICKNESS_M = 0.4
 _TARGET_THICKNESS_M = 0.03
@@ -40,7 +41,7 @@ def add_floor(spec: mujoco.MjSpec, scene: Scene) -> None:
     texture = spec.add_texture(
         name=FLOOR,
         type=mujoco.mjtTexture.mjTEXTURE_2D,
-        colorspace=mujoco.mjtColorSpace.mjCOLORSPACE_SRGB,
+        colorspace=mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR,
         height=image.shape[0],
         width=image.shape[1],
         nchannel=3,
@@ -54,7 +55,7 @@ def add_floor(spec: mujoco.MjSpec, scene: Scene) -> None:
         pos=[*center, 0.0],
         size=[*half, 1.0],
         material=FLOOR,
-        contype=FLOOR_BIT,
+        contype=_FLOOR_BIT,
         conaffinity=0,
         castshadow=False,
     )
@@ -68,12 +69,21 @@ def _floor_image(scene: Scene, center: np.ndarray, half: np.ndarray) -> np.ndarr
     y = center[1] + half[1] - (np.arange(rows) + 0.5) * 2.0 * half[1] / rows
     grid_x, grid_y = np.meshgrid(x, y)
     points = np.stack([grid_x.ravel(), grid_y.ravel()], axis=1)
-    classes, of_pixel = np.unique(multiplier_at(scene, points), return_inverse=True)
+    classes = np.unique([1.0, *(area.multiplier for area in scene.terrain)])
     colours = np.array([palette.terrain_colour(multiplier) for multiplier in classes])
-    image = colours[of_pixel].reshape(rows, columns, 3)
-    image[:, np.abs((x + _GRID_M / 2) % _GRID_M - _GRID_M / 2) < pixel_m] *= 0.94
-    image[np.abs((y + _GRID_M / 2) % _GRID_M - _GRID_M / 2) < pixel_m] *= 0.94
-    return np.asarray(np.round(255.0 * image), dtype=np.uint8)
+    of_pixel = np.searchsorted(classes, multiplier_at(scene, points))
+    image = _bytes(colours)[of_pixel].reshape(rows, columns, 3)
+    shade = _bytes(_GRID_SHADE * colours)[of_pixel].reshape(rows, columns, 3)
+    on_grid = _on_grid(y, pixel_m)[:, None] | _on_grid(x, pixel_m)[None]
+    return np.where(on_grid[..., None], shade, image)
+
+
+def _on_grid(at_m: np.ndarray, width_m: float) -> np.ndarray:
+    return np.abs((at_m + _GRID_M / 2) % _GRID_M - _GRID_M / 2) < width_m
+
+
+def _bytes(colours: np.ndarray) -> np.ndarray:
+    return np.asarray(np.round(255.0 * colours), dtype=np.uint8)
 
 
 def add_obstacle(spec: mujoco.MjSpec, obstacle: Obstacle) -> mujoco.MjsBody:
@@ -90,9 +100,9 @@ def add_obstacle(spec: mujoco.MjSpec, obstacle: Obstacle) -> mujoco.MjsBody:
             name=name,
             type=mujoco.mjtGeom.mjGEOM_MESH,
             meshname=name,
-            contype=OBSTACLE_BIT,
+            contype=_OBSTACLE_BIT,
             conaffinity=0,
-            group=SOLID_GROUP,
+            group=_SOLID_GROUP,
         )
     colour = palette.OBSTACLE if obstacle.blocks is None else palette.PARTIAL_OBSTACLE
     name = f"obstacle:{obstacle.id}"
@@ -103,7 +113,7 @@ def add_obstacle(spec: mujoco.MjSpec, obstacle: Obstacle) -> mujoco.MjsBody:
         meshname=name,
         contype=0,
         conaffinity=0,
-        group=DRAWN_GROUP,
+        group=_DRAWN_GROUP,
         rgba=[*colour, 1.0],
     )
     return body
@@ -125,9 +135,9 @@ def add_bounds(spec: mujoco.MjSpec, scene: Scene) -> None:
                 type=mujoco.mjtGeom.mjGEOM_BOX,
                 pos=[*at, _WALL_HEIGHT_M / 2],
                 size=[*size, _WALL_HEIGHT_M / 2],
-                contype=OBSTACLE_BIT,
+                contype=_OBSTACLE_BIT,
                 conaffinity=0,
-                group=DRAWN_GROUP,
+                group=_DRAWN_GROUP,
                 rgba=[*palette.WALL, 1.0],
             )
 
@@ -147,7 +157,7 @@ def _add_mark(
         "name": name,
         "contype": 0,
         "conaffinity": 0,
-        "group": DRAWN_GROUP,
+        "group": _DRAWN_GROUP,
         "rgba": [*colour, 0.8],
         "castshadow": False,
     }

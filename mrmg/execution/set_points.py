@@ -25,6 +25,13 @@ class SetPoints:
     def __init__(
         self, scene: Scene, reference: FleetReference, controllers: list[Controller]
     ) -> None:
+        """Start at the plan's first set-points.
+
+        Args:
+            scene: whose robots' limits bound the set-points.
+            reference: the plan.
+            controllers: one a robot, in the scene's order.
+        """
         limits = [robot.model.limits for robot in scene.robots]
         self._lower = np.array([[item.v_min_m_s, -item.w_max] for item in limits])
         self._upper = np.array([[item.v_max_m_s, item.w_max] for item in limits])

@@ -9,7 +9,6 @@ from importlib.metadata import version
 import mujoco
 import numpy as np
 
-from mrmg import storage
 from mrmg.errors import UsageError
 from mrmg.execution.contacts import ContactWatch
 from mrmg.execution.controller import Controller, controller_maker
@@ -131,7 +130,7 @@ class _Run:
 
     def fraction(self) -> float:
         """Return the share of the plan's time that is done."""
-        return min(self._clock.time_s / max(self._reference.duration_s, 1e-9), 1.0)
+        return float(min(self._clock.time_s / self._reference.duration_s, 1.0))
 
     def log(self, controller: str, wall_s: float) -> ExecutionLog:
         """Return everything recorded."""

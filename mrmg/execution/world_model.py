@@ -28,10 +28,10 @@ class MujocoWorld:
         spec: the editable description.
         model: the compiled model.
         digest: fingerprint of the compiled model.
-        hull_owner: index of the robot whose hull a geom is, -1 otherwise, shape (ngeom,).
+        hull_owner: index of the robot whose hull a geom is, else -1, shape (ngeom,).
         geom_label: what a contact calls each geom: the id of a robot or obstacle,
             "bounds" or "floor".
-        target_geom: geom of each goal and station, by its id, to recolour it when visited.
+        target_geom: geom of each goal and station, by its id, for recolouring.
         chassis: body of each robot, in the scene's order, shape (R,).
     """
 
@@ -91,8 +91,8 @@ def _set_options(spec: mujoco.MjSpec, robots: int) -> None:
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.impratio = 10.0
     option.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    # A diverged state must be seen by the caller, not silently set back; finding islands
-    # costs more than it saves for cars that touch nothing but the floor.
+    # A diverged state must be seen by the caller, not silently set back; finding
+    # islands costs more than it saves for cars that touch nothing but the floor.
     option.disableflags = (
         mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_ISLAND
     )

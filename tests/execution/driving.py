@@ -36,7 +36,10 @@ def open_ground(
 
 
 def rolled_out(
-    start: tuple[float, float, float], control: np.ndarray, robot: str, wheelbase_m: float
+    start: tuple[float, float, float],
+    control: np.ndarray,
+    robot: str,
+    wheelbase_m: float,
 ) -> Trajectory:
     """The trajectory of held controls, shape (n, 2), from rest."""
     state = [(*start, 0.0, 0.0)]
