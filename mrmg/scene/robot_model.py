@@ -1,7 +1,7 @@
 """One kind of robot: its shape, motion, limits, tyres and battery.
 
-A model is a folder in `models/` with `robot.yaml` (this module's fields) and an MJCF file;
-`scene.loading` reads the YAML, `execution` compiles the MJCF.
+A model is a folder in `models/` with `robot.yaml` (this module's fields) and an MJCF
+file; `scene.loading` reads the YAML, `execution` compiles the MJCF.
 """
 
 from __future__ import annotations
@@ -51,13 +51,15 @@ class RobotModel:
     Attributes:
         name: folder name of the model.
         motion_model: key of `motion.dynamics.DERIVATIVES`.
-        footprint_m: convex outline in the robot's frame, counter-clockwise, shape (m, 2).
-            The frame's origin is the reference point (x, y): the middle of the rear axle.
+        footprint_m: convex outline in the robot's frame, counter-clockwise, shape
+            (m, 2). The frame's origin is the reference point (x, y): the middle of the
+            rear axle.
         height_m: height of the body.
         wheelbase_m: distance L of the axles.
         track_m: distance of the wheels of one axle.
         limits: what the robot can do.
-        planning_share: share of the limits the planner uses; the controller keeps the rest.
+        planning_share: share of the limits the planner uses; the controller keeps the
+            rest.
         mass_kg: whole robot, wheels included.
         wheel_radius_m: rolling radius.
         wheel_inertia_kg_m2: spin inertia of one wheel, armature included.
@@ -114,7 +116,7 @@ class RobotModel:
 
     @property
     def inscribed_radius_m(self) -> float:
-        """Radius of the largest circle about the reference point inside the footprint."""
+        """Radius of the largest circle about the reference point in the footprint."""
         start = self.footprint_m
         edge = np.roll(start, -1, axis=0) - start
         normal_distance = (
@@ -134,7 +136,7 @@ class RobotModel:
 
     @property
     def turning_radius_m(self) -> float:
-        """Smallest turning radius of the reference point within the planner's limits."""
+        """Smallest turning radius of the reference point in the planner's limits."""
         if self.motion_model == "unicycle":
             return 0.0
         return self.wheelbase_m / math.tan(self.planning_share * self.limits.w_max)

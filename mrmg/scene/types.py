@@ -74,7 +74,7 @@ class Region:
         points = np.atleast_2d(points)
         if not len(self.corners):
             offset = points - self.center
-            return self.radius_m - np.hypot(offset[:, 0], offset[:, 1])
+            return np.asarray(self.radius_m - np.hypot(offset[:, 0], offset[:, 1]))
         start = self.corners
         edge = np.roll(start, -1, axis=0) - start
         edge = edge / np.hypot(edge[:, 0], edge[:, 1])[:, None]

@@ -106,6 +106,9 @@ def load_model(
     except ValidationError as error:
         raise SceneError(source, faults_of(error, ModelDocument)) from error
     faults = _geometry_faults(entry)
+    if not (folder / entry.mjcf).is_file():
+        message = f"got '{entry.mjcf}'; no such file in the folder"
+        faults.append(Fault("mjcf", message))
     if faults:
         raise SceneError(source, faults)
     return _model(folder, entry), entry.model_dump(mode="json")

@@ -57,9 +57,8 @@ Identifier = Annotated[
 Point = Annotated[
     list[Number], Field(min_length=2, max_length=2, description="[x, y] in m")
 ]
-Ring = Annotated[
-    list[Point], Field(min_length=3, description="at least 3 corners [x, y] in m")
-]
+_RING = "at least 3 corners [x, y] in m"
+Ring = Annotated[list[Point], Field(min_length=3, description=_RING)]
 
 
 class Strict(BaseModel):
@@ -88,9 +87,7 @@ class CircleEntry(Strict):
 class ShapedEntry(Strict):
     """Exactly one of polygon, box, circle."""
 
-    polygon: Ring | None = Field(
-        default=None, description="at least 3 corners [x, y] in m"
-    )
+    polygon: Ring | None = Field(default=None, description=_RING)
     holes: list[Ring] | None = Field(
         default=None, description="rings inside the polygon"
     )
@@ -120,9 +117,7 @@ class RegionEntry(Strict):
 
     id: Identifier
     circle: CircleEntry | None = None
-    polygon: Ring | None = Field(
-        default=None, description="at least 3 corners [x, y] in m"
-    )
+    polygon: Ring | None = Field(default=None, description=_RING)
 
 
 class BatteryEntry(Strict):
