@@ -1,0 +1,360 @@
+"""Every rule is broken once by a minimal plan; a valid plan breaks none.
+
+Oracle: shapely on densely sampled footprints, which sees what the verifier must see.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+
+from mrmg.ledger import EnergyLedger
+from mrmg.mission import Plan, Trajectory
+from mrmg.results.clearance import MINIMUM_ACCURACY_M
+from mrmg.results.swept_footprint import SweptFootprint, footprint_corners
+from mrmg.results.verdict import Verdict, Violation, ViolationKind
+from mrmg.results.verify import verify
+from mrmg.scene.types import Battery, Scene
+
+Kind = ViolationKind
+Case = tuple[Scene, Plan]
+
+TWO_ROBOTS = [
+    {"id": "r1", "model": "car", "pose": [5, 10, 0]},
+    {"id": "r2", "model": "car", "pose": [5, 14, 0]},
+]
+STATION = {"id": "s", "circle": {"center": [10, 10], "radius": 1}}
+WALL = {"id": "wall", "box": {"center": [13.5, 10], "size": [1, 4]}, "height": 1}
+
+
+@pytest.fixture
+def case(make_scene: Any, make_plan: Any, straight: Any) -> Callable[..., Case]:
+    """Return a maker of (scene, plan): r1 drives 12 m along y = 10 through the goal."""
+
+    def make(distance_m: float = 12.0, tour: tuple[str, ...] = ("g",), **scene: Any):
+        made = make_scene(**scene)
+        controls = {robot.id: straight(distance_m) for robot in made.robots}
+        tours = {robot.id: tour if robot.id == "r1" else () for robot in made.robots}
+        return made, make_plan(made, controls, tours)
+
+    return make
+
+
+def with_trajectory(plan: Plan, trajectory: Trajectory) -> Plan:
+    return replace(plan, trajectories=(trajectory, *plan.trajectories[1:]))
+
+
+def with_controls(case: Case, drive: Any, edit: Callable[[list], Any]) -> Case:
+    """Drive r1 with edited controls; keep the stated visits and ledger."""
+    scene, plan = case
+    controls = plan.trajectories[0].control.tolist()
+    edit(controls)
+    return scene, with_trajectory(plan, drive(scene.robots[0], controls))
+
+
+def kinds(verdict: Verdict) -> set[ViolationKind]:
+    return {violation.kind for violation in verdict.violations}
+
+
+def only(verdict: Verdict, kind: ViolationKind) -> Violation:
+    """Return the single violation of a kind."""
+    (violation,) = [item for item in verdict.violations if item.kind is kind]
+    return violation
+
+
+def broken_scene_mismatch(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    return scene, replace(plan, scene_digest="another")
+
+
+def broken_malformed(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    state = plan.trajectories[0].state.copy()
+    state[4, 2] = np.nan
+    return scene, with_trajectory(plan, replace(plan.trajectories[0], state=state))
+
+
+def broken_start(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    robot = replace(scene.robots[0], pose=(5.25, 10.0, 0.0))
+    return replace(scene, robots=(robot,)), plan
+
+
+def broken_final_rest(case: Any, drive: Any) -> Case:
+    return with_controls(case(), drive, lambda controls: controls.pop())
+
+
+def broken_dynamics(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    state = plan.trajectories[0].state.copy()
+    state[40, 0] = np.nextafter(state[40, 0], np.inf)
+    return scene, with_trajectory(plan, replace(plan.trajectories[0], state=state))
+
+
+def broken_state_limit(case: Any, drive: Any) -> Case:
+    def speed_up(controls: list) -> None:
+        controls[20:31] = [[1.0, 0.0]] * 11
+        controls[31:42] = [[-1.0, 0.0]] * 11
+
+    return with_controls(case(), drive, speed_up)
+
+
+def broken_control_limit(case: Any, drive: Any) -> Case:
+    def jerk(controls: list) -> None:
+        controls[20], controls[21] = [1.625, 0.0], [-1.625, 0.0]
+
+    return with_controls(case(), drive, jerk)
+
+
+def broken_obstacle(case: Any, drive: Any) -> Case:
+    return case(obstacles=[WALL])
+
+
+def broken_bounds(case: Any, drive: Any) -> Case:
+    return case(bounds=[0, 0, 18, 20])
+
+
+def broken_robot(case: Any, drive: Any) -> Case:
+    other = {"id": "r2", "model": "car", "pose": [30, 10, 3.141592653589793]}
+    return case(robots=[TWO_ROBOTS[0], other])
+
+
+def broken_goal_missed(case: Any, drive: Any) -> Case:
+    return case(goals=[{"id": "g", "circle": {"center": [15, 14], "radius": 1}}])
+
+
+def broken_tour(case: Any, drive: Any) -> Case:
+    scene, plan = case(stations=[STATION], tour=("s", "g"))
+    return scene, replace(plan, tours={"r1": ("g", "s")})
+
+
+def broken_visit(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    late = replace(plan.visits[0], step=plan.visits[0].step + 2)
+    return scene, replace(plan, visits=(late,))
+
+
+def broken_recharge(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    claim = replace(plan.visits[0], kind="station")
+    return scene, replace(plan, visits=(claim,))
+
+
+def broken_energy(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    battery = Battery(capacity_J=20000.0, start_J=2000.0, reserve_fraction=0.05)
+    robot = replace(scene.robots[0], battery=battery)
+    return replace(scene, robots=(robot,)), plan
+
+
+def broken_ledger(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    first, *rest = plan.ledger.entries
+    richer = replace(first, energy_J=first.energy_J + 1.0)
+    return scene, replace(plan, ledger=EnergyLedger((richer, *rest)))
+
+
+BROKEN = {kind: globals()[f"broken_{kind.value}"] for kind in Kind}
+
+# Who moves or recharges otherwise than stated also breaks what was stated of it.
+FOLLOWING = {
+    Kind.FINAL_REST: {Kind.LEDGER},
+    Kind.STATE_LIMIT: {Kind.VISIT, Kind.LEDGER},
+    Kind.CONTROL_LIMIT: {Kind.VISIT, Kind.LEDGER},
+    Kind.TOUR: {Kind.VISIT, Kind.LEDGER},
+    Kind.GOAL_MISSED: {Kind.TOUR},
+    Kind.RECHARGE: {Kind.VISIT},
+    Kind.ENERGY: {Kind.VISIT},
+}
+
+
+def test_valid_plan_has_no_violation(case: Any) -> None:
+    verdict = verify(*case(stations=[STATION], tour=("s", "g"), robots=TWO_ROBOTS))
+    assert verdict.ok
+    assert verdict.violations == ()
+
+
+@pytest.mark.parametrize("kind", Kind)
+def test_broken_rule_is_found_alone(kind: Kind, case: Any, drive: Any) -> None:
+    verdict = verify(*BROKEN[kind](case, drive))
+    assert not verdict.ok
+    found = kinds(verdict)
+    assert kind in found
+    assert found - {kind} <= FOLLOWING.get(kind, set())
+
+
+@pytest.mark.parametrize("kind", Kind)
+def test_message_names_what_is_broken(kind: Kind, case: Any, drive: Any) -> None:
+    for violation in verify(*BROKEN[kind](case, drive)).violations:
+        assert violation.message.startswith(violation.robot)
+        assert len(violation.message) > 15
+
+
+def test_start_tells_how_far_off(case: Any, drive: Any) -> None:
+    violation = only(verify(*broken_start(case, drive)), Kind.START)
+    assert violation.amount == 0.25
+    assert violation.time_s == 0.0
+
+
+def test_one_ulp_off_the_dynamics_is_found_once(case: Any, drive: Any) -> None:
+    violation = only(verify(*broken_dynamics(case, drive)), Kind.DYNAMICS)
+    assert 4.0 <= violation.time_s <= 4.1
+    assert 0.0 < violation.amount < 1e-14
+
+
+def test_state_limit_reports_the_fastest_moment(case: Any, drive: Any) -> None:
+    violation = only(verify(*broken_state_limit(case, drive)), Kind.STATE_LIMIT)
+    assert violation.amount == pytest.approx(0.1)
+    assert violation.time_s == pytest.approx(3.1)
+
+
+def test_obstacle_contact_is_one_violation_with_its_worst_overlap(
+    case: Any, drive: Any
+) -> None:
+    scene, plan = broken_obstacle(case, drive)
+    violation = only(verify(scene, plan), Kind.OBSTACLE)
+    state = plan.trajectories[0].state
+    shapes = shapely.polygons(footprint_corners(scene.robots[0].model, state))
+    overlap = shapely.area(shapely.intersection(shapes, scene.obstacles[0].shape))
+    assert violation.other == "wall"
+    assert violation.amount == pytest.approx(overlap.max())
+    x_m = np.interp(violation.time_s, np.arange(len(state)) * 0.1, state[:, 0])
+    assert violation.x_m == pytest.approx(x_m, abs=0.01)
+
+
+def test_bounds_violation_is_measured_in_metres(case: Any, drive: Any) -> None:
+    violation = only(verify(*broken_bounds(case, drive)), Kind.BOUNDS)
+    assert violation.amount == pytest.approx(5 + 12 + 1.5 - 18)
+
+
+def test_robots_in_conflict_are_both_named(case: Any, drive: Any) -> None:
+    violation = only(verify(*broken_robot(case, drive)), Kind.ROBOT)
+    assert (violation.robot, violation.other) == ("r1", "r2")
+
+
+def test_energy_violation_tells_the_lack(case: Any, drive: Any) -> None:
+    scene, plan = broken_energy(case, drive)
+    violation = only(verify(scene, plan), Kind.ENERGY)
+    assert violation.amount == pytest.approx(1000.0 - (2000.0 - plan.cost_J))
+
+
+def test_recharge_keeps_the_battery_above_the_reserve(case: Any) -> None:
+    scene, plan = case(
+        stations=[STATION],
+        tour=("s", "g"),
+        battery={"capacity_J": 1200, "reserve": 0.05},
+    )
+    without = replace(plan, tours={"r1": ("g",)})
+    assert verify(scene, plan).ok
+    assert Kind.ENERGY in kinds(verify(scene, without))
+
+
+def test_obstacle_of_another_robot_is_no_obstacle(case: Any) -> None:
+    only_r2 = {**WALL, "blocks": ["r2"]}
+    assert verify(*case(obstacles=[only_r2], robots=TWO_ROBOTS)).ok
+    only_r1 = {**WALL, "blocks": ["r1"]}
+    verdict = verify(*case(obstacles=[only_r1], robots=TWO_ROBOTS))
+    assert {item.robot for item in verdict.violations} == {"r1"}
+
+
+def test_robot_drives_inside_the_hole_of_an_obstacle(case: Any) -> None:
+    ring = {
+        "id": "ring",
+        "polygon": [[1, 6], [22, 6], [22, 14], [1, 14]],
+        "holes": [[[2, 7], [21, 7], [21, 13], [2, 13]]],
+        "height": 1,
+    }
+    verdict = verify(*case(obstacles=[ring]))
+    assert verdict.ok
+    # The nose ends at 5 + 12 + 1.5, the sides run 3 - 0.55 from the hole's rim.
+    assert verdict.min_obstacle_clearance_m == pytest.approx(2.45, abs=2e-3)
+
+
+def test_clearances_are_certified_from_below(case: Any) -> None:
+    beside = {"id": "b", "box": {"center": [12, 8], "size": [2, 1]}, "height": 1}
+    verdict = verify(*case(obstacles=[beside], robots=TWO_ROBOTS))
+    beside_m, apart_m = 1.5 - 0.55, 4.0 - 1.1
+    obstacle_m, robot_m = verdict.min_obstacle_clearance_m, verdict.min_robot_distance_m
+    assert beside_m - MINIMUM_ACCURACY_M <= obstacle_m <= beside_m + 1e-9
+    assert apart_m - MINIMUM_ACCURACY_M <= robot_m <= apart_m + 1e-9
+
+
+def test_lone_robot_has_no_distance_to_others(case: Any) -> None:
+    assert verify(*case()).min_robot_distance_m is None
+
+
+def test_corner_that_cuts_a_post_between_two_samples_is_caught(
+    make_scene: Any, make_plan: Any
+) -> None:
+    """The outer front corner swings out furthest between two samples."""
+    turn = [(1.5, 1.0)] * 5 + [(1.5, 0.0)] * 5 + [(0.0, 0.0)] * 6 + [(-1.5, 0.0)] * 10
+    free = make_scene(goals=[])
+    plan = make_plan(free, {"r1": turn}, {"r1": ()})
+    footprint = SweptFootprint.of(free.robots[0].model, plan.trajectories[0])
+    corner = footprint.corners_at(np.array([13]), np.array([0.05]))[0, 1]
+    heading = footprint.states_at(np.array([13]), np.array([0.05]))[0, 2]
+    post = corner + 0.004 * np.array([np.sin(heading), -np.cos(heading)])
+    post -= 0.008 * np.array([np.cos(heading), np.sin(heading)])
+    box = {"center": post.tolist(), "size": [0.01, 0.01], "yaw": float(heading)}
+    scene = make_scene(goals=[], obstacles=[{"id": "post", "box": box, "height": 1}])
+
+    state = plan.trajectories[0].state
+    sampled = shapely.polygons(footprint_corners(scene.robots[0].model, state))
+    assert shapely.distance(sampled, scene.obstacles[0].shape).min() > 0.0
+    verdict = verify(scene, replace(plan, scene_digest=scene.digest))
+    violation = only(verdict, Kind.OBSTACLE)
+    assert 1.3 < violation.time_s < 1.4
+    assert verdict.min_obstacle_clearance_m == 0.0
+
+
+def test_malformed_plan_names_every_fault(case: Any) -> None:
+    scene, plan = case(robots=TWO_ROBOTS)
+    short = replace(
+        plan.trajectories[1],
+        state=plan.trajectories[1].state[:-1],
+        control=plan.trajectories[1].control[:-1],
+    )
+    broken = replace(plan, trajectories=(plan.trajectories[0], short), tours={})
+    verdict = verify(scene, broken)
+    assert kinds(verdict) == {Kind.MALFORMED}
+    messages = " ".join(item.message for item in verdict.violations)
+    assert "steps" in messages
+    assert "r2: the plan has no tour" in messages
+    assert verdict.min_obstacle_clearance_m is None
+
+
+@pytest.mark.parametrize("offset", [(100.0, 0.0), (-37.5, 1000.0)])
+def test_moving_the_scene_changes_nothing(
+    offset: tuple[float, float], make_scene: Any, make_plan: Any
+) -> None:
+    rng = np.random.default_rng(5)
+    wiggle = [(1.0, float(u2)) for u2 in rng.uniform(-1, 1, 12)]
+    wiggle += [(-1.0, float(u2)) for u2 in rng.uniform(-1, 1, 12)]
+
+    def judged(dx: float, dy: float) -> Verdict:
+        scene = make_scene(
+            bounds=[dx, dy, 40 + dx, 20 + dy],
+            goals=[],
+            robots=[{"id": "r1", "model": "car", "pose": [5 + dx, 10 + dy, 0]}],
+            obstacles=[
+                {
+                    "id": "post",
+                    "circle": {"center": [7.5 + dx, 10.5 + dy], "radius": 0.4},
+                    "height": 1,
+                }
+            ],
+        )
+        return verify(scene, make_plan(scene, {"r1": wiggle}, {"r1": ()}))
+
+    here, there = judged(0.0, 0.0), judged(*offset)
+    assert here.min_obstacle_clearance_m == pytest.approx(
+        there.min_obstacle_clearance_m, abs=1e-6
+    )
+    assert [item.kind for item in here.violations] == [
+        item.kind for item in there.violations
+    ]
