@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from mrmg.accounting import find_visits, plan_ledger
+from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan, Trajectory
 from mrmg.motion.dynamics import DERIVATIVES, rk4_step
 from mrmg.scene.loading import scene_from_document
@@ -112,3 +113,70 @@ def make_plan(drive: Callable[..., Trajectory]) -> Callable[..., Plan]:
         )
 
     return make
+
+
+TICK_S = 0.02
+
+
+@pytest.fixture
+def make_log() -> Callable[..., ExecutionLog]:
+    """Return a maker of logs of straight plans that were driven without any error.
+
+    The work at the wheels is force times way, in closed form for straight motion over
+    plain ground.
+    """
+
+    def make(scene: Scene, plan: Plan) -> ExecutionLog:
+        ticks = round(DT_S / TICK_S)
+        states, works = zip(
+            *(_driven(scene, item, ticks) for item in plan.trajectories), strict=True
+        )
+        state = np.array(states)
+        robots, n, _ = state.shape
+        time_s = TICK_S * np.arange(n)
+        return ExecutionLog(
+            scene_digest=scene.digest,
+            plan_digest=plan.digest,
+            model_digest="none",
+            controller="perfect",
+            control_period_s=TICK_S,
+            completed=True,
+            robots=tuple(robot.id for robot in scene.robots),
+            versions={"mujoco": "none"},
+            time_s=time_s,
+            clock_s=time_s,
+            state=state,
+            reference=state,
+            command=state[:, :, 3:],
+            multiplier=np.ones((robots, n)),
+            force_N=np.zeros((robots, n - 1)),
+            work_J=np.array(works),
+            qpos=np.zeros((n, 0)),
+            contacts=(),
+            timing={
+                "wall_s": 1.0,
+                "realtime_factor": 20.0,
+                "controller_ms": {"median": 0.2, "p99": 0.4},
+            },
+        )
+
+    return make
+
+
+def _driven(
+    scene: Scene, trajectory: Trajectory, ticks: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return states and (driving, braking) work of a straight motion at every tick."""
+    model = scene.robot(trajectory.robot).model
+    u1 = np.repeat(trajectory.control[:, 0], ticks)
+    v = np.concatenate([[0.0], np.cumsum(u1 * TICK_S)])
+    way_m = 0.5 * (v[:-1] + v[1:]) * TICK_S
+    travelled_m = np.concatenate([[0.0], np.cumsum(way_m)])
+    x, y, theta = scene.robot(trajectory.robot).pose
+    state = np.zeros((len(v), 5))
+    state[:, 0] = x + travelled_m * np.cos(theta)
+    state[:, 1] = y + travelled_m * np.sin(theta)
+    state[:, 2], state[:, 3] = theta, v
+    force_N = model.effective_mass_kg * u1 + model.energy_model.rolling_force_N
+    work_J = force_N * way_m
+    return state, np.stack([np.maximum(work_J, 0), np.minimum(work_J, 0)], axis=-1)

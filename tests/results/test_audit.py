@@ -1,0 +1,218 @@
+"""The three meters on a perfectly driven plan, and every way a mission can fail."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mrmg.errors import RunFolderError
+from mrmg.execution.log import Contact, ExecutionLog
+from mrmg.mission import Plan
+from mrmg.results.audit import audit
+from mrmg.results.energy_audit import EnergyAudit
+from mrmg.scene.types import Scene
+
+STATION = {"id": "s", "circle": {"center": [10, 10], "radius": 1}}
+TWO_ROBOTS = [
+    {"id": "r1", "model": "car", "pose": [5, 10, 0]},
+    {"id": "r2", "model": "car", "pose": [5, 14, 0]},
+]
+Mission = tuple[Scene, Plan, ExecutionLog]
+
+
+@pytest.fixture
+def mission(
+    make_scene: Any, make_plan: Any, make_log: Any, straight: Any
+) -> Callable[..., Mission]:
+    """Return a maker of missions: r1 by the station to the goal, r2 stays parked."""
+
+    def make(**changes: Any) -> Mission:
+        scene = make_scene(**{"stations": [STATION], "robots": TWO_ROBOTS, **changes})
+        controls = {"r1": straight(12.0), "r2": [(0.0, 0.0)]}
+        plan = make_plan(scene, controls, {"r1": ("s", "g"), "r2": ()})
+        return scene, plan, make_log(scene, plan)
+
+    return make
+
+
+def test_perfect_execution_agrees_by_all_meters(mission: Any) -> None:
+    account = audit(*mission())
+    assert account.mission_ok
+    assert account.reasons == ()
+    driver = account.robot("r1")
+    assert driver.planned_J > 1000.0
+    assert driver.metered_J == pytest.approx(driver.planned_J, rel=1e-9)
+    assert driver.measured_J == pytest.approx(driver.planned_J, rel=1e-9)
+    assert abs(driver.metered_error_pct) < 1e-6
+    assert abs(driver.measured_error_pct) < 1e-6
+    assert driver.tracking_max_m == 0.0
+
+
+def test_parked_robot_has_finite_errors(mission: Any) -> None:
+    parked = audit(*mission()).robot("r2")
+    assert parked.planned_J == 0.0
+    assert parked.metered_error_pct == 0.0
+    assert parked.measured_error_pct == 0.0
+
+
+def test_work_of_a_parked_robot_counts_against_one_metre(mission: Any) -> None:
+    scene, plan, log = mission()
+    work_J = log.work_J.copy()
+    model = scene.robot("r2").model.energy_model
+    work_J[1, 0, 0] = 0.5 * model.rolling_force_N
+    parked = audit(scene, plan, replace(log, work_J=work_J)).robot("r2")
+    assert parked.measured_error_pct == pytest.approx(50.0)
+
+
+def test_ledgers_share_legs_and_parts(mission: Any) -> None:
+    account = audit(*mission())
+    legs = {
+        name: {(e.robot, e.leg, e.target) for e in getattr(account, name).entries}
+        for name in ("planned", "metered", "measured")
+    }
+    assert legs["planned"] == legs["metered"] == legs["measured"]
+    assert account.metered.parts() == account.planned.parts()
+    assert account.measured.parts() == ("drive", "idle")
+    for part in account.planned.parts():
+        assert account.metered.total_J(part=part) == pytest.approx(
+            account.planned.total_J(part=part), abs=1e-6
+        )
+
+
+def test_visits_and_recharges_are_those_of_the_simulation(mission: Any) -> None:
+    account = audit(*mission())
+    assert [(visit.target, visit.kind) for visit in account.visits] == [
+        ("s", "station"),
+        ("g", "goal"),
+    ]
+    (recharge,) = account.recharges
+    assert recharge.robot == "r1"
+    assert recharge.energy_J < 20000.0
+    assert account.goals_visited == ("g",)
+
+
+def test_least_charge_is_found_on_arrival_at_the_station(mission: Any) -> None:
+    account = audit(*mission())
+    arrival = account.recharges[0].energy_J
+    assert account.robot("r1").min_charge_fraction == pytest.approx(
+        min(arrival, 20000 - account.measured.total_J() + 20000 - arrival) / 20000
+    )
+
+
+def test_braking_feeds_back_by_the_regeneration_efficiency(mission: Any) -> None:
+    scene, plan, log = mission()
+    model = replace(scene.robots[0].model, regeneration_efficiency=0.5)
+    kinder = replace(
+        scene, robots=(replace(scene.robots[0], model=model), scene.robots[1])
+    )
+    braking_J = log.work_J[0, :, 1].sum()
+    difference_J = (
+        audit(kinder, plan, log).robot("r1").measured_J
+        - audit(scene, plan, log).robot("r1").measured_J
+    )
+    assert braking_J < -10.0
+    assert difference_J == pytest.approx(0.5 * braking_J)
+
+
+def test_tracking_error_is_the_distance_to_the_reference(mission: Any) -> None:
+    scene, plan, log = mission()
+    reference = log.reference.copy()
+    reference[0, :, 0] += 0.03
+    reference[0, :, 1] -= 0.04
+    reference[1, 0, 1] += 0.5
+    account = audit(scene, plan, replace(log, reference=reference))
+    assert account.robot("r1").tracking_rms_m == pytest.approx(0.05)
+    assert account.robot("r1").tracking_max_m == pytest.approx(0.05)
+    assert account.robot("r2").tracking_max_m == pytest.approx(0.5)
+    assert account.robot("r2").tracking_rms_m == pytest.approx(
+        0.5 / np.sqrt(len(log.time_s))
+    )
+
+
+def test_jitter_of_the_speed_does_not_add_up(mission: Any) -> None:
+    """Kinetic energy that goes to and fro while driving costs the battery nothing."""
+    scene, plan, log = mission()
+    state = log.state.copy()
+    cruising = np.abs(np.gradient(state[0, :, 3])) < 1e-9
+    cruising &= state[0, :, 3] > 0.5
+    jitter = 2e-4 * (-1.0) ** np.arange(cruising.sum())
+    state[0, cruising, 3] += jitter
+    account = audit(scene, plan, replace(log, state=state))
+    assert abs(account.robot("r1").metered_error_pct) < 0.2
+
+
+def failed(mission: Mission, **changes: Any) -> EnergyAudit:
+    scene, plan, log = mission
+    account = audit(scene, plan, replace(log, **changes))
+    assert not account.mission_ok
+    return account
+
+
+def test_goal_not_entered_fails_the_mission(mission: Any) -> None:
+    made = mission()
+    state = made[2].state.copy()
+    state[0, :, 1] += 1.2
+    account = failed(made, state=state)
+    assert account.goals_visited == ()
+    assert account.reasons == ("goal g was entered by no robot",)
+
+
+def test_goal_may_be_entered_by_another_robot(mission: Any) -> None:
+    scene, plan, log = mission()
+    swapped = replace(log, state=log.state[::-1].copy())
+    assert audit(scene, plan, swapped).goals_visited == ("g",)
+
+
+def test_contact_fails_the_mission(mission: Any) -> None:
+    contact = Contact(time_s=1.5, robot="r1", other="rock", x_m=6.0, y_m=10.0)
+    account = failed(mission(), contacts=(contact,))
+    assert account.reasons == ("r1 touched rock at 1.50 s near (6.00, 10.00)",)
+
+
+def test_battery_below_reserve_fails_the_mission(mission: Any) -> None:
+    made = mission()
+    work_J = made[2].work_J.copy()
+    work_J[0, 10, 0] += 0.85 * 19500.0
+    account = failed(made, work_J=work_J)
+    (reason,) = account.reasons
+    assert "r1's battery fell to" in reason
+    assert "reserve of 1000 J" in reason
+    assert account.robot("r1").min_charge_fraction < 0.05
+
+
+def test_early_end_fails_the_mission(mission: Any) -> None:
+    account = failed(mission(), completed=False)
+    assert "ended early" in account.reasons[0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "cure"),
+    [
+        ({"scene_digest": "another"}, "another scene"),
+        ({"plan_digest": "another"}, "another plan"),
+        ({"robots": ("r2", "r1")}, "log of robots"),
+    ],
+)
+def test_foreign_log_is_refused(mission: Any, changes: Any, cure: str) -> None:
+    scene, plan, log = mission()
+    with pytest.raises(RunFolderError, match=cure):
+        audit(scene, plan, replace(log, **changes))
+
+
+def test_audit_survives_saving(mission: Any, tmp_path: Path) -> None:
+    account = audit(*mission())
+    account.save(tmp_path)
+    assert EnergyAudit.load(tmp_path) == account
+    assert [path.name for path in tmp_path.iterdir()] == ["audit.json"]
+
+
+@pytest.mark.parametrize("content", ["", "[]", "{}", '{"format": 99}'])
+def test_unreadable_audit_names_the_cure(content: str, tmp_path: Path) -> None:
+    (tmp_path / "audit.json").write_text(content)
+    with pytest.raises(RunFolderError, match="mrmg audit"):
+        EnergyAudit.load(tmp_path)
