@@ -1,10 +1,51 @@
-"""What all tests share: the quick ones run before the slow ones."""
+"""What all tests share: the order of tests, and one run of the shipped quickstart."""
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
+
 import pytest
+
+WALLED = """\
+format: 1
+name: walled
+bounds: [0, 0, 30, 20]
+obstacles:
+  - polygon: [[18, 4], [28, 4], [28, 16], [18, 16]]
+    holes: [[[20, 6], [26, 6], [26, 14], [20, 14]]]
+goals:
+  - {id: g1, circle: {center: [23, 10], radius: 1.0}}
+battery: {capacity_m: 100}
+robots:
+  - {id: r1, model: car, pose: [5, 10, 0]}
+"""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Run the slow tests last, so that a broken build is told early."""
     items.sort(key=lambda item: item.get_closest_marker("slow") is not None)
+
+
+@pytest.fixture(scope="session")
+def quickstart_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run folder of a quickstart without video; only to be read."""
+    from mrmg import pipeline
+
+    folder = tmp_path_factory.mktemp("runs") / "quickstart"
+    pipeline.run("quickstart", out=folder, video=None)
+    return folder
+
+
+@pytest.fixture
+def own_run(quickstart_run: Path, tmp_path: Path) -> Path:
+    """A copy of that run folder to do anything with."""
+    return Path(shutil.copytree(quickstart_run, tmp_path / "run"))
+
+
+@pytest.fixture
+def walled_scene(tmp_path: Path) -> Path:
+    """A scene whose only goal stands inside a wall without a door."""
+    path = tmp_path / "walled.yaml"
+    path.write_text(WALLED)
+    return path

@@ -1,0 +1,105 @@
+"""A stopped run leaves no half-written file, and the same command finishes it."""
+
+from __future__ import annotations
+
+import io
+import json
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from PIL import Image
+
+from mrmg import storage
+from mrmg.errors import ExitCode
+
+pytestmark = pytest.mark.slow
+PATIENCE_S = 120.0
+
+
+def start(out: Path) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "mrmg", "run", "quickstart", "--no-video"]
+    return subprocess.Popen(
+        [*command, "--out", str(out)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def wait_for(path: Path, process: subprocess.Popen[str]) -> None:
+    """Return once `path` exists or the process has ended."""
+    until = time.monotonic() + PATIENCE_S
+    while not path.exists() and process.poll() is None:
+        assert time.monotonic() < until, f"{path.name} never came"
+        time.sleep(0.002)
+
+
+def assert_every_file_is_whole(folder: Path) -> None:
+    for path in folder.iterdir() if folder.exists() else []:
+        if path.name.startswith(".part-"):
+            continue
+        if path.suffix == ".json":
+            json.loads(path.read_text())
+        elif path.suffix == ".npz":
+            assert storage.read_arrays(path)
+        elif path.suffix == ".png":
+            Image.open(io.BytesIO(path.read_bytes())).load()
+        elif path.suffix == ".html":
+            assert path.read_text().rstrip().endswith("</html>")
+
+
+def assert_finishes_like(out: Path, reference: Path) -> None:
+    process = start(out)
+    _, told = process.communicate()
+    assert process.returncode == ExitCode.OK, told
+    assert_every_file_is_whole(out)
+    names = {path.name for path in reference.iterdir()}
+    assert {path.name for path in out.iterdir()} == names
+    for name in ("plan.json", "plan.npz", "log.json", "log.npz", "audit.json"):
+        assert (out / name).read_bytes() == (reference / name).read_bytes(), name
+
+
+@pytest.mark.parametrize(
+    "appearing",
+    ["run.json", "plan.npz", "plan.json", "planning.json", "log.npz", "audit.json"],
+)
+def test_killed_when_a_file_appears(
+    appearing: str, tmp_path: Path, quickstart_run: Path
+) -> None:
+    out = tmp_path / "run"
+    process = start(out)
+    wait_for(out / appearing, process)
+    process.kill()
+    process.communicate()
+    assert_every_file_is_whole(out)
+    assert_finishes_like(out, quickstart_run)
+
+
+def test_killed_again_and_again_at_random_moments(
+    tmp_path: Path, quickstart_run: Path
+) -> None:
+    out = tmp_path / "run"
+    moments = random.Random(7)
+    for _ in range(8):
+        process = start(out)
+        time.sleep(moments.uniform(0.1, 4.0))
+        process.kill()
+        process.communicate()
+        assert_every_file_is_whole(out)
+    assert_finishes_like(out, quickstart_run)
+
+
+def test_ctrl_c_ends_in_one_line(tmp_path: Path, quickstart_run: Path) -> None:
+    out = tmp_path / "run"
+    process = start(out)
+    wait_for(out / "planning.json", process)
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate()
+    assert process.returncode == 130
+    assert told == "mrmg: stopped; the same command takes it up again\n"
+    assert_finishes_like(out, quickstart_run)

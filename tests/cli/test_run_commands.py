@@ -1,0 +1,156 @@
+"""What the commands print and end with, on real runs."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+from mrmg import storage
+from mrmg.cli import main
+from mrmg.errors import ExitCode
+from mrmg.results.summary import summary_schema
+
+
+def test_json_stands_alone_on_stdout(own_run: Path) -> None:
+    arguments = ["run", "quickstart", "--no-video", "--json", "--out", str(own_run)]
+    ended = subprocess.run(
+        [sys.executable, "-m", "mrmg", *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (ended.returncode, ended.stderr) == (ExitCode.OK, "")
+    assert ended.stdout == (own_run / "summary.json").read_text()
+    jsonschema.validate(json.loads(ended.stdout), summary_schema())
+
+
+def test_a_run_tells_its_outcome_and_where_the_report_is(
+    own_run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = ["--no-video", "--out", str(own_run)]
+    assert main(["run", "quickstart", *out]) == ExitCode.OK
+    told = capsys.readouterr()
+    assert "mission done" in told.out
+    assert str(own_run / "report.html") in told.out
+    assert told.err == ""
+
+
+def test_the_verbs_do_the_run_step_by_step(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = str(tmp_path / "run")
+    assert main(["plan", "quickstart", "--out", run]) == ExitCode.OK
+    for verb in ("verify", "execute", "audit"):
+        assert main([verb, run]) == ExitCode.OK
+    before = (tmp_path / "run" / "plan.json").stat().st_mtime_ns
+    capsys.readouterr()
+    arguments = ["run", "quickstart", "--no-video", "--json", "--out", run]
+    assert main(arguments) == ExitCode.OK
+    assert json.loads(capsys.readouterr().out)["mission_ok"]
+    assert (tmp_path / "run" / "plan.json").stat().st_mtime_ns == before
+
+
+@pytest.mark.parametrize(
+    ("verb", "output"),
+    [
+        ("verify", "verdict.json"),
+        ("execute", "log.json"),
+        ("audit", "audit.json"),
+        ("report", "summary.json"),
+    ],
+)
+def test_steps_print_their_file_as_json(
+    own_run: Path, verb: str, output: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    if verb == "report":
+        assert main(["audit", str(own_run)]) == ExitCode.OK
+        capsys.readouterr()
+    assert main([verb, str(own_run), "--json"]) == ExitCode.OK
+    assert capsys.readouterr().out == (own_run / output).read_text()
+
+
+@pytest.mark.parametrize("verb", ["run", "plan"])
+def test_an_infeasible_mission_ends_with_its_code(
+    verb: str, walled_scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = [verb, str(walled_scene), "--out", str(tmp_path / "run")]
+    arguments += ["--no-video"] if verb == "run" else []
+    assert main(arguments) == ExitCode.INFEASIBLE
+    assert "g1" in capsys.readouterr().out
+
+
+def test_a_budget_too_small_ends_with_its_code_and_is_tried_again(
+    tmp_path: Path,
+) -> None:
+    out = str(tmp_path / "run")
+    arguments = ["run", "quickstart", "--no-video", "--out", out]
+    assert main([*arguments, "--budget", "1e-6"]) == ExitCode.OUT_OF_BUDGET
+    assert main([*arguments, "--budget", "1e-6"]) == ExitCode.OUT_OF_BUDGET
+    assert json.loads((tmp_path / "run/planning.json").read_text())["status"] == (
+        "timeout"
+    )
+    assert main(arguments) == ExitCode.OK
+
+
+def test_a_plan_that_was_tampered_with_is_refused(
+    own_run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arrays = storage.read_arrays(own_run / "plan.npz")
+    name = next(name for name in sorted(arrays) if name.endswith(".state"))
+    moved = arrays[name] + np.array([0.5, 0.0, 0.0, 0.0, 0.0])
+    storage.write_arrays(own_run / "plan.npz", {**arrays, name: moved})
+    assert main(["verify", str(own_run)]) == ExitCode.MISSION_FAILED
+    assert "not valid" in capsys.readouterr().out
+
+
+def test_a_log_with_a_contact_fails_the_mission(
+    own_run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = storage.read_json(own_run / "log.json")
+    touch = {"time_s": 1.0, "robot": log["robots"][0], "other": "wall"}
+    log["contacts"] = [{**touch, "x_m": 0.0, "y_m": 0.0}]
+    storage.write_json(own_run / "log.json", log)
+    assert main(["audit", str(own_run)]) == ExitCode.MISSION_FAILED
+    assert main(["report", str(own_run)]) in {
+        ExitCode.MISSION_FAILED,
+        ExitCode.INVALID_FILE,
+    }
+    assert "mission failed" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", ["plan.npz", "plan.json", "log.npz", "log.json"])
+def test_a_damaged_file_is_named(
+    own_run: Path, name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (own_run / name).write_bytes((own_run / name).read_bytes()[:50])
+    assert main(["audit", str(own_run)]) == ExitCode.INVALID_FILE
+    told = capsys.readouterr()
+    assert str(own_run) in told.err
+    assert told.out == ""
+
+
+def test_an_unknown_controller_is_answered_with_the_known_ones(
+    own_run: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["execute", str(own_run), "--controller", "mpcc"]
+    assert main(arguments) == ExitCode.USAGE
+    assert "mpc" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_render_leaves_a_video_as_asked(own_run: Path) -> None:
+    import av
+
+    arguments = ["--size", "320x180", "--fps", "10", "--speed", "20"]
+    assert main(["render", str(own_run), *arguments]) == ExitCode.OK
+    with av.open(str(own_run / "mission.mp4")) as video:
+        stream = video.streams.video[0]
+        assert (stream.width, stream.height) == (320, 180)
+        assert stream.average_rate == 10
+    assert "mission.mp4" in (own_run / "report.html").read_text()
