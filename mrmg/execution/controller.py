@@ -31,7 +31,11 @@ class Controller(Protocol):
         """
 
 
-_MAKERS = {"mpc": ("mrmg.execution.mpc", "TrackingMpc")}
+_MAKERS = {
+    "mpc": ("mrmg.execution.mpc", "TrackingMpc"),
+    "pure_pursuit": ("mrmg.execution.pure_pursuit", "PurePursuit"),
+    "tvlqr": ("mrmg.execution.tvlqr", "Tvlqr"),
+}
 
 
 def controller_names() -> list[str]:

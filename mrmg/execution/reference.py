@@ -28,7 +28,7 @@ class FleetReference:
             _pieces(robot.model, plan.trajectory(robot.id)) for robot in scene.robots
         ]
         steps = pieces[0].shape[1]
-        self.duration_s = steps * plan.dt_s
+        self.duration_s = plan.makespan_s
         self._plan = PPoly(
             np.stack(pieces, axis=2).reshape(4, steps, -1),
             np.arange(steps + 1) * plan.dt_s,
@@ -56,7 +56,9 @@ class FleetReference:
 def _pieces(model: RobotModel, item: Trajectory) -> np.ndarray:
     """Return the cubics of one trajectory, highest power first, shape (4, n, 5)."""
     derivative = DERIVATIVES[model.motion_model](np.sin, np.cos, np.tan)
-    state, dt_s = item.state, item.dt_s
+    # A plan without steps is one step of standing still.
+    state = np.repeat(item.state, 2, axis=0) if len(item.state) == 1 else item.state
+    dt_s = item.dt_s
     zero = np.zeros(len(state))
     slope = np.stack(
         derivative(

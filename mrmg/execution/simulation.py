@@ -130,7 +130,8 @@ class _Run:
 
     def fraction(self) -> float:
         """Return the share of the plan's time that is done."""
-        return float(min(self._clock.time_s / self._reference.duration_s, 1.0))
+        duration_s = max(self._reference.duration_s, self._period_s)
+        return float(min(self._clock.time_s / duration_s, 1.0))
 
     def log(self, controller: str, wall_s: float) -> ExecutionLog:
         """Return everything recorded."""
