@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -128,6 +129,7 @@ def draw_battery(
     )
     axes.axhspan(0.0, reserve_kJ, color=style.RESERVE, alpha=0.08, linewidth=0)
     _mark_visits(axes, scene, (simulated or planned).visits)
+    # The room above a full battery is for the names of the visits.
     axes.set_ylim(0.0, 1.22 * capacity_kJ)
     axes.set_xlim(left=0.0)
     axes.set_ylabel("battery [kJ]")
@@ -136,19 +138,15 @@ def draw_battery(
     axes.set_axisbelow(True)
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
-    percent = axes.secondary_yaxis(
-        "right",
-        functions=(
-            lambda energy_kJ: 100.0 * energy_kJ / capacity_kJ,
-            lambda share: share * capacity_kJ / 100.0,
-        ),
-    )
+    percent = axes.twinx()
+    percent.set_ylim(0.0, 122.0)
     percent.set_yticks([0, 25, 50, 75, 100])
     percent.set_ylabel("charge [%]")
+    percent.spines["top"].set_visible(False)
 
 
 def with_recharge_jumps(curve: BatteryCurve) -> tuple[np.ndarray, np.ndarray]:
-    """Return times and contents [J] with the content on arrival before each recharge."""
+    """Return times and contents [J], with the content on arrival at each station."""
     stations = [visit for visit in curve.visits if visit.kind == "station"]
     steps = np.array([visit.step for visit in stations], dtype=int)
     time_s = np.insert(curve.time_s, steps, curve.time_s[steps])
@@ -156,7 +154,7 @@ def with_recharge_jumps(curve: BatteryCurve) -> tuple[np.ndarray, np.ndarray]:
     return time_s, np.insert(curve.energy_J, steps, arrival_J)
 
 
-def _plot(axes: Axes, curve: BatteryCurve, **look: object) -> None:
+def _plot(axes: Axes, curve: BatteryCurve, **look: Any) -> None:
     time_s, energy_J = with_recharge_jumps(curve)
     axes.plot(time_s, energy_J / 1000.0, solid_joinstyle="round", **look)
 
@@ -183,6 +181,5 @@ def _mark_visits(axes: Axes, scene: Scene, visits: tuple[Visit, ...]) -> None:
             color=style.STATION_EDGE if station else style.MUTED,
             ha="center",
             va="top",
-            backgroundcolor="white",
             bbox={"fc": "white", "ec": "none", "pad": 0.8},
         )

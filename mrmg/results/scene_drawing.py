@@ -130,13 +130,13 @@ def draw_goal(
     axes: Axes, goal: Goal, label: str, *, color: str = style.GOAL_OPEN
 ) -> None:
     """Draw a goal region and its label; a colour other than white means visited."""
-    _draw_region(axes, goal.region, color, style.GOAL_EDGE)
+    draw_region(axes, goal.region, color, style.GOAL_EDGE, 1.3)
     _draw_label(axes, goal.region.center, label, style.INK)
 
 
 def draw_station(axes: Axes, station: Station, label: str) -> None:
     """Draw a recharging station: a yellow region with a square and its label."""
-    _draw_region(axes, station.region, style.STATION, style.STATION_EDGE)
+    draw_region(axes, station.region, style.STATION, style.STATION_EDGE, 1.3)
     axes.plot(
         *station.region.center,
         marker="s",
@@ -146,6 +146,20 @@ def draw_station(axes: Axes, station: Station, label: str) -> None:
         zorder=6,
     )
     _draw_label(axes, station.region.center, f"⚡{label}", style.STATION_EDGE)
+
+
+def draw_region(
+    axes: Axes, region: Region, color: str, edge: str, linewidth: float
+) -> None:
+    """Draw a goal's or station's region."""
+    _add_shape(
+        axes,
+        region.shape,
+        facecolor=color,
+        edgecolor=edge,
+        linewidth=linewidth,
+        zorder=5,
+    )
 
 
 def draw_robots(axes: Axes, scene: Scene) -> None:
@@ -284,12 +298,6 @@ def _label_terrain(axes: Axes, scene: Scene) -> None:
             path_effects=_HALO,
             zorder=4,
         )
-
-
-def _draw_region(axes: Axes, region: Region, color: str, edge: str) -> None:
-    _add_shape(
-        axes, region.shape, facecolor=color, edgecolor=edge, linewidth=1.3, zorder=5
-    )
 
 
 def _draw_label(axes: Axes, center: np.ndarray, text: str, color: str) -> None:

@@ -1,0 +1,155 @@
+"""The ground of the video: terrain, planned paths and labels painted on one image.
+
+All that lies flat is a texture of the floor, which costs nothing to draw, and driven
+trails are painted into it as the mission goes on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patheffects import withStroke
+from PIL import Image, ImageDraw
+
+from mrmg.mission import Plan
+from mrmg.results import scene_drawing, style
+from mrmg.scene.types import Region, Scene
+
+PIXELS = 2048
+"""Longer side of the image."""
+
+_DPI = 100
+_TRAIL_SHARE = 0.0045
+_PLANNED_PIXELS = 4.0
+_LABEL_PIXELS = 40.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GroundFrame:
+    """The rectangle of ground an image covers.
+
+    Attributes:
+        center_m: of the rectangle, shape (2,).
+        half_m: half its extents, shape (2,).
+    """
+
+    center_m: np.ndarray
+    half_m: np.ndarray
+
+    @property
+    def pixels_per_m(self) -> float:
+        """Resolution of the image."""
+        return float(PIXELS / (2.0 * self.half_m.max()))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the image [pixels]."""
+        width, height = np.round(2.0 * self.half_m * self.pixels_per_m).astype(int)
+        return int(width), int(height)
+
+    def to_pixels(self, points: np.ndarray) -> np.ndarray:
+        """Return image coordinates (column, row) of points [m], shape (n, 2)."""
+        corner = self.center_m + self.half_m * (-1.0, 1.0)
+        return np.asarray((points - corner) * (1.0, -1.0) * self.pixels_per_m)
+
+
+def paint_ground(scene: Scene, plan: Plan, frame: GroundFrame) -> np.ndarray:
+    """Return the ground from above, north up, shape (height, width, 3) of bytes."""
+    width, height = frame.size
+    figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI)
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    low, high = frame.center_m - frame.half_m, frame.center_m + frame.half_m
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    figure.set_facecolor("#DADCD6")
+    scene_drawing.draw_ground(axes, scene, hatched=False)
+    _paint_paths(axes, scene, plan)
+    _paint_labels(axes, scene)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+    return np.array(pixels[:, :, :3])
+
+
+class TrailPainter:
+    """Paints driven trails onto a ground image, piece by piece."""
+
+    def __init__(self, ground: np.ndarray, frame: GroundFrame) -> None:
+        """Start on a ground image, which is copied."""
+        self._image = Image.fromarray(ground)
+        self._brush = ImageDraw.Draw(self._image)
+        self._frame = frame
+        self._width = max(round(_TRAIL_SHARE * PIXELS), 3)
+
+    def paint(self, points: np.ndarray, color: str, target: np.ndarray) -> None:
+        """Paint a line through `points` [m] and copy what changed to `target`.
+
+        Args:
+            points: shape (n, 2); fewer than two leave the image as it is.
+            color: `#RRGGBB`.
+            target: pixels of the image's shape, changed in place.
+        """
+        if len(points) < 2:
+            return
+        pixels = self._frame.to_pixels(points)
+        self._brush.line(
+            [tuple(pixel) for pixel in pixels.tolist()],
+            fill=style.rgb(color),
+            width=self._width,
+            joint="curve",
+        )
+        rows, columns = target.shape[:2]
+        low = np.floor(pixels.min(axis=0)).astype(int) - self._width
+        high = np.ceil(pixels.max(axis=0)).astype(int) + self._width
+        left, top = np.clip(low, 0, [columns, rows])
+        right, bottom = np.clip(high, 0, [columns, rows])
+        patch = self._image.crop((left, top, right, bottom))
+        target[top:bottom, left:right] = np.asarray(patch)
+
+
+def _paint_paths(axes: Axes, scene: Scene, plan: Plan) -> None:
+    colors = style.scene_robot_colors(scene)
+    for trajectory in plan.trajectories:
+        axes.plot(
+            trajectory.state[:, 0],
+            trajectory.state[:, 1],
+            color=colors[trajectory.robot],
+            linewidth=_points(_PLANNED_PIXELS),
+            alpha=0.75,
+            zorder=4,
+        )
+
+
+def _paint_labels(axes: Axes, scene: Scene) -> None:
+    labels = {**style.goal_labels(scene), **style.station_labels(scene)}
+    stations = {station.id for station in scene.stations}
+    for target in scene.targets():
+        color = style.STATION_EDGE if target.id in stations else style.GOAL_EDGE
+        scene_drawing.draw_region(axes, target.region, "none", color, _points(5.0))
+        sign = "⚡" if target.id in stations else ""
+        _paint_label(axes, target.region, sign + labels[target.id], color)
+
+
+def _paint_label(axes: Axes, region: Region, text: str, color: str) -> None:
+    _, _, right, top = region.shape.bounds
+    axes.text(
+        float(right),
+        float(top),
+        text,
+        fontsize=_points(_LABEL_PIXELS),
+        fontweight="bold",
+        color=color,
+        ha="left",
+        va="center",
+        path_effects=[withStroke(linewidth=_points(9.0), foreground="white")],
+        zorder=9,
+    )
+
+
+def _points(pixels: float) -> float:
+    return pixels * 72.0 / _DPI

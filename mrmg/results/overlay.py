@@ -1,0 +1,305 @@
+"""Text and bars over the video: the panel beside the map, and tags over the robots."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+from mrmg.results import style
+from mrmg.scene.types import Robot, Scene
+
+_BACKGROUND = "#14181E"
+_CARD = "#202730"
+_TEXT = "#F2F4F7"
+_FAINT = "#A4ADBA"
+_EMPTY = "#3A434F"
+_FULL = "#5FD0A5"
+_LOW = "#FF6B5E"
+_LOW_SHARE = 0.2
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotReading:
+    """What the panel says about one robot at one time.
+
+    Attributes:
+        robot: id of the robot.
+        charge: battery content over capacity.
+        speed_m_s: signed speed.
+        heading_for: label of the next target; "" after the last.
+    """
+
+    robot: str
+    charge: float
+    speed_m_s: float
+    heading_for: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Reading:
+    """What the panel says about the mission at one time.
+
+    Attributes:
+        time_s: mission time.
+        used_J: energy the fleet has drawn so far.
+        visited: id of the robot that visited a goal, by goal id; open goals are absent.
+        robots: one reading per robot.
+    """
+
+    time_s: float
+    used_J: float
+    visited: dict[str, str]
+    robots: tuple[RobotReading, ...]
+
+
+class Panel:
+    """The panel beside the map: clock, goals, batteries, legend."""
+
+    def __init__(self, scene: Scene, size: tuple[int, int], speed: float) -> None:
+        """Lay out the panel and draw what never changes.
+
+        Args:
+            scene: names and colours.
+            size: width and height [pixels].
+            speed: mission seconds per second of video.
+        """
+        self._scene = scene
+        self._size = size
+        self._speed = speed
+        self._colors = style.scene_robot_colors(scene)
+        self._labels = style.goal_labels(scene)
+        self._unit = min(size[0] / 420.0, size[1] / 380.0, 2.5)
+        self._base = Image.new("RGB", size, _BACKGROUND)
+        self._cards_top = self._draw_head(ImageDraw.Draw(self._base))
+        self._cards_bottom = self._draw_legend(ImageDraw.Draw(self._base))
+
+    def draw(self, reading: Reading) -> np.ndarray:
+        """Return the panel at one time, shape (height, width, 3) of bytes."""
+        image = self._base.copy()
+        pen = ImageDraw.Draw(image)
+        self._draw_clock(pen, reading)
+        self._draw_goals(pen, reading)
+        room = self._cards_bottom - self._cards_top
+        pitch = min(self._px(66), room / max(len(reading.robots), 1))
+        for row, robot in enumerate(reading.robots):
+            top = self._cards_top + row * pitch
+            self._draw_card(pen, self._scene.robots[row], robot, top, pitch)
+        return np.asarray(image)
+
+    def _px(self, length: float) -> float:
+        return length * self._unit
+
+    def _font(self, size: float, *, bold: bool = False) -> ImageFont.FreeTypeFont:
+        return font(max(round(self._px(size)), 9), bold=bold)
+
+    def _draw_head(self, pen: ImageDraw.ImageDraw) -> float:
+        left = self._px(18)
+        pen.text(
+            (left, self._px(12)),
+            self._scene.name,
+            font=self._font(17, bold=True),
+            fill=_FAINT,
+        )
+        speed = f"×{self._speed:g} speed"
+        pen.text(
+            (self._size[0] - left, self._px(12)),
+            speed,
+            font=self._font(15),
+            fill=_FAINT,
+            anchor="ra",
+        )
+        rows = 1 + (len(self._scene.goals) - 1) // self._goals_per_row
+        return self._px(122) + rows * self._px(26)
+
+    @property
+    def _goals_per_row(self) -> int:
+        return max(int((self._size[0] - self._px(36)) // self._px(38)), 1)
+
+    def _draw_clock(self, pen: ImageDraw.ImageDraw, reading: Reading) -> None:
+        left = self._px(18)
+        minutes, seconds = divmod(reading.time_s, 60.0)
+        clock = f"{int(minutes):02d}:{seconds:04.1f}"
+        pen.text(
+            (left, self._px(34)), clock, font=self._font(42, bold=True), fill=_TEXT
+        )
+        used = f"{reading.used_J / 1000.0:.1f} kJ used"
+        pen.text(
+            (self._size[0] - left, self._px(52)),
+            used,
+            font=self._font(20, bold=True),
+            fill=_TEXT,
+            anchor="ra",
+        )
+        goals = f"{len(reading.visited)} of {len(self._scene.goals)} goals visited"
+        pen.text((left, self._px(90)), goals, font=self._font(16), fill=_TEXT)
+
+    def _draw_goals(self, pen: ImageDraw.ImageDraw, reading: Reading) -> None:
+        small = self._font(12, bold=True)
+        for number, goal in enumerate(self._scene.goals):
+            row, column = divmod(number, self._goals_per_row)
+            x = self._px(18) + column * self._px(38)
+            y = self._px(115) + row * self._px(26)
+            robot = reading.visited.get(goal.id)
+            pen.rounded_rectangle(
+                (x, y, x + self._px(34), y + self._px(21)),
+                radius=self._px(5),
+                fill=self._colors[robot] if robot else _BACKGROUND,
+                outline=_TEXT if robot else _FAINT,
+            )
+            pen.text(
+                (x + self._px(17), y + self._px(10.5)),
+                self._labels[goal.id],
+                font=small,
+                fill=_TEXT if robot else _FAINT,
+                anchor="mm",
+            )
+
+    def _draw_card(
+        self,
+        pen: ImageDraw.ImageDraw,
+        robot: Robot,
+        reading: RobotReading,
+        top: float,
+        pitch: float,
+    ) -> None:
+        left, right = self._px(14), self._size[0] - self._px(14)
+        bottom = top + pitch - self._px(6)
+        middle = top + 0.30 * (bottom - top)
+        pen.rounded_rectangle((left, top, right, bottom), self._px(7), fill=_CARD)
+        pen.rounded_rectangle(
+            (left, top, left + self._px(9), bottom),
+            self._px(4),
+            fill=self._colors[robot.id],
+        )
+        text = self._font(min(16.0, 0.27 * pitch / self._unit), bold=True)
+        pen.text(
+            (left + self._px(20), middle), robot.id, font=text, fill=_TEXT, anchor="lm"
+        )
+        way = f"→ {reading.heading_for}" if reading.heading_for else "tour done"
+        pen.text((left + self._px(84), middle), way, font=text, fill=_TEXT, anchor="lm")
+        pen.text(
+            (right - self._px(14), middle),
+            f"{reading.speed_m_s:+.1f} m/s",
+            font=text,
+            fill=_FAINT,
+            anchor="rm",
+        )
+        percent = f"{100.0 * reading.charge:.0f} %"
+        row = top + 0.73 * (bottom - top)
+        pen.text(
+            (right - self._px(14), row), percent, font=text, fill=_TEXT, anchor="rm"
+        )
+        half = 0.13 * (bottom - top)
+        bar = (left + self._px(20), row - half, right - self._px(74), row + half)
+        _draw_bar(pen, bar, reading.charge, robot.battery.reserve_fraction)
+
+    def _draw_legend(self, pen: ImageDraw.ImageDraw) -> float:
+        small = self._font(13)
+        entries = [("goal", "#E9EBEE"), ("charging station", style.STATION)]
+        entries += [
+            (look.label, look.color)
+            for look in style.terrain_classes(self._scene).values()
+        ]
+        entries.append(("obstacle", style.OBSTACLE))
+        rows = (len(entries) + 1) // 2
+        top = self._size[1] - self._px(40) - rows * self._px(22)
+        for number, (label, color) in enumerate(entries):
+            row, column = divmod(number, 2)
+            x = self._px(18) + column * 0.5 * self._size[0]
+            y = top + row * self._px(22)
+            pen.rectangle(
+                (x, y, x + self._px(18), y + self._px(14)), fill=color, outline=_FAINT
+            )
+            pen.text(
+                (x + self._px(26), y + self._px(7)),
+                label,
+                font=small,
+                fill=_FAINT,
+                anchor="lm",
+            )
+        pen.text(
+            (self._px(18), top + rows * self._px(22) + self._px(4)),
+            "thin line: planned    wide line: driven",
+            font=small,
+            fill=_FAINT,
+        )
+        return top - self._px(12)
+
+
+class Tag:
+    """A robot's id and battery bar, to be laid over the robot in a picture."""
+
+    def __init__(self, robot: Robot, color: str, height: int) -> None:
+        """Draw what never changes; `height` is that of the picture [pixels]."""
+        self._unit = max(height / 720.0, 0.6)
+        self._reserve = robot.battery.reserve_fraction
+        self._base = Image.new("RGB", self._scaled(46, 27), _CARD)
+        pen = ImageDraw.Draw(self._base)
+        width, tall = self._base.size
+        pen.rectangle((0, 0, width - 1, tall - 1), outline=color, width=2)
+        pen.text(
+            (width / 2, 9.5 * self._unit),
+            robot.id,
+            font=font(max(round(12 * self._unit), 9), bold=True),
+            fill=_TEXT,
+            anchor="mm",
+        )
+
+    def blit(self, picture: np.ndarray, spot: np.ndarray, charge: float) -> None:
+        """Lay the tag over `picture`, its lower edge above `spot` (column, row)."""
+        if not np.isfinite(spot).all():
+            return
+        image = self._base.copy()
+        left, top = self._scaled(5, 17)
+        right, bottom = self._scaled(41, 23)
+        _draw_bar(
+            ImageDraw.Draw(image), (left, top, right, bottom), charge, self._reserve
+        )
+        _paste(
+            picture,
+            np.asarray(image),
+            round(float(spot[0]) - image.width / 2),
+            round(float(spot[1]) - image.height - 12 * self._unit),
+        )
+
+    def _scaled(self, width: float, height: float) -> tuple[int, int]:
+        return round(width * self._unit), round(height * self._unit)
+
+
+@cache
+def font(size: int, *, bold: bool = False) -> ImageFont.FreeTypeFont:
+    """Return the typeface of all overlays; it comes with matplotlib."""
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    path = Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name
+    return ImageFont.truetype(str(path), size)
+
+
+def _draw_bar(
+    pen: ImageDraw.ImageDraw,
+    bar: tuple[float, float, float, float],
+    charge: float,
+    reserve: float,
+) -> None:
+    left, top, right, bottom = bar
+    full = min(max(charge, 0.0), 1.0)
+    pen.rectangle(bar, fill=_EMPTY)
+    color = _LOW if charge < reserve + _LOW_SHARE * (1.0 - reserve) else _FULL
+    pen.rectangle((left, top, left + full * (right - left), bottom), fill=color)
+    mark = left + reserve * (right - left)
+    pen.line((mark, top - 1, mark, bottom + 1), fill=_TEXT, width=1)
+
+
+def _paste(picture: np.ndarray, patch: np.ndarray, column: int, row: int) -> None:
+    height, width = patch.shape[:2]
+    top, left = max(row, 0), max(column, 0)
+    bottom = min(row + height, picture.shape[0])
+    right = min(column + width, picture.shape[1])
+    if top < bottom and left < right:
+        picture[top:bottom, left:right] = patch[
+            top - row : bottom - row, left - column : right - column
+        ]
