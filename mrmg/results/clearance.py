@@ -23,6 +23,9 @@ MINIMUM_ACCURACY_M = 1e-3
 RESOLUTION_M = 1e-4
 """A gap that cannot be told from zero at this resolution counts as a touch."""
 
+SHORTEST_S = 1e-9
+"""Intervals are not halved below this, so that absurd speeds end the search too."""
+
 
 class Gap(Protocol):
     """A distance that changes along a motion; zero or negative means contact."""
@@ -72,13 +75,14 @@ def bounded_minimum(gap: Gap, steps: np.ndarray, dt_s: float) -> GapMinimum:
         touching = nearer <= 0.0
         bound = np.where(touching, nearer, gap.over(step, start, end))
         unresolved = ~touching & (bound <= 0.0)
-        hopeless = unresolved & (nearer - bound < RESOLUTION_M)
+        exhausted = end - start < SHORTEST_S
+        hopeless = unresolved & ((nearer - bound < RESOLUTION_M) | exhausted)
         contact_step += [step[touching], step[hopeless]]
         contact_time += [
             np.where(at_start <= at_end, start, end)[touching],
             (0.5 * (start + end))[hopeless],
         ]
-        improvable = bound < least_known - MINIMUM_ACCURACY_M
+        improvable = ~exhausted & (bound < least_known - MINIMUM_ACCURACY_M)
         split = ~touching & ~hopeless & (unresolved | improvable)
         least_bound = float(np.min(bound[~split], initial=least_bound))
         step, start, end = step[split], start[split], end[split]

@@ -14,8 +14,12 @@ from mrmg.motion.dynamics import NU, NX
 from mrmg.results.contact_rules import check_obstacles, check_robots
 from mrmg.results.mission_rules import check_mission
 from mrmg.results.motion_rules import check_motion
+from mrmg.results.swept_footprint import SweptFootprint
 from mrmg.results.verdict import Verdict, Violation, ViolationKind
 from mrmg.scene.types import Scene
+
+COARSEST_STEP_M = 1.0
+"""How far a footprint may at most stray from its chord within one step."""
 
 
 def verify(scene: Scene, plan: Plan) -> Verdict:
@@ -27,7 +31,7 @@ def verify(scene: Scene, plan: Plan) -> Verdict:
             that are not finite) is judged by that alone.
     """
     mismatch = _check_digest(scene, plan)
-    malformed = _check_form(scene, plan)
+    malformed = _check_form(scene, plan) or _check_coarseness(scene, plan)
     if malformed:
         return Verdict(
             ok=False,
@@ -95,11 +99,32 @@ def _check_form(scene: Scene, plan: Plan) -> list[Violation]:
     faults += [
         (robot, "visits are stated but no motion") for robot in sorted(strangers)
     ]
-    return [
-        Violation(
-            kind=ViolationKind.MALFORMED,
-            robot=robot,
-            message=f"{robot}: {text}" if robot else text,
-        )
-        for robot, text in faults
-    ]
+    return [_malformed(robot, text) for robot, text in faults]
+
+
+def _check_coarseness(scene: Scene, plan: Plan) -> list[Violation]:
+    """Check that single steps are short enough for their motion to be bounded.
+
+    At a robot's limits a footprint strays centimetres from its chord in one step. A
+    plan that may stray a metre is nonsense, and proving it clear would take forever.
+    """
+    violations = []
+    for trajectory in plan.trajectories:
+        model = scene.robot(trajectory.robot).model
+        with np.errstate(over="ignore", invalid="ignore"):
+            footprint = SweptFootprint.of(model, trajectory)
+            steps = np.arange(len(trajectory.control))
+            straying_m = footprint.sagitta(steps, np.full(len(steps), plan.dt_s))
+        bounded = straying_m <= COARSEST_STEP_M
+        if not bounded.all():
+            text = f"step {int(bounded.argmin())} moves too wildly to be checked"
+            violations.append(_malformed(trajectory.robot, text))
+    return violations
+
+
+def _malformed(robot: str, text: str) -> Violation:
+    return Violation(
+        kind=ViolationKind.MALFORMED,
+        robot=robot,
+        message=f"{robot}: {text}" if robot else text,
+    )

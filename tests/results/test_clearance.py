@@ -8,6 +8,7 @@ stated accuracy.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -173,3 +174,13 @@ def test_a_millimetre_is_clear_and_a_hundredth_of_one_is_not(swept: Any) -> None
         )
         found = bounded_minimum(ObstacleGap(footprint, [rail]), np.arange(3), 0.1)
         assert set(found.contact_step.tolist()) == contacts
+
+
+def test_absurd_speed_and_place_end_the_search(swept: Any) -> None:
+    """Where floating-point numbers are metres apart, halving alone would never end."""
+    calm = swept([(0.0, 0.0)] * 2, 10.0, 10.0, 0.0)
+    state = calm.state.copy()
+    state[:, 0], state[:, 3] = -1e17, 2e18
+    post = Obstacle(id="post", shape=box(0.0, 9.0, 1.0, 11.0), height_m=1.0)
+    gap = ObstacleGap(replace(calm, state=state), [post])
+    assert bounded_minimum(gap, np.arange(2), 0.1).lower_bound_m <= 0.0

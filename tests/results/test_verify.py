@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from mrmg.ledger import EnergyLedger
 from mrmg.mission import Plan, Trajectory
@@ -358,3 +360,26 @@ def test_moving_the_scene_changes_nothing(
     assert [item.kind for item in here.violations] == [
         item.kind for item in there.violations
     ]
+
+
+@settings(
+    max_examples=150,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(
+    st.lists(
+        st.lists(
+            st.floats(allow_nan=True) | st.floats(-20, 20), min_size=7, max_size=7
+        ),
+        min_size=2,
+        max_size=5,
+    )
+)
+def test_nonsense_is_judged_and_never_raises(case: Any, rows: list) -> None:
+    scene, plan = case(obstacles=[WALL])
+    table = np.array(rows)
+    nonsense = replace(
+        plan.trajectories[0], state=table[:, :5], control=table[:-1, 5:].copy()
+    )
+    assert not verify(scene, with_trajectory(plan, nonsense)).ok
