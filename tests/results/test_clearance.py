@@ -8,7 +8,6 @@ stated accuracy.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -176,11 +175,23 @@ def test_a_millimetre_is_clear_and_a_hundredth_of_one_is_not(swept: Any) -> None
         assert set(found.contact_step.tolist()) == contacts
 
 
-def test_absurd_speed_and_place_end_the_search(swept: Any) -> None:
-    """Where floating-point numbers are metres apart, halving alone would never end."""
-    calm = swept([(0.0, 0.0)] * 2, 10.0, 10.0, 0.0)
-    state = calm.state.copy()
-    state[:, 0], state[:, 3] = -1e17, 2e18
-    post = Obstacle(id="post", shape=box(0.0, 9.0, 1.0, 11.0), height_m=1.0)
-    gap = ObstacleGap(replace(calm, state=state), [post])
-    assert bounded_minimum(gap, np.arange(2), 0.1).lower_bound_m <= 0.0
+class _Undecided:
+    """A gap whose bound never closes at one instant, as where numbers lie far apart."""
+
+    instant_s = 0.0333
+
+    def at(self, step: np.ndarray, time_s: np.ndarray) -> np.ndarray:
+        return np.ones(len(step))
+
+    def over(
+        self, step: np.ndarray, start_s: np.ndarray, end_s: np.ndarray
+    ) -> np.ndarray:
+        inside = (start_s <= self.instant_s) & (self.instant_s <= end_s)
+        return np.where(inside, -1.0, 1.0)
+
+
+def test_what_cannot_be_decided_counts_as_contact() -> None:
+    found = bounded_minimum(_Undecided(), np.array([4]), 0.1)
+    assert found.contact_step.tolist() == [4]
+    assert found.contact_time_s == pytest.approx([0.0333], abs=1e-8)
+    assert found.lower_bound_m == -1.0
