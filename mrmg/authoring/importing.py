@@ -84,9 +84,11 @@ def _in_metres(
 
 def _solid(shape: BaseGeometry) -> BaseGeometry:
     """Return a valid shape with area: thin things get a thickness."""
-    if shape.area == 0.0:
-        return shape.buffer(THIN_M, cap_style="square", join_style="mitre")
-    return shapely.make_valid(shape, method="structure", keep_collapsed=False)
+    # A polygon that crosses itself may count zero until it is repaired.
+    valid = shapely.make_valid(shape, method="structure", keep_collapsed=True)
+    if valid.area == 0.0:
+        return valid.buffer(THIN_M, cap_style="square", join_style="mitre")
+    return valid
 
 
 def _polygons(shape: BaseGeometry) -> Iterator[Polygon]:

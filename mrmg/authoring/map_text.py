@@ -87,7 +87,7 @@ class _Reader:
         self.source = source
         self.faults: list[Fault] = []
 
-    def rows(self, lines: list[tuple[int, str]]) -> RawMap:
+    def rows(self, lines: list[tuple[int, str]]) -> RawMap | None:
         shapes: list[BaseGeometry] = []
         for number, line in lines:
             values = self._numbers(number, line)
@@ -99,6 +99,8 @@ class _Reader:
                 continue
             points = np.reshape(values, (-1, 2))
             shapes.append((Point, LineString, Polygon)[len(points) - 1](points))
+        if self.faults:
+            return None
         border = _drawn_border(shapes)
         return RawMap(border=border, obstacles=tuple(shapes), unit_m=1.0)
 

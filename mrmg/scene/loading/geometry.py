@@ -14,6 +14,9 @@ from mrmg.scene.types import Region, Robot
 
 CIRCLE_SIDES = 32
 
+_ROUNDING_M2 = 1e-6
+"""A convex polygon may miss so much of its hull by the rounding of its corners."""
+
 
 def circle_around(center: list[float], radius_m: float) -> Polygon:
     """Return the regular polygon that touches a circle from outside."""
@@ -61,7 +64,7 @@ def region_of(entry: RegionEntry, path: str) -> Region | list[Fault]:
     assert entry.polygon is not None
     shape = Polygon(entry.polygon)
     reason = _ring_fault(shape)
-    if reason is None and shape.area < (1.0 - 1e-9) * shape.convex_hull.area:
+    if reason is None and _dent_m2(shape) > _ROUNDING_M2:
         reason = (
             f"not convex: it covers {shape.area:.4g} m2 of its hull's "
             f"{shape.convex_hull.area:.4g} m2; expected a convex polygon"
@@ -79,6 +82,10 @@ def footprint_at(robot: Robot) -> Polygon:
     x, y, yaw = robot.pose
     c, s = math.cos(yaw), math.sin(yaw)
     return Polygon(robot.model.footprint_m @ np.array([[c, s], [-s, c]]) + [x, y])
+
+
+def _dent_m2(shape: Polygon) -> float:
+    return float(shape.convex_hull.area - shape.area)
 
 
 def _region(center: np.ndarray, radius_m: float, corners: np.ndarray) -> Region:

@@ -1,0 +1,189 @@
+"""The shipped scenes are what the table of missions says, and worth planning for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from scipy.optimize import Bounds, LinearConstraint, milp
+
+from mrmg import shipped
+from mrmg.authoring.ground import Ground
+from mrmg.scene.loading import load_scene
+from mrmg.scene.types import Scene
+
+# name: robots, goals, stations, terrain areas, capacity in metres of plain ground
+TABLE = {
+    "scene1": (2, 14, 5, 4, 240),
+    "scene2": (2, 8, 3, 4, 200),
+    "scene3": (2, 9, 5, 3, 200),
+    "scene4": (2, 9, 2, 0, 300),
+    "scene5": (2, 14, 5, 2, 240),
+    "scene6": (4, 20, 4, 0, 250),
+    "scene6_r1": (1, 20, 4, 0, 250),
+    "scene6_r2": (2, 20, 4, 0, 250),
+    "scene6_r6": (6, 20, 4, 0, 250),
+    "scene6_r8": (8, 20, 4, 0, 250),
+    "quickstart": (2, 4, 1, 1, 45),
+}
+MARGIN_M = 0.1
+"""Beside half the robot's width: what a road must at least leave."""
+
+
+def ground_of(scene: Scene) -> Ground:
+    return Ground.over(
+        scene.bounds,
+        [obstacle.shape for obstacle in scene.obstacles],
+        [(area.shape, area.multiplier) for area in scene.terrain],
+        margin_m=scene.robots[0].model.half_width_m + MARGIN_M,
+    )
+
+
+def road_m(scene: Scene, ground: Ground) -> np.ndarray:
+    """Distances between robots, goals and stations [m of plain ground], in this order.
+
+    The grid makes a road up to 2.8 % longer than it must be.
+    """
+    places = [robot.pose[:2] for robot in scene.robots]
+    places += [tuple(target.region.center) for target in scene.targets()]
+    cells = [ground.nearest(place) for place in places]
+    return ground.distances(cells)[:, cells]
+
+
+def usable_m(scene: Scene) -> float:
+    robot = scene.robots[0]
+    capacity_m = (
+        robot.battery.capacity_J / robot.model.energy_model.plain_ground_J_per_m()
+    )
+    return capacity_m * (1.0 - robot.battery.reserve_fraction)
+
+
+def test_every_shipped_scene_is_in_the_table() -> None:
+    assert set(TABLE) == set(shipped.scene_names())
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_table(name: str) -> None:
+    scene = load_scene(name)
+    robots, goals, stations, terrain, capacity_m = TABLE[name]
+    assert len(scene.robots) == robots
+    assert len(scene.goals) == goals
+    assert len(scene.stations) == stations
+    assert len(scene.terrain) == terrain
+    for robot in scene.robots:
+        per_metre_J = robot.model.energy_model.plain_ground_J_per_m()
+        assert robot.battery.capacity_J == pytest.approx(capacity_m * per_metre_J)
+        assert robot.battery.start_J == robot.battery.capacity_J
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_every_target_can_be_reached_and_left(name: str) -> None:
+    """Goals have room about them and a station well within half a battery."""
+    scene = load_scene(name)
+    ground = ground_of(scene)
+    road = road_m(scene, ground)
+    robots, goals = len(scene.robots), len(scene.goals)
+    assert np.isfinite(road).all()
+    for target in scene.targets():
+        at = ground.nearest(target.region.center)
+        assert ground.clearance_m[at] >= 1.0, target.id
+    to_station = road[robots : robots + goals, robots + goals :].min(axis=1)
+    assert to_station.max() <= 0.45 * usable_m(scene)
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_the_energy_limit_binds(name: str) -> None:
+    """The cheapest assignment that ignores energy overdraws some battery."""
+    scene = load_scene(name)
+    road = road_m(scene, ground_of(scene))
+    cost_m, routes = cheapest_routes(road, len(scene.robots), len(scene.goals))
+    lengths_m = [
+        sum(road[a, b] for a, b in zip(r, r[1:], strict=False)) for r in routes
+    ]
+    assert sum(lengths_m) == pytest.approx(cost_m)
+    # More than the grid can err.
+    assert max(lengths_m) > 1.03 * usable_m(scene)
+
+
+def cheapest_routes(
+    cost: np.ndarray, robots: int, goals: int
+) -> tuple[float, list[list[int]]]:
+    """Return the cheapest open routes that visit all goals, and their total cost.
+
+    An exact integer programme: every goal is entered once, every place left at most
+    once, and cycles are cut off until none is left.
+    """
+    size = robots + goals
+    arcs = [(i, j) for i in range(size) for j in range(robots, size) if i != j]
+    enter = [[float(j == goal) for _, j in arcs] for goal in range(robots, size)]
+    leave = [[float(i == place) for i, _ in arcs] for place in range(size)]
+    rules = [LinearConstraint(enter, 1, 1), LinearConstraint(leave, 0, 1)]
+    prices = [cost[arc] for arc in arcs]
+    while True:
+        found = milp(
+            prices,
+            constraints=rules,
+            integrality=np.ones(len(arcs)),
+            bounds=Bounds(0, 1),
+        )
+        after = dict(arcs[k] for k in np.flatnonzero(found.x > 0.5))
+        routes = [walk(start, after) for start in range(robots)]
+        astray = set(range(robots, size)).difference(*routes)
+        if not astray:
+            return float(found.fun), routes
+        while astray:
+            cycle = set(walk(min(astray), after))
+            astray -= cycle
+            inside = [float(i in cycle and j in cycle) for i, j in arcs]
+            rules.append(LinearConstraint(inside, 0, len(cycle) - 1))
+
+
+def walk(start: int, after: dict[int, int]) -> list[int]:
+    route = [start]
+    while route[-1] in after and after[route[-1]] not in route:
+        route.append(after[route[-1]])
+    return route
+
+
+def test_cheapest_routes_on_a_line() -> None:
+    """Robots at 0 and 10, goals at 1, 2, 9: two go left, one right."""
+    places = np.array([0.0, 10.0, 1.0, 2.0, 9.0])
+    cost_m, routes = cheapest_routes(np.abs(places[:, None] - places), 2, 3)
+    assert cost_m == pytest.approx(3.0)
+    assert routes == [[0, 2, 3], [1, 4]]
+
+
+def test_scene4_makes_both_robots_back_out() -> None:
+    """Both start nose first in dead ends too narrow to turn round in."""
+    scene = load_scene("scene4")
+    solid = shapely.union_all([obstacle.shape for obstacle in scene.obstacles])
+    for robot in scene.robots:
+        x, y, yaw = robot.pose
+        model = robot.model
+        turning_width_m = 2.0 * (model.turning_radius_m + model.half_width_m)
+        ahead = np.array([np.cos(yaw), np.sin(yaw)])
+        across = np.array([-ahead[1], ahead[0]])
+        start = np.array([x, y])
+        sides = [_way_m(solid, start, side) for side in (across, -across)]
+        assert 2.6 <= sum(sides) < turning_width_m
+        assert _way_m(solid, start, ahead) < 6.0
+        narrow = [
+            sum(_way_m(solid, start - s * ahead, side) for side in (across, -across))
+            for s in np.arange(0.0, 5.5, 0.5)
+        ]
+        assert max(narrow) < turning_width_m
+
+
+def _way_m(solid: shapely.Geometry, start: np.ndarray, along: np.ndarray) -> float:
+    """Return how far one can go from `start` before touching `solid`."""
+    ray = shapely.LineString([start, start + 200.0 * along])
+    return float(shapely.Point(start).distance(ray.intersection(solid)))
+
+
+@pytest.mark.parametrize("name", [n for n in TABLE if n.startswith("scene6_")])
+def test_variants_of_scene6_share_its_map(name: str) -> None:
+    base, variant = load_scene("scene6"), load_scene(name)
+    for part in ("bounds", "obstacles", "goals", "stations", "battery"):
+        assert variant.document[part] == base.document[part]
+    for one, other in zip(base.robots, variant.robots, strict=False):
+        assert one.pose == other.pose
