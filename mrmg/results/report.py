@@ -1,0 +1,156 @@
+"""The report of a run: one self-contained HTML page, as far as the run came."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mrmg import shipped, storage
+from mrmg.results import report_page as html
+from mrmg.results import report_sections as sections
+from mrmg.results.report_record import RunRecord, read_record
+from mrmg.scene.loading import load_scene
+from mrmg.scene.types import Scene
+
+
+def write_report(run_folder: Path) -> None:
+    """Write `report.html` into a run folder, from the files that are there.
+
+    Args:
+        run_folder: holds at least `scene.yaml`, `planning.json` and `summary.json`.
+
+    Raises:
+        RunFolderError: if a file is missing or cannot be read.
+    """
+    record = read_record(run_folder)
+    storage.write_text(run_folder / "report.html", report_html(record))
+
+
+def report_html(record: RunRecord) -> str:
+    """Return the report as HTML."""
+    folder = record.folder
+    return html.page(
+        f"{record.scene.name}: mission report",
+        [
+            f"<h1>{html.text(record.scene.name)}</h1>",
+            _verdict_line(record),
+            html.tiles(_main_figures(record)),
+            html.section("Mission", html.video(folder / "mission.mp4")),
+            html.section(
+                "Map", html.picture(folder / "overview.png", "Map with all paths")
+            ),
+            html.section(
+                "Battery content",
+                html.picture(folder / "energy.png", "Battery content over time")
+                if record.plan
+                else "",
+            ),
+            html.section("Energy", *sections.energy(record)),
+            html.section("Tours", *sections.tours(record)),
+            html.section("Checks", *sections.checks(record)),
+            html.section("Planner", sections.planner(record)),
+            html.section("Reproduce", *_reproduce(record)),
+        ],
+    )
+
+
+def _verdict_line(record: RunRecord) -> str:
+    summary, scene = record.summary, record.scene
+    if record.plan is None:
+        word = record.planning["status"].replace("_", " ").capitalize() + ": "
+        return html.verdict_line(False, word, record.planning["reason"])
+    if record.audit is None or record.verdict is None:
+        return html.verdict_line(
+            False, "Not finished:", " the plan was not driven yet."
+        )
+    if not summary["mission_ok"]:
+        reasons = [item.message for item in record.verdict.violations]
+        reasons += record.audit.reasons
+        more = f" (and {len(reasons) - 1} more, see Checks)" if len(reasons) > 1 else ""
+        first = reasons[0] if reasons else "see Checks"
+        return html.verdict_line(False, "Mission failed: ", first + more)
+    energy = summary["energy"]
+    fleet = "1 robot" if len(scene.robots) == 1 else f"{len(scene.robots)} robots"
+    return html.verdict_line(
+        True,
+        "Mission accomplished: ",
+        f"{fleet} visited all {len(scene.goals)} goals without contact, used "
+        f"{energy['measured_J'] / 1000:.1f} kJ "
+        f"({sections.signed(energy['measured_error_pct'], 1)} % against plan for the "
+        f"worst robot) and never fell below "
+        f"{100 * energy['min_charge_fraction']:.0f} % charge.",
+    )
+
+
+def _main_figures(record: RunRecord) -> list[tuple[str, str, str]]:
+    summary, scene = record.summary, record.scene
+    kinds = (
+        f"{len(scene.robots)} robots, {len(scene.stations)} stations, seed "
+        f"{summary['seed']}"
+    )
+    if record.plan is None:
+        return [("Goals", str(len(scene.goals)), kinds)]
+    execution, energy = summary["execution"], summary["energy"]
+    done = f"{execution['goals_visited']} / " if execution else ""
+    figures = [
+        ("Goals visited", f"{done}{len(scene.goals)}", kinds),
+        ("Planned energy", sections.kJ(record.plan.cost_J), "whole fleet"),
+        ("Planned duration", f"{record.plan.makespan_s:.0f} s", "last robot at rest"),
+    ]
+    if execution and energy:
+        figures += [
+            (
+                "Simulated energy",
+                sections.kJ(energy["measured_J"]),
+                "work at the wheels",
+            ),
+            (
+                "Lowest charge",
+                f"{100 * energy['min_charge_fraction']:.1f} %",
+                f"{energy['recharges']} recharges",
+            ),
+            (
+                "Tracking error",
+                f"{100 * execution['tracking']['rms_m']:.1f} cm",
+                f"rms; at most {100 * execution['tracking']['max_m']:.1f} cm",
+            ),
+            (
+                "Simulation speed",
+                f"{execution['realtime_factor']:.0f} ×",
+                f"real time; control {execution['controller_ms']['median']:.2f} ms",
+            ),
+        ]
+    return figures
+
+
+def _reproduce(record: RunRecord) -> list[str]:
+    versions = ", ".join(
+        f"{name} {number}"
+        for name, number in sorted(record.summary["versions"].items())
+    )
+    return [
+        html.code(command(record)),
+        html.note(f"Scene {record.scene.digest}. Versions: {versions}."),
+    ]
+
+
+def command(record: RunRecord) -> str:
+    """Return the command line that makes the same plan and simulation again."""
+    words = [
+        "mrmg",
+        "run",
+        _source(record.scene),
+        "--seed",
+        str(record.summary["seed"]),
+    ]
+    if record.arguments.get("profile", "default") != "default":
+        words += ["--profile", str(record.arguments["profile"])]
+    if record.arguments.get("budget_s") is not None:
+        words += ["--budget", f"{record.arguments['budget_s']:g}"]
+    return " ".join(words)
+
+
+def _source(scene: Scene) -> str:
+    same = scene.name in shipped.scene_names()
+    if same and load_scene(scene.name).digest == scene.digest:
+        return scene.name
+    return "scene.yaml"

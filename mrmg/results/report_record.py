@@ -1,0 +1,76 @@
+"""What a run folder holds, read back for its report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mrmg import storage
+from mrmg.errors import Fault, RunFolderError
+from mrmg.execution.log import ExecutionLog
+from mrmg.mission import Plan, PlanStatus
+from mrmg.results.energy_audit import EnergyAudit
+from mrmg.results.verdict import Verdict
+from mrmg.scene.loading import load_scene
+from mrmg.scene.types import Scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunRecord:
+    """Everything a run folder holds; what was not reached is None.
+
+    Attributes:
+        folder: where the run lies.
+        scene: what was to be solved.
+        summary: content of `summary.json`.
+        planning: content of `planning.json`.
+        arguments: what the run was started with.
+        plan, verdict, log, audit: outcomes of the steps.
+    """
+
+    folder: Path
+    scene: Scene
+    summary: Mapping[str, Any]
+    planning: Mapping[str, Any]
+    arguments: Mapping[str, Any]
+    plan: Plan | None
+    verdict: Verdict | None
+    log: ExecutionLog | None
+    audit: EnergyAudit | None
+
+
+def read_record(run_folder: Path) -> RunRecord:
+    """Read a run folder.
+
+    Raises:
+        RunFolderError: if a file is missing or cannot be read.
+    """
+    planning = _read(run_folder, "planning.json", "mrmg plan")
+    solved = planning["status"] == PlanStatus.SOLVED.value
+
+    def left(name: str) -> bool:
+        return solved and (run_folder / name).exists()
+
+    has_run = (run_folder / "run.json").exists()
+    run = _read(run_folder, "run.json", "mrmg run") if has_run else {}
+    return RunRecord(
+        folder=run_folder,
+        scene=load_scene(run_folder / "scene.yaml"),
+        summary=_read(run_folder, "summary.json", "mrmg run"),
+        planning=planning,
+        arguments=run.get("arguments", {}),
+        plan=Plan.load(run_folder) if left("plan.json") else None,
+        verdict=Verdict.load(run_folder) if left("verdict.json") else None,
+        log=ExecutionLog.load(run_folder) if left("log.json") else None,
+        audit=EnergyAudit.load(run_folder) if left("audit.json") else None,
+    )
+
+
+def _read(folder: Path, name: str, cure: str) -> dict[str, Any]:
+    try:
+        return dict(storage.read_json(folder / name))
+    except (OSError, ValueError) as error:
+        fault = Fault(name, f"cannot be read ({error}); run '{cure}'")
+        raise RunFolderError(str(folder), [fault]) from error

@@ -1,0 +1,211 @@
+"""The sections of the report page that are tables: energy, tours, checks, planner."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from mrmg.energy import PARTS
+from mrmg.ledger import EnergyLedger
+from mrmg.mission import Plan
+from mrmg.results import report_page as html
+from mrmg.results import style
+from mrmg.results.energy_audit import EnergyAudit
+from mrmg.results.report_record import RunRecord
+
+_PART_COLORS = {
+    "rolling": "#4477AA",
+    "turning": "#CCBB44",
+    "inertia": "#EE6677",
+    "idle": "#8A94A0",
+}
+_MAX_LISTED = 20
+
+
+def energy(record: RunRecord) -> list[str]:
+    """Return the energy by robot, part and meter."""
+    if record.plan is None:
+        return []
+    audit, plan = record.audit, record.plan
+    colors = style.scene_robot_colors(record.scene)
+    most_J = max((plan.ledger.total_J(robot=item) for item in colors), default=0.0)
+    rows: list[list[str]] = []
+    sums = []
+    for robot in (*colors, None):
+        sums.append(len(rows))
+        name = html.dot(colors[robot], robot) if robot else "Fleet"
+        parts = [
+            (plan.ledger.total_J(robot=robot, part=part), _PART_COLORS[part], part)
+            for part in PARTS
+        ]
+        share = html.bar(parts, most_J) if robot else ""
+        rows.append([name, "all", share, *_meters(plan, audit, robot, None)])
+        rows += [
+            ["", html.dot(_PART_COLORS[part], part), ""]
+            + _meters(plan, audit, robot, part)
+            for part in PARTS
+            if plan.ledger.total_J(robot=robot, part=part) != 0.0
+        ]
+    head = ["Robot", "Part", "Planned by part", "Planned", "Metered", "Measured"]
+    head += ["Metered − planned", "Measured − planned"]
+    return [
+        html.table(head, rows, text_columns=(0, 1, 2), sums=sums),
+        html.note(
+            "Planned: energy model over the plan. Metered: the same model over the "
+            "simulated motion. Measured: work of the simulated wheels, which has no "
+            "parts but driving and idling."
+        ),
+    ]
+
+
+def _meters(
+    plan: Plan, audit: EnergyAudit | None, robot: str | None, part: str | None
+) -> list[str]:
+    planned_J = plan.ledger.total_J(robot=robot, part=part)
+    if audit is None:
+        return [kJ(planned_J), "", "", "", ""]
+    metered_J = audit.metered.total_J(robot=robot, part=part)
+    measured_J = audit.measured.total_J(robot=robot) if part is None else None
+    return [
+        kJ(planned_J),
+        kJ(metered_J),
+        "" if measured_J is None else kJ(measured_J),
+        _percent(metered_J, planned_J),
+        "" if measured_J is None else _percent(measured_J, planned_J),
+    ]
+
+
+def tours(record: RunRecord) -> list[str]:
+    """Return every robot's tour: stops, arrivals, energy."""
+    if record.plan is None:
+        return []
+    colors = style.scene_robot_colors(record.scene)
+    head = ["Stop", "Target", "Kind", "Planned arrival", "Arrival", "Leg planned"]
+    head += ["Leg measured", "Charge planned", "Charge on arrival"]
+    parts = []
+    for robot in record.plan.tours:
+        parts.append(f"<h3>{html.dot(colors[robot], robot)}</h3>")
+        rows = _tour_rows(record, record.plan, robot)
+        parts.append(
+            html.table(head, rows, text_columns=(0, 1, 2))
+            or html.note("stays where it is")
+        )
+    return parts
+
+
+def _tour_rows(record: RunRecord, plan: Plan, robot: str) -> list[list[str]]:
+    capacity_J = record.scene.robot(robot).battery.capacity_J
+    planned = [visit for visit in plan.visits if visit.robot == robot]
+    driven = (
+        [visit for visit in record.audit.visits if visit.robot == robot]
+        if record.audit
+        else []
+    )
+    planned_legs = _legs(plan.ledger, robot)
+    driven_legs = _legs(record.audit.measured, robot) if record.audit else {}
+    rows = []
+    for leg, target in enumerate(plan.tours[robot]):
+        hope = planned[leg] if leg < len(planned) else None
+        fact = driven[leg] if leg < len(driven) else None
+        kind = (hope or fact).kind if hope or fact else ""  # type: ignore[union-attr]
+        rows.append(
+            [
+                str(leg + 1),
+                html.text(target),
+                "⚡ station" if kind == "station" else kind,
+                f"{hope.time_s:.1f} s" if hope else "not reached",
+                f"{fact.time_s:.1f} s" if fact else "not reached" if driven else "",
+                kJ(planned_legs[leg]) if leg in planned_legs and hope else "",
+                kJ(driven_legs[leg]) if leg in driven_legs and fact else "",
+                f"{100 * hope.energy_J / capacity_J:.1f} %" if hope else "",
+                f"{100 * fact.energy_J / capacity_J:.1f} %" if fact else "",
+            ]
+        )
+    return rows
+
+
+def _legs(ledger: EnergyLedger, robot: str) -> dict[int, float]:
+    """Return the energy [J] of each leg of one robot."""
+    legs: dict[int, float] = {}
+    for entry in ledger.entries:
+        if entry.robot == robot:
+            legs[entry.leg] = legs.get(entry.leg, 0.0) + entry.energy_J
+    return legs
+
+
+def checks(record: RunRecord) -> list[str]:
+    """Return what verifier and audit found, robot by robot."""
+    verdict, audit, log = record.verdict, record.audit, record.log
+    parts = []
+    if verdict is not None:
+        count = len(verdict.violations)
+        rows = [
+            ["Rules broken by the plan", str(count) if count else "none"],
+            ["Least distance to an obstacle", _cm(verdict.min_obstacle_clearance_m)],
+            ["Least distance of two robots", _cm(verdict.min_robot_distance_m)],
+        ]
+        if log is not None:
+            contacts = str(len(log.contacts)) if log.contacts else "none"
+            rows.append(["Contacts in the simulation", contacts])
+        parts.append(html.table(["Check", "Result"], rows))
+        parts.append(html.bullets(_shortened([v.message for v in verdict.violations])))
+    if audit is not None:
+        parts.append(html.bullets(_shortened(list(audit.reasons))))
+        head = ["Robot", "Tracking rms", "Tracking max", "Lowest charge"]
+        rows = [
+            [
+                html.text(robot.robot),
+                f"{100 * robot.tracking_rms_m:.1f} cm",
+                f"{100 * robot.tracking_max_m:.1f} cm",
+                f"{100 * robot.min_charge_fraction:.1f} %",
+            ]
+            for robot in audit.robots
+        ]
+        parts += ["<h3>Execution</h3>", html.table(head, rows)]
+    return parts
+
+
+def _shortened(items: list[str]) -> list[str]:
+    rest = len(items) - _MAX_LISTED
+    return items[:_MAX_LISTED] + ([f"... and {rest} more"] if rest > 0 else [])
+
+
+def planner(record: RunRecord) -> str:
+    """Return the planner's statistics."""
+    rows = [
+        [html.text(name), html.text(value)]
+        for name, value in _flat(record.planning["statistics"])
+    ]
+    return html.table(["Statistic", "Value"], rows)
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, str]]:
+    """Return nested figures as (path, text); lists of data are left out."""
+    entries: list[tuple[str, str]] = []
+    for name, value in values.items():
+        label = f"{prefix}{name}"
+        if isinstance(value, Mapping):
+            entries += _flat(value, f"{label}.")
+        elif isinstance(value, float):
+            entries.append((label, f"{value:.4g}"))
+        elif isinstance(value, (str, int)):
+            entries.append((label, str(value)))
+    return entries
+
+
+def kJ(energy_J: float) -> str:
+    """Return an energy as text."""
+    return f"{energy_J / 1000.0:.2f} kJ"
+
+
+def _cm(distance_m: float | None) -> str:
+    return "–" if distance_m is None else f"{100.0 * distance_m:.1f} cm"
+
+
+def _percent(value: float, base: float) -> str:
+    return f"{signed(100.0 * (value - base) / base, 2)} %" if base else ""
+
+
+def signed(value: float, digits: int) -> str:
+    """Return a number with its sign as text."""
+    return f"{value:+.{digits}f}".replace("-", "−")
