@@ -1,0 +1,37 @@
+"""Maps that nobody here drew: imported, populated, and driven to the end."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mrmg import pipeline
+from mrmg.authoring import import_map, populate
+from mrmg.errors import ExitCode
+from mrmg.scene.loading import scene_from_document
+
+MAPS = Path(__file__).parents[3] / "shared/maps"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name",
+    [
+        "potholes.txt",
+        "complex2.txt",
+        "geometry-reduced.txt",
+        "warehouse2.txt",
+        "dense.tri",
+    ],
+)
+def test_a_mission_on_a_foreign_map_ends_well(name: str, tmp_path: Path) -> None:
+    if not (MAPS / name).exists():
+        pytest.skip(f"no map {name} in ../shared/maps")
+    document = import_map(MAPS / name, longest_side_m=100.0)
+    document = populate(document, robots=2, goals=14, stations=5, seed=3)
+    scene = scene_from_document(document, source=name)
+    result = pipeline.run(scene, out=tmp_path / "run", video=None)
+    assert result.exit_code == ExitCode.OK, result.reason
+    assert result.summary["energy"]["recharges"] > 0
+    assert result.summary["execution"]["goals_visited"] == 14
