@@ -7,6 +7,7 @@ the free ground shrunk by a margin, near places wide enough to turn round.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -95,17 +96,17 @@ def populate(
 
 def _drivable(scene: Scene, model: RobotModel) -> Ground:
     """Return the ground with the widest margin that keeps most of the map together."""
+    bare = Ground.over(
+        scene.bounds,
+        [obstacle.shape for obstacle in scene.obstacles],
+        [(area.shape, area.multiplier) for area in scene.terrain],
+        margin_m=0.0,
+    )
     grounds = [
-        Ground.over(
-            scene.bounds,
-            [obstacle.shape for obstacle in scene.obstacles],
-            [(area.shape, area.multiplier) for area in scene.terrain],
-            margin_m=model.half_width_m + margin_m,
-        )
-        for margin_m in _MARGINS_M
+        replace(bare, margin_m=model.half_width_m + margin_m) for margin_m in _MARGINS_M
     ]
     sizes = [_largest(ground).sum() for ground in grounds]
-    share = max(sizes) / max(1, (grounds[0].clearance_m > 0.0).sum())
+    share = max(sizes) / max(1, (bare.clearance_m > 0.0).sum())
     if share < _LEAST_SHARE:
         message = (
             f"roads wide enough for this robot join only {100 * share:.0f} % of the "
