@@ -39,6 +39,10 @@ def edge_costs(space, terrain, vertex, first, second, passage):  # type: ignore[
     return cost
 
 
+COMFORT_M = 0.4
+"""Clearance beyond the passage that lines of sight keep where they can."""
+
+
 @kernel
 def find_waypoint(  # type: ignore[no-untyped-def]
     space, terrain, roadmap, field, target, x, y, passage, view, out
@@ -47,6 +51,8 @@ def find_waypoint(  # type: ignore[no-untyped-def]
 
     The way is the roadmap's: of the near vertices the one with the least energy through
     it to the target, and then its successors as far as they can be seen at no more cost.
+    Lines of sight keep COMFORT_M more than the passage if the place allows it, so that
+    narrow mouths are driven at head on.
 
     Args:
         space, terrain: the world.
@@ -61,15 +67,48 @@ def find_waypoint(  # type: ignore[no-untyped-def]
     Returns:
         Weighted length [m] from (x, y) to the target; inf if no vertex is in sight.
     """
-    needed = min(passage, 0.95 * clearance_estimate(space, x, y))
-    cost_to_go = roadmap.cost_to_go[field, target]
+    here = 0.95 * clearance_estimate(space, x, y)
     successor = roadmap.successor[field, target]
+    comfortable = min(passage + COMFORT_M, here)
+    v, cost = best_vertex(
+        space, terrain, roadmap, field, target, x, y, comfortable, min(passage, here)
+    )
+    if v < 0:
+        return np.inf
+    cost_to_go = roadmap.cost_to_go[field, target]
+    while successor[v] >= 0:
+        after = successor[v]
+        ax, ay = roadmap.vertex[after, 0], roadmap.vertex[after, 1]
+        if hypot(ax - x, ay - y) > view or not segment_is_clear(
+            space, x, y, ax, ay, comfortable
+        ):
+            break
+        straight = segment_weighted_length(terrain, x, y, ax, ay) + cost_to_go[after]
+        if straight > cost * (1.0 + 1e-9) + 0.02:
+            break
+        cost = min(cost, straight)
+        v = after
+    out[0], out[1] = roadmap.vertex[v, 0], roadmap.vertex[v, 1]
+    return cost
+
+
+@kernel
+def best_vertex(  # type: ignore[no-untyped-def]
+    space, terrain, roadmap, field, target, x, y, comfortable, needed
+):
+    """Return (vertex in sight with the least energy through it, that energy [m]).
+
+    Looks in growing squares of buckets; vertices seen with comfortable clearance come
+    before those seen with the needed one. Returns (-1, inf) if none is in sight.
+    """
+    cost_to_go = roadmap.cost_to_go[field, target]
     column = int((x - roadmap.x_min) / roadmap.bucket)
     row = int((y - roadmap.y_min) / roadmap.bucket)
     candidate = np.empty(256, np.int64)
     cost = np.empty(256, np.float64)
-    n = 0
-    for reach in range(1, 4):
+    for attempt in range(3):
+        reach = 1 + (attempt == 2)
+        clearance = comfortable if attempt == 0 else needed
         n = 0
         for r in range(max(0, row - reach), min(roadmap.rows, row + reach + 1)):
             for c in range(
@@ -86,34 +125,18 @@ def find_waypoint(  # type: ignore[no-untyped-def]
                         n += 1
         best = -1
         best_cost = np.inf
-        for _ in range(min(n, 32)):
+        for _ in range(min(n, 40)):
             i = np.argmin(cost[:n])
             if cost[i] >= best_cost:
                 break
             v = candidate[i]
+            cost[i] = np.inf
             vx, vy = roadmap.vertex[v, 0], roadmap.vertex[v, 1]
-            if segment_is_clear(space, x, y, vx, vy, needed):
+            if segment_is_clear(space, x, y, vx, vy, clearance):
                 exact = cost_to_go[v] + segment_weighted_length(terrain, x, y, vx, vy)
                 if exact < best_cost:
                     best_cost = exact
                     best = v
-            cost[i] = np.inf
         if best >= 0:
-            break
-    if best < 0:
-        return np.inf
-    v = best
-    while successor[v] >= 0:
-        after = successor[v]
-        ax, ay = roadmap.vertex[after, 0], roadmap.vertex[after, 1]
-        if hypot(ax - x, ay - y) > view or not segment_is_clear(
-            space, x, y, ax, ay, needed
-        ):
-            break
-        straight = segment_weighted_length(terrain, x, y, ax, ay) + cost_to_go[after]
-        if straight > best_cost * (1.0 + 1e-9) + 0.02:
-            break
-        best_cost = min(best_cost, straight)
-        v = after
-    out[0], out[1] = roadmap.vertex[v, 0], roadmap.vertex[v, 1]
-    return best_cost
+            return best, best_cost
+    return -1, np.inf

@@ -256,6 +256,17 @@ def mean_cost(problem):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def _length(problem, r, route, length):  # type: ignore[no-untyped-def]
+    """Return the energy of a goal sequence without stations [J]."""
+    total = 0.0
+    place = problem.cost.shape[2]
+    for i in range(length):
+        total += problem.cost[r, place, route[i]]
+        place = route[i]
+    return total
+
+
+@kernel
 def refuel_route(problem, r, route, length, out):  # type: ignore[no-untyped-def]
     """Insert stations into a robot's goal sequence at least cost: exact.
 
@@ -332,9 +343,7 @@ def refuel_route(problem, r, route, length, out):  # type: ignore[no-untyped-def
             place = follower
             i += 1
     if best_state < 0:
-        total = cost[targets, route[0]]
-        for i in range(length - 1):
-            total += cost[route[i], route[i + 1]]
+        total = _length(problem, r, route, length)
         return IMPOSSIBLE + min(total, IMPOSSIBLE), 0
     # Write the tour from the end.
     n = 0
@@ -420,8 +429,10 @@ def improve_routes(problem, route, length, cost, scratch):  # type: ignore[no-un
                     for j in range(n + 1):
                         if a == b and j == i:
                             continue
-                        # Insertion alone costs at least this; skip hopeless places.
                         _with(base, n, j, goal, longer)
+                        # Stations only add to the length, so that bounds the gain.
+                        if saved - _length(problem, b, longer, n + 1) <= best_gain:
+                            continue
                         gain = saved - _route_cost(problem, b, longer, n + 1, scratch)
                         if gain > best_gain:
                             best_gain = gain
@@ -444,6 +455,8 @@ def improve_routes(problem, route, length, cost, scratch):  # type: ignore[no-un
                     for k in range(length[a]):
                         inside = i <= k <= j
                         longer[k] = route[a, i + j - k] if inside else route[a, k]
+                    if _length(problem, a, longer, length[a]) >= cost[a]:
+                        continue
                     new = _route_cost(problem, a, longer, length[a], scratch)
                     if new < cost[a] - 1e-6:
                         cost[a] = new

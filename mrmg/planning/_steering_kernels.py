@@ -14,7 +14,7 @@ from mrmg.compilation import kernel
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.world._kernels import clearance_estimate, segment_is_clear
 
-AUTO, FORWARD, REVERSE, SWAP, RANDOM, WAIT = range(6)
+AUTO, FORWARD, REVERSE, RANDOM, BACK_OFF, WAIT = range(6)
 """What a robot does during one expansion of the tree."""
 
 LOOKAHEAD_M = 3.5
@@ -41,12 +41,12 @@ def choose_gear(fleet, r, state, space, wx, wy, to_go, gear):  # type: ignore[no
         return 1
     bearing = abs(wrap(atan2(wy - state[1], wx - state[0]) - state[2]))
     room = clearance_estimate(space, state[0], state[1])
-    roomy = room > 2.0 * fleet.turning_radius[r] + 1.2
+    # The two thresholds lie apart, so that a turn once begun is not broken off.
     if gear > 0:
-        if bearing > 1.9 and not (roomy and to_go > 4.0):
+        if bearing > 1.9 and (room < fleet.turning_radius[r] + 1.0 or to_go < 4.0):
             return -1
         return 1
-    if bearing < 1.2 or (roomy and to_go > 6.0):
+    if bearing < 1.2 or (room > 2.0 * fleet.turning_radius[r] + 1.2 and to_go > 6.0):
         return 1
     return -1
 
@@ -81,7 +81,7 @@ def pursue(fleet, r, state, wx, wy, gear):  # type: ignore[no-untyped-def]
     psi = max(-w_max, min(w_max, psi))
     fastest = v_max if gear > 0 else v_min
     error = abs(psi - state[4])
-    return fastest * max(0.35, 1.0 - error / 0.8), psi
+    return fastest * max(0.6, min(1.0, 1.2 - error)), psi
 
 
 @kernel

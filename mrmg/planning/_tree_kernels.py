@@ -25,6 +25,7 @@ from mrmg.planning._safety_kernels import (
 )
 from mrmg.planning._steering_kernels import (
     AUTO,
+    BACK_OFF,
     FORWARD,
     RANDOM,
     REVERSE,
@@ -44,8 +45,13 @@ SOLVED, OUT_OF_VERTICES, NO_TOUR = range(3)
 """How growing a tree can end."""
 
 VIEW_M = 25.0
+"""How far along its way a robot looks for the farthest point in sight."""
+
 STEER_EVERY = 5
-LONG_WAIT = 0.25
+"""Steps between two looks."""
+
+ATTEMPTS = 5
+"""Controls tried before a robot brakes as committed."""
 
 
 class Targets(NamedTuple):
@@ -352,6 +358,26 @@ def route_from(  # type: ignore[no-untyped-def]
 
 
 @kernel
+def _attempt(fleet, r, state, v, w, attempt, dt):  # type: ignore[no-untyped-def]
+    """Return the control of the n-th attempt to get on: ever slower and wider.
+
+    The wanted motion; slower; slower and straighter; slower and swinging out; and last
+    braking while steering.
+    """
+    if attempt == 1:
+        v *= 0.5
+    elif attempt == 2:
+        v *= 0.4
+        w *= 0.4
+    elif attempt == 3:
+        v *= 0.4
+        w *= -0.5
+    elif attempt == 4:
+        v = 0.0
+    return control_towards(fleet, r, state, v, w, dt)
+
+
+@kernel
 def expand(  # type: ignore[no-untyped-def]
     fleet,
     spaces,
@@ -396,6 +422,10 @@ def expand(  # type: ignore[no-untyped-def]
             low, high = fleet.limit[r, 0], fleet.limit[r, 1]
             wanted_v[r] = low + random_unit(random) * (high - low)
             wanted_w[r] = (2.0 * random_unit(random) - 1.0) * fleet.limit[r, 2]
+        elif mode[r] == BACK_OFF:
+            backward = fleet.limit[r, 0] if gear[r] > 0 else fleet.limit[r, 1]
+            wanted_v[r] = (0.4 + 0.6 * random_unit(random)) * backward
+            wanted_w[r] = (2.0 * random_unit(random) - 1.0) * 0.6 * fleet.limit[r, 2]
     goal_point = np.zeros((robots, 2))
     aside = np.zeros((robots, 2))
     to_go = np.zeros(robots)
@@ -408,7 +438,8 @@ def expand(  # type: ignore[no-untyped-def]
             r = order[i]
             space = space_of(spaces, fleet.space[r])
             now = present_state(commitment, r)
-            driving = target[r] >= 0 and mode[r] != WAIT and mode[r] != RANDOM
+            drawn = mode[r] == RANDOM or mode[r] == BACK_OFF
+            driving = target[r] >= 0 and mode[r] != WAIT and not drawn
             if driving and n % STEER_EVERY == 0:
                 to_go[r] = find_waypoint(
                     space, terrain, roadmap, fleet.field[r], target[r], now[0], now[1],
@@ -433,30 +464,21 @@ def expand(  # type: ignore[no-untyped-def]
                 wanted_v[r], wanted_w[r] = pursue(
                     fleet, r, now, aside[r, 0], aside[r, 1], gear[r]
                 )
-            elif not driving and mode[r] != RANDOM:
-                wanted_v[r], wanted_w[r] = 0.0, 0.0 * now[4]
             before = now.copy()
-            moving = driving or mode[r] == RANDOM
             u1, u2 = braking_control(fleet, r, before, dt)
-            if moving:
-                a1, a2 = control_towards(fleet, r, before, wanted_v[r], wanted_w[r], dt)
-                refused = try_control(fleet, spaces, commitment, decided, r, a1, a2, dt)
-                if refused != 0:
-                    a1, a2 = control_towards(
-                        fleet, r, before, 0.4 * wanted_v[r], wanted_w[r], dt
+            if driving or drawn:
+                refused = 1
+                for attempt in range(ATTEMPTS if driving else 2):
+                    a1, a2 = _attempt(
+                        fleet, r, before, wanted_v[r], wanted_w[r], attempt, dt
                     )
                     refused = try_control(
                         fleet, spaces, commitment, decided, r, a1, a2, dt
                     )
+                    if refused == 0:
+                        u1, u2 = a1, a2
+                        break
                 if refused != 0:
-                    # Brake, but go on steering.
-                    a1 = u1
-                    refused = try_control(
-                        fleet, spaces, commitment, decided, r, a1, a2, dt
-                    )
-                if refused == 0:
-                    u1, u2 = a1, a2
-                else:
                     follow_braking(commitment, r)
             else:
                 follow_braking(commitment, r)
@@ -510,11 +532,13 @@ def choose_modes(tree, v, target, params, steer, random, mode):  # type: ignore[
             pick = random_unit(random)
             if pick < 0.25:
                 mode[r] = AUTO
-            elif pick < 0.45:
-                mode[r] = FORWARD
+            elif pick < 0.55:
+                mode[r] = BACK_OFF
             elif pick < 0.65:
+                mode[r] = FORWARD
+            elif pick < 0.75:
                 mode[r] = REVERSE
-            elif pick < 0.9 or len(target) == 1:
+            elif pick < 0.95 or len(target) == 1:
                 mode[r] = RANDOM
             else:
                 mode[r] = WAIT

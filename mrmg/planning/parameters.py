@@ -47,8 +47,8 @@ class PlannerParams:
     improvements: int = 3
     group_alpha: float = 1.0
     group_beta: float = 4.0
-    group_lambda: float = 0.9
-    group_bias: float = 0.9
+    group_lambda: float = 0.98
+    group_bias: float = 0.95
     steer_start: float = 1.0
     steer_decay: float = 0.9995
     steer_least: float = 0.85

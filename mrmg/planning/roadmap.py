@@ -24,9 +24,13 @@ from scipy.stats import qmc
 from mrmg.planning import _roadmap_kernels
 from mrmg.planning.fleet import travel_classes
 from mrmg.scene.types import Scene
+from mrmg.world._kernels import FreeSpace
 from mrmg.world.world import World
 
 BUCKET_M = 4.0
+
+NARROW_M = 2.5
+"""Clearance below which the middle of a place gets vertices of its own [m]."""
 
 
 class RoadmapArrays(NamedTuple):
@@ -163,7 +167,8 @@ def _vertices(
     corners = shapely.get_coordinates(
         [shapely.segmentize(ring, 8.0) for ring in rings if not ring.is_empty]
     )
-    loose = np.concatenate([spread, corners.reshape(-1, 2)])
+    ridges = [_ridge(world.spaces[space]) for space, _ in classes]
+    loose = np.concatenate([spread, corners.reshape(-1, 2), *ridges])
     inside = (
         (loose[:, 0] > x_min)
         & (loose[:, 1] > y_min)
@@ -175,6 +180,22 @@ def _vertices(
         [_field_at(world.spaces[space], loose) for space, _ in classes], axis=0
     )
     return np.concatenate([np.array(fixed).reshape(-1, 2), loose[widest >= passage]])
+
+
+def _ridge(space: FreeSpace) -> np.ndarray:
+    """Return points in the middle of narrow places, about one a square metre.
+
+    They are the local maxima of the distance field along x or y; free samples seldom hit
+    a corridor's middle.
+    """
+    d = space.distance
+    inner = d[1:-1, 1:-1]
+    across = (inner >= d[1:-1, :-2]) & (inner > d[1:-1, 2:])
+    along = (inner >= d[:-2, 1:-1]) & (inner > d[2:, 1:-1])
+    row, column = np.nonzero((across | along) & (inner > 0.0) & (inner < NARROW_M))
+    points = np.stack([column + 1.5, row + 1.5], axis=1) * space.cell
+    _, first = np.unique(np.floor(points).astype(int), axis=0, return_index=True)
+    return np.asarray(points[np.sort(first)] + (space.x_min, space.y_min))
 
 
 def _anchor(
