@@ -112,7 +112,7 @@ class Fleet:
         model, data = self._model, self._data
         step_s = model.opt.timestep
         rate = (steer_to - steer_from) / (steps * step_s)
-        share = (np.arange(1, steps + 1) / steps)[:, None]
+        share = (np.arange(steps) / steps)[:, None]
         psi = steer_from + share * (steer_to - steer_from) + rate * self._servo_lag_s
         angles = self._wheel_angles(psi)
         self.force_N = force_N

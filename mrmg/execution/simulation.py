@@ -35,7 +35,8 @@ _SETTLING_STEPS = 50
 _REST_S = 1.0
 _LONGEST_REST_S = 5.0
 _AT_REST_M_S = 0.005
-_LONGEST_SLOWDOWN = 3.0
+_STALLED_RATE = 0.1
+_LONGEST_STALL_S = 5.0
 _PROGRESS_TICKS = 50
 _VERSIONED = ("mujoco", "casadi", "numpy", "scipy", "shapely")
 
@@ -96,7 +97,7 @@ class _Run:
         self._contacts = ContactWatch(world)
         self._recording = Recording()
         self._controller_s: list[float] = []
-        self._finished_s = np.inf
+        self._got_on_s, self._finished_s = 0.0, np.inf
         self._fleet = Fleet(world, self.data)
         self._settle()
         self._observe()
@@ -202,8 +203,11 @@ class _Run:
     def _observe(self) -> None:
         self._state = self._fleet.state()
         self._planned = self._reference.at(np.array([self._clock.time_s]))[0]
-        if self._clock.time_s >= self._reference.duration_s - 1e-9:
+        finished = self._clock.time_s >= self._reference.duration_s - 1e-9
+        if finished:
             self._finished_s = min(self._finished_s, self.data.time)
+        if finished or self._clock.rate > _STALLED_RATE:
+            self._got_on_s = self.data.time
         self._recording.add(
             time_s=self.data.time,
             clock_s=min(self._clock.time_s, self._reference.duration_s),
@@ -221,8 +225,7 @@ class _Run:
 
     def _hopeless(self) -> bool:
         off_m = np.hypot(*(self._state - self._planned)[:, :2].T)
-        longest_s = _LONGEST_SLOWDOWN * self._reference.duration_s + _LONGEST_REST_S
-        overdue = self.data.time > longest_s
+        stalled = self.data.time - self._got_on_s > _LONGEST_STALL_S
         restless = self.data.time - self._finished_s > _LONGEST_REST_S
         # Written so that a state that is not a number counts as lost.
-        return not (off_m <= _LOST_M).all() or overdue or restless
+        return not (off_m <= _LOST_M).all() or stalled or restless

@@ -1,11 +1,13 @@
-"""Hand-made scenes and plans for the tests of the execution."""
+"""Hand-made scenes and plans for the tests of the execution, as one fixture."""
 
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from mrmg.accounting import step_energy_parts
 from mrmg.ledger import EnergyLedger
@@ -113,3 +115,10 @@ def straight(seconds: float, speed: float, acceleration: float = 1.0) -> np.ndar
     u1 = np.zeros(steps)
     u1[:ramp], u1[steps - ramp :] = acceleration, -acceleration
     return np.stack([u1, np.zeros(steps)], axis=1)
+
+
+@pytest.fixture(scope="session")
+def driving() -> SimpleNamespace:
+    """The makers above, by name."""
+    makers = (open_ground, rolled_out, plan_of, planned_J, bang_bang, straight)
+    return SimpleNamespace(**{maker.__name__: maker for maker in makers})

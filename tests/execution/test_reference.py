@@ -1,0 +1,86 @@
+"""The continuous plan against the exact motion between its states."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mrmg.execution.reference import FleetReference
+from mrmg.mission import Plan
+from mrmg.motion.dynamics import car_derivative, rk4_step
+from mrmg.scene.types import Scene
+
+STEP = rk4_step(car_derivative(math.sin, math.cos, math.tan))
+
+
+@pytest.fixture(scope="module")
+def scene(driving: SimpleNamespace) -> Scene:
+    return driving.open_ground([(-20.0, 0.0, 0.3), (20.0, 0.0, 2.0)])
+
+
+@pytest.fixture(scope="module")
+def plan(driving: SimpleNamespace, scene: Scene) -> Plan:
+    """Half a minute of switching controls for two robots."""
+    return driving.plan_of(
+        scene, [driving.bang_bang(scene, name, 30.0, 5) for name in ("r1", "r2")]
+    )
+
+
+def test_passes_through_every_state(scene: Scene, plan: Plan) -> None:
+    states = FleetReference(scene, plan).at(plan.trajectories[0].time_s)
+    for index, trajectory in enumerate(plan.trajectories):
+        np.testing.assert_allclose(states[:, index], trajectory.state, atol=1e-12)
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
+def test_between_states_it_is_the_exact_motion(
+    scene: Scene, plan: Plan, share: float
+) -> None:
+    """Oracle: a fine integration from the state before."""
+    item = plan.trajectories[1]
+    times = item.time_s[:-1] + share * plan.dt_s
+    states = FleetReference(scene, plan).at(times)[:, 1]
+    for start, control, state in zip(item.state, item.control, states, strict=False):
+        exact = tuple(start)
+        for _ in range(8):
+            exact = STEP(*exact, *control, 1.2, share * plan.dt_s / 8)
+        np.testing.assert_allclose(state, exact, atol=1e-4)
+
+
+def test_rests_after_the_end(scene: Scene, plan: Plan) -> None:
+    reference = FleetReference(scene, plan)
+    late = reference.at(np.array([reference.duration_s + 7.0]))[0]
+    last = [item.state[-1] for item in plan.trajectories]
+    np.testing.assert_allclose(late, last, atol=1e-12)
+
+
+def test_at_half_the_pace_speeds_are_halved(scene: Scene, plan: Plan) -> None:
+    """The way is the same; the speed matches the way per real time."""
+    reference = FleetReference(scene, plan)
+    full = reference.paced(4.0, 1.0, 0.02, 11)
+    half = reference.paced(4.0, 0.5, 0.04, 11)
+    np.testing.assert_allclose(half[..., [0, 1, 2, 4]], full[..., [0, 1, 2, 4]])
+    np.testing.assert_allclose(half[..., 3], 0.5 * full[..., 3])
+    np.testing.assert_allclose(reference.paced(4.0, 0.0, 0.1, 3)[..., 3], 0.0)
+
+
+def test_order_is_that_of_the_scene(scene: Scene, plan: Plan) -> None:
+    turned = replace(plan, trajectories=plan.trajectories[::-1])
+    at = np.array([3.3])
+    np.testing.assert_array_equal(
+        FleetReference(scene, turned).at(at), FleetReference(scene, plan).at(at)
+    )
+
+
+def test_a_plan_without_steps_stands_still(
+    driving: SimpleNamespace, scene: Scene
+) -> None:
+    plan = driving.plan_of(scene, [np.empty((0, 2)), np.empty((0, 2))])
+    reference = FleetReference(scene, plan)
+    assert reference.duration_s == 0.0
+    poses = [(*robot.pose, 0.0, 0.0) for robot in scene.robots]
+    np.testing.assert_array_equal(reference.at(np.array([0.0, 1.0])), [poses, poses])
