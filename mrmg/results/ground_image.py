@@ -68,7 +68,9 @@ def paint_ground(scene: Scene, plan: Plan, frame: GroundFrame) -> np.ndarray:
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     figure.set_facecolor("#DADCD6")
-    scene_drawing.draw_ground(axes, scene, hatched=False)
+    scene_drawing.draw_ground(
+        axes, scene, hatched=False, label_points=_points(_LABEL_PIXELS)
+    )
     _paint_paths(axes, scene, plan)
     _paint_labels(axes, scene)
     canvas.draw()  # type: ignore[no-untyped-call]

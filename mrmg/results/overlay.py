@@ -60,23 +60,29 @@ class Reading:
 class Panel:
     """The panel beside the map: clock, goals, batteries, legend."""
 
-    def __init__(self, scene: Scene, size: tuple[int, int], speed: float) -> None:
+    def __init__(
+        self, scene: Scene, size: tuple[int, int], speed: float, video_height: int
+    ) -> None:
         """Lay out the panel and draw what never changes.
 
         Args:
             scene: names and colours.
             size: width and height [pixels].
             speed: mission seconds per second of video.
+            video_height: of the whole picture [pixels]; decides the size of the text.
         """
         self._scene = scene
         self._size = size
         self._speed = speed
         self._colors = style.scene_robot_colors(scene)
         self._labels = style.goal_labels(scene)
-        self._unit = min(size[0] / 420.0, size[1] / 380.0, 2.5)
+        self._unit = min(size[0] / 345.0, video_height / 640.0)
         self._base = Image.new("RGB", size, _BACKGROUND)
         self._cards_top = self._draw_head(ImageDraw.Draw(self._base))
-        self._cards_bottom = self._draw_legend(ImageDraw.Draw(self._base))
+        self._cards_bottom = float(size[1])
+        robots = len(scene.robots)
+        if size[1] - self._cards_top - robots * self._px(46) > self._legend_height:
+            self._cards_bottom = self._draw_legend(ImageDraw.Draw(self._base))
 
     def draw(self, reading: Reading) -> np.ndarray:
         """Return the panel at one time, shape (height, width, 3) of bytes."""
@@ -184,7 +190,7 @@ class Panel:
         pen.text((left + self._px(84), middle), way, font=text, fill=_TEXT, anchor="lm")
         pen.text(
             (right - self._px(14), middle),
-            f"{reading.speed_m_s:+.1f} m/s",
+            f"{reading.speed_m_s:.1f} m/s",
             font=text,
             fill=_FAINT,
             anchor="rm",
@@ -198,14 +204,21 @@ class Panel:
         bar = (left + self._px(20), row - half, right - self._px(74), row + half)
         _draw_bar(pen, bar, reading.charge, robot.battery.reserve_fraction)
 
-    def _draw_legend(self, pen: ImageDraw.ImageDraw) -> float:
-        small = self._font(13)
+    def _legend_entries(self) -> list[tuple[str, str]]:
         entries = [("goal", "#E9EBEE"), ("charging station", style.STATION)]
         entries += [
             (look.label, look.color)
             for look in style.terrain_classes(self._scene).values()
         ]
-        entries.append(("obstacle", style.OBSTACLE))
+        return [*entries, ("obstacle", style.OBSTACLE)]
+
+    @property
+    def _legend_height(self) -> float:
+        return self._px(52 + 22 * ((len(self._legend_entries()) + 1) // 2))
+
+    def _draw_legend(self, pen: ImageDraw.ImageDraw) -> float:
+        small = self._font(13)
+        entries = self._legend_entries()
         rows = (len(entries) + 1) // 2
         top = self._size[1] - self._px(40) - rows * self._px(22)
         for number, (label, color) in enumerate(entries):

@@ -83,10 +83,7 @@ def _verdict_line(record: RunRecord) -> str:
 
 def _main_figures(record: RunRecord) -> list[tuple[str, str, str]]:
     summary, scene = record.summary, record.scene
-    kinds = (
-        f"{len(scene.robots)} robots, {len(scene.stations)} stations, seed "
-        f"{summary['seed']}"
-    )
+    kinds = f"{len(scene.robots)} robots, seed {summary['seed']}"
     if record.plan is None:
         return [("Goals", str(len(scene.goals)), kinds)]
     execution, energy = summary["execution"], summary["energy"]

@@ -40,7 +40,7 @@ section { background:var(--card); border:1px solid var(--line); border-radius:10
 .verdict b { margin-right:6px; }
 .good { color:var(--good); background:var(--good-bg); }
 .bad { color:var(--bad); background:var(--bad-bg); }
-.tiles { display:grid; grid-template-columns:repeat(auto-fit,minmax(150px,1fr));
+.tiles { display:grid; grid-template-columns:repeat(auto-fit,minmax(140px,1fr));
   gap:12px; margin-top:18px; }
 .tile { background:var(--card); border:1px solid var(--line); border-radius:10px;
   padding:12px 14px; }

@@ -87,13 +87,16 @@ def draw_scene(scene: Scene, path: Path) -> None:
     write_figure(figure, path)
 
 
-def draw_ground(axes: Axes, scene: Scene, *, hatched: bool = True) -> None:
+def draw_ground(
+    axes: Axes, scene: Scene, *, hatched: bool = True, label_points: float = 9.0
+) -> None:
     """Draw bounds, terrain classes and obstacles.
 
     Args:
         axes: where to draw, in metres.
         scene: what to draw.
-        hatched: hatch the terrain classes and print their multipliers.
+        hatched: hatch the terrain classes.
+        label_points: size of the multipliers printed on terrain areas.
     """
     bounds = box(*scene.bounds)
     _add_shape(
@@ -122,8 +125,7 @@ def draw_ground(axes: Axes, scene: Scene, *, hatched: bool = True) -> None:
             linestyle="--" if partial else "-",
             zorder=3,
         )
-    if hatched:
-        _label_terrain(axes, scene)
+    _label_terrain(axes, scene, label_points)
 
 
 def draw_goal(
@@ -131,7 +133,7 @@ def draw_goal(
 ) -> None:
     """Draw a goal region and its label; a colour other than white means visited."""
     draw_region(axes, goal.region, color, style.GOAL_EDGE, 1.3)
-    _draw_label(axes, goal.region.center, label, style.INK)
+    _draw_label(axes, goal.region, label, style.INK)
 
 
 def draw_station(axes: Axes, station: Station, label: str) -> None:
@@ -145,7 +147,7 @@ def draw_station(axes: Axes, station: Station, label: str) -> None:
         markeredgecolor=style.STATION_EDGE,
         zorder=6,
     )
-    _draw_label(axes, station.region.center, f"⚡{label}", style.STATION_EDGE)
+    _draw_label(axes, station.region, f"⚡{label}", style.STATION_EDGE)
 
 
 def draw_region(
@@ -167,14 +169,17 @@ def draw_robots(axes: Axes, scene: Scene) -> None:
     colors = style.scene_robot_colors(scene)
     for robot in scene.robots:
         draw_footprint(axes, robot, robot.pose, facecolor=colors[robot.id], alpha=1.0)
+        outline = footprint_at(robot, robot.pose)
         axes.annotate(
             robot.id,
-            robot.pose[:2],
-            xytext=(9, -11),
+            (float(outline[:, 0].mean()), float(outline[:, 1].min())),
+            xytext=(0, -3),
             textcoords="offset points",
             fontsize=10,
             fontweight="bold",
             color=colors[robot.id],
+            ha="center",
+            va="top",
             path_effects=_HALO,
             zorder=9,
         )
@@ -275,7 +280,7 @@ def _title(scene: Scene) -> str:
     return f"{scene.name}: " + ", ".join(words)
 
 
-def _label_terrain(axes: Axes, scene: Scene) -> None:
+def _label_terrain(axes: Axes, scene: Scene, points: float) -> None:
     taken = [obstacle.shape for obstacle in scene.obstacles]
     taken += [target.region.shape.buffer(_LABEL_M) for target in scene.targets()]
     free = box(*scene.bounds).difference(unary_union(taken))
@@ -291,7 +296,7 @@ def _label_terrain(axes: Axes, scene: Scene) -> None:
             center[0],
             center[1],
             f"×{area.multiplier:g}",
-            fontsize=9,
+            fontsize=points,
             color=style.INK,
             ha="center",
             va="center",
@@ -300,15 +305,18 @@ def _label_terrain(axes: Axes, scene: Scene) -> None:
         )
 
 
-def _draw_label(axes: Axes, center: np.ndarray, text: str, color: str) -> None:
+def _draw_label(axes: Axes, region: Region, text: str, color: str) -> None:
+    x_min, _, x_max, y_max = region.shape.bounds
+    # Towards the upper right corner of the region's box, where a circle leaves room.
     axes.annotate(
         text,
-        (float(center[0]), float(center[1])),
-        xytext=(7, 7),
+        (x_max - 0.12 * (x_max - x_min), y_max),
+        xytext=(1, -1),
         textcoords="offset points",
         fontsize=10,
         fontweight="bold",
         color=color,
+        va="bottom",
         path_effects=_HALO,
         zorder=8,
     )

@@ -25,7 +25,7 @@ STATION_EDGE = "#06504C"
 RESERVE = "#B00020"
 
 _HATCHES = ("..", "//", "xx", "\\\\", "++")
-_PALENESS = 0.45
+_PALENESS = 0.25
 _DARKEST_LUMINANCE = 0.26
 
 

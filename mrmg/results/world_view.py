@@ -19,6 +19,7 @@ from mrmg.results.ground_image import GroundFrame
 _SLICES, _STACKS = 10, 5
 _SAMPLES = 4
 _MAX_GEOMS = 20000
+_AWAY_M = 1e4
 CHASE_FOVY_DEG = 50.0
 _CHASE_DISTANCE_M = 9.0
 _CHASE_ELEVATION_DEG = -24.0
@@ -95,6 +96,13 @@ class WorldView:
         mujoco.mj_kinematics(self.model, self._data)
         mujoco.mj_comPos(self.model, self._data)
         mujoco.mj_camlight(self.model, self._data)
+
+    def place_robots_away(self, qpos: np.ndarray) -> None:
+        """Put everything where `qpos` says, but the robots out of sight."""
+        away = qpos.copy()
+        free = self.model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
+        away[self.model.jnt_qposadr[free]] += _AWAY_M
+        self.place(away)
 
     def draw(
         self, camera: mujoco.MjvCamera, *, fovy: float, shadows: bool, out: np.ndarray
