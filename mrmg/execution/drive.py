@@ -78,7 +78,10 @@ class DriveControl:
         """
         params = self._params
         error = wanted_m_s - speed_m_s
-        self._integral_m_s2 = np.clip(
+        middle = 0.5 * (wanted_m_s + next_m_s)
+        direction = np.sign(middle) * (np.abs(middle) > params.standstill_m_s)
+        # A robot that shall stand is held by friction; what was learnt is forgotten.
+        self._integral_m_s2 = np.abs(direction) * np.clip(
             self._integral_m_s2 + period_s * params.integral_per_s2 * error,
             -params.integral_limit_m_s2,
             params.integral_limit_m_s2,
@@ -87,10 +90,6 @@ class DriveControl:
         feedback = params.proportional_per_s * error + self._integral_m_s2
         inertial_N = self._mass_kg * (acceleration + feedback)
         limit_N = params.grip_share * self._grip_N
-        middle = 0.5 * (wanted_m_s + next_m_s)
-        direction = np.where(
-            np.abs(middle) > params.standstill_m_s, np.sign(middle), 0.0
-        )
         return np.asarray(
             direction * resistance_N + np.clip(inertial_N, -limit_N, limit_N)
         )

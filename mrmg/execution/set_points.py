@@ -48,7 +48,7 @@ class SetPoints:
         """Let every controller look ahead from the true states, shape (R, 5)."""
         horizon = self._reference.paced(clock_s, rate, HORIZON_STEP_S, HORIZON + 1)
         for index, controller in enumerate(self._controllers):
-            start = np.concatenate([state[index, :3], self.now[index]])
+            start = np.concatenate([state[index, :3], self.following[index]])
             self._correction[index] = controller.correct(start, horizon[:, index])
 
     def advance(
@@ -67,15 +67,17 @@ class SetPoints:
         self.now[:, 0] = np.clip(
             self.now[:, 0], axle_speed_m_s - _STALL_M_S, axle_speed_m_s + _STALL_M_S
         )
-        planned = self._reference.paced(clock_s + rate * period_s, rate, 0.0, 1)
-        fed_forward = (planned[0, :, 3:] - self._planned) / period_s
-        self._planned = planned[0, :, 3:]
-        control = np.clip(
-            fed_forward + self._correction, -self._control_bound, self._control_bound
-        )
+        coming = self._reference.at(clock_s + rate * period_s * np.arange(2))[..., 3:]
+        planned = coming[1] * [rate, 1.0]
+        control = (planned - self._planned) / period_s + self._correction
+        # Where the plan waits, so does the robot: creeping up would cost energy.
+        waits = (coming[..., 0] == 0.0).all(axis=0)
+        control[waits, 0] = -self.now[waits, 0] / period_s
+        control = np.clip(control, -self._control_bound, self._control_bound)
         self.following = np.clip(
             self.now + period_s * control, self._lower, self._upper
         )
+        self._planned = planned
 
     def brake(self, period_s: float) -> None:
         """Make the ramps of the coming tick those of stopping, steering held."""

@@ -138,6 +138,7 @@ class _Run:
         """Return everything recorded."""
         scene, recording = self._world.scene, self._recording
         robots = len(scene.robots)
+        state = recording.by_robot("state", robots)
         per_call_ms = 1e3 * np.array(self._controller_s or [0.0]) / robots
         return ExecutionLog(
             scene_digest=scene.digest,
@@ -150,10 +151,10 @@ class _Run:
             versions={name: version(name) for name in _VERSIONED},
             time_s=recording.in_time("time_s"),
             clock_s=recording.in_time("clock_s"),
-            state=recording.by_robot("state", robots),
+            state=state,
             reference=recording.by_robot("reference", robots),
             command=recording.by_robot("command", robots),
-            multiplier=recording.by_robot("multiplier", robots),
+            multiplier=np.stack([multiplier_at(scene, way) for way in state[..., :2]]),
             force_N=recording.by_robot("force_N", robots),
             work_J=recording.by_robot("work_J", robots),
             qpos=recording.in_time("qpos"),
@@ -214,7 +215,6 @@ class _Run:
             state=self._state,
             reference=self._planned,
             command=self._set_points.following,
-            multiplier=multiplier_at(self._world.scene, self._state[:, :2]),
             qpos=self.data.qpos,
         )
 

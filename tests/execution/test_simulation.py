@@ -195,6 +195,19 @@ def test_a_standing_robot_does_no_work(driving: SimpleNamespace) -> None:
     assert off_m(log).max() < 1e-3
 
 
+def test_waiting_costs_nothing(driving: SimpleNamespace) -> None:
+    """A short hop between two long waits, as robots that make way for others do."""
+    scene = driving.open_ground([(0.0, 0.0, 0.0)])
+    hop = np.array([[1.2, 0.0]] * 8 + [[0.0, 0.0]] * 5 + [[-1.2, 0.0]] * 8)
+    wait = np.zeros((150, 2))
+    plan = driving.plan_of(scene, [np.concatenate([wait, hop, wait])])
+    log = simulate(scene, plan)
+    planned = driving.planned_J(scene, plan, "r1")
+    assert planned < 400.0
+    assert metered_J(scene, log, 0) == pytest.approx(planned, rel=0.02)
+    assert measured_J(scene, log, 0) == pytest.approx(planned, rel=0.03)
+
+
 def test_a_plan_without_steps_ends_at_once(driving: SimpleNamespace) -> None:
     scene = driving.open_ground([(0.0, 0.0, 0.0)])
     log = simulate(scene, driving.plan_of(scene, [np.empty((0, 2))]))
