@@ -69,7 +69,6 @@ def run(
     )
     folder = RunFolder(out or default_folder(scene, seed))
     with folder.opened_for_writing():
-        folder.record_arguments(arguments.to_json())
         work = Run(
             scene=scene, arguments=arguments, folder=folder, on_progress=on_progress
         )

@@ -23,6 +23,8 @@ from mrmg.errors import Fault, RunFolderError, UsageError
 
 RUN_FORMAT = 1
 
+_UNFINISHED = ".part-"
+
 
 class Step(StrEnum):
     """The steps of a run, in their order."""
@@ -78,6 +80,10 @@ class RunFolder:
         """Return the path of one of the folder's files."""
         return self.path / name
 
+    def unfinished(self, name: str) -> Path:
+        """Return where a large file may grow before it is put in its place."""
+        return self.path / f"{_UNFINISHED}{name}"
+
     @contextmanager
     def opened_for_writing(self) -> Iterator[RunFolder]:
         """Create the folder, keep other runs out of it, and clear what a kill left.
@@ -93,17 +99,13 @@ class RunFolder:
         with _exclusive(self.path):
             if any(self.path.iterdir()) and not self.file("run.json").exists():
                 self._refuse_foreign_files()
-            for leftover in self.path.glob(".part-*"):
+            for leftover in self.path.glob(f"{_UNFINISHED}*"):
                 leftover.unlink()
             yield self
 
     def arguments(self) -> dict[str, Any]:
-        """Return the arguments the run was last started with; empty if none."""
+        """Return the arguments its files were last made with; empty if none."""
         return dict(self._record().get("arguments", {}))
-
-    def record_arguments(self, arguments: dict[str, Any]) -> None:
-        """Write the arguments of the run; the marks of finished steps stay."""
-        self._write(arguments, self.marks())
 
     def marks(self) -> dict[str, str]:
         """Return the fingerprints of the finished steps."""
@@ -114,11 +116,14 @@ class RunFolder:
         done = self.marks().get(step) == fingerprint
         return done and self.file(OUTPUTS[step][-1]).exists()
 
-    def begin(self, step: Step) -> None:
-        """Remove the marks and files of `step` and of all steps made from it."""
+    def begin(self, step: Step, arguments: dict[str, Any]) -> None:
+        """Make room for a new outcome of `step`, made with `arguments`.
+
+        Removes the marks and files of `step` and of all steps made from it.
+        """
         stale = stale_after(step)
         marks = {name: mark for name, mark in self.marks().items() if name not in stale}
-        self._write(self.arguments(), marks)
+        self._write(arguments, marks)
         for later in reversed(stale):
             for name in reversed(OUTPUTS[later]):
                 self.file(name).unlink(missing_ok=True)
@@ -158,7 +163,7 @@ class RunFolder:
         foreign = [
             item.name
             for item in sorted(self.path.iterdir())
-            if not item.name.startswith(".part-")
+            if not item.name.startswith(_UNFINISHED)
         ]
         if foreign:
             raise UsageError(

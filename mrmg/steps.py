@@ -26,6 +26,9 @@ from mrmg.shipped import models_folder
 StepProgress = Callable[[Step, float, str], None]
 """Told (step, fraction 0..1, text) while a step is under way."""
 
+Write = Callable[[], None]
+"""Puts the outcome of a step that has been worked out into the run folder."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VideoArguments:
@@ -98,13 +101,18 @@ class Run:
         return self.folder.is_done(step, self.fingerprint(step))
 
     def make(self, step: Step) -> None:
-        """Make `step`, and make everything that came of its last outcome stale."""
-        self.folder.begin(step)
+        """Make `step`, and make everything that came of its last outcome stale.
+
+        The folder changes only once the work is done: arguments that turn out to be
+        wrong, and a process that is stopped, leave what was there before.
+        """
         self._told(step, 0.0)
-        finished = _MAKERS[step](self)
-        self._told(step, 1.0)
-        if finished:
+        write = _WORK[step](self)
+        self.folder.begin(step, self.arguments.to_json())
+        write()
+        if step is not Step.PLAN or self.status() in _FINAL:
             self.folder.finish(step, self.fingerprint(step))
+        self._told(step, 1.0)
 
     def fingerprint(self, step: Step) -> str:
         """Return the digest of all that decides the outcome of `step`."""
@@ -177,37 +185,38 @@ def _code_digest() -> str:
     return storage.digest("".join([mrmg.__version__, version("mujoco"), *code]))
 
 
-def _plan(run: Run) -> bool:
-    from mrmg.planning import plan_mission
-    from mrmg.planning.parameters import profile_params
+def _plan(run: Run) -> Write:
+    from mrmg.planning import plan_mission, profile_params
 
-    params = profile_params(run.arguments.profile, budget_s=run.arguments.budget_s)
     result = plan_mission(
         run.scene,
         seed=run.arguments.seed,
-        params=params,
+        params=profile_params(run.arguments.profile, budget_s=run.arguments.budget_s),
         on_progress=run.progress_of(Step.PLAN),
     )
-    storage.write_text(run.folder.file("scene.yaml"), dump_scene(run.scene))
-    if result.plan is not None:
-        result.plan.save(run.folder.path)
     outcome = {
         "status": result.status.value,
         "reason": result.reason,
         "statistics": dict(result.statistics),
     }
-    storage.write_json(run.folder.file("planning.json"), outcome)
-    return result.status in {PlanStatus.SOLVED, PlanStatus.INFEASIBLE}
+
+    def write() -> None:
+        storage.write_text(run.folder.file("scene.yaml"), dump_scene(run.scene))
+        if result.plan is not None:
+            result.plan.save(run.folder.path)
+        storage.write_json(run.folder.file("planning.json"), outcome)
+
+    return write
 
 
-def _verify(run: Run) -> bool:
+def _verify(run: Run) -> Write:
     from mrmg.results.verify import verify
 
-    verify(run.scene, run.plan()).save(run.folder.path)
-    return True
+    verdict = verify(run.scene, run.plan())
+    return lambda: verdict.save(run.folder.path)
 
 
-def _execute(run: Run) -> bool:
+def _execute(run: Run) -> Write:
     from mrmg.execution import simulate
 
     log = simulate(
@@ -216,60 +225,71 @@ def _execute(run: Run) -> bool:
         controller=run.arguments.controller,
         on_progress=run.progress_of(Step.EXECUTE),
     )
-    log.save(run.folder.path)
-    return True
+    return lambda: log.save(run.folder.path)
 
 
-def _audit(run: Run) -> bool:
+def _audit(run: Run) -> Write:
     from mrmg.results.audit import audit
 
-    audit(run.scene, run.plan(), run.log()).save(run.folder.path)
-    return True
+    account = audit(run.scene, run.plan(), run.log())
+    return lambda: account.save(run.folder.path)
 
 
-def _draw(run: Run) -> bool:
+def _draw(run: Run) -> Write:
     from mrmg.results.energy_plot import draw_energy
     from mrmg.results.overview import draw_overview
 
     overview = run.folder.file("overview.png")
     if run.status() is not PlanStatus.SOLVED:
-        draw_overview(run.scene, path=overview)
-        return True
+        return lambda: draw_overview(run.scene, path=overview)
     plan, log = run.plan(), run.log()
-    draw_overview(run.scene, plan, log, path=overview)
-    draw_energy(run.scene, plan, log, path=run.folder.file("energy.png"))
-    return True
+
+    def write() -> None:
+        draw_overview(run.scene, plan, log, path=overview)
+        draw_energy(run.scene, plan, log, path=run.folder.file("energy.png"))
+
+    return write
 
 
-def _render(run: Run) -> bool:
+def _render(run: Run) -> Write:
     from mrmg.results.video import render_video
 
     video = run.arguments.video
+    made = run.folder.unfinished("mission.mp4")
     render_video(
         run.scene,
         run.plan(),
         run.log(),
-        run.folder.file("mission.mp4"),
+        made,
         view=video.view,
         speed=video.speed,
         size=video.size,
         fps=video.fps,
         on_progress=run.progress_of(Step.RENDER),
     )
-    return True
+
+    def write() -> None:
+        made.replace(run.folder.file("mission.mp4"))
+
+    return write
 
 
-def _report(run: Run) -> bool:
+def _report(run: Run) -> Write:
     from mrmg.results.report import write_report
     from mrmg.results.summary import summarize
 
-    summary = summarize(run.scene, run.folder.path)
-    storage.write_json(run.folder.file("summary.json"), summary)
-    write_report(run.folder.path)
-    return True
+    def write() -> None:
+        summary = summarize(run.scene, run.folder.path)
+        storage.write_json(run.folder.file("summary.json"), summary)
+        write_report(run.folder.path)
+
+    return write
 
 
-_MAKERS: dict[Step, Callable[[Run], bool]] = {
+_FINAL = (PlanStatus.SOLVED, PlanStatus.INFEASIBLE)
+"""Statuses that the same arguments would lead to again."""
+
+_WORK: dict[Step, Callable[[Run], Write]] = {
     Step.PLAN: _plan,
     Step.VERIFY: _verify,
     Step.EXECUTE: _execute,

@@ -14,8 +14,8 @@ def folder(tmp_path: Path) -> RunFolder:
     """A folder in which every step has been made."""
     made = RunFolder(tmp_path / "run")
     with made.opened_for_writing():
-        made.record_arguments({"seed": 1})
         for step in Step:
+            made.begin(step, {"seed": 1})
             for name in OUTPUTS[step]:
                 storage.write_text(made.file(name), "{}")
             made.finish(step, f"mark of {step}")
@@ -40,13 +40,13 @@ def test_a_step_is_not_done_without_its_last_file(
 def test_beginning_a_step_removes_what_came_of_it_and_nothing_else(
     folder: RunFolder, step: Step
 ) -> None:
-    folder.begin(step)
+    folder.begin(step, {"seed": 2})
     gone = stale_after(step)
     for other in Step:
         present = [folder.file(name).exists() for name in OUTPUTS[other]]
         assert set(present) == {other not in gone}
         assert (other in folder.marks()) == (other not in gone)
-    assert folder.arguments() == {"seed": 1}
+    assert folder.arguments() == {"seed": 2}
 
 
 def test_steps_come_after_what_they_need() -> None:

@@ -52,7 +52,6 @@ def plan(options: argparse.Namespace) -> int:
         seed=options.seed, profile=options.profile, budget_s=options.budget
     )
     with folder.opened_for_writing(), terminal.progress() as told:
-        folder.record_arguments(arguments.to_json())
         work = Run(scene=scene, arguments=arguments, folder=folder, on_progress=told)
         work.make(Step.PLAN)
     outcome = work.planning()
@@ -159,7 +158,6 @@ def _make(
             controller=controller or work.arguments.controller,
             video=replace(work.arguments.video, **(video or {})),
         )
-        folder.record_arguments(changed.to_json())
         work = replace(work, arguments=changed)
         for step in steps:
             work.make(step)

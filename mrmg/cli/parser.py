@@ -205,8 +205,6 @@ def _size(text: str) -> tuple[int, int]:
         width, height = (int(part) for part in text.lower().split("x"))
     except ValueError:
         width = height = 0
-    if min(width, height) < 64 or max(width, height) > 4096:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a size such as 1280x720 (64 to 4096 pixels a side)"
-        )
+    if min(width, height) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 1280x720")
     return width, height

@@ -135,22 +135,38 @@ def test_a_damaged_file_is_named(
     assert told.out == ""
 
 
-def test_an_unknown_controller_is_answered_with_the_known_ones(
-    own_run: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["execute", "--controller", "mpcc"], "mpc"),
+        (["render", "--size", "321x241"], "321x241"),
+        (["render", "--fps", "100000"], "fps"),
+    ],
+)
+def test_a_wrong_argument_leaves_the_run_as_it_was(
+    own_run: Path,
+    arguments: list[str],
+    named: str,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    arguments = ["execute", str(own_run), "--controller", "mpcc"]
-    assert main(arguments) == ExitCode.USAGE
-    assert "mpc" in capsys.readouterr().err
+    before = {path.name: path.read_bytes() for path in own_run.iterdir()}
+    verb, *options = arguments
+    assert main([verb, str(own_run), *options]) == ExitCode.USAGE
+    assert named in capsys.readouterr().err
+    after = {path.name: path.read_bytes() for path in own_run.iterdir()}
+    redrawn = {"overview.png", "energy.png", "run.json", "report.html", "summary.json"}
+    changed = {name for name in before if after.get(name) != before[name]}
+    assert changed <= (redrawn if verb == "render" else set())
 
 
 @pytest.mark.slow
 def test_render_leaves_a_video_as_asked(own_run: Path) -> None:
     import av
 
-    arguments = ["--size", "320x180", "--fps", "10", "--speed", "20"]
+    arguments = ["--size", "320x240", "--fps", "10", "--speed", "20"]
     assert main(["render", str(own_run), *arguments]) == ExitCode.OK
     with av.open(str(own_run / "mission.mp4")) as video:
         stream = video.streams.video[0]
-        assert (stream.width, stream.height) == (320, 180)
+        assert (stream.width, stream.height) == (320, 240)
         assert stream.average_rate == 10
     assert "mission.mp4" in (own_run / "report.html").read_text()

@@ -45,7 +45,7 @@ def run(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess
         (["run", "quickstart", "--budget", "nan"], "--budget"),
         (["run", "quickstart", "--profile", "fast"], "paper"),
         (["render", "runs/x", "--size", "huge"], "1280x720"),
-        (["render", "runs/x", "--size", "1x1"], "1280x720"),
+        (["render", "runs/x", "--size", "0x10"], "1280x720"),
         (["render", "runs/x", "--fps", "0"], "--fps"),
         (["render", "runs/x", "--view", "side"], "chase"),
         (["scene"], "COMMAND"),
