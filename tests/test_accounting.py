@@ -96,6 +96,16 @@ def test_turning_costs_by_the_tangent_of_the_steering_angle(scene: Scene) -> Non
     assert energy_J == pytest.approx(expected_J)
 
 
+def test_yaw_rate_of_a_unicycle_is_no_steering_angle(scene: Scene) -> None:
+    model = replace(scene.robots[0].model, motion_model="unicycle")
+    unicycle = replace(scene, robots=(replace(scene.robots[0], model=model),))
+    time_s = np.arange(0.0, 4.05, 0.1)
+    motion = along(10 + time_s, np.ones(len(time_s)), time_s, psi_rad=0.4)
+    energy_J = step_energy_parts(unicycle, motion).sum(axis=0)
+    assert energy_J[TURNING] == 0.0
+    assert energy_J[ROLLING] > 0.0
+
+
 @given(st.floats(0.1, 1.5), st.integers(1, 40))
 def test_speeding_up_costs_its_kinetic_energy(accel: float, n: int) -> None:
     """However finely the same motion is logged."""

@@ -104,6 +104,27 @@ def test_least_charge_is_found_on_arrival_at_the_station(mission: Any) -> None:
     )
 
 
+def test_low_battery_just_before_a_recharge_counts(mission: Any) -> None:
+    made = mission()
+    work_J = made[2].work_J.copy()
+    work_J[0, 10, 0] += 0.85 * 19500.0
+    scene, plan, log = made
+    account = audit(scene, plan, replace(log, work_J=work_J))
+    least = account.robot("r1").min_charge_fraction
+    assert least == account.recharges[0].energy_J / 20000 < 0.05
+
+
+def test_idle_power_is_drawn_at_all_times(mission: Any) -> None:
+    scene, plan, log = mission()
+    model = replace(scene.robots[1].model, idle_power_W=7.0)
+    parked = replace(scene.robots[1], model=model)
+    account = audit(replace(scene, robots=(scene.robots[0], parked)), plan, log)
+    idle_J = account.measured.total_J(robot="r2", part="idle")
+    assert idle_J == pytest.approx(7.0 * log.time_s[-1])
+    assert account.robot("r2").measured_J == pytest.approx(idle_J)
+    assert account.robot("r2").metered_J == pytest.approx(idle_J)
+
+
 def test_braking_feeds_back_by_the_regeneration_efficiency(mission: Any) -> None:
     scene, plan, log = mission()
     model = replace(scene.robots[0].model, regeneration_efficiency=0.5)

@@ -8,6 +8,7 @@ stated accuracy.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from shapely.geometry import Point, box
 
+from mrmg.motion.dynamics import DERIVATIVES
 from mrmg.results.clearance import (
     MINIMUM_ACCURACY_M,
     BoundsGap,
@@ -76,9 +78,17 @@ def assert_certified(gap: Gap, steps: int) -> None:
 def swept(make_scene: Any, drive: Any) -> Any:
     """Return a maker of swept footprints that start at a pose."""
 
-    def make(controls: list[tuple[float, float]], x: float, y: float, yaw: float):
+    def make(
+        controls: list[tuple[float, float]],
+        x: float,
+        y: float,
+        yaw: float,
+        motion_model: str = "car",
+    ) -> SweptFootprint:
         robots = [{"id": "r1", "model": "car", "pose": [x, y, yaw]}]
         robot = make_scene(robots=robots).robots[0]
+        model = replace(robot.model, motion_model=motion_model)
+        robot = replace(robot, model=model)
         return SweptFootprint.of(robot.model, drive(robot, held(controls)))
 
     return make
@@ -139,9 +149,11 @@ def test_pair_minimum_is_certified(
 
 
 @quiet
-@given(random_driving, st.floats(-3.2, 3.2))
-def test_swept_hull_holds_the_motion(swept: Any, controls: Any, yaw: float) -> None:
-    footprint = swept(controls, 10.0, 10.0, yaw)
+@given(random_driving, st.floats(-3.2, 3.2), st.sampled_from(sorted(DERIVATIVES)))
+def test_swept_hull_holds_the_motion(
+    swept: Any, controls: Any, yaw: float, motion_model: str
+) -> None:
+    footprint = swept(controls, 10.0, 10.0, yaw, motion_model)
     step = np.arange(len(controls))
     start, end = np.zeros(len(step)), np.full(len(step), 0.1)
     corners = np.concatenate(

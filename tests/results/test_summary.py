@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -94,6 +95,41 @@ def test_whole_run_has_exactly_the_promised_keys(parts: Any) -> None:
     assert summary["execution"]["goals_visited"] == summary["goals"] == 1
     assert summary["energy"]["planned_J"] == plan.cost_J
     assert summary["versions"]["mujoco"] == "none"
+
+
+def test_fleet_figures_do_not_average_a_robot_away(parts: Any) -> None:
+    scene, planning, plan, _, log, account = parts
+    (robot,) = account.robots
+    good = replace(
+        robot,
+        metered_error_pct=1.0,
+        measured_error_pct=2.0,
+        tracking_rms_m=0.03,
+        tracking_max_m=0.1,
+        min_charge_fraction=0.5,
+    )
+    bad = replace(
+        robot,
+        metered_error_pct=-3.0,
+        measured_error_pct=-6.0,
+        tracking_rms_m=0.04,
+        tracking_max_m=0.3,
+        min_charge_fraction=0.2,
+    )
+    summary = summary_of(
+        scene,
+        planning,
+        seed=3,
+        plan=plan,
+        log=log,
+        audit=replace(account, robots=(good, bad)),
+    )
+    assert summary["energy"]["metered_error_pct"] == -3.0
+    assert summary["energy"]["measured_error_pct"] == -6.0
+    assert summary["energy"]["min_charge_fraction"] == 0.2
+    tracking = summary["execution"]["tracking"]
+    assert tracking["rms_m"] == pytest.approx((0.0025 / 2) ** 0.5)
+    assert tracking["max_m"] == 0.3
 
 
 @pytest.mark.parametrize("reached", range(5))

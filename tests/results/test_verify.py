@@ -362,6 +362,59 @@ def test_moving_the_scene_changes_nothing(
     ]
 
 
+@pytest.mark.parametrize(
+    ("kind", "control", "amount"),
+    [
+        (Kind.STATE_LIMIT, (-1.3, 0.0), 0.1),  # faster backwards than v_min
+        (Kind.STATE_LIMIT, (0.0, 0.65), 0.05),  # steered beyond w_max to the left
+        (Kind.STATE_LIMIT, (0.0, -0.65), 0.05),  # and to the right
+        (Kind.CONTROL_LIMIT, (0.0, 1.25), 0.25),  # steered too fast
+    ],
+)
+def test_every_limit_is_watched(
+    kind: Kind,
+    control: tuple[float, float],
+    amount: float,
+    make_scene: Any,
+    make_plan: Any,
+) -> None:
+    there = 10 if kind is Kind.STATE_LIMIT else 1
+    controls = [control] * there + [(-control[0], -control[1])] * there
+    scene = make_scene(goals=[], robots=[{**TWO_ROBOTS[0], "pose": [20, 10, 0]}])
+    plan = make_plan(scene, {"r1": controls}, {"r1": ()})
+    found = [item for item in verify(scene, plan).violations if item.kind is kind]
+    assert max(item.amount for item in found) == pytest.approx(amount)
+
+
+def test_every_obstacle_under_a_footprint_is_named(case: Any) -> None:
+    second = {**WALL, "id": "second"}
+    verdict = verify(*case(obstacles=[WALL, second]))
+    assert [item.other for item in verdict.violations] == ["wall", "second"]
+
+
+def test_battery_must_hold_the_reserve_on_arrival_at_a_station(case: Any) -> None:
+    scene, plan = case(stations=[STATION], tour=("s", "g"))
+    spent_J = 20000.0 - plan.visits[0].energy_J
+    battery = replace(scene.robots[0].battery, start_J=1000.0 + spent_J - 10.0)
+    robot = replace(scene.robots[0], battery=battery)
+    violation = only(verify(replace(scene, robots=(robot,)), plan), Kind.ENERGY)
+    assert violation.amount == pytest.approx(10.0)
+    assert violation.time_s == pytest.approx(plan.visits[0].time_s)
+
+
+def test_recharge_before_the_station_is_told_with_its_distance(case: Any) -> None:
+    scene, plan = case(stations=[STATION], tour=("s", "g"))
+    early = replace(plan.visits[0], step=0, time_s=0.0)
+    verdict = verify(scene, replace(plan, visits=(early, *plan.visits[1:])))
+    assert only(verdict, Kind.RECHARGE).amount == pytest.approx(4.0)
+
+
+def test_stated_battery_content_must_be_the_recomputed_one(case: Any) -> None:
+    scene, plan = case()
+    rich = replace(plan.visits[0], energy_J=plan.visits[0].energy_J + 1.0)
+    assert kinds(verify(scene, replace(plan, visits=(rich,)))) == {Kind.VISIT}
+
+
 @settings(
     max_examples=150,
     deadline=None,
