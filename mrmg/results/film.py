@@ -27,6 +27,7 @@ from mrmg.scene.types import Scene
 _TRAIL_AHEAD_M = 1.2
 _YAW_SMOOTHING_S = 0.8
 _MAP_MARGIN = 1.03
+_TAG_LIFT_M = 0.5
 _OPEN = (1.0, 1.0, 1.0, 0.9)
 
 
@@ -217,7 +218,7 @@ class Stage:
         camera = chase_camera(float(x_m), float(y_m), float(film.yaw[tick]))
         self._view.draw(camera, fovy=CHASE_FOVY_DEG, shadows=True, out=pane)
         tops = [
-            [*state[tick, :2], robot.model.height_m]
+            [*state[tick, :2], robot.model.height_m + _TAG_LIFT_M]
             for robot, state in zip(film.scene.robots, film.log.state, strict=True)
         ]
         self._lay_tags(pane, self._view.project(np.array(tops)), reading)

@@ -25,6 +25,7 @@ PIXELS = 2048
 _DPI = 100
 _TRAIL_SHARE = 0.0045
 _PLANNED_PIXELS = 4.0
+_SPACING_M = 0.3
 _LABEL_PIXELS = 40.0
 
 
@@ -98,7 +99,7 @@ class TrailPainter:
         """
         if len(points) < 2:
             return
-        pixels = self._frame.to_pixels(points)
+        pixels = self._frame.to_pixels(_spaced(points, _SPACING_M))
         self._brush.line(
             [tuple(pixel) for pixel in pixels.tolist()],
             fill=style.rgb(color),
@@ -112,6 +113,16 @@ class TrailPainter:
         right, bottom = np.clip(high, 0, [columns, rows])
         patch = self._image.crop((left, top, right, bottom))
         target[top:bottom, left:right] = np.asarray(patch)
+
+
+def _spaced(points: np.ndarray, spacing_m: float) -> np.ndarray:
+    """Return points about `spacing_m` apart, ends included."""
+    # Pieces shorter than the line is wide would leave ragged edges.
+    steps_m = np.hypot(*np.diff(points, axis=0).T)
+    marks = np.floor(np.cumsum(steps_m) / spacing_m)
+    keep = np.concatenate([[True], np.diff(marks, prepend=0.0) > 0.0])
+    keep[-1] = True
+    return points[keep]
 
 
 def _paint_paths(axes: Axes, scene: Scene, plan: Plan) -> None:
