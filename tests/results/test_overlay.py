@@ -1,0 +1,78 @@
+"""Panel and tags: they show the reading, and stay inside the picture."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mrmg.results import style
+from mrmg.results.overlay import Panel, Reading, RobotReading, Tag
+
+
+def reading(charge: float = 0.8, **changes) -> Reading:
+    robot = RobotReading(robot="r1", charge=charge, speed_m_s=1.5, heading_for="g")
+    values = {"time_s": 61.5, "used_J": 1e3, "visited": {}, "robots": (robot,)}
+    return Reading(**{**values, **changes})
+
+
+@pytest.fixture
+def panel(make_scene) -> Panel:
+    return Panel(make_scene(), (330, 720), speed=8.0, video_height=720)
+
+
+def count(picture: np.ndarray, color: tuple[int, int, int]) -> int:
+    return int((picture == np.array(color, dtype=np.uint8)).all(axis=2).sum())
+
+
+def test_equal_readings_give_equal_panels_and_time_changes_them(panel: Panel) -> None:
+    first = panel.draw(reading())
+    assert first.shape == (720, 330, 3)
+    assert np.array_equal(first, panel.draw(reading()))
+    assert not np.array_equal(first, panel.draw(reading(time_s=61.7)))
+
+
+def test_bar_grows_with_the_charge_and_turns_red_near_the_reserve(panel: Panel) -> None:
+    full, low = (95, 208, 165), (255, 107, 94)
+    half, whole = panel.draw(reading(0.5)), panel.draw(reading(1.0))
+    assert count(half, low) == count(whole, low) == 0
+    assert count(half, full) == pytest.approx(0.5 * count(whole, full), rel=0.03)
+    empty = panel.draw(reading(0.1))
+    assert count(empty, full) == 0
+    assert count(empty, low) > 0
+
+
+def test_visited_goals_take_the_robot_s_color(panel: Panel, make_scene) -> None:
+    color = style.rgb(style.scene_robot_colors(make_scene())["r1"])
+    before = count(panel.draw(reading()), color)
+    after = count(panel.draw(reading(visited={"g": "r1"})), color)
+    assert after > before + 100
+
+
+def test_eight_robots_fit_above_the_legend(make_scene) -> None:
+    robots = [
+        {"id": f"r{n}", "model": "car", "pose": [3 + 4 * n, 3, 0]} for n in range(8)
+    ]
+    scene = make_scene(robots=robots)
+    many = tuple(
+        RobotReading(robot=robot["id"], charge=0.5, speed_m_s=0.0, heading_for="")
+        for robot in robots
+    )
+    drawn = Panel(scene, (330, 720), 8.0, 720).draw(reading(robots=many))
+    for color in style.scene_robot_colors(scene).values():
+        rows = np.nonzero((drawn == style.rgb(color)).all(axis=2).any(axis=1))[0]
+        assert 15 <= np.ptp(rows) <= 60
+
+
+@pytest.mark.parametrize("spot", [(0, 0), (99, 79), (50, 40), (-500, 20), (40, 900)])
+def test_tags_are_cut_at_the_edges(make_scene, spot) -> None:
+    picture = np.zeros((80, 100, 3), dtype=np.uint8)
+    tag = Tag(make_scene().robots[0], "#0072B2", height=720)
+    tag.blit(picture, np.array(spot, dtype=float), charge=0.5)
+    assert bool(picture.any()) == (spot in {(99, 79), (50, 40)})
+
+
+def test_tag_of_a_robot_behind_the_camera_is_left_out(make_scene) -> None:
+    picture = np.zeros((80, 100, 3), dtype=np.uint8)
+    tag = Tag(make_scene().robots[0], "#0072B2", height=720)
+    tag.blit(picture, np.array([np.nan, np.nan]), charge=0.5)
+    assert not picture.any()

@@ -1,0 +1,195 @@
+"""The report: one page that stands alone and says what the files say."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from mrmg import storage
+from mrmg.errors import RunFolderError
+from mrmg.execution.log import Contact
+from mrmg.results.audit import audit
+from mrmg.results.energy_plot import draw_energy
+from mrmg.results.overview import draw_overview
+from mrmg.results.report import command, write_report
+from mrmg.results.report_record import read_record
+from mrmg.results.summary import summary_of
+from mrmg.results.verify import verify
+from mrmg.scene.loading import dump_scene, load_scene
+
+VOID = {"meta", "link", "img", "br", "hr", "input"}
+STATISTICS = {
+    "vertices": 120,
+    "groups": 7,
+    "router_calls": 2,
+    "time_s": {"init": 0.1, "routing": 0.02, "first_solution": 0.2, "total": 0.25},
+}
+
+
+class Page(HTMLParser):
+    """Parses strictly: every element is closed in order."""
+
+    def __init__(self, source: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.references: list[str] = []
+        self.headings: list[str] = []
+        self.cells: list[str] = []
+        self.words = ""
+        self.feed(source)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs) -> None:
+        if tag not in VOID:
+            self.open.append(tag)
+        if tag == "td":
+            self.cells.append("")
+        names = ("src", "href", "action", "data", "srcset", "poster")
+        self.references += [value for name, value in attrs if name in names]
+
+    def handle_endtag(self, tag) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data) -> None:
+        if self.open and self.open[-1] == "h2":
+            self.headings.append(data)
+        if "td" in self.open:
+            self.cells[-1] += data
+        if "style" not in self.open:
+            self.words += data
+
+
+def page_of(folder: Path) -> Page:
+    return Page((folder / "report.html").read_text())
+
+
+@pytest.fixture
+def mission(make_scene, make_plan, make_log, straight):
+    scene = make_scene(
+        stations=[{"id": "s", "circle": {"center": [10, 10], "radius": 1}}]
+    )
+    plan = make_plan(scene, {"r1": straight(12.0)}, {"r1": ("s", "g")})
+    return scene, plan, make_log(scene, plan)
+
+
+def fill(folder: Path, scene, plan, log) -> None:
+    """Write all files of a run, as the pipeline does."""
+    planning = {"status": "solved", "reason": "", "statistics": STATISTICS}
+    storage.write_text(folder / "scene.yaml", dump_scene(scene))
+    storage.write_json(folder / "planning.json", planning)
+    storage.write_json(folder / "run.json", {"arguments": {"seed": plan.seed}})
+    plan.save(folder)
+    log.save(folder)
+    verdict, account = verify(scene, plan), audit(scene, plan, log)
+    verdict.save(folder)
+    account.save(folder)
+    summary = summary_of(
+        scene,
+        planning,
+        seed=plan.seed,
+        plan=plan,
+        verdict=verdict,
+        log=log,
+        audit=account,
+    )
+    storage.write_json(folder / "summary.json", summary)
+    draw_overview(scene, plan, log, path=folder / "overview.png")
+    draw_energy(scene, plan, log, path=folder / "energy.png")
+
+
+def test_page_stands_alone_and_follows_the_reader_s_scheme(mission, tmp_path) -> None:
+    fill(tmp_path, *mission)
+    (tmp_path / "mission.mp4").write_bytes(b"video")
+    write_report(tmp_path)
+    source = (tmp_path / "report.html").read_text()
+    page = Page(source)
+    inside = [item for item in page.references if item.startswith("data:")]
+    assert len(inside) == 3  # the empty icon, the map and the battery plot
+    assert set(page.references) - set(inside) == {"mission.mp4"}
+    assert not re.search(r"https?://|@import|url\(", source)
+    assert "prefers-color-scheme: dark" in source
+    assert "<script" not in source
+
+
+def test_page_of_a_good_run_says_what_the_files_say(mission, tmp_path) -> None:
+    scene, plan, log = mission
+    fill(tmp_path, scene, plan, log)
+    write_report(tmp_path)
+    page = page_of(tmp_path)
+    account = audit(scene, plan, log)
+    assert "Mission accomplished: 1 robot visited all 1 goals" in page.words
+    assert page.headings == [
+        "Map",
+        "Battery content",
+        "Energy",
+        "Tours",
+        "Checks",
+        "Planner",
+        "Reproduce",
+    ]
+    planned = f"{plan.ledger.total_J(robot='r1') / 1000:.2f} kJ"
+    measured = f"{account.measured.total_J(robot='r1') / 1000:.2f} kJ"
+    assert page.cells[3] == planned
+    assert page.cells[5] == measured
+    first = page.cells.index("⚡ station")
+    assert page.cells[first - 2 : first] == ["1", "s"]
+    assert page.cells[first + 1] == f"{plan.visits[0].time_s:.1f} s"
+    assert page.cells[first + 2] == f"{account.visits[0].time_s:.1f} s"
+    assert "time_s.first_solution" in page.cells
+    assert scene.digest in page.words
+
+
+def test_page_of_a_failed_run_names_the_reasons(mission, tmp_path) -> None:
+    scene, plan, log = mission
+    contact = Contact(time_s=3.0, robot="r1", other="wall<1>", x_m=1.0, y_m=2.0)
+    fill(tmp_path, scene, plan, replace(log, contacts=(contact,)))
+    write_report(tmp_path)
+    page = page_of(tmp_path)
+    assert "Mission failed: r1 touched wall<1> at 3.00 s" in page.words
+    assert "Mission accomplished" not in page.words
+
+
+def test_page_of_an_infeasible_mission_has_the_reason_and_the_map(
+    make_scene, tmp_path
+) -> None:
+    scene = make_scene()
+    planning = {
+        "status": "infeasible",
+        "reason": "goal 'g' cannot be reached by any robot",
+        "statistics": {"vertices": 0},
+    }
+    storage.write_text(tmp_path / "scene.yaml", dump_scene(scene))
+    storage.write_json(tmp_path / "planning.json", planning)
+    storage.write_json(tmp_path / "summary.json", summary_of(scene, planning, seed=5))
+    draw_overview(scene, path=tmp_path / "overview.png")
+    write_report(tmp_path)
+    page = page_of(tmp_path)
+    assert "Infeasible: goal 'g' cannot be reached by any robot" in page.words
+    assert page.headings == ["Map", "Planner", "Reproduce"]
+    assert "--seed 5" in page.words
+
+
+def test_command_names_a_shipped_scene_only_where_it_is_the_same(
+    mission, tmp_path
+) -> None:
+    fill(tmp_path, *mission)
+    record = read_record(tmp_path)
+    assert command(record) == "mrmg run scene.yaml --seed 3"
+    shipped = replace(record, scene=load_scene("quickstart"))
+    assert command(shipped) == "mrmg run quickstart --seed 3"
+    edited = replace(shipped, scene=replace(shipped.scene, digest="other"))
+    assert command(edited) == "mrmg run scene.yaml --seed 3"
+    asked = {"profile": "paper", "budget_s": 2.5}
+    assert command(replace(record, arguments=asked)) == (
+        "mrmg run scene.yaml --seed 3 --profile paper --budget 2.5"
+    )
+
+
+def test_a_folder_without_a_plan_is_refused(tmp_path) -> None:
+    with pytest.raises(RunFolderError, match="planning.json"):
+        write_report(tmp_path)
