@@ -69,11 +69,13 @@ def _verdict_line(record: RunRecord) -> str:
         first = reasons[0] if reasons else "see Checks"
         return html.verdict_line(False, "Mission failed: ", first + more)
     energy = summary["energy"]
-    fleet = "1 robot" if len(scene.robots) == 1 else f"{len(scene.robots)} robots"
+    fleet = _count(len(scene.robots), "robot")
+    number = len(scene.goals)
+    all_goals = "the goal" if number == 1 else f"all {number} goals"
     return html.verdict_line(
         True,
         "Mission accomplished: ",
-        f"{fleet} visited all {len(scene.goals)} goals without contact, used "
+        f"{fleet} visited {all_goals} without contact, used "
         f"{energy['measured_J'] / 1000:.1f} kJ "
         f"({sections.signed(energy['measured_error_pct'], 1)} % against plan for the "
         f"worst robot) and never fell below "
@@ -83,7 +85,7 @@ def _verdict_line(record: RunRecord) -> str:
 
 def _main_figures(record: RunRecord) -> list[tuple[str, str, str]]:
     summary, scene = record.summary, record.scene
-    kinds = f"{len(scene.robots)} robots, seed {summary['seed']}"
+    kinds = f"{_count(len(scene.robots), 'robot')}, seed {summary['seed']}"
     if record.plan is None:
         return [("Goals", str(len(scene.goals)), kinds)]
     execution, energy = summary["execution"], summary["energy"]
@@ -103,7 +105,7 @@ def _main_figures(record: RunRecord) -> list[tuple[str, str, str]]:
             (
                 "Lowest charge",
                 f"{100 * energy['min_charge_fraction']:.1f} %",
-                f"{energy['recharges']} recharges",
+                _count(energy["recharges"], "recharge"),
             ),
             (
                 "Tracking error",
@@ -151,3 +153,7 @@ def _source(scene: Scene) -> str:
     if same and load_scene(scene.name).digest == scene.digest:
         return scene.name
     return "scene.yaml"
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
