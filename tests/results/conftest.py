@@ -115,6 +115,23 @@ def make_plan(drive: Callable[..., Trajectory]) -> Callable[..., Plan]:
     return make
 
 
+@pytest.fixture
+def case(
+    make_scene: Any, make_plan: Any, straight: Any
+) -> Callable[..., tuple[Scene, Plan]]:
+    """Return a maker of (scene, plan): r1 drives 12 m along y = 10 through the goal."""
+
+    def make(
+        distance_m: float = 12.0, tour: tuple[str, ...] = ("g",), **scene: Any
+    ) -> tuple[Scene, Plan]:
+        made = make_scene(**scene)
+        controls = {robot.id: straight(distance_m) for robot in made.robots}
+        tours = {robot.id: tour if robot.id == "r1" else () for robot in made.robots}
+        return made, make_plan(made, controls, tours)
+
+    return make
+
+
 TICK_S = 0.02
 
 
