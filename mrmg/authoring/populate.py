@@ -143,7 +143,7 @@ def _candidates(
         ground.road_to_nearest(wide) <= 4.0 * model.turning_radius_m
     )
     turnable = near_wide if near_wide.sum() >= 0.5 * connected.sum() else connected
-    for clearance_m in (2.6, 2.0, 1.5, ground.margin_m):
+    for clearance_m in (3.2, 2.6, 2.0, 1.5, ground.margin_m):
         good = np.flatnonzero(turnable & (ground.clearance_m >= clearance_m))
         if len(good) >= 0.25 * connected.sum():
             break

@@ -1,0 +1,107 @@
+"""Robot models are read as their YAML says, and refused when they make no sense."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from mrmg import shipped
+from mrmg.energy import GRAVITY_M_S2
+from mrmg.errors import SceneError
+from mrmg.scene.loading.models import load_model, model_folder
+
+CAR = shipped.models_folder() / "car"
+
+
+def changed_car(tmp_path: Path, old: str, new: str) -> Path:
+    folder = tmp_path / "car"
+    shutil.copytree(CAR, folder)
+    text = (folder / "robot.yaml").read_text()
+    assert old in text
+    (folder / "robot.yaml").write_text(text.replace(old, new))
+    return folder
+
+
+def test_car_is_what_its_file_says() -> None:
+    car, parameters = load_model(CAR)
+    raw = yaml.safe_load((CAR / "robot.yaml").read_text())
+    assert parameters == raw
+    assert car.name == "car"
+    assert car.mass_kg == raw["mass"]
+    assert car.limits.v_max_m_s == raw["limits"]["v_max"]
+    assert car.limits.w_max == raw["limits"]["w_max"]
+    assert car.wheel_radius_m == raw["wheel"]["radius"]
+    assert car.mjcf.is_file()
+
+
+def test_car_is_about_the_stated_size() -> None:
+    car, _ = load_model(CAR)
+    length_m, width_m = np.ptp(car.footprint_m, axis=0)
+    assert (length_m, width_m) == pytest.approx((1.8, 1.1))
+    assert car.half_width_m == pytest.approx(0.55)
+    assert car.inscribed_radius_m == pytest.approx(0.3)
+    assert car.circumscribed_radius_m == pytest.approx(np.hypot(1.5, 0.55))
+    expected_m = car.wheelbase_m / np.tan(car.planning_share * car.limits.w_max)
+    assert car.turning_radius_m == pytest.approx(expected_m)
+
+
+def test_standard_battery_is_250_m_of_plain_ground() -> None:
+    car, _ = load_model(CAR)
+    weight_N = car.mass_kg * GRAVITY_M_S2
+    per_metre_J = car.rolling_coefficient * weight_N / car.drive_efficiency
+    assert car.energy_model.plain_ground_J_per_m() == pytest.approx(per_metre_J)
+    assert car.battery_capacity_J / per_metre_J == pytest.approx(250.0, rel=0.01)
+
+
+def test_footprint_is_turned_counter_clockwise(tmp_path: Path) -> None:
+    folder = tmp_path / "car"
+    shutil.copytree(CAR, folder)
+    raw = yaml.safe_load((CAR / "robot.yaml").read_text())
+    raw["footprint"].reverse()
+    (folder / "robot.yaml").write_text(yaml.safe_dump(raw))
+    model, _ = load_model(folder)
+    x, y = model.footprint_m.T
+    area_m2 = 0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    assert area_m2 == pytest.approx(1.8 * 1.1)
+    assert model.inscribed_radius_m > 0.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("mass: 180.0", "mass: 0", r"mass: got 0; must be > 0"),
+        ("v_min: -1.2", "v_min: 1.2", r"limits.v_min: got 1.2; must be <= 0"),
+        ("motion_model: car", "motion_model: boat", r"must be 'car' or 'unicycle'"),
+        ("w_max: 0.6", "w_max: 1.6", r"steering angle must be < pi/2"),
+        ("drive_efficiency: 0.85", "drive_efficiency: 1.2", r"must be <= 1"),
+        ("[1.5, 0.55]", "[0.0, 0.0]", r"footprint: not convex"),
+        ("[-0.3, 0.55]", "[1.4, -0.6]", r"footprint: crosses itself"),
+        ("mjcf: car.xml", "mjcf: van.xml", r"mjcf: got 'van.xml'; no such file"),
+        ("wheel:", "wheels:", r"did you mean 'wheel'\?"),
+    ],
+)
+def test_bad_models(tmp_path: Path, old: str, new: str, message: str) -> None:
+    folder = changed_car(tmp_path, old, new)
+    with pytest.raises(SceneError, match=message):
+        load_model(folder)
+
+
+def test_reference_point_must_be_inside(tmp_path: Path) -> None:
+    folder = tmp_path / "car"
+    shutil.copytree(CAR, folder)
+    raw = yaml.safe_load((CAR / "robot.yaml").read_text())
+    raw["footprint"] = [[x + 1.0, y] for x, y in raw["footprint"]]
+    (folder / "robot.yaml").write_text(yaml.safe_dump(raw))
+    with pytest.raises(SceneError, match=r"must hold \(0, 0\)"):
+        load_model(folder)
+
+
+def test_references() -> None:
+    assert model_folder("car", None) == CAR
+    assert model_folder("./car", CAR.parent) == CAR
+    assert "shipped models: car" in str(model_folder("lorry", None))
+    assert "no such folder" in str(model_folder("./lorry", CAR.parent))
