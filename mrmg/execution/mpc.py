@@ -66,12 +66,18 @@ class TrackingMpc:
         self._target[-NX:] = reference[-1]
         np.add(self._target, self._deviation, out=self._guess)
         self._fix_first_state(state)
-        self._call()
-        if not np.isfinite(self._solution).all():
+        if not self._solve():
             self._deviation[:] = 0.0
             return np.zeros(NU)
         np.subtract(self._solution, self._target, out=self._deviation)
         return self._deviation[NX:_STAGE].copy()
+
+    def _solve(self) -> bool:
+        """Solve the QP; tell whether question and answer are all numbers."""
+        if not np.isfinite(self._guess).all():
+            return False
+        self._call()
+        return bool(np.isfinite(self._solution).all())
 
     def _fix_first_state(self, state: np.ndarray) -> None:
         limits = self._limits

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.metadata import version
 
 import mujoco
@@ -38,6 +39,12 @@ _AT_REST_M_S = 0.005
 _STALLED_RATE = 0.1
 _LONGEST_STALL_S = 5.0
 _PROGRESS_TICKS = 50
+_DIVERGED = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+    mujoco.mjtWarning.mjWARN_BADCTRL,
+)
 _VERSIONED = ("mujoco", "casadi", "numpy", "scipy", "shapely")
 
 Progress = Callable[[float, str], None]
@@ -73,11 +80,23 @@ def simulate(
         )
     run = _Run(build_world(scene), plan, [maker(robot.model) for robot in scene.robots])
     started = time.perf_counter()
-    while not run.ended():
-        run.tick()
-        if on_progress is not None and run.ticks % _PROGRESS_TICKS == 0:
-            on_progress(run.fraction(), f"driven {run.data.time:.0f} s")
+    with _no_warning_file():
+        while not run.ended():
+            run.tick()
+            if on_progress is not None and run.ticks % _PROGRESS_TICKS == 0:
+                on_progress(run.fraction(), f"driven {run.data.time:.0f} s")
     return run.log(controller, time.perf_counter() - started)
+
+
+@contextmanager
+def _no_warning_file() -> Iterator[None]:
+    """Keep MuJoCo from writing warnings to a file in the user's folder."""
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 class _Run:
@@ -227,5 +246,7 @@ class _Run:
         off_m = np.hypot(*(self._state - self._planned)[:, :2].T)
         stalled = self.data.time - self._got_on_s > _LONGEST_STALL_S
         restless = self.data.time - self._finished_s > _LONGEST_REST_S
+        diverged = any(self.data.warning[kind].number for kind in _DIVERGED)
         # Written so that a state that is not a number counts as lost.
-        return not (off_m <= _LOST_M).all() or stalled or restless
+        lost = not (off_m <= _LOST_M).all()
+        return lost or diverged or stalled or restless

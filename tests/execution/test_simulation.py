@@ -279,6 +279,22 @@ def test_leaving_the_bounds_is_a_contact(driving: SimpleNamespace) -> None:
     assert (log.contacts[0].robot, log.contacts[0].other) == ("r1", "bounds")
 
 
+def test_a_plan_that_turns_to_no_number_ends_the_run(
+    driving: SimpleNamespace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And MuJoCo leaves no file of warnings where the command was run."""
+    monkeypatch.chdir(tmp_path)
+    scene = driving.open_ground([(0.0, 0.0, 0.0)])
+    plan = driving.plan_of(scene, [driving.straight(4.0, 1.0)])
+    state = plan.trajectories[0].state.copy()
+    state[20:] = np.nan
+    broken = replace(plan.trajectories[0], state=state)
+    log = simulate(scene, replace(plan, trajectories=(broken,)))
+    assert not log.completed
+    assert log.time_s[-1] < 2.5
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_progress_rises_to_the_end(wild: tuple[Scene, Plan]) -> None:
     seen: list[float] = []
     record: Callable[[float, str], None] = lambda share, _: seen.append(share)  # noqa: E731
