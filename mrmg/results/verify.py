@@ -21,6 +21,9 @@ from mrmg.scene.types import Scene
 COARSEST_STEP_M = 1.0
 """How far a footprint may at most stray from its chord within one step."""
 
+LARGEST_STATE = 1e9
+"""Largest magnitude of a state's component [SI] that geometry can be trusted with."""
+
 
 def verify(scene: Scene, plan: Plan) -> Verdict:
     """Return the verdict on `plan`: every violation found, and certified clearances.
@@ -115,7 +118,8 @@ def _check_coarseness(scene: Scene, plan: Plan) -> list[Violation]:
             footprint = SweptFootprint.of(model, trajectory)
             steps = np.arange(len(trajectory.control))
             straying_m = footprint.sagitta(steps, np.full(len(steps), plan.dt_s))
-        bounded = straying_m <= COARSEST_STEP_M
+        sizes = np.abs(trajectory.state[:-1]).max(axis=1)
+        bounded = (straying_m <= COARSEST_STEP_M) & (sizes <= LARGEST_STATE)
         if not bounded.all():
             text = f"step {int(bounded.argmin())} moves too wildly to be checked"
             violations.append(_malformed(trajectory.robot, text))

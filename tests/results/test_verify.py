@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -325,4 +327,8 @@ def test_nonsense_is_judged_and_never_raises(case: Any, rows: list) -> None:
     nonsense = replace(
         plan.trajectories[0], state=table[:, :5], control=table[:-1, 5:].copy()
     )
-    assert not verify(scene, with_trajectory(plan, nonsense)).ok
+    verdict = verify(scene, with_trajectory(plan, nonsense))
+    assert not verdict.ok
+    with TemporaryDirectory() as folder:
+        verdict.save(Path(folder))
+        assert Verdict.load(Path(folder)) == verdict
