@@ -14,7 +14,8 @@ from mrmg.mission import Plan
 from mrmg.results import style
 from mrmg.results.energy_plot import BatteryCurve, simulated_curves
 from mrmg.results.ground_image import TrailPainter
-from mrmg.results.overlay import Panel, Reading, RobotReading, Tag
+from mrmg.results.overlay import Panel, Reading, RobotReading
+from mrmg.results.tags import Label, Tag
 from mrmg.results.top_view import TopView
 from mrmg.results.world_view import (
     CHASE_FOVY_DEG,
@@ -28,6 +29,7 @@ _TRAIL_AHEAD_M = 1.2
 _YAW_SMOOTHING_S = 0.8
 _MAP_MARGIN = 1.03
 _TAG_LIFT_M = 0.5
+_NAMED_WITHIN_M = 40.0
 _OPEN = (1.0, 1.0, 1.0, 0.9)
 
 
@@ -154,6 +156,7 @@ class Stage:
         self._tags = [
             Tag(robot, film.colors[robot.id], height) for robot in film.scene.robots
         ]
+        self._labels = _labels(film.scene, height)
         self._painter = TrailPainter(ground, film.frame)
         self._painted = 0
         self._trailed = 0
@@ -202,7 +205,7 @@ class Stage:
             for robot, state in zip(log.robots, log.state, strict=True)
         }
         if anew or self._trailed == 0:
-            self._top.draw_background(log.qpos[tick], trails)
+            self._top.draw_background(log.qpos[tick], trails, self._labels)
         else:
             for color, points in trails.items():
                 self._top.extend_trail(points[self._trailed - 1 :], color)
@@ -217,6 +220,10 @@ class Stage:
         x_m, y_m = film.log.state[film.followed, tick, :2]
         camera = chase_camera(float(x_m), float(y_m), float(film.yaw[tick]))
         self._view.draw(camera, fovy=CHASE_FOVY_DEG, shadows=True, out=pane)
+        near_m = np.array([x_m, y_m])
+        for label, spot in self._labels:
+            if np.hypot(*(spot - near_m)) < _NAMED_WITHIN_M:
+                label.blit(pane, self._view.project(np.array([[*spot, 0.0]]))[0])
         tops = [
             [*state[tick, :2], robot.model.height_m + _TAG_LIFT_M]
             for robot, state in zip(film.scene.robots, film.log.state, strict=True)
@@ -255,3 +262,19 @@ class Stage:
 def _rgba(color: str) -> tuple[float, float, float, float]:
     red, green, blue = style.rgb(color)
     return red / 255.0, green / 255.0, blue / 255.0, 0.9
+
+
+def _labels(scene: Scene, height: int) -> list[tuple[Label, np.ndarray]]:
+    """Return the names of all targets, each with its place [m]."""
+    texts = {
+        **style.goal_labels(scene),
+        **{name: f"⚡{text}" for name, text in style.station_labels(scene).items()},
+    }
+    stations = {station.id for station in scene.stations}
+    labels = []
+    for target in scene.targets():
+        color = style.STATION_EDGE if target.id in stations else style.INK
+        x_min, _, x_max, y_max = target.region.shape.bounds
+        corner = np.array([x_max - 0.12 * (x_max - x_min), y_max])
+        labels.append((Label(texts[target.id], color, height), corner))
+    return labels

@@ -1,4 +1,4 @@
-"""The ground of the video: terrain, planned paths and labels painted on one image.
+"""The ground of the video: terrain and planned paths painted on one image.
 
 All that lies flat is a texture of the floor, which costs nothing to draw, and driven
 trails are painted into it as the mission goes on.
@@ -12,12 +12,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.patheffects import withStroke
 from PIL import Image, ImageDraw
 
 from mrmg.mission import Plan
 from mrmg.results import scene_drawing, style
-from mrmg.scene.types import Region, Scene
+from mrmg.scene.types import Scene
 
 PIXELS = 2048
 """Longer side of the image."""
@@ -73,7 +72,7 @@ def paint_ground(scene: Scene, plan: Plan, frame: GroundFrame) -> np.ndarray:
         axes, scene, hatched=False, label_points=_points(_LABEL_PIXELS)
     )
     _paint_paths(axes, scene, plan)
-    _paint_labels(axes, scene)
+    _paint_rims(axes, scene)
     canvas.draw()  # type: ignore[no-untyped-call]
     pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
     return np.array(pixels[:, :, :3])
@@ -122,7 +121,7 @@ def _spaced(points: np.ndarray, spacing_m: float) -> np.ndarray:
     marks = np.floor(np.cumsum(steps_m) / spacing_m)
     keep = np.concatenate([[True], np.diff(marks, prepend=0.0) > 0.0])
     keep[-1] = True
-    return points[keep]
+    return np.asarray(points[keep])
 
 
 def _paint_paths(axes: Axes, scene: Scene, plan: Plan) -> None:
@@ -138,30 +137,11 @@ def _paint_paths(axes: Axes, scene: Scene, plan: Plan) -> None:
         )
 
 
-def _paint_labels(axes: Axes, scene: Scene) -> None:
-    labels = {**style.goal_labels(scene), **style.station_labels(scene)}
+def _paint_rims(axes: Axes, scene: Scene) -> None:
     stations = {station.id for station in scene.stations}
     for target in scene.targets():
         color = style.STATION_EDGE if target.id in stations else style.GOAL_EDGE
         scene_drawing.draw_region(axes, target.region, "none", color, _points(5.0))
-        sign = "⚡" if target.id in stations else ""
-        _paint_label(axes, target.region, sign + labels[target.id], color)
-
-
-def _paint_label(axes: Axes, region: Region, text: str, color: str) -> None:
-    _, _, right, top = region.shape.bounds
-    axes.text(
-        float(right),
-        float(top),
-        text,
-        fontsize=_points(_LABEL_PIXELS),
-        fontweight="bold",
-        color=color,
-        ha="left",
-        va="center",
-        path_effects=[withStroke(linewidth=_points(9.0), foreground="white")],
-        zorder=9,
-    )
 
 
 def _points(pixels: float) -> float:

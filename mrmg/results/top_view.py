@@ -15,6 +15,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from mrmg.results import style
+from mrmg.results.tags import Label
 from mrmg.results.world_view import WorldView, top_camera
 
 _SUPERSAMPLING = 4
@@ -60,13 +61,17 @@ class TopView:
         return np.asarray(offset + middle)
 
     def draw_background(
-        self, qpos: np.ndarray, trails: Mapping[str, np.ndarray]
+        self,
+        qpos: np.ndarray,
+        trails: Mapping[str, np.ndarray],
+        labels: Sequence[tuple[Label, np.ndarray]],
     ) -> None:
         """Draw everything but the robots.
 
         Args:
             qpos: any positions of the model.
             trails: what was driven so far [m], shape (n, 2) each, by colour.
+            labels: names and where they belong [m], shape (2,).
         """
         self._view.place_robots_away(qpos)
         camera = top_camera(self._center_m)
@@ -75,6 +80,8 @@ class TopView:
         self._background = self._still.copy()
         for color, points in trails.items():
             self.extend_trail(points, color)
+        for label, spot in labels:
+            label.blit(self._background, self.to_pixels(spot[None])[0])
 
     def extend_trail(self, points: np.ndarray, color: str) -> None:
         """Paint a driven way through points [m], shape (n, 2), onto the background."""

@@ -16,7 +16,7 @@ from mrmg.execution.world_model import MujocoWorld
 from mrmg.results.gl_backend import offscreen_context
 from mrmg.results.ground_image import GroundFrame
 
-_SLICES, _STACKS = 20, 6
+_SLICES, _STACKS = 20, 2
 _SAMPLES = 4
 _MAX_GEOMS = 20000
 _AWAY_M = 1e4

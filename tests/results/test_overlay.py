@@ -1,4 +1,4 @@
-"""Panel and tags: they show the reading, and stay inside the picture."""
+"""The panel: it shows the reading."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mrmg.results import style
-from mrmg.results.overlay import Panel, Reading, RobotReading, Tag
+from mrmg.results.overlay import Panel, Reading, RobotReading
 
 
 def reading(charge: float = 0.8, **changes) -> Reading:
@@ -61,18 +61,3 @@ def test_eight_robots_fit_above_the_legend(make_scene) -> None:
     for color in style.scene_robot_colors(scene).values():
         rows = np.nonzero((drawn == style.rgb(color)).all(axis=2).any(axis=1))[0]
         assert 15 <= np.ptp(rows) <= 60
-
-
-@pytest.mark.parametrize("spot", [(0, 0), (99, 79), (50, 40), (-500, 20), (40, 900)])
-def test_tags_are_cut_at_the_edges(make_scene, spot) -> None:
-    picture = np.zeros((80, 100, 3), dtype=np.uint8)
-    tag = Tag(make_scene().robots[0], "#0072B2", height=720)
-    tag.blit(picture, np.array(spot, dtype=float), charge=0.5)
-    assert bool(picture.any()) == (spot in {(99, 79), (50, 40)})
-
-
-def test_tag_of_a_robot_behind_the_camera_is_left_out(make_scene) -> None:
-    picture = np.zeros((80, 100, 3), dtype=np.uint8)
-    tag = Tag(make_scene().robots[0], "#0072B2", height=720)
-    tag.blit(picture, np.array([np.nan, np.nan]), charge=0.5)
-    assert not picture.any()
