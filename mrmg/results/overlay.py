@@ -125,13 +125,13 @@ class Panel:
         minutes, seconds = divmod(reading.time_s, 60.0)
         clock = f"{int(minutes):02d}:{seconds:04.1f}"
         pen.text(
-            (left, self._px(34)), clock, font=self._font(42, bold=True), fill=_TEXT
+            (left, self._px(37)), clock, font=self._font(37, bold=True), fill=_TEXT
         )
         used = f"{reading.used_J / 1000.0:.1f} kJ used"
         pen.text(
-            (self._size[0] - left, self._px(52)),
+            (self._size[0] - left, self._px(54)),
             used,
-            font=self._font(20, bold=True),
+            font=self._font(16, bold=True),
             fill=_TEXT,
             anchor="ra",
         )
