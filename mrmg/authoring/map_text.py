@@ -99,6 +99,13 @@ class _Reader:
                 continue
             points = np.reshape(values, (-1, 2))
             shapes.append((Point, LineString, Polygon)[len(points) - 1](points))
+        if not shapes:
+            # Not one usable row: some other kind of file.
+            message = (
+                f"no map: it begins with '{lines[0][1][:30]}'; expected a sectioned map "
+                "or rows of 6, 4 or 2 numbers"
+            )
+            self.faults = [Fault("", message)]
         if self.faults:
             return None
         border = _drawn_border(shapes)
