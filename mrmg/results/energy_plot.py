@@ -166,6 +166,7 @@ def _mark_visits(axes: Axes, scene: Scene, visits: tuple[Visit, ...]) -> None:
         station = visit.kind == "station"
         axes.axvline(
             visit.time_s,
+            ymax=0.91 if station else 0.83,
             color=style.STATION_EDGE if station else "#B9BEC7",
             linewidth=1.0 if station else 0.7,
             linestyle="-" if station else ":",
