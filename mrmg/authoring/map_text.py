@@ -102,7 +102,7 @@ class _Reader:
         if not shapes:
             # Not one usable row: some other kind of file.
             message = (
-                f"no map: it begins with '{lines[0][1][:30]}'; expected a sectioned map "
+                f"no map, begins with '{lines[0][1][:30]}'; expected a sectioned map "
                 "or rows of 6, 4 or 2 numbers"
             )
             self.faults = [Fault("", message)]
