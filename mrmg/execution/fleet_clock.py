@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mrmg.execution.reference import STANDSTILL_M_S
+
 
 @dataclass(frozen=True, slots=True)
 class ClockParams:
@@ -64,6 +66,6 @@ def lag_s(
     heading = np.stack([np.cos(reference[:, 2]), np.sin(reference[:, 2])], axis=1)
     ahead_m = ((reference[:, :2] - state[:, :2]) * heading).sum(axis=1)
     speed = reference[:, 3]
-    return np.asarray(
-        np.sign(speed) * ahead_m / np.maximum(np.abs(speed), least_speed_m_s)
-    )
+    # One that waits is not late; where it stands short of its place, it stays there.
+    direction = np.sign(speed) * (np.abs(speed) > STANDSTILL_M_S)
+    return np.asarray(direction * ahead_m / np.maximum(np.abs(speed), least_speed_m_s))

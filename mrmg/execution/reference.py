@@ -10,6 +10,9 @@ from mrmg.motion.dynamics import DERIVATIVES, NX
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
 
+STANDSTILL_M_S = 1e-3
+"""Planned speed below which a robot waits; sums of controls leave rounding errors."""
+
 
 class FleetReference:
     """States of the fleet's plan at any plan time; at rest after its end.

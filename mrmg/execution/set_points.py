@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from mrmg.execution.controller import HORIZON, HORIZON_STEP_S, Controller
-from mrmg.execution.reference import FleetReference
+from mrmg.execution.reference import STANDSTILL_M_S, FleetReference
 from mrmg.scene.types import Scene
 
 _STALL_M_S = 0.3
+_STILL = 1e-6
 
 
 class SetPoints:
@@ -44,12 +45,25 @@ class SetPoints:
         self.now = self._planned.copy()
         self.following = self._planned.copy()
 
-    def correct(self, state: np.ndarray, clock_s: float, rate: float) -> None:
-        """Let every controller look ahead from the true states, shape (R, 5)."""
+    def correct(self, state: np.ndarray, clock_s: float, rate: float) -> int:
+        """Let the controllers look ahead from the true states, shape (R, 5).
+
+        A robot whose plan waits for the whole horizon has nothing to correct.
+
+        Returns:
+            Number of controllers called.
+        """
         horizon = self._reference.paced(clock_s, rate, HORIZON_STEP_S, HORIZON + 1)
-        for index, controller in enumerate(self._controllers):
+        still = np.ptp(horizon, axis=0).max(axis=1) < _STILL
+        slow = (np.abs(horizon[..., 3]) < STANDSTILL_M_S).all(axis=0)
+        waits = still & slow & (rate > 0.0)
+        self._correction[waits] = 0.0
+        for index in np.flatnonzero(~waits):
             start = np.concatenate([state[index, :3], self.following[index]])
-            self._correction[index] = controller.correct(start, horizon[:, index])
+            self._correction[index] = self._controllers[index].correct(
+                start, horizon[:, index]
+            )
+        return int((~waits).sum())
 
     def advance(
         self, axle_speed_m_s: np.ndarray, clock_s: float, rate: float, period_s: float
@@ -71,7 +85,7 @@ class SetPoints:
         planned = coming[1] * [rate, 1.0]
         control = (planned - self._planned) / period_s + self._correction
         # Where the plan waits, so does the robot: creeping up would cost energy.
-        waits = (coming[..., 0] == 0.0).all(axis=0)
+        waits = (np.abs(coming[..., 0]) < STANDSTILL_M_S).all(axis=0)
         control[waits, 0] = -self.now[waits, 0] / period_s
         control = np.clip(control, -self._control_bound, self._control_bound)
         self.following = np.clip(

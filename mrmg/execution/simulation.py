@@ -115,7 +115,7 @@ class _Run:
         self._drive = DriveControl(world.scene)
         self._contacts = ContactWatch(world)
         self._recording = Recording()
-        self._controller_s: list[float] = []
+        self._call_s: list[float] = []
         self._got_on_s, self._finished_s = 0.0, np.inf
         self._fleet = Fleet(world, self.data)
         self._settle()
@@ -158,7 +158,7 @@ class _Run:
         scene, recording = self._world.scene, self._recording
         robots = len(scene.robots)
         state = recording.by_robot("state", robots)
-        per_call_ms = 1e3 * np.array(self._controller_s or [0.0]) / robots
+        call_ms = 1e3 * np.array(self._call_s or [0.0])
         return ExecutionLog(
             scene_digest=scene.digest,
             plan_digest=self._plan.digest,
@@ -182,8 +182,8 @@ class _Run:
                 "wall_s": wall_s,
                 "realtime_factor": self.data.time / wall_s,
                 "controller_ms": {
-                    "median": float(np.median(per_call_ms)),
-                    "p99": float(np.percentile(per_call_ms, 99)),
+                    "median": float(np.median(call_ms)),
+                    "p99": float(np.percentile(call_ms, 99)),
                 },
             },
         )
@@ -204,8 +204,9 @@ class _Run:
         clock.pace(self._state, self._planned, self._period_s)
         if self.ticks % TICKS_PER_CORRECTION == 0:
             started = time.perf_counter()
-            self._set_points.correct(self._state, clock.time_s, clock.rate)
-            self._controller_s.append(time.perf_counter() - started)
+            calls = self._set_points.correct(self._state, clock.time_s, clock.rate)
+            if calls:
+                self._call_s.append((time.perf_counter() - started) / calls)
         self._set_points.advance(
             self._fleet.axle_speed_m_s(), clock.time_s, clock.rate, self._period_s
         )
