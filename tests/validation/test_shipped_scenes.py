@@ -7,7 +7,6 @@ integration (CI=true), where all of them are.
 from __future__ import annotations
 
 import os
-from functools import cache
 
 import pytest
 
@@ -29,20 +28,22 @@ in_ci = pytest.mark.skipif(
     os.environ.get("CI") != "true", reason="all scenes are driven where CI=true"
 )
 MISSIONS = [
-    pytest.param("quickstart", 0),
+    pytest.param(("quickstart", 0), id="quickstart"),
     *(
-        pytest.param(name, 0, marks=[pytest.mark.slow, in_ci])
+        pytest.param((name, 0), id=name, marks=[pytest.mark.slow, in_ci])
         for name in scene_names()
         if name != "quickstart"
     ),
 ]
-missions = pytest.mark.parametrize(("name", "seed"), MISSIONS)
 
 
-@cache
-def driven(
-    name: str, seed: int
-) -> tuple[Scene, Plan, Verdict, ExecutionLog, EnergyAudit]:
+Drive = tuple[Scene, Plan, Verdict, ExecutionLog, EnergyAudit]
+
+
+@pytest.fixture(scope="module", params=MISSIONS)
+def drive(request: pytest.FixtureRequest) -> Drive:
+    """One mission, from scene to audit."""
+    name, seed = request.param
     scene = mrmg.load_scene(name)
     result = mrmg.plan(scene, seed=seed)
     assert result.status is PlanStatus.SOLVED, result.reason
@@ -52,40 +53,35 @@ def driven(
     return scene, result.plan, verdict, log, mrmg.audit(scene, result.plan, log)
 
 
-@missions
-def test_the_plan_passes_the_independent_verifier(name: str, seed: int) -> None:
-    _, _, verdict, _, _ = driven(name, seed)
+def test_the_plan_passes_the_independent_verifier(drive: Drive) -> None:
+    _, _, verdict, _, _ = drive
     assert [violation.message for violation in verdict.violations] == []
 
 
-@missions
-def test_the_fleet_does_the_mission_in_simulation(name: str, seed: int) -> None:
-    scene, _, _, log, account = driven(name, seed)
+def test_the_fleet_does_the_mission_in_simulation(drive: Drive) -> None:
+    scene, _, _, log, account = drive
     assert log.completed
     assert log.contacts == ()
     assert account.reasons == ()
     assert set(account.goals_visited) == {goal.id for goal in scene.goals}
 
 
-@missions
-def test_the_cars_stay_near_their_reference(name: str, seed: int) -> None:
-    _, _, _, _, account = driven(name, seed)
+def test_the_cars_stay_near_their_reference(drive: Drive) -> None:
+    _, _, _, _, account = drive
     for robot in account.robots:
         assert robot.tracking_rms_m <= TRACKING_RMS_M
         assert robot.tracking_max_m <= TRACKING_MAX_M
 
 
-@missions
-def test_the_charge_never_falls_below_the_reserve(name: str, seed: int) -> None:
-    scene, _, _, _, account = driven(name, seed)
+def test_the_charge_never_falls_below_the_reserve(drive: Drive) -> None:
+    scene, _, _, _, account = drive
     for robot in account.robots:
         reserve = scene.robot(robot.robot).battery.reserve_fraction
         assert robot.min_charge_fraction >= reserve
 
 
-@missions
-def test_simulated_energy_is_near_the_plan_per_robot(name: str, seed: int) -> None:
-    _, plan, _, _, account = driven(name, seed)
+def test_simulated_energy_is_near_the_plan_per_robot(drive: Drive) -> None:
+    _, plan, _, _, account = drive
     for robot in plan.tours:
         planned = plan.ledger.total_J(robot=robot)
         assert account.metered.total_J(robot=robot) == pytest.approx(
@@ -96,10 +92,9 @@ def test_simulated_energy_is_near_the_plan_per_robot(name: str, seed: int) -> No
         )
 
 
-@missions
-def test_simulated_energy_is_near_the_plan_per_part(name: str, seed: int) -> None:
+def test_simulated_energy_is_near_the_plan_per_part(drive: Drive) -> None:
     """Each part is held to the same share of the robot's whole energy."""
-    _, plan, _, _, account = driven(name, seed)
+    _, plan, _, _, account = drive
     for robot in plan.tours:
         whole = plan.ledger.total_J(robot=robot)
         for part in PARTS:
