@@ -22,10 +22,11 @@ RESERVE = 0.05
 _START_GAP_M = 5.0
 """Least distance of two robots at the start: either can leave first."""
 
-_SHORTCUT = 0.82
-"""A robot may find roads this much shorter, in gaps narrower than those counted on."""
+_SHORTCUTS = (0.82, 0.9)
+"""A robot may find roads this much shorter, in gaps narrower than those counted on;
+the first is safe on mazes, the second is tried where the first leaves no capacity."""
 
-_ATTEMPTS = 100
+_ATTEMPTS = 40
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,8 @@ def place_mission(
     Raises:
         UsageError: if no placement is found.
     """
-    for _ in range(_ATTEMPTS):
+    for attempt in range(len(_SHORTCUTS) * _ATTEMPTS):
+        shortcut = _SHORTCUTS[attempt // _ATTEMPTS]
         starts = _depot(road_m, points_m, robots, rng)
         if len(starts) < robots:
             continue
@@ -68,7 +70,7 @@ def place_mission(
         rest = [i for i in free if i not in posts]
         sites = _spread(road_m, rest, [*starts, *posts], goals)
         least = _least_capacity_m(road_m, starts, sites, posts)
-        most = _most_capacity_m(road_m, starts, sites)
+        most = shortcut * _most_capacity_m(road_m, starts, sites)
         if math.ceil(least) <= most:
             # The largest capacity that still forces recharging is the fairest to drive.
             return Placement(starts, sites, posts, math.floor(most))
@@ -164,4 +166,4 @@ def _most_capacity_m(road_m: np.ndarray, starts: list[int], sites: list[int]) ->
         away.remove(closest)
         near = np.minimum(near, road_m[sites[closest], sites])
     need_m = max(float(reach.max()), forest_m / len(starts))
-    return _SHORTCUT * need_m / (1.0 - RESERVE)
+    return need_m / (1.0 - RESERVE)
