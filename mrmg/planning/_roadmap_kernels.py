@@ -43,6 +43,10 @@ COMFORT_M = 0.4
 """Clearance beyond the passage that lines of sight keep where they can."""
 
 
+NEAR_M = 2.5
+"""Distance within which a waypoint is passed over for the next one in sight."""
+
+
 @kernel
 def find_waypoint(  # type: ignore[no-untyped-def]
     space, terrain, roadmap, field, target, x, y, passage, view, out
@@ -79,8 +83,10 @@ def find_waypoint(  # type: ignore[no-untyped-def]
     while successor[v] >= 0:
         after = successor[v]
         ax, ay = roadmap.vertex[after, 0], roadmap.vertex[after, 1]
+        # A waypoint this near gives no direction: look on, through the tight place.
+        near = hypot(roadmap.vertex[v, 0] - x, roadmap.vertex[v, 1] - y) < NEAR_M
         if hypot(ax - x, ay - y) > view or not segment_is_clear(
-            space, x, y, ax, ay, comfortable
+            space, x, y, ax, ay, min(passage, here) if near else comfortable
         ):
             break
         straight = segment_weighted_length(terrain, x, y, ax, ay) + cost_to_go[after]

@@ -1,9 +1,7 @@
 """Steering: where a robot wants to go next, as a speed and a steering angle.
 
 A robot descends the roadmap's cost-to-go field: it drives at the farthest point of the way
-that it can see. Gears are chosen so that narrow places are left the way they were entered
-and open ground is used to turn round; a point inside the turning circle is approached by
-backing off first.
+that it can see. A point inside the turning circle is approached by backing off first.
 """
 
 from __future__ import annotations
@@ -12,9 +10,9 @@ from math import atan, atan2, cos, hypot, pi, sin
 
 from mrmg.compilation import kernel
 from mrmg.motion._kernels import UNICYCLE
-from mrmg.world._kernels import clearance_estimate, segment_is_clear
+from mrmg.world._kernels import segment_is_clear
 
-AUTO, FORWARD, REVERSE, RANDOM, BACK_OFF, WAIT = range(6)
+STEER, RANDOM, BACK_OFF, WAIT = range(4)
 """What a robot does during one expansion of the tree."""
 
 LOOKAHEAD_M = 3.5
@@ -32,23 +30,6 @@ def wrap(angle):  # type: ignore[no-untyped-def]
     while angle <= -pi:
         angle += 2.0 * pi
     return angle
-
-
-@kernel
-def choose_gear(fleet, r, state, space, wx, wy, to_go, gear):  # type: ignore[no-untyped-def]
-    """Return the gear (+1, -1) for the way to a waypoint, given the present one."""
-    if fleet.model[r] == UNICYCLE:
-        return 1
-    bearing = abs(wrap(atan2(wy - state[1], wx - state[0]) - state[2]))
-    room = clearance_estimate(space, state[0], state[1])
-    # The two thresholds lie apart, so that a turn once begun is not broken off.
-    if gear > 0:
-        if bearing > 1.9 and (room < fleet.turning_radius[r] + 1.0 or to_go < 4.0):
-            return -1
-        return 1
-    if bearing < 1.2 or (room > 2.0 * fleet.turning_radius[r] + 1.2 and to_go > 6.0):
-        return 1
-    return -1
 
 
 @kernel

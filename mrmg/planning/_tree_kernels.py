@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from math import floor, hypot
+from math import atan2, floor, hypot
 from typing import NamedTuple
 
 import numpy as np
 
 from mrmg.compilation import kernel
 from mrmg.energy import battery_power
-from mrmg.motion._kernels import tan_steer
+from mrmg.motion._kernels import UNICYCLE, tan_steer
+from mrmg.planning._maneuver_kernels import best_maneuver, way_left
 from mrmg.planning._random_kernels import random_below, random_unit
 from mrmg.planning._roadmap_kernels import find_waypoint
 from mrmg.planning._routing_kernels import IMPOSSIBLE, RoutingArrays, solve_routing
@@ -24,16 +25,14 @@ from mrmg.planning._safety_kernels import (
     write_braking,
 )
 from mrmg.planning._steering_kernels import (
-    AUTO,
     BACK_OFF,
-    FORWARD,
     RANDOM,
-    REVERSE,
+    STEER,
     WAIT,
-    choose_gear,
     control_towards,
     pursue,
     sidestep,
+    wrap,
 )
 from mrmg.world._kernels import multiplier_in, point_in_convex
 
@@ -47,8 +46,20 @@ SOLVED, OUT_OF_VERTICES, NO_TOUR = range(3)
 VIEW_M = 25.0
 """How far along its way a robot looks for the farthest point in sight."""
 
+AGAIN = 0.005
+"""Share of the first tours' energy that each expansion a vertex has had counts as."""
+
 STEER_EVERY = 5
 """Steps between two looks."""
+
+MANEUVER_STEPS = 20
+"""Length of each motion a maneuver is made of, in steps."""
+
+AHEAD = 0.9
+"""Bearing up to which a waypoint counts as ahead [rad]."""
+
+BEHIND = 2.4
+"""Bearing from which a waypoint counts as behind [rad]."""
 
 ATTEMPTS = 5
 """Controls tried before a robot brakes as committed."""
@@ -109,6 +120,7 @@ class Tree(NamedTuple):
         position: place in its tour each robot has reached, shape (N, R).
         gear: shape (N, R).
         stalled: how often in a row a robot has not got on, shape (N, R).
+        expanded: how often a vertex has been expanded, shape (N,).
         remaining: energy estimate of the rest of the tours [J], shape (N,).
         group: shape (N,).
         sibling: next vertex of the same group, -1 at the end, shape (N,).
@@ -124,6 +136,7 @@ class Tree(NamedTuple):
     position: np.ndarray
     gear: np.ndarray
     stalled: np.ndarray
+    expanded: np.ndarray
     remaining: np.ndarray
     group: np.ndarray
     sibling: np.ndarray
@@ -139,7 +152,6 @@ class Groups(NamedTuple):
     visits: np.ndarray
     unvisited: np.ndarray
     remaining: np.ndarray
-    best: np.ndarray
 
 
 @kernel
@@ -166,6 +178,7 @@ def new_tree(n, robots, goals, steps):  # type: ignore[no-untyped-def]
         np.zeros((n, robots), np.int64),
         np.ones((n, robots), np.int64),
         np.zeros((n, robots), np.int64),
+        np.zeros(n, np.int64),
         np.zeros(n),
         np.zeros(n, np.int64),
         np.full(n, -1, np.int64),
@@ -183,7 +196,6 @@ def new_groups(n):  # type: ignore[no-untyped-def]
         np.zeros(n, np.int64),
         np.zeros(n, np.int64),
         np.full(n, np.inf),
-        np.full(n, -1, np.int64),
     )
 
 
@@ -221,9 +233,7 @@ def add_to_group(groups, tree, n_groups, v, region):  # type: ignore[no-untyped-
     tree.sibling[v] = groups.first[g]
     groups.first[g] = v
     groups.size[g] += 1
-    if tree.remaining[v] < groups.remaining[g]:
-        groups.remaining[g] = tree.remaining[v]
-        groups.best[g] = v
+    groups.remaining[g] = min(groups.remaining[g], tree.remaining[v])
     return n_groups
 
 
@@ -262,11 +272,22 @@ def select_vertex(groups, tree, n_groups, params, initial, random):  # type: ign
             if draw < 0.0:
                 break
     groups.visits[chosen] += 1
-    if random_unit(random) < 0.7:
-        return groups.best[chosen]
     v = groups.first[chosen]
-    for _ in range(random_below(random, groups.size[chosen])):
-        v = tree.sibling[v]
+    if random_unit(random) < 0.7:
+        # The nearest to its targets; each expansion it has had counts as some way.
+        best = np.inf
+        nearest = v
+        while v >= 0:
+            rating = tree.remaining[v] + AGAIN * initial * tree.expanded[v]
+            if rating < best:
+                best = rating
+                nearest = v
+            v = tree.sibling[v]
+        v = nearest
+    else:
+        for _ in range(random_below(random, groups.size[chosen])):
+            v = tree.sibling[v]
+    tree.expanded[v] += 1
     return v
 
 
@@ -378,6 +399,44 @@ def _attempt(fleet, r, state, v, w, attempt, dt):  # type: ignore[no-untyped-def
 
 
 @kernel
+def choose_motion(  # type: ignore[no-untyped-def]
+    fleet,
+    r,
+    space,
+    terrain,
+    roadmap,
+    target,
+    state,
+    waypoint,
+    stalled,
+    params,
+    gear,
+    random,
+    motion,
+):
+    """Decide how a robot sets out for its waypoint; return whether to hold `motion`.
+
+    Ahead and not stuck, it pursues the waypoint. Else it looks for a maneuver; one that
+    leaves backwards with the way behind becomes pursuit in reverse gear.
+    """
+    off = abs(wrap(atan2(waypoint[1] - state[1], waypoint[0] - state[0]) - state[2]))
+    if fleet.model[r] == UNICYCLE or params.hold_control:
+        gear[r] = 1
+        return False
+    if off < AHEAD and stalled == 0:
+        gear[r] = 1
+        return False
+    found = best_maneuver(
+        fleet, r, space, terrain, roadmap, target, state, params.dt,
+        MANEUVER_STEPS, stalled, random, motion,
+    )  # fmt: skip
+    if not found:
+        return False
+    gear[r] = 1 if motion[0] > 0.0 else -1
+    return not (motion[0] < 0.0 and off > BEHIND and stalled < 2)
+
+
+@kernel
 def expand(  # type: ignore[no-untyped-def]
     fleet,
     spaces,
@@ -391,6 +450,7 @@ def expand(  # type: ignore[no-untyped-def]
     target,
     mode,
     gear,
+    stalled,
     order,
     random,
     control,
@@ -403,6 +463,7 @@ def expand(  # type: ignore[no-untyped-def]
         target: each robot's next target, -1 for none, shape (R,).
         mode: what each robot does, shape (R,).
         gear: each robot's gear; changed in place, shape (R,).
+        stalled: how often in a row each robot has not got on, shape (R,).
         order: robots in order of right of way, shape (R,).
         random: state of the generator.
         control: receives the controls, shape (k, R, 2).
@@ -430,6 +491,8 @@ def expand(  # type: ignore[no-untyped-def]
     aside = np.zeros((robots, 2))
     to_go = np.zeros(robots)
     decided = np.zeros(robots, np.bool_)
+    held = np.zeros(robots, np.bool_)
+    motion = np.zeros(2)
     event = False
     n = 0
     while n < params.steps and not event:
@@ -438,8 +501,8 @@ def expand(  # type: ignore[no-untyped-def]
             r = order[i]
             space = space_of(spaces, fleet.space[r])
             now = present_state(commitment, r)
-            drawn = mode[r] == RANDOM or mode[r] == BACK_OFF
-            driving = target[r] >= 0 and mode[r] != WAIT and not drawn
+            driving = target[r] >= 0 and mode[r] == STEER
+            drawn = mode[r] == RANDOM or mode[r] == BACK_OFF or held[r]
             if driving and n % STEER_EVERY == 0:
                 to_go[r] = find_waypoint(
                     space, terrain, roadmap, fleet.field[r], target[r], now[0], now[1],
@@ -451,16 +514,14 @@ def expand(  # type: ignore[no-untyped-def]
                     fleet, r, now, space, state, goal_point[r, 0], goal_point[r, 1],
                     aside[r],
                 )  # fmt: skip
-                if mode[r] == AUTO:
-                    gear[r] = choose_gear(
-                        fleet, r, now, space, aside[r, 0], aside[r, 1], to_go[r],
-                        gear[r],
+                if n == 0:
+                    held[r] = choose_motion(
+                        fleet, r, space, terrain, roadmap, target[r], now, aside[r],
+                        stalled[r], params, gear, random, motion,
                     )  # fmt: skip
-                elif mode[r] == FORWARD:
-                    gear[r] = 1
-                elif mode[r] == REVERSE:
-                    gear[r] = -1
-            if driving and not (params.hold_control and n > 0):
+                    if held[r]:
+                        wanted_v[r], wanted_w[r] = motion[0], motion[1]
+            if driving and not held[r] and not (params.hold_control and n > 0):
                 wanted_v[r], wanted_w[r] = pursue(
                     fleet, r, now, aside[r, 0], aside[r, 1], gear[r]
                 )
@@ -468,7 +529,7 @@ def expand(  # type: ignore[no-untyped-def]
             u1, u2 = braking_control(fleet, r, before, dt)
             if driving or drawn:
                 refused = 1
-                for attempt in range(ATTEMPTS if driving else 2):
+                for attempt in range(ATTEMPTS if driving and not held[r] else 2):
                     a1, a2 = _attempt(
                         fleet, r, before, wanted_v[r], wanted_w[r], attempt, dt
                     )
@@ -513,11 +574,18 @@ def expand(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def choose_modes(tree, v, target, params, steer, random, mode):  # type: ignore[no-untyped-def]
-    """Draw what each robot does next: steer, or random controls when that has failed."""
+def choose_modes(tree, v, target, params, steer, random, stuck, mode):  # type: ignore[no-untyped-def]
+    """Draw what each robot does next: steer, or random controls when that has failed.
+
+    Writes what each robot does into `mode`, and how stuck it is into `stuck`.
+    """
+    again = tree.expanded[v] > 1
     for r in range(len(target)):
-        stuck = tree.stalled[v, r]
         draw = random_unit(random)
+        # Expanded before, a vertex would only give the same child again.
+        stuck[r] = tree.stalled[v, r]
+        if again and random_unit(random) < 0.6:
+            stuck[r] = max(stuck[r], min(tree.expanded[v], 4))
         if target[r] < 0:
             # A robot without a target gives way only when the others are stuck.
             blocked = False
@@ -526,18 +594,14 @@ def choose_modes(tree, v, target, params, steer, random, mode):  # type: ignore[
             mode[r] = RANDOM if blocked and draw < 0.5 else WAIT
         elif draw >= steer:
             mode[r] = RANDOM
-        elif stuck == 0 or params.hold_control:
-            mode[r] = AUTO
+        elif stuck[r] < 2 or params.hold_control:
+            mode[r] = STEER
         else:
             pick = random_unit(random)
-            if pick < 0.25:
-                mode[r] = AUTO
-            elif pick < 0.55:
+            if pick < 0.5:
+                mode[r] = STEER
+            elif pick < 0.7:
                 mode[r] = BACK_OFF
-            elif pick < 0.65:
-                mode[r] = FORWARD
-            elif pick < 0.75:
-                mode[r] = REVERSE
             elif pick < 0.95 or len(target) == 1:
                 mode[r] = RANDOM
             else:
@@ -587,6 +651,7 @@ def grow(  # type: ignore[no-untyped-def]
     to_first = np.zeros(robots)
     target = np.zeros(robots, np.int64)
     mode = np.zeros(robots, np.int64)
+    stuck = np.zeros(robots, np.int64)
     order = np.arange(robots)
     n = 1
     tree.state[0] = start
@@ -617,7 +682,7 @@ def grow(  # type: ignore[no-untyped-def]
         for r in range(robots):
             done = tree.position[v, r] >= lengths[row, r]
             target[r] = -1 if done else tours[row, r, tree.position[v, r]]
-        choose_modes(tree, v, target, params, steer, random, mode)
+        choose_modes(tree, v, target, params, steer, random, stuck, mode)
         steer = max(params.steer_least, steer * params.steer_decay)
         for r in range(robots):
             order[r] = r
@@ -634,8 +699,8 @@ def grow(  # type: ignore[no-untyped-def]
         tree.tour[n] = row
         made, event, alive = expand(
             fleet, spaces, terrain, roadmap, targets, params, tree.state[n],
-            tree.energy[n], tree.visited[n], target, mode, tree.gear[n], order, random,
-            tree.control[n],
+            tree.energy[n], tree.visited[n], target, mode, tree.gear[n],
+            stuck, order, random, tree.control[n],
         )  # fmt: skip
         if not alive:
             continue
@@ -646,7 +711,7 @@ def grow(  # type: ignore[no-untyped-def]
                 tree.state[n, r, 1] - tree.state[v, r, 1],
             )
             moved |= far > 0.02
-            slow = far < 0.25 * made * params.dt * fleet.limit[r, 1]
+            slow = far < 0.3 and abs(tree.state[n, r, 3]) < 0.3
             held = target[r] >= 0 and slow and not event
             tree.stalled[n, r] = tree.stalled[v, r] + 1 if held else 0
         if not moved and not event:
@@ -673,10 +738,9 @@ def grow(  # type: ignore[no-untyped-def]
             return SOLVED, n
         for r in range(robots):
             if tree.position[n, r] < lengths[row, r]:
-                to_first[r] = find_waypoint(
-                    space_of(spaces, fleet.space[r]), terrain, roadmap, fleet.field[r],
-                    tours[row, r, tree.position[n, r]], tree.state[n, r, 0],
-                    tree.state[n, r, 1], fleet.passage[r], 0.0, waypoint,
+                to_first[r] = way_left(
+                    fleet, r, space_of(spaces, fleet.space[r]), terrain, roadmap,
+                    tours[row, r, tree.position[n, r]], tree.state[n, r], waypoint,
                 )  # fmt: skip
                 if to_first[r] == np.inf:
                     to_first[r] = tree.remaining[v] / fleet.plain[r]

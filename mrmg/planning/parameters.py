@@ -51,7 +51,7 @@ class PlannerParams:
     group_bias: float = 0.95
     steer_start: float = 1.0
     steer_decay: float = 0.9995
-    steer_least: float = 0.85
+    steer_least: float = 0.97
     region_m: float = 6.0
     route_margin: float = 0.08
     budget_s: float | None = None

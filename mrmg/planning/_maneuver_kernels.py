@@ -1,0 +1,176 @@
+"""Turning in tight places: the best of all short sequences of held motions.
+
+Where the way lies abeam or behind, or steering has run against something, a robot looks two
+or three motions ahead, each one of a few speeds and steering angles held for a while. It
+takes the first motion of the sequence after which it is, all told, nearest to its target:
+way driven + way to go + what turning towards that way still takes.
+"""
+
+from __future__ import annotations
+
+from math import atan2, cos, pi, sin
+
+import numpy as np
+
+from mrmg.compilation import kernel
+from mrmg.motion._kernels import step
+from mrmg.planning._random_kernels import random_unit
+from mrmg.planning._roadmap_kernels import find_waypoint
+from mrmg.planning._safety_kernels import toward_zero
+from mrmg.planning._steering_kernels import control_towards, wrap
+from mrmg.planning.fleet import PLANNING_MARGIN_M
+from mrmg.world._kernels import (
+    clearance_estimate,
+    footprint_is_clear,
+    place_footprint,
+)
+
+TURN_SHARE = 1.2
+"""Way that turning by one radian takes, in turning radii."""
+
+TIGHT_TURN = 2.0
+"""How much dearer turning round is where there is no room for it."""
+
+TAIL_FIRST = 0.6
+"""Radians of turning that leaving backwards is counted as."""
+
+TAIL_SHARE = 0.4
+"""Surcharge of each metre that would have to be driven backwards ..."""
+
+TAIL_REACH_M = 20.0
+"""... for at most this long."""
+
+SWITCH_M = 1.0
+"""Way that stopping to change the direction is counted as [m]."""
+
+
+@kernel
+def hold_motion(fleet, r, space, first, v, w, dt, steps, state):  # type: ignore[no-untyped-def]
+    """Drive at wanted (v, w) for `steps`, ending at rest before anything in the way.
+
+    Args:
+        fleet, r, space: robot and its free space.
+        first: state to begin with.
+        v, w: wanted speed and steering.
+        dt, steps: duration.
+        state: receives the state at the end.
+
+    Returns:
+        Way driven [m].
+    """
+    corners = fleet.corners[r]
+    placed = np.empty((corners, 2))
+    after = np.empty(5)
+    state[:] = first
+    way = 0.0
+    for _ in range(steps):
+        u1, u2 = control_towards(fleet, r, state, v, w, dt)
+        if state[3] * v < 0.0:
+            u1 = toward_zero(state[3], fleet.limit[r, 3], dt)
+        step(fleet.model[r], state, u1, u2, fleet.wheelbase[r], dt, after)
+        place_footprint(fleet.corner[r, :corners], after[0], after[1], after[2], placed)
+        c, s = cos(after[2]), sin(after[2])
+        mx, my = fleet.middle[r, 0], fleet.middle[r, 1]
+        if not footprint_is_clear(
+            space,
+            placed,
+            after[0] + c * mx - s * my,
+            after[1] + s * mx + c * my,
+            fleet.radius[r],
+            PLANNING_MARGIN_M,
+        ):
+            # Stopping takes some way; count it by going no farther.
+            state[3] = 0.0
+            return way
+        way += 0.5 * abs(state[3] + after[3]) * dt
+        state[:] = after
+    return way
+
+
+@kernel
+def way_left(fleet, r, space, terrain, roadmap, target, state, waypoint):  # type: ignore[no-untyped-def]
+    """Return the way to a target with what turning towards it takes [m]."""
+    to_go = find_waypoint(
+        space,
+        terrain,
+        roadmap,
+        fleet.field[r],
+        target,
+        state[0],
+        state[1],
+        fleet.passage[r],
+        12.0,
+        waypoint,
+    )
+    off = abs(wrap(atan2(waypoint[1] - state[1], waypoint[0] - state[0]) - state[2]))
+    turn = TURN_SHARE * fleet.turning_radius[r]
+    tail = turn * (pi - off + TAIL_FIRST) + TAIL_SHARE * min(to_go, TAIL_REACH_M)
+    if off > 0.5 * pi:
+        room = clearance_estimate(space, state[0], state[1])
+        tight = 0.5 * (fleet.turning_radius[r] + 2.0 - room)
+        turn *= 1.0 + TIGHT_TURN * max(0.0, min(1.0, tight))
+    return to_go + min(turn * off, tail)
+
+
+@kernel
+def best_maneuver(  # type: ignore[no-untyped-def]
+    fleet, r, space, terrain, roadmap, target, start, dt, steps, stalled, random, out
+):
+    """Find the first of the held motions that bring the robot on its way best.
+
+    Depth-first over sequences of two motions, or of three coarser ones for a robot that
+    has been stuck; ratings of a stuck robot get a random part, so that it tries others.
+
+    Args:
+        fleet, r, space, terrain, roadmap, target: robot, world and where it wants to go.
+        start: present state.
+        dt, steps: duration of each motion.
+        stalled: how often in a row the robot has not got on.
+        random: state of the generator.
+        out: receives the wanted (v, w).
+
+    Returns:
+        Whether the best sequence gets anywhere at all.
+    """
+    depth = 3 if stalled > 1 else 2
+    steerings = 3 if stalled > 1 else 5
+    noise = min(1.0 * stalled, 5.0)
+    states = np.empty((depth + 1, 5))
+    states[0] = start
+    motion = np.zeros(depth, np.int64)
+    driven = np.zeros(depth + 1)
+    speed = np.zeros(depth + 1)
+    speed[0] = start[3]
+    first = np.zeros(2)
+    waypoint = np.zeros(2)
+    best = np.inf
+    level = 0
+    while level >= 0:
+        if motion[level] == 2 * steerings:
+            motion[level] = 0
+            level -= 1
+            continue
+        i = motion[level]
+        motion[level] += 1
+        v = 0.7 * fleet.limit[r, 1] if i < steerings else fleet.limit[r, 0]
+        w = (2.0 * (i % steerings) / (steerings - 1) - 1.0) * fleet.limit[r, 2]
+        if level == 0:
+            first[0], first[1] = v, w
+        end = states[level + 1]
+        way = hold_motion(fleet, r, space, states[level], v, w, dt, steps, end)
+        if way < 0.05:
+            continue
+        switch = SWITCH_M if speed[level] * v < -1e-6 else 0.0
+        if level == 0:
+            switch += noise * random_unit(random)
+        driven[level + 1] = driven[level] + way + switch
+        speed[level + 1] = v
+        rating = driven[level + 1] + way_left(
+            fleet, r, space, terrain, roadmap, target, end, waypoint
+        )
+        if rating < best:
+            best = rating
+            out[0], out[1] = first[0], first[1]
+        if level + 1 < depth:
+            level += 1
+    return best < np.inf
