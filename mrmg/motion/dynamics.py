@@ -1,18 +1,20 @@
 """The equations of motion, stated once.
 
 Each factory takes the elementary functions it needs and returns the derivative of one
-motion model as a function of scalars. `math` gives the plain Python form (the verifier),
-numba compiles that form for the planner, and CasADi traces it for the controller.
+motion model as a function of scalars. `math` gives the plain Python form (the
+verifier), numba compiles that form for the planner, and CasADi traces it for the
+controller.
 
 State and control of both models (SI units):
 
 - `car`, the second-order car: state (x, y, theta, v, psi), control (u1, u2);
   x' = v cos theta, y' = v sin theta, theta' = v / L tan psi, v' = u1, psi' = u2.
-- `unicycle`, the second-order differential drive: state (x, y, theta, v, omega), control
-  (u1, u2); x' = v cos theta, y' = v sin theta, theta' = omega, v' = u1, omega' = u2.
+- `unicycle`, the second-order differential drive: state (x, y, theta, v, omega),
+  control (u1, u2); x' = v cos theta, y' = v sin theta, theta' = omega, v' = u1,
+  omega' = u2.
 
-The paper prints x' = cos theta and theta' = psi in eq. (1), which drops v and L; read as a
-second-order unicycle it is the second model.
+The paper prints x' = cos theta and theta' = psi in eq. (1), which drops v and L; read
+as a second-order unicycle it is the second model.
 """
 
 from __future__ import annotations
@@ -45,7 +47,10 @@ def car_derivative(sin: Any, cos: Any, tan: Any) -> Derivative:
 
 
 def unicycle_derivative(sin: Any, cos: Any, tan: Any) -> Derivative:
-    """Return f(theta, v, omega, u1, u2, L) -> (x', y', theta', v', omega'); L is unused."""
+    """Return f(theta, v, omega, u1, u2, L) -> (x', y', theta', v', omega').
+
+    L is unused.
+    """
 
     def derivative(theta, v, omega, u1, u2, wheelbase):  # type: ignore[no-untyped-def]
         return (v * cos(theta), v * sin(theta), omega, u1, u2)

@@ -1,9 +1,9 @@
 """Compiled geometry: distance field, footprint against obstacles, line of sight.
 
-Obstacles are stored as edges (the bounds' four sides included), bucketed on a coarse grid,
-and as a signed distance field on a fine one. The field answers the clear cases, since
-distance is 1-Lipschitz: d(p) >= d(cell centre) - |p - cell centre|. The edges answer the
-close ones exactly.
+Obstacles are stored as edges (the bounds' four sides included), bucketed on a coarse
+grid, and as a signed distance field on a fine one. The field answers the clear cases,
+since distance is 1-Lipschitz: d(p) >= d(cell centre) - |p - cell centre|. The edges
+answer the close ones exactly.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class FreeSpace(NamedTuple):
             outside the bounds, shape (ny, nx).
         bucket: side of a bucket [m].
         bucket_columns, bucket_rows: number of buckets.
-        bucket_start: first edge of each bucket in `bucket_edge`, shape (rows*cols + 1,).
+        bucket_start: first edge of each bucket, shape (rows * columns + 1,).
         bucket_edge: indices of the edges within `reach` of the bucket.
         reach: every edge within this distance of a point is in the point's bucket [m].
         edge: (x0, y0, x1, y1) [m], shape (n, 4).
@@ -143,12 +143,12 @@ def place_footprint(footprint, x, y, theta, out):  # type: ignore[no-untyped-def
 
 @kernel
 def clearance_at_least(space, x, y):  # type: ignore[no-untyped-def]
-    """Return a lower bound of the signed distance of a point from obstacles [m]."""
+    """Return a lower bound of the signed distance from obstacles [m]; -inf off grid."""
     rows, columns = space.distance.shape
     column = int(floor((x - space.x_min) / space.cell))
     row = int(floor((y - space.y_min) / space.cell))
     if column < 0 or row < 0 or column >= columns or row >= rows:
-        return -space.cell
+        return -np.inf
     dx = x - space.x_min - (column + 0.5) * space.cell
     dy = y - space.y_min - (row + 0.5) * space.cell
     return space.distance[row, column] - sqrt(dx * dx + dy * dy)
@@ -156,7 +156,7 @@ def clearance_at_least(space, x, y):  # type: ignore[no-untyped-def]
 
 @kernel
 def clearance_estimate(space, x, y):  # type: ignore[no-untyped-def]
-    """Return the signed distance of a point from obstacles [m], bilinear in the field."""
+    """Return the signed distance from obstacles [m], bilinear in the field."""
     rows, columns = space.distance.shape
     fx = (x - space.x_min) / space.cell - 0.5
     fy = (y - space.y_min) / space.cell - 0.5
@@ -177,9 +177,11 @@ def footprint_is_clear(space, placed, cx, cy, radius, margin):  # type: ignore[n
     Args:
         space: the free space; its `reach` is at least radius + margin.
         placed: corners in the world, shape (m, 2).
-        cx, cy: middle of the footprint in the world.
+        cx: x of the footprint's middle in the world.
+        cy: y of it.
         radius: distance of the farthest corner from the middle.
-        margin: required distance.
+        margin: required distance; with half the footprint's width more than a cell,
+            or else the field could take the far side of a wall for the near one.
     """
     bound = clearance_at_least(space, cx, cy)
     if bound > radius + margin:
@@ -336,8 +338,8 @@ def fill_rings(ring_start, point, x_min, y_min, cell, rows, columns):  # type: i
 def edge_distance_field(edge, x_min, y_min, cell, rows, columns):  # type: ignore[no-untyped-def]
     """Return the distance of each cell centre from the nearest edge [m].
 
-    Cells crossed by an edge know it exactly; sweeps in four directions hand the index of
-    the nearest edge on to the neighbours, which measure their own distance from it.
+    Cells crossed by an edge know it exactly; sweeps in four directions hand the index
+    of the nearest edge on to the neighbours, which measure their own distance from it.
     """
     nearest = np.full((rows, columns), -1, np.int64)
     distance = np.full((rows, columns), np.inf)
