@@ -27,7 +27,7 @@ from mrmg.execution.log import ExecutionLog
 from mrmg.ledger import EnergyLedger, LedgerEntry
 from mrmg.mission import Plan, Visit
 from mrmg.results.energy_audit import EnergyAudit, RobotAudit, SimulatedVisit
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Robot, Scene
 
 MEASURED_PARTS = ("drive", "idle")
 """The parts that work at the wheels can be split into."""
@@ -127,13 +127,7 @@ def _measure(scene: Scene, plan: Plan, log: ExecutionLog, index: int) -> _Measur
     robot = scene.robots[index]
     motion = LoggedMotion(robot=robot.id, time_s=log.time_s, state=log.state[index])
     visits = find_visits(scene, motion, plan.tours[robot.id])
-    model = robot.model.energy_model
-    driving_J, braking_J = log.work_J[index].T
-    drive_J = (
-        driving_J / model.drive_efficiency + braking_J * model.regeneration_efficiency
-    )
-    idle_J = model.idle_power_W * np.diff(log.time_s)
-    energy_J = np.stack([drive_J, idle_J], axis=-1)
+    energy_J = measured_step_energy(robot, log, index)
     content_J, arrival_J = battery_content(
         scene, robot.id, energy_J.sum(axis=1), visits
     )
@@ -144,6 +138,26 @@ def _measure(scene: Scene, plan: Plan, log: ExecutionLog, index: int) -> _Measur
         content_J=content_J,
         arrival_J=arrival_J,
     )
+
+
+def measured_step_energy(robot: Robot, log: ExecutionLog, index: int) -> np.ndarray:
+    """Return the measured energy of each tick by part [J].
+
+    Args:
+        robot: whose battery is drawn from.
+        log: what was driven.
+        index: of the robot in the log.
+
+    Returns:
+        By tick and part of `MEASURED_PARTS`, shape (n - 1, 2).
+    """
+    model = robot.model.energy_model
+    driving_J, braking_J = log.work_J[index].T
+    drive_J = (
+        driving_J / model.drive_efficiency + braking_J * model.regeneration_efficiency
+    )
+    idle_J = model.idle_power_W * np.diff(log.time_s)
+    return np.stack([drive_J, idle_J], axis=-1)
 
 
 def _measured_entries(item: _Measured) -> list[LedgerEntry]:
