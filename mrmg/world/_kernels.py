@@ -180,8 +180,7 @@ def footprint_is_clear(space, placed, cx, cy, radius, margin):  # type: ignore[n
         cx: x of the footprint's middle in the world.
         cy: y of it.
         radius: distance of the farthest corner from the middle.
-        margin: required distance; with half the footprint's width more than a cell,
-            or else the field could take the far side of a wall for the near one.
+        margin: required distance; with half the robot's width it exceeds a cell.
     """
     bound = clearance_at_least(space, cx, cy)
     if bound > radius + margin:
