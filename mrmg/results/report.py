@@ -7,7 +7,11 @@ from pathlib import Path
 from mrmg import shipped, storage
 from mrmg.results import report_page as html
 from mrmg.results import report_sections as sections
+from mrmg.results import style
+from mrmg.results.report_charts import chart_data
+from mrmg.results.report_map import mission_map
 from mrmg.results.report_record import RunRecord, read_record
+from mrmg.results.report_timeline import timeline
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
 
@@ -27,30 +31,62 @@ def write_report(run_folder: Path) -> None:
 
 def report_html(record: RunRecord) -> str:
     """Return the report as HTML."""
-    folder = record.folder
+    scene, plan, log = record.scene, record.plan, record.log
+    ids = [robot.id for robot in scene.robots]
+    light, dark = style.robot_colors(ids), style.robot_colors_on_dark(ids)
+    data = chart_data(scene, plan, log) if plan else None
+    places: dict[str, list[tuple[str, str]]] = {}
+    for chart in data["charts"] if data else ():
+        places.setdefault(chart["group"], []).append((chart["id"], chart["title"]))
     return html.page(
-        f"{record.scene.name}: mission report",
+        f"{scene.name}: mission report",
         [
-            f"<h1>{html.text(record.scene.name)}</h1>",
+            html.heading(scene.name),
             _verdict_line(record),
             html.tiles(_main_figures(record)),
-            html.section("Mission", html.video(folder / "mission.mp4")),
+            html.section("Map", *_map(record)),
+            html.section("Timeline", timeline(scene, plan, log) if plan else ""),
             html.section(
-                "Map", html.picture(folder / "overview.png", "Map with all paths")
-            ),
-            html.section(
-                "Battery content",
-                html.picture(folder / "energy.png", "Battery content over time")
-                if record.plan
-                else "",
+                "State of charge", html.charts(places.get("charge", ()), columns=2)
             ),
             html.section("Energy", *sections.energy(record)),
+            html.section("Energy by terrain", *sections.terrain(record)),
             html.section("Tours", *sections.tours(record)),
+            html.section("Tracking error", html.charts(places.get("tracking", ()))),
+            html.section(
+                "Distances", html.charts(places.get("distance", ()), columns=2)
+            ),
             html.section("Checks", *sections.checks(record)),
             html.section("Planner", sections.planner(record)),
+            html.section("Video", html.video(record.folder / "mission.mp4")),
             html.section("Reproduce", *_reproduce(record)),
         ],
+        colors=[(light[name], dark[name]) for name in ids],
+        data=data,
     )
+
+
+def _map(record: RunRecord) -> list[str]:
+    boxes = [html.toggle("layer", "targets", "goals and stations")]
+    if record.plan is not None:
+        boxes.append(html.toggle("layer", "planned", "planned paths"))
+    if record.log is not None:
+        boxes.append(html.toggle("layer", "driven", "driven paths"))
+    if record.plan is not None:
+        boxes += [
+            html.toggle("robot", robot.id, html.robot_dot(index, robot.id))
+            for index, robot in enumerate(record.scene.robots)
+        ]
+    return [
+        html.player() if record.plan else "",
+        html.controls(*boxes),
+        mission_map(record.scene, record.plan, record.log),
+        html.note(
+            "Wide line: planned. Thin line: driven. White: goal, filled with its "
+            "robot's colour once visited. ⚡: recharging station. ×: the energy of "
+            "driving there against plain ground. Point at anything for its name."
+        ),
+    ]
 
 
 def _verdict_line(record: RunRecord) -> str:

@@ -1,86 +1,105 @@
 """The look of the report page: its frame, and the few elements it is built from.
 
-The page is one file without references to anything outside the run folder: styles and
-pictures are inside it, and it follows the reader's light or dark scheme.
+The page is one file without references to anything outside the run folder: styles,
+script, data and the chart library (uPlot, MIT licence) are inside it, and it follows
+the reader's light or dark scheme. Styles and script lie in the folder `page`.
 """
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Iterable, Sequence
+import json
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
+from importlib.resources import files
 from pathlib import Path
 from string import Template
+from typing import Any
 
 _PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark">
 <link rel="icon" href="data:,">
 <title>$title</title>
 <style>
-:root { --page:#f4f5f7; --card:#fff; --ink:#1f2328; --soft:#5f6773; --line:#e1e4e8;
-  --good:#0b6e4f; --good-bg:#e2f4ec; --bad:#b00020; --bad-bg:#fbe6e8;
-  --accent:#0072b2; }
-@media (prefers-color-scheme: dark) { :root { --page:#101418; --card:#1a2027;
-  --ink:#e8ebef; --soft:#a4adba; --line:#323b46; --good:#6fd6ac; --good-bg:#12352a;
-  --bad:#ff8a80; --bad-bg:#40191d; --accent:#66b8e8; } }
-* { box-sizing:border-box; }
-body { margin:0; background:var(--page); color:var(--ink);
-  font:15px/1.5 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }
-main { max-width:1160px; margin:0 auto; padding:28px 20px 60px; }
-h1 { font-size:26px; margin:0 0 12px; }
-h2 { font-size:18px; margin:0 0 12px; }
-h3 { font-size:15px; margin:18px 0 6px; }
-section { background:var(--card); border:1px solid var(--line); border-radius:10px;
-  padding:18px 20px; margin-top:18px; }
-.verdict { border-radius:10px; padding:14px 18px; font-size:17px; border:1px solid; }
-.verdict b { margin-right:6px; }
-.good { color:var(--good); background:var(--good-bg); }
-.bad { color:var(--bad); background:var(--bad-bg); }
-.tiles { display:grid; grid-template-columns:repeat(auto-fit,minmax(140px,1fr));
-  gap:12px; margin-top:18px; }
-.tile { background:var(--card); border:1px solid var(--line); border-radius:10px;
-  padding:12px 14px; }
-.tile .name { color:var(--soft); font-size:13px; }
-.tile .value { font-size:22px; font-weight:650; font-variant-numeric:tabular-nums; }
-.tile .note { color:var(--soft); font-size:13px; }
-.scroll { overflow-x:auto; }
-table { border-collapse:collapse; width:100%; font-variant-numeric:tabular-nums; }
-th, td { padding:5px 10px; border-bottom:1px solid var(--line); text-align:right;
-  white-space:nowrap; }
-th { color:var(--soft); font-weight:600; font-size:13px; }
-th:first-child, td:first-child, .text { text-align:left; }
-tr.sum td { font-weight:650; }
-td.text.long { white-space:normal; }
-img, video { width:100%; height:auto; border-radius:6px; background:#fff;
-  display:block; }
-video { background:#000; }
-.dot { display:inline-block; width:11px; height:11px; border-radius:3px;
-  margin-right:7px; vertical-align:-1px; }
-.bar { display:flex; height:12px; border-radius:3px; overflow:hidden; min-width:180px; }
-.bar i { display:block; height:100%; }
-pre { background:var(--page); border:1px solid var(--line); border-radius:6px;
-  padding:10px 12px; overflow-x:auto; margin:0 0 12px;
-  font:13px/1.5 ui-monospace, "DejaVu Sans Mono", monospace; }
-p { margin:0 0 10px; } .soft { color:var(--soft); font-size:13.5px; }
-ul { margin:6px 0 0; padding-left:20px; } a { color:var(--accent); }
-@media print { section, .tile { break-inside:avoid; } }
+$styles
 </style>
 </head>
 <body><main>
 $body
-</main></body>
+</main>
+<div id="tip" role="tooltip" hidden></div>
+$scripts
+</body>
 </html>
 """)
+_NO_SCRIPT = (
+    "<noscript><p>The charts need JavaScript; energy.png and overview.png in the run "
+    "folder show the same.</p></noscript>"
+)
 
 
-def page(title: str, parts: Iterable[str]) -> str:
-    """Return the whole page; empty parts are left out."""
+def page(
+    title: str,
+    parts: Iterable[str],
+    *,
+    colors: Iterable[tuple[str, str]] = (),
+    data: Mapping[str, Any] | None = None,
+) -> str:
+    """Return the whole page; empty parts are left out.
+
+    Args:
+        title: of the window.
+        parts: HTML of the body.
+        colors: of the robots, in their order, on light and on dark; styles and script
+            know them as `--r0`, `--r1`, ...
+        data: what the page's script draws charts of; None for a page without charts.
+    """
     body = "\n".join(part for part in parts if part)
-    return _PAGE.substitute(title=escape(title), body=body)
+    styles = [*_color_rules(list(colors)), _asset("report.css")]
+    scripts = [_script(_asset("report.js"))]
+    if data is not None:
+        styles.insert(0, _asset("uPlot.min.css"))
+        library = f"/*\n{_asset('uPlot.LICENSE.txt')}*/\n{_asset('uPlot.iife.min.js')}"
+        # A closing tag inside a string would end the element that holds the data.
+        text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+        content = text.replace("</", "<\\/")
+        scripts = [
+            f'<script type="application/json" id="data">{content}</script>',
+            _script(library),
+            *scripts,
+            _NO_SCRIPT,
+        ]
+    return _PAGE.substitute(
+        title=escape(title),
+        styles="\n".join(styles),
+        body=body,
+        scripts="\n".join(scripts),
+    )
+
+
+def _asset(name: str) -> str:
+    return (files(__package__) / "page" / name).read_text(encoding="utf-8")
+
+
+def _script(source: str) -> str:
+    return f"<script>\n{source}</script>"
+
+
+def _color_rules(colors: list[tuple[str, str]]) -> list[str]:
+    light = "".join(f"--r{at}:{one};" for at, (one, _) in enumerate(colors))
+    dark = "".join(f"--r{at}:{one};" for at, (_, one) in enumerate(colors))
+    return [f":root {{ {light} }}", f":root[data-theme=dark] {{ {dark} }}"]
+
+
+def heading(title: str) -> str:
+    """Return the page's heading with the button that changes the scheme."""
+    return (
+        f"<header><h1>{escape(title)}</h1>"
+        '<button id="scheme" aria-label="Change between light and dark">☾ Dark</button>'
+        "</header>"
+    )
 
 
 def section(heading: str, *parts: str) -> str:
@@ -152,19 +171,68 @@ def bullets(items: Iterable[str]) -> str:
 
 
 def bar(parts: Iterable[tuple[float, str, str]], full: float) -> str:
-    """Return a stacked bar from (value, colour, name); `full` is its whole width."""
+    """Return a stacked bar from (value, colour, tip); `full` is its whole width."""
     pieces = [
         f'<i style="width:{100.0 * max(value, 0.0) / full:.2f}%;background:{color}" '
-        f'title="{escape(name)}"></i>'
-        for value, color, name in parts
+        f'data-tip="{escape(tip)}"></i>'
+        for value, color, tip in parts
         if full > 0.0
     ]
     return f'<div class="bar">{"".join(pieces)}</div>'
 
 
 def dot(color: str, content: str) -> str:
-    """Return text behind a coloured mark."""
-    return f'<span class="dot" style="background:{color}"></span>{escape(content)}'
+    """Return text behind a mark of a CSS colour."""
+    return f'<span class="dot" style="--c:{color}"></span>{escape(content)}'
+
+
+def robot_dot(index: int, content: str) -> str:
+    """Return text behind a mark of a robot's colour."""
+    return dot(f"var(--r{index})", content)
+
+
+def toggle(kind: str, value: str, label: str) -> str:
+    """Return a ticked box that shows and hides a `layer` of the map or a `robot`.
+
+    Args:
+        kind: "layer" or "robot".
+        value: name of the layer or id of the robot.
+        label: HTML beside the box.
+    """
+    return (
+        f'<label><input type="checkbox" checked data-toggle-{kind}="{escape(value)}"> '
+        f"{label}</label>"
+    )
+
+
+def controls(*parts: str) -> str:
+    """Return a row of things to click."""
+    return f'<div class="controls">{"".join(parts)}</div>'
+
+
+def player() -> str:
+    """Return the slider and the button that move the time shown on map and charts."""
+    speeds = "".join(
+        f'<option value="{value}"{" selected" if value == 8 else ""}>×{value}</option>'
+        for value in (1, 2, 4, 8, 16, 32)
+    )
+    return controls(
+        '<button id="play">▶ Play</button>',
+        f'<label>speed <select id="speed">{speeds}</select></label>',
+        '<input id="time" type="range" min="0" value="0" aria-label="Mission time">',
+        '<output class="readout" id="clock"></output>',
+    )
+
+
+def charts(identifiers: Iterable[tuple[str, str]], *, columns: int = 1) -> str:
+    """Return the places of charts from (id, title), which the page's script fills."""
+    boxes = "".join(
+        f'<div class="chart"><h3>{escape(title)}</h3>'
+        f'<div id="chart-{escape(name)}"></div></div>'
+        for name, title in identifiers
+    )
+    look = "charts two" if columns == 2 else "charts"
+    return f'<div class="{look}">{boxes}</div>' if boxes else ""
 
 
 def text(content: str) -> str:
@@ -180,14 +248,6 @@ def note(content: str) -> str:
 def code(content: str) -> str:
     """Return a command or other literal text."""
     return f"<pre>{escape(content)}</pre>"
-
-
-def picture(path: Path, description: str) -> str:
-    """Return a PNG file as part of the page; empty if there is no such file."""
-    if not path.exists():
-        return ""
-    data = base64.b64encode(path.read_bytes()).decode()
-    return f'<img alt="{escape(description)}" src="data:image/png;base64,{data}">'
 
 
 def video(path: Path) -> str:

@@ -9,9 +9,10 @@ from mrmg.energy import PARTS
 from mrmg.ledger import EnergyLedger
 from mrmg.mission import Plan
 from mrmg.results import report_page as html
-from mrmg.results import style
 from mrmg.results.energy_audit import EnergyAudit
+from mrmg.results.mission_series import energy_by_terrain
 from mrmg.results.report_record import RunRecord
+from mrmg.results.style import terrain_classes
 
 _PART_COLORS = {
     "rolling": "#4477AA",
@@ -27,16 +28,17 @@ def energy(record: RunRecord) -> list[str]:
     if record.plan is None:
         return []
     audit, plan = record.audit, record.plan
-    colors = style.scene_robot_colors(record.scene)
-    most_J = max((plan.ledger.total_J(robot=item) for item in colors), default=0.0)
+    dots = _robot_dots(record)
+    most_J = max((plan.ledger.total_J(robot=item) for item in dots), default=0.0)
     rows: list[list[str]] = []
     sums = []
-    for robot in (*colors, None):
+    for robot in (*dots, None):
         sums.append(len(rows))
-        name = html.dot(colors[robot], robot) if robot else "Fleet"
+        name = dots[robot] if robot else "Fleet"
         parts = [
-            (plan.ledger.total_J(robot=robot, part=part), _PART_COLORS[part], part)
+            (part_J, _PART_COLORS[part], f"{robot or 'fleet'}, {part}: {kJ(part_J)}")
             for part in PARTS
+            for part_J in [plan.ledger.total_J(robot=robot, part=part)]
         ]
         share = html.bar(parts, most_J) if robot else ""
         rows.append([name, "all", share, *_meters(plan, audit, robot, None)])
@@ -56,6 +58,44 @@ def energy(record: RunRecord) -> list[str]:
             "parts but driving and idling."
         ),
     ]
+
+
+def terrain(record: RunRecord) -> list[str]:
+    """Return the fleet's energy by terrain class and meter."""
+    if record.plan is None:
+        return []
+    classes = energy_by_terrain(record.scene, record.plan, record.log)
+    colors = {key: look.color for key, look in terrain_classes(record.scene).items()}
+    most_J = max((item.planned_J for item in classes), default=0.0)
+    rows = []
+    for item in classes:
+        color = colors.get(item.multiplier, "var(--quiet)")
+        tip = f"terrain ×{item.multiplier:g}: {kJ(item.planned_J)} planned"
+        rows.append(
+            [
+                html.dot(color, f"×{item.multiplier:g}"),
+                html.bar([(item.planned_J, color, tip)], most_J),
+                f"{item.planned_m:.1f} m",
+                "" if item.driven_m is None else f"{item.driven_m:.1f} m",
+                kJ(item.planned_J),
+                "" if item.metered_J is None else kJ(item.metered_J),
+                "" if item.measured_J is None else kJ(item.measured_J),
+                ""
+                if item.measured_J is None
+                else _percent(item.measured_J, item.planned_J),
+            ]
+        )
+    head = ["Terrain", "Planned by terrain", "Way planned", "Way driven", "Planned"]
+    head += ["Metered", "Measured", "Measured − planned"]
+    return [html.table(head, rows, text_columns=(0, 1))]
+
+
+def _robot_dots(record: RunRecord) -> dict[str, str]:
+    """Return each robot's id behind a mark of its colour."""
+    return {
+        robot.id: html.robot_dot(index, robot.id)
+        for index, robot in enumerate(record.scene.robots)
+    }
 
 
 def _meters(
@@ -79,12 +119,12 @@ def tours(record: RunRecord) -> list[str]:
     """Return every robot's tour: stops, arrivals, energy."""
     if record.plan is None:
         return []
-    colors = style.scene_robot_colors(record.scene)
+    dots = _robot_dots(record)
     head = ["Stop", "Target", "Kind", "Planned arrival", "Arrival", "Leg planned"]
     head += ["Leg measured", "Charge planned", "Charge on arrival"]
     parts = []
     for robot in record.plan.tours:
-        parts.append(f"<h3>{html.dot(colors[robot], robot)}</h3>")
+        parts.append(f"<h3>{dots[robot]}</h3>")
         rows = _tour_rows(record, record.plan, robot)
         parts.append(
             html.table(head, rows, text_columns=(0, 1, 2))

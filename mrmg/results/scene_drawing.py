@@ -280,22 +280,32 @@ def _title(scene: Scene) -> str:
     return f"{scene.name}: " + ", ".join(words)
 
 
-def _label_terrain(axes: Axes, scene: Scene, points: float) -> None:
+def terrain_spots(scene: Scene) -> list[tuple[float, float, float]]:
+    """Return where each visible terrain area has room for its name: (x, y, multiplier).
+
+    Areas that obstacles, targets or later areas cover altogether are left out.
+    """
     taken = [obstacle.shape for obstacle in scene.obstacles]
     taken += [target.region.shape.buffer(_LABEL_M) for target in scene.targets()]
     free = box(*scene.bounds).difference(unary_union(taken))
+    spots = []
     for rank, area in enumerate(scene.terrain):
         visible = area.shape.intersection(free)
         for later in scene.terrain[rank + 1 :]:
             visible = visible.difference(later.shape)
-        if visible.is_empty:
-            continue
-        spot = max(_polygons(visible), key=lambda part: part.area)
-        center = maximum_inscribed_circle(spot, tolerance=0.5).coords[0]
+        if not visible.is_empty:
+            widest = max(polygons_of(visible), key=lambda part: part.area)
+            x_m, y_m = maximum_inscribed_circle(widest, tolerance=0.5).coords[0]
+            spots.append((x_m, y_m, area.multiplier))
+    return spots
+
+
+def _label_terrain(axes: Axes, scene: Scene, points: float) -> None:
+    for x_m, y_m, multiplier in terrain_spots(scene):
         axes.text(
-            center[0],
-            center[1],
-            f"×{area.multiplier:g}",
+            x_m,
+            y_m,
+            f"×{multiplier:g}",
             fontsize=points,
             color=style.INK,
             ha="center",
@@ -336,7 +346,7 @@ def _marker(shape: str, face: str, edge: str, label: str) -> Line2D:
 
 
 def _add_shape(axes: Axes, shape: BaseGeometry, **look: object) -> None:
-    for polygon in _polygons(shape):
+    for polygon in polygons_of(shape):
         rings = [polygon.exterior, *polygon.interiors]
         outline = Outline.make_compound_path(
             *(Outline(np.asarray(ring.coords), closed=True) for ring in rings)
@@ -344,9 +354,10 @@ def _add_shape(axes: Axes, shape: BaseGeometry, **look: object) -> None:
         axes.add_patch(PathPatch(outline, **look))
 
 
-def _polygons(shape: BaseGeometry) -> list[Polygon]:
+def polygons_of(shape: BaseGeometry) -> list[Polygon]:
+    """Return the polygons a geometry is made of; lines and points are left out."""
     if isinstance(shape, Polygon):
         return [shape] if not shape.is_empty else []
     if isinstance(shape, MultiPolygon) or hasattr(shape, "geoms"):
-        return [part for item in shape.geoms for part in _polygons(item)]
+        return [part for item in shape.geoms for part in polygons_of(item)]
     return []

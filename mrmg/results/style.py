@@ -26,7 +26,11 @@ RESERVE = "#B00020"
 
 _HATCHES = ("..", "//", "xx", "\\\\", "++")
 _PALENESS = 0.25
+_WHITE = (1.0, 1.0, 1.0)
 _DARKEST_LUMINANCE = 0.26
+"""Lines of it have a contrast of 3.4 on white."""
+_LIGHTEST_LUMINANCE = 0.22
+"""Lines of it have a contrast of 4.3 on the dark page's cards."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +59,7 @@ def terrain_classes(scene: Scene) -> dict[float, TerrainClass]:
     classes = {
         value: TerrainClass(
             value,
-            _mixed(palette.terrain_colour(value), (1.0, 1.0, 1.0), _PALENESS),
+            _hex(_blend(palette.terrain_colour(value), _WHITE, _PALENESS)),
             _HATCHES[rank % len(_HATCHES)],
         )
         for rank, value in enumerate(multipliers)
@@ -68,6 +72,11 @@ def terrain_classes(scene: Scene) -> dict[float, TerrainClass]:
 def robot_colors(robots: Sequence[str]) -> dict[str, str]:
     """Return a colour by robot id (scene's order) that is dark enough for lines."""
     return {robot: _ink(palette.robot_colour(at)) for at, robot in enumerate(robots)}
+
+
+def robot_colors_on_dark(robots: Sequence[str]) -> dict[str, str]:
+    """Return a colour by robot id (scene's order) that is light enough on dark."""
+    return {robot: _glow(palette.robot_colour(at)) for at, robot in enumerate(robots)}
 
 
 def scene_robot_colors(scene: Scene) -> dict[str, str]:
@@ -98,17 +107,28 @@ def rgb(color: str) -> tuple[int, int, int]:
 
 def _ink(color: palette.Rgb) -> str:
     red, green, blue = color
-    # Relative luminance after WCAG 2.2; 0.26 gives a contrast of 3.4 on white.
-    luminance = 0.2126 * red**2.2 + 0.7152 * green**2.2 + 0.0722 * blue**2.2
-    scale = min(1.0, (_DARKEST_LUMINANCE / luminance) ** (1 / 2.2))
+    scale = min(1.0, (_DARKEST_LUMINANCE / _luminance(color)) ** (1 / 2.2))
     return _hex((red * scale, green * scale, blue * scale))
 
 
-def _mixed(color: palette.Rgb, other: palette.Rgb, share: float) -> str:
+def _glow(color: palette.Rgb) -> str:
+    share = 0.0
+    while _luminance(_blend(color, _WHITE, share)) < _LIGHTEST_LUMINANCE:
+        share += 0.05
+    return _hex(_blend(color, _WHITE, share))
+
+
+def _luminance(color: palette.Rgb) -> float:
+    """Return the relative luminance after WCAG 2.2, its curve simplified."""
+    red, green, blue = color
+    return float(0.2126 * red**2.2 + 0.7152 * green**2.2 + 0.0722 * blue**2.2)
+
+
+def _blend(color: palette.Rgb, other: palette.Rgb, share: float) -> palette.Rgb:
     red, green, blue = (
         (1.0 - share) * a + share * b for a, b in zip(color, other, strict=True)
     )
-    return _hex((red, green, blue))
+    return red, green, blue
 
 
 def _hex(color: palette.Rgb) -> str:

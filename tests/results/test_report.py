@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -12,6 +13,7 @@ import pytest
 from mrmg import storage
 from mrmg.errors import RunFolderError
 from mrmg.execution.log import Contact
+from mrmg.results import report_page as html
 from mrmg.results.audit import audit
 from mrmg.results.energy_plot import draw_energy
 from mrmg.results.overview import draw_overview
@@ -60,7 +62,7 @@ class Page(HTMLParser):
             self.headings.append(data)
         if "td" in self.open:
             self.cells[-1] += data
-        if "style" not in self.open:
+        if not {"style", "script"} & {*self.open}:
             self.words += data
 
 
@@ -108,12 +110,26 @@ def test_page_stands_alone_and_follows_the_reader_s_scheme(mission, tmp_path) ->
     write_report(tmp_path)
     source = (tmp_path / "report.html").read_text()
     page = Page(source)
-    inside = [item for item in page.references if item.startswith("data:")]
-    assert len(inside) == 3  # the empty icon, the map and the battery plot
-    assert set(page.references) - set(inside) == {"mission.mp4"}
-    assert not re.search(r"https?://|@import|url\(", source)
+    assert set(page.references) == {"data:,", "mission.mp4"}
+    assert not re.search(r"@import|url\(|fetch\(|XMLHttpRequest|import\(", source)
     assert "prefers-color-scheme: dark" in source
-    assert "<script" not in source
+
+
+def test_the_library_s_licence_goes_with_it(mission, tmp_path) -> None:
+    fill(tmp_path, *mission)
+    write_report(tmp_path)
+    source = (tmp_path / "report.html").read_text()
+    assert "The MIT License" in source
+    assert "Copyright (c) 2022 Leon Sorokin" in source
+
+
+def test_data_cannot_end_the_element_that_holds_it() -> None:
+    data = {"name": "</script><b>'\"&"}
+    source = html.page("<t>", ["<p>here</p>"], data=data)
+    assert Page(source).open == []
+    held = re.search(r'id="data">(.*?)</script>', source, re.DOTALL)
+    assert held is not None
+    assert json.loads(held.group(1)) == data
 
 
 def test_page_of_a_good_run_says_what_the_files_say(mission, tmp_path) -> None:
@@ -125,9 +141,13 @@ def test_page_of_a_good_run_says_what_the_files_say(mission, tmp_path) -> None:
     assert "Mission accomplished: 1 robot visited the goal" in page.words
     assert page.headings == [
         "Map",
-        "Battery content",
+        "Timeline",
+        "State of charge",
         "Energy",
+        "Energy by terrain",
         "Tours",
+        "Tracking error",
+        "Distances",
         "Checks",
         "Planner",
         "Reproduce",

@@ -1,0 +1,194 @@
+"use strict";
+/* One state, the time and what is shown, that map, timeline and charts follow. */
+(() => {
+  const root = document.documentElement;
+  const all = (selector, within = document) => [...within.querySelectorAll(selector)];
+  const one = (selector) => document.querySelector(selector);
+  const color = (name) => getComputedStyle(root).getPropertyValue(name).trim();
+  const source = one("#data");
+  const data = source ? JSON.parse(source.textContent) : null;
+
+  /* Scheme: the reader's, until the button says otherwise. */
+  const reader = matchMedia("(prefers-color-scheme: dark)");
+  let chosen = null;
+  function applyScheme() {
+    const dark = chosen === null ? reader.matches : chosen === "dark";
+    root.dataset.theme = dark ? "dark" : "light";
+    one("#scheme").textContent = dark ? "☀ Light" : "☾ Dark";
+    if (data) drawCharts();
+  }
+  reader.addEventListener("change", applyScheme);
+  one("#scheme").addEventListener("click", () => {
+    chosen = root.dataset.theme === "dark" ? "light" : "dark";
+    applyScheme();
+  });
+
+  /* What things are, on hover and on focus. */
+  const tip = one("#tip");
+  function tell(element, x, y) {
+    tip.hidden = !element;
+    if (!element) return;
+    tip.textContent = element.dataset.tip;
+    const room = document.documentElement.clientWidth - tip.offsetWidth - 8;
+    tip.style.left = `${Math.max(4, Math.min(x + 14, room))}px`;
+    tip.style.top = `${y + 18}px`;
+  }
+  document.addEventListener("pointermove", (event) => {
+    tell(event.target.closest("[data-tip]"), event.clientX, event.clientY);
+  });
+  document.addEventListener("focusin", (event) => {
+    const element = event.target.closest("[data-tip]");
+    if (!element) return;
+    const box = element.getBoundingClientRect();
+    tell(element, box.left, box.bottom - 18);
+  });
+  document.addEventListener("focusout", () => tell(null));
+
+  /* Charts. */
+  const charts = [];
+  const hiddenRobots = new Set();
+  const DASHES = [[], [9, 4], [3, 3], [12, 3, 3, 3]];
+  function lineOf(series) {
+    const at = data.robots.findIndex((robot) => robot.id === series.robot);
+    const own = color(`--r${at}`);
+    const looks = {
+      planned: { stroke: `${own}66`, width: 5, dash: [] },
+      simulated: { stroke: own, width: 1.6, dash: [] },
+      limit: { stroke: color("--bad"), width: 1.4, dash: [6, 4] },
+      robot: { stroke: own, width: 1.6, dash: DASHES[at % DASHES.length] },
+    };
+    return looks[series.kind];
+  }
+  function valueText(chart) {
+    return (u, value) =>
+      value === null || value === undefined ? "–" : `${value.toFixed(chart.digits)} ${chart.unit}`;
+  }
+  function axis(extra) {
+    return {
+      stroke: color("--soft"),
+      grid: { stroke: color("--line"), width: 1 },
+      ticks: { stroke: color("--line"), width: 1 },
+      font: "12px system-ui, sans-serif",
+      ...extra,
+    };
+  }
+  function drawChart(chart) {
+    const place = document.getElementById(`chart-${chart.id}`);
+    place.replaceChildren();
+    const series = chart.series.map((item) => {
+      const look = lineOf(item);
+      return { label: item.label, value: valueText(chart), points: { show: false },
+        show: !hiddenRobots.has(item.robot), ...look };
+    });
+    const range = chart.range ? () => chart.range : (u, low, high) => [0, (high || 1) * 1.06];
+    const plot = new uPlot({
+      width: place.clientWidth,
+      height: 190,
+      cursor: { sync: { key: "time", setSeries: false }, y: false },
+      scales: { x: { time: false }, y: { range } },
+      axes: [
+        axis({ values: (u, ticks) => ticks.map((at) => `${at} s`), size: 34 }),
+        axis({ values: (u, ticks) => ticks.map((at) => `${at} ${chart.unit}`), size: 58 }),
+      ],
+      series: [{ label: "time", value: (u, at) => (at === null ? "–" : `${at.toFixed(1)} s`) },
+        ...series],
+      legend: { markers: { width: (u, at) => (at ? Math.max(2, series[at - 1].width) : 0) } },
+      hooks: { setCursor: [(u) => {
+        const index = u.cursor.idx;
+        if (u.cursor.event && index !== null && index !== undefined && index !== shownIndex) show(index);
+      }] },
+    }, [data.time_s, ...chart.series.map((item) => item.values)], place);
+    all(".u-legend th", place).slice(1).forEach((head) => {
+      head.tabIndex = 0;
+      head.setAttribute("role", "button");
+      head.addEventListener("keydown", (event) => {
+        if (event.key === "Enter" || event.key === " ") { event.preventDefault(); head.click(); }
+      });
+    });
+    return plot;
+  }
+  function drawCharts() {
+    charts.splice(0).forEach((plot) => plot.destroy());
+    charts.push(...data.charts.map(drawChart));
+  }
+
+  /* The time shown. */
+  const slider = one("#time");
+  let shownIndex = 0;
+  function show(index) {
+    shownIndex = index;
+    const time = data.time_s[index];
+    const end = data.time_s[data.time_s.length - 1];
+    data.robots.forEach((robot) => {
+      const group = one(`#map .robot[data-robot="${CSS.escape(robot.id)}"]`);
+      const x = robot.x[index], y = robot.y[index];
+      group.querySelector(".body").setAttribute("transform", `translate(${x} ${y}) rotate(${robot.turn[index]})`);
+      const name = group.querySelector(".name");
+      name.setAttribute("x", x);
+      name.setAttribute("y", y);
+    });
+    const done = new Map(data.visits
+      .filter((visit) => visit.kind === "goal" && visit.time_s <= time + 1e-6)
+      .map((visit) => [visit.target, visit.robot]));
+    all("#map .goal").forEach((goal) => goal.classList.toggle("done", done.has(goal.dataset.target)));
+    const mark = one(".timeline .now");
+    mark.hidden = false;
+    mark.style.left = `${(100 * time) / Number(one(".timeline").dataset.end || end)}%`;
+    slider.value = index;
+    one("#clock").textContent = `${time.toFixed(1)} s, ${done.size} of ${all("#map .goal").length} goals`;
+  }
+  let playing = null;
+  function play() {
+    const button = one("#play");
+    if (playing !== null) {
+      cancelAnimationFrame(playing);
+      playing = null;
+      button.textContent = "▶ Play";
+      return;
+    }
+    button.textContent = "⏸ Pause";
+    const last = data.time_s.length - 1;
+    if (shownIndex >= last) shownIndex = 0;
+    const start = performance.now(), from = data.time_s[shownIndex];
+    const speed = Number(one("#speed").value);
+    const step = (now) => {
+      const time = from + (speed * (now - start)) / 1000;
+      let index = shownIndex;
+      while (index < last && data.time_s[index + 1] <= time) index += 1;
+      if (index !== shownIndex) show(index);
+      if (index >= last) { playing = 1; play(); return; }
+      playing = requestAnimationFrame(step);
+    };
+    playing = requestAnimationFrame(step);
+  }
+
+  /* Toggles. */
+  function toggleRobot(id, shown) {
+    if (shown) hiddenRobots.delete(id); else hiddenRobots.add(id);
+    all(`#map [data-robot="${CSS.escape(id)}"]`).forEach((part) => { part.style.display = shown ? "" : "none"; });
+    data.charts.forEach((chart, number) => chart.series.forEach((item, at) => {
+      if (item.robot === id) charts[number].setSeries(at + 1, { show: shown });
+    }));
+  }
+  function toggleLayer(name, shown) {
+    all(`#map [data-layer="${name}"]`).forEach((group) => { group.style.display = shown ? "" : "none"; });
+  }
+  all("input[data-toggle-layer]").forEach((box) =>
+    box.addEventListener("change", () => toggleLayer(box.dataset.toggleLayer, box.checked)));
+  all("input[data-toggle-robot]").forEach((box) =>
+    box.addEventListener("change", () => toggleRobot(box.dataset.toggleRobot, box.checked)));
+
+  applyScheme();
+  if (data) {
+    slider.max = data.time_s.length - 1;
+    slider.addEventListener("input", () => show(Number(slider.value)));
+    one("#play").addEventListener("click", play);
+    let width = innerWidth;
+    addEventListener("resize", () => {
+      if (innerWidth === width) return;
+      width = innerWidth;
+      charts.forEach((plot) => plot.setSize({ width: plot.root.parentElement.clientWidth, height: 190 }));
+    });
+    show(0);
+  }
+})();
