@@ -36,6 +36,11 @@ def cache_folder() -> Path:
 
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))
+# Vectorisers and the last optimisation level double the time to compile and gain nothing
+# on kernels that branch at every step (measured on the planner's).
+os.environ.setdefault("NUMBA_OPT", "2")
+os.environ.setdefault("NUMBA_LOOP_VECTORIZE", "0")
+os.environ.setdefault("NUMBA_SLP_VECTORIZE", "0")
 
 import numba  # noqa: E402  (must follow the cache setting)
 

@@ -20,7 +20,7 @@ _unicycle_step = numba.njit(rk4_step(numba.njit(unicycle_derivative(sin, cos, ta
 
 
 @kernel
-def step(model, state, u1, u2, wheelbase, dt, out):  # type: ignore[no-untyped-def]
+def step(model, state, u1, u2, wheelbase, dt, out):
     """Write the state after `dt` under held controls into `out`, shape (5,)."""
     if model == CAR:
         x, y, theta, v, w = _car_step(
@@ -34,6 +34,6 @@ def step(model, state, u1, u2, wheelbase, dt, out):  # type: ignore[no-untyped-d
 
 
 @kernel
-def tan_steer(model, w):  # type: ignore[no-untyped-def]
+def tan_steer(model, w):
     """Return tan psi for the energy model's turning part; 0 for a unicycle."""
     return tan(w) if model == CAR else 0.0

@@ -14,11 +14,11 @@ import numpy as np
 
 from mrmg.compilation import kernel
 from mrmg.motion._kernels import step
+from mrmg.planning._fleet_kernels import PLANNING_MARGIN_M, space_of
+from mrmg.planning._mission_kernels import look_ahead
 from mrmg.planning._random_kernels import random_unit
-from mrmg.planning._roadmap_kernels import find_waypoint
 from mrmg.planning._safety_kernels import toward_zero
 from mrmg.planning._steering_kernels import control_towards, wrap
-from mrmg.planning.fleet import PLANNING_MARGIN_M
 from mrmg.world._kernels import (
     clearance_estimate,
     footprint_is_clear,
@@ -44,26 +44,35 @@ SWITCH_M = 1.0
 """Way that stopping to change the direction is counted as [m]."""
 
 
+MANEUVER_STEPS = 20
+"""Length of each motion, in steps."""
+
+MANEUVER_VIEW_M = 12.0
+"""How far along the way a rated state looks [m]."""
+
+
 @kernel
-def hold_motion(fleet, r, space, first, v, w, dt, steps, state):  # type: ignore[no-untyped-def]
-    """Drive at wanted (v, w) for `steps`, ending at rest before anything in the way.
+def hold_motion(mission, r, first, v, w, state):
+    """Drive at wanted (v, w) for MANEUVER_STEPS, or up to whatever is in the way.
 
     Args:
-        fleet, r, space: robot and its free space.
+        mission, r: the problem and the robot.
         first: state to begin with.
         v, w: wanted speed and steering.
-        dt, steps: duration.
         state: receives the state at the end.
 
     Returns:
         Way driven [m].
     """
+    fleet = mission.fleet
+    dt = mission.params.dt
+    space = space_of(mission.spaces, fleet.space[r])
     corners = fleet.corners[r]
     placed = np.empty((corners, 2))
     after = np.empty(5)
     state[:] = first
     way = 0.0
-    for _ in range(steps):
+    for _ in range(MANEUVER_STEPS):
         u1, u2 = control_towards(fleet, r, state, v, w, dt)
         if state[3] * v < 0.0:
             u1 = toward_zero(state[3], fleet.limit[r, 3], dt)
@@ -79,7 +88,6 @@ def hold_motion(fleet, r, space, first, v, w, dt, steps, state):  # type: ignore
             fleet.radius[r],
             PLANNING_MARGIN_M,
         ):
-            # Stopping takes some way; count it by going no farther.
             state[3] = 0.0
             return way
         way += 0.5 * abs(state[3] + after[3]) * dt
@@ -88,24 +96,15 @@ def hold_motion(fleet, r, space, first, v, w, dt, steps, state):  # type: ignore
 
 
 @kernel
-def way_left(fleet, r, space, terrain, roadmap, target, state, waypoint):  # type: ignore[no-untyped-def]
+def way_left(mission, r, target, state, waypoint):
     """Return the way to a target with what turning towards it takes [m]."""
-    to_go = find_waypoint(
-        space,
-        terrain,
-        roadmap,
-        fleet.field[r],
-        target,
-        state[0],
-        state[1],
-        fleet.passage[r],
-        12.0,
-        waypoint,
-    )
+    fleet = mission.fleet
+    to_go = look_ahead(mission, r, target, state, MANEUVER_VIEW_M, waypoint)
     off = abs(wrap(atan2(waypoint[1] - state[1], waypoint[0] - state[0]) - state[2]))
     turn = TURN_SHARE * fleet.turning_radius[r]
     tail = turn * (pi - off + TAIL_FIRST) + TAIL_SHARE * min(to_go, TAIL_REACH_M)
     if off > 0.5 * pi:
+        space = space_of(mission.spaces, fleet.space[r])
         room = clearance_estimate(space, state[0], state[1])
         tight = 0.5 * (fleet.turning_radius[r] + 2.0 - room)
         turn *= 1.0 + TIGHT_TURN * max(0.0, min(1.0, tight))
@@ -113,28 +112,26 @@ def way_left(fleet, r, space, terrain, roadmap, target, state, waypoint):  # typ
 
 
 @kernel
-def best_maneuver(  # type: ignore[no-untyped-def]
-    fleet, r, space, terrain, roadmap, target, start, dt, steps, stalled, random, out
-):
+def best_maneuver(mission, r, target, start, stuck, random, out):
     """Find the first of the held motions that bring the robot on its way best.
 
     Depth-first over sequences of two motions, or of three coarser ones for a robot that
     has been stuck; ratings of a stuck robot get a random part, so that it tries others.
 
     Args:
-        fleet, r, space, terrain, roadmap, target: robot, world and where it wants to go.
+        mission, r, target: the problem, the robot and where it wants to go.
         start: present state.
-        dt, steps: duration of each motion.
-        stalled: how often in a row the robot has not got on.
+        stuck: how often it has tried in vain.
         random: state of the generator.
         out: receives the wanted (v, w).
 
     Returns:
         Whether the best sequence gets anywhere at all.
     """
-    depth = 3 if stalled > 1 else 2
-    steerings = 3 if stalled > 1 else 5
-    noise = min(1.0 * stalled, 5.0)
+    limit = mission.fleet.limit
+    depth = 3 if stuck > 1 else 2
+    steerings = 3 if stuck > 1 else 5
+    noise = min(1.0 * stuck, 5.0)
     states = np.empty((depth + 1, 5))
     states[0] = start
     motion = np.zeros(depth, np.int64)
@@ -152,22 +149,20 @@ def best_maneuver(  # type: ignore[no-untyped-def]
             continue
         i = motion[level]
         motion[level] += 1
-        v = 0.7 * fleet.limit[r, 1] if i < steerings else fleet.limit[r, 0]
-        w = (2.0 * (i % steerings) / (steerings - 1) - 1.0) * fleet.limit[r, 2]
+        v = 0.7 * limit[r, 1] if i < steerings else limit[r, 0]
+        w = (2.0 * (i % steerings) / (steerings - 1) - 1.0) * limit[r, 2]
         if level == 0:
             first[0], first[1] = v, w
         end = states[level + 1]
-        way = hold_motion(fleet, r, space, states[level], v, w, dt, steps, end)
+        way = hold_motion(mission, r, states[level], v, w, end)
         if way < 0.05:
             continue
-        switch = SWITCH_M if speed[level] * v < -1e-6 else 0.0
+        extra = SWITCH_M if speed[level] * v < -1e-6 else 0.0
         if level == 0:
-            switch += noise * random_unit(random)
-        driven[level + 1] = driven[level] + way + switch
+            extra += noise * random_unit(random)
+        driven[level + 1] = driven[level] + way + extra
         speed[level + 1] = v
-        rating = driven[level + 1] + way_left(
-            fleet, r, space, terrain, roadmap, target, end, waypoint
-        )
+        rating = driven[level + 1] + way_left(mission, r, target, end, waypoint)
         if rating < best:
             best = rating
             out[0], out[1] = first[0], first[1]

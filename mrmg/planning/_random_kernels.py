@@ -8,7 +8,7 @@ from mrmg.compilation import kernel
 
 
 @kernel
-def random_unit(state):  # type: ignore[no-untyped-def]
+def random_unit(state):
     """Return a number in [0, 1) and advance `state` (uint64, shape (1,)): splitmix64."""
     state[0] += np.uint64(0x9E3779B97F4A7C15)
     z = state[0]
@@ -19,6 +19,6 @@ def random_unit(state):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def random_below(state, n):  # type: ignore[no-untyped-def]
+def random_below(state, n):
     """Return an integer in [0, n)."""
     return int(random_unit(state) * n)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import hypot
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,30 @@ from mrmg.world._kernels import (
     segment_weighted_length,
 )
 
+
+class RoadmapArrays(NamedTuple):
+    """The roadmap as the kernels see it; V vertices, T targets, F travel classes.
+
+    Attributes:
+        vertex: positions [m], shape (V, 2); the first T are the targets' centres.
+        cost_to_go: weighted length to each target [m], shape (F, T, V); inf where cut off.
+        successor: next vertex on the way to each target, -1 at the end, shape (F, T, V).
+        x_min, y_min, bucket, columns, rows, bucket_start, bucket_vertex: a coarse grid of
+            the vertices.
+    """
+
+    vertex: np.ndarray
+    cost_to_go: np.ndarray
+    successor: np.ndarray
+    x_min: float
+    y_min: float
+    bucket: float
+    columns: int
+    rows: int
+    bucket_start: np.ndarray
+    bucket_vertex: np.ndarray
+
+
 TIGHT_M = 0.7
 """Clearance beyond the passage below which driving is made dearer in the roadmap."""
 
@@ -22,7 +47,7 @@ TIGHT_SHARE = 0.35
 
 
 @kernel
-def edge_costs(space, terrain, vertex, first, second, passage):  # type: ignore[no-untyped-def]
+def edge_costs(space, terrain, vertex, first, second, passage):
     """Return the weighted length [m] of candidate edges; inf where they are blocked.
 
     An edge through a tight passage costs up to TIGHT_SHARE more: driving there takes
@@ -48,9 +73,7 @@ NEAR_M = 2.5
 
 
 @kernel
-def find_waypoint(  # type: ignore[no-untyped-def]
-    space, terrain, roadmap, field, target, x, y, passage, view, out
-):
+def find_waypoint(space, terrain, roadmap, field, target, x, y, passage, view, out):
     """Find the point to drive at from (x, y) on the way to a target.
 
     The way is the roadmap's: of the near vertices the one with the least energy through
@@ -60,7 +83,7 @@ def find_waypoint(  # type: ignore[no-untyped-def]
 
     Args:
         space, terrain: the world.
-        roadmap: `roadmap.RoadmapArrays`.
+        roadmap: the roadmap.
         field: index of the cost-to-go fields.
         target: number of the target.
         x, y: position [m].
@@ -99,9 +122,7 @@ def find_waypoint(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def best_vertex(  # type: ignore[no-untyped-def]
-    space, terrain, roadmap, field, target, x, y, comfortable, needed
-):
+def best_vertex(space, terrain, roadmap, field, target, x, y, comfortable, needed):
     """Return (vertex in sight with the least energy through it, that energy [m]).
 
     Looks in growing squares of buckets; vertices seen with comfortable clearance come

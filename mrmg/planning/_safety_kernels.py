@@ -16,9 +16,8 @@ import numpy as np
 
 from mrmg.compilation import kernel
 from mrmg.motion._kernels import UNICYCLE, step
-from mrmg.planning.fleet import PLANNING_MARGIN_M, ROBOT_MARGIN_M
+from mrmg.planning._fleet_kernels import PLANNING_MARGIN_M, ROBOT_MARGIN_M, space_of
 from mrmg.world._kernels import (
-    FreeSpace,
     convex_convex_distance,
     footprint_is_clear,
     place_footprint,
@@ -49,7 +48,7 @@ class Commitment(NamedTuple):
 
 
 @kernel
-def new_commitment(fleet, dt):  # type: ignore[no-untyped-def]
+def new_commitment(fleet, dt):
     """Return an empty commitment large enough for the fleet's longest braking."""
     robots, corners, _ = fleet.corner.shape
     longest = 0
@@ -69,7 +68,7 @@ def new_commitment(fleet, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def toward_zero(value, bound, dt):  # type: ignore[no-untyped-def]
+def toward_zero(value, bound, dt):
     """Return the rate that brings `value` to 0 as fast as `bound` allows."""
     if abs(value) < REST:
         return 0.0
@@ -77,7 +76,7 @@ def toward_zero(value, bound, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def braking_control(fleet, r, state, dt):  # type: ignore[no-untyped-def]
+def braking_control(fleet, r, state, dt):
     """Return the control (u1, u2) of full braking; a car holds its steering."""
     u1 = toward_zero(state[3], fleet.limit[r, 3], dt)
     u2 = 0.0
@@ -87,13 +86,13 @@ def braking_control(fleet, r, state, dt):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def stands(fleet, r, state):  # type: ignore[no-untyped-def]
+def stands(fleet, r, state):
     """Tell whether a robot is at rest."""
     return abs(state[3]) < REST and (fleet.model[r] != UNICYCLE or abs(state[4]) < REST)
 
 
 @kernel
-def write_braking(fleet, r, first, dt, commitment, slot):  # type: ignore[no-untyped-def]
+def write_braking(fleet, r, first, dt, commitment, slot):
     """Fill a slot with `first` and the braking that follows it."""
     states = commitment.state[r, slot]
     states[0] = first
@@ -114,25 +113,7 @@ def write_braking(fleet, r, first, dt, commitment, slot):  # type: ignore[no-unt
 
 
 @kernel
-def space_of(spaces, index):  # type: ignore[no-untyped-def]
-    """Return one free space of the stack."""
-    return FreeSpace(
-        spaces.x_min,
-        spaces.y_min,
-        spaces.cell,
-        spaces.distance[index],
-        spaces.bucket,
-        spaces.bucket_columns,
-        spaces.bucket_rows,
-        spaces.bucket_start[index],
-        spaces.bucket_edge,
-        spaces.reach,
-        spaces.edge,
-    )
-
-
-@kernel
-def clear_of_obstacles(fleet, spaces, commitment, r, slot, first):  # type: ignore[no-untyped-def]
+def clear_of_obstacles(fleet, spaces, commitment, r, slot, first):
     """Tell whether a slot's states from `first` on keep the margin from obstacles."""
     space = space_of(spaces, fleet.space[r])
     for k in range(first, commitment.count[r, slot]):
@@ -149,7 +130,7 @@ def clear_of_obstacles(fleet, spaces, commitment, r, slot, first):  # type: igno
 
 
 @kernel
-def clear_of_robot(fleet, commitment, r, slot, first, other, other_first, margin):  # type: ignore[no-untyped-def]
+def clear_of_robot(fleet, commitment, r, slot, first, other, other_first, margin):
     """Tell whether two committed motions keep `margin`, step by step.
 
     State `first + k` of robot r is compared with state `other_first + k` of the other;
@@ -182,7 +163,7 @@ def clear_of_robot(fleet, commitment, r, slot, first, other, other_first, margin
 
 
 @kernel
-def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):  # type: ignore[no-untyped-def]
+def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):
     """Replace robot r's commitment by one step of a control and braking, if it is safe.
 
     Args:
@@ -194,7 +175,7 @@ def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):  # type: ign
         dt: step [s].
 
     Returns:
-        0 on success, 1 if an obstacle forbids it, 2 if another robot does.
+        Whether it was safe.
     """
     active = commitment.active[r]
     slot = 1 - active
@@ -203,7 +184,7 @@ def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):  # type: ign
     step(fleet.model[r], state, u1, u2, fleet.wheelbase[r], dt, after)
     write_braking(fleet, r, after, dt, commitment, slot)
     if not clear_of_obstacles(fleet, spaces, commitment, r, slot, 0):
-        return 1
+        return False
     for other in range(len(fleet.model)):
         if other == r:
             continue
@@ -212,20 +193,20 @@ def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):  # type: ign
         if not clear_of_robot(
             fleet, commitment, r, slot, 0, other, other_first, ROBOT_MARGIN_M
         ):
-            return 2
+            return False
     commitment.active[r] = slot
     commitment.now[r] = 0
-    return 0
+    return True
 
 
 @kernel
-def follow_braking(commitment, r):  # type: ignore[no-untyped-def]
+def follow_braking(commitment, r):
     """Advance robot r one step along its commitment."""
     last = commitment.count[r, commitment.active[r]] - 1
     commitment.now[r] = min(commitment.now[r] + 1, last)
 
 
 @kernel
-def present_state(commitment, r):  # type: ignore[no-untyped-def]
+def present_state(commitment, r):
     """Return robot r's present state, a view of shape (5,)."""
     return commitment.state[r, commitment.active[r], commitment.now[r]]

@@ -23,7 +23,7 @@ SIGHT_M = 9.0
 
 
 @kernel
-def wrap(angle):  # type: ignore[no-untyped-def]
+def wrap(angle):
     """Return the angle in (-pi, pi]."""
     while angle > pi:
         angle -= 2.0 * pi
@@ -33,7 +33,7 @@ def wrap(angle):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def pursue(fleet, r, state, wx, wy, gear):  # type: ignore[no-untyped-def]
+def pursue(fleet, r, state, wx, wy, gear):
     """Return the wanted (v, w) to drive at a waypoint in a gear by pure pursuit."""
     dx = wx - state[0]
     dy = wy - state[1]
@@ -66,7 +66,7 @@ def pursue(fleet, r, state, wx, wy, gear):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def sidestep(fleet, r, state, space, others, wx, wy, out):  # type: ignore[no-untyped-def]
+def sidestep(fleet, r, state, space, others, wx, wy, out):
     """Move a waypoint aside where a slower or oncoming robot is in the way.
 
     Passes on the right when meeting head on, else on the side the other leaves free;
@@ -108,7 +108,7 @@ def sidestep(fleet, r, state, space, others, wx, wy, out):  # type: ignore[no-un
 
 
 @kernel
-def control_towards(fleet, r, state, v, w, dt):  # type: ignore[no-untyped-def]
+def control_towards(fleet, r, state, v, w, dt):
     """Return the control (u1, u2) that brings speed and steering to (v, w)."""
     v = max(fleet.limit[r, 0], min(fleet.limit[r, 1], v))
     w = max(-fleet.limit[r, 2], min(fleet.limit[r, 2], w))

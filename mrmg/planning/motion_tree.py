@@ -12,12 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrmg import seeding
-from mrmg.motion._kernels import step as motion_step
 from mrmg.mission import Trajectory
-from mrmg.planning import _tree_kernels
-from mrmg.planning._routing_kernels import RoutingArrays
-from mrmg.planning._tree_kernels import SOLVED, Targets, Tree, TreeParams
-from mrmg.planning.fleet import Fleet, Spaces, fleet_arrays, stack_spaces
+from mrmg.motion._kernels import step as motion_step
+from mrmg.planning import _groups_kernels, _tree_kernels
+from mrmg.planning._groups_kernels import Tree
+from mrmg.planning._mission_kernels import Mission, Targets, TreeParams, in_target
+from mrmg.planning._tree_kernels import Tours
+from mrmg.planning.fleet import fleet_arrays, stack_spaces
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.roadmap import Roadmap
 from mrmg.planning.routing import Routing, routing_arrays
@@ -33,15 +34,19 @@ TOUR_ROWS = 2000
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """A scene as the arrays the kernels work on."""
+    """A scene and its arrays.
+
+    Attributes:
+        scene: the scene.
+        roadmap: its roadmap.
+        mission: what the kernels work on.
+        start: composite state at the start, shape (R, 5).
+        start_energy: battery contents at the start [J], shape (R,).
+    """
 
     scene: Scene
-    fleet: Fleet
-    spaces: Spaces
-    world: World
     roadmap: Roadmap
-    targets: Targets
-    routing: RoutingArrays
+    mission: Mission
     start: np.ndarray
     start_energy: np.ndarray
 
@@ -54,26 +59,24 @@ def state_problem(
     energy = np.array([robot.battery.start_J for robot in scene.robots])
     start = np.zeros((len(scene.robots), 5))
     start[:, :3] = [robot.pose for robot in scene.robots]
-    plain = fleet.plain * (1.0 + params.route_margin)
-    return Problem(
-        scene=scene,
+    mission = Mission(
         fleet=fleet,
         spaces=stack_spaces(world),
-        world=world,
-        roadmap=roadmap,
+        terrain=world.terrain,
+        roadmap=roadmap.arrays,
         targets=_target_arrays(scene),
         routing=routing_arrays(
             goals=len(scene.goals),
             distance=roadmap.distance[fleet.field],
             start_distance=roadmap.start_distance,
-            plain=plain,
+            plain=fleet.plain * (1.0 + params.route_margin),
             energy=energy,
             capacity=fleet.capacity,
             reserve=fleet.reserve,
         ),
-        start=start,
-        start_energy=energy,
+        params=tree_params(params),
     )
+    return Problem(scene, roadmap, mission, start, energy)
 
 
 def _target_arrays(scene: Scene) -> Targets:
@@ -154,40 +157,32 @@ def grow_tree(
     problem: Problem, params: PlannerParams, routing: Routing, seed: int
 ) -> Growth:
     """Grow one motion tree along given tours (Algorithms 1-3)."""
+    mission = problem.mission
     robots = len(problem.scene.robots)
-    numbers = tree_params(params)
-    tree = _tree_kernels.new_tree(
-        params.max_vertices, robots, problem.targets.goals, params.steps
+    width = 3 * mission.targets.goals + 3
+    tree = _groups_kernels.new_tree(
+        params.max_vertices, robots, mission.targets.goals, params.steps
     )
-    width = 3 * problem.targets.goals + 3
-    tours = np.zeros((TOUR_ROWS, robots, width), np.int64)
-    lengths = np.zeros((TOUR_ROWS, robots), np.int64)
-    first = np.zeros((robots, width), np.int64)
+    tours = Tours(
+        target=np.zeros((TOUR_ROWS, robots, width), np.int64),
+        length=np.zeros((TOUR_ROWS, robots), np.int64),
+    )
     for r, tour in enumerate(routing.tours):
-        first[r, : len(tour)] = tour
+        tours.target[0, r, : len(tour)] = tour
+        tours.length[0, r] = len(tour)
     counts = np.zeros(4, np.int64)
-    random = np.array([seeding.stream_seed(seed, "tree")], np.uint64)
-    ended, leaf = _tree_kernels.grow(
-        problem.fleet,
-        problem.spaces,
-        problem.world.terrain,
-        problem.roadmap.arrays,
-        problem.targets,
-        problem.routing,
-        numbers,
+    leaf = _tree_kernels.grow(
+        mission,
         problem.start,
         problem.start_energy,
-        random,
+        np.array([seeding.stream_seed(seed, "tree")], np.uint64),
         tree,
         tours,
-        lengths,
         counts,
-        first,
-        np.array([len(tour) for tour in routing.tours]),
     )
     names = ("vertices", "groups", "router_calls", "expansions")
     statistics = {name: int(n) for name, n in zip(names, counts, strict=True)}
-    if ended != SOLVED:
+    if leaf < 0:
         return Growth((), {}, statistics)
     branch = _branch(tree, leaf)
     control = _controls(problem, params, tree, branch)
@@ -211,7 +206,9 @@ def _controls(
 ) -> np.ndarray:
     """Return the controls along a branch and the braking after it, shape (n, R, 2)."""
     stop = np.zeros((200, len(problem.start), 2))
-    n = _tree_kernels.stop_all(problem.fleet, tree.state[branch[-1]], params.dt_s, stop)
+    n = _tree_kernels.stop_all(
+        problem.mission.fleet, tree.state[branch[-1]], params.dt_s, stop
+    )
     pieces = [tree.control[v, : tree.steps[v]] for v in branch[1:]]
     return np.concatenate([*pieces, stop[:n]])
 
@@ -220,7 +217,7 @@ def _replay(
     problem: Problem, params: PlannerParams, control: np.ndarray
 ) -> tuple[Trajectory, ...]:
     trajectories = []
-    fleet = problem.fleet
+    fleet = problem.mission.fleet
     for r, robot in enumerate(problem.scene.robots):
         state = np.zeros((len(control) + 1, 5))
         state[0] = problem.start[r]
@@ -246,10 +243,10 @@ def _replay(
 
 
 def _visited_tours(
-    problem: Problem, tree: Tree, tours: np.ndarray, branch: list[int]
+    problem: Problem, tree: Tree, tours: Tours, branch: list[int]
 ) -> dict[str, tuple[str, ...]]:
     """Return what each robot visited: goals it entered first, stations it drove to."""
-    targets = problem.targets
+    targets = problem.mission.targets
     robots = problem.scene.robots
     found: list[list[int]] = [[] for _ in robots]
     seen = np.zeros(targets.goals, bool)
@@ -258,20 +255,20 @@ def _visited_tours(
         for r in range(len(robots)):
             x, y = tree.state[v, r, :2]
             for g in np.flatnonzero(tree.visited[v] & ~seen):
-                if _tree_kernels.in_target(targets, g, x, y):
+                if in_target(targets, g, x, y):
                     found[r].append(int(g))
                     seen[g] = True
-            if parent < 0:
-                continue
-            position = tree.position[parent, r]
-            target = tours[tree.tour[parent], r, position]
-            # The place in the tour moves past a station only by entering it.
-            if target >= targets.goals and _tree_kernels.in_target(
-                targets, target, x, y
-            ):
-                if tree.energy[v, r] == problem.fleet.capacity[r]:
-                    found[r].append(int(target))
+            if parent >= 0:
+                t = _target_at(tree, tours, parent, r)
+                if t >= targets.goals and in_target(targets, t, x, y):
+                    found[r].append(t)
     names = [target.id for target in problem.scene.targets()]
     return {
         robot.id: tuple(names[t] for t in found[r]) for r, robot in enumerate(robots)
     }
+
+
+def _target_at(tree: Tree, tours: Tours, v: int, r: int) -> int:
+    """Return robot r's next target at vertex v, -1 for none."""
+    row, place = tree.tour[v], tree.position[v, r]
+    return int(tours.target[row, r, place]) if place < tours.length[row, r] else -1

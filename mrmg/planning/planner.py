@@ -15,7 +15,7 @@ from mrmg.mission import Plan, PlanResult, PlanStatus
 from mrmg.planning.motion_tree import Growth, Problem, grow_tree, state_problem
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.roadmap import build_roadmap
-from mrmg.planning.routing import Routing, solve_routing
+from mrmg.planning.routing import solve_routing
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
 
@@ -123,7 +123,7 @@ def _best_plan(
             break
         before = statistics.elapsed()
         draw = seeding.stream_seed(seed, "tours", number)
-        routing = solve_routing(problem.routing, params.router, draw)
+        routing = solve_routing(problem.mission.routing, params.router, draw)
         spent = statistics.time_s.get("routing", 0.0)
         statistics.time_s["routing"] = spent + statistics.elapsed() - before
         if not routing.feasible:

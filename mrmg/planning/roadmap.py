@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import networkx as nx
 import numpy as np
@@ -22,6 +21,7 @@ from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
 from mrmg.planning import _roadmap_kernels
+from mrmg.planning._roadmap_kernels import RoadmapArrays
 from mrmg.planning.fleet import travel_classes
 from mrmg.scene.types import Scene
 from mrmg.world._kernels import FreeSpace
@@ -31,29 +31,6 @@ BUCKET_M = 4.0
 
 NARROW_M = 2.5
 """Clearance below which the middle of a place gets vertices of its own [m]."""
-
-
-class RoadmapArrays(NamedTuple):
-    """The roadmap as the kernels see it; V vertices, T targets, F travel classes.
-
-    Attributes:
-        vertex: positions [m], shape (V, 2); the first T are the targets' centres.
-        cost_to_go: weighted length to each target [m], shape (F, T, V); inf where cut off.
-        successor: next vertex on the way to each target, -1 at the end, shape (F, T, V).
-        x_min, y_min, bucket, columns, rows, bucket_start, bucket_vertex: a coarse grid of
-            the vertices.
-    """
-
-    vertex: np.ndarray
-    cost_to_go: np.ndarray
-    successor: np.ndarray
-    x_min: float
-    y_min: float
-    bucket: float
-    columns: int
-    rows: int
-    bucket_start: np.ndarray
-    bucket_vertex: np.ndarray
 
 
 @dataclass(frozen=True, slots=True)

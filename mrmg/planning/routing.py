@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrmg.planning import _routing_kernels
-from mrmg.planning._routing_kernels import IMPOSSIBLE, RoutingArrays
+from mrmg.planning._nrpa_kernels import RoutingArrays
+from mrmg.planning._refuel_kernels import IMPOSSIBLE
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -55,7 +55,7 @@ class TerrainGrid(NamedTuple):
 
 
 @kernel
-def point_segment_distance(px, py, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+def point_segment_distance(px, py, ax, ay, bx, by):
     """Return the distance of a point from a segment."""
     dx = bx - ax
     dy = by - ay
@@ -68,7 +68,7 @@ def point_segment_distance(px, py, ax, ay, bx, by):  # type: ignore[no-untyped-d
 
 
 @kernel
-def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):  # type: ignore[no-untyped-def]
+def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
     """Tell whether segments ab and cd properly cross."""
     d1 = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
     d2 = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
@@ -78,7 +78,7 @@ def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):  # type: ignore[no-untyped-d
 
 
 @kernel
-def point_in_convex(px, py, corners):  # type: ignore[no-untyped-def]
+def point_in_convex(px, py, corners):
     """Tell whether a point lies in a convex counter-clockwise polygon."""
     n = len(corners)
     for i in range(n):
@@ -91,7 +91,7 @@ def point_in_convex(px, py, corners):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def convex_segment_distance(corners, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+def convex_segment_distance(corners, ax, ay, bx, by):
     """Return the distance of a convex polygon from a segment; 0 where they meet."""
     if point_in_convex(ax, ay, corners):
         return 0.0
@@ -110,7 +110,7 @@ def convex_segment_distance(corners, ax, ay, bx, by):  # type: ignore[no-untyped
 
 
 @kernel
-def convex_convex_distance(first, second):  # type: ignore[no-untyped-def]
+def convex_convex_distance(first, second):
     """Return the distance of two convex polygons; 0 where they meet."""
     if point_in_convex(second[0, 0], second[0, 1], first):
         return 0.0
@@ -132,7 +132,7 @@ def convex_convex_distance(first, second):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def place_footprint(footprint, x, y, theta, out):  # type: ignore[no-untyped-def]
+def place_footprint(footprint, x, y, theta, out):
     """Write the footprint's corners at a pose into `out`, shape (m, 2)."""
     c = cos(theta)
     s = sin(theta)
@@ -142,7 +142,7 @@ def place_footprint(footprint, x, y, theta, out):  # type: ignore[no-untyped-def
 
 
 @kernel
-def clearance_at_least(space, x, y):  # type: ignore[no-untyped-def]
+def clearance_at_least(space, x, y):
     """Return a lower bound of the signed distance from obstacles [m]; -inf off grid."""
     rows, columns = space.distance.shape
     column = int(floor((x - space.x_min) / space.cell))
@@ -155,7 +155,7 @@ def clearance_at_least(space, x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def clearance_estimate(space, x, y):  # type: ignore[no-untyped-def]
+def clearance_estimate(space, x, y):
     """Return the signed distance from obstacles [m], bilinear in the field."""
     rows, columns = space.distance.shape
     fx = (x - space.x_min) / space.cell - 0.5
@@ -171,7 +171,7 @@ def clearance_estimate(space, x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def footprint_is_clear(space, placed, cx, cy, radius, margin):  # type: ignore[no-untyped-def]
+def footprint_is_clear(space, placed, cx, cy, radius, margin):
     """Tell whether a placed footprint keeps `margin` [m] from every obstacle; exact.
 
     Args:
@@ -211,7 +211,7 @@ def footprint_is_clear(space, placed, cx, cy, radius, margin):  # type: ignore[n
 
 
 @kernel
-def multiplier_in(terrain, x, y):  # type: ignore[no-untyped-def]
+def multiplier_in(terrain, x, y):
     """Return the terrain's energy multiplier of the cell that holds a point."""
     rows, columns = terrain.multiplier.shape
     column = int(floor((x - terrain.x_min) / terrain.cell))
@@ -222,7 +222,7 @@ def multiplier_in(terrain, x, y):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def segment_clearance(space, ax, ay, bx, by, enough):  # type: ignore[no-untyped-def]
+def segment_clearance(space, ax, ay, bx, by, enough):
     """Return the smallest clearance [m] along a segment, capped at `enough`.
 
     Steps by the clearance found (no obstacle can be nearer), at least half a cell.
@@ -241,7 +241,7 @@ def segment_clearance(space, ax, ay, bx, by, enough):  # type: ignore[no-untyped
 
 
 @kernel
-def segment_is_clear(space, ax, ay, bx, by, needed):  # type: ignore[no-untyped-def]
+def segment_is_clear(space, ax, ay, bx, by, needed):
     """Tell whether a segment keeps `needed` clearance [m]."""
     length = hypot(bx - ax, by - ay)
     travelled = 0.0
@@ -257,7 +257,7 @@ def segment_is_clear(space, ax, ay, bx, by, needed):  # type: ignore[no-untyped-
 
 
 @kernel
-def segment_weighted_length(terrain, ax, ay, bx, by):  # type: ignore[no-untyped-def]
+def segment_weighted_length(terrain, ax, ay, bx, by):
     """Return the integral of the multiplier along a segment [m], by midpoints."""
     length = hypot(bx - ax, by - ay)
     n = max(1, int(ceil(length / (2.0 * terrain.cell))))
@@ -269,7 +269,7 @@ def segment_weighted_length(terrain, ax, ay, bx, by):  # type: ignore[no-untyped
 
 
 @kernel
-def bucket_edges(edge, x_min, y_min, bucket, columns, rows, reach):  # type: ignore[no-untyped-def]
+def bucket_edges(edge, x_min, y_min, bucket, columns, rows, reach):
     """Return (bucket_start, bucket_edge): for each bucket the edges within `reach`."""
     count = np.zeros(columns * rows + 1, np.int64)
     half = 0.5 * bucket * sqrt(2.0)
@@ -308,7 +308,7 @@ def bucket_edges(edge, x_min, y_min, bucket, columns, rows, reach):  # type: ign
 
 
 @kernel
-def fill_rings(ring_start, point, x_min, y_min, cell, rows, columns):  # type: ignore[no-untyped-def]
+def fill_rings(ring_start, point, x_min, y_min, cell, rows, columns):
     """Return which cell centres lie inside the rings, by the even-odd rule."""
     inside = np.zeros((rows, columns), np.bool_)
     crossing = np.zeros(len(point), np.float64)
@@ -334,7 +334,7 @@ def fill_rings(ring_start, point, x_min, y_min, cell, rows, columns):  # type: i
 
 
 @kernel
-def edge_distance_field(edge, x_min, y_min, cell, rows, columns):  # type: ignore[no-untyped-def]
+def edge_distance_field(edge, x_min, y_min, cell, rows, columns):
     """Return the distance of each cell centre from the nearest edge [m].
 
     Cells crossed by an edge know it exactly; sweeps in four directions hand the index
@@ -386,7 +386,7 @@ def edge_distance_field(edge, x_min, y_min, cell, rows, columns):  # type: ignor
 
 
 @kernel
-def _offer(edge, e, r, c, x_min, y_min, cell, nearest, distance):  # type: ignore[no-untyped-def]
+def _offer(edge, e, r, c, x_min, y_min, cell, nearest, distance):
     d = point_segment_distance(
         x_min + (c + 0.5) * cell,
         y_min + (r + 0.5) * cell,

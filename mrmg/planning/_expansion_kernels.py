@@ -1,0 +1,276 @@
+"""One expansion of the motion tree: every robot drives for k steps (Algorithm 3)."""
+
+from __future__ import annotations
+
+from math import atan2
+
+import numba
+import numpy as np
+
+from mrmg.compilation import kernel
+from mrmg.energy import battery_power
+from mrmg.motion._kernels import UNICYCLE, tan_steer
+from mrmg.planning._fleet_kernels import space_of
+from mrmg.planning._maneuver_kernels import best_maneuver
+from mrmg.planning._mission_kernels import in_target, look_ahead
+from mrmg.planning._random_kernels import random_unit
+from mrmg.planning._safety_kernels import (
+    braking_control,
+    follow_braking,
+    new_commitment,
+    present_state,
+    try_control,
+    write_braking,
+)
+from mrmg.planning._steering_kernels import (
+    BACK_OFF,
+    RANDOM,
+    STEER,
+    WAIT,
+    control_towards,
+    pursue,
+    sidestep,
+    wrap,
+)
+from mrmg.world._kernels import multiplier_in
+
+_battery_power = numba.njit(battery_power)
+
+VIEW_M = 25.0
+"""How far along its way a robot looks for the farthest point in sight."""
+
+STEER_EVERY = 5
+"""Steps between two looks."""
+
+AHEAD = 0.9
+"""Bearing up to which a waypoint counts as ahead [rad]."""
+
+BEHIND = 2.4
+"""Bearing from which a waypoint counts as behind [rad]."""
+
+ATTEMPTS = 5
+"""Controls tried before a robot brakes as committed."""
+
+
+@kernel
+def choose_modes(tree, v, target, params, steer, random, stuck, mode):
+    """Draw what each robot does next: steer, or random controls when that has failed.
+
+    Args:
+        tree, v: vertex to be expanded.
+        target: each robot's next target, -1 for none, shape (R,).
+        params: `TreeParams`.
+        steer: probability of steering.
+        random: state of the generator.
+        stuck: receives how stuck each robot is, shape (R,).
+        mode: receives what each robot does, shape (R,).
+    """
+    again = tree.expanded[v] > 1
+    blocked = False
+    for r in range(len(target)):
+        blocked |= target[r] >= 0 and tree.stalled[v, r] > 1
+    for r in range(len(target)):
+        # Expanded as before, a vertex would only give the same child again.
+        stuck[r] = tree.stalled[v, r]
+        if again and random_unit(random) < 0.6:
+            stuck[r] = max(stuck[r], min(tree.expanded[v], 4))
+        draw = random_unit(random)
+        if target[r] < 0:
+            # A robot without a target gives way only when others are stuck.
+            mode[r] = RANDOM if blocked and draw < 0.5 else WAIT
+        elif draw >= steer:
+            mode[r] = RANDOM
+        elif stuck[r] < 2 or params.hold_control:
+            mode[r] = STEER
+        else:
+            pick = random_unit(random)
+            if pick < 0.5:
+                mode[r] = STEER
+            elif pick < 0.7:
+                mode[r] = BACK_OFF
+            elif pick < 0.95 or len(target) == 1:
+                mode[r] = RANDOM
+            else:
+                mode[r] = WAIT
+
+
+@kernel
+def draw_motion(fleet, r, mode, gear, random):
+    """Return a random wanted (v, w): any, or one that backs off from where it heads."""
+    low, high = fleet.limit[r, 0], fleet.limit[r, 1]
+    unit = random_unit(random)
+    side = (2.0 * random_unit(random) - 1.0) * fleet.limit[r, 2]
+    if mode == RANDOM:
+        return low + unit * (high - low), side
+    back = low if gear > 0 else high
+    return (0.4 + 0.6 * unit) * back, 0.6 * side
+
+
+@kernel
+def choose_motion(mission, r, target, state, waypoint, stuck, gear, random, motion):
+    """Decide how a robot sets out for its waypoint; return whether to hold `motion`.
+
+    Ahead and not stuck, it pursues the waypoint. Else it looks for a maneuver; one that
+    leaves backwards with the way behind becomes pursuit in reverse gear.
+    """
+    off = abs(wrap(atan2(waypoint[1] - state[1], waypoint[0] - state[0]) - state[2]))
+    gear[r] = 1
+    if mission.fleet.model[r] == UNICYCLE or mission.params.hold_control:
+        return False
+    if off < AHEAD and stuck == 0:
+        return False
+    if not best_maneuver(mission, r, target, state, stuck, random, motion):
+        return False
+    gear[r] = 1 if motion[0] > 0.0 else -1
+    return not (motion[0] < 0.0 and off > BEHIND and stuck < 2)
+
+
+@kernel
+def attempt_control(fleet, r, state, v, w, attempt, dt):
+    """Return the control of the n-th attempt to get on: ever slower and wider.
+
+    The wanted motion; slower; slower and straighter; slower and swinging out; and last
+    braking while steering.
+    """
+    if attempt == 1:
+        v *= 0.5
+    elif attempt == 2:
+        v *= 0.4
+        w *= 0.4
+    elif attempt == 3:
+        v *= 0.4
+        w *= -0.5
+    elif attempt == 4:
+        v = 0.0
+    return control_towards(fleet, r, state, v, w, dt)
+
+
+@kernel
+def drive_step(mission, commitment, decided, r, v, w, attempts):
+    """Drive one robot one step as near to (v, w) as is safe; return its control."""
+    dt = mission.params.dt
+    state = present_state(commitment, r).copy()
+    for attempt in range(attempts):
+        u1, u2 = attempt_control(mission.fleet, r, state, v, w, attempt, dt)
+        if try_control(
+            mission.fleet, mission.spaces, commitment, decided, r, u1, u2, dt
+        ):
+            return u1, u2
+    follow_braking(commitment, r)
+    return braking_control(mission.fleet, r, state, dt)
+
+
+@kernel
+def step_energy(mission, r, before, after, u1):
+    """Return the battery energy of one step [J], charged at its midpoint."""
+    k = multiplier_in(
+        mission.terrain, 0.5 * (before[0] + after[0]), 0.5 * (before[1] + after[1])
+    )
+    return mission.params.dt * _battery_power(
+        0.5 * (before[3] + after[3]),
+        u1,
+        tan_steer(mission.fleet.model[r], 0.5 * (before[4] + after[4])),
+        k,
+        mission.fleet.energy[r],
+    )
+
+
+@kernel
+def note_arrivals(mission, state, energy, visited, target):
+    """Mark goals that robots have entered and refill at stations they drove to.
+
+    Returns:
+        Whether anything was reached.
+    """
+    targets = mission.targets
+    event = False
+    for r in range(len(target)):
+        for g in range(targets.goals):
+            if not visited[g] and in_target(targets, g, state[r, 0], state[r, 1]):
+                visited[g] = True
+                event = True
+        t = target[r]
+        if t >= targets.goals and in_target(targets, t, state[r, 0], state[r, 1]):
+            energy[r] = mission.fleet.capacity[r]
+            event = True
+    return event
+
+
+@kernel
+def expand(
+    mission, state, energy, visited, target, mode, gear, stuck, order, random, control
+):
+    """Drive all robots for up to k steps; ends early when a target is reached.
+
+    Args:
+        mission: the problem.
+        state, energy, visited: of the vertex; changed in place to those at the end.
+        target: each robot's next target, -1 for none, shape (R,).
+        mode: what each robot does, shape (R,).
+        gear: each robot's gear; changed in place, shape (R,).
+        stuck: how stuck each robot is, shape (R,).
+        order: robots in order of right of way, shape (R,).
+        random: state of the generator.
+        control: receives the controls, shape (k, R, 2).
+
+    Returns:
+        (steps made, whether a target was reached, whether all stayed above reserve).
+    """
+    fleet, params = mission.fleet, mission.params
+    robots = len(target)
+    commitment = new_commitment(fleet, params.dt)
+    wanted = np.zeros((robots, 2))
+    held = np.zeros(robots, np.bool_)
+    for r in range(robots):
+        write_braking(fleet, r, state[r], params.dt, commitment, 0)
+        if mode[r] == RANDOM or mode[r] == BACK_OFF:
+            held[r] = True
+            wanted[r, 0], wanted[r, 1] = draw_motion(fleet, r, mode[r], gear[r], random)
+    waypoint = np.zeros((robots, 2))
+    decided = np.zeros(robots, np.bool_)
+    for n in range(params.steps):
+        decided[:] = False
+        for i in range(robots):
+            r = order[i]
+            before = present_state(commitment, r).copy()
+            if mode[r] == WAIT:
+                u1, u2 = braking_control(fleet, r, before, params.dt)
+                follow_braking(commitment, r)
+            else:
+                if mode[r] == STEER and n % STEER_EVERY == 0 and not held[r]:
+                    _look(mission, r, target[r], state, waypoint[r])
+                    if n == 0:
+                        held[r] = choose_motion(
+                            mission, r, target[r], before, waypoint[r], stuck[r], gear,
+                            random, wanted[r],
+                        )  # fmt: skip
+                if not held[r]:
+                    wanted[r, 0], wanted[r, 1] = pursue(
+                        fleet, r, before, waypoint[r, 0], waypoint[r, 1], gear[r]
+                    )
+                    held[r] = params.hold_control
+                u1, u2 = drive_step(
+                    mission, commitment, decided, r, wanted[r, 0], wanted[r, 1],
+                    2 if held[r] else ATTEMPTS,
+                )  # fmt: skip
+            decided[r] = True
+            after = present_state(commitment, r)
+            energy[r] -= step_energy(mission, r, before, after, u1)
+            control[n, r, 0], control[n, r, 1] = u1, u2
+        for r in range(robots):
+            state[r] = present_state(commitment, r)
+            if energy[r] < fleet.reserve[r]:
+                return n + 1, False, False
+        if note_arrivals(mission, state, energy, visited, target):
+            return n + 1, True, True
+    return params.steps, False, True
+
+
+@kernel
+def _look(mission, r, target, state, waypoint):
+    """Write the point robot r drives at: its way's, or aside of a robot in the way."""
+    ahead = np.empty(2)
+    if look_ahead(mission, r, target, state[r], VIEW_M, ahead) == np.inf:
+        ahead[:] = mission.targets.center[target]
+    space = space_of(mission.spaces, mission.fleet.space[r])
+    sidestep(mission.fleet, r, state[r], space, state, ahead[0], ahead[1], waypoint)

@@ -1,0 +1,110 @@
+"""The whole planning problem as one value for the kernels, and its simplest questions."""
+
+from __future__ import annotations
+
+from math import hypot
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.compilation import kernel
+from mrmg.planning._fleet_kernels import Fleet, Spaces, space_of
+from mrmg.planning._nrpa_kernels import RoutingArrays
+from mrmg.planning._roadmap_kernels import RoadmapArrays, find_waypoint
+from mrmg.world._kernels import TerrainGrid, point_in_convex
+
+
+class Targets(NamedTuple):
+    """Goals and stations: convex regions; T targets, goals first.
+
+    Attributes:
+        goals: number of goals.
+        center: shape (T, 2).
+        reach: radius of the circle about the centre that holds the region, shape (T,).
+        corner: padded corners of polygons, shape (T, M, 2).
+        corners: number of corners; 0 for a circle, shape (T,).
+    """
+
+    goals: int
+    center: np.ndarray
+    reach: np.ndarray
+    corner: np.ndarray
+    corners: np.ndarray
+
+
+class TreeParams(NamedTuple):
+    """Numbers the tree is grown by; see `parameters.PlannerParams`."""
+
+    dt: float
+    steps: int
+    max_vertices: int
+    group_alpha: float
+    group_beta: float
+    group_lambda: float
+    group_bias: float
+    steer_start: float
+    steer_decay: float
+    steer_least: float
+    region: float
+    route_margin: float
+    reroute_always: bool
+    hold_control: bool
+    levels: int
+    iterations: int
+    alpha: float
+    kicks: int
+
+
+class Mission(NamedTuple):
+    """A planning problem.
+
+    Attributes:
+        fleet, spaces, terrain, roadmap, targets: robots, world and where to go.
+        routing: the routing problem at the start; costs include the route margin.
+        params: numbers the tree is grown by.
+    """
+
+    fleet: Fleet
+    spaces: Spaces
+    terrain: TerrainGrid
+    roadmap: RoadmapArrays
+    targets: Targets
+    routing: RoutingArrays
+    params: TreeParams
+
+
+@kernel
+def in_target(targets, t, x, y):
+    """Tell whether a point lies in a target's region."""
+    far = hypot(x - targets.center[t, 0], y - targets.center[t, 1])
+    if far > targets.reach[t]:
+        return False
+    n = targets.corners[t]
+    return n == 0 or point_in_convex(x, y, targets.corner[t, :n])
+
+
+@kernel
+def look_ahead(mission, r, target, state, view, waypoint):
+    """Write robot r's waypoint towards a target; return the way to go [m].
+
+    Args:
+        mission: the problem.
+        r: robot.
+        target: number of the target.
+        state: the robot's state.
+        view: how far along its way it looks [m].
+        waypoint: receives (x, y).
+    """
+    fleet = mission.fleet
+    return find_waypoint(
+        space_of(mission.spaces, fleet.space[r]),
+        mission.terrain,
+        mission.roadmap,
+        fleet.field[r],
+        target,
+        state[0],
+        state[1],
+        fleet.passage[r],
+        view,
+        waypoint,
+    )
