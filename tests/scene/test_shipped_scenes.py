@@ -30,20 +30,33 @@ MARGIN_M = 0.1
 """Beside half the robot's width: what a road must at least leave."""
 
 
-def ground_of(scene: Scene) -> Ground:
+def kinds_of(scene: Scene) -> list[list[int]]:
+    """Group the robots (by number) that the same obstacles stop."""
+    kinds: dict[tuple[str, ...], list[int]] = {}
+    for number, robot in enumerate(scene.robots):
+        walls = tuple(wall.id for wall in scene.obstacles if wall.stops(robot.id))
+        kinds.setdefault(walls, []).append(number)
+    return list(kinds.values())
+
+
+def ground_of(scene: Scene, number: int = 0) -> Ground:
+    """Where the robot of that number can drive."""
+    robot = scene.robots[number]
     return Ground.over(
         scene.bounds,
-        [obstacle.shape for obstacle in scene.obstacles],
+        [wall.shape for wall in scene.obstacles if wall.stops(robot.id)],
         [(area.shape, area.multiplier) for area in scene.terrain],
-        margin_m=scene.robots[0].model.half_width_m + MARGIN_M,
+        margin_m=robot.model.half_width_m + MARGIN_M,
     )
 
 
-def road_m(scene: Scene, ground: Ground) -> np.ndarray:
+def road_m(scene: Scene, number: int = 0) -> np.ndarray:
     """Distances between robots, goals and stations [m of plain ground], in this order.
 
-    The grid makes a road up to 2.8 % longer than it must be.
+    They are those of one robot: places it cannot reach are infinitely far. The grid
+    makes a road up to 2.8 % longer than it must be.
     """
+    ground = ground_of(scene, number)
     places = [robot.pose[:2] for robot in scene.robots]
     places += [tuple(target.region.center) for target in scene.targets()]
     cells = [ground.nearest(place) for place in places]
@@ -80,25 +93,34 @@ def test_table(name: str) -> None:
 def test_every_target_can_be_reached_and_left(name: str) -> None:
     """Goals have room about them and a station well within half a battery."""
     scene = load_scene(name)
-    ground = ground_of(scene)
-    road = road_m(scene, ground)
     robots, goals = len(scene.robots), len(scene.goals)
-    assert np.isfinite(road).all()
-    for target in scene.targets():
-        at = ground.nearest(target.region.center)
-        assert ground.clearance_m[at] >= 1.0, target.id
-    to_station = road[robots : robots + goals, robots + goals :].min(axis=1)
-    assert to_station.max() <= 0.45 * usable_m(scene)
+    reached = np.zeros(goals, dtype=bool)
+    for kind in kinds_of(scene):
+        ground, road = ground_of(scene, kind[0]), road_m(scene, kind[0])
+        for target in scene.targets():
+            at = ground.nearest(target.region.center)
+            assert ground.clearance_m[at] >= 1.0, target.id
+        to_goal = road[np.ix_(kind, range(robots, robots + goals))]
+        within = np.isfinite(to_goal).all(axis=0)
+        assert (within == np.isfinite(to_goal).any(axis=0)).all()
+        assert np.isfinite(road[kind, robots + goals :]).all()
+        to_station = road[robots : robots + goals, robots + goals :].min(axis=1)
+        assert to_station[within].max() <= 0.45 * usable_m(scene)
+        reached |= within
+    assert reached.all()
 
 
 @pytest.mark.parametrize("name", TABLE)
 def test_the_energy_limit_binds(name: str) -> None:
     """The cheapest assignment that ignores energy overdraws some battery."""
     scene = load_scene(name)
-    road = road_m(scene, ground_of(scene))
-    cost_m, routes = cheapest_routes(road, len(scene.robots), len(scene.goals))
+    kinds = kinds_of(scene)
+    roads = np.stack([road_m(scene, kind[0]) for kind in kinds])
+    cost_m, routes = cheapest_routes(roads, kinds, len(scene.goals))
+    road_of = {number: k for k, kind in enumerate(kinds) for number in kind}
     lengths_m = [
-        sum(road[a, b] for a, b in zip(r, r[1:], strict=False)) for r in routes
+        sum(roads[road_of[r[0]], a, b] for a, b in zip(r, r[1:], strict=False))
+        for r in routes
     ]
     assert sum(lengths_m) == pytest.approx(cost_m)
     # More than the grid can err.
@@ -106,18 +128,40 @@ def test_the_energy_limit_binds(name: str) -> None:
 
 
 def cheapest_routes(
-    cost: np.ndarray, robots: int, goals: int
+    cost: np.ndarray, kinds: list[list[int]], goals: int
 ) -> tuple[float, list[list[int]]]:
     """Return the cheapest open routes that visit all goals, and their total cost.
 
-    An exact integer programme: every goal is entered once, every place left at most
-    once, and cycles are cut off until none is left.
+    An exact integer programme: every goal is entered once, and left at most once by the
+    kind of robot that entered it; cycles are cut off until none is left.
+
+    Args:
+        cost: from place to place, for each kind of robot, infinite where there is no
+            way; robots first, then goals. Shape (kinds, n, n).
+        kinds: the robots of each kind.
+        goals: how many.
     """
+    robots = sum(map(len, kinds))
     size = robots + goals
-    arcs = [(i, j) for i in range(size) for j in range(robots, size) if i != j]
-    enter = [[float(j == goal) for _, j in arcs] for goal in range(robots, size)]
-    leave = [[float(i == place) for i, _ in arcs] for place in range(size)]
-    rules = [LinearConstraint(enter, 1, 1), LinearConstraint(leave, 0, 1)]
+    arcs = [
+        (kind, i, j)
+        for kind, members in enumerate(kinds)
+        for i in (*members, *range(robots, size))
+        for j in range(robots, size)
+        if i != j and np.isfinite(cost[kind, i, j])
+    ]
+    enter = [[float(j == goal) for _, _, j in arcs] for goal in range(robots, size)]
+    start = [[float(i == robot) for _, i, _ in arcs] for robot in range(robots)]
+    flow = [
+        [float(k == kind) * ((j == goal) - (i == goal)) for k, i, j in arcs]
+        for kind in range(len(kinds))
+        for goal in range(robots, size)
+    ]
+    rules = [
+        LinearConstraint(enter, 1, 1),
+        LinearConstraint(start, 0, 1),
+        LinearConstraint(flow, 0, 1),
+    ]
     prices = [cost[arc] for arc in arcs]
     while True:
         found = milp(
@@ -126,15 +170,15 @@ def cheapest_routes(
             integrality=np.ones(len(arcs)),
             bounds=Bounds(0, 1),
         )
-        after = dict(arcs[k] for k in np.flatnonzero(found.x > 0.5))
-        routes = [walk(start, after) for start in range(robots)]
+        after = {arcs[k][1]: arcs[k][2] for k in np.flatnonzero(found.x > 0.5)}
+        routes = [walk(first, after) for first in range(robots)]
         astray = set(range(robots, size)).difference(*routes)
         if not astray:
             return float(found.fun), routes
         while astray:
             cycle = set(walk(min(astray), after))
             astray -= cycle
-            inside = [float(i in cycle and j in cycle) for i, j in arcs]
+            inside = [float(i in cycle and j in cycle) for _, i, j in arcs]
             rules.append(LinearConstraint(inside, 0, len(cycle) - 1))
 
 
@@ -145,12 +189,25 @@ def walk(start: int, after: dict[int, int]) -> list[int]:
     return route
 
 
+LINE = np.array([0.0, 10.0, 1.0, 2.0, 9.0])
+"""Robots at 0 and 10, goals at 1, 2, 9."""
+
+
 def test_cheapest_routes_on_a_line() -> None:
-    """Robots at 0 and 10, goals at 1, 2, 9: two go left, one right."""
-    places = np.array([0.0, 10.0, 1.0, 2.0, 9.0])
-    cost_m, routes = cheapest_routes(np.abs(places[:, None] - places), 2, 3)
+    """Two goals are left for the left robot, one for the right."""
+    cost = np.abs(LINE[:, None] - LINE)[None]
+    cost_m, routes = cheapest_routes(cost, [[0, 1]], 3)
     assert cost_m == pytest.approx(3.0)
     assert routes == [[0, 2, 3], [1, 4]]
+
+
+def test_cheapest_routes_keep_off_what_is_closed_to_a_robot() -> None:
+    """The left robot must not visit the goal at 2, so the right one comes over."""
+    cost = np.stack([np.abs(LINE[:, None] - LINE)] * 2)
+    cost[0, 3, :] = cost[0, :, 3] = np.inf
+    cost_m, routes = cheapest_routes(cost, [[0], [1]], 3)
+    assert cost_m == pytest.approx(9.0)
+    assert routes == [[0, 2], [1, 4, 3]]
 
 
 def test_scene4_makes_both_robots_back_out() -> None:
@@ -172,6 +229,36 @@ def test_scene4_makes_both_robots_back_out() -> None:
             for s in np.arange(0.0, 5.5, 0.5)
         ]
         assert max(narrow) < turning_width_m
+
+
+def test_scene4_makes_both_robots_use_narrow_passages() -> None:
+    """Each robot alone can visit some goal, and that lies where no car can turn."""
+    scene = load_scene("scene4")
+    robots, goals = len(scene.robots), len(scene.goals)
+    reach = np.stack(
+        [
+            np.isfinite(road_m(scene, number)[number, robots : robots + goals])
+            for number in range(robots)
+        ]
+    )
+    solid = shapely.union_all(
+        [wall.shape for wall in scene.obstacles if not wall.blocks]
+    )
+    for number, robot in enumerate(scene.robots):
+        model = robot.model
+        turning_width_m = 2.0 * (model.turning_radius_m + model.half_width_m)
+        only = [
+            scene.goals[goal]
+            for goal in np.flatnonzero(reach[number] & (reach.sum(axis=0) == 1))
+        ]
+        assert only, robot.id
+        for goal in only:
+            narrow = [
+                _way_m(solid, goal.region.center, side)
+                + _way_m(solid, goal.region.center, -side)
+                for side in (np.array([1.0, 0.0]), np.array([0.0, 1.0]))
+            ]
+            assert min(narrow) < turning_width_m
 
 
 def _way_m(solid: shapely.Geometry, start: np.ndarray, along: np.ndarray) -> float:
