@@ -46,6 +46,7 @@ def report_html(record: RunRecord) -> str:
             html.tiles(_main_figures(record)),
             html.section("Map", *_map(record)),
             html.section("Timeline", timeline(scene, plan, log) if plan else ""),
+            html.section("Video", html.video(record.folder / "mission.mp4")),
             html.section(
                 "State of charge", html.charts(places.get("charge", ()), columns=2)
             ),
@@ -58,7 +59,6 @@ def report_html(record: RunRecord) -> str:
             ),
             html.section("Checks", *sections.checks(record)),
             html.section("Planner", sections.planner(record)),
-            html.section("Video", html.video(record.folder / "mission.mp4")),
             html.section("Reproduce", *_reproduce(record)),
         ],
         colors=[(light[name], dark[name]) for name in ids],
@@ -74,7 +74,7 @@ def _map(record: RunRecord) -> list[str]:
         boxes.append(html.toggle("layer", "driven", "driven paths"))
     if record.plan is not None:
         boxes += [
-            html.toggle("robot", robot.id, html.robot_dot(index, robot.id))
+            html.toggle("owner", robot.id, html.robot_dot(index, robot.id))
             for index, robot in enumerate(record.scene.robots)
         ]
     return [

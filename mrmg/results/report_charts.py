@@ -5,6 +5,7 @@ All series share one grid of times, so that one cursor reads them all.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,39 +15,34 @@ from mrmg.accounting import Motion, battery_content
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan
 from mrmg.results import mission_series as series
-from mrmg.results import style
 from mrmg.results.audit import measured_step_energy
+from mrmg.results.chart_spec import chart, line, rounded
 from mrmg.results.energy_plot import BatteryCurve, planned_curves, with_recharge_jumps
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Battery, Scene
 
 _MOST_SAMPLES = 1200
 _FINEST_S = 0.1
 
 
 def chart_data(scene: Scene, plan: Plan, log: ExecutionLog | None) -> dict[str, Any]:
-    """Return everything the page's script needs.
+    """Return everything the report's script needs.
 
     Returns:
-        `time_s`; `robots` with id, colours on light and dark, and poses; `charts`, each
-        with a title, a unit and series. A series belongs to a robot, and its values are
-        null where it has none.
+        `time_s`; `robots` with their poses on the map; `visits`; and `charts` as of
+        `chart_spec`.
     """
     time_s = _grid(plan, log)
     motions = series.shown_motions(plan, log)
-    ids = [robot.id for robot in scene.robots]
-    light, dark = style.robot_colors(ids), style.robot_colors_on_dark(ids)
     poses = [_poses(motion, time_s) for motion in motions]
     return {
-        "time_s": _rounded(time_s, 3),
+        "time_s": rounded(time_s, 3),
         "robots": [
             {
                 "id": motion.robot,
-                "light": light[motion.robot],
-                "dark": dark[motion.robot],
-                "x": _rounded(pose[:, 0] - scene.bounds[0], 2),
-                "y": _rounded(scene.bounds[3] - pose[:, 1], 2),
-                "turn": _rounded(-np.degrees(pose[:, 2]), 1),
-                "speed": _rounded(pose[:, 3], 2),
+                "x": rounded(pose[:, 0] - scene.bounds[0], 2),
+                "y": rounded(scene.bounds[3] - pose[:, 1], 2),
+                "turn": rounded(-np.degrees(pose[:, 2]), 1),
+                "speed": rounded(pose[:, 3], 2),
             }
             for motion, pose in zip(motions, poses, strict=True)
         ],
@@ -63,7 +59,7 @@ def chart_data(scene: Scene, plan: Plan, log: ExecutionLog | None) -> dict[str, 
         "charts": [
             *_charge_charts(scene, plan, log, time_s),
             *_tracking_chart(log, time_s),
-            *_distance_charts(scene, poses, time_s),
+            *_distance_charts(scene, poses),
         ],
     }
 
@@ -112,39 +108,32 @@ def _poses(motion: Motion, time_s: np.ndarray) -> np.ndarray:
 def _charge_charts(
     scene: Scene, plan: Plan, log: ExecutionLog | None, time_s: np.ndarray
 ) -> list[dict[str, Any]]:
-    driven = (
-        {item.robot: item for item in measured_curves(scene, plan, log)} if log else {}
-    )
+    driven = measured_curves(scene, plan, log) if log is not None else ()
     charts = []
-    for planned in planned_curves(scene, plan):
-        battery = scene.robot(planned.robot).battery
+    for at, planned in enumerate(planned_curves(scene, plan)):
+        owner, battery = (at, planned.robot), scene.robot(planned.robot).battery
         reserve = np.full(len(time_s), 100.0 * battery.reserve_fraction)
-        lines = [_charge("planned", planned, battery.capacity_J, time_s)]
-        if planned.robot in driven:
-            measured = driven[planned.robot]
-            lines.append(_charge("simulated", measured, battery.capacity_J, time_s))
-        lines.append(_line("reserve", "limit", planned.robot, reserve, 2))
+        lines = [
+            line(label, label, owner, _percent(curve, battery, time_s), digits=2)
+            for label, curve in zip(
+                ("planned", "simulated"), (planned, *driven[at : at + 1]), strict=False
+            )
+        ]
+        lines.append(line("reserve", "limit", owner, reserve))
+        title = f"{planned.robot}, battery of {battery.capacity_J / 1000:.1f} kJ"
+        name = f"charge-{planned.robot}"
         charts.append(
-            {
-                "id": f"charge-{planned.robot}",
-                "group": "charge",
-                "title": f"{planned.robot}, battery of "
-                f"{battery.capacity_J / 1000:.1f} kJ",
-                "unit": "%",
-                "range": [0, 105],
-                "digits": 1,
-                "series": lines,
-            }
+            chart(
+                name, title, "%", lines, group="charge", digits=1, limits=(0.0, 105.0)
+            )
         )
     return charts
 
 
-def _charge(
-    label: str, curve: BatteryCurve, capacity_J: float, time_s: np.ndarray
-) -> dict[str, Any]:
+def _percent(curve: BatteryCurve, battery: Battery, time_s: np.ndarray) -> np.ndarray:
     at_s, content_J = with_recharge_jumps(curve)
-    percent = 100.0 * np.interp(time_s, at_s, content_J, right=np.nan) / capacity_J
-    return _line(label, label, curve.robot, percent, 2)
+    content_J = np.interp(time_s, at_s, content_J, right=np.nan)
+    return np.asarray(100.0 * content_J / battery.capacity_J)
 
 
 def _tracking_chart(
@@ -152,92 +141,43 @@ def _tracking_chart(
 ) -> list[dict[str, Any]]:
     if log is None:
         return []
-    return [
-        {
-            "id": "tracking",
-            "group": "tracking",
-            "title": "Distance from the planned place",
-            "unit": "cm",
-            "digits": 2,
-            "series": [
-                _line(
-                    robot,
-                    "robot",
-                    robot,
-                    100.0 * _largest(log.time_s, error_m, time_s),
-                    3,
-                )
-                for robot, error_m in zip(
-                    log.robots, series.tracking_error(log), strict=True
-                )
-            ],
-        }
+    errors_cm = [
+        100.0 * _largest(log.time_s, error_m, time_s)
+        for error_m in series.tracking_error(log)
     ]
+    lines = _own_lines(log.robots, errors_cm)
+    title = "Distance from the planned place"
+    return [chart("tracking", title, "cm", lines, group="tracking")]
 
 
 def _largest(at_s: np.ndarray, values: np.ndarray, time_s: np.ndarray) -> np.ndarray:
-    """Return the largest value around each of the grid's times; NaN after the last."""
+    """Return the largest value around each of the grid's times; NaN where none is."""
     middles = 0.5 * (time_s[:-1] + time_s[1:])
-    bins = np.searchsorted(middles, at_s)
     largest = np.full(len(time_s), np.nan)
-    np.fmax.at(largest, bins, values)
+    np.fmax.at(largest, np.searchsorted(middles, at_s), values)
     return largest
 
 
-def _distance_charts(
-    scene: Scene, poses: list[np.ndarray], time_s: np.ndarray
-) -> list[dict[str, Any]]:
+def _distance_charts(scene: Scene, poses: list[np.ndarray]) -> list[dict[str, Any]]:
     ids = [robot.id for robot in scene.robots]
     to_obstacles = [
         series.obstacle_distance(scene, robot, pose)
         for robot, pose in zip(scene.robots, poses, strict=True)
     ]
-    charts = [
-        {
-            "id": "obstacles",
-            "group": "distance",
-            "title": "To the nearest obstacle or the bounds",
-            "unit": "m",
-            "digits": 2,
-            "series": [
-                _line(name, "robot", name, distance, 3)
-                for name, distance in zip(ids, to_obstacles, strict=True)
-            ],
-        }
-    ]
+    lines = _own_lines(ids, to_obstacles)
+    title = "To the nearest obstacle or the bounds"
+    charts = [chart("obstacles", title, "m", lines, group="distance")]
     if len(ids) > 1:
-        apart = series.robot_distance(scene.robots, poses)
-        charts.append(
-            {
-                "id": "robots",
-                "group": "distance",
-                "title": "To the nearest other robot",
-                "unit": "m",
-                "digits": 2,
-                "series": [
-                    _line(name, "robot", name, distance, 3)
-                    for name, distance in zip(ids, apart, strict=True)
-                ],
-            }
-        )
+        lines = _own_lines(ids, series.robot_distance(scene.robots, poses))
+        title = "To the nearest other robot"
+        charts.append(chart("robots", title, "m", lines, group="distance"))
     return charts
 
 
-def _line(
-    label: str, kind: str, robot: str, values: np.ndarray, digits: int
-) -> dict[str, Any]:
-    return {
-        "label": label,
-        "kind": kind,
-        "robot": robot,
-        "values": _rounded(values, digits),
-    }
-
-
-def _rounded(values: np.ndarray, digits: int) -> list[float | None]:
+def _own_lines(
+    ids: Sequence[str], values: Iterable[np.ndarray]
+) -> list[dict[str, Any]]:
     return [
-        None if missing else value
-        for missing, value in zip(
-            np.isnan(values).tolist(), np.round(values, digits).tolist(), strict=True
-        )
+        line(name, "own", (at, name), own)
+        for at, (name, own) in enumerate(zip(ids, values, strict=True))
     ]

@@ -131,7 +131,7 @@ class _Canvas:
                 f'style="--c:var(--r{at})" data-tip="{escape(_about(robot))}">'
                 f'<g class="body" transform="translate({x} {y}) rotate({turn:.2f})">'
                 f'<polygon points="{outline}"/><circle r="0.18"/></g>'
-                f'<text class="name" x="{x}" y="{y}" dy="-1.4em">{escape(robot.id)}'
+                f'<text class="name" x="{x}" y="{y}" dy="2em">{escape(robot.id)}'
                 "</text></g>"
             )
 

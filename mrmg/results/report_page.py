@@ -192,11 +192,11 @@ def robot_dot(index: int, content: str) -> str:
 
 
 def toggle(kind: str, value: str, label: str) -> str:
-    """Return a ticked box that shows and hides a `layer` of the map or a `robot`.
+    """Return a ticked box that shows and hides things.
 
     Args:
-        kind: "layer" or "robot".
-        value: name of the layer or id of the robot.
+        kind: "layer" of the map, or "owner" of lines in charts and paths on the map.
+        value: name of the layer or of the owner.
         label: HTML beside the box.
     """
     return (

@@ -264,10 +264,10 @@ def test_toggles_hide_robots_and_layers(report: Tab) -> None:
     chart = "document.querySelector('#chart-tracking canvas').toDataURL()"
     assert report.value(path) != "none"
     before = report.value(chart)
-    report.click("[data-toggle-robot=r1]")
+    report.click("[data-toggle-owner=r1]")
     assert report.value(path) == "none"
     assert report.value(chart) != before
-    report.click("[data-toggle-robot=r1]")
+    report.click("[data-toggle-owner=r1]")
     assert report.value(path) != "none"
     assert report.value(chart) == before
     layer = "document.querySelector('#map [data-layer=driven]').style.display"

@@ -46,18 +46,17 @@
 
   /* Charts. */
   const charts = [];
-  const hiddenRobots = new Set();
+  const hiddenOwners = new Set();
   const DASHES = [[], [9, 4], [3, 3], [12, 3, 3, 3]];
   function lineOf(series) {
-    const at = data.robots.findIndex((robot) => robot.id === series.robot);
-    const own = color(`--r${at}`);
+    const own = color(`--r${series.color}`);
     const looks = {
       planned: { stroke: `${own}66`, width: 5, dash: [] },
       simulated: { stroke: own, width: 1.6, dash: [] },
       limit: { stroke: color("--bad"), width: 1.4, dash: [6, 4] },
-      robot: { stroke: own, width: 1.6, dash: DASHES[at % DASHES.length] },
+      own: { stroke: own, width: 1.6, dash: DASHES[series.color % DASHES.length] },
     };
-    return looks[series.kind];
+    return looks[series.look];
   }
   function valueText(chart) {
     return (u, value) =>
@@ -78,7 +77,7 @@
     const series = chart.series.map((item) => {
       const look = lineOf(item);
       return { label: item.label, value: valueText(chart), points: { show: false },
-        show: !hiddenRobots.has(item.robot), ...look };
+        show: !hiddenOwners.has(item.owner), ...look };
     });
     const range = chart.range ? () => chart.range : (u, low, high) => [0, (high || 1) * 1.06];
     const plot = new uPlot({
@@ -116,6 +115,7 @@
   const slider = one("#time");
   let shownIndex = 0;
   function show(index) {
+    if (!slider) return;
     shownIndex = index;
     const time = data.time_s[index];
     const end = data.time_s[data.time_s.length - 1];
@@ -163,11 +163,11 @@
   }
 
   /* Toggles. */
-  function toggleRobot(id, shown) {
-    if (shown) hiddenRobots.delete(id); else hiddenRobots.add(id);
+  function toggleOwner(id, shown) {
+    if (shown) hiddenOwners.delete(id); else hiddenOwners.add(id);
     all(`#map [data-robot="${CSS.escape(id)}"]`).forEach((part) => { part.style.display = shown ? "" : "none"; });
     data.charts.forEach((chart, number) => chart.series.forEach((item, at) => {
-      if (item.robot === id) charts[number].setSeries(at + 1, { show: shown });
+      if (item.owner === id) charts[number].setSeries(at + 1, { show: shown });
     }));
   }
   function toggleLayer(name, shown) {
@@ -175,20 +175,22 @@
   }
   all("input[data-toggle-layer]").forEach((box) =>
     box.addEventListener("change", () => toggleLayer(box.dataset.toggleLayer, box.checked)));
-  all("input[data-toggle-robot]").forEach((box) =>
-    box.addEventListener("change", () => toggleRobot(box.dataset.toggleRobot, box.checked)));
+  all("input[data-toggle-owner]").forEach((box) =>
+    box.addEventListener("change", () => toggleOwner(box.dataset.toggleOwner, box.checked)));
 
   applyScheme();
-  if (data) {
+  if (slider) {
     slider.max = data.time_s.length - 1;
     slider.addEventListener("input", () => show(Number(slider.value)));
     one("#play").addEventListener("click", play);
+    show(0);
+  }
+  if (data) {
     let width = innerWidth;
     addEventListener("resize", () => {
       if (innerWidth === width) return;
       width = innerWidth;
       charts.forEach((plot) => plot.setSize({ width: plot.root.parentElement.clientWidth, height: 190 }));
     });
-    show(0);
   }
 })();

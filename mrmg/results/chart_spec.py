@@ -1,0 +1,76 @@
+"""Charts as JSON: what the script of a page needs to draw one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+
+def chart(
+    name: str,
+    title: str,
+    unit: str,
+    lines: Iterable[dict[str, Any]],
+    *,
+    group: str = "",
+    digits: int = 2,
+    limits: tuple[float, float] | None = None,
+) -> dict[str, Any]:
+    """Return a chart over the page's grid of times.
+
+    Args:
+        name: the page has a place of that name.
+        title: heading above the chart.
+        unit: of the values.
+        lines: from `line`.
+        group: section of the page it belongs to.
+        digits: of values in the legend.
+        limits: of the vertical axis; None fits it, from zero.
+    """
+    spec = {
+        "id": name,
+        "group": group,
+        "title": title,
+        "unit": unit,
+        "digits": digits,
+        "series": list(lines),
+    }
+    return spec if limits is None else {**spec, "range": list(limits)}
+
+
+def line(
+    label: str,
+    look: str,
+    owner: tuple[int, str],
+    values: np.ndarray,
+    *,
+    digits: int = 3,
+) -> dict[str, Any]:
+    """Return one line of a chart.
+
+    Args:
+        label: name in the legend.
+        look: "planned", "simulated", "limit", or "own" for the owner's dash pattern.
+        owner: number of its colour, and what a toggle calls it.
+        values: at the grid's times, NaN where there is none.
+        digits: kept after the decimal point.
+    """
+    return {
+        "label": label,
+        "look": look,
+        "color": owner[0],
+        "owner": owner[1],
+        "values": rounded(values, digits),
+    }
+
+
+def rounded(values: np.ndarray, digits: int) -> list[float | None]:
+    """Return numbers for JSON; NaN becomes None."""
+    return [
+        None if missing else value
+        for missing, value in zip(
+            np.isnan(values).tolist(), np.round(values, digits).tolist(), strict=True
+        )
+    ]
