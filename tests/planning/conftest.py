@@ -1,0 +1,164 @@
+"""Random missions for the router, and independent answers to them."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+import pytest
+
+from mrmg.planning._nrpa_kernels import RoutingArrays
+from mrmg.planning.routing import routing_arrays
+
+
+def random_mission(
+    seed: int,
+    *,
+    goals: int,
+    stations: int,
+    robots: int = 1,
+    range_m: tuple[float, float] = (60.0, 160.0),
+    open_goal: Sequence[bool] | None = None,
+) -> RoutingArrays:
+    """Return a mission over 100 x 100 m of uneven ground.
+
+    Ways cost up to 1.6 times their length, and are shortened through each other, so
+    that they are a metric, as shortest paths are.
+
+    Args:
+        seed: draws everything.
+        goals, stations, robots: their numbers.
+        range_m: between these lies the way a full battery lasts for.
+        open_goal: which goals are still to be visited.
+    """
+    rng = np.random.default_rng(seed)
+    targets = goals + stations
+    point = rng.uniform(0.0, 100.0, (targets + robots, 2))
+    way = np.hypot(*(point[:, None] - point[None]).transpose(2, 0, 1))
+    rough = rng.uniform(1.0, 1.6, way.shape)
+    way *= np.maximum(rough, rough.T)
+    for k in range(len(way)):
+        way = np.minimum(way, way[:, k : k + 1] + way[k : k + 1])
+    plain = rng.uniform(80.0, 120.0, robots)
+    capacity = plain * rng.uniform(*range_m, robots)
+    return routing_arrays(
+        goals=goals,
+        distance=np.repeat(way[None, :targets, :targets], robots, axis=0),
+        start_distance=way[targets:, :targets],
+        plain=plain,
+        energy=capacity * rng.uniform(0.5, 1.0, robots),
+        capacity=capacity,
+        reserve=0.05 * capacity,
+        open_goal=None if open_goal is None else np.array(open_goal),
+    )
+
+
+def drive(
+    problem: RoutingArrays, robot: int, tour: Sequence[int]
+) -> tuple[float, float]:
+    """Return (cost, least energy above the reserve) of driving a tour [J]."""
+    place = problem.cost.shape[2]
+    energy = problem.energy[robot]
+    total, least = 0.0, energy - problem.reserve[robot]
+    for target in tour:
+        leg = problem.cost[robot, place, target]
+        total += leg
+        energy -= leg
+        least = min(least, energy - problem.reserve[robot])
+        if target >= problem.goals:
+            energy = problem.capacity[robot]
+        place = target
+    return total, least
+
+
+def with_stations(
+    route: tuple[int, ...], stations: range, most: int
+) -> Iterator[tuple[int, ...]]:
+    """Yield a route with every choice of up to `most` stations before each goal."""
+    pauses = [
+        pause for n in range(most + 1) for pause in itertools.permutations(stations, n)
+    ]
+    for choice in itertools.product(pauses, repeat=len(route)):
+        yield tuple(
+            itertools.chain.from_iterable(
+                (*pause, goal) for pause, goal in zip(choice, route, strict=True)
+            )
+        )
+
+
+def cheapest_of_subsets(problem: RoutingArrays, robot: int) -> dict[int, float]:
+    """Return the exact least cost of every set of goals one robot can visit.
+
+    Label setting over (set visited, place): a label is (cost, energy), and one that
+    costs more and has less energy than another is dropped. Recharges are not limited.
+    """
+    targets, goals = problem.cost.shape[2], problem.goals
+    labels: dict[tuple[int, int], list[tuple[float, float]]] = defaultdict(list)
+    best: dict[int, float] = {}
+    heap = [(0.0, -float(problem.energy[robot]), 0, targets)]
+    while heap:
+        cost, minus_energy, mask, place = heapq.heappop(heap)
+        energy = -minus_energy
+        known = labels[mask, place]
+        if any(c <= cost and e >= energy for c, e in known):
+            continue
+        known.append((cost, energy))
+        best[mask] = min(cost, best.get(mask, np.inf))
+        for target in range(targets):
+            leg = problem.cost[robot, place, target]
+            after = energy - leg
+            if after < problem.reserve[robot] or target == place:
+                continue
+            if target >= goals:
+                full = -float(problem.capacity[robot])
+                heapq.heappush(heap, (cost + leg, full, mask, target))
+            elif problem.open_goal[target] and not mask >> target & 1:
+                visited = mask | 1 << target
+                heapq.heappush(heap, (cost + leg, -after, visited, target))
+    return best
+
+
+def cheapest_fleet(problem: RoutingArrays) -> float:
+    """Return the exact least cost of visiting all open goals; inf if impossible."""
+    per_robot = [
+        cheapest_of_subsets(problem, robot) for robot in range(len(problem.energy))
+    ]
+    fleet = {0: 0.0}
+    for best in per_robot:
+        joined: dict[int, float] = {}
+        for (done, before), (more, cost) in itertools.product(
+            fleet.items(), best.items()
+        ):
+            if done & more == 0:
+                total = before + cost
+                joined[done | more] = min(total, joined.get(done | more, np.inf))
+        fleet = joined
+    everything = sum(1 << g for g in range(problem.goals) if problem.open_goal[g])
+    return fleet.get(everything, np.inf)
+
+
+@pytest.fixture
+def mission() -> Callable[..., RoutingArrays]:
+    """Return the maker of random missions."""
+    return random_mission
+
+
+@pytest.fixture
+def replay() -> Callable[..., tuple[float, float]]:
+    """Return the function that drives a tour leg by leg."""
+    return drive
+
+
+@pytest.fixture
+def oracle() -> Callable[[RoutingArrays], float]:
+    """Return the exact solver of small missions."""
+    return cheapest_fleet
+
+
+@pytest.fixture
+def insertions() -> Callable[..., Iterator[tuple[int, ...]]]:
+    """Return the enumeration of all ways to put stations into a route."""
+    return with_stations

@@ -1,0 +1,106 @@
+"""Nested rollout policy adaptation on its own: legal moves, and learning."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from mrmg.planning import _nrpa_kernels
+from mrmg.planning._nrpa_kernels import UNVISITED, RoutingArrays
+
+
+def search(
+    problem: RoutingArrays, seed: int, *, levels: int = 2, iterations: int = 15
+) -> tuple[float, list[tuple[int, int]]]:
+    """Return (cost, moves as (robot, target)) of one search."""
+    robots, _, targets = problem.cost.shape
+    sequence = np.zeros(3 * problem.goals + 4 * robots, np.int64)
+    cost, length = _nrpa_kernels.nrpa(
+        problem, levels, iterations, 1.0, np.array([seed], np.uint64), sequence
+    )
+    return cost, [divmod(int(move), targets) for move in sequence[:length]]
+
+
+@pytest.mark.parametrize("robots", [1, 3])
+def test_every_move_is_legal_and_the_cost_is_theirs(
+    mission: Callable[..., RoutingArrays], robots: int
+) -> None:
+    complete = 0
+    for seed in range(40):
+        problem = mission(
+            seed, goals=6, stations=3, robots=robots, range_m=(100.0, 220.0)
+        )
+        cost, moves = search(problem, seed)
+        place = [problem.cost.shape[2]] * robots
+        energy = problem.energy.copy()
+        unvisited = set(range(problem.goals))
+        recharges = [0] * robots
+        spent = 0.0
+        for r, t in moves:
+            leg = problem.cost[r, place[r], t]
+            assert leg <= energy[r] - problem.reserve[r]
+            assert t != place[r]
+            spent += leg
+            energy[r] -= leg
+            place[r] = t
+            if t < problem.goals:
+                unvisited.remove(t)
+                recharges[r] = 0
+            else:
+                energy[r] = problem.capacity[r]
+                recharges[r] += 1
+                assert recharges[r] <= 2
+        assert cost == pytest.approx(spent + UNVISITED * len(unvisited))
+        complete += not unvisited
+    assert complete >= 10
+
+
+def test_the_same_state_draws_the_same_search(
+    mission: Callable[..., RoutingArrays],
+) -> None:
+    problem = mission(1, goals=8, stations=2, robots=2, range_m=(200.0, 300.0))
+    assert search(problem, 4) == search(problem, 4)
+
+
+def test_nesting_and_iterations_pay(mission: Callable[..., RoutingArrays]) -> None:
+    """On average over missions; one draw alone may be lucky."""
+    problems = [
+        mission(seed, goals=10, stations=2, robots=2, range_m=(300.0, 400.0))
+        for seed in range(10)
+    ]
+    mean = {
+        effort: np.mean(
+            [
+                search(problem, 7, levels=effort[0], iterations=effort[1])[0]
+                for problem in problems
+            ]
+        )
+        for effort in ((1, 1), (1, 30), (2, 30))
+    }
+    assert mean[2, 30] < mean[1, 30] < mean[1, 1] < UNVISITED
+
+
+def test_learning_makes_the_learnt_moves_likelier(
+    mission: Callable[..., RoutingArrays],
+) -> None:
+    problem = mission(2, goals=6, stations=0, range_m=(600.0, 700.0))
+    scale = _nrpa_kernels.mean_cost(problem)
+    policy = np.zeros(problem.cost.shape)
+    wanted = np.array([5, 3, 1, 0, 2, 4])
+    drawn = np.zeros(18, np.int64)
+
+    def hits() -> int:
+        random = np.array([9], np.uint64)
+        found = 0
+        for _ in range(300):
+            _nrpa_kernels.playout(problem, policy, scale, random, drawn)
+            found += bool((drawn[:6] == wanted).all())
+        return found
+
+    before = hits()
+    for _ in range(30):
+        _nrpa_kernels.adapt(problem, policy, scale, 1.0, wanted, len(wanted))
+    assert before < 60
+    assert hits() > 200
