@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 from mrmg import __version__
-from mrmg.cli import commands, scene_commands
+from mrmg.cli import commands, scene_commands, show_commands
 
 EXIT_CODES = """\
 exit codes:
@@ -33,6 +33,8 @@ def make_parser() -> argparse.ArgumentParser:
     _add_plan(verbs)
     _add_steps(verbs)
     _add_render(verbs)
+    _add_compare(verbs)
+    _add_figure(verbs)
     _add_scene(verbs)
     doctor = verbs.add_parser("doctor", help="check this machine, with cures")
     _add_json(doctor, "the findings")
@@ -108,6 +110,42 @@ def _add_render(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     render.add_argument("--size", type=_size, metavar="WxH", help="such as 1280x720")
     render.add_argument("--fps", type=_fps, metavar="N", help="frames per second")
     render.set_defaults(command=commands.render)
+
+
+def _add_compare(verbs: _Verbs) -> None:  # type: ignore[type-arg]
+    compare = verbs.add_parser("compare", help="set runs side by side")
+    compare.add_argument(
+        "runs", type=Path, nargs="+", metavar="RUN", help="run folders, two or more"
+    )
+    compare.add_argument(
+        "-o",
+        "--out",
+        type=Path,
+        default=Path("compare.html"),
+        metavar="PAGE.html",
+        help="page with table and plots; default compare.html",
+    )
+    _add_json(compare, "the table")
+    compare.set_defaults(command=show_commands.compare)
+
+
+def _add_figure(verbs: _Verbs) -> None:  # type: ignore[type-arg]
+    figure = verbs.add_parser("figure", help="draw a figure for a paper")
+    figure.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    figure.add_argument(
+        "--kind",
+        choices=("map", "energy", "timeline"),
+        default="map",
+        help="default map",
+    )
+    figure.add_argument(
+        "-o",
+        "--out",
+        type=Path,
+        metavar="FIGURE.pdf",
+        help="PDF, SVG or PNG by its suffix; default KIND.pdf",
+    )
+    figure.set_defaults(command=show_commands.figure)
 
 
 def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]

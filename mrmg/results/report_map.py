@@ -38,7 +38,7 @@ def mission_map(scene: Scene, plan: Plan | None, log: ExecutionLog | None) -> st
     ]
     margin = 0.6 * letter
     return (
-        f'<svg id="map" role="img" aria-label="Map of the mission {escape(scene.name)}"'
+        f'<svg class="map" role="img" aria-label="Map of {escape(scene.name)}"'
         f' viewBox="{-margin:.2f} {-margin:.2f} '
         f'{width + 2 * margin:.2f} {height + 2 * margin:.2f}"'
         f' style="font-size:{letter:.3f}px;--line:{letter / 10:.3f}px">'

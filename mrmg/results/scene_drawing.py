@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,6 +26,12 @@ _MAP_INCHES = 8.6
 _LEGEND_INCHES = 2.6
 _LABEL_M = 1.5
 _PARTIAL = style.OBSTACLE + "66"
+_TIMELESS: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None},
+    "svg": {"Date": None},
+}
+"""Metadata by format, such that equal figures give equal files."""
 _HALO = [withStroke(linewidth=2.5, foreground="white")]
 
 
@@ -60,11 +67,9 @@ def new_map_figure(scene: Scene) -> tuple[Figure, Axes]:
 
 def write_figure(figure: Figure, path: Path) -> None:
     """Write a figure to `path` atomically, in the format of its suffix."""
-    form = path.suffix.removeprefix(".") or "png"
-    # Fixed metadata: equal figures give equal files.
-    metadata = {"Software": None} if form == "png" else None
+    form = path.suffix.removeprefix(".").lower() or "png"
     with storage.atomic_path(path) as temporary:
-        figure.savefig(temporary, format=form, metadata=metadata)
+        figure.savefig(temporary, format=form, metadata=_TIMELESS.get(form))
 
 
 def draw_scene(scene: Scene, path: Path) -> None:

@@ -193,10 +193,10 @@ def test_the_button_changes_the_scheme_and_the_charts_with_it(report: Tab) -> No
 @pytest.mark.parametrize(
     ("selector", "words"),
     [
-        ("#map [data-target=g1]", "g1: goal; stop 1 of"),
-        ("#map [data-target=s1]", "s1: recharging station"),
-        ("#map .obstacle", "obstacle"),
-        ("#map .robot[data-robot=r2] polygon", "r2: car"),
+        (".map [data-target=g1]", "g1: goal; stop 1 of"),
+        (".map [data-target=s1]", "s1: recharging station"),
+        (".map .obstacle", "obstacle"),
+        (".map .robot[data-robot=r2] polygon", "r2: car"),
         (".timeline .act.driving", "drives from 0.0"),
         (".bar i", "rolling"),
     ],
@@ -215,7 +215,7 @@ def test_pointing_at_a_chart_reads_all_charts_and_moves_the_robots(
     report: Tab, quickstart_run: Path
 ) -> None:
     clock = "document.querySelector('#clock').textContent"
-    body = "document.querySelector('#map .robot .body').getAttribute('transform')"
+    body = "document.querySelector('.map .robot .body').getAttribute('transform')"
     assert report.value(clock).startswith("0.0 s, 0 of 4")
     start = report.value(body)
     report.point_at("#chart-tracking .u-over", 0.99)
@@ -238,7 +238,7 @@ def test_the_slider_moves_the_time(report: Tab) -> None:
         "(() => { const s = document.querySelector('#time'); s.value = s.max;"
         "s.dispatchEvent(new Event('input')); })()"
     )
-    assert report.value("document.querySelectorAll('#map .goal.done').length") == 4
+    assert report.value("document.querySelectorAll('.map .goal.done').length") == 4
     assert report.value("document.querySelector('.now').style.left") == "100%"
 
 
@@ -260,7 +260,7 @@ def test_play_runs_to_the_end_and_stops(report: Tab) -> None:
 
 
 def test_toggles_hide_robots_and_layers(report: Tab) -> None:
-    path = "getComputedStyle(document.querySelector('#map .path.driven')).display"
+    path = "getComputedStyle(document.querySelector('.map .path.driven')).display"
     chart = "document.querySelector('#chart-tracking canvas').toDataURL()"
     assert report.value(path) != "none"
     before = report.value(chart)
@@ -270,7 +270,7 @@ def test_toggles_hide_robots_and_layers(report: Tab) -> None:
     report.click("[data-toggle-owner=r1]")
     assert report.value(path) != "none"
     assert report.value(chart) == before
-    layer = "document.querySelector('#map [data-layer=driven]').style.display"
+    layer = "document.querySelector('.map [data-layer=driven]').style.display"
     report.click("[data-toggle-layer=driven]")
     assert report.value(layer) == "none"
     assert report.errors == []
@@ -294,5 +294,5 @@ def test_an_infeasible_mission_has_a_page_too(
     tab.open(tmp_path / "run" / "report.html")
     assert tab.errors == []
     assert "Infeasible" in tab.value("document.querySelector('#verdict').textContent")
-    tab.point_at("#map .goal")
+    tab.point_at(".map .goal")
     assert "g1: goal" in tab.value("document.querySelector('#tip').textContent")

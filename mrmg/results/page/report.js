@@ -120,7 +120,7 @@
     const time = data.time_s[index];
     const end = data.time_s[data.time_s.length - 1];
     data.robots.forEach((robot) => {
-      const group = one(`#map .robot[data-robot="${CSS.escape(robot.id)}"]`);
+      const group = one(`.map .robot[data-robot="${CSS.escape(robot.id)}"]`);
       const x = robot.x[index], y = robot.y[index];
       group.querySelector(".body").setAttribute("transform", `translate(${x} ${y}) rotate(${robot.turn[index]})`);
       const name = group.querySelector(".name");
@@ -130,12 +130,12 @@
     const done = new Map(data.visits
       .filter((visit) => visit.kind === "goal" && visit.time_s <= time + 1e-6)
       .map((visit) => [visit.target, visit.robot]));
-    all("#map .goal").forEach((goal) => goal.classList.toggle("done", done.has(goal.dataset.target)));
+    all(".map .goal").forEach((goal) => goal.classList.toggle("done", done.has(goal.dataset.target)));
     const mark = one(".timeline .now");
     mark.hidden = false;
     mark.style.left = `${(100 * time) / Number(one(".timeline").dataset.end || end)}%`;
     slider.value = index;
-    one("#clock").textContent = `${time.toFixed(1)} s, ${done.size} of ${all("#map .goal").length} goals`;
+    one("#clock").textContent = `${time.toFixed(1)} s, ${done.size} of ${all(".map .goal").length} goals`;
   }
   let playing = null;
   function play() {
@@ -165,13 +165,13 @@
   /* Toggles. */
   function toggleOwner(id, shown) {
     if (shown) hiddenOwners.delete(id); else hiddenOwners.add(id);
-    all(`#map [data-robot="${CSS.escape(id)}"]`).forEach((part) => { part.style.display = shown ? "" : "none"; });
+    all(`.map [data-robot="${CSS.escape(id)}"]`).forEach((part) => { part.style.display = shown ? "" : "none"; });
     data.charts.forEach((chart, number) => chart.series.forEach((item, at) => {
       if (item.owner === id) charts[number].setSeries(at + 1, { show: shown });
     }));
   }
   function toggleLayer(name, shown) {
-    all(`#map [data-layer="${name}"]`).forEach((group) => { group.style.display = shown ? "" : "none"; });
+    all(`.map [data-layer="${name}"]`).forEach((group) => { group.style.display = shown ? "" : "none"; });
   }
   all("input[data-toggle-layer]").forEach((box) =>
     box.addEventListener("change", () => toggleLayer(box.dataset.toggleLayer, box.checked)));

@@ -1,0 +1,174 @@
+"""Runs side by side: a table of their figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mrmg.errors import UsageError
+from mrmg.results.report_record import RunRecord, read_record
+
+MISSING = "–"
+_MEASURES = ("kJ", "s", "m", "cm")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """One figure of every run.
+
+    Attributes:
+        name: what the figure is.
+        unit: of the values; "" for texts.
+        values: one per run; None where a run has none.
+        digits: after the decimal point.
+    """
+
+    name: str
+    unit: str
+    values: tuple[float | str | None, ...]
+    digits: int = 0
+
+    def cells(self) -> list[str]:
+        """Return the values as text; measures after the first with their difference."""
+        first = self.values[0]
+        texts = []
+        for number, value in enumerate(self.values):
+            if value is None or isinstance(value, str):
+                texts.append(value or MISSING)
+                continue
+            text = f"{value:.{self.digits}f} {self.unit}".rstrip()
+            if number and self.unit in _MEASURES and isinstance(first, float) and first:
+                text += f" ({100.0 * (value - first) / abs(first):+.1f} %)"
+            texts.append(text.replace("-", "−"))
+        return texts
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """Some runs, and what they have in common to be compared by.
+
+    Attributes:
+        names: what tells the runs apart, one per run.
+        records: of the runs.
+        rows: their figures.
+    """
+
+    names: tuple[str, ...]
+    records: tuple[RunRecord, ...]
+    rows: tuple[Row, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Return names and figures as JSON data."""
+        return {
+            "runs": list(self.names),
+            "figures": [
+                {"name": row.name, "unit": row.unit, "values": list(row.values)}
+                for row in self.rows
+            ],
+        }
+
+    def to_text(self) -> str:
+        """Return the table as text with aligned columns."""
+        table = [["", *self.names], *([row.name, *row.cells()] for row in self.rows)]
+        widths = [max(len(line[at]) for line in table) for at in range(len(table[0]))]
+        return "\n".join(
+            "  ".join(
+                [line[0].ljust(widths[0])]
+                + [
+                    cell.rjust(width)
+                    for cell, width in zip(line[1:], widths[1:], strict=True)
+                ]
+            ).rstrip()
+            for line in table
+        )
+
+
+def compare_runs(folders: Sequence[Path]) -> Comparison:
+    """Read run folders to compare.
+
+    Args:
+        folders: at least two, none twice.
+
+    Raises:
+        UsageError: if there are fewer, or one is named twice.
+        RunFolderError: if one cannot be read.
+    """
+    resolved = [folder.resolve() for folder in folders]
+    if len(set(resolved)) < max(len(resolved), 2):
+        raise UsageError("compare needs at least two run folders, none of them twice")
+    records = tuple(read_record(folder) for folder in folders)
+    return Comparison(
+        names=_names(resolved), records=records, rows=tuple(_rows(records))
+    )
+
+
+def _names(folders: Sequence[Path]) -> tuple[str, ...]:
+    """Return the shortest ends of the paths that tell them apart."""
+    for length in range(1, max(len(folder.parts) for folder in folders) + 1):
+        names = ["/".join(folder.parts[-length:]) for folder in folders]
+        if len(set(names)) == len(names):
+            break
+    return tuple(names)
+
+
+_FIGURES: tuple[tuple[str, str, int, float, tuple[str, ...]], ...] = (
+    ("planned energy", "kJ", 2, 1e-3, ("plan", "cost_J")),
+    ("planned duration", "s", 1, 1.0, ("plan", "makespan_s")),
+    ("planning time", "s", 2, 1.0, ("plan", "time_s", "total")),
+    ("first plan after", "s", 2, 1.0, ("plan", "time_s", "first_solution")),
+    ("tree vertices", "", 0, 1.0, ("plan", "vertices")),
+    (
+        "least distance to obstacles",
+        "m",
+        2,
+        1.0,
+        ("verdict", "min_obstacle_clearance_m"),
+    ),
+    ("least distance of robots", "m", 2, 1.0, ("verdict", "min_robot_distance_m")),
+    ("rules broken", "", 0, 1.0, ("verdict", "violations")),
+    ("simulated energy", "kJ", 2, 1e-3, ("energy", "measured_J")),
+    ("lowest charge", "%", 1, 100.0, ("energy", "min_charge_fraction")),
+    ("recharges", "", 0, 1.0, ("energy", "recharges")),
+    ("goals visited", "", 0, 1.0, ("execution", "goals_visited")),
+    ("contacts", "", 0, 1.0, ("execution", "contacts")),
+    ("tracking error, rms", "cm", 2, 100.0, ("execution", "tracking", "rms_m")),
+    ("tracking error, largest", "cm", 2, 100.0, ("execution", "tracking", "max_m")),
+)
+"""Name, unit, digits, factor and place in `summary.json`."""
+
+
+def _rows(records: Sequence[RunRecord]) -> list[Row]:
+    def texts(name: str, of: Callable[[RunRecord], str]) -> Row:
+        return Row(name=name, unit="", values=tuple(of(record) for record in records))
+
+    rows = [
+        texts("scene", lambda record: record.scene.name),
+        texts("seed", lambda record: str(record.summary["seed"])),
+        texts("profile", lambda record: str(record.arguments.get("profile", MISSING))),
+        texts("outcome", _outcome),
+    ]
+    for name, unit, digits, factor, place in _FIGURES:
+        values = [_at(record.summary, place) for record in records]
+        if any(value is not None for value in values):
+            scaled = tuple(
+                None if value is None else factor * value for value in values
+            )
+            rows.append(Row(name=name, unit=unit, values=scaled, digits=digits))
+    return rows
+
+
+def _outcome(record: RunRecord) -> str:
+    if record.plan is None:
+        return str(record.planning["status"]).replace("_", " ")
+    if record.audit is None:
+        return "planned"
+    return "accomplished" if record.summary["mission_ok"] else "failed"
+
+
+def _at(summary: Mapping[str, Any], place: Sequence[str]) -> float | None:
+    value: Any = summary
+    for name in place:
+        value = value.get(name) if isinstance(value, Mapping) else None
+    return None if value is None else float(value)

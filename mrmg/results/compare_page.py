@@ -1,0 +1,172 @@
+"""The page of a comparison: table, courses over one another, maps side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrmg import storage
+from mrmg.results import chart_spec, style
+from mrmg.results import report_page as html
+from mrmg.results.compare import Comparison
+from mrmg.results.energy_plot import BatteryCurve, planned_curves
+from mrmg.results.mission_series import shown_motions, shown_visits
+from mrmg.results.report_charts import measured_curves
+from mrmg.results.report_map import mission_map
+from mrmg.results.report_record import RunRecord
+
+_SAMPLES = 800
+
+
+def write_comparison(comparison: Comparison, path: Path) -> None:
+    """Write the comparison as a page that stands alone.
+
+    Args:
+        comparison: what to show.
+        path: HTML file to write.
+    """
+    storage.write_text(path, comparison_html(comparison))
+
+
+def comparison_html(comparison: Comparison) -> str:
+    """Return the comparison as HTML."""
+    names, records = comparison.names, comparison.records
+    light, dark = style.robot_colors(names), style.robot_colors_on_dark(names)
+    solved = [number for number, item in enumerate(records) if item.plan is not None]
+    charts = _charts(comparison, solved) if solved else None
+    places = (
+        [(item["id"], item["title"]) for item in charts["charts"]] if charts else []
+    )
+    toggles = [
+        html.toggle("owner", names[number], html.robot_dot(number, names[number]))
+        for number in solved
+    ]
+    return html.page(
+        "Comparison of runs",
+        [
+            html.heading(f"Comparison of {len(names)} runs"),
+            html.section(
+                "Figures",
+                html.table(
+                    ["", *names],
+                    [
+                        [html.text(row.name), *map(html.text, row.cells())]
+                        for row in comparison.rows
+                    ],
+                ),
+                html.note("In brackets: the difference from the first run."),
+            ),
+            html.section("Courses", html.controls(*toggles), html.charts(places))
+            if places
+            else "",
+            html.section("Maps", _maps(comparison)),
+        ],
+        colors=[(light[name], dark[name]) for name in names],
+        data=charts,
+    )
+
+
+def _maps(comparison: Comparison) -> str:
+    boxes = "".join(
+        f'<div class="chart"><h3>{html.text(name)}</h3>'
+        f"{mission_map(record.scene, record.plan, record.log)}</div>"
+        for name, record in zip(comparison.names, comparison.records, strict=True)
+    )
+    return f'<div class="charts two">{boxes}</div>'
+
+
+def _charts(comparison: Comparison, solved: Sequence[int]) -> dict[str, Any]:
+    curves = {number: _curves(comparison.records[number]) for number in solved}
+    end_s = max(float(curve.time_s[-1]) for run in curves.values() for curve in run)
+    time_s = np.linspace(0.0, end_s, _SAMPLES)
+
+    def drawn(
+        name: str, title: str, unit: str, of: Callable[[int], Any], digits: int = 1
+    ) -> Any:
+        lines = [
+            chart_spec.line(
+                comparison.names[at], "own", (at, comparison.names[at]), of(at)
+            )
+            for at in solved
+        ]
+        return chart_spec.chart(name, title, unit, lines, digits=digits)
+
+    return {
+        "time_s": chart_spec.rounded(time_s, 3),
+        "charts": [
+            drawn(
+                "used",
+                "Energy drawn by the fleet",
+                "kJ",
+                lambda at: _used_kJ(curves[at], time_s),
+            ),
+            drawn(
+                "goals",
+                "Goals visited",
+                "",
+                lambda at: _goals_visited(comparison.records[at], time_s),
+                digits=0,
+            ),
+            drawn(
+                "lowest",
+                "Lowest charge in the fleet",
+                "%",
+                lambda at: _lowest_percent(comparison.records[at], curves[at], time_s),
+            ),
+        ],
+    }
+
+
+def _curves(record: RunRecord) -> tuple[BatteryCurve, ...]:
+    assert record.plan is not None
+    if record.log is None:
+        return planned_curves(record.scene, record.plan)
+    return measured_curves(record.scene, record.plan, record.log)
+
+
+def _used_kJ(curves: Sequence[BatteryCurve], time_s: np.ndarray) -> np.ndarray:
+    """Return the energy drawn since the start; recharges add nothing."""
+    used = np.zeros(len(time_s))
+    for curve in curves:
+        drop_J = -np.diff(curve.energy_J)
+        for visit in curve.visits:
+            if visit.kind == "station" and visit.step > 0:
+                drop_J[visit.step - 1] = curve.energy_J[visit.step - 1] - visit.energy_J
+        drawn_J = np.concatenate([[0.0], np.cumsum(drop_J)])
+        used += np.interp(time_s, curve.time_s, drawn_J)
+    return _until_end(used / 1000.0, curves, time_s)
+
+
+def _goals_visited(record: RunRecord, time_s: np.ndarray) -> np.ndarray:
+    assert record.plan is not None
+    motions = shown_motions(record.plan, record.log)
+    at_s = [
+        visit.time_s
+        for motion in motions
+        for visit in shown_visits(record.scene, record.plan, motion)
+        if visit.kind == "goal"
+    ]
+    count = np.searchsorted(np.sort(at_s), time_s, side="right").astype(float)
+    count[time_s > float(motions[0].time_s[-1])] = np.nan
+    return np.asarray(count)
+
+
+def _lowest_percent(
+    record: RunRecord, curves: Sequence[BatteryCurve], time_s: np.ndarray
+) -> np.ndarray:
+    shares = [
+        np.interp(time_s, curve.time_s, curve.energy_J)
+        / record.scene.robot(curve.robot).battery.capacity_J
+        for curve in curves
+    ]
+    return _until_end(100.0 * np.min(shares, axis=0), curves, time_s)
+
+
+def _until_end(
+    values: np.ndarray, curves: Sequence[BatteryCurve], time_s: np.ndarray
+) -> np.ndarray:
+    end_s = max(float(curve.time_s[-1]) for curve in curves)
+    return np.where(time_s > end_s, np.nan, values)

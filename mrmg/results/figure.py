@@ -1,0 +1,63 @@
+"""Figures of a run for papers: map, energy or timeline, as PDF, SVG or PNG."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from matplotlib import rc_context
+
+from mrmg.errors import Fault, RunFolderError, UsageError
+from mrmg.execution.log import ExecutionLog
+from mrmg.mission import Plan
+from mrmg.results.energy_plot import draw_energy
+from mrmg.results.overview import draw_overview
+from mrmg.results.report_record import read_record
+from mrmg.results.timeline_plot import draw_timeline
+from mrmg.scene.types import Scene
+
+Draw = Callable[[Scene, Plan, ExecutionLog | None, Path], None]
+
+_DRAW: dict[str, Draw] = {
+    "map": lambda scene, plan, log, path: draw_overview(scene, plan, log, path=path),
+    "energy": lambda scene, plan, log, path: draw_energy(scene, plan, log, path=path),
+    "timeline": lambda scene, plan, log, path: draw_timeline(
+        scene, plan, log, path=path
+    ),
+}
+KINDS = tuple(_DRAW)
+"""What a figure can show."""
+FORMATS = (".pdf", ".svg", ".png")
+
+# Journals want text as text, in embedded TrueType fonts.
+_FOR_PRINT: Any = {
+    "pdf.fonttype": 42,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "mrmg",
+    "savefig.dpi": 300,
+}
+
+
+def draw_figure(run_folder: Path, kind: str, path: Path) -> None:
+    """Draw one figure of a run.
+
+    Args:
+        run_folder: the run; at least planned.
+        kind: one of `KINDS`.
+        path: file to write; its suffix, one of `FORMATS`, gives the format.
+
+    Raises:
+        UsageError: if kind or suffix is unknown.
+        RunFolderError: if the run has no plan, or cannot be read.
+    """
+    if kind not in _DRAW:
+        raise UsageError(f"kind {kind!r} is unknown; use one of {', '.join(KINDS)}")
+    if path.suffix.lower() not in FORMATS:
+        raise UsageError(f"{path} must end in one of {', '.join(FORMATS)}")
+    record = read_record(run_folder)
+    if record.plan is None:
+        reason = f"there is no plan to draw ({record.planning['reason']})"
+        raise RunFolderError(str(run_folder), [Fault("planning.json", reason)])
+    with rc_context(_FOR_PRINT):
+        _DRAW[kind](record.scene, record.plan, record.log, path)

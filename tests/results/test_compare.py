@@ -1,0 +1,105 @@
+"""Comparisons say what the runs' files say, side by side."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from mrmg import pipeline
+from mrmg.cli import main
+from mrmg.errors import ExitCode, RunFolderError, UsageError
+from mrmg.results.compare import Row, compare_runs
+from mrmg.results.compare_page import comparison_html
+
+
+def data_of(page: str) -> dict:
+    return json.loads(re.search(r'id="data">(.*?)</script>', page, re.DOTALL).group(1))
+
+
+def test_measures_come_with_their_difference_and_counts_without() -> None:
+    energy = Row(name="energy", unit="kJ", values=(10.0, 11.0, None), digits=1)
+    assert energy.cells() == ["10.0 kJ", "11.0 kJ (+10.0 %)", "–"]
+    less = Row(name="energy", unit="kJ", values=(10.0, 9.0), digits=1)
+    assert less.cells() == ["10.0 kJ", "9.0 kJ (−10.0 %)"]
+    assert Row(name="goals", unit="", values=(4.0, 5.0)).cells() == ["4", "5"]
+    assert Row(name="lag", unit="s", values=(0.0, 5.0)).cells() == ["0 s", "5 s"]
+    assert Row(name="scene", unit="", values=("a", "b")).cells() == ["a", "b"]
+
+
+def test_figures_are_those_of_the_summaries(
+    quickstart_run: Path, own_run: Path
+) -> None:
+    comparison = compare_runs([quickstart_run, own_run])
+    summary = json.loads((own_run / "summary.json").read_text())
+    values = {row.name: row.values for row in comparison.rows}
+    energy_kJ = summary["energy"]["measured_J"] / 1000.0
+    assert values["simulated energy"] == pytest.approx((energy_kJ, energy_kJ))
+    assert values["outcome"] == ("accomplished", "accomplished")
+    assert values["goals visited"] == (4.0, 4.0)
+    assert comparison.names == ("quickstart", "run")
+
+
+def test_courses_end_at_the_audit_s_figures(
+    quickstart_run: Path, own_run: Path
+) -> None:
+    comparison = compare_runs([quickstart_run, own_run])
+    charts = {
+        item["id"]: item for item in data_of(comparison_html(comparison))["charts"]
+    }
+    summary = json.loads((own_run / "summary.json").read_text())
+    for number in (0, 1):
+        used = charts["used"]["series"][number]["values"]
+        wanted = summary["energy"]["measured_J"] / 1000.0
+        assert used[-1] == pytest.approx(wanted, abs=2e-3)
+        assert charts["goals"]["series"][number]["values"][-1] == 4
+        least = min(charts["lowest"]["series"][number]["values"])
+        assert least == pytest.approx(
+            100 * summary["energy"]["min_charge_fraction"], abs=0.1
+        )
+
+
+def test_runs_of_one_name_are_told_apart_by_their_folders(
+    quickstart_run: Path, tmp_path: Path
+) -> None:
+    import shutil
+
+    folders = [tmp_path / "a" / "run", tmp_path / "b" / "run"]
+    for folder in folders:
+        shutil.copytree(quickstart_run, folder)
+    assert compare_runs(folders).names == ("a/run", "b/run")
+
+
+def test_a_run_without_a_plan_can_be_compared(
+    quickstart_run: Path, walled_scene: Path, tmp_path: Path
+) -> None:
+    pipeline.run(walled_scene, out=tmp_path / "run", video=None)
+    comparison = compare_runs([quickstart_run, tmp_path / "run"])
+    values = {row.name: row.values for row in comparison.rows}
+    assert values["outcome"] == ("accomplished", "infeasible")
+    assert values["planned energy"][1] is None
+    assert len(data_of(comparison_html(comparison))["charts"][0]["series"]) == 1
+
+
+def test_fewer_than_two_runs_are_refused(quickstart_run: Path, tmp_path: Path) -> None:
+    for folders in ([quickstart_run], [quickstart_run, quickstart_run]):
+        with pytest.raises(UsageError, match="at least two"):
+            compare_runs(folders)
+    with pytest.raises(RunFolderError, match="planning.json"):
+        compare_runs([quickstart_run, tmp_path])
+
+
+def test_the_command_prints_the_table_and_writes_the_page(
+    quickstart_run: Path, own_run: Path, tmp_path: Path, capsys
+) -> None:
+    page = tmp_path / "c.html"
+    runs = [str(quickstart_run), str(own_run)]
+    assert main(["compare", *runs, "-o", str(page)]) == ExitCode.OK
+    told = capsys.readouterr().out
+    assert "simulated energy" in told
+    assert told.endswith(f"{page}\n")
+    assert "simulated energy" in page.read_text()
+    assert main(["compare", *runs, "-o", str(page), "--json"]) == ExitCode.OK
+    assert json.loads(capsys.readouterr().out)["runs"] == ["quickstart", "run"]
