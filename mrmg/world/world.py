@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from mrmg.scene.types import Scene
-from mrmg.world import _kernels
+from mrmg.world import _raster_kernels
 from mrmg.world._kernels import FreeSpace, TerrainGrid
 from mrmg.world.terrain import multiplier_at
 
@@ -88,10 +88,12 @@ def free_space(
         int(np.ceil((high - low) / CELL_M))
         for low, high in ((x_min, x_max), (y_min, y_max))
     )
-    distance = _kernels.edge_distance_field(edge, x_min, y_min, CELL_M, rows, columns)
+    distance = _raster_kernels.edge_distance_field(
+        edge, x_min, y_min, CELL_M, rows, columns
+    )
     ring_start = np.cumsum([0, *(len(ring) for ring in rings)])
     points = np.concatenate(rings) if rings else np.zeros((0, 2))
-    inside = _kernels.fill_rings(
+    inside = _raster_kernels.fill_rings(
         ring_start, points, x_min, y_min, CELL_M, rows, columns
     )
     center_x = x_min + (np.arange(columns) + 0.5) * CELL_M
@@ -101,8 +103,19 @@ def free_space(
         int(np.ceil((high - low) / BUCKET_M))
         for low, high in ((x_min, x_max), (y_min, y_max))
     )
-    bucket_start, bucket_edge = _kernels.bucket_edges(
+    bucket_start, bucket_edge = _raster_kernels.bucket_edges(
         edge, x_min, y_min, BUCKET_M, bucket_columns, bucket_rows, reach
+    )
+    _raster_kernels.correct_near(
+        distance,
+        edge,
+        bucket_start,
+        bucket_edge,
+        x_min,
+        y_min,
+        CELL_M,
+        BUCKET_M,
+        bucket_columns,
     )
     return FreeSpace(
         x_min=float(x_min),
@@ -131,7 +144,7 @@ def _terrain_grid(scene: Scene) -> TerrainGrid:
     for area in scene.terrain:
         points = np.asarray(area.shape.exterior.coords)[:-1]
         rings = [points, *(np.asarray(r.coords)[:-1] for r in area.shape.interiors)]
-        inside = _kernels.fill_rings(
+        inside = _raster_kernels.fill_rings(
             np.cumsum([0, *(len(ring) for ring in rings)]),
             np.concatenate(rings),
             float(x_min),
