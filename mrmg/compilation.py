@@ -1,8 +1,8 @@
 """The one way this package compiles kernels with numba.
 
-numba's cache does not notice edits in other files: a cached caller keeps the old callee.
-The cache folder is therefore named after a digest of all sources that feed kernels, and is
-set before numba is imported anywhere.
+numba's cache does not notice edits in other files: a cached caller keeps the old
+callee. The cache folder is therefore named after a digest of all sources that feed
+kernels, and is set before numba is imported anywhere.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ def cache_folder() -> Path:
 
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))
-# Vectorisers and the last optimisation level double the time to compile and gain nothing
-# on kernels that branch at every step (measured on the planner's).
+# Vectorisers and the last optimisation level double the time to compile and gain
+# nothing on kernels that branch at every step (measured on the planner's).
 os.environ.setdefault("NUMBA_OPT", "2")
 os.environ.setdefault("NUMBA_LOOP_VECTORIZE", "0")
 os.environ.setdefault("NUMBA_SLP_VECTORIZE", "0")

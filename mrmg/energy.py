@@ -8,8 +8,8 @@ multiplier and psi the steering angle:
     P_inertia = m_eff a v
 
 Battery power is the sum divided by the drive efficiency when the drive pulls, times the
-regeneration efficiency when it brakes, plus idle power. The paper's cost, distance times
-terrain plus turning, is the special case m_eff = 0.
+regeneration efficiency when it brakes, plus idle power. The paper's cost, distance
+times terrain plus turning, is the special case m_eff = 0.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class EnergyModel:
         )
 
     def plain_ground_J_per_m(self) -> float:
-        """Return the battery energy of one metre straight on at constant speed, k = 1."""
+        """Return the battery energy of a metre straight on at steady speed, k = 1."""
         return self.rolling_force_N / self.drive_efficiency
 
     def power_parts(

@@ -134,7 +134,8 @@ class Plan:
             for trajectory in self.trajectories
             for array in (trajectory.state, trajectory.control)
         ]
-        return storage.digest("".join([storage.canonical_json(self._header()), *arrays]))
+        header = storage.canonical_json(self._header())
+        return storage.digest("".join([header, *arrays]))
 
     def trajectory(self, robot_id: str) -> Trajectory:
         """Return one robot's trajectory."""

@@ -34,7 +34,7 @@ Derivative = Callable[..., Any]
 def car_derivative(sin: Any, cos: Any, tan: Any) -> Derivative:
     """Return f(theta, v, psi, u1, u2, L) -> (x', y', theta', v', psi')."""
 
-    def derivative(theta, v, psi, u1, u2, wheelbase):  # type: ignore[no-untyped-def]
+    def derivative(theta, v, psi, u1, u2, wheelbase):
         return (
             v * cos(theta),
             v * sin(theta),
@@ -52,7 +52,7 @@ def unicycle_derivative(sin: Any, cos: Any, tan: Any) -> Derivative:
     L is unused.
     """
 
-    def derivative(theta, v, omega, u1, u2, wheelbase):  # type: ignore[no-untyped-def]
+    def derivative(theta, v, omega, u1, u2, wheelbase):
         return (v * cos(theta), v * sin(theta), omega, u1, u2)
 
     return derivative
@@ -64,7 +64,7 @@ def rk4_step(derivative: Derivative) -> Derivative:
     v and w (psi or omega) are integrals of the held control, so their stages are exact.
     """
 
-    def step(x, y, theta, v, w, u1, u2, wheelbase, dt):  # type: ignore[no-untyped-def]
+    def step(x, y, theta, v, w, u1, u2, wheelbase, dt):
         half = 0.5 * dt
         ax, ay, at, _, _ = derivative(theta, v, w, u1, u2, wheelbase)
         vm = v + half * u1

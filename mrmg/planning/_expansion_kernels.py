@@ -97,9 +97,9 @@ def choose_modes(tree, v, target, params, steer, random, stuck, mode):
 @kernel
 def draw_motion(fleet, r, mode, gear, random):
     """Return a random wanted (v, w): any, or one that backs off from where it heads."""
-    low, high = fleet.limit[r, 0], fleet.limit[r, 1]
+    low, high = fleet[r].limit[0], fleet[r].limit[1]
     unit = random_unit(random)
-    side = (2.0 * random_unit(random) - 1.0) * fleet.limit[r, 2]
+    side = (2.0 * random_unit(random) - 1.0) * fleet[r].limit[2]
     if mode == RANDOM:
         return low + unit * (high - low), side
     back = low if gear > 0 else high
@@ -115,7 +115,7 @@ def choose_motion(mission, r, target, state, waypoint, stuck, gear, random, moti
     """
     off = abs(wrap(atan2(waypoint[1] - state[1], waypoint[0] - state[0]) - state[2]))
     gear[r] = 1
-    if mission.fleet.model[r] == UNICYCLE or mission.params.hold_control:
+    if mission.fleet[r].model == UNICYCLE or mission.params.hold_control:
         return False
     if off < AHEAD and stuck == 0:
         return False
@@ -169,9 +169,9 @@ def step_energy(mission, r, before, after, u1):
     return mission.params.dt * _battery_power(
         0.5 * (before[3] + after[3]),
         u1,
-        tan_steer(mission.fleet.model[r], 0.5 * (before[4] + after[4])),
+        tan_steer(mission.fleet[r].model, 0.5 * (before[4] + after[4])),
         k,
-        mission.fleet.energy[r],
+        mission.fleet[r].energy,
     )
 
 
@@ -191,7 +191,7 @@ def note_arrivals(mission, state, energy, visited, target):
                 event = True
         t = target[r]
         if t >= targets.goals and in_target(targets, t, state[r, 0], state[r, 1]):
-            energy[r] = mission.fleet.capacity[r]
+            energy[r] = mission.fleet[r].capacity
             event = True
     return event
 
@@ -259,7 +259,7 @@ def expand(
             control[n, r, 0], control[n, r, 1] = u1, u2
         for r in range(robots):
             state[r] = present_state(commitment, r)
-            if energy[r] < fleet.reserve[r]:
+            if energy[r] < fleet[r].reserve:
                 return n + 1, False, False
         if note_arrivals(mission, state, energy, visited, target):
             return n + 1, True, True
@@ -272,5 +272,5 @@ def _look(mission, r, target, state, waypoint):
     ahead = np.empty(2)
     if look_ahead(mission, r, target, state[r], VIEW_M, ahead) == np.inf:
         ahead[:] = mission.targets.center[target]
-    space = space_of(mission.spaces, mission.fleet.space[r])
+    space = space_of(mission.spaces, mission.fleet[r].space)
     sidestep(mission.fleet, r, state[r], space, state, ahead[0], ahead[1], waypoint)

@@ -20,45 +20,40 @@ ROBOT_MARGIN_M = 0.5
 """Distance the planner keeps between robots at its time steps."""
 
 
-class Fleet(NamedTuple):
-    """Robots as arrays; R robots, planner's share of the limits.
+MOST_CORNERS = 12
+"""Most corners a footprint may have."""
 
-    Attributes:
-        model: motion model id, shape (R,).
-        wheelbase: [m], shape (R,).
-        limit: (v_min, v_max, w_max, u1_max, u2_max), shape (R, 5).
-        corner: footprint corners, padded, shape (R, M, 2).
-        corners: number of corners, shape (R,).
-        middle: middle of the footprint in the robot's frame, shape (R, 2).
-        radius: distance of the farthest corner from the middle, shape (R,).
-        turning_radius: [m], shape (R,).
-        passage: clearance of the reference point's line of travel [m], shape (R,).
-        space: index of the free space, shape (R,).
-        field: index of the cost-to-go fields, shape (R,).
-        energy: coefficients of the energy model, shape (R, 6).
-        plain: battery energy per metre of plain ground [J/m], shape (R,).
-        capacity, reserve: [J], shape (R,).
-    """
-
-    model: np.ndarray
-    wheelbase: np.ndarray
-    limit: np.ndarray
-    corner: np.ndarray
-    corners: np.ndarray
-    middle: np.ndarray
-    radius: np.ndarray
-    turning_radius: np.ndarray
-    passage: np.ndarray
-    space: np.ndarray
-    field: np.ndarray
-    energy: np.ndarray
-    plain: np.ndarray
-    capacity: np.ndarray
-    reserve: np.ndarray
+FLEET = np.dtype(
+    [
+        ("model", np.int64),  # motion model id
+        ("wheelbase", np.float64),  # [m]
+        ("limit", np.float64, (5,)),  # planner's v_min, v_max, w_max, u1_max, u2_max
+        ("corner", np.float64, (MOST_CORNERS, 2)),  # footprint [m], padded
+        ("corners", np.int64),  # number of corners
+        (
+            "middle",
+            np.float64,
+            (2,),
+        ),  # middle of the footprint in the robot's frame [m]
+        ("radius", np.float64),  # of the farthest corner from the middle [m]
+        ("turning_radius", np.float64),  # [m]
+        (
+            "passage",
+            np.float64,
+        ),  # clearance of the reference point's line of travel [m]
+        ("space", np.int64),  # index of the free space
+        ("field", np.int64),  # index of the cost-to-go fields
+        ("energy", np.float64, (6,)),  # coefficients of the energy model
+        ("plain", np.float64),  # battery energy per metre of plain ground [J/m]
+        ("capacity", np.float64),  # [J]
+        ("reserve", np.float64),  # energy the planner leaves [J]
+    ]
+)
+"""One robot as a record; a fleet is an array of them, shape (R,)."""
 
 
 class Spaces(NamedTuple):
-    """All free spaces of a world stacked, so that their number is not part of a type."""
+    """The free spaces of a world stacked: their number is not part of a type."""
 
     x_min: float
     y_min: float

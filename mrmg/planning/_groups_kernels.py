@@ -1,4 +1,4 @@
-"""The motion tree's vertices, and the groups they are chosen by (Algorithm 2, eq. (5))."""
+"""The motion tree's vertices and the groups they are chosen by (Algorithm 2)."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Tree(NamedTuple):
 
 
 class Groups(NamedTuple):
-    """Vertex groups: same region of every robot and same visited goals (Algorithm 2)."""
+    """Vertex groups: same regions of the robots, same visited goals (Algorithm 2)."""
 
     key: np.ndarray
     slot: np.ndarray
@@ -115,7 +115,7 @@ def group_key(state, visited, region):
 
 @kernel
 def add_to_group(groups, tree, n_groups, v, region):
-    """Put a vertex into its group, making the group if it is new; return their number."""
+    """Put a vertex into its group, a new one if need be; return their number."""
     key = group_key(tree.state[v], tree.visited[v], region)
     place = np.int64(key % np.uint64(len(groups.slot)))
     while groups.slot[place] >= 0 and groups.key[groups.slot[place]] != key:
@@ -142,8 +142,8 @@ def add_to_group(groups, tree, n_groups, v, region):
 def group_weight(groups, g, params, initial):
     """Return eq. (5): w = lambda^visits (alpha / |unvisited| + beta dist).
 
-    dist is read as the share of the first tours' energy that is already behind the group,
-    so that groups nearer to the end weigh more.
+    dist is read as the share of the first tours' energy that is already behind the
+    group, so that groups nearer to the end weigh more.
     """
     progress = 1.0 - groups.remaining[g] / initial
     return params.group_lambda ** groups.visits[g] * (

@@ -1,9 +1,9 @@
 """Turning in tight places: the best of all short sequences of held motions.
 
-Where the way lies abeam or behind, or steering has run against something, a robot looks two
-or three motions ahead, each one of a few speeds and steering angles held for a while. It
-takes the first motion of the sequence after which it is, all told, nearest to its target:
-way driven + way to go + what turning towards that way still takes.
+Where the way lies abeam or behind, or steering has run against something, a robot looks
+two or three motions ahead, each one of a few speeds and steering angles held for a
+while. It takes the first motion of the sequence after which it is, all told, nearest to
+its target: way driven + way to go + what turning towards that way still takes.
 """
 
 from __future__ import annotations
@@ -66,8 +66,8 @@ def hold_motion(mission, r, first, v, w, state):
     """
     fleet = mission.fleet
     dt = mission.params.dt
-    space = space_of(mission.spaces, fleet.space[r])
-    corners = fleet.corners[r]
+    space = space_of(mission.spaces, fleet[r].space)
+    corners = fleet[r].corners
     placed = np.empty((corners, 2))
     after = np.empty(5)
     state[:] = first
@@ -75,17 +75,17 @@ def hold_motion(mission, r, first, v, w, state):
     for _ in range(MANEUVER_STEPS):
         u1, u2 = control_towards(fleet, r, state, v, w, dt)
         if state[3] * v < 0.0:
-            u1 = toward_zero(state[3], fleet.limit[r, 3], dt)
-        step(fleet.model[r], state, u1, u2, fleet.wheelbase[r], dt, after)
-        place_footprint(fleet.corner[r, :corners], after[0], after[1], after[2], placed)
+            u1 = toward_zero(state[3], fleet[r].limit[3], dt)
+        step(fleet[r].model, state, u1, u2, fleet[r].wheelbase, dt, after)
+        place_footprint(fleet[r].corner[:corners], after[0], after[1], after[2], placed)
         c, s = cos(after[2]), sin(after[2])
-        mx, my = fleet.middle[r, 0], fleet.middle[r, 1]
+        mx, my = fleet[r].middle[0], fleet[r].middle[1]
         if not footprint_is_clear(
             space,
             placed,
             after[0] + c * mx - s * my,
             after[1] + s * mx + c * my,
-            fleet.radius[r],
+            fleet[r].radius,
             PLANNING_MARGIN_M,
         ):
             state[3] = 0.0
@@ -101,12 +101,12 @@ def way_left(mission, r, target, state, waypoint):
     fleet = mission.fleet
     to_go = look_ahead(mission, r, target, state, MANEUVER_VIEW_M, waypoint)
     off = abs(wrap(atan2(waypoint[1] - state[1], waypoint[0] - state[0]) - state[2]))
-    turn = TURN_SHARE * fleet.turning_radius[r]
+    turn = TURN_SHARE * fleet[r].turning_radius
     tail = turn * (pi - off + TAIL_FIRST) + TAIL_SHARE * min(to_go, TAIL_REACH_M)
     if off > 0.5 * pi:
-        space = space_of(mission.spaces, fleet.space[r])
+        space = space_of(mission.spaces, fleet[r].space)
         room = clearance_estimate(space, state[0], state[1])
-        tight = 0.5 * (fleet.turning_radius[r] + 2.0 - room)
+        tight = 0.5 * (fleet[r].turning_radius + 2.0 - room)
         turn *= 1.0 + TIGHT_TURN * max(0.0, min(1.0, tight))
     return to_go + min(turn * off, tail)
 
@@ -128,7 +128,7 @@ def best_maneuver(mission, r, target, start, stuck, random, out):
     Returns:
         Whether the best sequence gets anywhere at all.
     """
-    limit = mission.fleet.limit
+    limit = mission.fleet[r].limit
     depth = 3 if stuck > 1 else 2
     steerings = 3 if stuck > 1 else 5
     noise = min(1.0 * stuck, 5.0)
@@ -149,8 +149,8 @@ def best_maneuver(mission, r, target, start, stuck, random, out):
             continue
         i = motion[level]
         motion[level] += 1
-        v = 0.7 * limit[r, 1] if i < steerings else limit[r, 0]
-        w = (2.0 * (i % steerings) / (steerings - 1) - 1.0) * limit[r, 2]
+        v = 0.7 * limit[1] if i < steerings else limit[0]
+        w = (2.0 * (i % steerings) / (steerings - 1) - 1.0) * limit[2]
         if level == 0:
             first[0], first[1] = v, w
         end = states[level + 1]

@@ -1,4 +1,4 @@
-"""The whole planning problem as one value for the kernels, and its simplest questions."""
+"""The planning problem as one value for the kernels, and its simplest questions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.planning._fleet_kernels import Fleet, Spaces, space_of
+from mrmg.planning._fleet_kernels import Spaces, space_of
 from mrmg.planning._nrpa_kernels import RoutingArrays
 from mrmg.planning._roadmap_kernels import RoadmapArrays, find_waypoint
 from mrmg.world._kernels import TerrainGrid, point_in_convex
@@ -64,7 +64,7 @@ class Mission(NamedTuple):
         params: numbers the tree is grown by.
     """
 
-    fleet: Fleet
+    fleet: np.ndarray
     spaces: Spaces
     terrain: TerrainGrid
     roadmap: RoadmapArrays
@@ -97,14 +97,14 @@ def look_ahead(mission, r, target, state, view, waypoint):
     """
     fleet = mission.fleet
     return find_waypoint(
-        space_of(mission.spaces, fleet.space[r]),
+        space_of(mission.spaces, fleet[r].space),
         mission.terrain,
         mission.roadmap,
-        fleet.field[r],
+        fleet[r].field,
         target,
         state[0],
         state[1],
-        fleet.passage[r],
+        fleet[r].passage,
         view,
         waypoint,
     )

@@ -1,7 +1,7 @@
 """Nested rollout policy adaptation (Rosin 2011) for the routing problem.
 
-Numbering: targets 0..G-1 are goals, G..T-1 stations; place 0..T-1 is a target, place T a
-robot's start. All costs are energies [J].
+Numbering: targets 0..G-1 are goals, G..T-1 stations; place 0..T-1 is a target, place T
+a robot's start. All costs are energies [J].
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ def playout(problem, policy, scale, random, sequence):
 
 @kernel
 def adapt(problem, policy, scale, alpha, sequence, length):
-    """Move the policy towards a sequence: alpha times the gradient of its log-likelihood."""
+    """Move the policy towards a sequence by alpha times its likelihood's gradient."""
     robots, places, targets = problem.cost.shape
     before = policy.copy()
     place = np.full(robots, targets, np.int64)
@@ -191,8 +191,8 @@ def adapt(problem, policy, scale, alpha, sequence, length):
 def nrpa(problem, levels, iterations, alpha, random, sequence):
     """Nested rollout policy adaptation (Rosin 2011); return (cost, length).
 
-    Level l runs `iterations` searches of level l - 1, each from a copy of its policy, and
-    adapts its policy to the best sequence found so far; level 0 is a playout. The
+    Level l runs `iterations` searches of level l - 1, each from a copy of its policy,
+    and adapts its policy to the best sequence found so far; level 0 is a playout. The
     recursion is unrolled over a counter per level, so that it compiles.
     """
     robots, places, targets = problem.cost.shape

@@ -9,7 +9,7 @@ from mrmg.compilation import kernel
 
 @kernel
 def random_unit(state):
-    """Return a number in [0, 1) and advance `state` (uint64, shape (1,)): splitmix64."""
+    """Return a number in [0, 1) by splitmix64; advances `state` (uint64, (1,))."""
     state[0] += np.uint64(0x9E3779B97F4A7C15)
     z = state[0]
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)

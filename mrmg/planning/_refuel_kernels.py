@@ -26,8 +26,8 @@ def refuel_route(problem, r, route, length, out):
     """Insert stations into a robot's goal sequence at least cost: exact.
 
     Dynamic programme over (goal i, station s visited just before it): between two
-    recharges the energy used is a sum of legs, so the last recharge alone decides what is
-    left. One or two stations may stand between two goals.
+    recharges the energy used is a sum of legs, so the last recharge alone decides what
+    is left. One or two stations may stand between two goals.
 
     Args:
         problem: the problem.
@@ -37,8 +37,8 @@ def refuel_route(problem, r, route, length, out):
         out: receives goals and stations in order, shape (>= 3 * length,).
 
     Returns:
-        (cost [J], number of targets in `out`); cost is at least IMPOSSIBLE if no choice of
-        stations makes the route drivable.
+        (cost [J], number of targets in `out`); cost is at least IMPOSSIBLE if no choice
+        of stations makes the route drivable.
     """
     targets = problem.cost.shape[2]
     goals = problem.goals

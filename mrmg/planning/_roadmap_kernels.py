@@ -21,10 +21,12 @@ class RoadmapArrays(NamedTuple):
 
     Attributes:
         vertex: positions [m], shape (V, 2); the first T are the targets' centres.
-        cost_to_go: weighted length to each target [m], shape (F, T, V); inf where cut off.
-        successor: next vertex on the way to each target, -1 at the end, shape (F, T, V).
-        x_min, y_min, bucket, columns, rows, bucket_start, bucket_vertex: a coarse grid of
-            the vertices.
+        cost_to_go: weighted length to each target [m], shape (F, T, V); inf where cut
+            off.
+        successor: next vertex on the way to each target, -1 at the end, shape (F, T,
+            V).
+        x_min, y_min, bucket, columns, rows, bucket_start, bucket_vertex: a coarse grid
+            of the vertices.
     """
 
     vertex: np.ndarray
@@ -77,9 +79,9 @@ def find_waypoint(space, terrain, roadmap, field, target, x, y, passage, view, o
     """Find the point to drive at from (x, y) on the way to a target.
 
     The way is the roadmap's: of the near vertices the one with the least energy through
-    it to the target, and then its successors as far as they can be seen at no more cost.
-    Lines of sight keep COMFORT_M more than the passage if the place allows it, so that
-    narrow mouths are driven at head on.
+    it to the target, and then its successors as far as they can be seen at no more
+    cost. Lines of sight keep COMFORT_M more than the passage if the place allows it, so
+    that narrow mouths are driven at head on.
 
     Args:
         space, terrain: the world.
@@ -153,11 +155,11 @@ def best_vertex(space, terrain, roadmap, field, target, x, y, comfortable, neede
         best = -1
         best_cost = np.inf
         for _ in range(min(n, 40)):
-            i = np.argmin(cost[:n])
-            if cost[i] >= best_cost:
+            cheapest = np.argmin(cost[:n])
+            if cost[cheapest] >= best_cost:
                 break
-            v = candidate[i]
-            cost[i] = np.inf
+            v = candidate[cheapest]
+            cost[cheapest] = np.inf
             vx, vy = roadmap.vertex[v, 0], roadmap.vertex[v, 1]
             if segment_is_clear(space, x, y, vx, vy, clearance):
                 exact = cost_to_go[v] + segment_weighted_length(terrain, x, y, vx, vy)

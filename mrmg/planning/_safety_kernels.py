@@ -1,10 +1,11 @@
 """Committed braking: what keeps every state of the motion tree safe.
 
-Each robot carries a committed motion: the states it will go through if it brakes from now
-on, steering held, until it stands. All committed motions keep clear of obstacles and, step
-by step, of each other. A robot may replace its commitment by "one step under a new control,
-then brake" only if that keeps clear too; otherwise it follows the one it has. So braking is
-always possible, no expansion ever dies, and a mission may end at any time.
+Each robot carries a committed motion: the states it will go through if it brakes from
+now on, steering held, until it stands. All committed motions keep clear of obstacles
+and, step by step, of each other. A robot may replace its commitment by "one step under
+a new control, then brake" only if that keeps clear too; otherwise it follows the one it
+has. So braking is always possible, no expansion ever dies, and a mission may end at any
+time.
 """
 
 from __future__ import annotations
@@ -16,7 +17,12 @@ import numpy as np
 
 from mrmg.compilation import kernel
 from mrmg.motion._kernels import UNICYCLE, step
-from mrmg.planning._fleet_kernels import PLANNING_MARGIN_M, ROBOT_MARGIN_M, space_of
+from mrmg.planning._fleet_kernels import (
+    MOST_CORNERS,
+    PLANNING_MARGIN_M,
+    ROBOT_MARGIN_M,
+    space_of,
+)
 from mrmg.world._kernels import (
     convex_convex_distance,
     footprint_is_clear,
@@ -34,7 +40,7 @@ class Commitment(NamedTuple):
         state: shape (R, 2, K, 5).
         corner: placed footprints, shape (R, 2, K, M, 2).
         middle: middles of the footprints, shape (R, 2, K, 2).
-        count: number of states in each slot, shape (R, 2).
+        length: number of states in each slot, shape (R, 2).
         active: slot in force, shape (R,).
         now: index of the present state in the active slot, shape (R,).
     """
@@ -42,7 +48,7 @@ class Commitment(NamedTuple):
     state: np.ndarray
     corner: np.ndarray
     middle: np.ndarray
-    count: np.ndarray
+    length: np.ndarray
     active: np.ndarray
     now: np.ndarray
 
@@ -50,16 +56,16 @@ class Commitment(NamedTuple):
 @kernel
 def new_commitment(fleet, dt):
     """Return an empty commitment large enough for the fleet's longest braking."""
-    robots, corners, _ = fleet.corner.shape
+    robots = len(fleet)
     longest = 0
     for r in range(robots):
-        fastest = max(fleet.limit[r, 1], -fleet.limit[r, 0]) / fleet.limit[r, 3]
-        if fleet.model[r] == UNICYCLE:
-            fastest = max(fastest, fleet.limit[r, 2] / fleet.limit[r, 4])
+        fastest = max(fleet[r].limit[1], -fleet[r].limit[0]) / fleet[r].limit[3]
+        if fleet[r].model == UNICYCLE:
+            fastest = max(fastest, fleet[r].limit[2] / fleet[r].limit[4])
         longest = max(longest, int(ceil(fastest / dt)) + 3)
     return Commitment(
         np.zeros((robots, 2, longest, 5)),
-        np.zeros((robots, 2, longest, corners, 2)),
+        np.zeros((robots, 2, longest, MOST_CORNERS, 2)),
         np.zeros((robots, 2, longest, 2)),
         np.zeros((robots, 2), np.int64),
         np.zeros(robots, np.int64),
@@ -78,17 +84,17 @@ def toward_zero(value, bound, dt):
 @kernel
 def braking_control(fleet, r, state, dt):
     """Return the control (u1, u2) of full braking; a car holds its steering."""
-    u1 = toward_zero(state[3], fleet.limit[r, 3], dt)
+    u1 = toward_zero(state[3], fleet[r].limit[3], dt)
     u2 = 0.0
-    if fleet.model[r] == UNICYCLE:
-        u2 = toward_zero(state[4], fleet.limit[r, 4], dt)
+    if fleet[r].model == UNICYCLE:
+        u2 = toward_zero(state[4], fleet[r].limit[4], dt)
     return u1, u2
 
 
 @kernel
 def stands(fleet, r, state):
     """Tell whether a robot is at rest."""
-    return abs(state[3]) < REST and (fleet.model[r] != UNICYCLE or abs(state[4]) < REST)
+    return abs(state[3]) < REST and (fleet[r].model != UNICYCLE or abs(state[4]) < REST)
 
 
 @kernel
@@ -99,30 +105,30 @@ def write_braking(fleet, r, first, dt, commitment, slot):
     n = 1
     while n < len(states) and not stands(fleet, r, states[n - 1]):
         u1, u2 = braking_control(fleet, r, states[n - 1], dt)
-        step(fleet.model[r], states[n - 1], u1, u2, fleet.wheelbase[r], dt, states[n])
+        step(fleet[r].model, states[n - 1], u1, u2, fleet[r].wheelbase, dt, states[n])
         n += 1
-    outline = fleet.corner[r, : fleet.corners[r]]
-    mx, my = fleet.middle[r, 0], fleet.middle[r, 1]
+    outline = fleet[r].corner[: fleet[r].corners]
+    mx, my = fleet[r].middle[0], fleet[r].middle[1]
     for k in range(n):
         x, y, theta = states[k, 0], states[k, 1], states[k, 2]
         place_footprint(outline, x, y, theta, commitment.corner[r, slot, k])
         c, s = cos(theta), sin(theta)
         commitment.middle[r, slot, k, 0] = x + c * mx - s * my
         commitment.middle[r, slot, k, 1] = y + s * mx + c * my
-    commitment.count[r, slot] = n
+    commitment.length[r, slot] = n
 
 
 @kernel
 def clear_of_obstacles(fleet, spaces, commitment, r, slot, first):
     """Tell whether a slot's states from `first` on keep the margin from obstacles."""
-    space = space_of(spaces, fleet.space[r])
-    for k in range(first, commitment.count[r, slot]):
+    space = space_of(spaces, fleet[r].space)
+    for k in range(first, commitment.length[r, slot]):
         if not footprint_is_clear(
             space,
-            commitment.corner[r, slot, k, : fleet.corners[r]],
+            commitment.corner[r, slot, k, : fleet[r].corners],
             commitment.middle[r, slot, k, 0],
             commitment.middle[r, slot, k, 1],
-            fleet.radius[r],
+            fleet[r].radius,
             PLANNING_MARGIN_M,
         ):
             return False
@@ -137,9 +143,9 @@ def clear_of_robot(fleet, commitment, r, slot, first, other, other_first, margin
     a robot that stands stays.
     """
     other_slot = commitment.active[other]
-    last = commitment.count[r, slot] - 1
-    other_last = commitment.count[other, other_slot] - 1
-    reach = fleet.radius[r] + fleet.radius[other] + margin
+    last = commitment.length[r, slot] - 1
+    other_last = commitment.length[other, other_slot] - 1
+    reach = fleet[r].radius + fleet[other].radius + margin
     span = max(last - first, other_last - other_first)
     for k in range(max(span, 0) + 1):
         i = min(first + k, last)
@@ -153,8 +159,8 @@ def clear_of_robot(fleet, commitment, r, slot, first, other, other_first, margin
         if (
             apart < reach
             and convex_convex_distance(
-                commitment.corner[r, slot, i, : fleet.corners[r]],
-                commitment.corner[other, other_slot, j, : fleet.corners[other]],
+                commitment.corner[r, slot, i, : fleet[r].corners],
+                commitment.corner[other, other_slot, j, : fleet[other].corners],
             )
             < margin
         ):
@@ -181,11 +187,11 @@ def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):
     slot = 1 - active
     state = commitment.state[r, active, commitment.now[r]]
     after = np.empty(5)
-    step(fleet.model[r], state, u1, u2, fleet.wheelbase[r], dt, after)
+    step(fleet[r].model, state, u1, u2, fleet[r].wheelbase, dt, after)
     write_braking(fleet, r, after, dt, commitment, slot)
     if not clear_of_obstacles(fleet, spaces, commitment, r, slot, 0):
         return False
-    for other in range(len(fleet.model)):
+    for other in range(len(fleet)):
         if other == r:
             continue
         # A robot that has not moved yet is met where its braking takes it.
@@ -202,7 +208,7 @@ def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):
 @kernel
 def follow_braking(commitment, r):
     """Advance robot r one step along its commitment."""
-    last = commitment.count[r, commitment.active[r]] - 1
+    last = commitment.length[r, commitment.active[r]] - 1
     commitment.now[r] = min(commitment.now[r] + 1, last)
 
 

@@ -1,7 +1,8 @@
 """Steering: where a robot wants to go next, as a speed and a steering angle.
 
-A robot descends the roadmap's cost-to-go field: it drives at the farthest point of the way
-that it can see. A point inside the turning circle is approached by backing off first.
+A robot descends the roadmap's cost-to-go field: it drives at the farthest point of the
+way that it can see. A point inside the turning circle is approached by backing off
+first.
 """
 
 from __future__ import annotations
@@ -39,13 +40,13 @@ def pursue(fleet, r, state, wx, wy, gear):
     dy = wy - state[1]
     distance = hypot(dx, dy)
     bearing = wrap(atan2(dy, dx) - state[2])
-    v_min, v_max, w_max = fleet.limit[r, 0], fleet.limit[r, 1], fleet.limit[r, 2]
-    if fleet.model[r] == UNICYCLE:
+    v_min, v_max, w_max = fleet[r].limit[0], fleet[r].limit[1], fleet[r].limit[2]
+    if fleet[r].model == UNICYCLE:
         # Slow enough for the turn; on the spot when the point is abeam.
         w = max(-w_max, min(w_max, 1.5 * bearing))
         return v_max * max(0.0, cos(bearing)) ** 3, w
     off = bearing if gear > 0 else wrap(bearing - pi)
-    radius = fleet.turning_radius[r]
+    radius = fleet[r].turning_radius
     if distance < 2.0 * radius and abs(off) > 0.35:
         needed = distance / (2.0 * max(sin(abs(off)), 1e-6))
         if abs(off) > 0.5 * pi or needed < radius:
@@ -58,7 +59,7 @@ def pursue(fleet, r, state, wx, wy, gear):
     lateral = sin(bearing)
     if abs(off) > 0.5 * pi:
         lateral = 1.0 if bearing > 0.0 else -1.0
-    psi = atan(2.0 * fleet.wheelbase[r] * lateral / ahead)
+    psi = atan(2.0 * fleet[r].wheelbase * lateral / ahead)
     psi = max(-w_max, min(w_max, psi))
     fastest = v_max if gear > 0 else v_min
     error = abs(psi - state[4])
@@ -81,27 +82,27 @@ def sidestep(fleet, r, state, space, others, wx, wy, out):
         return
     dx /= distance
     dy /= distance
-    nearest = min(SIGHT_M, distance + fleet.radius[r])
+    nearest = min(SIGHT_M, distance + fleet[r].radius)
     for other in range(len(others)):
         if other == r:
             continue
         c, s = cos(others[other, 2]), sin(others[other, 2])
-        ox = others[other, 0] + c * fleet.middle[other, 0] - s * fleet.middle[other, 1]
-        oy = others[other, 1] + s * fleet.middle[other, 0] + c * fleet.middle[other, 1]
+        ox = others[other, 0] + c * fleet[other].middle[0] - s * fleet[other].middle[1]
+        oy = others[other, 1] + s * fleet[other].middle[0] + c * fleet[other].middle[1]
         along = (ox - state[0]) * dx + (oy - state[1]) * dy
         lateral = (oy - state[1]) * dx - (ox - state[0]) * dy
-        wide = fleet.radius[r] + fleet.radius[other] + 0.8
+        wide = fleet[r].radius + fleet[other].radius + 0.8
         if along <= 0.0 or along >= nearest or abs(lateral) > wide:
             continue
         speed = others[other, 3] * (c * dx + s * dy)
-        if speed > 0.5 * fleet.limit[r, 1]:
+        if speed > 0.5 * fleet[r].limit[1]:
             continue
         nearest = along
         side = -1.0 if lateral > -0.3 else 1.0
         for _ in range(2):
             px = ox - side * dy * (wide + 0.3)
             py = oy + side * dx * (wide + 0.3)
-            if segment_is_clear(space, state[0], state[1], px, py, fleet.passage[r]):
+            if segment_is_clear(space, state[0], state[1], px, py, fleet[r].passage):
                 out[0], out[1] = px, py
                 break
             side = -side
@@ -110,8 +111,8 @@ def sidestep(fleet, r, state, space, others, wx, wy, out):
 @kernel
 def control_towards(fleet, r, state, v, w, dt):
     """Return the control (u1, u2) that brings speed and steering to (v, w)."""
-    v = max(fleet.limit[r, 0], min(fleet.limit[r, 1], v))
-    w = max(-fleet.limit[r, 2], min(fleet.limit[r, 2], w))
-    u1 = max(-fleet.limit[r, 3], min(fleet.limit[r, 3], (v - state[3]) / dt))
-    u2 = max(-fleet.limit[r, 4], min(fleet.limit[r, 4], (w - state[4]) / dt))
+    v = max(fleet[r].limit[0], min(fleet[r].limit[1], v))
+    w = max(-fleet[r].limit[2], min(fleet[r].limit[2], w))
+    u1 = max(-fleet[r].limit[3], min(fleet[r].limit[3], (v - state[3]) / dt))
+    u2 = max(-fleet[r].limit[4], min(fleet[r].limit[4], (w - state[4]) / dt))
     return u1, u2

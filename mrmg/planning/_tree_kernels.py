@@ -90,8 +90,8 @@ def rest_of_tours(mission, tree, tours, v, otherwise):
     waypoint = np.empty(2)
     total = 0.0
     enough = True
-    for r in range(len(fleet.model)):
-        left = tree.energy[v, r] - fleet.reserve[r]
+    for r in range(len(fleet)):
+        left = tree.energy[v, r] - fleet[r].reserve
         place = -1
         for p in range(tree.position[v, r], tours.length[row, r]):
             t = tours.target[row, r, p]
@@ -101,12 +101,12 @@ def rest_of_tours(mission, tree, tours, v, otherwise):
                 leg = mission.routing.cost[r, place, t]
             else:
                 way = way_left(mission, r, t, tree.state[v, r], waypoint)
-                leg = way * fleet.plain[r] if way < np.inf else otherwise
+                leg = way * fleet[r].plain if way < np.inf else otherwise
             total += leg
             left -= leg
             enough &= left >= 0.0
             if t >= mission.targets.goals:
-                left = fleet.capacity[r] - fleet.reserve[r]
+                left = fleet[r].capacity - fleet[r].reserve
             place = t
     return total, enough
 
@@ -119,7 +119,7 @@ def route_from(mission, tree, v, random, tour, length):
     cost = problem.cost.copy()
     waypoint = np.empty(2)
     for r in range(robots):
-        joules = mission.fleet.plain[r] * (1.0 + params.route_margin)
+        joules = mission.fleet[r].plain * (1.0 + params.route_margin)
         for t in range(n_targets):
             way = look_ahead(mission, r, t, tree.state[v, r], 0.0, waypoint)
             cost[r, n_targets, t] = way * joules
@@ -153,7 +153,7 @@ def plant(mission, tree, tours, start, energy):
         for r in range(len(start)):
             if in_target(mission.targets, g, start[r, 0], start[r, 1]):
                 tree.visited[0, g] = True
-    skip_visited(mission, tree, tours, 0)
+    skip_visited(mission, tree, tours, np.int64(0))
     initial = 1e-9
     for r in range(len(start)):
         place = mission.routing.cost.shape[2]
@@ -218,8 +218,8 @@ def extend(mission, tree, v, n, target, steer, random):
 def insert(mission, tree, tours, n, n_tours, target, event, random, counts):
     """Keep book of vertex n (Algorithm 3, second half): tours, feasibility, new tours.
 
-    A child follows the rest of its parent's tours as long as the batteries allow it; else,
-    or in the paper's profile whenever a target was reached, the router is called.
+    A child follows the rest of its parent's tours as long as the batteries allow it;
+    else, or in the paper's profile whenever a target was reached, the router is called.
 
     Returns:
         (whether the vertex is worth keeping, number of tours).
@@ -274,11 +274,10 @@ def grow(mission, start, energy, random, tree, tours, counts):
     groups = new_groups(params.max_vertices)
     target = np.zeros(len(start), np.int64)
     initial = plant(mission, tree, tours, start, energy)
-    if goals_left(tree, 0) == 0:
+    if goals_left(tree, np.int64(0)) == 0:
         return 0
-    n_groups = add_to_group(groups, tree, 0, 0, params.region)
-    n_tours = 1
-    n = 1
+    n_groups = add_to_group(groups, tree, np.int64(0), np.int64(0), params.region)
+    n_tours = n = np.int64(1)  # typed: a literal would be compiled for on its own
     counts[ROUTER_CALLS] = 1
     steer = params.steer_start
     most = EXPANSIONS_PER_VERTEX * params.max_vertices
@@ -322,10 +321,10 @@ def stop_all(fleet, state, dt, control):
     longest = 0
     for r in range(robots):
         write_braking(fleet, r, state[r], dt, commitment, 0)
-        longest = max(longest, commitment.count[r, 0] - 1)
+        longest = max(longest, commitment.length[r, 0] - 1)
     for k in range(longest):
         for r in range(robots):
-            i = min(k, commitment.count[r, 0] - 1)
+            i = min(k, commitment.length[r, 0] - 1)
             u1, u2 = braking_control(fleet, r, commitment.state[r, 0, i], dt)
             control[k, r, 0], control[k, r, 1] = u1, u2
     return longest

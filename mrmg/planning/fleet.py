@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from mrmg.errors import Fault, SceneError
 from mrmg.motion._kernels import MODEL_ID
-from mrmg.planning._fleet_kernels import Fleet, Spaces
+from mrmg.planning._fleet_kernels import FLEET, MOST_CORNERS, Spaces
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
+
+RESERVE_MARGIN = 0.01
+"""Share of the capacity the planner keeps above the reserve, for execution to use."""
 
 ROADMAP_MARGIN_M = 0.3
 """Clearance of roadmap edges beyond half the robot's width."""
@@ -42,7 +46,7 @@ def stack_spaces(world: World) -> Spaces:
 def travel_classes(
     scene: Scene, world: World
 ) -> tuple[list[tuple[int, float]], list[int]]:
-    """Return the distinct (free space, passage clearance) pairs, and each robot's index.
+    """Return the distinct (free space, passage clearance) pairs and robots' indices.
 
     Robots of one class share a roadmap and its cost-to-go fields.
     """
@@ -57,40 +61,42 @@ def travel_classes(
     return distinct, [distinct.index(key) for key in keys]
 
 
-def fleet_arrays(scene: Scene, world: World) -> Fleet:
-    """Return the scene's robots as arrays."""
-    robots = scene.robots
-    models = [robot.model for robot in robots]
-    most = max(len(model.footprint_m) for model in models)
-    corner = np.zeros((len(robots), most, 2))
-    middle = np.zeros((len(robots), 2))
-    radius = np.zeros(len(robots))
-    for i, model in enumerate(models):
+def fleet_array(scene: Scene, world: World) -> np.ndarray:
+    """Return the scene's robots as records of FLEET, shape (R,).
+
+    Raises:
+        SceneError: if a footprint has more corners than the kernels hold.
+    """
+    fleet = np.zeros(len(scene.robots), FLEET)
+    _, fields = travel_classes(scene, world)
+    for r, robot in enumerate(scene.robots):
+        model, battery = robot.model, robot.battery
         outline = model.footprint_m
-        corner[i, : len(outline)] = outline
-        middle[i] = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
-        radius[i] = np.hypot(*(outline - middle[i]).T).max()
-    limits = [model.limits.scaled(model.planning_share) for model in models]
-    _, field = travel_classes(scene, world)
-    return Fleet(
-        model=np.array([MODEL_ID[model.motion_model] for model in models]),
-        wheelbase=np.array([model.wheelbase_m for model in models]),
-        limit=np.array(
-            [
-                (s.v_min_m_s, s.v_max_m_s, s.w_max, s.u1_max_m_s2, s.u2_max)
-                for s in limits
-            ]
-        ),
-        corner=corner,
-        corners=np.array([len(model.footprint_m) for model in models]),
-        middle=middle,
-        radius=radius,
-        turning_radius=np.array([model.turning_radius_m for model in models]),
-        passage=np.array([m.half_width_m + ROADMAP_MARGIN_M for m in models]),
-        space=np.asarray(world.space_of_robot, dtype=np.int64),
-        field=np.array(field),
-        energy=np.array([model.energy_model.coefficients() for model in models]),
-        plain=np.array([m.energy_model.plain_ground_J_per_m() for m in models]),
-        capacity=np.array([robot.battery.capacity_J for robot in robots]),
-        reserve=np.array([robot.battery.reserve_J for robot in robots]),
-    )
+        if len(outline) > MOST_CORNERS:
+            message = f"has {len(outline)} corners, at most {MOST_CORNERS} are allowed"
+            raise SceneError(model.name, [Fault("footprint", message)])
+        limits = model.limits.scaled(model.planning_share)
+        middle = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
+        one = fleet[r]
+        one["model"] = MODEL_ID[model.motion_model]
+        one["wheelbase"] = model.wheelbase_m
+        one["limit"] = (
+            limits.v_min_m_s,
+            limits.v_max_m_s,
+            limits.w_max,
+            limits.u1_max_m_s2,
+            limits.u2_max,
+        )
+        one["corner"][: len(outline)] = outline
+        one["corners"] = len(outline)
+        one["middle"] = middle
+        one["radius"] = np.hypot(*(outline - middle).T).max()
+        one["turning_radius"] = model.turning_radius_m
+        one["passage"] = model.half_width_m + ROADMAP_MARGIN_M
+        one["space"] = world.space_of_robot[r]
+        one["field"] = fields[r]
+        one["energy"] = model.energy_model.coefficients()
+        one["plain"] = model.energy_model.plain_ground_J_per_m()
+        one["capacity"] = battery.capacity_J
+        one["reserve"] = battery.reserve_J + RESERVE_MARGIN * battery.capacity_J
+    return fleet

@@ -1,7 +1,7 @@
 """Growing one motion tree, and reading the mission it found.
 
-The work is done in `_tree_kernels`; this module turns scenes into its arrays and a solved
-tree back into trajectories and tours.
+The work is done in `_tree_kernels`; this module turns scenes into its arrays and a
+solved tree back into trajectories and tours.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from mrmg.planning import _groups_kernels, _tree_kernels
 from mrmg.planning._groups_kernels import Tree
 from mrmg.planning._mission_kernels import Mission, Targets, TreeParams, in_target
 from mrmg.planning._tree_kernels import Tours
-from mrmg.planning.fleet import fleet_arrays, stack_spaces
+from mrmg.planning.fleet import fleet_array, stack_spaces
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.roadmap import Roadmap
 from mrmg.planning.routing import Routing, routing_arrays
@@ -55,7 +55,7 @@ def state_problem(
     scene: Scene, world: World, roadmap: Roadmap, params: PlannerParams
 ) -> Problem:
     """Return the scene's problem; routing costs include the route margin."""
-    fleet = fleet_arrays(scene, world)
+    fleet = fleet_array(scene, world)
     energy = np.array([robot.battery.start_J for robot in scene.robots])
     start = np.zeros((len(scene.robots), 5))
     start[:, :3] = [robot.pose for robot in scene.robots]
@@ -67,12 +67,12 @@ def state_problem(
         targets=_target_arrays(scene),
         routing=routing_arrays(
             goals=len(scene.goals),
-            distance=roadmap.distance[fleet.field],
+            distance=roadmap.distance[fleet["field"]],
             start_distance=roadmap.start_distance,
-            plain=fleet.plain * (1.0 + params.route_margin),
+            plain=fleet["plain"] * (1.0 + params.route_margin),
             energy=energy,
-            capacity=fleet.capacity,
-            reserve=fleet.reserve,
+            capacity=fleet["capacity"],
+            reserve=fleet["reserve"],
         ),
         params=tree_params(params),
     )
@@ -223,11 +223,11 @@ def _replay(
         state[0] = problem.start[r]
         for k, (u1, u2) in enumerate(control[:, r]):
             motion_step(
-                fleet.model[r],
+                fleet[r]["model"],
                 state[k],
                 u1,
                 u2,
-                fleet.wheelbase[r],
+                fleet[r]["wheelbase"],
                 params.dt_s,
                 state[k + 1],
             )

@@ -24,13 +24,17 @@ class PlannerParams:
         steps: steps of one expansion, k.
         max_vertices: size of one tree at which it is given up.
         trees: trees grown at most; a tree that fails is followed by one with new draws.
-        improvements: further trees grown after the first plan; the cheapest plan counts.
+        improvements: further trees grown after the first plan; the cheapest plan
+            counts.
         group_alpha, group_beta, group_lambda: alpha, beta, lambda of eq. (5).
-        group_bias: probability of taking the group of largest weight instead of drawing.
+        group_bias: probability of taking the group of largest weight instead of
+            drawing.
         steer_start, steer_decay, steer_least: probability that an expansion steers
-            instead of applying random controls: first value, factor per expansion, floor.
+            instead of applying random controls: first value, factor per expansion,
+                floor.
         region_m: side of the square regions that tell groups apart [m].
-        route_margin: surcharge on roadmap energies in routing, for what the roadmap does
+        route_margin: surcharge on roadmap energies in routing, for what the roadmap
+            does
             not see: turns, corrections, speed changes.
         budget_s: time limit [s]; None for none. With a limit only validity is promised,
             without one the plan is a function of scene, seed and parameters.

@@ -1,4 +1,4 @@
-"""From a scene to a plan: roadmap, tours, motion trees, and the best of what they find."""
+"""From a scene to a plan: roadmap, tours, motion trees, the best of their finds."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from mrmg import seeding
 from mrmg.accounting import battery_profile, find_visits, plan_ledger
-from mrmg.mission import Plan, PlanResult, PlanStatus
+from mrmg.mission import Plan, PlanResult, PlanStatus, Visit
 from mrmg.planning.motion_tree import Growth, Problem, grow_tree, state_problem
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.roadmap import build_roadmap
@@ -58,7 +58,8 @@ def plan_mission(
     """Plan a mission.
 
     Grows motion trees along routed tours until one visits all goals, then
-    `params.improvements` more, each along tours of its own draw, and returns the cheapest.
+    `params.improvements` more, each along tours of its own draw, and returns the
+    cheapest.
 
     Args:
         scene: the mission.
@@ -166,7 +167,7 @@ def _plan_of(
     The tree meters terrain on a grid; the ledger uses the exact areas.
     """
     scene = problem.scene
-    visits = []
+    visits: list[Visit] = []
     for trajectory in growth.trajectories:
         own = find_visits(scene, trajectory, growth.tours[trajectory.robot])
         battery = scene.robot(trajectory.robot).battery

@@ -1,10 +1,11 @@
 """ConstructPRM: a probabilistic roadmap with energy-weighted edges.
 
 Vertices are goals, stations, robot starts, points around obstacle corners and terrain
-borders, and free samples. An edge's weight is the integral of the terrain multiplier along
-it, in metres of plain ground (a robot's energy is that times its J/m on plain ground);
-dynamics are neglected, obstacles and clearance are not. One Dijkstra per target gives the
-cost-to-go fields the steering descends and the distance matrix the router needs.
+borders, and free samples. An edge's weight is the integral of the terrain multiplier
+along it, in metres of plain ground (a robot's energy is that times its J/m on plain
+ground); dynamics are neglected, obstacles and clearance are not. One Dijkstra per
+target gives the cost-to-go fields the steering descends and the distance matrix the
+router needs.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from scipy.stats import qmc
 from mrmg.planning import _roadmap_kernels
 from mrmg.planning._roadmap_kernels import RoadmapArrays
 from mrmg.planning.fleet import travel_classes
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Region, Scene
 from mrmg.world._kernels import FreeSpace
 from mrmg.world.world import World
 
@@ -162,8 +163,8 @@ def _vertices(
 def _ridge(space: FreeSpace) -> np.ndarray:
     """Return points in the middle of narrow places, about one a square metre.
 
-    They are the local maxima of the distance field along x or y; free samples seldom hit
-    a corridor's middle.
+    They are the local maxima of the distance field along x or y; free samples seldom
+    hit a corridor's middle.
     """
     d = space.distance
     inner = d[1:-1, 1:-1]
@@ -176,9 +177,12 @@ def _ridge(space: FreeSpace) -> np.ndarray:
 
 
 def _anchor(
-    scene: Scene, world: World, classes: Sequence[tuple[int, float]], region
-) -> np.ndarray:  # type: ignore[no-untyped-def]
-    """Return the centre of a region, or its clearest point where the centre is tight."""
+    scene: Scene,
+    world: World,
+    classes: Sequence[tuple[int, float]],
+    region: Region,
+) -> np.ndarray:
+    """Return a region's centre, or its clearest point where the centre is tight."""
     space, passage = classes[0]
     centre = np.asarray(region.center, dtype=float)
     if _field_at(world.spaces[space], centre[None])[0] >= passage:
@@ -191,7 +195,7 @@ def _anchor(
     return np.asarray(grid[np.argmax(_field_at(world.spaces[space], grid))])
 
 
-def _field_at(space, points: np.ndarray) -> np.ndarray:  # type: ignore[no-untyped-def]
+def _field_at(space: FreeSpace, points: np.ndarray) -> np.ndarray:
     """Return the distance field at the cells of points; -inf outside."""
     rows, columns = space.distance.shape
     column = np.floor((points[:, 0] - space.x_min) / space.cell).astype(int)

@@ -1,4 +1,4 @@
-"""The discrete problem: which robot visits which goals in what order, and recharges where.
+"""The discrete problem: who visits which goals in what order, recharging where.
 
 An energy-constrained multi-start open route problem with recharging, solved by nested
 rollout policy adaptation and local search with exact placing of the stations.
@@ -69,7 +69,8 @@ def routing_arrays(
         start_distance: from each robot to each target [m], shape (R, T).
         plain: energy per metre of plain ground [J/m], shape (R,).
         energy: energy now [J], shape (R,).
-        capacity, reserve: [J], shape (R,).
+        capacity: [J], shape (R,).
+        reserve: [J], shape (R,).
         open_goal: which goals are still to be visited; all if None.
     """
     cost = np.concatenate([distance, start_distance[:, None, :]], axis=1)
