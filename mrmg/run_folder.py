@@ -49,6 +49,9 @@ OUTPUTS: dict[Step, tuple[str, ...]] = {
 }
 """Files each step leaves; the last one is written last."""
 
+ON_REQUEST: dict[Step, tuple[str, ...]] = {Step.RENDER: ("mission.gif",)}
+"""Files a step leaves besides, when asked to."""
+
 NEEDS: dict[Step, tuple[Step, ...]] = {
     Step.PLAN: (),
     Step.VERIFY: (Step.PLAN,),
@@ -125,7 +128,7 @@ class RunFolder:
         marks = {name: mark for name, mark in self.marks().items() if name not in stale}
         self._write(arguments, marks)
         for later in reversed(stale):
-            for name in reversed(OUTPUTS[later]):
+            for name in reversed((*ON_REQUEST.get(later, ()), *OUTPUTS[later])):
                 self.file(name).unlink(missing_ok=True)
 
     def finish(self, step: Step, fingerprint: str) -> None:

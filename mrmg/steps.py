@@ -40,12 +40,19 @@ class VideoArguments:
             minute.
         size: width and height in pixels.
         fps: frames per second.
+        robot: id of the robot a chase camera follows; None takes the first.
+        from_s, to_s: the part of the mission; None goes to its end.
+        gif: make a GIF, too.
     """
 
     view: str = "top"
     speed: float | None = None
     size: tuple[int, int] = (1280, 720)
     fps: int = 30
+    robot: str | None = None
+    from_s: float = 0.0
+    to_s: float | None = None
+    gif: bool = False
 
 
 DEFAULT_VIDEO = VideoArguments()
@@ -252,24 +259,37 @@ def _draw(run: Run) -> Write:
 
 
 def _render(run: Run) -> Write:
+    from mrmg.results.gif import render_gif
     from mrmg.results.video import render_video
 
     video = run.arguments.video
-    made = run.folder.unfinished("mission.mp4")
+    plan, log = run.plan(), run.log()
+    part: dict[str, Any] = {
+        "view": video.view,
+        "robot": video.robot,
+        "speed": video.speed,
+        "from_s": video.from_s,
+        "to_s": video.to_s,
+        "on_progress": run.progress_of(Step.RENDER),
+    }
+    made = {}
+    if video.gif:
+        made["mission.gif"] = run.folder.unfinished("mission.gif")
+        render_gif(run.scene, plan, log, made["mission.gif"], **part)
+    made["mission.mp4"] = run.folder.unfinished("mission.mp4")
     render_video(
         run.scene,
-        run.plan(),
-        run.log(),
-        made,
-        view=video.view,
-        speed=video.speed,
+        plan,
+        log,
+        made["mission.mp4"],
         size=video.size,
         fps=video.fps,
-        on_progress=run.progress_of(Step.RENDER),
+        **part,
     )
 
     def write() -> None:
-        made.replace(run.folder.file("mission.mp4"))
+        for name, path in made.items():
+            path.replace(run.folder.file(name))
 
     return write
 

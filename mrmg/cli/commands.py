@@ -101,18 +101,23 @@ def audit(options: argparse.Namespace) -> int:
     return ExitCode.OK if account["mission_ok"] else ExitCode.MISSION_FAILED
 
 
+_VIDEO = ("view", "robot", "speed", "size", "fps", "from_s", "to_s", "gif")
+_SHOWN = ("overview.png", "energy.png", "mission.gif", "mission.mp4", "report.html")
+
+
 def render(options: argparse.Namespace) -> int:
     """Make the pictures, the video and the report of a run folder."""
     from mrmg.run_folder import Step
 
     wanted = {
         name: getattr(options, name)
-        for name in ("view", "speed", "size", "fps")
+        for name in _VIDEO
         if getattr(options, name) is not None
     }
-    work = _make(options.run, Step.DRAW, Step.RENDER, Step.REPORT, video=wanted)
-    for name in ("overview.png", "energy.png", "mission.mp4", "report.html"):
-        print(work.folder.file(name))
+    work = _make(options.run, Step.RENDER, Step.DRAW, Step.REPORT, video=wanted)
+    for name in _SHOWN:
+        if work.folder.file(name).exists():
+            print(work.folder.file(name))
     return ExitCode.OK
 
 

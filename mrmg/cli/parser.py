@@ -109,6 +109,18 @@ def _add_render(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     )
     render.add_argument("--size", type=_size, metavar="WxH", help="such as 1280x720")
     render.add_argument("--fps", type=_fps, metavar="N", help="frames per second")
+    render.add_argument("--robot", metavar="ID", help="followed by the chase camera")
+    render.add_argument(
+        "--from", dest="from_s", type=_time, metavar="SECONDS", help="mission time"
+    )
+    render.add_argument(
+        "--to", dest="to_s", type=_time, metavar="SECONDS", help="mission time"
+    )
+    render.add_argument(
+        "--gif",
+        action=argparse.BooleanOptionalAction,
+        help="make a GIF of less than 5 MB, too",
+    )
     render.set_defaults(command=commands.render)
 
 
@@ -236,6 +248,10 @@ def _positive(text: str) -> float:
     if not 0.0 < value < math.inf:
         raise argparse.ArgumentTypeError(f"{text!r} is not a positive number")
     return value
+
+
+def _time(text: str) -> float:
+    return 0.0 if text.strip() in {"0", "0.0"} else _positive(text)
 
 
 def _size(text: str) -> tuple[int, int]:

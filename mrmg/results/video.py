@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import av
@@ -66,7 +66,7 @@ def render_video(
     options = VideoOptions(
         view=view,
         robot=robot,
-        speed=_fitting_speed(end_s - from_s) if speed is None else speed,
+        speed=fitting_speed(end_s - from_s, _FITTING_S) if speed is None else speed,
         size=size,
         fps=fps,
         from_s=from_s,
@@ -92,8 +92,9 @@ def frame_ticks(scene: Scene, log: ExecutionLog, options: VideoOptions) -> np.nd
     return np.asarray(np.maximum(after - 1, 0))
 
 
-def _fitting_speed(window_s: float) -> float:
-    return float(max(np.ceil(window_s / _FITTING_S), 1.0))
+def fitting_speed(window_s: float, video_s: float) -> float:
+    """Return the least whole speed that fits a window of the mission to `video_s`."""
+    return float(max(np.ceil(window_s / video_s), 1.0))
 
 
 def _check(scene: Scene, log: ExecutionLog, options: VideoOptions) -> None:
@@ -122,22 +123,38 @@ def _check(scene: Scene, log: ExecutionLog, options: VideoOptions) -> None:
             raise UsageError(message)
 
 
+def pictures(
+    film: Film, ticks: np.ndarray, on_progress: Progress | None = None
+) -> Iterator[np.ndarray]:
+    """Yield the picture of each tick, shape (height, width, 3) of bytes.
+
+    Args:
+        film: what is shown.
+        ticks: of the log, not decreasing.
+        on_progress: called with the share done and a text.
+
+    Raises:
+        MachineError: if this machine has no OpenGL that draws offscreen.
+    """
+    ground = paint_ground(film.scene, film.plan, film.frame)
+    with open_view(film.world, ground, film.options.size) as view:
+        stage = Stage(film, view, ground)
+        for number, tick in enumerate(ticks):
+            yield stage.draw(int(tick))
+            if on_progress is not None:
+                on_progress((number + 1) / len(ticks), "rendering video")
+
+
 def _write_video(
     path: Path, film: Film, ticks: np.ndarray, on_progress: Progress | None
 ) -> None:
     width, height = film.options.size
-    ground = paint_ground(film.scene, film.plan, film.frame)
-    with (
-        open_view(film.world, ground, film.options.size) as view,
-        av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as box,
-    ):
-        stage = Stage(film, view, ground)
+    options = {"movflags": "faststart"}
+    with av.open(str(path), "w", format="mp4", options=options) as box:
         stream = box.add_stream("libx264", rate=film.options.fps)
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
         stream.options = {"preset": _PRESET, "crf": _CRF}
-        for number, tick in enumerate(ticks):
-            frame = av.VideoFrame.from_ndarray(stage.draw(int(tick)), format="rgb24")
+        for picture in pictures(film, ticks, on_progress):
+            frame = av.VideoFrame.from_ndarray(picture, format="rgb24")
             box.mux(stream.encode(frame))
-            if on_progress is not None:
-                on_progress((number + 1) / len(ticks), "rendering video")
         box.mux(stream.encode(None))
