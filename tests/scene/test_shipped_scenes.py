@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 import shapely
 from scipy.optimize import Bounds, LinearConstraint, milp
+from shapely import affinity
+from shapely.geometry import Polygon
 
 from mrmg import shipped
 from mrmg.authoring.ground import Ground
@@ -111,8 +115,32 @@ def test_every_target_can_be_reached_and_left(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TABLE)
-def test_the_energy_limit_binds(name: str) -> None:
-    """The cheapest assignment that ignores energy overdraws some battery."""
+def test_robots_start_with_room_about_them(name: str) -> None:
+    """A metre from footprint to obstacles, bounds and the other robots."""
+    scene = load_scene(name)
+    footprints = [
+        affinity.translate(
+            affinity.rotate(
+                Polygon(robot.model.footprint_m),
+                robot.pose[2],
+                origin=(0, 0),
+                use_radians=True,
+            ),
+            *robot.pose[:2],
+        )
+        for robot in scene.robots
+    ]
+    outline = shapely.box(*scene.bounds)
+    for number, footprint in enumerate(footprints):
+        others = [other for k, other in enumerate(footprints) if k != number]
+        about = [outline.exterior, *(wall.shape for wall in scene.obstacles), *others]
+        assert outline.contains(footprint)
+        assert min(footprint.distance(thing) for thing in about) >= 1.0
+
+
+@cache
+def cheapest_mission(name: str) -> tuple[list[list[int]], list[float]]:
+    """Routes of the cheapest assignment that ignores energy, and their lengths [m]."""
     scene = load_scene(name)
     kinds = kinds_of(scene)
     roads = np.stack([road_m(scene, kind[0]) for kind in kinds])
@@ -123,8 +151,22 @@ def test_the_energy_limit_binds(name: str) -> None:
         for r in routes
     ]
     assert sum(lengths_m) == pytest.approx(cost_m)
+    return routes, lengths_m
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_the_energy_limit_binds(name: str) -> None:
+    """The cheapest assignment that ignores energy overdraws some battery."""
+    _, lengths_m = cheapest_mission(name)
     # More than the grid can err.
-    assert max(lengths_m) > 1.03 * usable_m(scene)
+    assert max(lengths_m) > 1.03 * usable_m(load_scene(name))
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_every_robot_is_worth_using(name: str) -> None:
+    """It starts where it is the cheapest for some goal."""
+    routes, _ = cheapest_mission(name)
+    assert min(len(route) - 1 for route in routes) >= 1
 
 
 def cheapest_routes(
