@@ -23,38 +23,63 @@ def search(
     return cost, [divmod(int(move), targets) for move in sequence[:length]]
 
 
+def check(problem: RoutingArrays, cost: float, moves: list[tuple[int, int]]) -> int:
+    """Require that every move is legal and the cost theirs; return goals left."""
+    robots = len(problem.energy)
+    place = [problem.cost.shape[2]] * robots
+    energy = problem.energy.copy()
+    unvisited = set(range(problem.goals))
+    recharges = [0] * robots
+    spent = 0.0
+    for r, t in moves:
+        leg = problem.cost[r, place[r], t]
+        assert leg <= energy[r] - problem.reserve[r]
+        assert t != place[r]
+        spent += leg
+        energy[r] -= leg
+        place[r] = t
+        if t < problem.goals:
+            unvisited.remove(t)
+            recharges[r] = 0
+        else:
+            energy[r] = problem.capacity[r]
+            recharges[r] += 1
+            assert recharges[r] <= 2
+    assert cost == pytest.approx(spent + UNVISITED * len(unvisited))
+    return len(unvisited)
+
+
 @pytest.mark.parametrize("robots", [1, 3])
-def test_every_move_is_legal_and_the_cost_is_theirs(
+def test_every_move_of_a_search_is_legal(
     mission: Callable[..., RoutingArrays], robots: int
 ) -> None:
-    complete = 0
+    left = []
     for seed in range(40):
         problem = mission(
             seed, goals=6, stations=3, robots=robots, range_m=(100.0, 220.0)
         )
-        cost, moves = search(problem, seed)
-        place = [problem.cost.shape[2]] * robots
-        energy = problem.energy.copy()
-        unvisited = set(range(problem.goals))
-        recharges = [0] * robots
-        spent = 0.0
-        for r, t in moves:
-            leg = problem.cost[r, place[r], t]
-            assert leg <= energy[r] - problem.reserve[r]
-            assert t != place[r]
-            spent += leg
-            energy[r] -= leg
-            place[r] = t
-            if t < problem.goals:
-                unvisited.remove(t)
-                recharges[r] = 0
-            else:
-                energy[r] = problem.capacity[r]
-                recharges[r] += 1
-                assert recharges[r] <= 2
-        assert cost == pytest.approx(spent + UNVISITED * len(unvisited))
-        complete += not unvisited
-    assert complete >= 10
+        left.append(check(problem, *search(problem, seed)))
+    assert left.count(0) >= 10
+
+
+def test_every_move_of_a_playout_is_legal(
+    mission: Callable[..., RoutingArrays],
+) -> None:
+    """Without learning robots wander about, and need many recharges."""
+    random = np.array([1], np.uint64)
+    sequence = np.zeros(40, np.int64)
+    recharges = 0
+    for seed in range(20):
+        problem = mission(seed, goals=4, stations=6, robots=2, range_m=(90.0, 150.0))
+        targets = problem.cost.shape[2]
+        for _ in range(50):
+            cost, length = _nrpa_kernels.playout(
+                problem, np.zeros(problem.cost.shape), 1e4, random, sequence
+            )
+            moves = [divmod(int(move), targets) for move in sequence[:length]]
+            check(problem, cost, moves)
+            recharges += sum(t >= problem.goals for _, t in moves)
+    assert recharges > 500
 
 
 def test_the_same_state_draws_the_same_search(

@@ -14,6 +14,7 @@ from mrmg.world.world import BUCKET_M, CELL_M
 
 CAR = np.array([(-0.3, -0.55), (1.5, -0.55), (1.5, 0.55), (-0.3, 0.55)])
 KITE = np.array([(-0.8, 0.0), (0.0, -0.4), (1.1, 0.0), (0.0, 0.4)])
+LATH = np.array([(-0.3, -0.1), (0.3, -0.1), (0.3, 0.1), (-0.3, 0.1)])
 MARGIN_M = 0.25
 
 TIE_M = 1e-9
@@ -200,21 +201,33 @@ def exact_clearance_m(world_map, placed: shapely.Polygon) -> float:  # type: ign
     return float(placed.distance(lines))
 
 
-@pytest.mark.parametrize("outline", [CAR, KITE], ids=["car", "kite"])
+@pytest.mark.parametrize(
+    ("outline", "margin_m"), [(CAR, 0.25), (CAR, 0.9), (KITE, 0.25), (LATH, 0.2)]
+)
 def test_footprints_are_clear_exactly_when_shapely_says(
-    maps: list, outline: np.ndarray
+    maps: list, outline: np.ndarray, margin_m: float
 ) -> None:
     rng = np.random.default_rng(7)
     told = []
     for world_map in maps:
         for point in world_map.random_points(rng, 250):
             pose = np.array([*point, rng.uniform(-4.0, 4.0)])
-            clear, placed = is_clear(world_map.space, outline, pose)
+            clear, placed = is_clear(world_map.space, outline, pose, margin_m)
             exact = exact_clearance_m(world_map, placed)
-            if abs(exact - MARGIN_M) > TIE_M:
-                assert clear == (exact > MARGIN_M), (world_map.bounds, pose, exact)
+            if abs(exact - margin_m) > TIE_M:
+                assert clear == (exact > margin_m), (world_map.bounds, pose, exact)
                 told.append(clear)
     assert 0.2 < np.mean(told) < 0.8, "both answers must be drawn"
+
+
+def test_a_lath_just_inside_an_obstacle_is_not_clear(make_map: Callable) -> None:
+    """No edge is within its margin; only the sign of the field tells."""
+    world_map = make_map((0.0, 0.0, 30.0, 20.0), shapely.box(10.0, 5.0, 20.0, 15.0))
+    for depth_m in np.linspace(0.301, 0.6, 30):
+        inside = np.array([15.0, 5.0 + depth_m, 0.0])
+        outside = np.array([15.0, 5.0 - depth_m, 0.0])
+        assert not is_clear(world_map.space, LATH, inside, 0.2)[0]
+        assert is_clear(world_map.space, LATH, outside, 0.2)[0]
 
 
 def test_footprints_at_the_threshold(make_map: Callable) -> None:
@@ -312,3 +325,17 @@ def test_segments_without_length_are_points(make_map: Callable) -> None:
         assert _kernels.segment_is_clear(space, x, 10.0, x, 10.0, 0.5) == expected
     clearance = _kernels.segment_clearance(space, 4.0, 10.0, 4.0, 10.0, 9.0)
     assert clearance == pytest.approx(4.0, abs=0.5 * CELL_M)
+
+
+def test_segments_are_not_stepped_along_past_their_tightest_place(
+    make_map: Callable,
+) -> None:
+    """A step as long as the clearance would pass over a thin post beside the way."""
+    post = shapely.box(19.99, 12.5, 20.01, 14.0)
+    space = make_map((0.0, 0.0, 40.0, 40.0), post).space
+    for ahead_m in (0.6, 1.25, 2.0):
+        ends = (20.0 - ahead_m, 10.0, 26.0, 10.0)
+        found = _kernels.segment_clearance(space, *ends, 9.0)
+        assert found == pytest.approx(2.5, abs=0.2 * CELL_M)
+        assert _kernels.segment_is_clear(space, *ends, 2.4)
+        assert not _kernels.segment_is_clear(space, *ends, 2.56)
