@@ -7,7 +7,7 @@ solved tree back into trajectories and tours.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,6 +49,19 @@ class Problem:
     mission: Mission
     start: np.ndarray
     start_energy: np.ndarray
+
+    def without_margin(self, params: PlannerParams) -> Problem:
+        """Return the problem with routing energies as the roadmap has them."""
+        routing, share = self.mission.routing, 1.0 / (1.0 + params.route_margin)
+        return replace(
+            self,
+            mission=self.mission._replace(
+                routing=routing._replace(
+                    cost=routing.cost * share, escape=routing.escape * share
+                ),
+                params=self.mission.params._replace(route_margin=0.0),
+            ),
+        )
 
 
 def state_problem(
@@ -204,13 +217,16 @@ def _branch(tree: Tree, leaf: int) -> list[int]:
 def _controls(
     problem: Problem, params: PlannerParams, tree: Tree, branch: list[int]
 ) -> np.ndarray:
-    """Return the controls along a branch and the braking after it, shape (n, R, 2)."""
+    """Return the controls along a branch and the braking after it, shape (n, R, 2).
+
+    A mission that is over before it begins still has one step, of standing.
+    """
     stop = np.zeros((200, len(problem.start), 2))
     n = _tree_kernels.stop_all(
         problem.mission.fleet, tree.state[branch[-1]], params.dt_s, stop
     )
     pieces = [tree.control[v, : tree.steps[v]] for v in branch[1:]]
-    return np.concatenate([*pieces, stop[:n]])
+    return np.concatenate([*pieces, stop[: max(n, 1)]])
 
 
 def _replay(

@@ -11,16 +11,24 @@ import numpy as np
 
 from mrmg import seeding
 from mrmg.accounting import battery_profile, find_visits, plan_ledger
+from mrmg.errors import Fault, SceneError
 from mrmg.mission import Plan, PlanResult, PlanStatus, Visit
+from mrmg.planning.feasibility import proof_of_infeasibility
 from mrmg.planning.motion_tree import Growth, Problem, grow_tree, state_problem
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.roadmap import build_roadmap
+from mrmg.planning.roadmap import Roadmap, build_roadmap
 from mrmg.planning.routing import solve_routing
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
 
 Progress = Callable[[float, str], None]
 """Receives the fraction done, in [0, 1], and a short text."""
+
+ROADMAPS = 3
+"""Roadmaps built at most, each with three times the samples, to join all goals."""
+
+HOPELESS = 10
+"""With a time limit, times the number of trees after which finding none ends it."""
 
 
 @dataclass
@@ -71,38 +79,65 @@ def plan_mission(
     params = params or PlannerParams()
     tell = on_progress or (lambda fraction, text: None)
     statistics = Statistics()
-    world = World.from_scene(scene)
-    roadmap = build_roadmap(
-        scene,
-        world,
-        samples=params.samples,
-        neighbours=params.neighbours,
-        rng=seeding.stream(seed, "roadmap"),
-    )
-    problem = state_problem(scene, world, roadmap, params)
+    if not scene.robots:
+        fault = Fault("robots", "there are none; a mission needs at least one")
+        raise SceneError(scene.name, [fault])
+    problem = _problem(scene, seed, params)
     statistics.time_s["init"] = statistics.elapsed()
-    unreachable = unreachable_goals(problem)
-    if unreachable:
+    tell(0.1, "roadmap built")
+    best = _best_plan(problem, seed, params, statistics, tell)
+    if best is not None:
         return PlanResult(
-            status=PlanStatus.INFEASIBLE,
-            plan=None,
-            reason="no robot can reach "
-            + ", ".join(unreachable)
-            + ": cut off by obstacles for every robot's width",
+            status=PlanStatus.SOLVED,
+            plan=best,
+            reason="",
             statistics=statistics.as_dict(),
         )
-    tell(0.1, "roadmap built")
-    return _best_plan(problem, seed, params, statistics, tell)
+    proof = proof_of_infeasibility(scene)
+    return PlanResult(
+        status=PlanStatus.TIMEOUT if proof is None else PlanStatus.INFEASIBLE,
+        plan=None,
+        reason=proof or _why_not(problem, statistics),
+        statistics=statistics.as_dict(),
+    )
 
 
-def unreachable_goals(problem: Problem) -> list[str]:
+def _problem(scene: Scene, seed: int, params: PlannerParams) -> Problem:
+    """Build the roadmap, denser while it does not join all goals, and the problem."""
+    world = World.from_scene(scene)
+    samples = params.samples
+    for attempt in range(ROADMAPS):
+        roadmap = build_roadmap(
+            scene,
+            world,
+            samples=samples,
+            neighbours=params.neighbours,
+            rng=seeding.stream(seed, "roadmap", attempt),
+        )
+        if not unjoined_goals(scene, roadmap):
+            break
+        samples *= 3
+    return state_problem(scene, world, roadmap, params)
+
+
+def unjoined_goals(scene: Scene, roadmap: Roadmap) -> list[str]:
     """Return the goals to which the roadmap knows no way for any robot."""
-    reach = np.isfinite(problem.roadmap.start_distance).any(axis=0)
+    joined = np.isfinite(roadmap.start_distance).any(axis=0)
     return [
-        goal.id
-        for goal, fine in zip(problem.scene.goals, reach, strict=False)
-        if not fine
+        goal.id for goal, fine in zip(scene.goals, joined, strict=False) if not fine
     ]
+
+
+def _why_not(problem: Problem, statistics: Statistics) -> str:
+    unjoined = unjoined_goals(problem.scene, problem.roadmap)
+    if unjoined:
+        return (
+            f"the roadmap found no way to {', '.join(unjoined)}, and no proof that "
+            "there is none"
+        )
+    if not statistics.counts:
+        return "the router found no tours that keep every battery above its reserve"
+    return "no motion tree reached all goals within its size and the time limit"
 
 
 def _best_plan(
@@ -111,52 +146,71 @@ def _best_plan(
     params: PlannerParams,
     statistics: Statistics,
     tell: Progress,
-) -> PlanResult:
+) -> Plan | None:
+    """Return the cheapest plan of several trees, each along tours of its own draw.
+
+    With a time limit trees are grown until it is reached, else as many as the
+    parameters say.
+    """
     best: Plan | None = None
-    wanted = 1 + params.improvements
-    found = 0
-    routed = False
-    for number in range(params.trees):
-        out_of_time = (
-            params.budget_s is not None and statistics.elapsed() > params.budget_s
-        )
-        if found == wanted or out_of_time:
-            break
-        before = statistics.elapsed()
-        draw = seeding.stream_seed(seed, "tours", number)
-        routing = solve_routing(problem.mission.routing, params.router, draw)
-        spent = statistics.time_s.get("routing", 0.0)
-        statistics.time_s["routing"] = spent + statistics.elapsed() - before
-        if not routing.feasible:
-            continue
-        routed = True
-        growth = grow_tree(
-            problem, params, routing, seeding.stream_seed(seed, "tree", number)
-        )
-        statistics.add(dict(growth.counts))
-        plan = _plan_of(problem, seed, params, growth) if growth.solved else None
+    found = number = 0
+    while not _enough(number, found, params, statistics):
+        plan = _one_plan(problem, seed, number, params, statistics)
+        number += 1
         if plan is not None:
             found += 1
             statistics.time_s.setdefault("first_solution", statistics.elapsed())
             if best is None or plan.cost_J < best.cost_J:
                 best = plan
-        tell(0.1 + 0.9 * found / wanted, f"{found} of {wanted} plans")
-    if best is not None:
-        return PlanResult(
-            status=PlanStatus.SOLVED,
-            plan=best,
-            reason="",
-            statistics=statistics.as_dict(),
-        )
-    reason = "the motion tree reached its size limit before all goals were visited"
-    if not routed:
-        reason = "the router found no tours that keep every battery above its reserve"
-    return PlanResult(
-        status=PlanStatus.TIMEOUT,
-        plan=None,
-        reason=reason,
-        statistics=statistics.as_dict(),
+        tell(_fraction(number, found, params, statistics), f"{found} plans")
+    return best
+
+
+def _enough(
+    number: int, found: int, params: PlannerParams, statistics: Statistics
+) -> bool:
+    if params.budget_s is not None:
+        hopeless = found == 0 and number >= HOPELESS * params.trees
+        return statistics.elapsed() > params.budget_s or hopeless
+    return found > params.improvements or number >= params.trees
+
+
+def _fraction(
+    number: int, found: int, params: PlannerParams, statistics: Statistics
+) -> float:
+    if params.budget_s is not None:
+        done = statistics.elapsed() / params.budget_s
+    else:
+        done = max(number / params.trees, found / (1 + params.improvements))
+    return 0.1 + 0.9 * min(done, 1.0)
+
+
+def _one_plan(
+    problem: Problem,
+    seed: int,
+    number: int,
+    params: PlannerParams,
+    statistics: Statistics,
+) -> Plan | None:
+    """Draw tours and grow a tree along them; return its plan, if it found one.
+
+    Every other draw trusts the roadmap's energies without the margin, for missions in
+    which the batteries leave no room for it.
+    """
+    before = statistics.elapsed()
+    if number % 2:
+        problem = problem.without_margin(params)
+    draw = seeding.stream_seed(seed, "tours", number)
+    routing = solve_routing(problem.mission.routing, params.router, draw)
+    spent = statistics.time_s.get("routing", 0.0)
+    statistics.time_s["routing"] = spent + statistics.elapsed() - before
+    if not routing.feasible:
+        return None
+    growth = grow_tree(
+        problem, params, routing, seeding.stream_seed(seed, "tree", number)
     )
+    statistics.add(dict(growth.counts))
+    return _plan_of(problem, seed, params, growth) if growth.solved else None
 
 
 def _plan_of(

@@ -1,0 +1,166 @@
+"""Proofs that a mission cannot be solved; nothing is called infeasible without one.
+
+Both proofs relax the problem: robots become discs that fit inside their footprints,
+their dynamics and each other are ignored, and ways are as short as the obstacles allow
+at all. What is impossible then is impossible.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import networkx as nx
+import numpy as np
+import shapely
+from shapely.geometry import Point, Polygon, box
+
+from mrmg.scene.types import Region, Robot, Scene
+
+MOST_CORNERS = 400
+"""Corners up to which shortest ways round obstacles are computed; beyond, as the crow
+flies."""
+
+
+def proof_of_infeasibility(scene: Scene) -> str | None:
+    """Return why the mission has no solution, or None if no proof is known."""
+    proofs = [_Reach.of(scene, robot) for robot in scene.robots]
+    for goal in scene.goals:
+        connected = [reach for reach in proofs if reach.is_connected(goal.region)]
+        if not connected:
+            return (
+                f"goal {goal.id} is unreachable: for every robot it is cut off from "
+                "the start by obstacles with no gap as wide as the robot"
+            )
+        missing_J = min(reach.missing_energy_J(goal.region) for reach in connected)
+        if missing_J > 0.0:
+            return (
+                f"goal {goal.id} is out of energy's reach: even on the shortest way, "
+                "over every station that can be reached, each robot that can get there "
+                f"lacks at least {missing_J:.0f} J above its reserve"
+            )
+    return None
+
+
+@dataclass(frozen=True)
+class _Reach:
+    """What one robot can reach at best.
+
+    Attributes:
+        scene, robot: the problem.
+        free: where the centre of a disc inside the robot may be, the part joined to
+            the start.
+        offset_m: distance of the disc's centre from the reference point.
+        blocked: obstacles the reference point cannot enter.
+        left_J: energy above the reserve with which the robot can leave each place it
+            can recharge at, and the start, at best: (region, energy).
+    """
+
+    scene: Scene
+    robot: Robot
+    free: shapely.Geometry
+    offset_m: float
+    blocked: shapely.Geometry
+    left_J: tuple[tuple[Region | Point, float], ...]
+
+    @staticmethod
+    def of(scene: Scene, robot: Robot) -> _Reach:
+        obstacles = shapely.union_all(
+            [obstacle.shape for obstacle in scene.obstacles if obstacle.stops(robot.id)]
+        )
+        # The largest disc inside the footprint; shrunk by the search's tolerance.
+        spoke = shapely.maximum_inscribed_circle(Polygon(robot.model.footprint_m))
+        centre = np.asarray(spoke.coords[0])
+        radius = 0.98 * spoke.length
+        x_min, y_min, x_max, y_max = scene.bounds
+        free = box(
+            x_min + radius, y_min + radius, x_max - radius, y_max - radius
+        ).difference(obstacles.buffer(radius))
+        x, y, yaw = robot.pose
+        turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+        disc = Point(turn @ centre + (x, y))
+        parts = [part for part in shapely.get_parts(free) if part.distance(disc) < 0.05]
+        reach = _Reach(
+            scene=scene,
+            robot=robot,
+            free=shapely.union_all(parts),
+            offset_m=float(np.hypot(*centre)),
+            blocked=obstacles,
+            left_J=(),
+        )
+        return reach._with_stations()
+
+    def is_connected(self, region: Region) -> bool:
+        """Tell whether the robot may get into a region as far as obstacles go."""
+        near = region.shape.buffer(self.offset_m + 0.05)
+        return bool(self.free.intersects(near))
+
+    def missing_energy_J(self, region: Region) -> float:
+        """Return what the robot lacks to get to a region; not positive if it may."""
+        return min(
+            self._least_J(place, region) - energy_J for place, energy_J in self.left_J
+        )
+
+    def _with_stations(self) -> _Reach:
+        battery = self.robot.battery
+        full_J = battery.capacity_J - battery.reserve_J
+        start = (Point(*self.robot.pose[:2]), battery.start_J - battery.reserve_J)
+        reached: list[tuple[Region | Point, float]] = [start]
+        waiting = [s for s in self.scene.stations if self.is_connected(s.region)]
+        for place, energy_J in reached:  # grows while it is walked through
+            for station in [*waiting]:
+                if self._least_J(place, station.region) <= energy_J:
+                    waiting.remove(station)
+                    reached.append((station.region, full_J))
+        return _Reach(
+            scene=self.scene,
+            robot=self.robot,
+            free=self.free,
+            offset_m=self.offset_m,
+            blocked=self.blocked,
+            left_J=tuple(reached),
+        )
+
+    def _least_J(self, place: Region | Point, region: Region) -> float:
+        """Return a lower bound of the energy from a place to a region."""
+        cheapest = min([1.0, *(area.multiplier for area in self.scene.terrain)])
+        joules = cheapest * self.robot.model.energy_model.plain_ground_J_per_m()
+        shape = place if isinstance(place, Point) else place.shape
+        return joules * shortest_way_m(shape, region.shape, self.blocked)
+
+
+def shortest_way_m(
+    start: shapely.Geometry, end: shapely.Geometry, blocked: shapely.Geometry
+) -> float:
+    """Return the length of the shortest way between two convex sets round obstacles.
+
+    A visibility graph over the obstacles' corners; where there are more than
+    MOST_CORNERS, the straight distance, which is never longer.
+    """
+    straight = float(start.distance(end))
+    line = shapely.shortest_line(start, end)
+    corners = np.unique(shapely.get_coordinates(blocked), axis=0)
+    inside = shapely.buffer(blocked, -1e-6)
+    if not line.intersects(inside) or len(corners) > MOST_CORNERS:
+        return straight
+    shapely.prepare(inside)
+    points = shapely.points(corners)
+    i, j = np.triu_indices(len(corners), 1)
+    segments = shapely.linestrings(np.stack([corners[i], corners[j]], axis=1))
+    seen = ~shapely.intersects(inside, segments)
+    graph = nx.Graph()
+    graph.add_weighted_edges_from(
+        zip(
+            i[seen].tolist(),
+            j[seen].tolist(),
+            shapely.length(segments[seen]).tolist(),
+            strict=True,
+        )
+    )
+    # Distances to the convex sets without asking for sight keep the bound a bound.
+    for name, shape in (("start", start), ("end", end)):
+        away = shapely.distance(points, shape)
+        graph.add_weighted_edges_from(
+            (name, k, float(d)) for k, d in enumerate(away.tolist())
+        )
+    way = nx.dijkstra_path_length(graph, "start", "end")
+    return max(straight, float(way))
