@@ -1,0 +1,63 @@
+"""The planner's parameters: refused by name, and fingerprinted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from mrmg.errors import UsageError
+from mrmg.planning.parameters import PROFILES, PlannerParams, profile_params
+from mrmg.planning.routing import RouterParams
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("profile", "fast"),
+        ("samples", -1),
+        ("neighbours", 0),
+        ("dt_s", 0.0),
+        ("dt_s", 0.5),
+        ("steps", 0),
+        ("max_vertices", 1),
+        ("trees", 0),
+        ("improvements", -1),
+        ("group_lambda", 0.0),
+        ("group_bias", 1.5),
+        ("budget_s", 0.0),
+        ("budget_s", -3.0),
+    ],
+)
+def test_values_out_of_range_are_refused_by_name(name: str, value: Any) -> None:
+    with pytest.raises(UsageError, match=name):
+        PlannerParams(**{name: value})
+
+
+def test_every_wrong_value_is_named_at_once() -> None:
+    with pytest.raises(UsageError, match=r"samples.*neighbours"):
+        PlannerParams(samples=-1, neighbours=0)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_profiles_carry_their_name_and_the_budget(profile: str) -> None:
+    params = profile_params(profile, budget_s=7.0)
+    assert (params.profile, params.budget_s) == (profile, 7.0)
+
+
+def test_an_unknown_profile_is_refused() -> None:
+    with pytest.raises(UsageError, match="profile"):
+        profile_params("fast")
+
+
+def test_the_digest_tells_apart_what_decides_the_plan() -> None:
+    """A time limit does not: it only ends the search."""
+    base = PlannerParams()
+    assert replace(base, budget_s=5.0).digest == base.digest
+    others = [
+        replace(base, samples=base.samples + 1),
+        replace(base, router=RouterParams(kicks=base.router.kicks + 1)),
+        profile_params("paper"),
+    ]
+    assert len({base.digest, *(params.digest for params in others)}) == 4
