@@ -35,6 +35,7 @@ def make_parser() -> argparse.ArgumentParser:
     _add_render(verbs)
     _add_compare(verbs)
     _add_figure(verbs)
+    _add_view(verbs)
     _add_scene(verbs)
     doctor = verbs.add_parser("doctor", help="check this machine, with cures")
     _add_json(doctor, "the findings")
@@ -158,6 +159,26 @@ def _add_figure(verbs: _Verbs) -> None:  # type: ignore[type-arg]
         help="PDF, SVG or PNG by its suffix; default KIND.pdf",
     )
     figure.set_defaults(command=show_commands.figure)
+
+
+def _add_view(verbs: _Verbs) -> None:  # type: ignore[type-arg]
+    view = verbs.add_parser("view", help="watch a run or a scene in three dimensions")
+    view.add_argument(
+        "source", metavar="RUN|SCENE", help="run folder, scene file or shipped scene"
+    )
+    view.add_argument(
+        "--in",
+        dest="place",
+        choices=("window", "browser"),
+        help="default: window where there is a screen, else browser",
+    )
+    view.add_argument(
+        "--host", default="127.0.0.1", help="address the page is served on"
+    )
+    view.add_argument(
+        "--port", type=_count, default=8080, help="port of the page; default 8080"
+    )
+    view.set_defaults(command=show_commands.view)
 
 
 def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import os
+import sys
+from pathlib import Path
 
 from mrmg.cli import terminal
 from mrmg.errors import ExitCode
@@ -24,11 +27,42 @@ def compare(options: argparse.Namespace) -> int:
 
 def figure(options: argparse.Namespace) -> int:
     """Draw one figure of a run for a paper."""
-    from pathlib import Path
-
     from mrmg.results.figure import draw_figure
 
     out = options.out or Path(f"{options.kind}.pdf")
     draw_figure(options.run, options.kind, out)
     print(out)
     return ExitCode.OK
+
+
+def view(options: argparse.Namespace) -> int:
+    """Show a run or a scene in three dimensions, until told to stop."""
+    from mrmg.results.replay import replay_of
+    from mrmg.scene.loading import load_scene
+
+    if (Path(options.source) / "run.json").exists():
+        replay = replay_of(Path(options.source))
+        scene = replay.film.scene
+    else:
+        replay, scene = None, load_scene(options.source)
+    if (options.place or ("window" if _has_screen() else "browser")) == "window":
+        from mrmg.results.native_view import open_window
+
+        open_window(scene, replay)
+        return ExitCode.OK
+    from mrmg.results.browser_view import BrowserView
+
+    page = BrowserView(scene, replay, host=options.host, port=options.port)
+    print(f"{scene.name}: open {page.address} in a browser; Ctrl-C ends", flush=True)
+    try:
+        page.run()
+    except KeyboardInterrupt:
+        return ExitCode.OK
+    finally:
+        page.close()
+    return ExitCode.OK
+
+
+def _has_screen() -> bool:
+    named = os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    return bool(named) or sys.platform in ("darwin", "win32")

@@ -57,8 +57,14 @@ class GroundFrame:
         return np.asarray((points - corner) * (1.0, -1.0) * self.pixels_per_m)
 
 
-def paint_ground(scene: Scene, plan: Plan, frame: GroundFrame) -> np.ndarray:
-    """Return the ground from above, north up, shape (height, width, 3) of bytes."""
+def paint_ground(scene: Scene, plan: Plan | None, frame: GroundFrame) -> np.ndarray:
+    """Return the ground from above, north up, shape (height, width, 3) of bytes.
+
+    Args:
+        scene: the map.
+        plan: adds planned paths.
+        frame: what the picture covers.
+    """
     width, height = frame.size
     figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI)
     canvas = FigureCanvasAgg(figure)
@@ -71,7 +77,8 @@ def paint_ground(scene: Scene, plan: Plan, frame: GroundFrame) -> np.ndarray:
     scene_drawing.draw_ground(
         axes, scene, hatched=False, label_points=_points(_LABEL_PIXELS)
     )
-    _paint_paths(axes, scene, plan)
+    if plan is not None:
+        _paint_paths(axes, scene, plan)
     _paint_rims(axes, scene)
     canvas.draw()  # type: ignore[no-untyped-call]
     pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]

@@ -179,7 +179,7 @@ def open_view(
         MachineError: if this machine has no OpenGL that draws offscreen.
     """
     with offscreen_context(*size):
-        model = _drawable(world, ground, size)
+        model = drawable_model(world, ground, size)
         try:
             view = WorldView(world, model, size)
         except mujoco.FatalError as error:
@@ -196,9 +196,16 @@ def floor_frame(world: MujocoWorld) -> GroundFrame:
     return GroundFrame(center_m=floor.pos[:2].copy(), half_m=floor.size[:2].copy())
 
 
-def _drawable(
+def drawable_model(
     world: MujocoWorld, ground: np.ndarray, size: tuple[int, int]
 ) -> mujoco.MjModel:
+    """Return the world's model as it is drawn: its floor painted, round things lean.
+
+    Args:
+        world: what to draw.
+        ground: image of the floor as of `floor_frame`, north up.
+        size: largest width and height of a picture drawn offscreen [pixels].
+    """
     # Cost grows with the number of vertices, so round things get few.
     spec = world.spec.copy()
     texture = spec.texture(FLOOR)

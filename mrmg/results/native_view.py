@@ -1,0 +1,113 @@
+"""A mission or a scene in MuJoCo's own viewer, for machines with a screen."""
+
+from __future__ import annotations
+
+import time
+
+import mujoco
+import numpy as np
+
+from mrmg.errors import MachineError
+from mrmg.execution.world_model import MujocoWorld, build_world
+from mrmg.results import style
+from mrmg.results.ground_image import paint_ground
+from mrmg.results.replay import SPEEDS, Replay, spoken
+from mrmg.results.world_view import drawable_model, floor_frame
+from mrmg.scene.types import Scene
+
+KEYS = "space: play or pause, arrows left and right: 5 s, up and down: speed"
+"""How the replay is steered."""
+
+_FRAME_S = 1.0 / 60.0
+_JUMP_S = 5.0
+_SPACE, _RIGHT, _LEFT, _DOWN, _UP = 32, 262, 263, 264, 265
+
+
+def open_window(scene: Scene, replay: Replay | None) -> None:
+    """Show a mission, or a scene at its start, until the window is closed.
+
+    Args:
+        scene: what is shown.
+        replay: how it was driven; None shows the start.
+
+    Raises:
+        MachineError: if no window can be opened.
+    """
+    import mujoco.viewer
+
+    world = replay.film.world if replay else build_world(scene)
+    plan = replay.film.plan if replay else None
+    ground = paint_ground(scene, plan, floor_frame(world))
+    model = drawable_model(world, ground, (1280, 720))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    if replay is not None:
+        replay.playing = True
+    try:
+        window = mujoco.viewer.launch_passive(
+            model,
+            data,
+            key_callback=lambda key: steer(replay, key),
+            show_left_ui=False,
+            show_right_ui=False,
+        )
+    except Exception as error:
+        raise MachineError(
+            f"no window could be opened ({error}); 'mrmg view --in browser' needs none"
+        ) from error
+    with window:
+        before = time.monotonic()
+        while window.is_running():
+            now = time.monotonic()
+            if replay is not None:
+                replay.advance(now - before)
+                with window.lock():
+                    _place(world, model, data, replay)
+                window.set_texts(_texts(scene, replay))
+            window.sync()
+            before = now
+            time.sleep(_FRAME_S)
+
+
+def steer(replay: Replay | None, key: int) -> None:
+    """Do what a key says; see `KEYS`.
+
+    Args:
+        replay: to be steered.
+        key: code of the key as GLFW has it.
+    """
+    if replay is None:
+        return
+    if key == _SPACE:
+        replay.toggle()
+    elif key in (_LEFT, _RIGHT):
+        replay.seek(replay.time_s + (_JUMP_S if key == _RIGHT else -_JUMP_S))
+    elif key in (_UP, _DOWN):
+        at = SPEEDS.index(int(replay.speed)) + (1 if key == _UP else -1)
+        replay.speed = float(SPEEDS[min(max(at, 0), len(SPEEDS) - 1)])
+
+
+def _place(
+    world: MujocoWorld, model: mujoco.MjModel, data: mujoco.MjData, replay: Replay
+) -> None:
+    data.qpos[:] = replay.film.log.qpos[replay.tick]
+    data.time = replay.time_s
+    mujoco.mj_forward(model, data)
+    visited = replay.reading().visited
+    for goal in replay.film.scene.goals:
+        robot = visited.get(goal.id)
+        color = replay.film.colors[robot] if robot else style.GOAL_OPEN
+        rgb = np.array(style.rgb(color)) / 255.0
+        model.geom_rgba[world.target_geom[goal.id], :3] = rgb
+
+
+def _texts(scene: Scene, replay: Replay) -> list[tuple[int, int, str, str]]:
+    mission, robots = spoken(scene, replay.reading())
+    font = mujoco.mjtFontScale.mjFONTSCALE_150.value
+    corner = mujoco.mjtGridPos
+    left = "\n".join(["mission", *(name for name, _ in robots)])
+    right = "\n".join([mission, *(words for _, words in robots)])
+    return [
+        (font, corner.mjGRID_TOPLEFT.value, left, right),
+        (font, corner.mjGRID_BOTTOMLEFT.value, f"×{replay.speed:g}", KEYS),
+    ]
