@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 
 import mujoco
@@ -20,6 +21,10 @@ KEYS = "space: play or pause, arrows left and right: 5 s, up and down: speed"
 
 _FRAME_S = 1.0 / 60.0
 _JUMP_S = 5.0
+_TAG_LIFT_M = 0.6
+_LINE_LIFT_M = 0.06
+_LINE_PIXELS = 3.0
+_LEAST_STRIDE = 10
 _SPACE, _RIGHT, _LEFT, _DOWN, _UP = 32, 262, 263, 264, 265
 
 
@@ -56,6 +61,7 @@ def open_window(scene: Scene, replay: Replay | None) -> None:
             f"no window could be opened ({error}); 'mrmg view --in browser' needs none"
         ) from error
     with window:
+        _look_from_above(window.cam, scene)
         before = time.monotonic()
         while window.is_running():
             now = time.monotonic()
@@ -63,6 +69,7 @@ def open_window(scene: Scene, replay: Replay | None) -> None:
                 replay.advance(now - before)
                 with window.lock():
                     _place(world, model, data, replay)
+                    annotate(window.user_scn, scene, replay)
                 window.set_texts(_texts(scene, replay))
             window.sync()
             before = now
@@ -101,6 +108,72 @@ def _place(
         model.geom_rgba[world.target_geom[goal.id], :3] = rgb
 
 
+def _look_from_above(camera: mujoco.MjvCamera, scene: Scene) -> None:
+    x_min, y_min, x_max, y_max = scene.bounds
+    camera.lookat[:] = [(x_min + x_max) / 2, (y_min + y_max) / 2, 0.0]
+    camera.distance = 1.2 * max(x_max - x_min, y_max - y_min)
+    camera.azimuth, camera.elevation = 90.0, -58.0
+
+
+def annotate(extra: mujoco.MjvScene, scene: Scene, replay: Replay) -> None:
+    """Put driven ways, names of targets and batteries into the window's extra geoms."""
+    extra.ngeom = 0
+    names = {**style.goal_labels(scene), **style.station_labels(scene)}
+    for target in scene.targets():
+        _add_label(extra, (*target.region.center, 0.3), names[target.id])
+    log, reading = replay.film.log, replay.reading()
+    for robot, state, said in zip(scene.robots, log.state, reading.robots, strict=True):
+        at = (*state[replay.tick, :2], robot.model.height_m + _TAG_LIFT_M)
+        _add_label(extra, at, f"{robot.id} {100.0 * said.charge:.0f} %")
+    room = (extra.maxgeom - extra.ngeom) // len(scene.robots)
+    for robot, state in zip(scene.robots, log.state, strict=True):
+        color = np.array([*style.rgb(replay.film.colors[robot.id]), 255.0]) / 255.0
+        stride = max(math.ceil(len(state) / max(room, 1)), _LEAST_STRIDE)
+        driven = state[: replay.tick + 1 : stride, :2]
+        for start, end in zip(driven[:-1], driven[1:], strict=True):
+            _add_line(extra, start, end, color)
+
+
+def _add_label(
+    extra: mujoco.MjvScene, at: tuple[float, float, float], text: str
+) -> None:
+    if extra.ngeom < extra.maxgeom:
+        geom = extra.geoms[extra.ngeom]
+        mujoco.mjv_initGeom(
+            geom,
+            mujoco.mjtGeom.mjGEOM_LABEL,
+            np.zeros(3),
+            np.array(at, dtype=float),
+            np.eye(3).ravel(),
+            np.array([1.0, 1.0, 1.0, 1.0], dtype=np.float32),
+        )
+        geom.label = text
+        extra.ngeom += 1
+
+
+def _add_line(
+    extra: mujoco.MjvScene, start: np.ndarray, end: np.ndarray, rgba: np.ndarray
+) -> None:
+    if extra.ngeom < extra.maxgeom:
+        geom = extra.geoms[extra.ngeom]
+        mujoco.mjv_initGeom(
+            geom,
+            mujoco.mjtGeom.mjGEOM_LINE,
+            np.zeros(3),
+            np.zeros(3),
+            np.eye(3).ravel(),
+            rgba.astype(np.float32),
+        )
+        mujoco.mjv_connector(
+            geom,
+            mujoco.mjtGeom.mjGEOM_LINE,
+            _LINE_PIXELS,
+            np.array([*start, _LINE_LIFT_M]),
+            np.array([*end, _LINE_LIFT_M]),
+        )
+        extra.ngeom += 1
+
+
 def _texts(scene: Scene, replay: Replay) -> list[tuple[int, int, str, str]]:
     mission, robots = spoken(scene, replay.reading())
     font = mujoco.mjtFontScale.mjFONTSCALE_150.value
@@ -109,5 +182,5 @@ def _texts(scene: Scene, replay: Replay) -> list[tuple[int, int, str, str]]:
     right = "\n".join([mission, *(words for _, words in robots)])
     return [
         (font, corner.mjGRID_TOPLEFT.value, left, right),
-        (font, corner.mjGRID_BOTTOMLEFT.value, f"×{replay.speed:g}", KEYS),
+        (font, corner.mjGRID_BOTTOMLEFT.value, f"speed {replay.speed:g}", KEYS),
     ]

@@ -108,6 +108,26 @@ def test_speeds_end_at_the_fastest_and_the_slowest(replay) -> None:
     assert replay.speed == 1.0
 
 
+@pytest.mark.parametrize("room", [3, 40, 1000])
+def test_the_window_s_notes_fit_its_room(replay, room: int) -> None:
+    film = replay.film
+    extra = mujoco.MjvScene(film.world.model, maxgeom=room)
+    replay.seek(replay.end_s)
+    native_view.annotate(extra, film.scene, replay)
+    notes = [extra.geoms[at] for at in range(extra.ngeom)]
+    assert extra.ngeom <= room
+    labels = [note.label for note in notes if note.label]
+    wanted = ["g1", "g2", "g3", "g4", "s1"]
+    assert labels[:5] == wanted[: len(labels)]
+    if room == 1000:
+        charge = replay.reading().robots[0].charge
+        assert labels[5] == f"r1 {100 * charge:.0f} %"
+        lines = [n for n in notes if n.type == mujoco.mjtGeom.mjGEOM_LINE]
+        drawn_m = sum(float(n.size[2]) for n in lines)
+        driven_m = np.hypot(*np.diff(film.log.state[:, :, :2], axis=1).T).sum()
+        assert drawn_m == pytest.approx(driven_m, rel=0.02)
+
+
 def test_shapes_are_where_mujoco_has_them() -> None:
     spec = mujoco.MjSpec.from_string("""
       <mujoco><worldbody><body pos="0 0 5">
