@@ -97,7 +97,11 @@ def hold_motion(mission, r, first, v, w, state):
 
 @kernel
 def way_left(mission, r, target, state, waypoint):
-    """Return the way to a target with what turning towards it takes [m]."""
+    """Return (way to a target, way that turning towards it is counted as) [m].
+
+    Leaving backwards is an alternative to turning round, the dearer the longer the way;
+    turning round is dearer where there is no room for it.
+    """
     fleet = mission.fleet
     to_go = look_ahead(mission, r, target, state, MANEUVER_VIEW_M, waypoint)
     off = abs(wrap(atan2(waypoint[1] - state[1], waypoint[0] - state[0]) - state[2]))
@@ -108,7 +112,7 @@ def way_left(mission, r, target, state, waypoint):
         room = clearance_estimate(space, state[0], state[1])
         tight = 0.5 * (fleet[r].turning_radius + 2.0 - room)
         turn *= 1.0 + TIGHT_TURN * max(0.0, min(1.0, tight))
-    return to_go + min(turn * off, tail)
+    return to_go, min(turn * off, tail)
 
 
 @kernel
@@ -162,7 +166,8 @@ def best_maneuver(mission, r, target, start, stuck, random, out):
             extra += noise * random_unit(random)
         driven[level + 1] = driven[level] + way + extra
         speed[level + 1] = v
-        rating = driven[level + 1] + way_left(mission, r, target, end, waypoint)
+        to_go, turning = way_left(mission, r, target, end, waypoint)
+        rating = driven[level + 1] + to_go + turning
         if rating < best:
             best = rating
             out[0], out[1] = first[0], first[1]

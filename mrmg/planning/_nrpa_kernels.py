@@ -64,7 +64,7 @@ def legal_moves(problem, place, energy, unvisited, left, refuelled, moves):
             elif (
                 t == place[r]
                 or refuelled[r] >= 2
-                or energy[r] > 0.95 * problem.capacity[r]
+                or energy[r] - problem.cost[r, place[r], t] > 0.95 * problem.capacity[r]
             ):
                 continue
             moves[n] = r * targets + t

@@ -55,6 +55,7 @@ def refuel_route(problem, r, route, length, out):
     value[states] = 0.0
     best = np.inf
     best_state = -1
+    reached = -1
     for order in range(states + 1):
         k = states if order == 0 else order - 1
         if value[k] == np.inf:
@@ -71,6 +72,7 @@ def refuel_route(problem, r, route, length, out):
             left = usable - leg
             spent = value[k]
         while left >= 0.0:
+            reached = max(reached, i)
             if i == length - 1:
                 if spent < best:
                     best = spent
@@ -99,7 +101,9 @@ def refuel_route(problem, r, route, length, out):
             i += 1
     if best_state < 0:
         total = route_length(problem, r, route, length)
-        return IMPOSSIBLE + min(total, IMPOSSIBLE), 0
+        # The farther it gets, the better: that gives local search a direction.
+        missing = length - 1 - reached
+        return IMPOSSIBLE * missing + min(total, IMPOSSIBLE), 0
     # Write the tour from the end.
     n = 0
     i = length - 1

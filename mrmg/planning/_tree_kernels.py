@@ -31,7 +31,10 @@ SHUFFLED = 0.3
 STALLED_M = 0.3
 """Way per expansion below which a robot that then stands has not got on."""
 
-VERTICES, GROUPS, ROUTER_CALLS, EXPANSIONS = range(4)
+FAILED_ROUTES = 60
+"""A tree is given up after this many vertices from which no tours are feasible."""
+
+VERTICES, GROUPS, ROUTER_CALLS, EXPANSIONS, ROUTER_FAILURES = range(5)
 """Places in the array of counts."""
 
 
@@ -81,6 +84,8 @@ def goals_left(tree, v):
 def rest_of_tours(mission, tree, tours, v, otherwise):
     """Return (energy the rest of the tours takes [J], whether the batteries allow it).
 
+    The route margin is left out: it is there to be used up by driving.
+
     Args:
         mission, tree, tours, v: the vertex.
         otherwise: energy taken for a first leg whose way is not known [J].
@@ -88,6 +93,7 @@ def rest_of_tours(mission, tree, tours, v, otherwise):
     fleet = mission.fleet
     row = tree.tour[v]
     waypoint = np.empty(2)
+    surcharge = 1.0 + mission.params.route_margin
     total = 0.0
     enough = True
     for r in range(len(fleet)):
@@ -98,10 +104,12 @@ def rest_of_tours(mission, tree, tours, v, otherwise):
             if t < mission.targets.goals and tree.visited[v, t]:
                 continue
             if place >= 0:
-                leg = mission.routing.cost[r, place, t]
+                leg = mission.routing.cost[r, place, t] / surcharge
             else:
-                way = way_left(mission, r, t, tree.state[v, r], waypoint)
-                leg = way * fleet[r].plain if way < np.inf else otherwise
+                to_go, turning = way_left(mission, r, t, tree.state[v, r], waypoint)
+                leg = to_go * fleet[r].plain if to_go < np.inf else otherwise
+                # Turning ranks vertices; it takes less energy than it is counted as.
+                total += turning * fleet[r].plain if to_go < np.inf else 0.0
             total += leg
             left -= leg
             enough &= left >= 0.0
@@ -247,6 +255,7 @@ def insert(mission, tree, tours, n, n_tours, target, event, random, counts):
     )
     counts[ROUTER_CALLS] += 1
     if cost >= IMPOSSIBLE:
+        counts[ROUTER_FAILURES] += not enough
         return enough, n_tours
     tree.tour[n] = n_tours
     tree.position[n] = 0
@@ -281,7 +290,11 @@ def grow(mission, start, energy, random, tree, tours, counts):
     counts[ROUTER_CALLS] = 1
     steer = params.steer_start
     most = EXPANSIONS_PER_VERTEX * params.max_vertices
-    while n < params.max_vertices and counts[EXPANSIONS] < most:
+    while (
+        n < params.max_vertices
+        and counts[EXPANSIONS] < most
+        and counts[ROUTER_FAILURES] < FAILED_ROUTES
+    ):
         counts[EXPANSIONS] += 1
         v = select_vertex(groups, tree, n_groups, params, initial, random)
         next_targets(tree, tours, v, target)

@@ -50,16 +50,17 @@ class Problem:
     start: np.ndarray
     start_energy: np.ndarray
 
-    def without_margin(self, params: PlannerParams) -> Problem:
-        """Return the problem with routing energies as the roadmap has them."""
-        routing, share = self.mission.routing, 1.0 / (1.0 + params.route_margin)
+    def with_margin(self, margin: float) -> Problem:
+        """Return the problem with another surcharge on the roadmap's energies."""
+        routing = self.mission.routing
+        share = (1.0 + margin) / (1.0 + self.mission.params.route_margin)
         return replace(
             self,
             mission=self.mission._replace(
                 routing=routing._replace(
                     cost=routing.cost * share, escape=routing.escape * share
                 ),
-                params=self.mission.params._replace(route_margin=0.0),
+                params=self.mission.params._replace(route_margin=margin),
             ),
         )
 
@@ -183,7 +184,7 @@ def grow_tree(
     for r, tour in enumerate(routing.tours):
         tours.target[0, r, : len(tour)] = tour
         tours.length[0, r] = len(tour)
-    counts = np.zeros(4, np.int64)
+    counts = np.zeros(5, np.int64)
     leaf = _tree_kernels.grow(
         mission,
         problem.start,
@@ -193,7 +194,7 @@ def grow_tree(
         tours,
         counts,
     )
-    names = ("vertices", "groups", "router_calls", "expansions")
+    names = ("vertices", "groups", "router_calls", "expansions", "dead_ends")
     statistics = {name: int(n) for name, n in zip(names, counts, strict=True)}
     if leaf < 0:
         return Growth((), {}, statistics)

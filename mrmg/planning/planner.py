@@ -27,6 +27,9 @@ Progress = Callable[[float, str], None]
 ROADMAPS = 3
 """Roadmaps built at most, each with three times the samples, to join all goals."""
 
+MARGINS = (1.0, 0.0, 2.0)
+"""Multiples of the route margin that successive trees are grown with."""
+
 HOPELESS = 10
 """With a time limit, times the number of trees after which finding none ends it."""
 
@@ -194,12 +197,12 @@ def _one_plan(
 ) -> Plan | None:
     """Draw tours and grow a tree along them; return its plan, if it found one.
 
-    Every other draw trusts the roadmap's energies without the margin, for missions in
-    which the batteries leave no room for it.
+    The surcharge on the roadmap's energies changes from draw to draw: batteries may
+    leave no room for it, or driving may take more than it allows for.
     """
     before = statistics.elapsed()
-    if number % 2:
-        problem = problem.without_margin(params)
+    margin = MARGINS[number % len(MARGINS)] * params.route_margin
+    problem = problem.with_margin(margin)
     draw = seeding.stream_seed(seed, "tours", number)
     routing = solve_routing(problem.mission.routing, params.router, draw)
     spent = statistics.time_s.get("routing", 0.0)
