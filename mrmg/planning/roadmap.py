@@ -17,7 +17,7 @@ import networkx as nx
 import numpy as np
 import shapely
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import cKDTree
 from scipy.stats import qmc
 
@@ -29,6 +29,9 @@ from mrmg.world._kernels import FreeSpace
 from mrmg.world.world import World
 
 BUCKET_M = 4.0
+
+ENTRY_DEPTH_M = 0.3
+"""How deep inside a region a vertex lies that stands for having entered it [m]."""
 
 NARROW_M = 2.5
 """Clearance below which the middle of a place gets vertices of its own [m]."""
@@ -86,8 +89,8 @@ def build_roadmap(
     classes, class_of_robot = travel_classes(scene, world)
     vertex = _vertices(scene, world, classes, samples, rng)
     first, second = _candidate_edges(vertex, neighbours)
-    targets = len(scene.targets())
-    cost_to_go, successor, edges = [], [], []
+    n_targets = len(scene.targets())
+    fields, successors, distances, edges = [], [], [], []
     for space, passage in classes:
         weight = _roadmap_kernels.edge_costs(
             world.spaces[space], world.terrain, vertex, first, second, passage
@@ -97,26 +100,62 @@ def build_roadmap(
         graph = csr_array(
             (weight[usable], (first[usable], second[usable])), shape=(len(vertex),) * 2
         )
-        cost, previous = dijkstra(
-            graph, directed=False, indices=np.arange(targets), return_predecessors=True
-        )
-        cost_to_go.append(cost)
-        successor.append(np.where(previous < 0, -1, previous).astype(np.int32))
-    fields = np.stack(cost_to_go).reshape(len(classes), targets, len(vertex))
-    starts = targets + np.arange(len(scene.robots))
+        entries = _entries(scene, graph, vertex)
+        cost, successor = _cost_to_go(graph, entries)
+        fields.append(cost)
+        successors.append(successor)
+        distances.append([cost[:, sources].min(axis=1) for sources in entries])
+    starts = n_targets + np.arange(len(scene.robots))
     return Roadmap(
-        arrays=_with_buckets(
-            scene,
-            vertex,
-            fields,
-            np.stack(successor).reshape(len(classes), targets, len(vertex)),
-        ),
-        distance=np.ascontiguousarray(fields[:, :, :targets]),
+        arrays=_with_buckets(scene, vertex, np.stack(fields), np.stack(successors)),
+        distance=np.array(distances).reshape(len(classes), n_targets, n_targets),
         start_distance=np.stack(
-            [fields[c, :, v] for c, v in zip(class_of_robot, starts, strict=True)]
+            [fields[c][:, v] for c, v in zip(class_of_robot, starts, strict=True)]
         ),
         edges=tuple(edges),
     )
+
+
+def _entries(scene: Scene, graph: csr_array, vertex: np.ndarray) -> list[np.ndarray]:
+    """Return the vertices at which each target may be entered.
+
+    That is the target's own vertex, and where a region reaches across a wall, those of
+    its vertices that are cut off from it.
+    """
+    _, part = connected_components(graph, directed=False)
+    entries = []
+    for t, target in enumerate(scene.targets()):
+        near = np.hypot(*(vertex - target.region.center).T)
+        inside = np.flatnonzero(near < _reach(target.region))
+        inside = inside[target.region.depth(vertex[inside]) >= ENTRY_DEPTH_M]
+        others = inside[part[inside] != part[t]]
+        entries.append(np.concatenate([[t], others[others != t]]))
+    return entries
+
+
+def _reach(region: Region) -> float:
+    """Return the radius of a region about its centre."""
+    if len(region.corners):
+        return float(np.hypot(*(region.corners - region.center).T).max())
+    return region.radius_m
+
+
+def _cost_to_go(
+    graph: csr_array, entries: list[np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return each target's weighted length and successor for all vertices, (T, V)."""
+    shape = (len(entries), graph.shape[0])
+    cost, successor = np.empty(shape), np.empty(shape, np.int32)
+    for t, sources in enumerate(entries):
+        cost[t], previous, _ = dijkstra(
+            graph,
+            directed=False,
+            indices=sources,
+            min_only=True,
+            return_predecessors=True,
+        )
+        successor[t] = np.maximum(previous, -1)
+    return cost, successor
 
 
 def _vertices(
@@ -146,7 +185,8 @@ def _vertices(
         [shapely.segmentize(ring, 8.0) for ring in rings if not ring.is_empty]
     )
     ridges = [_ridge(world.spaces[space]) for space, _ in classes]
-    loose = np.concatenate([spread, corners.reshape(-1, 2), *ridges])
+    inner = [_inner_points(target.region) for target in scene.targets()]
+    loose = np.concatenate([spread, corners.reshape(-1, 2), *ridges, *inner])
     inside = (
         (loose[:, 0] > x_min)
         & (loose[:, 1] > y_min)
@@ -158,6 +198,14 @@ def _vertices(
         [_field_at(world.spaces[space], loose) for space, _ in classes], axis=0
     )
     return np.concatenate([np.array(fixed).reshape(-1, 2), loose[widest >= passage]])
+
+
+def _inner_points(region: Region) -> np.ndarray:
+    """Return points spread over a region, shape (8, 2)."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1) * _reach(region)
+    points = region.center + 0.7 * ring
+    return np.asarray(points[region.depth(points) >= ENTRY_DEPTH_M])
 
 
 def _ridge(space: FreeSpace) -> np.ndarray:

@@ -1,0 +1,169 @@
+"""Plan, verify and drive missions over scenes and seeds; print tables, write JSONL.
+
+Protocol: one process, one thread; every scene is planned once before anything is
+timed, so that kernels are compiled and caches warm. Times are wall-clock, of planning
+in process. The runs of one call are comparable with each other; figures of different
+machines are not.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import statistics
+import sys
+import time
+from collections.abc import Iterator
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import mrmg
+from mrmg.planning import plan_mission, profile_params
+
+TABLE = ("scene1", "scene2", "scene3", "scene4", "scene5", "scene6")
+
+
+def main() -> int:
+    """Run the bench; return 1 if any mission failed."""
+    options = parse_options()
+    print(protocol(options))
+    rows = []
+    print(header(options))
+    for scene in options.scenes:
+        of_scene = list(missions(scene, options))
+        rows += of_scene
+        print(table_row(scene, of_scene, options), flush=True)
+    if options.output:
+        text = "".join(json.dumps(row, sort_keys=True) + "\n" for row in rows)
+        options.output.write_text(text)
+    return 0 if all(row["ok"] for row in rows) else 1
+
+
+def parse_options() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, prog="tools/bench")
+    parser.add_argument("--scenes", nargs="+", default=list(TABLE), metavar="SCENE")
+    parser.add_argument("--seeds", default="0-9", help="first-last, default 0-9")
+    parser.add_argument("--profile", default="default", choices=("default", "paper"))
+    parser.add_argument("--budget", type=float, help="seconds of planning")
+    parser.add_argument("--execute", action="store_true", help="drive in MuJoCo too")
+    parser.add_argument("--output", type=Path, help="JSONL file, one line a mission")
+    options = parser.parse_args()
+    first, _, last = options.seeds.partition("-")
+    options.seeds = range(int(first), int(last or first) + 1)
+    return options
+
+
+def protocol(options: argparse.Namespace) -> str:
+    """Return what was measured how and on what."""
+    names = ("mrmg", "mujoco", "numba", "numpy", "casadi")
+    versions = ", ".join(f"{name} {version(name)}" for name in names)
+    seeds = f"{options.seeds.start}-{options.seeds.stop - 1}"
+    chosen = f"profile {options.profile}, seeds {seeds}, budget {options.budget}"
+    return (
+        f"{__doc__}\n{chosen}\n"
+        f"{versions}, Python {platform.python_version()}, {cpu()}\n"
+    )
+
+
+def cpu() -> str:
+    """Return the processor's name."""
+    info = Path("/proc/cpuinfo")
+    if not info.exists():
+        return platform.processor()
+    lines = info.read_text().splitlines()
+    names = [line.partition(":")[2].strip() for line in lines if "model name" in line]
+    return f"{names[0]} x {len(names)}" if names else platform.machine()
+
+
+def missions(source: str, options: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    """Yield one row for each seed."""
+    scene = mrmg.load_scene(source)
+    params = profile_params(options.profile, budget_s=options.budget)
+    plan_mission(scene, seed=options.seeds.start, params=params)
+    for seed in options.seeds:
+        began = time.perf_counter()
+        result = plan_mission(scene, seed=seed, params=params)
+        row = {
+            "scene": scene.name,
+            "seed": seed,
+            "profile": options.profile,
+            "status": result.status.value,
+            "reason": result.reason,
+            "plan_s": time.perf_counter() - began,
+            "statistics": dict(result.statistics),
+            "ok": False,
+        }
+        if result.plan is not None:
+            verdict = mrmg.verify(scene, result.plan)
+            metre = scene.robots[0].model.energy_model.plain_ground_J_per_m()
+            row |= {
+                "cost_J": result.plan.cost_J,
+                "cost_m": result.plan.cost_J / metre,
+                "makespan_s": result.plan.makespan_s,
+                "violations": len(verdict.violations),
+                "ok": verdict.ok,
+            }
+            if options.execute:
+                row |= driven(scene, result.plan, verdict.ok)
+        if not row["ok"]:
+            print(f"FAILED {scene.name} seed {seed}: {row}", file=sys.stderr)
+        yield row
+
+
+def driven(scene: Any, plan: Any, plan_ok: bool) -> dict[str, Any]:
+    """Drive a plan and return what came of it."""
+    log = mrmg.execute(scene, plan)
+    account = mrmg.audit(scene, plan, log)
+    robots = account.robots
+    return {
+        "ok": plan_ok and account.mission_ok,
+        "reasons": list(account.reasons),
+        "realtime_factor": log.timing["realtime_factor"],
+        "contacts": len(log.contacts),
+        "tracking_rms_m": max(robot.tracking_rms_m for robot in robots),
+        "tracking_max_m": max(robot.tracking_max_m for robot in robots),
+        "metered_error_pct": max(abs(robot.metered_error_pct) for robot in robots),
+        "measured_error_pct": max(abs(robot.measured_error_pct) for robot in robots),
+    }
+
+
+COLUMNS = ("first_s median", "first_s p95", "plan_s median", "cost_m median")
+DRIVEN = ("rms_m worst", "max_m worst", "metered% worst", "measured% worst", "x real")
+
+
+def header(options: argparse.Namespace) -> str:
+    """Return the table's head."""
+    names = ("scene", "ok", *COLUMNS, *(DRIVEN if options.execute else ()))
+    return " | ".join(names)
+
+
+def table_row(
+    scene: str, rows: list[dict[str, Any]], options: argparse.Namespace
+) -> str:
+    """Return one scene's line of the table."""
+    solved = [row for row in rows if "cost_m" in row]
+    cells = [scene, f"{sum(row['ok'] for row in rows)}/{len(rows)}"]
+    if solved:
+        first = sorted(row["statistics"]["time_s"]["first_solution"] for row in solved)
+        cells += [
+            f"{statistics.median(first):.3f}",
+            f"{first[min(len(first) - 1, int(0.95 * len(first)))]:.3f}",
+            f"{statistics.median(row['plan_s'] for row in solved):.3f}",
+            f"{statistics.median(row['cost_m'] for row in solved):.1f}",
+        ]
+    if solved and options.execute:
+        cells += [
+            f"{max(row['tracking_rms_m'] for row in solved):.4f}",
+            f"{max(row['tracking_max_m'] for row in solved):.4f}",
+            f"{max(row['metered_error_pct'] for row in solved):.2f}",
+            f"{max(row['measured_error_pct'] for row in solved):.2f}",
+            f"{statistics.median(row['realtime_factor'] for row in solved):.0f}",
+        ]
+    return " | ".join(cells)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
