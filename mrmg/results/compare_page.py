@@ -19,6 +19,7 @@ from mrmg.results.report_map import mission_map
 from mrmg.results.report_record import RunRecord
 
 _SAMPLES = 800
+_SHORTEST_S = 0.1
 
 
 def write_comparison(comparison: Comparison, path: Path) -> None:
@@ -80,7 +81,8 @@ def _maps(comparison: Comparison) -> str:
 
 def _charts(comparison: Comparison, solved: Sequence[int]) -> dict[str, Any]:
     curves = {number: _curves(comparison.records[number]) for number in solved}
-    end_s = max(float(curve.time_s[-1]) for run in curves.values() for curve in run)
+    ends_s = [float(curve.time_s[-1]) for run in curves.values() for curve in run]
+    end_s = max(_SHORTEST_S, *ends_s)
     time_s = np.linspace(0.0, end_s, _SAMPLES)
 
     def drawn(

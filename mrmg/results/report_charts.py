@@ -90,7 +90,7 @@ def measured_curves(
 
 
 def _grid(plan: Plan, log: ExecutionLog | None) -> np.ndarray:
-    end_s = plan.makespan_s
+    end_s = max(plan.makespan_s, _FINEST_S)
     if log is not None:
         end_s = max(end_s, float(log.time_s[-1]))
     samples = min(int(np.ceil(end_s / _FINEST_S)) + 1, _MOST_SAMPLES)

@@ -181,8 +181,11 @@ def checks(record: RunRecord) -> list[str]:
         count = len(verdict.violations)
         rows = [
             ["Rules broken by the plan", str(count) if count else "none"],
-            ["Least distance to an obstacle", _cm(verdict.min_obstacle_clearance_m)],
-            ["Least distance of two robots", _cm(verdict.min_robot_distance_m)],
+            [
+                "Least distance to an obstacle",
+                _distance(verdict.min_obstacle_clearance_m),
+            ],
+            ["Least distance of two robots", _distance(verdict.min_robot_distance_m)],
         ]
         if log is not None:
             contacts = str(len(log.contacts)) if log.contacts else "none"
@@ -238,8 +241,11 @@ def kJ(energy_J: float) -> str:
     return f"{energy_J / 1000.0:.2f} kJ"
 
 
-def _cm(distance_m: float | None) -> str:
-    return "–" if distance_m is None else f"{100.0 * distance_m:.1f} cm"
+def _distance(distance_m: float | None) -> str:
+    if distance_m is None:
+        return "–"
+    far = distance_m >= 1.0
+    return f"{distance_m:.2f} m" if far else f"{100.0 * distance_m:.1f} cm"
 
 
 def _percent(value: float, base: float) -> str:

@@ -12,6 +12,7 @@ from mrmg.results import style
 from mrmg.scene.types import Scene
 
 _MOST_TICKS = 10
+_SHORTEST_S = 0.1
 _SAID = {
     series.DRIVING: "drives",
     series.WAITING: "waits",
@@ -23,7 +24,7 @@ _SAID = {
 def timeline(scene: Scene, plan: Plan, log: ExecutionLog | None) -> str:
     """Return the timeline of the driven mission (planned, where none was driven)."""
     motions = series.shown_motions(plan, log)
-    end_s = max(float(motion.time_s[-1]) for motion in motions)
+    end_s = max(_SHORTEST_S, *(float(motion.time_s[-1]) for motion in motions))
     names = {**style.goal_labels(scene), **style.station_labels(scene)}
     rows = []
     for at, motion in enumerate(motions):
@@ -74,6 +75,8 @@ def _visit(visit: Visit, name: str, end_s: float) -> str:
 
 
 def _shares(duration_s: dict[str, float]) -> str:
+    if not any(duration_s[kind] for kind in (series.DRIVING, series.WAITING)):
+        return "stays where it is"
     words = [f"{duration_s[series.DRIVING]:.0f} s driving"]
     if duration_s[series.WAITING] > 0.0:
         words.append(f"{duration_s[series.WAITING]:.0f} s waiting")

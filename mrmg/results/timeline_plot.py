@@ -19,6 +19,7 @@ from mrmg.scene.types import Scene
 
 _WIDTH_INCHES, _ROW_INCHES = 9.5, 0.62
 _HALF_HEIGHT = 0.2
+_SHORTEST_S = 0.1
 _WAITING: dict[str, Any] = {
     "facecolor": "white",
     "edgecolor": style.MUTED,
@@ -54,7 +55,9 @@ def draw_timeline(
         _draw_row(axes, scene, plan, motion, row)
     axes.set_ylim(len(motions) - 0.5, -0.75)
     axes.set_yticks(range(len(motions)), [motion.robot for motion in motions])
-    axes.set_xlim(0.0, max(float(motion.time_s[-1]) for motion in motions))
+    axes.set_xlim(
+        0.0, max(_SHORTEST_S, *(float(motion.time_s[-1]) for motion in motions))
+    )
     axes.set_xlabel("time [s]")
     for side in ("top", "right", "left"):
         axes.spines[side].set_visible(False)

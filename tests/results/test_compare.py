@@ -103,3 +103,19 @@ def test_the_command_prints_the_table_and_writes_the_page(
     assert "simulated energy" in page.read_text()
     assert main(["compare", *runs, "-o", str(page), "--json"]) == ExitCode.OK
     assert json.loads(capsys.readouterr().out)["runs"] == ["quickstart", "run"]
+
+
+def test_missions_that_take_no_time_can_be_shown(
+    quickstart_run: Path, tmp_path: Path, capsys
+) -> None:
+    scene = str(Path(__file__).parents[1] / "scenes" / "no_goals.yaml")
+    run, page = str(tmp_path / "run"), tmp_path / "c.html"
+    assert main(["plan", scene, "--out", run]) == ExitCode.OK
+    assert main(["report", run]) == ExitCode.MISSION_FAILED  # not driven yet
+    for kind in ("map", "energy", "timeline"):
+        figure = ["--kind", kind, "-o", str(tmp_path / f"{kind}.pdf")]
+        assert main(["figure", run, *figure]) == ExitCode.OK
+    runs = [run, str(quickstart_run)]
+    assert main(["compare", *runs, "-o", str(page)]) == ExitCode.OK
+    assert "stays where it is" in (tmp_path / "run" / "report.html").read_text()
+    assert "Traceback" not in capsys.readouterr().err

@@ -165,7 +165,7 @@
   /* Toggles. */
   function toggleOwner(id, shown) {
     if (shown) hiddenOwners.delete(id); else hiddenOwners.add(id);
-    all(`.map [data-robot="${CSS.escape(id)}"]`).forEach((part) => { part.style.display = shown ? "" : "none"; });
+    all(`[data-robot="${CSS.escape(id)}"]`).forEach((part) => { part.style.display = shown ? "" : "none"; });
     data.charts.forEach((chart, number) => chart.series.forEach((item, at) => {
       if (item.owner === id) charts[number].setSeries(at + 1, { show: shown });
     }));
