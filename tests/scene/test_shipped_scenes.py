@@ -28,7 +28,7 @@ TABLE = {
     "scene6_r2": (2, 20, 4, 0, 250),
     "scene6_r6": (6, 20, 4, 0, 250),
     "scene6_r8": (8, 20, 4, 0, 250),
-    "quickstart": (2, 4, 1, 1, 45),
+    "quickstart": (2, 4, 1, 1, 48),
 }
 MARGIN_M = 0.1
 """Beside half the robot's width: what a road must at least leave."""
