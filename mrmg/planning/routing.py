@@ -83,9 +83,10 @@ def routing_arrays(
     return RoutingArrays(
         goals=goals,
         cost=cost,
-        energy=np.asarray(energy, dtype=float),
-        capacity=np.asarray(capacity, dtype=float),
-        reserve=np.asarray(reserve, dtype=float),
+        # Contiguous, or kernels would be compiled anew for columns of a record array.
+        energy=np.ascontiguousarray(energy, dtype=float),
+        capacity=np.ascontiguousarray(capacity, dtype=float),
+        reserve=np.ascontiguousarray(reserve, dtype=float),
         escape=np.ascontiguousarray(escape),
         open_goal=np.ones(goals, bool) if open_goal is None else open_goal,
     )
