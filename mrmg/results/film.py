@@ -28,6 +28,7 @@ from mrmg.scene.types import Scene
 _TRAIL_AHEAD_M = 1.2
 _YAW_SMOOTHING_S = 0.8
 _MAP_MARGIN = 1.03
+_CHASE_SHARE = 0.35
 _TAG_LIFT_M = 0.5
 _NAMED_WITHIN_M = 40.0
 _OPEN = (1.0, 1.0, 1.0, 0.9)
@@ -85,7 +86,7 @@ class Film:
         share = 0.26 if self.options.view == "chase" else 1.0 - height * ratio / width
         panel_width = round(min(max(share, 0.26), 0.42) * width)
         main = width - panel_width
-        cut = round(0.46 * height) if self.options.view == "split" else 0
+        cut = round(_CHASE_SHARE * height) if self.options.view == "split" else 0
         self.main_pane = (slice(0, height), slice(0, main))
         self.chase_pane = (slice(0, cut), slice(main, width))
         self.panel_pane = (slice(cut, height), slice(main, width))

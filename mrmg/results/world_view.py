@@ -17,7 +17,8 @@ from mrmg.results.gl_backend import offscreen_context
 from mrmg.results.ground_image import GroundFrame
 
 _SLICES, _STACKS = 20, 2
-_SAMPLES = 4
+_SMOOTH_SAMPLES = 4
+_SHADOW_PIXELS = 1024
 _MAX_GEOMS = 20000
 _AWAY_M = 1e4
 CHASE_FOVY_DEG = 50.0
@@ -166,7 +167,11 @@ class WorldView:
 
 @contextmanager
 def open_view(
-    world: MujocoWorld, ground: np.ndarray, size: tuple[int, int]
+    world: MujocoWorld,
+    ground: np.ndarray,
+    size: tuple[int, int],
+    *,
+    smooth: bool = True,
 ) -> Iterator[WorldView]:
     """Open a renderer for pictures up to `size`, its floor painted with `ground`.
 
@@ -174,12 +179,14 @@ def open_view(
         world: what to draw.
         ground: image of the floor as of `floor_frame`, north up.
         size: largest width and height of a picture [pixels].
+        smooth: smooth edges, which doubles the cost of drawing without a GPU.
 
     Raises:
         MachineError: if this machine has no OpenGL that draws offscreen.
     """
     with offscreen_context(*size):
         model = drawable_model(world, ground, size)
+        model.vis.quality.offsamples = _SMOOTH_SAMPLES if smooth else 0
         try:
             view = WorldView(world, model, size)
         except mujoco.FatalError as error:
@@ -213,7 +220,6 @@ def drawable_model(
     texture.data = ground.tobytes()
     quality = spec.visual.quality
     quality.numslices, quality.numstacks, quality.numquads = _SLICES, _STACKS, 1
-    quality.offsamples = _SAMPLES
-    quality.shadowsize = 2048
+    quality.shadowsize = _SHADOW_PIXELS
     spec.visual.global_.offwidth, spec.visual.global_.offheight = size
     return spec.compile()
