@@ -284,6 +284,29 @@ def test_a_series_can_be_switched_off_by_its_name(report: Tab) -> None:
     assert report.errors == []
 
 
+def test_a_comparison_draws_and_its_toggles_work(
+    tab: Tab, quickstart_run: Path, own_run: Path, tmp_path: Path
+) -> None:
+    from mrmg.results.compare import compare_runs
+    from mrmg.results.compare_page import write_comparison
+
+    twin = own_run.rename(tmp_path / "r1")  # a run called like a robot
+    comparison = compare_runs([quickstart_run, twin])
+    write_comparison(comparison, tmp_path / "compare.html")
+    tab.errors.clear()
+    tab.open(tmp_path / "compare.html", scheme="dark")
+    chart = "document.querySelector('#chart-used canvas').toDataURL()"
+    path = "getComputedStyle(document.querySelector('.map .path')).display"
+    before = tab.value(chart)
+    tab.click("[data-toggle-owner='run 0']")
+    tab.click("[data-toggle-owner='run 1']")
+    assert tab.value(chart) != before
+    assert tab.value(path) != "none"
+    tab.click("#scheme")
+    tab.point_at("#chart-goals .u-over", 0.9)
+    assert tab.errors == []
+
+
 def test_an_infeasible_mission_has_a_page_too(
     tab: Tab, walled_scene: Path, tmp_path: Path
 ) -> None:
