@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from mrmg import pipeline
 from mrmg.cli import main
 from mrmg.errors import ExitCode, RunFolderError, UsageError
+from mrmg.execution.log import ExecutionLog
 from mrmg.results.compare import Row, compare_runs
 from mrmg.results.compare_page import comparison_html
 
@@ -59,6 +61,25 @@ def test_courses_end_at_the_audit_s_figures(
         assert least == pytest.approx(
             100 * summary["energy"]["min_charge_fraction"], abs=0.1
         )
+
+
+def test_a_shorter_run_s_lines_end_with_it(quickstart_run: Path, own_run: Path) -> None:
+    log = ExecutionLog.load(own_run)
+    half = len(log.time_s) // 2
+    replace(
+        log,
+        time_s=log.time_s[:half],
+        clock_s=log.clock_s[:half],
+        state=log.state[:, :half],
+        reference=log.reference[:, :half],
+        work_J=log.work_J[:, : half - 1],
+    ).save(own_run)
+    data = data_of(comparison_html(compare_runs([quickstart_run, own_run])))
+    after = [time_s > log.time_s[half - 1] for time_s in data["time_s"]]
+    for item in data["charts"]:
+        long, short = (line["values"] for line in item["series"])
+        assert None not in long
+        assert [value is None for value in short] == after
 
 
 def test_runs_of_one_name_are_told_apart_by_their_folders(

@@ -116,6 +116,20 @@ def test_distances_agree_with_footprints_one_by_one(make_scene) -> None:
     )
 
 
+def test_of_several_robots_the_nearest_counts(make_scene) -> None:
+    places = {"r1": [5, 10, 0], "r2": [15, 10, 0], "r3": [35, 10, 0]}
+    scene = make_scene(
+        robots=[
+            {"id": name, "model": "car", "pose": pose} for name, pose in places.items()
+        ]
+    )
+    length_m = np.ptp(scene.robots[0].model.footprint_m[:, 0])
+    poses = [np.array([robot.pose]) for robot in scene.robots]
+    distance = series.robot_distance(scene.robots, poses)
+    wanted = np.array([[10.0], [10.0], [20.0]]) - length_m
+    assert distance == pytest.approx(wanted)
+
+
 def test_energy_by_terrain_adds_up_to_the_audit(case, make_log) -> None:
     scene, plan = case(
         terrain=[

@@ -10,6 +10,7 @@ import pytest
 
 from mrmg.results.audit import audit
 from mrmg.results.report_charts import chart_data, measured_curves
+from mrmg.results.report_map import mission_map
 
 
 @pytest.fixture
@@ -91,3 +92,33 @@ def test_a_plan_alone_has_charts_of_the_plan(mission) -> None:
     lines = chart(data, "charge-r1")["series"]
     assert [line["label"] for line in lines] == ["planned", "reserve"]
     assert [visit["target"] for visit in data["visits"]] == ["s", "g"]
+
+
+def test_robots_turn_clockwise_on_a_map_whose_y_points_down(
+    make_scene, make_plan, straight
+) -> None:
+    scene = make_scene(robots=[{"id": "r1", "model": "car", "pose": [5, 5, 0.5]}])
+    plan = make_plan(scene, {"r1": straight(4.0)}, {"r1": ()})
+    (robot,) = chart_data(scene, plan, None)["robots"]
+    assert robot["turn"][0] == pytest.approx(-np.degrees(0.5), abs=0.1)
+    assert f"rotate({-np.degrees(0.5):.2f})" in mission_map(scene, plan, None)
+
+
+def test_where_the_simulation_ended_early_its_lines_end(mission) -> None:
+    scene, plan, log = mission
+    half = len(log.time_s) // 2
+    cut = replace(
+        log,
+        completed=False,
+        time_s=log.time_s[:half],
+        clock_s=log.clock_s[:half],
+        state=log.state[:, :half],
+        reference=log.reference[:, :half],
+        work_J=log.work_J[:, : half - 1],
+    )
+    data = chart_data(scene, plan, cut)
+    planned, simulated, _ = chart(data, "charge-r1")["series"]
+    assert None not in planned["values"]
+    ended = [value is None for value in simulated["values"]]
+    after = [time_s > log.time_s[half - 1] for time_s in data["time_s"]]
+    assert ended == after

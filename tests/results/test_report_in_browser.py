@@ -240,6 +240,13 @@ def test_the_slider_moves_the_time(report: Tab) -> None:
     )
     assert report.value("document.querySelectorAll('.map .goal.done').length") == 4
     assert report.value("document.querySelector('.now').style.left") == "100%"
+    pose = report.value(
+        "(() => { const r = JSON.parse(document.querySelector('#data').textContent)"
+        ".robots[0]; return [r.x.at(-1), r.y.at(-1), r.turn.at(-1)]; })()"
+    )
+    body = "document.querySelector('.map .robot .body').getAttribute('transform')"
+    x, y, turn = pose
+    assert report.value(body) == f"translate({x:g} {y:g}) rotate({turn:g})"
 
 
 def test_play_runs_to_the_end_and_stops(report: Tab) -> None:
