@@ -1,4 +1,4 @@
-"""Random missions for the router, and independent answers to them."""
+"""Random missions for the router with independent answers; small planning problems."""
 
 from __future__ import annotations
 
@@ -6,12 +6,20 @@ import heapq
 import itertools
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 
+from mrmg import seeding
 from mrmg.planning._nrpa_kernels import RoutingArrays
+from mrmg.planning.motion_tree import Problem, state_problem
+from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.roadmap import build_roadmap
 from mrmg.planning.routing import routing_arrays
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.types import Scene
+from mrmg.world.world import World
 
 
 def random_mission(
@@ -162,3 +170,52 @@ def oracle() -> Callable[[RoutingArrays], float]:
 def insertions() -> Callable[..., Iterator[tuple[int, ...]]]:
     """Return the enumeration of all ways to put stations into a route."""
     return with_stations
+
+
+def yard_scene(**changes: Any) -> Scene:
+    """Return 30 x 20 m of plain ground with a goal in the east and a car in the west.
+
+    Args:
+        changes: entries of the scene file to replace.
+    """
+    document = {
+        "format": 1,
+        "name": "yard",
+        "bounds": [0, 0, 30, 20],
+        "goals": [{"id": "g", "circle": {"center": [26, 10], "radius": 1.5}}],
+        "battery": {"capacity_m": 200},
+        "robots": [{"id": "r1", "model": "car", "pose": [4, 10, 0]}],
+    }
+    return scene_from_document({**document, **changes}, source="yard")
+
+
+def state_scene(scene: Scene, seed: int = 0, **changes: Any) -> Problem:
+    """Return the planning problem of a scene, over a small roadmap.
+
+    Args:
+        scene: the scene.
+        seed: of the roadmap.
+        changes: parameters that differ from the default profile's.
+    """
+    params = PlannerParams(**{"samples": 400, **changes})
+    world = World.from_scene(scene)
+    roadmap = build_roadmap(
+        scene,
+        world,
+        samples=params.samples,
+        neighbours=params.neighbours,
+        rng=seeding.stream(seed, "roadmap"),
+    )
+    return state_problem(scene, world, roadmap, params)
+
+
+@pytest.fixture
+def yard() -> Callable[..., Scene]:
+    """Return the maker of small scenes."""
+    return yard_scene
+
+
+@pytest.fixture
+def state() -> Callable[..., Problem]:
+    """Return the maker of planning problems."""
+    return state_scene

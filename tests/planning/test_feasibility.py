@@ -1,0 +1,357 @@
+"""Proofs of infeasibility: closed-form cases, and never against what can be done."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable
+from math import hypot, pi, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+
+import mrmg
+from mrmg.planning.feasibility import proof_of_infeasibility, shortest_way_m
+from mrmg.scene.types import Scene
+from mrmg.shipped import scene_names
+
+SCENES = Path(__file__).parents[1] / "scenes"
+CAR_WIDTH_M = 1.1
+NOTHING = shapely.MultiPolygon()
+
+MakeScene = Callable[..., Scene]
+
+
+def circle(name: str, x: float, y: float, radius: float = 1.0) -> dict[str, Any]:
+    return {"id": name, "circle": {"center": [x, y], "radius": radius}}
+
+
+def car(name: str, x: float, y: float, yaw: float = 0.0, **more: Any) -> dict[str, Any]:
+    return {"id": name, "model": "car", "pose": [x, y, yaw], **more}
+
+
+def wall_with_gap(gap_m: float, **more: Any) -> list[dict[str, Any]]:
+    """Return a wall across the yard at x = 15 with a gap about y = 10."""
+    size = 0.5 * (20.0 - gap_m)
+    return [
+        {
+            "id": name,
+            "box": {"center": [15, y], "size": [0.4, size]},
+            "height": 1,
+            **more,
+        }
+        for name, y in (("south", 0.5 * size), ("north", 20.0 - 0.5 * size))
+    ]
+
+
+# --- goals cut off -----------------------------------------------------------------
+
+
+RING = {
+    "id": "ring",
+    "polygon": [[12, 5], [20, 5], [20, 15], [12, 15]],
+    "holes": [[[13, 6], [19, 6], [19, 14], [13, 14]]],
+    "height": 1,
+}
+
+
+def test_a_goal_inside_a_ring_is_unreachable_and_named(yard: MakeScene) -> None:
+    goals = [circle("free", 26, 10), circle("caged", 16, 10)]
+    proof = proof_of_infeasibility(yard(obstacles=[RING], goals=goals))
+    assert proof is not None
+    assert "caged" in proof
+    assert "unreachable" in proof
+
+
+def test_a_goal_that_reaches_out_of_its_ring_is_reachable(yard: MakeScene) -> None:
+    goals = [circle("wide", 16, 10, radius=5.5)]
+    assert proof_of_infeasibility(yard(obstacles=[RING], goals=goals)) is None
+
+
+def test_a_robot_inside_the_ring_can_serve_it(yard: MakeScene) -> None:
+    goals = [circle("caged", 16, 12), circle("free", 26, 10)]
+    robots = [car("in", 15, 8), car("out", 4, 10)]
+    assert (
+        proof_of_infeasibility(yard(obstacles=[RING], goals=goals, robots=robots))
+        is None
+    )
+
+
+@pytest.mark.parametrize("gap_m", [0.2, 0.8, 0.9 * CAR_WIDTH_M])
+def test_no_way_leads_through_a_gap_narrower_than_the_car(
+    yard: MakeScene, gap_m: float
+) -> None:
+    assert "unreachable" in (
+        proof_of_infeasibility(yard(obstacles=wall_with_gap(gap_m))) or ""
+    )
+
+
+@pytest.mark.parametrize("gap_m", [CAR_WIDTH_M, 1.02 * CAR_WIDTH_M, 2.0])
+def test_nothing_is_proven_of_a_gap_as_wide_as_the_car(
+    yard: MakeScene, gap_m: float
+) -> None:
+    assert proof_of_infeasibility(yard(obstacles=wall_with_gap(gap_m))) is None
+
+
+def test_a_wall_for_one_robot_leaves_the_goal_to_the_other(yard: MakeScene) -> None:
+    robots = [car("r1", 4, 6), car("r2", 4, 14)]
+    for blocks, provable in ((["r1"], False), (["r1", "r2"], True), (None, True)):
+        more = {} if blocks is None else {"blocks": blocks}
+        scene = yard(obstacles=wall_with_gap(0.2, **more), robots=robots)
+        assert (proof_of_infeasibility(scene) is not None) is provable
+
+
+def test_walls_may_add_up_only_for_the_robots_they_stop(yard: MakeScene) -> None:
+    """Each half of a wall stops another robot: both get past."""
+    halves = wall_with_gap(0.2)
+    halves[0]["blocks"], halves[1]["blocks"] = ["r1"], ["r2"]
+    robots = [car("r1", 4, 6), car("r2", 4, 14)]
+    assert proof_of_infeasibility(yard(obstacles=halves, robots=robots)) is None
+
+
+# --- goals out of energy's reach ----------------------------------------------------
+
+
+def long_scene(
+    yard: MakeScene, capacity_m: float, stations: list[dict[str, Any]], **more: Any
+) -> Scene:
+    """Return a straight lane: start at x = 4, goal's edge at x = 104."""
+    return yard(
+        bounds=[0, 0, 120, 20],
+        goals=[circle("far", 105, 10)],
+        stations=stations,
+        battery={"capacity_m": capacity_m, "reserve": 0.1},
+        **more,
+    )
+
+
+@pytest.mark.parametrize(
+    ("capacity_m", "stations", "start", "provable"),
+    [
+        # 100 m to go on 0.9 of the battery
+        (110.0, [], 1.0, True),
+        (112.0, [], 1.0, False),
+        (112.0, [], 0.95, True),
+        # a station of 49 m to go to and 49 m to go on from
+        (54.0, [circle("mid", 54, 10)], 1.0, True),
+        (55.0, [circle("mid", 54, 10)], 1.0, False),
+        # the second leg is too long; a second station helps
+        (52.0, [circle("early", 34, 10)], 1.0, True),
+        (52.0, [circle("early", 34, 10), circle("late", 70, 10)], 1.0, False),
+        # the station itself cannot be reached at first
+        (60.0, [circle("mid", 54, 10)], 0.5, True),
+    ],
+)
+def test_energy_decides_to_the_metre_on_a_straight_lane(
+    yard: MakeScene,
+    capacity_m: float,
+    stations: list[dict[str, Any]],
+    start: float,
+    provable: bool,
+) -> None:
+    robots = [car("r1", 4, 10, start_energy=start)]
+    scene = long_scene(yard, capacity_m, stations, robots=robots)
+    proof = proof_of_infeasibility(scene)
+    assert (proof is not None) is provable
+    if proof is not None:
+        assert "far" in proof
+
+
+def test_the_missing_energy_is_that_of_the_missing_way(yard: MakeScene) -> None:
+    scene = long_scene(yard, 100.0, [])
+    joules = scene.robots[0].model.energy_model.plain_ground_J_per_m()
+    proof = proof_of_infeasibility(scene)
+    assert proof is not None
+    assert f"at least {10.0 * joules:.0f} J" in proof
+
+
+def test_easy_ground_anywhere_weakens_the_bound(yard: MakeScene) -> None:
+    """Ground of multiplier 0.8 might lie on the way: 100 m may cost as little as 80."""
+    area = {
+        "id": "ice",
+        "box": {"center": [60, 2], "size": [4, 2]},
+        "multiplier": 0.8,
+    }
+    assert proof_of_infeasibility(long_scene(yard, 90.0, [], terrain=[area])) is None
+    assert proof_of_infeasibility(long_scene(yard, 88.0, [], terrain=[area]))
+    mud = {**area, "multiplier": 5.0}
+    assert proof_of_infeasibility(long_scene(yard, 112.0, [], terrain=[mud])) is None
+
+
+def test_one_robot_in_reach_is_enough(yard: MakeScene) -> None:
+    robots = [car("r1", 4, 6), car("r2", 80, 14)]
+    assert proof_of_infeasibility(long_scene(yard, 60.0, [], robots=robots)) is None
+    assert proof_of_infeasibility(long_scene(yard, 60.0, [], robots=robots[:1]))
+
+
+def test_a_detour_counts(yard: MakeScene) -> None:
+    """A wall up to y = 19.9 forces the way over its top (its corners at x 60)."""
+    wall = [{"id": "w", "box": {"center": [60, 9.5], "size": [2, 19]}, "height": 1}]
+    stretched = {"bounds": [0, 0, 120, 40], "obstacles": wall}
+    over = hypot(55, 9) + 2.0 + hypot(44, 9) - 1.0
+    for capacity_m, provable in (((over - 1) / 0.9, True), ((over + 1) / 0.9, False)):
+        scene = yard(
+            **stretched,
+            goals=[circle("far", 105, 10)],
+            battery={"capacity_m": capacity_m, "reserve": 0.1},
+        )
+        assert (proof_of_infeasibility(scene) is not None) is provable
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] if "scene6" in name else [])
+        for name in scene_names()
+    ],
+)
+def test_nothing_is_proven_of_shipped_scenes(name: str) -> None:
+    assert proof_of_infeasibility(mrmg.load_scene(name)) is None
+
+
+@pytest.mark.parametrize("path", sorted(SCENES.glob("*.yaml")), ids=lambda p: p.stem)
+def test_of_the_edge_scenes_two_are_proven_infeasible(path: Path) -> None:
+    proof = proof_of_infeasibility(mrmg.load_scene(path))
+    words = {"goal_enclosed": "unreachable", "goal_out_of_energy": "out of energy"}
+    if path.stem in words:
+        assert proof is not None
+        assert words[path.stem] in proof
+    else:
+        assert proof is None
+
+
+# --- shortest ways -----------------------------------------------------------------
+
+
+def test_with_nothing_in_the_way_it_is_the_distance() -> None:
+    a, b = shapely.Point(0, 0), shapely.Point(3, 4).buffer(1.0)
+    assert shortest_way_m(a, b, NOTHING) == pytest.approx(4.0, abs=0.01)
+    assert shortest_way_m(a, b, shapely.box(5, 5, 6, 6)) == a.distance(b)
+    assert shortest_way_m(b, b, NOTHING) == 0.0
+
+
+SQUARE = shapely.box(-1, -1, 1, 1)
+GAP = shapely.union_all([shapely.box(0, -50, 1, 9), shapely.box(0, 11, 1, 50)])
+TOUCHING = shapely.union_all([shapely.box(0, -3, 1, 0), shapely.box(0, 0, 1, 2)])
+DISC = shapely.Point(0, 0).buffer(1.0, quad_segs=64)
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "blocked", "exact_m"),
+    [
+        ((-2, 0.5), (0.5, 1.5), SQUARE, hypot(1, 0.5) + hypot(1.5, 0.5)),  # one corner
+        ((-3, 0), (3, 0), SQUARE, 2 * hypot(2, 1) + 2),  # two corners
+        ((-5, -1), (6, -1), GAP, 2 * hypot(5, 10) + 1),  # through the gap
+        ((-1, 0), (2, 0), TOUCHING, 2 * hypot(1, 2) + 1),  # not between the walls
+        ((-2, 0), (2, 0), DISC, 2 * sqrt(3) + pi / 3),  # two tangents and an arc
+    ],
+)
+def test_it_is_between_the_distance_and_the_true_way_round_obstacles(
+    start: tuple[float, float],
+    end: tuple[float, float],
+    blocked: shapely.Geometry,
+    exact_m: float,
+) -> None:
+    way = shortest_way_m(shapely.Point(start), shapely.Point(end), blocked)
+    straight = hypot(end[0] - start[0], end[1] - start[1])
+    assert straight - 1e-9 <= way <= exact_m + 1e-9
+
+
+def test_round_one_corner_it_is_exact() -> None:
+    way = shortest_way_m(shapely.Point(-2, 0.5), shapely.Point(0.5, 1.5), SQUARE)
+    assert way == pytest.approx(hypot(1, 0.5) + hypot(1.5, 0.5))
+
+
+def test_many_corners_fall_back_on_the_straight_distance() -> None:
+    rough = shapely.Point(0, 0).buffer(1.0, quad_segs=200)
+    assert shortest_way_m(shapely.Point(-2, 0), shapely.Point(2, 0), rough) == 4.0
+
+
+GRID_M = 0.25
+
+
+def grid_way_m(
+    start: tuple[float, float], end: tuple[float, float], blocked: shapely.Geometry
+) -> float:
+    """Return the shortest way on a fine grid with 16 directions of moves."""
+    n = int(20.0 / GRID_M) + 1
+    axis = np.arange(n) * GRID_M
+    x, y = np.meshgrid(axis, axis, indexing="ij")
+    free = ~shapely.intersects_xy(blocked, x, y)
+    steps = [
+        (i, j)
+        for i in range(-2, 3)
+        for j in range(-2, 3)
+        if np.gcd(i, j) == 1  # (0, 1), (1, 1), (1, 2) and so on
+    ]
+    able = {}
+    for i, j in steps:
+        lines = np.stack([x, y, x + i * GRID_M, y + j * GRID_M], axis=-1).reshape(
+            -1, 2, 2
+        )
+        able[i, j] = ~shapely.intersects(blocked, shapely.linestrings(lines)).reshape(
+            n, n
+        )
+    first = tuple(round(c / GRID_M) for c in start)
+    last = tuple(round(c / GRID_M) for c in end)
+    best = {first: 0.0}
+    heap = [(0.0, first)]
+    while heap:
+        far, here = heapq.heappop(heap)
+        if here == last:
+            return far
+        if far > best[here]:
+            continue
+        for i, j in steps:
+            to = here[0] + i, here[1] + j
+            if not (0 <= to[0] < n and 0 <= to[1] < n):
+                continue
+            if not able[i, j][here] or not free[to]:
+                continue
+            further = far + GRID_M * hypot(i, j)
+            if further < best.get(to, np.inf):
+                best[to] = further
+                heapq.heappush(heap, (further, to))
+    return np.inf
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_it_is_never_longer_than_a_way_on_a_fine_grid(
+    seed: int,
+) -> None:
+    rng = np.random.default_rng(seed)
+    shapes = []
+    for _ in range(7):
+        spread = rng.uniform(-3.5, 3.5, (6, 2))
+        shapes.append(shapely.MultiPoint(rng.uniform(4, 16, 2) + spread).convex_hull)
+    if seed % 2:
+        shapes.append(shapely.box(9.9, 2.0, 10.4, 20.0))
+    blocked = shapely.union_all(shapes)
+    shapely.prepare(blocked)
+    compared = 0
+    while compared < 4:
+        start, end = rng.integers(0, 81, (2, 2)) * GRID_M
+        ends = shapely.points([start, end])
+        if shapely.intersects(blocked, ends).any() or hypot(*(start - end)) < 8.0:
+            continue
+        on_grid = grid_way_m(tuple(start), tuple(end), blocked)
+        way = shortest_way_m(*ends, blocked)
+        assert way <= on_grid + 1e-9
+        assert way >= np.hypot(*(start - end)) - 1e-9
+        compared += 1
+
+
+def test_between_regions_it_is_no_longer_than_between_their_points() -> None:
+    rng = np.random.default_rng(4)
+    wall = shapely.box(9, 3, 11, 17)
+    for _ in range(40):
+        a = shapely.Point(rng.uniform((1, 1), (6, 19))).buffer(rng.uniform(0.5, 2.5))
+        b = shapely.Point(rng.uniform((14, 1), (19, 19))).buffer(rng.uniform(0.5, 2.5))
+        between = shortest_way_m(a, b, wall)
+        for _ in range(5):
+            p, q = (
+                shapely.get_point(s.exterior, int(rng.integers(0, 60))) for s in (a, b)
+            )
+            assert between <= shortest_way_m(p, q, wall) + 1e-9
