@@ -1,0 +1,232 @@
+"""A proven lower bound of a fleet's energy, and exact tours of small missions.
+
+Whoever solves a mission visits the goals and recharges at stations in some order. The
+energy of that is at least the rolling resistance on the shortest ways (`geodesic`), as
+a robot that starts and ends at rest gets no inertia for nothing, and turning, idling
+and other robots only cost more. The least over all orders is the bound.
+
+Charges are taken at the middle of each planning step. In a step in which the robot
+turns round, the way back is not charged; that is worth less than 0.01 mm.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mrmg.planning import _bound_kernels
+from mrmg.planning._nrpa_kernels import RoutingArrays
+from mrmg.planning.geodesic import Ground, least_ways_m
+from mrmg.planning.routing import Routing, routing_arrays
+from mrmg.scene.types import Robot, Scene
+
+MOST_GOALS = 14
+"""Goals up to which tours are exact."""
+
+MOST_LABELS = 3_000_000
+"""Labels per robot up to which tours are exact."""
+
+CELLS = 60_000
+"""Cells of the grid on which ways are bounded."""
+
+SPANNING_ROUNDS = 400
+"""Changes of the prices in the bound of missions with more goals."""
+
+ROUNDING_SHARE = 1e-9
+"""What rounding may add to a bound; taken off."""
+
+
+def exact_routing(problem: RoutingArrays) -> Routing | None:
+    """Return the cheapest tours there are, stations in any number and order.
+
+    Label setting over (goals visited, place) per robot, where a label is (cost, energy
+    left) and one that costs no less and leaves no more energy is dropped; then the best
+    division of the goals among the robots. Costs need not be a metric.
+
+    Returns:
+        The tours, with infinite cost if there are none; None if the mission is too
+        large: more than MOST_GOALS open goals or MOST_LABELS labels.
+    """
+    goal_list = np.flatnonzero(problem.open_goal)
+    if len(goal_list) > MOST_GOALS:
+        return None
+    fleet = np.full(1 << len(goal_list), np.inf)
+    fleet[0] = 0.0
+    ways, shares = [], []
+    for r in range(len(problem.energy)):
+        way = _RobotWays(problem, r, goal_list)
+        if not way.complete:
+            return None
+        fleet, share = _bound_kernels.join_robot(fleet, way.cost)
+        ways.append(way)
+        shares.append(share)
+    mask = len(fleet) - 1
+    if not np.isfinite(fleet[mask]):
+        return Routing(tuple(() for _ in ways), math.inf)
+    tours: list[tuple[int, ...]] = []
+    for way, share in zip(reversed(ways), reversed(shares), strict=True):
+        tours.append(way.tour(int(share[mask])))
+        mask ^= int(share[mask])
+    return Routing(tuple(reversed(tours)), float(fleet[-1]))
+
+
+class _RobotWays:
+    """The undominated ways of one robot to visit each subset of the goals."""
+
+    def __init__(self, problem: RoutingArrays, r: int, goal_list: np.ndarray) -> None:
+        self.goal_list = goal_list
+        self.goals = problem.goals
+        self.hop, self.next_station = _station_closure(problem, r)
+        self.label, self.parent, self.start_of, station, self.came = (
+            _bound_kernels.subset_labels(problem, r, self.hop, goal_list, MOST_LABELS)
+        )
+        self.cost, self.last = _bound_kernels.cheapest_labels(
+            self.label, self.start_of, len(goal_list)
+        )
+        self.complete = int(self.start_of[-1]) == len(self.label)
+
+    def tour(self, mask: int) -> tuple[int, ...]:
+        """Return the cheapest tour through a subset of the goals."""
+        backwards: list[int] = []
+        label = int(self.last[mask]) if mask else -1
+        while label >= 0:
+            state = int(np.searchsorted(self.start_of, label, side="right")) - 1
+            goal = state % len(self.goal_list)
+            before = state // len(self.goal_list) ^ (1 << goal)
+            backwards.append(int(self.goal_list[goal]))
+            label = int(self.parent[label])
+            if label <= -2:
+                station = -2 - label
+                label, first = (int(i) for i in self.came[before, station])
+                chain = [first]
+                while chain[-1] != station:
+                    chain.append(int(self.next_station[chain[-1], station]))
+                backwards += [self.goals + s for s in reversed(chain)]
+        return tuple(reversed(backwards))
+
+
+def _station_closure(problem: RoutingArrays, r: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return (least cost, next station) from station to station over any others."""
+    goals = problem.goals
+    hop = problem.cost[r, goals:-1, goals:].copy()
+    hop[hop > problem.capacity[r] - problem.reserve[r]] = np.inf
+    np.fill_diagonal(hop, 0.0)
+    follower = np.tile(np.arange(len(hop)), (len(hop), 1))
+    for k in range(len(hop)):
+        over = hop[:, k : k + 1] + hop[k : k + 1]
+        shorter = over < hop
+        hop = np.where(shorter, over, hop)
+        follower = np.where(shorter, follower[:, k : k + 1], follower)
+    return np.ascontiguousarray(hop), follower
+
+
+def lower_bound_J(scene: Scene, *, step_s: float = 0.1, cells: int = CELLS) -> float:
+    """Return an energy [J] that no plan of a mission undercuts.
+
+    Args:
+        scene: the mission.
+        step_s: time step of the plans.
+        cells: cells of the grid on which ways are bounded; more bring the bound nearer
+            to the truth.
+
+    Returns:
+        The bound, at least 0; inf if the mission is proven to have no solution.
+    """
+    if not scene.goals:
+        return 0.0
+    problem = relaxed_problem(scene, step_s=step_s, cells=cells)
+    routing = exact_routing(problem)
+    bound = relaxed_routing_J(problem) if routing is None else routing.cost_J
+    return bound * (1.0 - ROUNDING_SHARE)
+
+
+def relaxed_problem(
+    scene: Scene, *, step_s: float = 0.1, cells: int = CELLS
+) -> RoutingArrays:
+    """Return the routing problem in which every leg costs at most what it must.
+
+    Between recharges a robot may bring kinetic energy along, which is added to its
+    capacity.
+    """
+    x_min, y_min, x_max, y_max = scene.bounds
+    cell_m = math.sqrt((x_max - x_min) * (y_max - y_min) / cells)
+    regions = [target.region for target in scene.targets()]
+    starts = np.array([robot.pose[:2] for robot in scene.robots])
+    keys = [_travel_key(scene, robot) for robot in scene.robots]
+    ways = {}
+    for key, robot in zip(keys, scene.robots, strict=True):
+        if key not in ways:
+            step_m = _top_speed_m_s(robot) * step_s
+            ground = Ground.of(scene, robot, cell_m=cell_m, step_m=step_m)
+            ways[key] = least_ways_m(ground, regions, starts)
+    batteries = [robot.battery for robot in scene.robots]
+    capacity_J = [
+        robot.battery.capacity_J + _most_kinetic_J(robot) for robot in scene.robots
+    ]
+    return routing_arrays(
+        goals=len(scene.goals),
+        distance=np.stack([ways[key][0] for key in keys]),
+        start_distance=np.stack([ways[key][1][r] for r, key in enumerate(keys)]),
+        plain=np.array(
+            [r.model.energy_model.plain_ground_J_per_m() for r in scene.robots]
+        ),
+        energy=np.array([battery.start_J for battery in batteries]),
+        capacity=np.array(capacity_J),
+        reserve=np.array([battery.reserve_J - 1e-3 for battery in batteries]),
+    )
+
+
+def _travel_key(scene: Scene, robot: Robot) -> tuple[object, ...]:
+    """Return what the ways of a robot depend on."""
+    obstacles = tuple(o.id for o in scene.obstacles if o.stops(robot.id))
+    return obstacles, robot.model.inscribed_radius_m, _top_speed_m_s(robot)
+
+
+def _top_speed_m_s(robot: Robot) -> float:
+    return max(robot.model.limits.v_max_m_s, -robot.model.limits.v_min_m_s)
+
+
+def _most_kinetic_J(robot: Robot) -> float:
+    """Return the battery energy that stands behind a robot's top speed."""
+    kinetic_J = 0.5 * robot.model.effective_mass_kg * _top_speed_m_s(robot) ** 2
+    return kinetic_J / robot.model.drive_efficiency
+
+
+def relaxed_routing_J(problem: RoutingArrays) -> float:
+    """Return a lower bound of the cost of all tours of a mission of any size.
+
+    Robots are exchangeable but for their starts, and batteries only limit single legs;
+    the bound is that of spanning trees with prices (`_bound_kernels.spanning_bound`).
+    """
+    goal_list = np.flatnonzero(problem.open_goal)
+    if not len(goal_list):
+        return 0.0
+    between, start = [], []
+    for r in range(len(problem.energy)):
+        hop, _ = _station_closure(problem, r)
+        cost = problem.cost[r]
+        usable = problem.capacity[r] - problem.reserve[r]
+        first = problem.energy[r] - problem.reserve[r]
+        here = cost[-1].copy()
+        here[here > first] = np.inf
+        legs = cost[:-1].copy()
+        legs[legs > usable] = np.inf
+        goals = problem.goals
+        way, own = legs[:goals, :goals], here[:goals]
+        if len(hop):
+            to_goal = _over(hop, legs[goals:, :goals])
+            way = np.minimum(way, _over(legs[:goals, goals:], to_goal))
+            own = np.minimum(own, _over(here[None, goals:], to_goal)[0])
+        between.append(way[np.ix_(goal_list, goal_list)])
+        start.append(own[goal_list])
+    cheapest = np.min(between, axis=0)
+    symmetric = np.ascontiguousarray(np.minimum(cheapest, cheapest.T))
+    return float(
+        _bound_kernels.spanning_bound(symmetric, np.array(start), SPANNING_ROUNDS)
+    )
+
+
+def _over(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the least sums of legs over the places between, (A, S) + (S, B)."""
+    return np.asarray((first[:, :, None] + second[None]).min(axis=1))
