@@ -1,0 +1,207 @@
+"""The planner's answers: statuses, reproducibility, budgets and statistics."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from math import pi
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import mrmg
+from mrmg.errors import SceneError
+from mrmg.mission import PlanResult, PlanStatus
+from mrmg.planning import PlannerParams, plan_mission, profile_params
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.types import Scene
+
+SCENES = Path(__file__).parents[1] / "scenes"
+
+MakeScene = Callable[..., Scene]
+
+
+def edge_scene(name: str) -> Scene:
+    return mrmg.load_scene(SCENES / f"{name}.yaml")
+
+
+def digest(result: PlanResult) -> str:
+    assert result.plan is not None, result.reason
+    return result.plan.digest
+
+
+# --- reproducibility ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["two_swap", "station_needed", "obstacle_with_hole"])
+def test_a_plan_is_a_function_of_scene_and_seed(name: str) -> None:
+    scene = edge_scene(name)
+    digests = [digest(plan_mission(scene, seed=seed)) for seed in (0, 1, 0)]
+    assert digests[0] == digests[2]
+    assert digests[0] != digests[1]
+
+
+def test_other_parameters_give_a_plan_of_another_fingerprint() -> None:
+    scene = edge_scene("one_goal")
+    first = plan_mission(scene, seed=0)
+    other = plan_mission(scene, seed=0, params=PlannerParams(samples=900))
+    assert first.plan is not None and other.plan is not None
+    assert first.plan.parameters_digest != other.plan.parameters_digest
+
+
+# --- limits ------------------------------------------------------------------------
+
+
+def test_a_budget_is_spent_on_better_plans_and_kept() -> None:
+    """The first call compiles what the second one is timed with."""
+    scene = edge_scene("two_swap")
+    free = plan_mission(scene, seed=0)
+    began = time.perf_counter()
+    result = plan_mission(scene, seed=0, params=PlannerParams(budget_s=1.5))
+    assert time.perf_counter() - began >= 1.5
+    assert result.status is PlanStatus.SOLVED
+    assert result.plan is not None and free.plan is not None
+    spent = result.statistics["time_s"]
+    assert 0.0 < spent["first_solution"] <= spent["total"] >= 1.5
+    if result.statistics["expansions"] > free.statistics["expansions"]:
+        assert result.plan.cost_J <= free.plan.cost_J
+
+
+@pytest.mark.parametrize("name", ["two_swap", "station_needed"])
+def test_without_time_it_is_out_of_budget_and_says_so(name: str) -> None:
+    result = plan_mission(edge_scene(name), params=PlannerParams(budget_s=1e-6))
+    assert result.status is PlanStatus.TIMEOUT
+    assert result.plan is None
+    assert result.reason
+
+
+def test_a_proof_is_given_even_without_time() -> None:
+    scene = edge_scene("goal_enclosed")
+    result = plan_mission(scene, params=PlannerParams(budget_s=1e-6))
+    assert result.status is PlanStatus.INFEASIBLE
+    assert "g1" in result.reason
+
+
+def test_trees_too_small_end_without_a_plan() -> None:
+    params = PlannerParams(max_vertices=4, trees=3)
+    result = plan_mission(edge_scene("one_goal"), params=params)
+    assert result.status is PlanStatus.TIMEOUT
+    assert "no motion tree" in result.reason
+    assert result.statistics["vertices"] == 3 * 4
+
+
+def test_a_fleet_of_none_is_a_fault_of_the_scene(yard: MakeScene) -> None:
+    with pytest.raises(SceneError, match="robots"):
+        plan_mission(yard(robots=[]))
+
+
+# --- what it reports ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["two_swap", "no_goals", "goal_out_of_energy"])
+def test_statistics_have_all_counts_and_times(name: str) -> None:
+    statistics = plan_mission(edge_scene(name)).statistics
+    assert {"vertices", "groups", "router_calls", "expansions"} <= set(statistics)
+    assert set(statistics["time_s"]) == {"init", "routing", "first_solution", "total"}
+    assert all(value >= 0.0 for value in statistics["time_s"].values())
+    assert max(statistics["time_s"].values()) == statistics["time_s"]["total"]
+    if name == "two_swap":
+        assert statistics["vertices"] >= statistics["groups"] > 0
+        assert statistics["expansions"] >= statistics["vertices"] - 4
+        assert statistics["router_calls"] >= 4
+
+
+def test_progress_grows_from_the_roadmap_to_the_end() -> None:
+    told: list[float] = []
+    scene = edge_scene("two_swap")
+    plan_mission(scene, on_progress=lambda fraction, text: told.append(fraction))
+    assert len(told) >= 3
+    assert told == sorted(told)
+    assert told[0] == pytest.approx(0.1)
+    assert told[-1] == pytest.approx(1.0)
+
+
+def test_more_improvements_never_give_a_dearer_plan() -> None:
+    scene = edge_scene("obstacle_with_hole")
+    costs = []
+    for improvements in (0, 1, 4):
+        params = PlannerParams(improvements=improvements)
+        plan = plan_mission(scene, seed=2, params=params).plan
+        assert plan is not None
+        costs.append(plan.cost_J)
+    assert costs == sorted(costs, reverse=True)
+
+
+@pytest.mark.parametrize("name", ["one_goal", "two_swap"])
+def test_the_papers_profile_solves_small_missions(name: str) -> None:
+    scene = edge_scene(name)
+    result = plan_mission(scene, seed=0, params=profile_params("paper"))
+    assert result.status is PlanStatus.SOLVED, result.reason
+    assert result.plan is not None
+    assert result.plan.profile == "paper"
+    assert mrmg.verify(scene, result.plan).violations == ()
+
+
+def test_the_papers_profile_is_reproducible() -> None:
+    scene = edge_scene("one_goal")
+    params = profile_params("paper")
+    results = [plan_mission(scene, seed=5, params=params) for _ in range(2)]
+    assert digest(results[0]) == digest(results[1])
+
+
+# --- symmetry ----------------------------------------------------------------------
+
+
+def turned(document: Any, shift: tuple[float, float]) -> Any:
+    """Return a scene file's content turned by 90 degrees to the left and moved."""
+
+    def point(p: list[float]) -> list[float]:
+        return [shift[0] - p[1], shift[1] + p[0]]
+
+    def shape(entry: dict[str, Any]) -> dict[str, Any]:
+        new = dict(entry)
+        if entry.get("polygon"):
+            new["polygon"] = [point(p) for p in entry["polygon"]]
+        if entry.get("holes"):
+            new["holes"] = [[point(p) for p in ring] for ring in entry["holes"]]
+        for kind in ("box", "circle"):
+            if entry.get(kind):
+                new[kind] = {**entry[kind], "center": point(entry[kind]["center"])}
+        if entry.get("box"):
+            new["box"]["yaw"] = new["box"].get("yaw", 0.0) + 0.5 * pi
+        return new
+
+    x_min, y_min, x_max, y_max = document["bounds"]
+    low, high = point([x_min, y_max]), point([x_max, y_min])
+    lists = ("obstacles", "terrain", "goals", "stations")
+    robots = [
+        {**robot, "pose": [*point(robot["pose"][:2]), robot["pose"][2] + 0.5 * pi]}
+        for robot in document["robots"]
+    ]
+    return {
+        **document,
+        "bounds": [*low, *high],
+        "robots": robots,
+        **{key: [shape(entry) for entry in document.get(key) or []] for key in lists},
+    }
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["two_swap", "station_needed", "obstacle_with_hole", "overlapping_terrain"],
+)
+def test_turning_and_moving_the_world_changes_little(name: str) -> None:
+    """Over four seeds: as solvable, and as dear within a few percent."""
+    scene = edge_scene(name)
+    document = turned(scene.document, (-137.5, 61.25))
+    moved = scene_from_document(document, source=name)
+    cheapest = []
+    for one in (scene, moved):
+        plans = [plan_mission(one, seed=seed).plan for seed in range(4)]
+        assert None not in plans
+        cheapest.append(min(plan.cost_J for plan in plans if plan is not None))
+        for plan in plans:
+            assert plan is not None
+            assert mrmg.verify(one, plan).violations == ()
+    assert cheapest[1] == pytest.approx(cheapest[0], rel=0.1)
