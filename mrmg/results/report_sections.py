@@ -219,7 +219,20 @@ def planner(record: RunRecord) -> str:
         [html.text(name), html.text(value)]
         for name, value in _flat(record.planning["statistics"])
     ]
-    return html.table(["Statistic", "Value"], rows)
+    return html.table(["Statistic", "Value"], rows) + _improvements(
+        record.planning["statistics"]
+    )
+
+
+def _improvements(statistics: Mapping[str, Any]) -> str:
+    """Return the plans found over time, each cheaper than the one before."""
+    rows = [
+        [f"{found['time_s']:.2f} s", kJ(found["cost_J"])]
+        for found in statistics.get("improvements", [])
+    ]
+    if not rows:
+        return ""
+    return "<h3>Cost over time</h3>" + html.table(["After", "Cost of the plan"], rows)
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, str]]:
