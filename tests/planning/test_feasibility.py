@@ -111,6 +111,12 @@ def test_walls_may_add_up_only_for_the_robots_they_stop(yard: MakeScene) -> None
     assert proof_of_infeasibility(yard(obstacles=halves, robots=robots)) is None
 
 
+def test_a_goal_only_the_rear_axle_can_enter_is_reachable(yard: MakeScene) -> None:
+    """Backed up to the wall, the axle is nearer to it than any disc's centre."""
+    goals = [circle("rear", 0.35, 10, radius=0.1)]
+    assert proof_of_infeasibility(yard(goals=goals)) is None
+
+
 # --- goals out of energy's reach ----------------------------------------------------
 
 
