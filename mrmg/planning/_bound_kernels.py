@@ -1,8 +1,8 @@
 """Compiled parts of the lower bound: certified distance fields and exact tours.
 
-A field u over the nodes of a grid is certified if, bilinear between the nodes, it is
-nowhere steeper than the ground is dear: then u(b) - u(a) is at most the cost of any way
-from a to b through free cells, however u was found.
+A field u over a grid is certified if it is nowhere steeper than the ground is dear:
+then u(b) - u(a) is at most the cost of any way from a to b through free cells, however
+u was found. Between the nodes of the grid fields are bilinear.
 """
 
 from __future__ import annotations
@@ -19,38 +19,49 @@ UNREACHED = 1e18
 
 
 @kernel
-def certified_field(price, cell, seed, rounds, tolerance):
-    """Return a certified field that is nearly the cost from a source, (Y + 1, X + 1).
+def certified_field(price, cell, seed, rounds, band):
+    """Return a field that is nearly the cost from a source, and what certifies it.
 
     Solves the eikonal equation, lowers the price where the solution is too steep for
-    the given price, and starts again. A cell whose price is lowered by sqrt(2) cannot
-    be too steep, as no edge is steeper than the price of either cell beside it. What
-    steepness is left after the last round is divided out.
+    the given price, and starts again, as fronts that spread are too steep behind. What
+    steepness is left, mostly where fronts meet, is divided out level by level: f(u) is
+    certified if f grows no faster than 1 / (largest excess among cells on a level).
 
     Args:
         price: cost per metre of each cell, inf where blocked, shape (Y, X).
         cell: side of a cell [m].
         seed: values near the source, UNREACHED elsewhere, shape (Y + 1, X + 1).
-        rounds: solutions at most.
-        tolerance: steepness beyond the price, as a share, that ends the rounds.
+        rounds: solutions.
+        band: width of a level.
+
+    Returns:
+        (u, level, certified): the field, shape (Y + 1, X + 1), and f at rising levels;
+        it is linear between them.
     """
     lowered = price.copy()
-    field = seed.copy()
-    for _ in range(rounds):
+    field = _solve_eikonal(lowered, cell, seed)
+    for _ in range(rounds - 1):
+        _lower_where_steep(field, price, cell, lowered)
         field = _solve_eikonal(lowered, cell, seed)
-        if _lower_where_steep(field, price, cell, lowered) <= 1.0 + tolerance:
-            break
-    worst = 1.0
+    low, high = field.min(), field.min()
+    for value in field.ravel():
+        if value < UNREACHED:
+            high = max(high, value)
+    excess = np.ones(int((high - low) / band) + 2)
     for row in range(price.shape[0]):
         for column in range(price.shape[1]):
-            if price[row, column] < np.inf:
-                slope = steepness(field, cell, row, column)
-                worst = max(worst, slope / price[row, column])
-    for row in range(field.shape[0]):
-        for column in range(field.shape[1]):
-            if field[row, column] < UNREACHED:
-                field[row, column] /= worst
-    return field
+            if price[row, column] == np.inf or field[row, column] >= UNREACHED:
+                continue
+            ratio = steepness(field, cell, row, column) / price[row, column]
+            corners = field[row : row + 2, column : column + 2]
+            first = int((corners.min() - low) / band)
+            last = int((corners.max() - low) / band)
+            for k in range(first, last + 1):
+                excess[k] = max(excess[k], ratio)
+    level = low + band * np.arange(len(excess) + 1)
+    certified = np.zeros(len(level))
+    certified[1:] = np.cumsum(band / excess)
+    return field, level, certified
 
 
 @kernel
@@ -69,18 +80,15 @@ def steepness(field, cell, row, column):
 
 @kernel
 def _lower_where_steep(field, price, cell, lowered):
-    """Lower the working price of too steep cells; return the worst ratio."""
-    worst = 1.0
+    """Lower the working price of too steep cells, by sqrt(2) at most."""
     for row in range(price.shape[0]):
         for column in range(price.shape[1]):
             if price[row, column] == np.inf:
                 continue
             ratio = steepness(field, cell, row, column) / price[row, column]
             if ratio > 1.0:
-                worst = max(worst, ratio)
                 floor = price[row, column] / sqrt(2.0)
                 lowered[row, column] = max(floor, lowered[row, column] / ratio)
-    return worst
 
 
 @kernel

@@ -23,8 +23,8 @@ from mrmg.scene.types import Region, Robot, Scene
 ROUNDS = 4
 """Solutions of the eikonal equation at most per field."""
 
-TOLERANCE = 0.003
-"""Steepness that is divided out of a field rather than repaired."""
+BAND_SHARE = 0.25
+"""Width of the levels of a field, as a share of a cell."""
 
 CLEARANCE_TOLERANCE_M = 0.02
 """How much nearer to an obstacle than its disc allows a robot is taken to come."""
@@ -34,6 +34,27 @@ SPACING_M = 0.04
 
 SEED_SHARE = 0.95
 """Steepness of a field next to its source, as a share of the price there."""
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A certified field f(u).
+
+    Attributes:
+        values: u at the nodes, flat.
+        level: levels of u, rising.
+        certified: f there.
+    """
+
+    values: np.ndarray
+    level: np.ndarray
+    certified: np.ndarray
+
+    def at(self, nodes: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Return f(u) where u has the given nodes and weights, shape (n, 4) -> (n,)."""
+        raw = (self.values[nodes] * weights).sum(axis=1)
+        certified = np.interp(raw, self.level, self.certified)
+        return np.where(raw < 0.5 * UNREACHED, certified, UNREACHED)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,8 +135,8 @@ class Ground:
         )
         return nodes, weights, self.price[row, column] * reach_m
 
-    def field_from(self, region: Region) -> np.ndarray:
-        """Return a certified field that grows away from a region, flat."""
+    def field_from(self, region: Region) -> Field:
+        """Return a certified field that grows away from a region."""
         rows, columns = self.price.shape
         y, x = np.mgrid[0 : rows + 1, 0 : columns + 1] * self.cell_m
         points = np.stack([x + self.x_min, y + self.y_min], axis=-1).reshape(-1, 2)
@@ -126,10 +147,10 @@ class Ground:
         prices = self.price[touching & np.isfinite(self.price)]
         share = SEED_SHARE * prices.min() if prices.size else 1.0
         seed = np.where(near, share * np.maximum(away, -band), UNREACHED)
-        field = _bound_kernels.certified_field(
-            self.price, self.cell_m, seed, ROUNDS, TOLERANCE
+        values, level, certified = _bound_kernels.certified_field(
+            self.price, self.cell_m, seed, ROUNDS, BAND_SHARE * self.cell_m
         )
-        return np.asarray(field).reshape(-1)
+        return Field(values.reshape(-1), level, certified)
 
 
 def _least_multiplier(scene: Scene, boxes: np.ndarray, reach_m: float) -> np.ndarray:
@@ -199,12 +220,12 @@ def least_ways_m(
     return way, start_way
 
 
-def _extreme(field: np.ndarray, look: tuple[np.ndarray, ...], of: Any) -> float:
+def _extreme(field: Field, look: tuple[np.ndarray, ...], of: Any) -> float:
     """Return a bound of the least or greatest value of a field over a border."""
     nodes, weights, slack = look
     if not len(nodes):  # no free point: nothing gets there
         return UNREACHED if of is np.min else 0.0
-    value = (field[nodes] * weights).sum(axis=1)
+    value = field.at(nodes, weights)
     if of is np.max:
         value = value[value < 0.5 * UNREACHED] + slack[value < 0.5 * UNREACHED]
         return float(value.max(initial=-UNREACHED)) if len(value) else 0.0
