@@ -324,8 +324,8 @@ def grow(mission, start, energy, random, tree, tours, counts):
 
 
 @kernel
-def stop_all(fleet, state, dt, control):
-    """Brake all robots to rest from a vertex; return the number of steps it takes.
+def stop_all(fleet, state, dt):
+    """Return the controls that brake all robots to rest from a vertex, shape (n, R, 2).
 
     The commitments of the vertex are what is carried out, so this is always safe.
     """
@@ -335,9 +335,10 @@ def stop_all(fleet, state, dt, control):
     for r in range(robots):
         write_braking(fleet, r, state[r], dt, commitment, 0)
         longest = max(longest, commitment.length[r, 0] - 1)
+    control = np.zeros((longest, robots, 2))
     for k in range(longest):
         for r in range(robots):
             i = min(k, commitment.length[r, 0] - 1)
             u1, u2 = braking_control(fleet, r, commitment.state[r, 0, i], dt)
             control[k, r, 0], control[k, r, 1] = u1, u2
-    return longest
+    return control

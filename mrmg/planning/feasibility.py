@@ -9,16 +9,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import networkx as nx
 import numpy as np
 import shapely
 from shapely.geometry import Point, Polygon, box
 
 from mrmg.scene.types import Region, Robot, Scene
-
-MOST_CORNERS = 400
-"""Corners up to which shortest ways round obstacles are computed; beyond, as the crow
-flies."""
 
 
 def proof_of_infeasibility(scene: Scene) -> str | None:
@@ -91,7 +86,7 @@ class _Reach:
 
     def is_connected(self, region: Region) -> bool:
         """Tell whether the robot may get into a region as far as obstacles go."""
-        near = region.shape.buffer(self.offset_m + 0.05)
+        near = _whole(region).buffer(self.offset_m + 0.05)
         return bool(self.free.intersects(near))
 
     def missing_energy_J(self, region: Region) -> float:
@@ -124,43 +119,27 @@ class _Reach:
         """Return a lower bound of the energy from a place to a region."""
         cheapest = min([1.0, *(area.multiplier for area in self.scene.terrain)])
         joules = cheapest * self.robot.model.energy_model.plain_ground_J_per_m()
-        shape = place if isinstance(place, Point) else place.shape
-        return joules * shortest_way_m(shape, region.shape, self.blocked)
+        start = place if isinstance(place, Point) else _whole(place)
+        return joules * shortest_way_m(start, _whole(region), self.blocked)
 
 
 def shortest_way_m(
     start: shapely.Geometry, end: shapely.Geometry, blocked: shapely.Geometry
 ) -> float:
-    """Return the length of the shortest way between two convex sets round obstacles.
+    """Return a lower bound of the shortest way between two convex sets [m].
 
-    A visibility graph over the obstacles' corners; where there are more than
-    MOST_CORNERS, the straight distance, which is never longer.
+    Where an obstacle is in the way of the straight line, the way goes by one of the
+    obstacles' corners at least.
     """
     straight = float(start.distance(end))
     line = shapely.shortest_line(start, end)
-    corners = np.unique(shapely.get_coordinates(blocked), axis=0)
-    inside = shapely.buffer(blocked, -1e-6)
-    if not line.intersects(inside) or len(corners) > MOST_CORNERS:
+    if not line.intersects(shapely.buffer(blocked, -1e-6)):
         return straight
-    shapely.prepare(inside)
-    points = shapely.points(corners)
-    i, j = np.triu_indices(len(corners), 1)
-    segments = shapely.linestrings(np.stack([corners[i], corners[j]], axis=1))
-    seen = ~shapely.intersects(inside, segments)
-    graph = nx.Graph()
-    graph.add_weighted_edges_from(
-        zip(
-            i[seen].tolist(),
-            j[seen].tolist(),
-            shapely.length(segments[seen]).tolist(),
-            strict=True,
-        )
-    )
-    # Distances to the convex sets without asking for sight keep the bound a bound.
-    for name, shape in (("start", start), ("end", end)):
-        away = shapely.distance(points, shape)
-        graph.add_weighted_edges_from(
-            (name, k, float(d)) for k, d in enumerate(away.tolist())
-        )
-    way = nx.dijkstra_path_length(graph, "start", "end")
-    return max(straight, float(way))
+    corners = shapely.points(shapely.get_coordinates(blocked))
+    by_corner = shapely.distance(corners, start) + shapely.distance(corners, end)
+    return max(straight, float(by_corner.min()))
+
+
+def _whole(region: Region) -> shapely.Geometry:
+    """Return a polygon that holds the region; circles are drawn from within."""
+    return region.shape.buffer(0.002 * region.radius_m)

@@ -222,12 +222,12 @@ def _controls(
 
     A mission that is over before it begins still has one step, of standing.
     """
-    stop = np.zeros((200, len(problem.start), 2))
-    n = _tree_kernels.stop_all(
-        problem.mission.fleet, tree.state[branch[-1]], params.dt_s, stop
+    stop = _tree_kernels.stop_all(
+        problem.mission.fleet, tree.state[branch[-1]], params.dt_s
     )
     pieces = [tree.control[v, : tree.steps[v]] for v in branch[1:]]
-    return np.concatenate([*pieces, stop[: max(n, 1)]])
+    control = np.concatenate([*pieces, stop])
+    return control if len(control) else np.zeros((1, len(problem.start), 2))
 
 
 def _replay(

@@ -166,6 +166,8 @@ def _why_not(problem: Problem, statistics: Statistics) -> str:
             f"the roadmap found no way to {', '.join(unjoined)}, and no proof that "
             "there is none"
         )
+    if "routing" not in statistics.time_s:
+        return "the time limit was over before the first tours were drawn"
     if not statistics.counts:
         return "the router found no tours that keep every battery above its reserve"
     return "no motion tree reached all goals within its size and the time limit"

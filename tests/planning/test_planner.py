@@ -205,3 +205,10 @@ def test_turning_and_moving_the_world_changes_little(name: str) -> None:
             assert plan is not None
             assert mrmg.verify(one, plan).violations == ()
     assert cheapest[1] == pytest.approx(cheapest[0], rel=0.1)
+
+
+def test_very_short_steps_leave_room_for_long_braking() -> None:
+    params = PlannerParams(dt_s=0.005, steps=200, max_vertices=300, improvements=0)
+    result = plan_mission(mrmg.load_scene(SCENES / "one_goal.yaml"), params=params)
+    assert result.plan is not None
+    assert mrmg.verify(mrmg.load_scene(SCENES / "one_goal.yaml"), result.plan).ok
