@@ -29,6 +29,9 @@ BAND_SHARE = 0.25
 CLEARANCE_TOLERANCE_M = 0.02
 """How much nearer to an obstacle than its disc allows a robot is taken to come."""
 
+ROUND_MARGIN = 1.02
+"""Factor on radii of terrain's surroundings, whose arcs are drawn by chords."""
+
 SPACING_M = 0.04
 """Distance of the points that stand for a region's border."""
 
@@ -94,7 +97,7 @@ class Ground:
         y = np.arange(y_min, y_max, cell_m)
         low_x, low_y = np.meshgrid(x, y)
         boxes = shapely.box(low_x, low_y, low_x + cell_m, low_y + cell_m)
-        price = _least_multiplier(scene, boxes, 0.5 * step_m + 1e-6)
+        price = _least_multiplier(scene, boxes, ROUND_MARGIN * 0.5 * step_m)
         price[_covered(blocked, boxes)] = np.inf
         return Ground(float(x_min), float(y_min), cell_m, price, blocked)
 
