@@ -21,6 +21,7 @@ from typing import Any
 
 import mrmg
 from mrmg.planning import plan_mission, profile_params
+from mrmg.planning.bound import lower_bound_J
 
 TABLE = ("scene1", "scene2", "scene3", "scene4", "scene5", "scene6")
 
@@ -49,6 +50,7 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument("--profile", default="default", choices=("default", "paper"))
     parser.add_argument("--budget", type=float, help="seconds of planning")
     parser.add_argument("--execute", action="store_true", help="drive in MuJoCo too")
+    parser.add_argument("--bound", action="store_true", help="compare with a bound")
     parser.add_argument("--output", type=Path, help="JSONL file, one line a mission")
     options = parser.parse_args()
     first, _, last = options.seeds.partition("-")
@@ -83,6 +85,7 @@ def missions(source: str, options: argparse.Namespace) -> Iterator[dict[str, Any
     scene = mrmg.load_scene(source)
     params = profile_params(options.profile, budget_s=options.budget)
     plan_mission(scene, seed=options.seeds.start, params=params)
+    bound_J = lower_bound_J(scene, step_s=params.dt_s) if options.bound else None
     for seed in options.seeds:
         began = time.perf_counter()
         result = plan_mission(scene, seed=seed, params=params)
@@ -106,6 +109,8 @@ def missions(source: str, options: argparse.Namespace) -> Iterator[dict[str, Any
                 "violations": len(verdict.violations),
                 "ok": verdict.ok,
             }
+            if bound_J is not None:
+                row |= {"bound_J": bound_J, "cost_to_bound": row["cost_J"] / bound_J}
             if options.execute:
                 row |= driven(scene, result.plan, verdict.ok)
         if not row["ok"]:
@@ -136,8 +141,9 @@ DRIVEN = ("rms_m worst", "max_m worst", "metered% worst", "measured% worst", "x 
 
 def header(options: argparse.Namespace) -> str:
     """Return the table's head."""
-    names = ("scene", "ok", *COLUMNS, *(DRIVEN if options.execute else ()))
-    return " | ".join(names)
+    driven_names = DRIVEN if options.execute else ()
+    bound_names = ("cost/bound median",) if options.bound else ()
+    return " | ".join(("scene", "ok", *COLUMNS, *bound_names, *driven_names))
 
 
 def table_row(
@@ -154,6 +160,8 @@ def table_row(
             f"{statistics.median(row['plan_s'] for row in solved):.3f}",
             f"{statistics.median(row['cost_m'] for row in solved):.1f}",
         ]
+    if solved and options.bound:
+        cells.append(f"{statistics.median(row['cost_to_bound'] for row in solved):.3f}")
     if solved and options.execute:
         cells += [
             f"{max(row['tracking_rms_m'] for row in solved):.4f}",
