@@ -196,6 +196,14 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     )
     draw.set_defaults(command=scene_commands.draw)
 
+    roadmap = acts.add_parser("roadmap", help="write the roadmap as GraphML")
+    roadmap.add_argument("scene", metavar="SCENE")
+    roadmap.add_argument("--seed", type=_seed, default=0, metavar="N", help="default 0")
+    roadmap.add_argument(
+        "-o", "--out", type=Path, metavar="OUT.graphml", help="default NAME.graphml"
+    )
+    roadmap.set_defaults(command=scene_commands.roadmap)
+
     imported = acts.add_parser("import", help="read a polygon or triangle map")
     imported.add_argument("map", type=Path, metavar="MAP")
     imported.add_argument(
@@ -218,7 +226,9 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
             metavar="N",
             help=f"default {count}",
         )
-    populate.add_argument("--seed", type=_seed, default=0, metavar="N")
+    populate.add_argument(
+        "--seed", type=_seed, default=3, metavar="N", help="default 3"
+    )
     _add_scene_out(populate)
     populate.set_defaults(command=scene_commands.populate)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mrmg import storage
-from mrmg.errors import ExitCode
+from mrmg.errors import ExitCode, UsageError
 
 
 def check(options: argparse.Namespace) -> int:
@@ -33,6 +33,38 @@ def draw(options: argparse.Namespace) -> int:
     picture = options.out or Path(f"{scene.name}.png")
     draw_scene(scene, picture)
     print(picture)
+    return ExitCode.OK
+
+
+def roadmap(options: argparse.Namespace) -> int:
+    """Write a scene's roadmap as GraphML, for analysis with other tools."""
+    import networkx as nx
+
+    from mrmg import seeding
+    from mrmg.planning import PlannerParams
+    from mrmg.planning.roadmap import build_roadmap
+    from mrmg.scene.loading import load_scene
+    from mrmg.world.world import World
+
+    scene = load_scene(options.scene)
+    if not scene.robots:
+        raise UsageError(f"{scene.name} has no robots, whose width decides the roadmap")
+    params = PlannerParams()
+    graph = build_roadmap(
+        scene,
+        World.from_scene(scene),
+        samples=params.samples,
+        neighbours=params.neighbours,
+        rng=seeding.stream(options.seed, "roadmap", 0),
+    ).graph()
+    out = options.out or Path(f"{scene.name}.graphml")
+    with storage.atomic_path(out) as temporary:
+        nx.write_graphml(graph, temporary)
+    parts = nx.number_connected_components(graph)
+    print(
+        f"{out}: {graph.number_of_nodes()} vertices, {graph.number_of_edges()} edges, "
+        f"{parts} connected parts"
+    )
     return ExitCode.OK
 
 

@@ -50,21 +50,26 @@ class Roadmap:
             shape (F, T, T).
         start_distance: from each robot's start to each target, shape (R, T).
         edges: (first, second) vertex and weighted length of each class's edges.
+        targets: ids of the targets, which are the first vertices.
     """
 
     arrays: RoadmapArrays
     distance: np.ndarray
     start_distance: np.ndarray
     edges: tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...]
+    targets: tuple[str, ...]
 
     def graph(self, travel_class: int = 0) -> nx.Graph:
         """Return one class's roadmap as a networkx graph for analysis and export.
 
-        Nodes have `pos` [m]; edges have `weight`, metres of plain ground.
+        Nodes have `x_m` and `y_m`, and targets a `target`; edges have `weight`, metres
+        of plain ground.
         """
         graph = nx.Graph()
         for i, (x, y) in enumerate(self.arrays.vertex):
-            graph.add_node(i, pos=(float(x), float(y)))
+            graph.add_node(i, x_m=float(x), y_m=float(y))
+        for i, name in enumerate(self.targets):
+            graph.nodes[i]["target"] = name
         first, second, weight = self.edges[travel_class]
         graph.add_weighted_edges_from(
             zip(first.tolist(), second.tolist(), weight.tolist(), strict=True)
@@ -116,6 +121,7 @@ def build_roadmap(
             [fields[c][:, v] for c, v in zip(class_of_robot, starts, strict=True)]
         ),
         edges=tuple(edges),
+        targets=tuple(target.id for target in scene.targets()),
     )
 
 

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+from math import hypot
 from pathlib import Path
 
+import networkx as nx
 import pytest
 
 from mrmg.cli import main
@@ -81,3 +83,15 @@ def test_a_map_that_is_none_is_told(
     told = capsys.readouterr()
     assert "letter.txt" in told.err
     assert told.out == ""
+
+
+def test_the_roadmap_is_a_graph_other_tools_read(tmp_path: Path) -> None:
+    scene = load_scene("quickstart")
+    out = tmp_path / "roadmap.graphml"
+    assert main(["scene", "roadmap", "quickstart", "-o", str(out)]) == ExitCode.OK
+    graph = nx.read_graphml(out)
+    found = {data["target"] for _, data in graph.nodes(data=True) if "target" in data}
+    assert found == {target.id for target in scene.targets()}
+    for one, other, weight in graph.edges(data="weight"):
+        a, b = graph.nodes[one], graph.nodes[other]
+        assert weight >= 0.999 * hypot(a["x_m"] - b["x_m"], a["y_m"] - b["y_m"])
