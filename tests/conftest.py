@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import signal
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,16 @@ battery: {capacity_m: 100}
 robots:
   - {id: r1, model: car, pose: [5, 10, 0]}
 """
+
+
+def pytest_configure() -> None:
+    """Let commands under test be stopped by Ctrl-C.
+
+    A shell that starts the tests in the background has them ignore it, and what they
+    start would inherit that.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

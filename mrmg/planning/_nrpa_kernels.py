@@ -103,6 +103,25 @@ def move_bias(problem, scale, r, place, t, energy):
 
 
 @kernel
+def move_weights(problem, policy, scale, place, energy, moves, weight):
+    """Write the moves' unnormalised probabilities into `weight`; return their sum."""
+    targets = problem.cost.shape[2]
+    top = -np.inf
+    for i in range(len(moves)):
+        r = moves[i] // targets
+        t = moves[i] % targets
+        weight[i] = policy[r, place[r], t] + move_bias(
+            problem, scale, r, place[r], t, energy[r]
+        )
+        top = max(top, weight[i])
+    mass = 0.0
+    for i in range(len(moves)):
+        weight[i] = exp(weight[i] - top)
+        mass += weight[i]
+    return mass
+
+
+@kernel
 def playout(problem, policy, scale, random, sequence):
     """Draw a sequence of moves from the policy; return (cost, length)."""
     robots, places, targets = problem.cost.shape
@@ -121,18 +140,7 @@ def playout(problem, policy, scale, random, sequence):
         n = legal_moves(problem, place, energy, unvisited, left, refuelled, moves)
         if n == 0:
             break
-        top = -np.inf
-        for i in range(n):
-            r = moves[i] // targets
-            t = moves[i] % targets
-            weight[i] = policy[r, place[r], t] + move_bias(
-                problem, scale, r, place[r], t, energy[r]
-            )
-            top = max(top, weight[i])
-        mass = 0.0
-        for i in range(n):
-            weight[i] = exp(weight[i] - top)
-            mass += weight[i]
+        mass = move_weights(problem, policy, scale, place, energy, moves[:n], weight)
         draw = random_unit(random) * mass
         chosen = 0
         while chosen < n - 1 and draw >= weight[chosen]:
@@ -164,18 +172,7 @@ def adapt(problem, policy, scale, alpha, sequence, length):
         left += unvisited[g]
     for k in range(length):
         n = legal_moves(problem, place, energy, unvisited, left, refuelled, moves)
-        top = -np.inf
-        for i in range(n):
-            r = moves[i] // targets
-            t = moves[i] % targets
-            weight[i] = before[r, place[r], t] + move_bias(
-                problem, scale, r, place[r], t, energy[r]
-            )
-            top = max(top, weight[i])
-        mass = 0.0
-        for i in range(n):
-            weight[i] = exp(weight[i] - top)
-            mass += weight[i]
+        mass = move_weights(problem, before, scale, place, energy, moves[:n], weight)
         for i in range(n):
             r = moves[i] // targets
             policy[r, place[r], moves[i] % targets] -= alpha * weight[i] / mass
