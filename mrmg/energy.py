@@ -107,7 +107,11 @@ def battery_power(v, a, tan_steer, k, c):  # type: ignore[no-untyped-def]
         c: `EnergyModel.coefficients()`.
     """
     way = abs(v)
-    mechanical = c[0] * k * way + c[1] * abs(tan_steer) * way + c[2] * a * v
+    mechanical = (
+        c[ROLLING_N] * k * way
+        + c[TURNING_N] * abs(tan_steer) * way
+        + c[EFFECTIVE_MASS_KG] * a * v
+    )
     if mechanical > 0.0:
-        return mechanical / c[3] + c[5]
-    return mechanical * c[4] + c[5]
+        return mechanical / c[DRIVE_EFF] + c[IDLE_W]
+    return mechanical * c[REGEN_EFF] + c[IDLE_W]

@@ -64,12 +64,6 @@ class RunFolderError(FileError):
     """A run folder lacks or contradicts what a step needs."""
 
 
-class InfeasibleError(MrmgError):
-    """The mission has no solution, and the message names the proof."""
-
-    exit_code = ExitCode.INFEASIBLE
-
-
 class MachineError(MrmgError):
     """Something the command needs is missing on this machine; names the cure."""
 

@@ -240,10 +240,6 @@ def _legend(
     return handles + scene_drawing.map_legend(scene)
 
 
-def _line(width: float, alpha: float, label: str) -> Line2D:
-    return Line2D([], [], color=style.MUTED, linewidth=width, alpha=alpha, label=label)
-
-
 def _ring(label: str, text: str = "o") -> Line2D:
     return Line2D(
         [],

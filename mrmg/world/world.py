@@ -11,7 +11,6 @@ from shapely.geometry import Polygon
 from mrmg.scene.types import Scene
 from mrmg.world import _raster_kernels
 from mrmg.world._kernels import FreeSpace, TerrainGrid
-from mrmg.world.terrain import multiplier_at
 
 CELL_M = 0.25
 """Side of a cell of the distance field and of the terrain grid."""
@@ -155,6 +154,3 @@ def _terrain_grid(scene: Scene) -> TerrainGrid:
         )
         multiplier[inside] = area.multiplier
     return TerrainGrid(float(x_min), float(y_min), CELL_M, multiplier)
-
-
-__all__ = ["BUCKET_M", "CELL_M", "World", "free_space", "multiplier_at"]
