@@ -41,10 +41,7 @@ class DriveControl:
         """Control the robots of `scene`, all at rest."""
         self._params = params or DriveParams()
         models = [robot.model for robot in scene.robots]
-        energy = [model.energy_model for model in models]
-        self._rolling_N = np.array([item.rolling_force_N for item in energy])
-        self._turning_N = np.array([item.turning_force_N for item in energy])
-        self._mass_kg = np.array([item.effective_mass_kg for item in energy])
+        self._mass_kg = np.array([model.effective_mass_kg for model in models])
         self._grip_N = np.array(
             [
                 # Half the weight: the driven axle carries at least that.
@@ -53,11 +50,6 @@ class DriveControl:
             ]
         )
         self._integral_m_s2 = np.zeros(len(models))
-
-    def resistance_N(self, multiplier: np.ndarray, steer: np.ndarray) -> np.ndarray:
-        """Return the force the ground takes, by the energy model's law, shape (R,)."""
-        turning = self._turning_N * np.abs(np.tan(steer))
-        return np.asarray(self._rolling_N * multiplier + turning)
 
     def force_N(
         self,
@@ -73,7 +65,7 @@ class DriveControl:
             speed_m_s: speed of the axle now.
             wanted_m_s: speed asked for now.
             next_m_s: speed asked for at the end of the period.
-            resistance_N: force the ground takes.
+            resistance_N: force the ground is believed to take.
             period_s: how long the force will be held.
         """
         params = self._params

@@ -16,6 +16,7 @@ from mrmg.execution.controller import Controller, controller_maker
 from mrmg.execution.drive import DriveControl
 from mrmg.execution.fleet import Fleet
 from mrmg.execution.fleet_clock import FleetClock
+from mrmg.execution.ground import believed_resistance, true_resistance
 from mrmg.execution.log import ExecutionLog
 from mrmg.execution.recording import Recording, held_force_work_J
 from mrmg.execution.reference import FleetReference
@@ -113,6 +114,8 @@ class _Run:
         self._clock = FleetClock()
         self._set_points = SetPoints(world.scene, self._reference, controllers)
         self._drive = DriveControl(world.scene)
+        self._believed = believed_resistance(world.scene)
+        self._true = true_resistance(world)
         self._contacts = ContactWatch(world)
         self._recording = Recording()
         self._call_s: list[float] = []
@@ -125,12 +128,16 @@ class _Run:
         """Advance the simulation by one control period."""
         self._command()
         now, following = self._set_points.now, self._set_points.following
-        resistance = self._resistance_N(following[:, 1])
+        ground = self._ground(following[:, 1])
         speed, rolled = self._fleet.axle_speed_m_s(), self._fleet.rolled_m()
         force = self._drive.force_N(
-            speed, now[:, 0], following[:, 0], resistance, self._period_s
+            speed,
+            now[:, 0],
+            following[:, 0],
+            self._believed.force_N(*ground),
+            self._period_s,
         )
-        self._fleet.set_resistance(resistance)
+        self._fleet.set_resistance(self._true.force_N(*ground))
         self._fleet.drive(force, now[:, 1], following[:, 1], STEPS_PER_TICK)
         self._clock.advance(self._period_s)
         self.ticks += 1
@@ -191,7 +198,7 @@ class _Run:
     def _settle(self) -> None:
         """Let the tyres take the weight, then start the time."""
         still = np.zeros(len(self._world.scene.robots))
-        self._fleet.set_resistance(self._drive.resistance_N(still + 1.0, still))
+        self._fleet.set_resistance(self._true.force_N(still + 1.0, still))
         self._fleet.drive(still, still, still, _SETTLING_STEPS)
         self.data.time = 0.0
 
@@ -211,15 +218,15 @@ class _Run:
             self._fleet.axle_speed_m_s(), clock.time_s, clock.rate, self._period_s
         )
 
-    def _resistance_N(self, steer: np.ndarray) -> np.ndarray:
-        """Return the ground's force on each robot in the middle of the coming tick."""
+    def _ground(self, steer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return terrain and steering in the middle of the coming tick, each (R,)."""
         _, _, heading, speed, steer_now = self._state.T
         way = 0.5 * self._period_s * speed
         middle = self._state[:, :2] + np.stack(
             [way * np.cos(heading), way * np.sin(heading)], axis=1
         )
         multiplier = multiplier_at(self._world.scene, middle)
-        return self._drive.resistance_N(multiplier, 0.5 * (steer_now + steer))
+        return multiplier, 0.5 * (steer_now + steer)
 
     def _observe(self) -> None:
         self._state = self._fleet.state()

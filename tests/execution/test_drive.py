@@ -24,15 +24,6 @@ def force(scene: Scene, speed: float, now: float, following: float, ground: floa
     return control.force_N(*values, TICK_S)[0]
 
 
-def test_resistance_is_the_energy_models(scene: Scene) -> None:
-    """Force times way is the model's power of rolling and turning, battery to wheel."""
-    model = scene.robots[0].model.energy_model
-    multiplier, steer = np.array([3.0]), np.array([-0.4])
-    resistance = DriveControl(scene).resistance_N(multiplier, steer)
-    parts = model.power_parts(np.ones(1), np.zeros(1), np.tan(steer), multiplier)
-    np.testing.assert_allclose(resistance / model.drive_efficiency, parts.sum())
-
-
 @pytest.mark.parametrize("direction", [1.0, -1.0])
 def test_on_its_ramp_only_the_physics_is_fed_forward(
     scene: Scene, direction: float

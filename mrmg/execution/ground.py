@@ -1,0 +1,83 @@
+"""What the ground takes from the robots: as it is, and as their models think it is.
+
+The MJCF of a robot states what its tyres lose, as the numerics `rolling_coefficient`
+and `turning_coefficient`: that is the truth of the simulation. The coefficients of the
+same names in `robot.yaml` are what planner and drive control believe; calibration makes
+both meet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from mrmg.energy import GRAVITY_M_S2
+from mrmg.errors import Fault, FileError
+from mrmg.execution.world_model import MujocoWorld
+from mrmg.scene.types import Robot, Scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GroundResistance:
+    """The force the ground takes from each robot of a fleet.
+
+    Attributes:
+        rolling_N: on plain ground, straight on, shape (R,).
+        turning_N: more of it per |tan psi|, shape (R,).
+    """
+
+    rolling_N: np.ndarray
+    turning_N: np.ndarray
+
+    def force_N(self, multiplier: np.ndarray, steer: np.ndarray) -> np.ndarray:
+        """Return the force by the energy model's law, shape (R,).
+
+        Args:
+            multiplier: terrain under each robot, shape (R,).
+            steer: psi [rad], shape (R,).
+        """
+        turning = self.turning_N * np.abs(np.tan(steer))
+        return np.asarray(self.rolling_N * multiplier + turning)
+
+
+def believed_resistance(scene: Scene) -> GroundResistance:
+    """Return the resistance by the energy models of the robots."""
+    energy = [robot.model.energy_model for robot in scene.robots]
+    return GroundResistance(
+        rolling_N=np.array([model.rolling_force_N for model in energy]),
+        turning_N=np.array([model.turning_force_N for model in energy]),
+    )
+
+
+def true_resistance(world: MujocoWorld) -> GroundResistance:
+    """Return the resistance by the MJCF of the robots.
+
+    Raises:
+        FileError: if an MJCF does not state a coefficient.
+    """
+    robots = world.scene.robots
+    weight_N = world.model.body_subtreemass[world.chassis] * GRAVITY_M_S2
+    coefficients = np.array(
+        [
+            [
+                _numeric(world.model, robot, f"{kind}_coefficient")
+                for kind in ("rolling", "turning")
+            ]
+            for robot in robots
+        ]
+    )
+    rolling_N, turning_N = coefficients.T * weight_N
+    return GroundResistance(rolling_N=rolling_N, turning_N=turning_N)
+
+
+def _numeric(model: mujoco.MjModel, robot: Robot, name: str) -> float:
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, f"{robot.id}/{name}")
+    if index < 0:
+        message = (
+            f'states no {name}; add <custom><numeric name="{name}" data="..."/>'
+            "</custom>: the force over the weight that the simulated tyres lose"
+        )
+        raise FileError(str(robot.model.mjcf), [Fault("custom", message)])
+    return float(model.numeric_data[model.numeric_adr[index]])

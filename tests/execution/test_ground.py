@@ -1,0 +1,72 @@
+"""What the simulated ground takes is the MJCF's affair; robot.yaml holds a belief."""
+
+from __future__ import annotations
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mrmg.errors import FileError
+from mrmg.execution.ground import believed_resistance, true_resistance
+from mrmg.execution.simulation import simulate
+from mrmg.execution.world_model import build_world
+from mrmg.scene.types import Scene
+
+
+@pytest.fixture(scope="module")
+def scene(driving: SimpleNamespace) -> Scene:
+    return driving.open_ground([(0.0, 0.0, 0.0), (0.0, 5.0, 0.0)])
+
+
+def believing(scene: Scene, **values: float) -> Scene:
+    """The scene with other coefficients in the robots' energy models."""
+    robots = tuple(
+        replace(robot, model=replace(robot.model, **values)) for robot in scene.robots
+    )
+    return replace(scene, robots=robots)
+
+
+def test_resistance_is_the_energy_models_power_over_the_speed(scene: Scene) -> None:
+    model = scene.robots[0].model.energy_model
+    multiplier, steer = np.array([3.0, 1.0]), np.array([-0.4, 0.2])
+    force = believed_resistance(scene).force_N(multiplier, steer)
+    parts = model.power_parts(np.ones(2), np.zeros(2), np.tan(steer), multiplier)
+    np.testing.assert_allclose(force / model.drive_efficiency, parts.sum(axis=1))
+
+
+def test_what_is_believed_of_the_shipped_car_is_true(scene: Scene) -> None:
+    believed, true = believed_resistance(scene), true_resistance(build_world(scene))
+    np.testing.assert_allclose(believed.rolling_N, true.rolling_N, rtol=1e-12)
+    np.testing.assert_allclose(believed.turning_N, true.turning_N, rtol=1e-12)
+
+
+def test_a_wrong_belief_does_not_change_what_driving_takes(
+    driving: SimpleNamespace, scene: Scene
+) -> None:
+    """A robot thought to roll twice as easily does the same work on the same way."""
+    work_J = []
+    for coefficient in (0.06, 0.03):
+        held = believing(scene, rolling_coefficient=coefficient)
+        controls = [driving.straight(8.0, 1.0), np.zeros((80, 2))]
+        log = simulate(held, driving.plan_of(held, controls))
+        work_J.append(log.work_J[0].sum())
+    assert work_J[1] == pytest.approx(work_J[0], rel=0.01)
+    assert work_J[0] == pytest.approx(0.06 * 180 * 9.81 * 7.0, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["rolling_coefficient", "turning_coefficient"])
+def test_an_mjcf_that_does_not_state_its_losses_is_refused(
+    scene: Scene, tmp_path: Path, name: str
+) -> None:
+    model = scene.robots[0].model
+    mjcf = tmp_path / "car.xml"
+    shutil.copy(model.mjcf, mjcf)
+    mjcf.write_text(
+        mjcf.read_text().replace(f'numeric name="{name}"', 'numeric name="x"')
+    )
+    with pytest.raises(FileError, match=f"{mjcf}.*\n.*states no {name}; add"):
+        true_resistance(build_world(believing(scene, mjcf=mjcf)))
