@@ -11,6 +11,7 @@ import numpy as np
 
 from mrmg import storage
 from mrmg.errors import Fault, RunFolderError
+from mrmg.execution.supervision import Event
 
 LOG_FORMAT = 1
 
@@ -55,6 +56,7 @@ class ExecutionLog:
             shape (R, n - 1, 2).
         qpos: MuJoCo's positions, shape (n, nq); what a video is drawn from.
         contacts: every contact other than wheel and floor.
+        events: what a supervisor saw and did, in order of time.
         timing: wall-clock figures: wall_s, realtime_factor, controller_ms
             {median, p99}. Kept apart: all else is equal between equal runs.
     """
@@ -78,6 +80,7 @@ class ExecutionLog:
     qpos: np.ndarray
     contacts: tuple[Contact, ...]
     timing: Mapping[str, Any]
+    events: tuple[Event, ...] = ()
 
     def save(self, folder: Path) -> None:
         """Write `log.npz`, `timing.json`, then `log.json`, whose presence says done."""
@@ -86,7 +89,7 @@ class ExecutionLog:
         header = {
             field.name: getattr(self, field.name)
             for field in fields(self)
-            if field.name not in {*self._arrays(), "contacts", "timing"}
+            if field.name not in {*self._arrays(), "contacts", "events", "timing"}
         }
         header["robots"] = list(self.robots)
         header["versions"] = dict(self.versions)
@@ -94,6 +97,7 @@ class ExecutionLog:
             {name: getattr(contact, name) for name in Contact.__slots__}
             for contact in self.contacts
         ]
+        header["events"] = [event.to_json() for event in self.events]
         storage.write_json(folder / "log.json", {"format": LOG_FORMAT, **header})
 
     def _arrays(self) -> dict[str, np.ndarray]:
@@ -117,6 +121,7 @@ class ExecutionLog:
                 raise ValueError(f"this version reads format {LOG_FORMAT} only")
             header["robots"] = tuple(header["robots"])
             header["contacts"] = tuple(Contact(**row) for row in header["contacts"])
+            header["events"] = tuple(Event(**row) for row in header.get("events", ()))
             arrays: dict[str, Any] = storage.read_arrays(folder / "log.npz")
             timing = storage.read_json(folder / "timing.json")
             return ExecutionLog(**header, **arrays, timing=timing)

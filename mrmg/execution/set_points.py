@@ -45,6 +45,10 @@ class SetPoints:
         self.now = self._planned.copy()
         self.following = self._planned.copy()
 
+    def follow(self, reference: FleetReference) -> None:
+        """Go on by another plan, from the present set-points."""
+        self._reference = reference
+
     def correct(self, state: np.ndarray, clock_s: float, rate: float) -> int:
         """Let the controllers look ahead from the true states, shape (R, 5).
 

@@ -21,6 +21,7 @@ from mrmg.execution.log import ExecutionLog
 from mrmg.execution.recording import Recording, held_force_work_J
 from mrmg.execution.reference import FleetReference
 from mrmg.execution.set_points import SetPoints
+from mrmg.execution.supervision import Event, Observation, Orders, Supervisor
 from mrmg.execution.world_model import MujocoWorld, build_world
 from mrmg.mission import Plan
 from mrmg.scene.types import Scene
@@ -56,6 +57,7 @@ def simulate(
     plan: Plan,
     *,
     controller: str = "mpc",
+    supervisor: Supervisor | None = None,
     on_progress: Progress | None = None,
 ) -> ExecutionLog:
     """Drive `plan` in the MuJoCo world of `scene` until the fleet is at rest.
@@ -68,6 +70,8 @@ def simulate(
         scene: the scene the plan was made for.
         plan: what to drive.
         controller: name of the tracking controller.
+        supervisor: watches every tick and may give the fleet another plan; the log is
+            then of the plan in force at the end, which begins with those before.
         on_progress: called with the fraction done and a text.
 
     Raises:
@@ -84,9 +88,14 @@ def simulate(
     with _no_warning_file():
         while not run.ended():
             run.tick()
+            if supervisor is not None:
+                orders = supervisor.watch(run.observation())
+                if orders is not None:
+                    run.obey(orders)
             if on_progress is not None and run.ticks % _PROGRESS_TICKS == 0:
                 on_progress(run.fraction(), f"driven {run.data.time:.0f} s")
-    return run.log(controller, time.perf_counter() - started)
+    events = () if supervisor is None else supervisor.events
+    return run.log(controller, events, time.perf_counter() - started)
 
 
 @contextmanager
@@ -118,6 +127,7 @@ class _Run:
         self._true = true_resistance(world)
         self._contacts = ContactWatch(world)
         self._recording = Recording()
+        self._work_J = np.zeros((len(world.scene.robots), 2))
         self._call_s: list[float] = []
         self._got_on_s, self._finished_s = 0.0, np.inf
         self._fleet = Fleet(world, self.data)
@@ -148,6 +158,7 @@ class _Run:
             self._world.model.opt.timestep,
         )
         self._recording.add(force_N=force, work_J=work)
+        self._work_J = work
         self._contacts.look(self.data)
         self._observe()
 
@@ -155,12 +166,35 @@ class _Run:
         """Tell whether the fleet is at rest after its plan, or is past helping."""
         return self._completed() or self._hopeless()
 
+    def observation(self) -> Observation:
+        """Return what a supervisor sees."""
+        return Observation(
+            time_s=float(self.data.time),
+            clock_s=self._clock.time_s,
+            rate=self._clock.rate,
+            state=self._state,
+            planned=self._planned,
+            work_J=self._work_J,
+            ended=self._completed(),
+        )
+
+    def obey(self, orders: Orders) -> None:
+        """Go on by another plan."""
+        self._plan = orders.plan
+        self._reference = FleetReference(self._world.scene, orders.plan)
+        self._set_points.follow(self._reference)
+        self._clock.time_s = orders.clock_s
+        self._got_on_s, self._finished_s = float(self.data.time), np.inf
+        self._planned = self._reference.at(np.array([orders.clock_s]))[0]
+
     def fraction(self) -> float:
         """Return the share of the plan's time that is done."""
         duration_s = max(self._reference.duration_s, self._period_s)
         return float(min(self._clock.time_s / duration_s, 1.0))
 
-    def log(self, controller: str, wall_s: float) -> ExecutionLog:
+    def log(
+        self, controller: str, events: tuple[Event, ...], wall_s: float
+    ) -> ExecutionLog:
         """Return everything recorded."""
         scene, recording = self._world.scene, self._recording
         robots = len(scene.robots)
@@ -185,6 +219,7 @@ class _Run:
             work_J=recording.by_robot("work_J", robots),
             qpos=recording.in_time("qpos"),
             contacts=tuple(self._contacts.contacts),
+            events=events,
             timing={
                 "wall_s": wall_s,
                 "realtime_factor": self.data.time / wall_s,
