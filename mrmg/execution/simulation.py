@@ -170,7 +170,7 @@ class _Run:
         """Return what a supervisor sees."""
         return Observation(
             time_s=float(self.data.time),
-            clock_s=self._clock.time_s,
+            clock_s=self._clock_s(),
             rate=self._clock.rate,
             state=self._state,
             planned=self._planned,
@@ -273,12 +273,15 @@ class _Run:
             self._got_on_s = self.data.time
         self._recording.add(
             time_s=self.data.time,
-            clock_s=min(self._clock.time_s, self._reference.duration_s),
+            clock_s=self._clock_s(),
             state=self._state,
             reference=self._planned,
             command=self._set_points.following,
             qpos=self.data.qpos,
         )
+
+    def _clock_s(self) -> float:
+        return min(self._clock.time_s, self._reference.duration_s)
 
     def _completed(self) -> bool:
         rested_s = self.data.time - self._finished_s

@@ -1,4 +1,4 @@
-"""A supervisor sees every tick, and its orders are driven on from where the fleet is."""
+"""A supervisor sees every tick; its orders are driven on from where the fleet is."""
 
 from __future__ import annotations
 
