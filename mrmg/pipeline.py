@@ -12,7 +12,14 @@ from mrmg.results.gl_backend import choose_backend
 from mrmg.run_folder import RunFolder, Step
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
-from mrmg.steps import DEFAULT_VIDEO, Run, RunArguments, StepProgress, VideoArguments
+from mrmg.steps import (
+    DEFAULT_VIDEO,
+    OnImprovement,
+    Run,
+    RunArguments,
+    StepProgress,
+    VideoArguments,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,10 +45,13 @@ def run(
     seed: int = 0,
     out: Path | None = None,
     budget_s: float | None = None,
+    trees: int | None = None,
+    workers: int = 1,
     profile: str = "default",
     controller: str = "mpc",
     video: VideoArguments | None = DEFAULT_VIDEO,
     on_progress: StepProgress | None = None,
+    on_improvement: OnImprovement | None = None,
 ) -> RunResult:
     """Do the whole mission and leave a run folder; take up a run that was stopped.
 
@@ -50,10 +60,13 @@ def run(
         seed: of all random streams.
         out: the run folder; `default_folder` if None.
         budget_s: wall-clock limit of planning; None for none.
+        trees: number of motion trees to grow; None for the profile's.
+        workers: threads that grow them.
         profile: "default" or "paper".
         controller: name of the tracking controller.
         video: how the video is made; None for no video.
         on_progress: told (step, fraction, text).
+        on_improvement: told of every plan that is cheaper than all before it.
 
     Raises:
         MrmgError: for everything that keeps the run from starting. A mission that
@@ -64,13 +77,19 @@ def run(
         seed=seed,
         profile=profile,
         budget_s=budget_s,
+        trees=trees,
+        workers=workers,
         controller=controller,
         video=video or DEFAULT_VIDEO,
     )
     folder = RunFolder(out or default_folder(scene, seed))
     with folder.opened_for_writing():
         work = Run(
-            scene=scene, arguments=arguments, folder=folder, on_progress=on_progress
+            scene=scene,
+            arguments=arguments,
+            folder=folder,
+            on_progress=on_progress,
+            on_improvement=on_improvement,
         )
         if video is not None and not work.is_done(Step.RENDER):
             choose_backend()  # better told now than after minutes of driving

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import mrmg
 from mrmg import storage
@@ -23,8 +23,14 @@ from mrmg.scene.loading import dump_scene, load_scene
 from mrmg.scene.types import Scene
 from mrmg.shipped import models_folder
 
+if TYPE_CHECKING:
+    from mrmg.planning import Improvement
+
 StepProgress = Callable[[Step, float, str], None]
 """Told (step, fraction 0..1, text) while a step is under way."""
+
+OnImprovement = Callable[["Improvement"], None]
+"""Told of every plan that is cheaper than all before it."""
 
 Write = Callable[[], None]
 """Puts the outcome of a step that has been worked out into the run folder."""
@@ -66,6 +72,8 @@ class RunArguments:
         seed: of all random streams.
         profile: "default" or "paper".
         budget_s: wall-clock limit of planning; None for none.
+        trees: number of motion trees to grow; None for the profile's.
+        workers: threads that grow them; without a time limit they decide nothing.
         controller: name of the tracking controller.
         video: how the video is made.
     """
@@ -73,6 +81,8 @@ class RunArguments:
     seed: int = 0
     profile: str = "default"
     budget_s: float | None = None
+    trees: int | None = None
+    workers: int = 1
     controller: str = "mpc"
     video: VideoArguments = DEFAULT_VIDEO
 
@@ -97,6 +107,7 @@ class Run:
     arguments: RunArguments
     folder: RunFolder
     on_progress: StepProgress | None = None
+    on_improvement: OnImprovement | None = None
 
     def ensure(self, step: Step) -> None:
         """Make `step` unless the folder already holds its outcome."""
@@ -129,6 +140,7 @@ class Run:
                 self.arguments.seed,
                 self.arguments.profile,
                 self.arguments.budget_s,
+                self.arguments.trees,
             ],
             Step.EXECUTE: [self.arguments.controller],
             Step.RENDER: asdict(self.arguments.video),
@@ -195,11 +207,17 @@ def _code_digest() -> str:
 def _plan(run: Run) -> Write:
     from mrmg.planning import plan_mission, profile_params
 
+    arguments = run.arguments
     result = plan_mission(
         run.scene,
-        seed=run.arguments.seed,
-        params=profile_params(run.arguments.profile, budget_s=run.arguments.budget_s),
+        seed=arguments.seed,
+        params=profile_params(
+            arguments.profile, budget_s=arguments.budget_s, trees=arguments.trees
+        ),
+        workers=arguments.workers,
+        with_bound=True,
         on_progress=run.progress_of(Step.PLAN),
+        on_improvement=run.on_improvement,
     )
     outcome = {
         "status": result.status.value,

@@ -26,9 +26,12 @@ def run(options: argparse.Namespace) -> int:
             seed=options.seed,
             out=options.out,
             budget_s=options.budget,
+            trees=options.trees,
+            workers=options.workers,
             profile=options.profile,
             video=None if options.no_video else DEFAULT_VIDEO,
             on_progress=told,
+            on_improvement=terminal.improvement_teller(told),
         )
     if options.json:
         terminal.print_json(result.summary)
@@ -49,14 +52,26 @@ def plan(options: argparse.Namespace) -> int:
     scene = load_scene(options.scene)
     folder = RunFolder(options.out or default_folder(scene, options.seed))
     arguments = RunArguments(
-        seed=options.seed, profile=options.profile, budget_s=options.budget
+        seed=options.seed,
+        profile=options.profile,
+        budget_s=options.budget,
+        trees=options.trees,
+        workers=options.workers,
     )
     with folder.opened_for_writing(), terminal.progress() as told:
-        work = Run(scene=scene, arguments=arguments, folder=folder, on_progress=told)
+        work = Run(
+            scene=scene,
+            arguments=arguments,
+            folder=folder,
+            on_progress=told,
+            on_improvement=terminal.improvement_teller(told),
+        )
         work.make(Step.PLAN)
     outcome = work.planning()
     text = f"{scene.name}: {outcome['status']}"
     text += f"; {outcome['reason']}" if outcome["reason"] else ""
+    if outcome["statistics"]["improvements"]:
+        text += f"\n  {terminal.quality(outcome['statistics']['improvements'][-1])}"
     _print(options, outcome, f"{text}\n  in {folder.path}")
     return work.status().exit_code
 

@@ -65,11 +65,25 @@ def _add_planning(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--out", type=Path, metavar="DIR", help="run folder; default runs/SCENE-sN"
     )
-    verb.add_argument(
+    limit = verb.add_mutually_exclusive_group()
+    limit.add_argument(
         "--budget",
         type=_positive,
         metavar="SECONDS",
-        help="wall-clock limit of planning",
+        help="go on improving the plan for so long; Ctrl-C ends it earlier",
+    )
+    limit.add_argument(
+        "--trees",
+        type=_count,
+        metavar="N",
+        help="go on improving for so many motion trees: the same plan every time",
+    )
+    verb.add_argument(
+        "--workers",
+        type=_count,
+        default=1,
+        metavar="N",
+        help="threads that plan; default 1",
     )
     verb.add_argument(
         "--profile",

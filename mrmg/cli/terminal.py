@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from mrmg import storage
 
 if TYPE_CHECKING:
+    from mrmg.planning import Improvement
     from mrmg.run_folder import Step
     from mrmg.steps import StepProgress
 
@@ -50,6 +51,27 @@ def progress() -> Iterator[StepProgress | None]:
         yield told
 
 
+def improvement_teller(
+    told: StepProgress | None,
+) -> Callable[[Improvement], None] | None:
+    """Return a callback that prints a line per better plan; None without progress."""
+    if told is None:
+        return None
+    return lambda found: print(
+        f"{found.time_s:9.2f} s  {quality(found.to_json())}", file=sys.stderr
+    )
+
+
+def quality(found: Mapping[str, Any]) -> str:
+    """Return cost, bound and gap of a plan in words."""
+    text = f"cost {found['cost_J'] / 1000:.2f} kJ"
+    if found["bound_J"] is not None:
+        text += f", proven bound {found['bound_J'] / 1000:.2f} kJ"
+    if found["gap"] is not None:
+        text += f", gap {found['gap']:.1%}"
+    return text
+
+
 def announce_compilation() -> None:
     """Tell a person who waits for it that kernels are being compiled."""
     if not sys.stderr.isatty():
@@ -83,6 +105,7 @@ def _summary_lines(summary: dict[str, Any]) -> Iterator[str]:
             f"plan       {plan['cost_J'] / 1000:.1f} kJ in {plan['makespan_s']:.0f} s, "
             f"planned in {plan['time_s']['total']:.2f} s"
         )
+        yield f"quality    {quality(plan)}"
     if verdict:
         yield (
             f"verdict    {verdict['violations']} violations; clearance to obstacles "

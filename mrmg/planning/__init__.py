@@ -10,5 +10,6 @@ from mrmg.planning.parameters import (
     profile_params as profile_params,
 )
 from mrmg.planning.planner import plan_mission as plan_mission
+from mrmg.planning.statistics import Improvement as Improvement
 
-__all__ = ["PROFILES", "PlannerParams", "plan_mission", "profile_params"]
+__all__ = ["Improvement", "PROFILES", "PlannerParams", "plan_mission", "profile_params"]

@@ -264,7 +264,7 @@ def insert(mission, tree, tours, n, n_tours, target, event, random, counts):
 
 
 @kernel
-def grow(mission, start, energy, random, tree, tours, counts):
+def grow(mission, start, energy, random, tree, tours, counts, halt):
     """Grow a motion tree until all goals are visited (Algorithm 1).
 
     Args:
@@ -275,6 +275,7 @@ def grow(mission, start, energy, random, tree, tours, counts):
         tree: `new_tree`; filled.
         tours: table of tours; row 0 holds the first ones, the others are filled.
         counts: receives the numbers of vertices, groups, router calls and expansions.
+        halt: shape (1,); another thread may turn it true to end the search.
 
     Returns:
         The vertex at which all goals are visited, or -1.
@@ -291,7 +292,8 @@ def grow(mission, start, energy, random, tree, tours, counts):
     steer = params.steer_start
     most = EXPANSIONS_PER_VERTEX * params.max_vertices
     while (
-        n < params.max_vertices
+        not halt[0]
+        and n < params.max_vertices
         and counts[EXPANSIONS] < most
         and counts[ROUTER_FAILURES] < FAILED_ROUTES
     ):

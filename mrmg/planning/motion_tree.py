@@ -168,9 +168,21 @@ class Growth:
 
 
 def grow_tree(
-    problem: Problem, params: PlannerParams, routing: Routing, seed: int
+    problem: Problem,
+    params: PlannerParams,
+    routing: Routing,
+    seed: int,
+    halt: np.ndarray,
 ) -> Growth:
-    """Grow one motion tree along given tours (Algorithms 1-3)."""
+    """Grow one motion tree along given tours (Algorithms 1-3).
+
+    Args:
+        problem: the mission.
+        params: parameters.
+        routing: the tours to begin with.
+        seed: of the tree's random choices.
+        halt: shape (1,); growing ends, without a solution, once it has turned true.
+    """
     mission = problem.mission
     robots = len(problem.scene.robots)
     width = 3 * mission.targets.goals + 3
@@ -193,6 +205,7 @@ def grow_tree(
         tree,
         tours,
         counts,
+        halt,
     )
     names = ("vertices", "groups", "router_calls", "expansions", "dead_ends")
     statistics = {name: int(n) for name, n in zip(names, counts, strict=True)}

@@ -92,12 +92,26 @@ class PlannerParams:
         return storage.digest(storage.canonical_json(values))
 
 
-def profile_params(profile: str, *, budget_s: float | None = None) -> PlannerParams:
+def profile_params(
+    profile: str, *, budget_s: float | None = None, trees: int | None = None
+) -> PlannerParams:
     """Return the parameters of a profile.
 
+    Args:
+        profile: "default" or "paper".
+        budget_s: time limit [s]; None for none.
+        trees: number of trees to grow, all of them; None for the profile's.
+
     Raises:
-        UsageError: if the profile is unknown.
+        UsageError: if the profile is unknown, or a number is out of range.
     """
+    params = _profile(profile, budget_s)
+    if trees is not None:
+        return replace(params, trees=trees, improvements=trees)
+    return params
+
+
+def _profile(profile: str, budget_s: float | None) -> PlannerParams:
     base = PlannerParams(profile=profile, budget_s=budget_s)
     if profile == "paper":
         # A new tour at every reached goal, one control held for the whole expansion.

@@ -100,7 +100,10 @@ def _plan_figures(plan: Plan, statistics: Mapping[str, Any]) -> dict[str, Any]:
     times = ("init", "routing", "first_solution", "total")
     return {
         "cost_J": plan.cost_J,
+        "bound_J": statistics.get("bound_J"),
+        "gap": statistics.get("gap"),
         "makespan_s": plan.makespan_s,
+        "improvements": list(statistics.get("improvements", [])),
         "vertices": statistics["vertices"],
         "groups": statistics["groups"],
         "router_calls": statistics["router_calls"],

@@ -62,6 +62,10 @@ MISSIONS: dict[str, dict[str, Any]] = {
 }
 
 
+HALT = np.zeros(1, np.bool_)
+"""Never turned true."""
+
+
 @dataclass(frozen=True)
 class Grown:
     """A tree with all that it was grown from."""
@@ -104,6 +108,7 @@ def grow(problem: Problem, params: PlannerParams, seed: int = 1) -> Grown:
         tree,
         tours,
         counts,
+        HALT,
     )
     # The vertex that ends the search is counted, too.
     vertices = int(counts[_tree_kernels.VERTICES])
@@ -253,7 +258,7 @@ def test_a_growth_ends_at_rest_with_every_goal_on_one_tour(
     scene = yard(**MISSIONS[name])
     problem, params = state(scene), PlannerParams()
     routing = solve_routing(problem.mission.routing, params.router, 2)
-    growth = grow_tree(problem, params, routing, 2)
+    growth = grow_tree(problem, params, routing, 2, HALT)
     assert growth.solved
     visited = [t for tour in growth.tours.values() for t in tour]
     goals = [goal.id for goal in scene.goals]
@@ -273,7 +278,9 @@ def test_a_growth_ends_at_rest_with_every_goal_on_one_tour(
 def test_growing_is_a_function_of_the_seed(yard: MakeScene, state: MakeProblem) -> None:
     problem, params = state(yard(**MISSIONS["swap"])), PlannerParams()
     routing = solve_routing(problem.mission.routing, params.router, 2)
-    first, again, other = (grow_tree(problem, params, routing, s) for s in (3, 3, 4))
+    first, again, other = (
+        grow_tree(problem, params, routing, s, HALT) for s in (3, 3, 4)
+    )
     assert first.counts == again.counts
     assert first.tours == again.tours
     for one, two in zip(first.trajectories, again.trajectories, strict=True):
@@ -291,7 +298,7 @@ def test_a_tree_that_is_too_small_gives_nothing(
     params = PlannerParams(max_vertices=4)
     problem = state(yard(), max_vertices=4)
     routing = solve_routing(problem.mission.routing, params.router, 2)
-    growth = grow_tree(problem, params, routing, 2)
+    growth = grow_tree(problem, params, routing, 2, HALT)
     assert not growth.solved
     assert growth.tours == {}
     assert growth.counts["vertices"] == 4
@@ -313,3 +320,14 @@ def test_the_margin_scales_the_roadmaps_energies_alone(
     )
     back = problem.with_margin(0.5).with_margin(problem.mission.params.route_margin)
     assert back.mission.routing.cost == pytest.approx(problem.mission.routing.cost)
+
+
+def test_a_halted_tree_ends_without_a_solution(
+    yard: MakeScene, state: MakeProblem
+) -> None:
+    params = PlannerParams(max_vertices=3000)
+    problem = state(yard(**next(iter(MISSIONS.values()))))
+    routing = solve_routing(problem.mission.routing, params.router, 2)
+    growth = grow_tree(problem, params, routing, 2, np.ones(1, np.bool_))
+    assert not growth.solved
+    assert growth.counts["expansions"] == 0

@@ -19,7 +19,10 @@ from mrmg.results.verify import verify
 SECTIONS = {
     "plan": {
         "cost_J",
+        "bound_J",
+        "gap",
         "makespan_s",
+        "improvements",
         "vertices",
         "groups",
         "router_calls",
@@ -53,7 +56,12 @@ STATISTICS = {
     "vertices": 100,
     "groups": 7,
     "router_calls": 3,
-    "lower_bound_J": 1.0,
+    "improvements": [
+        {"time_s": 0.5, "cost_J": 3.0, "bound_J": 2.0, "gap": 0.5},
+        {"time_s": 0.7, "cost_J": 2.5, "bound_J": 2.0, "gap": 0.25},
+    ],
+    "bound_J": 2.0,
+    "gap": 0.25,
     "time_s": {"init": 0.1, "routing": 0.2, "first_solution": 0.5, "total": 0.5},
 }
 

@@ -1,0 +1,139 @@
+"""Anytime search: attempts on several threads until there are enough, or time is over.
+
+Attempts are numbered, and each is a function of its number alone. Without a time limit
+they count in the order of their numbers, whichever thread is first, so that the outcome
+does not depend on the number of workers. With a time limit they count as they come.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mrmg.mission import Plan
+from mrmg.planning.attempt import Attempt
+from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.statistics import Improvement, Statistics
+
+Progress = Callable[[float, str], None]
+"""Receives the fraction done, in [0, 1], and a short text."""
+
+OnImprovement = Callable[[Improvement], None]
+"""Receives each plan that is cheaper than all before it, as soon as it counts."""
+
+HOPELESS = 10
+"""With a time limit, times the number of trees after which finding none ends it."""
+
+
+@dataclass
+class Search:
+    """The search for a cheap plan.
+
+    Attributes:
+        attempt: makes attempt number n; ends soon after `halt[0]` has turned true.
+        params: says when to stop.
+        statistics: receives counts, times and improvements.
+        workers: threads.
+        on_progress, on_improvement: told how it goes.
+        on_first: called when the first plan has been found.
+        best: the cheapest plan so far.
+    """
+
+    attempt: Callable[[int, np.ndarray], Attempt]
+    params: PlannerParams
+    statistics: Statistics
+    workers: int
+    on_progress: Progress
+    on_improvement: OnImprovement
+    on_first: Callable[[], object]
+    best: Plan | None = None
+    halt: np.ndarray = field(default_factory=lambda: np.zeros(1, np.bool_))
+
+    def run(self) -> Plan | None:
+        """Return the cheapest plan found.
+
+        An interrupt during a time limit ends the search as if the limit were reached,
+        provided there is a plan to keep.
+        """
+        number = found = 0
+        if self._enough(number, found):
+            return None
+        with ThreadPoolExecutor(self.workers) as pool, self._limited():
+            try:
+                for attempt in self._attempts(pool):
+                    number += 1
+                    self.statistics.add(dict(attempt.counts), attempt.routing_s)
+                    if attempt.plan is not None:
+                        found += 1
+                        self._take(attempt.plan, attempt.found_at)
+                    self.on_progress(self._fraction(number, found), f"{found} plans")
+                    if self._enough(number, found):
+                        break
+            except KeyboardInterrupt:
+                if self.best is None or self.params.budget_s is None:
+                    raise
+            finally:
+                self.halt[0] = True
+        return self.best
+
+    def _attempts(self, pool: ThreadPoolExecutor) -> Iterator[Attempt]:
+        """Yield attempts, keeping every worker busy with one."""
+        free = self.params.budget_s is not None
+        pending: list[Future[Attempt]] = []
+        number = 0
+        while True:
+            while len(pending) < self.workers:
+                pending.append(pool.submit(self.attempt, number, self.halt))
+                number += 1
+            done = wait(pending, return_when=FIRST_COMPLETED).done if free else ()
+            ready = next((one for one in pending if one in done), pending[0])
+            pending.remove(ready)
+            yield ready.result()
+
+    @contextmanager
+    def _limited(self) -> Iterator[None]:
+        """Halt attempts under way when the time limit is reached."""
+        if self.params.budget_s is None:
+            yield
+            return
+        left = max(0.0, self.params.budget_s - self.statistics.elapsed())
+        alarm = threading.Timer(left, lambda: self.halt.fill(True))
+        alarm.daemon = True
+        alarm.start()
+        try:
+            yield
+        finally:
+            alarm.cancel()
+
+    def _take(self, plan: Plan, found_at: float) -> None:
+        """Keep a plan if it is the cheapest so far."""
+        time_s = found_at - self.statistics.started
+        if self.best is None:
+            self.statistics.time_s["first_solution"] = time_s
+            self.on_first()
+        elif plan.cost_J >= self.best.cost_J:
+            return
+        self.best = plan
+        improvement = Improvement.of(time_s, plan.cost_J, self.statistics.bound_J)
+        self.statistics.improvements.append(improvement)
+        self.on_improvement(improvement)
+
+    def _enough(self, number: int, found: int) -> bool:
+        params = self.params
+        if params.budget_s is not None:
+            hopeless = found == 0 and number >= HOPELESS * params.trees
+            return self.statistics.elapsed() > params.budget_s or hopeless
+        return found > params.improvements or number >= params.trees
+
+    def _fraction(self, number: int, found: int) -> float:
+        params = self.params
+        if params.budget_s is not None:
+            done = self.statistics.elapsed() / params.budget_s
+        else:
+            done = max(number / params.trees, found / (1 + params.improvements))
+        return 0.1 + 0.9 * min(done, 1.0)
