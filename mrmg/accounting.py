@@ -19,6 +19,7 @@ import numpy as np
 from mrmg.energy import PARTS
 from mrmg.ledger import EnergyLedger, LedgerEntry
 from mrmg.mission import Visit
+from mrmg.motion.dynamics import TURN_SPEEDS
 from mrmg.scene.types import Scene, Station
 from mrmg.world.terrain import multiplier_at
 
@@ -60,11 +61,13 @@ def step_power_parts(scene: Scene, motion: Motion) -> np.ndarray:
     before, after = motion.state[:-1], motion.state[1:]
     middle = 0.5 * (before + after)
     acceleration_m_s2 = (after[:, 3] - before[:, 3]) / np.diff(motion.time_s)
-    # The fifth state of a unicycle is a yaw rate: its wheels roll without scrub.
-    unsteered = robot.model.motion_model == "unicycle"
-    tan_steer = np.zeros(len(middle)) if unsteered else np.tan(middle[:, 4])
+    turn_speed = TURN_SPEEDS[robot.model.motion_model](np.tan)
     return robot.model.energy_model.power_parts(
-        middle[:, 3], acceleration_m_s2, tan_steer, multiplier_at(scene, middle[:, :2])
+        speed_m_s=middle[:, 3],
+        acceleration_m_s2=acceleration_m_s2,
+        turn_speed_m_s=turn_speed(middle[:, 3], middle[:, 4], robot.model.track_m),
+        multiplier=multiplier_at(scene, middle[:, :2]),
+        climb_m_s=np.zeros(len(middle)),
     )
 
 

@@ -1,32 +1,52 @@
 """The energy model: motion over terrain gives the power drawn from the battery.
 
-Mechanical power at the drive, with v the speed, a the acceleration, k the terrain's
-multiplier and psi the steering angle:
+Mechanical power at the drive, with v the speed over the map, a its change, k the
+terrain's multiplier, L theta' the speed at which tyres scrub in a turn and h' the rate
+of climb:
 
     P_rolling = k C_rr m g |v|
-    P_turning = C_turn m g |tan psi| |v|
+    P_turning = C_turn m g |L theta'|
     P_inertia = m_eff a v
+    P_grade   = m g h'
 
 Battery power is the sum divided by the drive efficiency when the drive pulls, times the
-regeneration efficiency when it brakes, plus idle power. The paper's cost, distance
-times terrain plus turning, is the special case m_eff = 0.
+regeneration efficiency when it brakes, plus idle and device power.
+
+Rolling is charged by the way over the map: on a slope the way is longer by 1 / cos and
+the load on the tyres smaller by cos. The grade's power is that of the height, so that
+whatever is climbed adds up to m g times the difference of heights.
+
+The paper's cost, distance times terrain plus turning, has neither inertia, grade nor
+other consumers: the preset "paper".
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
 
 import numpy as np
 
-PARTS = ("rolling", "turning", "inertia", "idle")
+PARTS = ("rolling", "turning", "inertia", "grade", "idle", "device")
 """The parts every energy account is split into; their sum is the battery's loss."""
+
+EnergyPreset = Literal["full", "paper"]
+"""Which parts count: all of them, or those of the paper's cost."""
+
+ENERGY_PRESETS: tuple[EnergyPreset, ...] = get_args(EnergyPreset)
 
 GRAVITY_M_S2 = 9.81
 
-N_COEFFICIENTS = 6
-ROLLING_N, TURNING_N, EFFECTIVE_MASS_KG, DRIVE_EFF, REGEN_EFF, IDLE_W = range(
-    N_COEFFICIENTS
-)
+N_COEFFICIENTS = 7
+(
+    ROLLING_N,
+    TURNING_N,
+    EFFECTIVE_MASS_KG,
+    WEIGHT_N,
+    DRIVE_EFF,
+    REGEN_EFF,
+    CONSUMERS_W,
+) = range(N_COEFFICIENTS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,30 +55,50 @@ class EnergyModel:
 
     Attributes:
         rolling_force_N: C_rr m g on plain ground (multiplier 1).
-        turning_force_N: C_turn m g, the extra force per |tan psi|.
+        turning_force_N: C_turn m g, the force that scrubbing tyres meet.
         effective_mass_kg: mass plus the wheels' inertia seen along the road.
+        weight_N: m g, what climbing works against.
         drive_efficiency: battery to wheel, in (0, 1].
         regeneration_efficiency: wheel to battery when braking, in [0, 1].
-        idle_power_W: drawn at all times.
+        idle_power_W: drawn at all times by the robot itself.
+        device_power_W: drawn at all times by what it carries.
     """
 
     rolling_force_N: float
     turning_force_N: float
     effective_mass_kg: float
+    weight_N: float
     drive_efficiency: float
     regeneration_efficiency: float
     idle_power_W: float
+    device_power_W: float
+
+    def with_preset(self, preset: EnergyPreset) -> EnergyModel:
+        """Return the model with only the parts that count in `preset`.
+
+        A metre of plain ground costs the same in all presets.
+        """
+        if preset == "full":
+            return self
+        return replace(
+            self,
+            effective_mass_kg=0.0,
+            weight_N=0.0,
+            idle_power_W=0.0,
+            device_power_W=0.0,
+        )
 
     def coefficients(self) -> np.ndarray:
-        """Return the coefficients in the order the kernels index them, shape (6,)."""
+        """Return what the kernels index, shape (N_COEFFICIENTS,)."""
         return np.array(
             [
                 self.rolling_force_N,
                 self.turning_force_N,
                 self.effective_mass_kg,
+                self.weight_N,
                 self.drive_efficiency,
                 self.regeneration_efficiency,
-                self.idle_power_W,
+                self.idle_power_W + self.device_power_W,
             ]
         )
 
@@ -70,20 +110,28 @@ class EnergyModel:
         self,
         speed_m_s: np.ndarray,
         acceleration_m_s2: np.ndarray,
-        tan_steer: np.ndarray,
+        turn_speed_m_s: np.ndarray,
         multiplier: np.ndarray,
+        climb_m_s: np.ndarray,
     ) -> np.ndarray:
         """Return the battery power by part [W], shape (n, len(PARTS)).
 
-        Rolling and turning are charged as the battery would feed them; inertia is what
-        remains of the total, so it turns negative where a slowing robot coasts.
+        Rolling and turning are charged as the battery would feed them. Inertia and
+        grade share what remains of the drive's total in proportion to their mechanical
+        power, so they turn negative where a robot slows down or descends.
+
+        Args:
+            speed_m_s: speed over the map, negative backwards, shape (n,).
+            acceleration_m_s2: its change, shape (n,).
+            turn_speed_m_s: L |theta'|, see `motion.dynamics.TURN_SPEEDS`, shape (n,).
+            multiplier: of the terrain, shape (n,).
+            climb_m_s: rate of climb, 0 on flat ground, shape (n,).
         """
-        way = np.abs(speed_m_s)
-        rolling = self.rolling_force_N * multiplier * way
-        turning = self.turning_force_N * np.abs(tan_steer) * way
-        mechanical = (
-            rolling + turning + self.effective_mass_kg * acceleration_m_s2 * speed_m_s
-        )
+        rolling = self.rolling_force_N * multiplier * np.abs(speed_m_s)
+        turning = self.turning_force_N * turn_speed_m_s
+        inertia = self.effective_mass_kg * acceleration_m_s2 * speed_m_s
+        grade = self.weight_N * climb_m_s
+        mechanical = rolling + turning + inertia + grade
         battery = np.where(
             mechanical > 0.0,
             mechanical / self.drive_efficiency,
@@ -91,27 +139,37 @@ class EnergyModel:
         )
         rolling = rolling / self.drive_efficiency
         turning = turning / self.drive_efficiency
-        inertia = battery - rolling - turning
-        idle = np.full_like(way, self.idle_power_W)
-        return np.stack([rolling, turning, inertia, idle], axis=-1)
+        stored = inertia + grade
+        share = np.divide(
+            battery - rolling - turning,
+            stored,
+            out=np.full_like(stored, 1.0 / self.drive_efficiency),
+            where=mechanical < 0.0,
+        )
+        grade = grade * share
+        inertia = battery - rolling - turning - grade
+        idle = np.full_like(battery, self.idle_power_W)
+        device = np.full_like(battery, self.device_power_W)
+        return np.stack([rolling, turning, inertia, grade, idle, device], axis=-1)
 
 
-def battery_power(v, a, tan_steer, k, c):  # type: ignore[no-untyped-def]
+def battery_power(v, a, turn_speed, k, climb, c):  # type: ignore[no-untyped-def]
     """Return the battery power [W] of one robot: the scalar form the kernels compile.
 
     Args:
         v: speed [m/s].
         a: acceleration [m/s^2].
-        tan_steer: tan psi (car) or omega L / v (unicycle: zero).
+        turn_speed: L |theta'| [m/s].
         k: terrain multiplier.
+        climb: rate of climb [m/s].
         c: `EnergyModel.coefficients()`.
     """
-    way = abs(v)
     mechanical = (
-        c[ROLLING_N] * k * way
-        + c[TURNING_N] * abs(tan_steer) * way
+        c[ROLLING_N] * k * abs(v)
+        + c[TURNING_N] * turn_speed
         + c[EFFECTIVE_MASS_KG] * a * v
+        + c[WEIGHT_N] * climb
     )
     if mechanical > 0.0:
-        return mechanical / c[DRIVE_EFF] + c[IDLE_W]
-    return mechanical * c[REGEN_EFF] + c[IDLE_W]
+        return mechanical / c[DRIVE_EFF] + c[CONSUMERS_W]
+    return mechanical * c[REGEN_EFF] + c[CONSUMERS_W]

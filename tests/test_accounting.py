@@ -24,7 +24,7 @@ from mrmg.energy import PARTS
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 
-ROLLING, TURNING, INERTIA, IDLE = range(len(PARTS))
+ROLLING, TURNING, INERTIA, GRADE, IDLE, DEVICE = range(len(PARTS))
 
 
 def make_scene(**changes: Any) -> Scene:
@@ -78,7 +78,7 @@ def test_cruise_on_plain_ground_costs_rolling_alone(scene: Scene) -> None:
     model = scene.robots[0].model.energy_model
     energy_J = step_energy_parts(scene, cruise(5, 45)).sum(axis=0)
     assert energy_J[ROLLING] == pytest.approx(40 * model.plain_ground_J_per_m())
-    assert np.abs(energy_J[[TURNING, INERTIA, IDLE]]).max() < 1e-9
+    assert np.abs(energy_J[[TURNING, INERTIA, GRADE, IDLE, DEVICE]]).max() < 1e-9
 
 
 def test_terrain_multiplies_and_the_later_area_counts(scene: Scene) -> None:
@@ -96,14 +96,15 @@ def test_turning_costs_by_the_tangent_of_the_steering_angle(scene: Scene) -> Non
     assert energy_J == pytest.approx(expected_J)
 
 
-def test_yaw_rate_of_a_unicycle_is_no_steering_angle(scene: Scene) -> None:
+def test_a_unicycle_turns_by_its_yaw_rate_even_on_the_spot(scene: Scene) -> None:
     model = replace(scene.robots[0].model, motion_model="unicycle")
     unicycle = replace(scene, robots=(replace(scene.robots[0], model=model),))
     time_s = np.arange(0.0, 4.05, 0.1)
-    motion = along(10 + time_s, np.ones(len(time_s)), time_s, psi_rad=0.4)
+    motion = along(np.full(41, 10.0), np.zeros(41), time_s, psi_rad=-0.4)
     energy_J = step_energy_parts(unicycle, motion).sum(axis=0)
-    assert energy_J[TURNING] == 0.0
-    assert energy_J[ROLLING] > 0.0
+    force_N = model.energy_model.turning_force_N / model.drive_efficiency
+    assert energy_J[TURNING] == pytest.approx(force_N * model.track_m * 0.4 * 4.0)
+    assert energy_J[ROLLING] == 0.0
 
 
 @given(st.floats(0.1, 1.5), st.integers(1, 40))

@@ -7,7 +7,13 @@ from math import cos, sin, tan
 import numba
 
 from mrmg.compilation import kernel
-from mrmg.motion.dynamics import car_derivative, rk4_step, unicycle_derivative
+from mrmg.motion.dynamics import (
+    car_derivative,
+    car_turn_speed,
+    rk4_step,
+    unicycle_derivative,
+    unicycle_turn_speed,
+)
 
 CAR = 0
 UNICYCLE = 1
@@ -17,6 +23,8 @@ MODEL_ID = {"car": CAR, "unicycle": UNICYCLE}
 # kernels that call them are.
 _car_step = numba.njit(rk4_step(numba.njit(car_derivative(sin, cos, tan))))
 _unicycle_step = numba.njit(rk4_step(numba.njit(unicycle_derivative(sin, cos, tan))))
+_car_turn_speed = numba.njit(car_turn_speed(tan))
+_unicycle_turn_speed = numba.njit(unicycle_turn_speed(tan))
 
 
 @kernel
@@ -34,6 +42,8 @@ def step(model, state, u1, u2, wheelbase, dt, out):
 
 
 @kernel
-def tan_steer(model, w):
-    """Return tan psi for the energy model's turning part; 0 for a unicycle."""
-    return tan(w) if model == CAR else 0.0
+def turn_speed(model, v, w, track):
+    """Return L |theta'| for the energy model's turning part [m/s]."""
+    if model == CAR:
+        return _car_turn_speed(v, w, track)
+    return _unicycle_turn_speed(v, w, track)

@@ -86,8 +86,36 @@ def rk4_step(derivative: Derivative) -> Derivative:
     return step
 
 
+def car_turn_speed(tan: Any) -> Callable[..., Any]:
+    """Return L |theta'| of a car [m/s] from (v, psi, track): |v tan psi|."""
+
+    def turn_speed(v, psi, track):
+        return abs(v * tan(psi))
+
+    return turn_speed
+
+
+def unicycle_turn_speed(tan: Any) -> Callable[..., Any]:
+    """Return L |theta'| of a differential drive [m/s] from (v, omega, track).
+
+    L is the track, as its wheels scrub by what they turn about each other; tan and v
+    are unused.
+    """
+
+    def turn_speed(v, omega, track):
+        return track * abs(omega)
+
+    return turn_speed
+
+
 DERIVATIVES: dict[str, Callable[[Any, Any, Any], Derivative]] = {
     "car": car_derivative,
     "unicycle": unicycle_derivative,
 }
 """Derivative factories by the name of the motion model."""
+
+TURN_SPEEDS: dict[str, Callable[[Any], Callable[..., Any]]] = {
+    "car": car_turn_speed,
+    "unicycle": unicycle_turn_speed,
+}
+"""Factories of L |theta'|, what turning costs by, by the name of the motion model."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from mrmg.compilation import kernel
 from mrmg.energy import battery_power
-from mrmg.motion._kernels import UNICYCLE, tan_steer
+from mrmg.motion._kernels import UNICYCLE, turn_speed
 from mrmg.planning._fleet_kernels import space_of
 from mrmg.planning._maneuver_kernels import best_maneuver
 from mrmg.planning._mission_kernels import in_target, look_ahead
@@ -163,15 +163,18 @@ def drive_step(mission, commitment, decided, r, v, w, attempts):
 @kernel
 def step_energy(mission, r, before, after, u1):
     """Return the battery energy of one step [J], charged at its midpoint."""
+    robot = mission.fleet[r]
+    v = 0.5 * (before[3] + after[3])
     k = multiplier_in(
         mission.terrain, 0.5 * (before[0] + after[0]), 0.5 * (before[1] + after[1])
     )
     return mission.params.dt * _battery_power(
-        0.5 * (before[3] + after[3]),
+        v,
         u1,
-        tan_steer(mission.fleet[r].model, 0.5 * (before[4] + after[4])),
+        turn_speed(robot.model, v, 0.5 * (before[4] + after[4]), robot.track),
         k,
-        mission.fleet[r].energy,
+        0.0,
+        robot.energy,
     )
 
 

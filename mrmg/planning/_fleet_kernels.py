@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
+from mrmg.energy import N_COEFFICIENTS
 from mrmg.world._kernels import FreeSpace
 
 PLANNING_MARGIN_M = 0.25
@@ -27,6 +28,7 @@ FLEET = np.dtype(
     [
         ("model", np.int64),  # motion model id
         ("wheelbase", np.float64),  # [m]
+        ("track", np.float64),  # [m]
         ("limit", np.float64, (5,)),  # planner's v_min, v_max, w_max, u1_max, u2_max
         ("corner", np.float64, (MOST_CORNERS, 2)),  # footprint [m], padded
         ("corners", np.int64),  # number of corners
@@ -43,7 +45,7 @@ FLEET = np.dtype(
         ),  # clearance of the reference point's line of travel [m]
         ("space", np.int64),  # index of the free space
         ("field", np.int64),  # index of the cost-to-go fields
-        ("energy", np.float64, (6,)),  # coefficients of the energy model
+        ("energy", np.float64, (N_COEFFICIENTS,)),  # coefficients of the energy model
         ("plain", np.float64),  # battery energy per metre of plain ground [J/m]
         ("capacity", np.float64),  # [J]
         ("reserve", np.float64),  # energy the planner leaves [J]

@@ -80,6 +80,7 @@ def fleet_array(scene: Scene, world: World) -> np.ndarray:
         one = fleet[r]
         one["model"] = MODEL_ID[model.motion_model]
         one["wheelbase"] = model.wheelbase_m
+        one["track"] = model.track_m
         one["limit"] = (
             limits.v_min_m_s,
             limits.v_max_m_s,

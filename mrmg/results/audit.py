@@ -3,7 +3,7 @@
 Three meters: *planned* is the energy model over the plan, *metered* the same model over
 the simulated motion, *measured* the work done at the simulated wheels,
 
-    E = W_driving / eta + regeneration * W_braking + P_idle t.
+    E = W_driving / eta + regeneration * W_braking + (P_idle + P_device) t.
 
 Planned to metered shows what tracking changed, metered to measured what the energy
 model misses of the physics.
@@ -29,7 +29,7 @@ from mrmg.mission import Plan, Visit
 from mrmg.results.energy_audit import EnergyAudit, RobotAudit, SimulatedVisit
 from mrmg.scene.types import Robot, Scene
 
-MEASURED_PARTS = ("drive", "idle")
+MEASURED_PARTS = ("drive", "idle", "device")
 """The parts that work at the wheels can be split into."""
 
 
@@ -40,7 +40,7 @@ class _Measured:
     Attributes:
         motion: its logged states.
         visits: of its tour's targets, in order; steps are control ticks.
-        energy_J: measured over each tick by part, shape (n - 1, 2).
+        energy_J: measured over each tick by part, shape (n - 1, 3).
         content_J: measured battery content at each tick, shape (n,).
         arrival_J: content on arrival at each visit.
     """
@@ -149,15 +149,17 @@ def measured_step_energy(robot: Robot, log: ExecutionLog, index: int) -> np.ndar
         index: of the robot in the log.
 
     Returns:
-        By tick and part of `MEASURED_PARTS`, shape (n - 1, 2).
+        By tick and part of `MEASURED_PARTS`, shape (n - 1, 3).
     """
     model = robot.model.energy_model
     driving_J, braking_J = log.work_J[index].T
     drive_J = (
         driving_J / model.drive_efficiency + braking_J * model.regeneration_efficiency
     )
-    idle_J = model.idle_power_W * np.diff(log.time_s)
-    return np.stack([drive_J, idle_J], axis=-1)
+    duration_s = np.diff(log.time_s)
+    idle_J = model.idle_power_W * duration_s
+    device_J = model.device_power_W * duration_s
+    return np.stack([drive_J, idle_J, device_J], axis=-1)
 
 
 def _measured_entries(item: _Measured) -> list[LedgerEntry]:

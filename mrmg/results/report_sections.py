@@ -18,7 +18,9 @@ _PART_COLORS = {
     "rolling": "#4477AA",
     "turning": "#CCBB44",
     "inertia": "#EE6677",
+    "grade": "#228833",
     "idle": "#8A94A0",
+    "device": "#AA3377",
 }
 _MAX_LISTED = 20
 
@@ -55,7 +57,7 @@ def energy(record: RunRecord) -> list[str]:
         html.note(
             "Planned: energy model over the plan. Metered: the same model over the "
             "simulated motion. Measured: work of the simulated wheels, which has no "
-            "parts but driving and idling."
+            "parts but driving and the consumers that run at all times."
         ),
     ]
 

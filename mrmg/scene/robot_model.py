@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mrmg.energy import GRAVITY_M_S2, EnergyModel
+from mrmg.energy import GRAVITY_M_S2, EnergyModel, EnergyPreset
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +70,8 @@ class RobotModel:
         drive_efficiency: battery to wheel.
         regeneration_efficiency: wheel to battery.
         idle_power_W: electronics.
+        device_power_W: what it carries.
+        energy_preset: which parts of the energy model count.
         battery_capacity_J: of the standard battery.
         mjcf: path of the MJCF file.
     """
@@ -92,6 +94,8 @@ class RobotModel:
     drive_efficiency: float
     regeneration_efficiency: float
     idle_power_W: float
+    device_power_W: float
+    energy_preset: EnergyPreset
     battery_capacity_J: float
     mjcf: Path
 
@@ -105,14 +109,17 @@ class RobotModel:
     def energy_model(self) -> EnergyModel:
         """The energy model with this robot's coefficients."""
         weight_N = self.mass_kg * GRAVITY_M_S2
-        return EnergyModel(
+        full = EnergyModel(
             rolling_force_N=self.rolling_coefficient * weight_N,
             turning_force_N=self.turning_coefficient * weight_N,
             effective_mass_kg=self.effective_mass_kg,
+            weight_N=weight_N,
             drive_efficiency=self.drive_efficiency,
             regeneration_efficiency=self.regeneration_efficiency,
             idle_power_W=self.idle_power_W,
+            device_power_W=self.device_power_W,
         )
+        return full.with_preset(self.energy_preset)
 
     @property
     def inscribed_radius_m(self) -> float:

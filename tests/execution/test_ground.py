@@ -34,7 +34,10 @@ def test_resistance_is_the_energy_models_power_over_the_speed(scene: Scene) -> N
     model = scene.robots[0].model.energy_model
     multiplier, steer = np.array([3.0, 1.0]), np.array([-0.4, 0.2])
     force = believed_resistance(scene).force_N(multiplier, steer)
-    parts = model.power_parts(np.ones(2), np.zeros(2), np.tan(steer), multiplier)
+    turn_speed = np.abs(np.tan(steer))
+    parts = model.power_parts(
+        np.ones(2), np.zeros(2), turn_speed, multiplier, np.zeros(2)
+    )
     np.testing.assert_allclose(force / model.drive_efficiency, parts.sum(axis=1))
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from mrmg.motion import _kernels
-from mrmg.motion.dynamics import DERIVATIVES, NU, NX, rk4_step
+from mrmg.motion.dynamics import DERIVATIVES, NU, NX, TURN_SPEEDS, rk4_step
 
 WHEELBASE_M = 1.2
 DT_S = 0.1
@@ -165,6 +165,15 @@ def test_driving_back_with_mirrored_time_returns_to_the_start(model: str) -> Non
         assert back == pytest.approx(state.tolist(), abs=1e-5)
 
 
-def test_tan_steer_is_what_the_energy_model_charges() -> None:
-    assert _kernels.tan_steer(_kernels.CAR, 0.4) == math.tan(0.4)
-    assert _kernels.tan_steer(_kernels.UNICYCLE, 0.4) == 0.0
+@pytest.mark.parametrize("model", MODELS)
+def test_turn_speed_is_the_yaw_rate_times_a_length(model: str) -> None:
+    """Of the wheelbase for a car, of the track for a differential drive."""
+    track_m = 0.7
+    length_m = WHEELBASE_M if model == "car" else track_m
+    plain = TURN_SPEEDS[model](math.tan)
+    for (_, _, theta, v, w), control, _ in random_cases(6, 200):
+        derivative = DERIVATIVES[model](math.sin, math.cos, math.tan)
+        yaw_rate = derivative(theta, v, w, *control, WHEELBASE_M)[2]
+        assert plain(v, w, track_m) == pytest.approx(length_m * abs(yaw_rate))
+        compiled = _kernels.turn_speed(_kernels.MODEL_ID[model], v, w, track_m)
+        assert compiled == plain(v, w, track_m)

@@ -161,8 +161,9 @@ def test_a_step_costs_what_the_energy_model_says_of_its_midpoint(
         if np.abs(np.asarray(border.coords) - middle[:2]).min() < 0.3:
             continue
         u1 = rng.uniform(-1.2, 1.2)
+        turn = np.abs(middle[3:4] * np.tan(middle[4:5]))
         watts = model.power_parts(
-            middle[3:4], np.array([u1]), np.tan(middle[4:5]), k
+            middle[3:4], np.array([u1]), turn, k, np.zeros(1)
         ).sum()
         joules = step_energy(problem.mission, 0, before, after, u1)
         assert joules == pytest.approx(DT_S * watts, abs=1e-9)

@@ -77,7 +77,7 @@ def test_ledgers_share_legs_and_parts(mission: Any) -> None:
     }
     assert legs["planned"] == legs["metered"] == legs["measured"]
     assert account.metered.parts() == account.planned.parts()
-    assert account.measured.parts() == ("drive", "idle")
+    assert account.measured.parts() == ("drive", "idle", "device")
     for part in account.planned.parts():
         assert account.metered.total_J(part=part) == pytest.approx(
             account.planned.total_J(part=part), abs=1e-6

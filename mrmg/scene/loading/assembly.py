@@ -7,6 +7,7 @@ well-formed entries, also when others are malformed: a user sees everything at o
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -131,6 +132,8 @@ class Assembly:
             model = self._model(entry.id, entry.model, path)
             if model is None:
                 continue
+            if entry.energy is not None:
+                model = replace(model, energy_preset=entry.energy)
             battery = battery_of(entry, default, model, path)
             if isinstance(battery, list):
                 self.faults += battery

@@ -14,6 +14,7 @@ import shapely
 from pydantic import Field, ValidationError
 
 from mrmg import shipped
+from mrmg.energy import EnergyPreset
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.loading.faults import faults_of, nearest
 from mrmg.scene.loading.schema import Positive, Ring, Strict
@@ -62,6 +63,8 @@ class ModelDocument(Strict):
     drive_efficiency: Share
     regeneration_efficiency: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
     idle_power: NotNegative
+    device_power: NotNegative = 0.0
+    energy: EnergyPreset = "full"
     battery_capacity: Positive
     mjcf: Annotated[str, Field(min_length=1)]
 
@@ -111,7 +114,8 @@ def load_model(
         faults.append(Fault("mjcf", message))
     if faults:
         raise SceneError(source, faults)
-    return _model(folder, entry), entry.model_dump(mode="json")
+    # Keys left at their defaults stay out: files without them keep their digests.
+    return _model(folder, entry), entry.model_dump(mode="json", exclude_defaults=True)
 
 
 def _geometry_faults(entry: ModelDocument) -> list[Fault]:
@@ -159,6 +163,8 @@ def _model(folder: Path, entry: ModelDocument) -> RobotModel:
         drive_efficiency=entry.drive_efficiency,
         regeneration_efficiency=entry.regeneration_efficiency,
         idle_power_W=entry.idle_power,
+        device_power_W=entry.device_power,
+        energy_preset=entry.energy,
         battery_capacity_J=entry.battery_capacity,
         mjcf=folder / entry.mjcf,
     )

@@ -37,6 +37,9 @@ Details:
 - `start_energy` is a share of the capacity (0..1), or one of {J: }, {Wh: }, {m: }.
 - `model` is the name of a shipped model, or a folder (with a `/` in it), relative to
   the scene file, that holds a `robot.yaml`.
+- `energy: paper` (of a robot here, or in its `robot.yaml`) charges only distance times
+  terrain and turning, the cost of the published method; the default `full` also counts
+  inertia, slopes, and idle and device power.
 - A map without robots, goals or stations is a valid scene; nothing can be planned on it
   until it is populated.
 """
@@ -46,6 +49,8 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+
+from mrmg.energy import EnergyPreset
 
 SCENE_FORMAT = 1
 
@@ -191,6 +196,9 @@ class RobotEntry(Strict):
         description="a share of the capacity, 0..1",
     )
     battery: BatteryEntry | None = None
+    energy: EnergyPreset | None = Field(
+        default=None, description="which parts of the energy model count"
+    )
 
 
 class SceneDocument(Strict):

@@ -81,6 +81,12 @@ def test_footprint_is_turned_counter_clockwise(tmp_path: Path) -> None:
         ("[1.5, 0.55]", "[0.0, 0.0]", r"footprint: not convex"),
         ("[-0.3, 0.55]", "[1.4, -0.6]", r"footprint: crosses itself"),
         ("mjcf: car.xml", "mjcf: van.xml", r"mjcf: got 'van.xml'; no such file"),
+        ("idle_power: 0.0", "device_power: -1\nidle_power: 0.0", r"must be >= 0"),
+        (
+            "format: 1",
+            "format: 1\nenergy: papr",
+            r"energy: got 'papr'; must be 'full' or",
+        ),
         ("wheel:", "wheels:", r"did you mean 'wheel'\?"),
     ],
 )
@@ -88,6 +94,17 @@ def test_bad_models(tmp_path: Path, old: str, new: str, message: str) -> None:
     folder = changed_car(tmp_path, old, new)
     with pytest.raises(SceneError, match=message):
         load_model(folder)
+
+
+def test_device_power_and_the_papers_energy_are_options(tmp_path: Path) -> None:
+    plain, parameters = load_model(CAR)
+    assert (plain.device_power_W, plain.energy_preset) == (0.0, "full")
+    assert not {"device_power", "energy"} & set(parameters)
+    options = "device_power: 40\nenergy: paper\nidle_power: 0.0"
+    changed, parameters = load_model(changed_car(tmp_path, "idle_power: 0.0", options))
+    assert changed.device_power_W == parameters["device_power"] == 40.0
+    assert parameters["energy"] == "paper"
+    assert changed.energy_model == plain.energy_model.with_preset("paper")
 
 
 def test_reference_point_must_be_inside(tmp_path: Path) -> None:

@@ -189,6 +189,20 @@ def test_regions_hold_what_they_say(
     assert ((depth > 0) == inside)[clear].all()
 
 
+def test_one_robot_may_be_charged_as_in_the_paper() -> None:
+    robots = [
+        {"id": "r1", "model": "car", "pose": [3, 5, 0], "energy": "paper"},
+        {"id": "r2", "model": "car", "pose": [3, 8, 0]},
+    ]
+    scene = scene_from_document(document(robots=robots), source="test")
+    first, second = (robot.model.energy_model for robot in scene.robots)
+    assert first == second.with_preset("paper")
+    assert first != second
+    again = scene_from_document(scene.document, source="test")
+    assert again.robots[0].model.energy_preset == "paper"
+    assert again.digest == scene.digest
+
+
 def test_digest_sees_every_value() -> None:
     digests = {
         scene_from_document(changed, source="test").digest
@@ -199,9 +213,14 @@ def test_digest_sees_every_value() -> None:
             document(battery={"reserve": 0.1}),
             document(goals=[{"id": "g", "circle": {"center": [9, 9], "radius": 1}}]),
             document(robots=[{"id": "r1", "model": "car", "pose": [3, 5, 0.1]}]),
+            document(
+                robots=[
+                    {"id": "r1", "model": "car", "pose": [3, 5, 0], "energy": "paper"}
+                ]
+            ),
         )
     }
-    assert len(digests) == 6
+    assert len(digests) == 7
 
 
 def test_digest_sees_defaults_as_if_written() -> None:
