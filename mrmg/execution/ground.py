@@ -15,6 +15,7 @@ import numpy as np
 
 from mrmg.energy import GRAVITY_M_S2
 from mrmg.errors import Fault, FileError
+from mrmg.execution.disturbance import Disturbance
 from mrmg.execution.world_model import MujocoWorld
 from mrmg.scene.types import Robot, Scene
 
@@ -51,8 +52,10 @@ def believed_resistance(scene: Scene) -> GroundResistance:
     )
 
 
-def true_resistance(world: MujocoWorld) -> GroundResistance:
-    """Return the resistance by the MJCF of the robots.
+def true_resistance(
+    world: MujocoWorld, disturbance: Disturbance | None = None
+) -> GroundResistance:
+    """Return the resistance by the MJCF of the robots, and what disturbs it.
 
     Raises:
         FileError: if an MJCF does not state a coefficient.
@@ -69,6 +72,9 @@ def true_resistance(world: MujocoWorld) -> GroundResistance:
         ]
     )
     rolling_N, turning_N = coefficients.T * weight_N
+    if disturbance is not None:
+        change = np.array([item.rolling for item in disturbance.robots])
+        rolling_N = rolling_N * (1.0 + change)
     return GroundResistance(rolling_N=rolling_N, turning_N=turning_N)
 
 

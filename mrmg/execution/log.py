@@ -11,9 +11,12 @@ import numpy as np
 
 from mrmg import storage
 from mrmg.errors import Fault, RunFolderError
+from mrmg.execution.disturbance import Disturbance
 from mrmg.execution.supervision import Event
 
 LOG_FORMAT = 1
+
+_NOT_PLAIN = ("contacts", "disturbance", "events", "timing")
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +46,10 @@ class ExecutionLog:
         controller: name of the tracking controller.
         control_period_s: time between ticks.
         completed: False where the simulation was ended early.
+        gave_up: why it was: "lost", too far from the plan; "diverged", physics out of
+            hand; "stalled", the fleet did not get on; "restless", it did not come to
+            rest; "" where completed.
+        disturbance: how the simulated robots differed from their models; None if not.
         robots: ids in the scene's order.
         versions: of the packages that decide the result.
         time_s: simulated time, shape (n,).
@@ -81,6 +88,8 @@ class ExecutionLog:
     contacts: tuple[Contact, ...]
     timing: Mapping[str, Any]
     events: tuple[Event, ...] = ()
+    gave_up: str = ""
+    disturbance: Disturbance | None = None
 
     def save(self, folder: Path) -> None:
         """Write `log.npz`, `timing.json`, then `log.json`, whose presence says done."""
@@ -89,7 +98,7 @@ class ExecutionLog:
         header = {
             field.name: getattr(self, field.name)
             for field in fields(self)
-            if field.name not in {*self._arrays(), "contacts", "events", "timing"}
+            if field.name not in {*self._arrays(), *_NOT_PLAIN}
         }
         header["robots"] = list(self.robots)
         header["versions"] = dict(self.versions)
@@ -98,6 +107,8 @@ class ExecutionLog:
             for contact in self.contacts
         ]
         header["events"] = [event.to_json() for event in self.events]
+        if self.disturbance is not None:
+            header["disturbance"] = self.disturbance.to_json()
         storage.write_json(folder / "log.json", {"format": LOG_FORMAT, **header})
 
     def _arrays(self) -> dict[str, np.ndarray]:
@@ -122,6 +133,8 @@ class ExecutionLog:
             header["robots"] = tuple(header["robots"])
             header["contacts"] = tuple(Contact(**row) for row in header["contacts"])
             header["events"] = tuple(Event(**row) for row in header.get("events", ()))
+            if "disturbance" in header:
+                header["disturbance"] = Disturbance.from_json(header["disturbance"])
             arrays: dict[str, Any] = storage.read_arrays(folder / "log.npz")
             timing = storage.read_json(folder / "timing.json")
             return ExecutionLog(**header, **arrays, timing=timing)

@@ -11,8 +11,11 @@ import mujoco
 import numpy as np
 
 from mrmg.errors import UsageError
+from mrmg.execution.actuation import Actuation
 from mrmg.execution.contacts import ContactWatch
 from mrmg.execution.controller import Controller, controller_maker
+from mrmg.execution.disturbance import Disturbance, DisturbanceRanges
+from mrmg.execution.disturbed_world import disturb_world, move_starts
 from mrmg.execution.drive import DriveControl
 from mrmg.execution.fleet import Fleet
 from mrmg.execution.fleet_clock import FleetClock
@@ -20,6 +23,7 @@ from mrmg.execution.ground import believed_resistance, true_resistance
 from mrmg.execution.log import ExecutionLog
 from mrmg.execution.recording import Recording, held_force_work_J
 from mrmg.execution.reference import FleetReference
+from mrmg.execution.sensing import sensing_of
 from mrmg.execution.set_points import SetPoints
 from mrmg.execution.supervision import Event, Observation, Orders, Supervisor
 from mrmg.execution.world_model import MujocoWorld, build_world
@@ -57,6 +61,7 @@ def simulate(
     plan: Plan,
     *,
     controller: str = "mpc",
+    disturbance: Disturbance | None = None,
     supervisor: Supervisor | None = None,
     on_progress: Progress | None = None,
 ) -> ExecutionLog:
@@ -70,6 +75,7 @@ def simulate(
         scene: the scene the plan was made for.
         plan: what to drive.
         controller: name of the tracking controller.
+        disturbance: how the robots differ from their models; None if they do not.
         supervisor: watches every tick and may give the fleet another plan; the log is
             then of the plan in force at the end, which begins with those before.
         on_progress: called with the fraction done and a text.
@@ -83,7 +89,8 @@ def simulate(
             f"the plan was made for scene {plan.scene_digest}, but '{scene.name}' is "
             f"{scene.digest}; plan this scene anew"
         )
-    run = _Run(build_world(scene), plan, [maker(robot.model) for robot in scene.robots])
+    controllers = [maker(robot.model) for robot in scene.robots]
+    run = _Run(build_world(scene), plan, controllers, disturbance)
     started = time.perf_counter()
     with _no_warning_file():
         while not run.ended():
@@ -113,10 +120,21 @@ class _Run:
     """One simulation in progress."""
 
     def __init__(
-        self, world: MujocoWorld, plan: Plan, controllers: list[Controller]
+        self,
+        world: MujocoWorld,
+        plan: Plan,
+        controllers: list[Controller],
+        disturbance: Disturbance | None,
     ) -> None:
         self.ticks = 0
+        self._disturbance = disturbance
+        if disturbance is None:
+            robots = [robot.id for robot in world.scene.robots]
+            disturbance = DisturbanceRanges().draw(0, robots)
+        else:
+            disturb_world(world, disturbance)
         self.data = mujoco.MjData(world.model)
+        move_starts(world, self.data, disturbance)
         self._world, self._plan = world, plan
         self._period_s = STEPS_PER_TICK * world.model.opt.timestep
         self._reference = FleetReference(world.scene, plan)
@@ -124,13 +142,15 @@ class _Run:
         self._set_points = SetPoints(world.scene, self._reference, controllers)
         self._drive = DriveControl(world.scene)
         self._believed = believed_resistance(world.scene)
-        self._true = true_resistance(world)
+        self._true = true_resistance(world, disturbance)
         self._contacts = ContactWatch(world)
         self._recording = Recording()
         self._work_J = np.zeros((len(world.scene.robots), 2))
         self._call_s: list[float] = []
         self._got_on_s, self._finished_s = 0.0, np.inf
         self._fleet = Fleet(world, self.data)
+        self._sensing = sensing_of(world.scene, disturbance, self._period_s)
+        self._actuation = Actuation(disturbance, self._set_points.following[:, 1])
         self._settle()
         self._observe()
 
@@ -138,17 +158,21 @@ class _Run:
         """Advance the simulation by one control period."""
         self._command()
         now, following = self._set_points.now, self._set_points.following
-        ground = self._ground(following[:, 1])
-        speed, rolled = self._fleet.axle_speed_m_s(), self._fleet.rolled_m()
-        force = self._drive.force_N(
-            speed,
+        steer, period_s = following[:, 1], self._period_s
+        believed = self._believed.force_N(*self._ground(self._sensing.state, steer))
+        wanted = self._drive.force_N(
+            self._sensing.axle_speed_m_s,
             now[:, 0],
             following[:, 0],
-            self._believed.force_N(*ground),
-            self._period_s,
+            believed,
+            period_s,
         )
+        force = self._actuation.force_N(wanted, period_s)
+        steer_from, steer_to = self._actuation.steer(now[:, 1], steer, period_s)
+        ground = self._ground(self._state, steer_to)
+        speed, rolled = self._fleet.axle_speed_m_s(), self._fleet.rolled_m()
         self._fleet.set_resistance(self._true.force_N(*ground))
-        self._fleet.drive(force, now[:, 1], following[:, 1], STEPS_PER_TICK)
+        self._fleet.drive(force, steer_from, steer_to, STEPS_PER_TICK)
         self._clock.advance(self._period_s)
         self.ticks += 1
         work = held_force_work_J(
@@ -164,7 +188,7 @@ class _Run:
 
     def ended(self) -> bool:
         """Tell whether the fleet is at rest after its plan, or is past helping."""
-        return self._completed() or self._hopeless()
+        return self._completed() or bool(self._trouble())
 
     def observation(self) -> Observation:
         """Return what a supervisor sees."""
@@ -172,7 +196,7 @@ class _Run:
             time_s=float(self.data.time),
             clock_s=self._clock_s(),
             rate=self._clock.rate,
-            state=self._state,
+            state=self._sensing.state,
             planned=self._planned,
             work_J=self._work_J,
             ended=self._completed(),
@@ -207,6 +231,8 @@ class _Run:
             controller=controller,
             control_period_s=self._period_s,
             completed=self._completed(),
+            gave_up="" if self._completed() else self._trouble(),
+            disturbance=self._disturbance,
             robots=tuple(robot.id for robot in scene.robots),
             versions={name: version(name) for name in _VERSIONED},
             time_s=recording.in_time("time_s"),
@@ -243,21 +269,30 @@ class _Run:
             self._set_points.brake(self._period_s)
             return
         clock = self._clock
-        clock.pace(self._state, self._planned, self._period_s)
+        clock.pace(self._sensing.state, self._planned, self._period_s)
         if self.ticks % TICKS_PER_CORRECTION == 0:
             started = time.perf_counter()
-            calls = self._set_points.correct(self._state, clock.time_s, clock.rate)
+            calls = self._set_points.correct(
+                self._sensing.state, clock.time_s, clock.rate
+            )
             if calls:
                 self._call_s.append((time.perf_counter() - started) / calls)
         self._set_points.advance(
-            self._fleet.axle_speed_m_s(), clock.time_s, clock.rate, self._period_s
+            self._sensing.axle_speed_m_s, clock.time_s, clock.rate, self._period_s
         )
 
-    def _ground(self, steer: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return terrain and steering in the middle of the coming tick, each (R,)."""
-        _, _, heading, speed, steer_now = self._state.T
+    def _ground(
+        self, state: np.ndarray, steer: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return terrain and steering in the middle of the coming tick, each (R,).
+
+        Args:
+            state: true or seen, shape (R, 5).
+            steer: at the end of the tick, shape (R,).
+        """
+        _, _, heading, speed, steer_now = state.T
         way = 0.5 * self._period_s * speed
-        middle = self._state[:, :2] + np.stack(
+        middle = state[:, :2] + np.stack(
             [way * np.cos(heading), way * np.sin(heading)], axis=1
         )
         multiplier = multiplier_at(self._world.scene, middle)
@@ -265,6 +300,9 @@ class _Run:
 
     def _observe(self) -> None:
         self._state = self._fleet.state()
+        self._sensing.look(
+            self._state, self._fleet.axle_speed_m_s(), self._set_points.following[:, 0]
+        )
         self._planned = self._reference.at(np.array([self._clock.time_s]))[0]
         finished = self._clock.time_s >= self._reference.duration_s - 1e-9
         if finished:
@@ -288,11 +326,16 @@ class _Run:
         at_rest = (np.abs(self._state[:, 3]) < _AT_REST_M_S).all()
         return bool(rested_s >= _REST_S and at_rest)
 
-    def _hopeless(self) -> bool:
+    def _trouble(self) -> str:
+        """Return why the fleet is past helping, in the log's words; "" if it is not."""
         off_m = np.hypot(*(self._state - self._planned)[:, :2].T)
-        stalled = self.data.time - self._got_on_s > _LONGEST_STALL_S
-        restless = self.data.time - self._finished_s > _LONGEST_REST_S
-        diverged = any(self.data.warning[kind].number for kind in _DIVERGED)
+        if any(self.data.warning[kind].number for kind in _DIVERGED):
+            return "diverged"
         # Written so that a state that is not a number counts as lost.
-        lost = not (off_m <= _LOST_M).all()
-        return lost or diverged or stalled or restless
+        if not (off_m <= _LOST_M).all():
+            return "lost"
+        if self.data.time - self._got_on_s > _LONGEST_STALL_S:
+            return "stalled"
+        if self.data.time - self._finished_s > _LONGEST_REST_S:
+            return "restless"
+        return ""

@@ -7,6 +7,10 @@ the simulated motion, *measured* the work done at the simulated wheels,
 
 Planned to metered shows what tracking changed, metered to measured what the energy
 model misses of the physics.
+
+A battery may never fall below its reserve. Under disturbances it may: the reserve is
+there for them. A disturbed mission fails only where a battery runs empty, the battery
+taken as the disturbance has it, and by what was measured.
 """
 
 from __future__ import annotations
@@ -28,6 +32,13 @@ from mrmg.ledger import EnergyLedger, LedgerEntry
 from mrmg.mission import Plan, Visit
 from mrmg.results.energy_audit import EnergyAudit, RobotAudit, SimulatedVisit
 from mrmg.scene.types import Robot, Scene
+
+_TROUBLE = {
+    "lost": "a robot was too far from its plan",
+    "diverged": "the physics got out of hand",
+    "stalled": "the fleet did not get on",
+    "restless": "the fleet did not come to rest",
+}
 
 MEASURED_PARTS = ("drive", "idle", "device")
 """The parts that work at the wheels can be split into."""
@@ -69,6 +80,8 @@ def audit(scene: Scene, plan: Plan, log: ExecutionLog) -> EnergyAudit:
         RunFolderError: if the log is of another scene, plan or fleet.
     """
     _check_same_mission(scene, plan, log)
+    if log.disturbance is not None:
+        scene = log.disturbance.actual_scene(scene)
     measured = [_measure(scene, plan, log, index) for index in range(len(log.robots))]
     planned_ledger = plan.ledger
     metered_ledger = plan_ledger(
@@ -84,7 +97,7 @@ def audit(scene: Scene, plan: Plan, log: ExecutionLog) -> EnergyAudit:
         *_unfinished(log),
         *_goals_missed(scene, goals_visited),
         *_contacts(log),
-        *_below_reserve(scene, measured),
+        *_run_down(scene, log, measured),
     )
     return EnergyAudit(
         mission_ok=not reasons,
@@ -219,7 +232,8 @@ def _goals_visited(scene: Scene, log: ExecutionLog) -> tuple[str, ...]:
 def _unfinished(log: ExecutionLog) -> list[str]:
     if log.completed:
         return []
-    return [f"the simulation was ended early, at {log.time_s[-1]:.1f} s"]
+    why = f" ({_TROUBLE[log.gave_up]})" if log.gave_up in _TROUBLE else ""
+    return [f"the simulation was ended early, at {log.time_s[-1]:.1f} s{why}"]
 
 
 def _goals_missed(scene: Scene, visited: tuple[str, ...]) -> list[str]:
@@ -238,13 +252,17 @@ def _contacts(log: ExecutionLog) -> list[str]:
     ]
 
 
-def _below_reserve(scene: Scene, measured: list[_Measured]) -> list[str]:
+def _run_down(scene: Scene, log: ExecutionLog, measured: list[_Measured]) -> list[str]:
+    disturbed = log.disturbance is not None
     reasons = []
     for item in measured:
-        battery = scene.robot(item.motion.robot).battery
-        if item.least_J < battery.reserve_J:
+        reserve_J = scene.robot(item.motion.robot).battery.reserve_J
+        name = item.motion.robot
+        if disturbed and item.least_J < 0.0:
+            reasons.append(f"{name}'s battery ran empty, {-item.least_J:.0f} J short")
+        elif not disturbed and item.least_J < reserve_J:
             reasons.append(
-                f"{item.motion.robot}'s battery fell to {item.least_J:.0f} J, "
-                f"below its reserve of {battery.reserve_J:.0f} J"
+                f"{name}'s battery fell to {item.least_J:.0f} J, "
+                f"below its reserve of {reserve_J:.0f} J"
             )
     return reasons

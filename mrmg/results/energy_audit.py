@@ -65,8 +65,8 @@ class EnergyAudit:
     """The account of a simulated mission.
 
     Attributes:
-        mission_ok: all goals visited, no contact, no battery below its reserve, and the
-            simulation ran to the end.
+        mission_ok: all goals visited, no contact, no battery below its reserve (under
+            disturbances: none empty), and the simulation ran to the end.
         reasons: why not, one sentence each.
         robots: one account per robot, in the scene's order.
         visits: of tours' targets in the simulation, in order of time.

@@ -1,0 +1,163 @@
+"""How a simulated mission differs from the one that was planned for.
+
+`DisturbanceRanges` says how far each quantity may stray, `draw` picks one `Disturbance`
+from them by a seed. A disturbance is a plain value: logs keep it, so that a log says
+what was simulated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Any
+
+from mrmg import seeding
+from mrmg.scene.types import Battery, Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """An interval that a value is drawn from, evenly; both ends equal for a fixed one.
+
+    Attributes:
+        low, high: ends, low <= high.
+    """
+
+    low: float = 0.0
+    high: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotDisturbance:
+    """What is different about one robot; changes are shares of the model's value.
+
+    Attributes:
+        robot: its id.
+        mass: change of all its masses and inertias.
+        friction: change of the grip of its tyres and hull.
+        rolling: change of its rolling resistance, over that which the mass brings.
+        drive_gain: change of the drive's force against the one commanded.
+        steering_gain: change of the steering against the one commanded.
+        lag_s: time constant of drive and steering.
+        position_noise_m: standard deviation of each measured coordinate.
+        heading_noise_rad: standard deviation of the measured heading.
+        speed_noise_m_s: standard deviation of the measured speed.
+        delay_s: age of measured positions and headings.
+        start_x_m, start_y_m, start_heading_rad: offset of the start pose.
+        capacity: change of the battery's capacity and of its content at the start.
+    """
+
+    robot: str
+    mass: float = 0.0
+    friction: float = 0.0
+    rolling: float = 0.0
+    drive_gain: float = 0.0
+    steering_gain: float = 0.0
+    lag_s: float = 0.0
+    position_noise_m: float = 0.0
+    heading_noise_rad: float = 0.0
+    speed_noise_m_s: float = 0.0
+    delay_s: float = 0.0
+    start_x_m: float = 0.0
+    start_y_m: float = 0.0
+    start_heading_rad: float = 0.0
+    capacity: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Disturbance:
+    """What is different about a mission.
+
+    Attributes:
+        seed: of the draw, and of the noise while driving.
+        robots: one disturbance a robot, in the scene's order.
+    """
+
+    seed: int
+    robots: tuple[RobotDisturbance, ...]
+
+    def battery(self, index: int, battery: Battery) -> Battery:
+        """Return the battery that a robot really has, its reserve in joules kept."""
+        factor = 1.0 + self.robots[index].capacity
+        return replace(
+            battery,
+            capacity_J=battery.capacity_J * factor,
+            start_J=battery.start_J * factor,
+            reserve_fraction=battery.reserve_fraction / factor,
+        )
+
+    def actual_scene(self, scene: Scene) -> Scene:
+        """Return the scene with the batteries that its robots really have."""
+        robots = (
+            replace(robot, battery=self.battery(index, robot.battery))
+            for index, robot in enumerate(scene.robots)
+        )
+        return replace(scene, robots=tuple(robots))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the disturbance as JSON data."""
+        return asdict(self)
+
+    @staticmethod
+    def from_json(data: Mapping[str, Any]) -> Disturbance:
+        """Rebuild a disturbance from `to_json`."""
+        return Disturbance(
+            seed=data["seed"],
+            robots=tuple(RobotDisturbance(**row) for row in data["robots"]),
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DisturbanceRanges:
+    """How far each quantity of `RobotDisturbance` may stray, in its unit."""
+
+    mass: Span = Span()
+    friction: Span = Span()
+    rolling: Span = Span()
+    drive_gain: Span = Span()
+    steering_gain: Span = Span()
+    lag_s: Span = Span()
+    position_noise_m: Span = Span()
+    heading_noise_rad: Span = Span()
+    speed_noise_m_s: Span = Span()
+    delay_s: Span = Span()
+    start_x_m: Span = Span()
+    start_y_m: Span = Span()
+    start_heading_rad: Span = Span()
+    capacity: Span = Span()
+
+    def draw(self, seed: int, robots: Iterable[str]) -> Disturbance:
+        """Return the disturbance that `seed` picks for the robots of these ids.
+
+        Every quantity of every robot has a stream of its own: widening one range
+        leaves what is drawn from the others.
+        """
+        return Disturbance(
+            seed=seed,
+            robots=tuple(
+                RobotDisturbance(
+                    robot=robot,
+                    **{
+                        item.name: _drawn(getattr(self, item.name), seed, robot, item)
+                        for item in fields(self)
+                    },
+                )
+                for robot in robots
+            ),
+        )
+
+
+def _drawn(span: Span, seed: int, robot: str, item: Any) -> float:
+    rng = seeding.stream(seed, "disturbance", robot, item.name)
+    # Exact where both ends are equal, which low + (high - low) u is.
+    return float(span.low + (span.high - span.low) * rng.random())
+
+
+DEFAULT_RANGES = DisturbanceRanges(
+    mass=Span(-0.05, 0.05),
+    friction=Span(-0.20, 0.20),
+    rolling=Span(-0.10, 0.10),
+    lag_s=Span(0.05, 0.05),
+    position_noise_m=Span(0.02, 0.02),
+)
+"""The disturbances a plan is expected to survive."""
