@@ -22,6 +22,7 @@ class ClockParams:
         slowing_per_s: fastest fall of the rate.
         recovery_per_s: fastest rise of the rate.
         least_speed_m_s: speed below which lag is measured as if at this speed.
+        least_yaw_rate_rad_s: the same for turning on the spot.
     """
 
     tolerated_lag_s: float = 0.1
@@ -29,6 +30,7 @@ class ClockParams:
     slowing_per_s: float = 4.0
     recovery_per_s: float = 1.5
     least_speed_m_s: float = 0.5
+    least_yaw_rate_rad_s: float = 0.5
 
 
 class FleetClock:
@@ -39,16 +41,29 @@ class FleetClock:
         rate: plan seconds per simulated second, in [0, 1].
     """
 
-    def __init__(self, params: ClockParams | None = None) -> None:
-        """Start at plan time 0, at full rate."""
+    def __init__(
+        self, turns: np.ndarray | None = None, params: ClockParams | None = None
+    ) -> None:
+        """Start at plan time 0, at full rate.
+
+        Args:
+            turns: which robots have a yaw rate as fifth state, shape (R,); None for
+                none.
+            params: how the rate follows the lag.
+        """
         self.time_s = 0.0
         self.rate = 1.0
+        self._turns = np.zeros(0, dtype=int) if turns is None else np.flatnonzero(turns)
         self._params = params or ClockParams()
 
     def pace(self, state: np.ndarray, reference: np.ndarray, period_s: float) -> None:
         """Set the rate from where the robots are and should be, both (R, 5)."""
         params = self._params
         worst_s = float(lag_s(state, reference, params.least_speed_m_s).max())
+        turning_s = turning_lag_s(
+            state[self._turns], reference[self._turns], params.least_yaw_rate_rad_s
+        )
+        worst_s = max(worst_s, float(turning_s.max(initial=-np.inf)))
         target = 1.0 - params.gain_per_s * max(worst_s - params.tolerated_lag_s, 0.0)
         lowest = self.rate - params.slowing_per_s * period_s
         highest = self.rate + params.recovery_per_s * period_s
@@ -69,3 +84,17 @@ def lag_s(
     # One that waits is not late; where it stands short of its place, it stays there.
     direction = np.sign(speed) * (np.abs(speed) > STANDSTILL_M_S)
     return np.asarray(direction * ahead_m / np.maximum(np.abs(speed), least_speed_m_s))
+
+
+def turning_lag_s(
+    state: np.ndarray, reference: np.ndarray, least_yaw_rate_rad_s: float
+) -> np.ndarray:
+    """Return how late each robot is in its planned turn [s], shape (R,).
+
+    One that drove on before it has turned would leave its way.
+    """
+    yaw_rate = reference[:, 4]
+    # The standstill of turning is that of driving, in radians.
+    direction = np.sign(yaw_rate) * (np.abs(yaw_rate) > STANDSTILL_M_S)
+    ahead_rad = direction * (reference[:, 2] - state[:, 2])
+    return np.asarray(ahead_rad / np.maximum(np.abs(yaw_rate), least_yaw_rate_rad_s))

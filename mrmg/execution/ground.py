@@ -8,6 +8,7 @@ both meet.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import mujoco
@@ -26,18 +27,33 @@ class GroundResistance:
 
     Attributes:
         rolling_N: on plain ground, straight on, shape (R,).
-        turning_N: more of it per |tan psi|, shape (R,).
+        turning_N: more of it per |tan psi| of a car, shape (R,); 0 for other robots.
+        swing_N: against the way that a differential drive's wheels roll differently,
+            shape (R,); 0 for other robots.
     """
 
     rolling_N: np.ndarray
     turning_N: np.ndarray
+    swing_N: np.ndarray
+
+    @staticmethod
+    def of(
+        robots: Sequence[Robot], rolling_N: np.ndarray, turning_N: np.ndarray
+    ) -> GroundResistance:
+        """Return the resistance of robots whose turning is lost as their kind does."""
+        steers = np.array([robot.model.motion_model == "car" for robot in robots])
+        return GroundResistance(
+            rolling_N=rolling_N,
+            turning_N=np.where(steers, turning_N, 0.0),
+            swing_N=np.where(steers, 0.0, turning_N),
+        )
 
     def force_N(self, multiplier: np.ndarray, steer: np.ndarray) -> np.ndarray:
-        """Return the force by the energy model's law, shape (R,).
+        """Return the force along the way by the energy model's law, shape (R,).
 
         Args:
             multiplier: terrain under each robot, shape (R,).
-            steer: psi [rad], shape (R,).
+            steer: psi [rad] of the cars, shape (R,).
         """
         turning = self.turning_N * np.abs(np.tan(steer))
         return np.asarray(self.rolling_N * multiplier + turning)
@@ -46,7 +62,8 @@ class GroundResistance:
 def believed_resistance(scene: Scene) -> GroundResistance:
     """Return the resistance by the energy models of the robots."""
     energy = [robot.model.energy_model for robot in scene.robots]
-    return GroundResistance(
+    return GroundResistance.of(
+        scene.robots,
         rolling_N=np.array([model.rolling_force_N for model in energy]),
         turning_N=np.array([model.turning_force_N for model in energy]),
     )
@@ -75,7 +92,7 @@ def true_resistance(
     if disturbance is not None:
         change = np.array([item.rolling for item in disturbance.robots])
         rolling_N = rolling_N * (1.0 + change)
-    return GroundResistance(rolling_N=rolling_N, turning_N=turning_N)
+    return GroundResistance.of(robots, rolling_N, turning_N)
 
 
 def _numeric(model: mujoco.MjModel, robot: Robot, name: str) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.interpolate import PPoly
 
 from mrmg.mission import Plan, Trajectory
-from mrmg.motion.dynamics import DERIVATIVES, NX
+from mrmg.motion.dynamics import DERIVATIVES, NX, SPEED_STATES
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
 
@@ -30,6 +30,7 @@ class FleetReference:
         pieces = [
             _pieces(robot.model, plan.trajectory(robot.id)) for robot in scene.robots
         ]
+        self._is_speed = speed_states(scene)
         steps = pieces[0].shape[1]
         self.duration_s = plan.makespan_s
         self._plan = PPoly(
@@ -52,8 +53,17 @@ class FleetReference:
         multiplied by it.
         """
         states = self.at(clock_s + rate * period_s * np.arange(count))
-        states[:, :, 3] *= rate
-        return states
+        return np.where(self._is_speed, rate * states, states)
+
+
+def speed_states(scene: Scene) -> np.ndarray:
+    """Tell which states of which robot are speeds, shape (R, 5)."""
+    return np.array(
+        [
+            np.isin(np.arange(NX), SPEED_STATES[robot.model.motion_model])
+            for robot in scene.robots
+        ]
+    )
 
 
 def _pieces(model: RobotModel, item: Trajectory) -> np.ndarray:

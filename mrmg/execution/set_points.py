@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrmg.execution.controller import HORIZON, HORIZON_STEP_S, Controller
-from mrmg.execution.reference import STANDSTILL_M_S, FleetReference
+from mrmg.execution.reference import STANDSTILL_M_S, FleetReference, speed_states
 from mrmg.scene.types import Scene
 
 _STALL_M_S = 0.3
@@ -13,7 +13,7 @@ _STILL = 1e-6
 
 
 class SetPoints:
-    """Commanded (v [m/s], psi [rad]) of all robots; between ticks they are ramps.
+    """Commanded (v [m/s], psi [rad] or omega [rad/s]) of all robots, ramps in time.
 
     The plan's own controls are fed forward tick by tick, exactly as they switch; the
     controllers, called less often, only add to them.
@@ -39,6 +39,7 @@ class SetPoints:
         self._control_bound = np.array(
             [[item.u1_max_m_s2, item.u2_max] for item in limits]
         )
+        self._is_speed = speed_states(scene)[:, 3:]
         self._reference, self._controllers = reference, controllers
         self._correction = np.zeros((len(limits), 2))
         self._planned = reference.at(np.zeros(1))[0, :, 3:]
@@ -86,11 +87,13 @@ class SetPoints:
             self.now[:, 0], axle_speed_m_s - _STALL_M_S, axle_speed_m_s + _STALL_M_S
         )
         coming = self._reference.at(clock_s + rate * period_s * np.arange(2))[..., 3:]
-        planned = coming[1] * [rate, 1.0]
+        planned = np.where(self._is_speed, rate * coming[1], coming[1])
         control = (planned - self._planned) / period_s + self._correction
         # Where the plan waits, so does the robot: creeping up would cost energy.
         waits = (np.abs(coming[..., 0]) < STANDSTILL_M_S).all(axis=0)
-        control[waits, 0] = -self.now[waits, 0] / period_s
+        rests = waits & (np.abs(coming[..., 1]) < STANDSTILL_M_S).all(axis=0)
+        stops = self._is_speed & np.stack([waits, rests], axis=1)
+        control = np.where(stops, -self.now / period_s, control)
         control = np.clip(control, -self._control_bound, self._control_bound)
         self.following = np.clip(
             self.now + period_s * control, self._lower, self._upper
@@ -100,6 +103,5 @@ class SetPoints:
     def brake(self, period_s: float) -> None:
         """Make the ramps of the coming tick those of stopping, steering held."""
         self.now = self.following.copy()
-        change = period_s * self._control_bound[:, 0]
-        self.following = self.now.copy()
-        self.following[:, 0] -= np.clip(self.now[:, 0], -change, change)
+        change = self._is_speed * period_s * self._control_bound
+        self.following = self.now - np.clip(self.now, -change, change)

@@ -12,6 +12,7 @@ import numpy as np
 
 from mrmg.errors import UsageError
 from mrmg.execution.actuation import Actuation
+from mrmg.execution.chassis import chassis_maker
 from mrmg.execution.contacts import ContactWatch
 from mrmg.execution.controller import Controller, controller_maker
 from mrmg.execution.disturbance import Disturbance, DisturbanceRanges
@@ -21,8 +22,8 @@ from mrmg.execution.fleet import Fleet
 from mrmg.execution.fleet_clock import FleetClock
 from mrmg.execution.ground import believed_resistance, true_resistance
 from mrmg.execution.log import ExecutionLog
-from mrmg.execution.recording import Recording, held_force_work_J
-from mrmg.execution.reference import FleetReference
+from mrmg.execution.recording import Recording
+from mrmg.execution.reference import FleetReference, speed_states
 from mrmg.execution.sensing import sensing_of
 from mrmg.execution.set_points import SetPoints
 from mrmg.execution.supervision import Event, Observation, Orders, Supervisor
@@ -81,7 +82,8 @@ def simulate(
         on_progress: called with the fraction done and a text.
 
     Raises:
-        UsageError: if the controller is unknown or the plan is of another scene.
+        UsageError: if the controller is unknown, the plan is of another scene, or a
+            robot is of a kind that cannot be executed.
     """
     maker = controller_maker(controller)
     if plan.scene_digest != scene.digest:
@@ -89,6 +91,8 @@ def simulate(
             f"the plan was made for scene {plan.scene_digest}, but '{scene.name}' is "
             f"{scene.digest}; plan this scene anew"
         )
+    for robot in scene.robots:
+        chassis_maker(robot)
     controllers = [maker(robot.model) for robot in scene.robots]
     run = _Run(build_world(scene), plan, controllers, disturbance)
     started = time.perf_counter()
@@ -138,7 +142,7 @@ class _Run:
         self._world, self._plan = world, plan
         self._period_s = STEPS_PER_TICK * world.model.opt.timestep
         self._reference = FleetReference(world.scene, plan)
-        self._clock = FleetClock()
+        self._clock = FleetClock(speed_states(world.scene)[:, 4])
         self._set_points = SetPoints(world.scene, self._reference, controllers)
         self._drive = DriveControl(world.scene)
         self._believed = believed_resistance(world.scene)
@@ -170,17 +174,10 @@ class _Run:
         force = self._actuation.force_N(wanted, period_s)
         steer_from, steer_to = self._actuation.steer(now[:, 1], steer, period_s)
         ground = self._ground(self._state, steer_to)
-        speed, rolled = self._fleet.axle_speed_m_s(), self._fleet.rolled_m()
-        self._fleet.set_resistance(self._true.force_N(*ground))
-        self._fleet.drive(force, steer_from, steer_to, STEPS_PER_TICK)
+        self._fleet.set_resistance(self._true.force_N(*ground), self._true.swing_N)
+        work = self._fleet.drive(force, steer_from, steer_to, STEPS_PER_TICK)
         self._clock.advance(self._period_s)
         self.ticks += 1
-        work = held_force_work_J(
-            force,
-            self._fleet.rolled_m() - rolled,
-            self._fleet.axle_speed_m_s() - speed,
-            self._world.model.opt.timestep,
-        )
         self._recording.add(force_N=force, work_J=work)
         self._work_J = work
         self._contacts.look(self.data)
@@ -259,7 +256,8 @@ class _Run:
     def _settle(self) -> None:
         """Let the tyres take the weight, then start the time."""
         still = np.zeros(len(self._world.scene.robots))
-        self._fleet.set_resistance(self._true.force_N(still + 1.0, still))
+        force = self._true.force_N(still + 1.0, still)
+        self._fleet.set_resistance(force, self._true.swing_N)
         self._fleet.drive(still, still, still, _SETTLING_STEPS)
         self.data.time = 0.0
 

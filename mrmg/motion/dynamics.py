@@ -119,3 +119,9 @@ TURN_SPEEDS: dict[str, Callable[[Any], Callable[..., Any]]] = {
     "unicycle": unicycle_turn_speed,
 }
 """Factories of L |theta'|, what turning costs by, by the name of the motion model."""
+
+SPEED_STATES: dict[str, tuple[int, ...]] = {"car": (3,), "unicycle": (3, 4)}
+"""Indices of the states that are speeds, by the name of the motion model.
+
+They are zero at rest, and run at half its pace a motion has half of them.
+"""

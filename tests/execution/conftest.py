@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,43 +13,46 @@ import pytest
 from mrmg.accounting import step_energy_parts
 from mrmg.ledger import EnergyLedger
 from mrmg.mission import Plan, Trajectory
-from mrmg.motion.dynamics import car_derivative, rk4_step
+from mrmg.motion.dynamics import DERIVATIVES, rk4_step
 from mrmg.scene.loading import scene_from_document
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Robot, Scene
 
 DT_S = 0.1
-_STEP = rk4_step(car_derivative(math.sin, math.cos, math.tan))
 
 
 def open_ground(
-    poses: list[tuple[float, float, float]], half_m: float = 60.0, **parts: Any
+    poses: list[tuple[float, float, float]],
+    half_m: float = 60.0,
+    models: Sequence[str] = ("car",),
+    **parts: Any,
 ) -> Scene:
-    """A square of plain ground with cars r1, r2, ... at `poses` and further parts."""
+    """A square of plain ground with robots r1, r2, ... at `poses` and further parts.
+
+    The last of `models` goes for all robots that follow.
+    """
+    kinds = [*models, *[models[-1]] * len(poses)]
     document = {
         "format": 1,
         "name": "open ground",
         "bounds": [-half_m, -half_m, half_m, half_m],
         "robots": [
-            {"id": f"r{index + 1}", "model": "car", "pose": list(pose)}
-            for index, pose in enumerate(poses)
+            {"id": f"r{index + 1}", "model": kind, "pose": list(pose)}
+            for index, (kind, pose) in enumerate(zip(kinds, poses, strict=False))
         ],
         **parts,
     }
     return scene_from_document(document, source="test", base=None)
 
 
-def rolled_out(
-    start: tuple[float, float, float],
-    control: np.ndarray,
-    robot: str,
-    wheelbase_m: float,
-) -> Trajectory:
-    """The trajectory of held controls, shape (n, 2), from rest."""
-    state = [(*start, 0.0, 0.0)]
+def rolled_out(robot: Robot, control: np.ndarray) -> Trajectory:
+    """The trajectory of held controls, shape (n, 2), from rest at the start pose."""
+    derivative = DERIVATIVES[robot.model.motion_model](math.sin, math.cos, math.tan)
+    step = rk4_step(derivative)
+    state = [(*robot.pose, 0.0, 0.0)]
     for u1, u2 in control:
-        state.append(_STEP(*state[-1], u1, u2, wheelbase_m, DT_S))
+        state.append(step(*state[-1], u1, u2, robot.model.wheelbase_m, DT_S))
     return Trajectory(
-        robot=robot, dt_s=DT_S, state=np.array(state), control=np.array(control)
+        robot=robot.id, dt_s=DT_S, state=np.array(state), control=np.array(control)
     )
 
 
@@ -63,7 +67,7 @@ def plan_of(scene: Scene, controls: list[np.ndarray]) -> Plan:
         versions={},
         dt_s=DT_S,
         trajectories=tuple(
-            rolled_out(robot.pose, control, robot.id, robot.model.wheelbase_m)
+            rolled_out(robot, control)
             for robot, control in zip(scene.robots, controls, strict=True)
         ),
         tours={robot.id: () for robot in scene.robots},
@@ -80,8 +84,8 @@ def planned_J(scene: Scene, plan: Plan, robot: str) -> float:
 def bang_bang(scene: Scene, robot: str, seconds: float, seed: int) -> np.ndarray:
     """Random controls as the planner makes them: at 85 % of the limits, held 0.3-1.5 s.
 
-    Speeds reach both bounds and cross zero; steering wanders over its whole range; the
-    last seconds bring the car to rest with straight wheels.
+    Speeds reach both bounds and cross zero; steering, or turning, wanders over its
+    whole range; the last seconds bring the robot to rest with straight wheels.
     """
     model = scene.robot(robot).model
     limits = model.limits.scaled(model.planning_share)

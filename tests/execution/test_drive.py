@@ -59,7 +59,7 @@ def test_integral_removes_a_steady_error_and_is_bounded(scene: Scene) -> None:
     for _ in range(2000):
         held = control.force_N(np.zeros(1), asked, asked, np.zeros(1), TICK_S)
     params = DriveParams()
-    bound = params.proportional_per_s + params.integral_limit_m_s2
+    bound = params.loop.proportional_per_s + params.loop.integral_limit_m_s2
     assert held[0] == pytest.approx(
         min(mass * bound, params.grip_share * 0.5 * 180 * 9.81)
     )

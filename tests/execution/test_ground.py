@@ -41,12 +41,6 @@ def test_resistance_is_the_energy_models_power_over_the_speed(scene: Scene) -> N
     np.testing.assert_allclose(force / model.drive_efficiency, parts.sum(axis=1))
 
 
-def test_what_is_believed_of_the_shipped_car_is_true(scene: Scene) -> None:
-    believed, true = believed_resistance(scene), true_resistance(build_world(scene))
-    np.testing.assert_allclose(believed.rolling_N, true.rolling_N, rtol=1e-12)
-    np.testing.assert_allclose(believed.turning_N, true.turning_N, rtol=1e-12)
-
-
 def test_a_wrong_belief_does_not_change_what_driving_takes(
     driving: SimpleNamespace, scene: Scene
 ) -> None:

@@ -16,7 +16,6 @@ from shapely.geometry import Polygon, box
 from mrmg.errors import FileError
 from mrmg.execution import palette
 from mrmg.execution.contacts import ContactWatch
-from mrmg.execution.fleet import Fleet
 from mrmg.execution.world_model import MujocoWorld, build_world
 from mrmg.scene.types import Scene
 
@@ -155,27 +154,6 @@ def test_a_touch_is_noted_once_while_it_lasts(world: MujocoWorld) -> None:
         data.time = time_s
         watch.look(data)
     assert [contact.time_s for contact in watch.contacts] == [0.1, 0.4]
-
-
-def test_ramming_leaves_both_cars_on_their_wheels(scene: Scene) -> None:
-    """20 s of wild pushing among obstacles, walls and each other; no warning."""
-    world = build_world(scene)
-    data = mujoco.MjData(world.model)
-    fleet = Fleet(world, data)
-    fleet.set_resistance(np.full(2, 100.0))
-    rng = np.random.default_rng(8)
-    watch, steer = ContactWatch(world), np.zeros(2)
-    for _ in range(100):
-        force, following = rng.uniform(-600, 900, 2), rng.uniform(-0.6, 0.6, 2)
-        for _ in range(10):
-            fleet.drive(force, steer, following, 5)
-            steer = following
-            watch.look(data)
-            upright = data.xmat[world.chassis].reshape(2, 3, 3)[:, 2, 2]
-            assert upright.min() > np.cos(np.radians(12))
-            assert np.abs(data.xpos[world.chassis, 2]).max() < 0.15
-    assert len(watch.contacts) > 5
-    assert sum(warning.number for warning in data.warning) == 0
 
 
 def test_robots_start_at_their_poses(world: MujocoWorld) -> None:

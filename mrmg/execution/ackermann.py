@@ -1,0 +1,115 @@
+"""The chassis of a car: two steered wheels in front, an open differential behind.
+
+The MJCF names its parts: joints `steer_fl`, `steer_fr`, `spin_rl`, `spin_rr`; actuators
+`steer_l`, `steer_r` (position servos) and `drive` (traction force at the rear axle).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from mrmg.execution.chassis import part_ids
+from mrmg.execution.recording import held_force_work_J
+from mrmg.scene.types import Robot
+
+
+class AckermannChassis:
+    """All cars of a running simulation; a `Chassis`."""
+
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[Robot]
+    ) -> None:
+        """Find the parts of `robots`.
+
+        Raises:
+            FileError: if an MJCF lacks one.
+        """
+        self._model, self._data = model, data
+        models = [robot.model for robot in robots]
+        self._wheelbase_m = np.array([item.wheelbase_m for item in models])
+        self._half_track_m = np.array([item.track_m for item in models]) / 2
+        self._radius_m = np.array([item.wheel_radius_m for item in models])
+        joint, actuator = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_ACTUATOR
+        steer = part_ids(model, joint, robots, ("steer_fl", "steer_fr"))
+        spin = part_ids(model, joint, robots, ("spin_rl", "spin_rr"))
+        self._steer_q = model.jnt_qposadr[steer]
+        self._spin_q = model.jnt_qposadr[spin]
+        self._spin_v = model.jnt_dofadr[spin]
+        self._steer_ctrl = part_ids(model, actuator, robots, ("steer_l", "steer_r"))
+        self._drive_ctrl = part_ids(model, actuator, robots, ("drive",))[:, 0]
+        # A servo with stiffness kp and damping kv follows a ramp kv / kp late.
+        servo = self._steer_ctrl[:, 0]
+        self._servo_lag_s = (
+            model.actuator_biasprm[servo, 2] / model.actuator_biasprm[servo, 1]
+        )
+
+    def fifth_state(self) -> np.ndarray:
+        """Return the true psi, shape (K,)."""
+        tan_steer = self._tan_steer(np.tan(self._data.qpos[self._steer_q]))
+        return np.asarray(np.arctan(tan_steer))
+
+    def axle_speed_m_s(self) -> np.ndarray:
+        """Return the speed the rear axle rolls at, shape (K,)."""
+        return self._mean_over_axle(self._data.qvel[self._spin_v])
+
+    def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
+        """Set the dry friction of the rear axle, shape (K,); its differential is free.
+
+        Args:
+            resistance_N: against the way of its middle.
+            swing_N: zero.
+        """
+        torque = 0.5 * self._radius_m * resistance_N
+        self._model.dof_frictionloss[self._spin_v] = torque[:, None]
+
+    def command(
+        self, force_N: np.ndarray, w_from: np.ndarray, w_to: np.ndarray, steps: int
+    ) -> None:
+        """Hold the traction force; ramp psi so that the servos are on it in time."""
+        step_s = self._model.opt.timestep
+        rate = (w_to - w_from) / (steps * step_s)
+        share = (np.arange(steps) / steps)[:, None]
+        psi = w_from + share * (w_to - w_from) + rate * self._servo_lag_s
+        self._angles = self._wheel_angles(psi)
+        self._force_N = force_N
+        self._speed_m_s, self._rolled_m = self.axle_speed_m_s(), self._axle_way_m()
+        self._data.ctrl[self._drive_ctrl] = force_N
+
+    def apply(self, step: int) -> None:
+        """Give the servos the angles of physics step `step`."""
+        self._data.ctrl[self._steer_ctrl] = self._angles[step]
+
+    def work_J(self) -> np.ndarray:
+        """Return the work since `command`: driving and braking, shape (K, 2)."""
+        return held_force_work_J(
+            self._force_N,
+            self._axle_way_m() - self._rolled_m,
+            self.axle_speed_m_s() - self._speed_m_s,
+            self._model.opt.timestep,
+        )
+
+    def _axle_way_m(self) -> np.ndarray:
+        """Return the way the rear axle has rolled, forward less back, shape (K,)."""
+        return self._mean_over_axle(self._data.qpos[self._spin_q])
+
+    def _mean_over_axle(self, wheels: np.ndarray) -> np.ndarray:
+        """Return the axle's motion from that of its wheels, shape (K, 2) -> (K,)."""
+        return np.asarray(0.5 * self._radius_m * (wheels[:, 0] + wheels[:, 1]))
+
+    def _wheel_angles(self, steer: np.ndarray) -> np.ndarray:
+        """Return left and right Ackermann angles, shape (n, K) -> (n, K, 2)."""
+        way = self._wheelbase_m * np.tan(steer)
+        swing = self._half_track_m / self._wheelbase_m * way
+        left = np.arctan(way / (self._wheelbase_m - swing))
+        right = np.arctan(way / (self._wheelbase_m + swing))
+        return np.stack([left, right], axis=-1)
+
+    def _tan_steer(self, tan_wheel: np.ndarray) -> np.ndarray:
+        """Return tan psi from the tangents of both wheels' angles, (K, 2) -> (K,)."""
+        ratio = self._half_track_m / self._wheelbase_m
+        left = tan_wheel[:, 0] / (1.0 + ratio * tan_wheel[:, 0])
+        right = tan_wheel[:, 1] / (1.0 - ratio * tan_wheel[:, 1])
+        return np.asarray(0.5 * (left + right))

@@ -1,0 +1,134 @@
+"""The chassis of a differential drive: two driven wheels, and casters without drag.
+
+The MJCF names its parts: joints `spin_l`, `spin_r`; motors `drive_l`, `drive_r`
+(traction force at each wheel); tendons `axle` (way rolled by the middle of the axle)
+and `swing` (way rolled by the right wheel less that of the left). The tendons carry dry
+friction: rolling resistance on the first, what turning takes on the second, so that
+both losses add up as in the energy model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from mrmg.execution.chassis import part_ids
+from mrmg.execution.drive import DriveParams, axle_grip_N
+from mrmg.execution.recording import held_force_work_J
+from mrmg.execution.speed_loop import SpeedLoop
+from mrmg.scene.types import Robot
+
+
+class DifferentialChassis:
+    """All differential drives of a running simulation; a `Chassis`."""
+
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[Robot]
+    ) -> None:
+        """Find the parts of `robots`.
+
+        Raises:
+            FileError: if an MJCF lacks one.
+        """
+        self._model, self._data = model, data
+        models = [robot.model for robot in robots]
+        self._track_m = np.array([item.track_m for item in models])
+        self._radius_m = np.array([item.wheel_radius_m for item in models])
+        joint, actuator = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_ACTUATOR
+        spin = part_ids(model, joint, robots, ("spin_l", "spin_r"))
+        self._spin_q, self._spin_v = model.jnt_qposadr[spin], model.jnt_dofadr[spin]
+        root = part_ids(model, joint, robots, ("root",))[:, 0]
+        self._yaw_v = model.jnt_dofadr[root] + 5
+        self._drive_ctrl = part_ids(model, actuator, robots, ("drive_l", "drive_r"))
+        self._tendon = part_ids(
+            model, mujoco.mjtObj.mjOBJ_TENDON, robots, ("axle", "swing")
+        )
+        turning_N = np.array([item.energy_model.turning_force_N for item in models])
+        self._turning_Nm = turning_N * self._track_m
+        params = DriveParams()
+        grip_N = params.grip_share * np.array([axle_grip_N(item) for item in models])
+        spin = np.array([item.wheel_inertia_kg_m2 for item in models])
+        wheels_kg_m2 = 0.5 * spin * (self._track_m / self._radius_m) ** 2
+        yaw_kg_m2, self._lead_kg_m = self._inertia_about_axle(robots)
+        self._loop = SpeedLoop(
+            inertia=yaw_kg_m2 + wheels_kg_m2,
+            limit=grip_N * self._track_m / 2,
+            params=params.loop,
+        )
+
+    def fifth_state(self) -> np.ndarray:
+        """Return the true omega, shape (K,)."""
+        return np.asarray(self._data.qvel[self._yaw_v])
+
+    def axle_speed_m_s(self) -> np.ndarray:
+        """Return the speed the axle rolls at, shape (K,)."""
+        return np.asarray(self._wheel_speed_m_s().mean(axis=1))
+
+    def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
+        """Set the dry friction of both tendons, each of shape (K,)."""
+        friction = np.stack([resistance_N, swing_N], axis=1)
+        self._model.tendon_frictionloss[self._tendon] = friction
+
+    def command(
+        self, force_N: np.ndarray, w_from: np.ndarray, w_to: np.ndarray, steps: int
+    ) -> None:
+        """Hold the traction force, and the moment that follows the ramp of omega."""
+        speed = self._wheel_speed_m_s()
+        moment_Nm = self._loop.force(
+            (speed[:, 1] - speed[:, 0]) / self._track_m,
+            w_from,
+            w_to,
+            self._turning_Nm,
+            steps * self._model.opt.timestep,
+        )
+        # A mass ahead of the axle wants to go straight on.
+        moment_Nm += self._lead_kg_m * speed.mean(axis=1) * 0.5 * (w_from + w_to)
+        swing_N = moment_Nm / self._track_m
+        self._force_N = 0.5 * force_N[:, None] + np.stack([-swing_N, swing_N], axis=1)
+        self._speed_m_s, self._rolled_m = speed, self._wheel_way_m()
+        self._data.ctrl[self._drive_ctrl] = self._force_N
+
+    def apply(self, step: int) -> None:
+        """Do nothing: the motors hold their forces."""
+
+    def work_J(self) -> np.ndarray:
+        """Return the work of both wheels since `command`, shape (K, 2).
+
+        Driving and braking are told apart wheel by wheel: what one wheel brakes, the
+        other does not get.
+        """
+        work = held_force_work_J(
+            self._force_N.ravel(),
+            (self._wheel_way_m() - self._rolled_m).ravel(),
+            (self._wheel_speed_m_s() - self._speed_m_s).ravel(),
+            self._model.opt.timestep,
+        )
+        return np.asarray(work.reshape(-1, 2, 2).sum(axis=1))
+
+    def _wheel_speed_m_s(self) -> np.ndarray:
+        """Return the speed each wheel rolls at, left and right, shape (K, 2)."""
+        return np.asarray(self._data.qvel[self._spin_v] * self._radius_m[:, None])
+
+    def _wheel_way_m(self) -> np.ndarray:
+        """Return the way each wheel has rolled, left and right, shape (K, 2)."""
+        return np.asarray(self._data.qpos[self._spin_q] * self._radius_m[:, None])
+
+    def _inertia_about_axle(
+        self, robots: Sequence[Robot]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return yaw inertias about the axles' middles, and masses times their leads.
+
+        Returns:
+            Inertia of each robot as a rigid body [kg m^2], shape (K,), and mass times
+            the distance by which its centre is ahead of the axle [kg m], shape (K,).
+        """
+        model, still = self._model, mujoco.MjData(self._model)
+        mujoco.mj_forward(model, still)
+        inertia = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, still, inertia)
+        body = part_ids(model, mujoco.mjtObj.mjOBJ_BODY, robots, ("chassis",))[:, 0]
+        forward = still.xmat[body].reshape(-1, 3, 3)[:, :, 0]
+        lead_m = ((still.subtree_com[body] - still.xpos[body]) * forward).sum(axis=1)
+        return inertia[self._yaw_v, self._yaw_v], model.body_subtreemass[body] * lead_m

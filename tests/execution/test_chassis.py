@@ -1,0 +1,122 @@
+"""Every chassis meters its own work, and says what an MJCF lacks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import mujoco
+import numpy as np
+import pytest
+
+from mrmg import shipped
+from mrmg.errors import FileError, UsageError
+from mrmg.execution.chassis import chassis_maker
+from mrmg.execution.fleet import Fleet
+from mrmg.execution.world_model import build_world
+from mrmg.scene.types import Scene
+
+STEP_S = 0.004
+DRIVES = {
+    "car": (["drive"], [["spin_rl", "spin_rr"]]),
+    "unicycle": (["drive_l", "drive_r"], [["spin_l"], ["spin_r"]]),
+}
+"""By motion model: the motors, and the wheels whose mean speed each of them drives."""
+
+
+@pytest.fixture(scope="module", params=shipped.model_names())
+def scene(request: pytest.FixtureRequest, driving: SimpleNamespace) -> Scene:
+    return driving.open_ground([(0.0, 0.0, 0.0)], models=[request.param])
+
+
+@pytest.mark.parametrize("steps", [1, 5, 10])
+def test_work_agrees_with_metering_every_physics_step(scene: Scene, steps: int) -> None:
+    """Oracle: force times the mean of each step's speeds, motor by motor."""
+    world = build_world(scene)
+    data = mujoco.MjData(world.model)
+    model, robot = scene.robots[0].model, scene.robots[0]
+    chassis = chassis_maker(robot)(world.model, data, [robot])
+    motors, wheels = DRIVES[model.motion_model]
+    ctrl = [world.model.actuator(f"r1/{name}").id for name in motors]
+    dofs = [
+        [world.model.joint(f"r1/{name}").dofadr[0] for name in group]
+        for group in wheels
+    ]
+
+    def speeds() -> np.ndarray:
+        return np.array([data.qvel[group].mean() for group in dofs]) * (
+            model.wheel_radius_m
+        )
+
+    chassis.set_resistance(np.array([0.5 * model.mass_kg]), np.array([10.0]))
+    w, rng = np.array([0.2]), np.random.default_rng(4)
+    exact, held = np.zeros(2), np.zeros(2)
+    for _ in range(400 // steps):
+        force = rng.uniform(-1.0, 3.0, 1) * model.mass_kg
+        following = rng.uniform(-0.4, 0.4, 1)
+        chassis.command(force, w, following, steps)
+        w = following
+        work = np.zeros(len(motors))
+        for step in range(steps):
+            chassis.apply(step)
+            before = speeds()
+            mujoco.mj_step(world.model, data)
+            work += data.ctrl[ctrl] * 0.5 * (before + speeds()) * STEP_S
+        exact += [work[work > 0].sum(), work[work < 0].sum()]
+        held += chassis.work_J()[0]
+    assert exact[0] > 30.0
+    assert exact[1] < -10.0
+    np.testing.assert_allclose(held, exact, rtol=1e-5)
+
+
+def test_a_kind_that_cannot_be_executed_is_named(scene: Scene) -> None:
+    robot = scene.robots[0]
+    boat = replace(robot, model=replace(robot.model, motion_model="boat"))
+    with pytest.raises(UsageError, match="'r1'.*'boat'.*allowed: car, unicycle"):
+        chassis_maker(boat)
+
+
+@pytest.mark.parametrize(
+    ("name", "part", "noun"),
+    [
+        ("car", "steer_fl", "joint"),
+        ("car", "drive", "actuator"),
+        ("diffdrive", "swing", "tendon"),
+    ],
+)
+def test_a_missing_part_is_named(
+    driving: SimpleNamespace, tmp_path: Path, name: str, part: str, noun: str
+) -> None:
+    scene = driving.open_ground([(0.0, 0.0, 0.0)], models=[name])
+    robot = scene.robots[0]
+    mjcf = tmp_path / "robot.xml"
+    text = robot.model.mjcf.read_text()
+    mjcf.write_text(text.replace(f'"{part}"', '"other"'))
+    changed = replace(robot, model=replace(robot.model, mjcf=mjcf))
+    world = build_world(replace(scene, robots=(changed,)))
+    with pytest.raises(FileError, match=f"robot.xml.*\n.*has no {noun} '{part}'"):
+        Fleet(world, mujoco.MjData(world.model))
+
+
+def test_a_mixed_fleet_is_read_in_the_scenes_order(driving: SimpleNamespace) -> None:
+    """Values of each robot are those it has when it is alone."""
+    kinds = ["diffdrive", "car", "diffdrive", "hauler"]
+    poses = [(0.0, 6.0 * index, 0.3 * index) for index in range(4)]
+    force, w = np.array([60.0, 300.0, -40.0, 700.0]), np.array([0.5, 0.2, -0.3, -0.1])
+    resistance, swing = np.array([20.0, 80.0, 30.0, 200.0]), np.array([9.0, 0, 9.0, 0])
+
+    def driven(scene: Scene, own: np.ndarray) -> tuple[np.ndarray, ...]:
+        world = build_world(scene)
+        fleet = Fleet(world, mujoco.MjData(world.model))
+        fleet.set_resistance(resistance[own], swing[own])
+        still = np.zeros(len(own))
+        for _ in range(20):
+            work = fleet.drive(force[own], still, w[own], 5)
+        return fleet.state(), fleet.axle_speed_m_s(), work
+
+    together = driven(driving.open_ground(poses, models=kinds), np.arange(4))
+    for index, (kind, pose) in enumerate(zip(kinds, poses, strict=True)):
+        alone = driven(driving.open_ground([pose], models=[kind]), np.array([index]))
+        for whole, own in zip(together, alone, strict=True):
+            np.testing.assert_allclose(whole[index], own[0], atol=1e-5)
