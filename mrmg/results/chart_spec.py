@@ -17,8 +17,9 @@ def chart(
     group: str = "",
     digits: int = 2,
     limits: tuple[float, float] | None = None,
+    along_s: np.ndarray | None = None,
 ) -> dict[str, Any]:
-    """Return a chart over the page's grid of times.
+    """Return a chart over the page's grid of times, or over times of its own.
 
     Args:
         name: the page has a place of that name.
@@ -28,8 +29,10 @@ def chart(
         group: section of the page it belongs to.
         digits: of values in the legend.
         limits: of the vertical axis; None fits it, from zero.
+        along_s: times of its own, which are not the mission's; values hold until the
+            next.
     """
-    spec = {
+    spec: dict[str, Any] = {
         "id": name,
         "group": group,
         "title": title,
@@ -37,7 +40,11 @@ def chart(
         "digits": digits,
         "series": list(lines),
     }
-    return spec if limits is None else {**spec, "range": list(limits)}
+    if limits is not None:
+        spec["range"] = list(limits)
+    if along_s is not None:
+        spec["along_s"] = rounded(along_s, 3)
+    return spec
 
 
 def line(
@@ -52,9 +59,10 @@ def line(
 
     Args:
         label: name in the legend.
-        look: "planned", "simulated", "limit", or "own" for the owner's dash pattern.
+        look: "planned", "simulated", "limit", "course" of what is no robot's, or "own"
+            for the owner's dash pattern.
         owner: number of its colour, and what a toggle calls it.
-        values: at the grid's times, NaN where there is none.
+        values: at the chart's times, NaN where there is none.
         digits: kept after the decimal point.
     """
     return {

@@ -23,12 +23,15 @@ class Row:
         unit: of the values; "" for texts.
         values: one per run; None where a run has none.
         digits: after the decimal point.
+        comparable: whether each run's value may be set against the first run's; for
+            all runs if empty.
     """
 
     name: str
     unit: str
     values: tuple[float | str | None, ...]
     digits: int = 0
+    comparable: tuple[bool, ...] = ()
 
     def cells(self) -> list[str]:
         """Return the values as text; measures after the first with their difference."""
@@ -39,10 +42,15 @@ class Row:
                 texts.append(value or MISSING)
                 continue
             text = f"{value:.{self.digits}f} {self.unit}".rstrip()
-            if number and self.unit in _MEASURES and isinstance(first, float) and first:
+            if self._has_difference(number) and isinstance(first, float) and first:
                 text += f" ({100.0 * (value - first) / abs(first):+.1f} %)"
             texts.append(text.replace("-", "−"))
         return texts
+
+    def _has_difference(self, number: int) -> bool:
+        if number == 0 or self.unit not in _MEASURES:
+            return False
+        return not self.comparable or self.comparable[number]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,6 +123,8 @@ def _names(folders: Sequence[Path]) -> tuple[str, ...]:
 
 _FIGURES: tuple[tuple[str, str, int, float, tuple[str, ...]], ...] = (
     ("planned energy", "kJ", 2, 1e-3, ("plan", "cost_J")),
+    ("proven bound", "kJ", 2, 1e-3, ("plan", "bound_J")),
+    ("above the bound", "%", 1, 100.0, ("plan", "gap")),
     ("planned duration", "s", 1, 1.0, ("plan", "makespan_s")),
     ("planning time", "s", 2, 1.0, ("plan", "time_s", "total")),
     ("first plan after", "s", 2, 1.0, ("plan", "time_s", "first_solution")),
@@ -143,8 +153,9 @@ def _rows(records: Sequence[RunRecord]) -> list[Row]:
     def texts(name: str, of: Callable[[RunRecord], str]) -> Row:
         return Row(name=name, unit="", values=tuple(of(record) for record in records))
 
+    alike = tuple(item.scene.digest == records[0].scene.digest for item in records)
     rows = [
-        texts("scene", lambda record: record.scene.name),
+        texts("scene", lambda record: _scene_name(record, records)),
         texts("seed", lambda record: str(record.summary["seed"])),
         texts("profile", lambda record: str(record.arguments.get("profile", MISSING))),
         texts("outcome", _outcome),
@@ -155,8 +166,23 @@ def _rows(records: Sequence[RunRecord]) -> list[Row]:
             scaled = tuple(
                 None if value is None else factor * value for value in values
             )
-            rows.append(Row(name=name, unit=unit, values=scaled, digits=digits))
+            rows.append(
+                Row(
+                    name=name,
+                    unit=unit,
+                    values=scaled,
+                    digits=digits,
+                    comparable=alike,
+                )
+            )
     return rows
+
+
+def _scene_name(record: RunRecord, records: Sequence[RunRecord]) -> str:
+    """Return the scene's name, with its digest if others of that name differ."""
+    scene = record.scene
+    named = {item.scene.digest for item in records if item.scene.name == scene.name}
+    return scene.name if len(named) == 1 else f"{scene.name} ({scene.digest[:6]})"
 
 
 def _outcome(record: RunRecord) -> str:

@@ -35,7 +35,10 @@ def write_comparison(comparison: Comparison, path: Path) -> None:
 def comparison_html(comparison: Comparison) -> str:
     """Return the comparison as HTML."""
     names, records = comparison.names, comparison.records
-    light, dark = style.robot_colors(names), style.robot_colors_on_dark(names)
+    # Courses have a colour for each run; maps have one for each robot.
+    colored = range(max(len(names), *(len(item.scene.robots) for item in records)))
+    numbers = [str(at) for at in colored]
+    light, dark = style.robot_colors(numbers), style.robot_colors_on_dark(numbers)
     solved = [number for number, item in enumerate(records) if item.plan is not None]
     charts = _charts(comparison, solved) if solved else None
     places = (
@@ -58,14 +61,17 @@ def comparison_html(comparison: Comparison) -> str:
                         for row in comparison.rows
                     ],
                 ),
-                html.note("In brackets: the difference from the first run."),
+                html.note(
+                    "In brackets: the difference from the first run, where it is one "
+                    "of the same scene."
+                ),
             ),
             html.section("Courses", html.controls(*toggles), html.charts(places))
             if places
             else "",
             html.section("Maps", _maps(comparison)),
         ],
-        colors=[(light[name], dark[name]) for name in names],
+        colors=[(light[at], dark[at]) for at in numbers],
         data=charts,
     )
 

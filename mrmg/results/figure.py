@@ -58,6 +58,7 @@ def draw_figure(run_folder: Path, kind: str, path: Path) -> None:
     record = read_record(run_folder)
     if record.plan is None:
         reason = f"there is no plan to draw ({record.planning['reason']})"
+        reason += "; 'mrmg scene draw' draws the scene"
         raise RunFolderError(str(run_folder), [Fault("planning.json", reason)])
     with rc_context(_FOR_PRINT):
         _DRAW[kind](record.scene, record.plan, record.log, path)

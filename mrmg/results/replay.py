@@ -67,6 +67,9 @@ def replay_of(run_folder: Path) -> Replay:
         RunFolderError: if the run was not driven yet, or cannot be read.
     """
     scene = load_scene(run_folder / "scene.yaml")
+    if not (run_folder / "plan.json").exists():
+        fault = Fault("plan.json", "missing: there is no plan; view the scene instead")
+        raise RunFolderError(str(run_folder), [fault])
     if not (run_folder / "log.json").exists():
         fault = Fault("log.json", "missing: nothing was driven; run 'mrmg execute'")
         raise RunFolderError(str(run_folder), [fault])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from mrmg import shipped, storage
 from mrmg.results import report_page as html
@@ -10,6 +12,7 @@ from mrmg.results import report_sections as sections
 from mrmg.results import style
 from mrmg.results.report_charts import chart_data
 from mrmg.results.report_map import mission_map
+from mrmg.results.report_planner import cost_chart, planner
 from mrmg.results.report_record import RunRecord, read_record
 from mrmg.results.report_timeline import timeline
 from mrmg.scene.loading import load_scene
@@ -35,6 +38,9 @@ def report_html(record: RunRecord) -> str:
     ids = [robot.id for robot in scene.robots]
     light, dark = style.robot_colors(ids), style.robot_colors_on_dark(ids)
     data = chart_data(scene, plan, log) if plan else None
+    cost = cost_chart(record)
+    if data and cost:
+        data["charts"].append(cost)
     places: dict[str, list[tuple[str, str]]] = {}
     for chart in data["charts"] if data else ():
         places.setdefault(chart["group"], []).append((chart["id"], chart["title"]))
@@ -58,7 +64,7 @@ def report_html(record: RunRecord) -> str:
                 "Distances", html.charts(places.get("distance", ()), columns=2)
             ),
             html.section("Checks", *sections.checks(record)),
-            html.section("Planner", sections.planner(record)),
+            html.section("Planner", *planner(record)),
             html.section("Reproduce", *_reproduce(record)),
         ],
         colors=[(light[name], dark[name]) for name in ids],
@@ -77,14 +83,15 @@ def _map(record: RunRecord) -> list[str]:
             html.toggle("owner", robot.id, html.robot_dot(index, robot.id))
             for index, robot in enumerate(record.scene.robots)
         ]
+    lines = "Wide line: planned. Thin line: driven. " if record.plan else ""
     return [
         html.player() if record.plan else "",
         html.controls(*boxes),
         mission_map(record.scene, record.plan, record.log),
         html.note(
-            "Wide line: planned. Thin line: driven. White: goal, filled with its "
-            "robot's colour once visited. ⚡: recharging station. ×: the energy of "
-            "driving there against plain ground. Point at anything for its name."
+            f"{lines}Circle: goal, filled with its robot's colour once visited. "
+            "⚡: recharging station. ×: the energy of driving there against plain "
+            "ground. Point at anything for its name."
         ),
     ]
 
@@ -128,7 +135,7 @@ def _main_figures(record: RunRecord) -> list[tuple[str, str, str]]:
     done = f"{execution['goals_visited']} / " if execution else ""
     figures = [
         ("Goals visited", f"{done}{len(scene.goals)}", kinds),
-        ("Planned energy", sections.kJ(record.plan.cost_J), "whole fleet"),
+        ("Planned energy", sections.kJ(record.plan.cost_J), _above_bound(summary)),
         ("Planned duration", f"{record.plan.makespan_s:.0f} s", "last robot at rest"),
     ]
     if execution and energy:
@@ -155,6 +162,13 @@ def _main_figures(record: RunRecord) -> list[tuple[str, str, str]]:
             ),
         ]
     return figures
+
+
+def _above_bound(summary: Mapping[str, Any]) -> str:
+    gap = summary["plan"].get("gap")
+    if gap is None:
+        return "whole fleet"
+    return f"whole fleet; at most {100 * gap:.0f} % above the least"
 
 
 def _reproduce(record: RunRecord) -> list[str]:

@@ -38,6 +38,7 @@ _NO_SCRIPT = (
     "<noscript><p>The charts need JavaScript; energy.png and overview.png in the run "
     "folder show the same.</p></noscript>"
 )
+_FEW_COLUMNS = 4
 
 
 def page(
@@ -158,10 +159,17 @@ def table(
         lines.append(f"<tr{look}>{cells}</tr>")
     if not lines:
         return ""
+    # Few columns far apart would be hard to read across.
+    width = ' class="narrow"' if len(head) <= _FEW_COLUMNS else ""
     return (
-        f'<div class="scroll"><table><thead><tr>{titles}</tr></thead>'
+        f'<div class="scroll"><table{width}><thead><tr>{titles}</tr></thead>'
         f"<tbody>{''.join(lines)}</tbody></table></div>"
     )
+
+
+def beside(*parts: str) -> str:
+    """Return parts next to each other, where the page is wide enough."""
+    return f'<div class="beside">{"".join(part for part in parts if part)}</div>'
 
 
 def bullets(items: Iterable[str]) -> str:
@@ -243,6 +251,11 @@ def text(content: str) -> str:
 def note(content: str) -> str:
     """Return a small remark."""
     return f'<p class="soft">{escape(content)}</p>'
+
+
+def paragraph(content: str) -> str:
+    """Return a plain paragraph."""
+    return f"<p>{escape(content)}</p>"
 
 
 def code(content: str) -> str:

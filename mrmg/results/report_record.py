@@ -12,6 +12,7 @@ from mrmg.errors import Fault, RunFolderError
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan, PlanStatus
 from mrmg.results.energy_audit import EnergyAudit
+from mrmg.results.summary import summarize
 from mrmg.results.verdict import Verdict
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
@@ -24,7 +25,7 @@ class RunRecord:
     Attributes:
         folder: where the run lies.
         scene: what was to be solved.
-        summary: content of `summary.json`.
+        summary: content of `summary.json`, worked out anew where it is missing.
         planning: content of `planning.json`.
         arguments: what the run was started with.
         plan, verdict, log, audit: outcomes of the steps.
@@ -47,6 +48,8 @@ def read_record(run_folder: Path) -> RunRecord:
     Raises:
         RunFolderError: if a file is missing or cannot be read.
     """
+    if not (run_folder / "planning.json").exists():
+        raise RunFolderError(str(run_folder), [_why_no_record(run_folder)])
     planning = _read(run_folder, "planning.json", "mrmg plan")
     solved = planning["status"] == PlanStatus.SOLVED.value
 
@@ -55,10 +58,14 @@ def read_record(run_folder: Path) -> RunRecord:
 
     has_run = (run_folder / "run.json").exists()
     run = _read(run_folder, "run.json", "mrmg run") if has_run else {}
+    scene = load_scene(run_folder / "scene.yaml")
+    summed_up = (run_folder / "summary.json").exists()
     return RunRecord(
         folder=run_folder,
-        scene=load_scene(run_folder / "scene.yaml"),
-        summary=_read(run_folder, "summary.json", "mrmg run"),
+        scene=scene,
+        summary=_read(run_folder, "summary.json", "mrmg report")
+        if summed_up
+        else summarize(scene, run_folder),
         planning=planning,
         arguments=run.get("arguments", {}),
         plan=Plan.load(run_folder) if left("plan.json") else None,
@@ -66,6 +73,15 @@ def read_record(run_folder: Path) -> RunRecord:
         log=ExecutionLog.load(run_folder) if left("log.json") else None,
         audit=EnergyAudit.load(run_folder) if left("audit.json") else None,
     )
+
+
+def _why_no_record(folder: Path) -> Fault:
+    if not folder.is_dir():
+        return Fault("", f"no such folder; 'mrmg run SCENE --out {folder}' makes one")
+    if not (folder / "run.json").exists():
+        return Fault("planning.json", "missing: this is not a run folder")
+    cure = f"'mrmg run SCENE --out {folder}' goes on with it"
+    return Fault("planning.json", f"missing: the run was stopped early; {cure}")
 
 
 def _read(folder: Path, name: str, cure: str) -> dict[str, Any]:

@@ -1,9 +1,6 @@
-"""The sections of the report page that are tables: energy, tours, checks, planner."""
+"""The sections of the report page that are tables: energy, tours, checks."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
-from typing import Any
 
 from mrmg.energy import PARTS
 from mrmg.ledger import EnergyLedger
@@ -213,42 +210,6 @@ def checks(record: RunRecord) -> list[str]:
 def _shortened(items: list[str]) -> list[str]:
     rest = len(items) - _MAX_LISTED
     return items[:_MAX_LISTED] + ([f"... and {rest} more"] if rest > 0 else [])
-
-
-def planner(record: RunRecord) -> str:
-    """Return the planner's statistics."""
-    rows = [
-        [html.text(name), html.text(value)]
-        for name, value in _flat(record.planning["statistics"])
-    ]
-    return html.table(["Statistic", "Value"], rows) + _improvements(
-        record.planning["statistics"]
-    )
-
-
-def _improvements(statistics: Mapping[str, Any]) -> str:
-    """Return the plans found over time, each cheaper than the one before."""
-    rows = [
-        [f"{found['time_s']:.2f} s", kJ(found["cost_J"])]
-        for found in statistics.get("improvements", [])
-    ]
-    if not rows:
-        return ""
-    return "<h3>Cost over time</h3>" + html.table(["After", "Cost of the plan"], rows)
-
-
-def _flat(values: Mapping[str, Any], prefix: str = "") -> list[tuple[str, str]]:
-    """Return nested figures as (path, text); lists of data are left out."""
-    entries: list[tuple[str, str]] = []
-    for name, value in values.items():
-        label = f"{prefix}{name}"
-        if isinstance(value, Mapping):
-            entries += _flat(value, f"{label}.")
-        elif isinstance(value, float):
-            entries.append((label, f"{value:.4g}"))
-        elif isinstance(value, (str, int)):
-            entries.append((label, str(value)))
-    return entries
 
 
 def kJ(energy_J: float) -> str:

@@ -31,6 +31,36 @@ def test_measures_come_with_their_difference_and_counts_without() -> None:
     assert Row(name="scene", unit="", values=("a", "b")).cells() == ["a", "b"]
 
 
+def test_only_runs_of_one_scene_come_with_differences(
+    quickstart_run: Path, own_run: Path
+) -> None:
+    row = Row(name="energy", unit="kJ", values=(10.0, 9.0, 8.0), digits=0)
+    some = replace(row, comparable=(True, False, True))
+    assert some.cells() == ["10 kJ", "9 kJ", "8 kJ (−20.0 %)"]
+    scene = own_run / "scene.yaml"
+    scene.write_text(scene.read_text().replace("reserve: 0.05", "reserve: 0.04"))
+    rows = {row.name: row for row in compare_runs([quickstart_run, own_run]).rows}
+    assert "(" not in rows["planned energy"].cells()[1]
+    names = rows["scene"].cells()
+    assert names[0] != names[1]
+    assert all(name.startswith("quickstart (") for name in names)
+
+
+def test_maps_have_a_colour_for_each_robot(quickstart_run: Path, own_run: Path) -> None:
+    fleet = "\n".join(
+        f"- {{id: extra{at}, model: car, pose: [{30 + 3 * at}, 2, 0]}}"
+        for at in range(3)
+    )
+    scene = own_run / "scene.yaml"
+    scene.write_text(re.sub(r"robots:\n", f"robots:\n{fleet}\n", scene.read_text()))
+    for name in ("plan.json", "log.json"):
+        (own_run / name).unlink()
+    page = comparison_html(compare_runs([quickstart_run, own_run]))
+    used = {int(at) for at in re.findall(r"var\(--r(\d+)\)", page)}
+    assert max(used) == 4
+    assert all(f"--r{at}:#" in page for at in used)
+
+
 def test_figures_are_those_of_the_summaries(
     quickstart_run: Path, own_run: Path
 ) -> None:

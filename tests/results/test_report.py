@@ -160,7 +160,8 @@ def test_page_of_a_good_run_says_what_the_files_say(mission, tmp_path) -> None:
     assert page.cells[first - 2 : first] == ["1", "s"]
     assert page.cells[first + 1] == f"{plan.visits[0].time_s:.1f} s"
     assert page.cells[first + 2] == f"{account.visits[0].time_s:.1f} s"
-    assert "time_s.first_solution" in page.cells
+    routing = page.cells.index("Time of the discrete solver")
+    assert page.cells[routing + 1] == "0.020 s (8 % of all)"
     assert scene.digest in page.words
 
 
@@ -211,5 +212,21 @@ def test_command_names_a_shipped_scene_only_where_it_is_the_same(
 
 
 def test_a_folder_without_a_plan_is_refused(tmp_path) -> None:
-    with pytest.raises(RunFolderError, match="planning.json"):
+    with pytest.raises(RunFolderError, match="planning.json: missing: this is not a"):
         write_report(tmp_path)
+    storage.write_json(tmp_path / "run.json", {"arguments": {}})
+    with pytest.raises(RunFolderError, match="the run was stopped early; 'mrmg run"):
+        write_report(tmp_path)
+    with pytest.raises(RunFolderError, match="no such folder"):
+        write_report(tmp_path / "absent")
+
+
+def test_a_run_that_was_not_summed_up_has_a_report_all_the_same(
+    mission, tmp_path
+) -> None:
+    fill(tmp_path, *mission)
+    write_report(tmp_path)
+    whole = (tmp_path / "report.html").read_text()
+    (tmp_path / "summary.json").unlink()
+    write_report(tmp_path)
+    assert (tmp_path / "report.html").read_text() == whole

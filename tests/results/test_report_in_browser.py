@@ -166,7 +166,7 @@ def test_page_draws_without_errors_and_follows_the_reader(
         "for (let i = 0; i < d.length; i += 4) n.add(d.slice(i, i + 4).join());"
         "return n.size; })"
     )
-    assert len(drawn) == 5  # two batteries, tracking, two distances
+    assert len(drawn) == 6  # two batteries, tracking, two distances, cost
     assert min(drawn) > 10  # an empty chart has one colour
 
 
@@ -280,6 +280,16 @@ def test_toggles_hide_robots_and_layers(report: Tab) -> None:
     layer = "document.querySelector('.map [data-layer=driven]').style.display"
     report.click("[data-toggle-layer=driven]")
     assert report.value(layer) == "none"
+    assert report.errors == []
+
+
+def test_the_chart_of_costs_has_a_time_of_its_own(report: Tab) -> None:
+    clock = "document.querySelector('#clock').textContent"
+    before = report.value(clock)
+    report.point_at("#chart-cost .u-over", 0.9)
+    cost = "document.querySelector('#chart-cost .u-series:nth-child(2) .u-value')"
+    assert report.value(f"{cost}.textContent").endswith(" kJ")
+    assert report.value(clock) == before
     assert report.errors == []
 
 

@@ -54,6 +54,7 @@
       planned: { stroke: `${own}66`, width: 5, dash: [] },
       simulated: { stroke: own, width: 1.6, dash: [] },
       limit: { stroke: color("--bad"), width: 1.4, dash: [6, 4] },
+      course: { stroke: color("--accent"), width: 1.8, dash: [] },
       own: { stroke: own, width: 1.6, dash: DASHES[series.color % DASHES.length] },
     };
     return looks[series.look];
@@ -74,29 +75,34 @@
   function drawChart(chart) {
     const place = document.getElementById(`chart-${chart.id}`);
     place.replaceChildren();
+    const own = Boolean(chart.along_s);  // not over the mission's time
+    const held = own ? { paths: uPlot.paths.stepped({ align: 1 }) } : {};
     const series = chart.series.map((item) => {
       const look = lineOf(item);
-      return { label: item.label, value: valueText(chart), points: { show: false },
-        show: !hiddenOwners.has(item.owner), ...look };
+      return { label: item.label, value: valueText(chart), points: { show: own && item.look === "course" },
+        show: !hiddenOwners.has(item.owner), ...held, ...look };
     });
     const range = chart.range ? () => chart.range : (u, low, high) => [0, (high || 1) * 1.06];
     const plot = new uPlot({
       width: place.clientWidth,
       height: 190,
-      cursor: { sync: { key: "time", setSeries: false }, y: false },
+      cursor: { ...(own ? {} : { sync: { key: "time", setSeries: false } }), y: false },
       scales: { x: { time: false }, y: { range } },
       axes: [
         axis({ values: (u, ticks) => ticks.map((at) => `${at} s`), size: 34 }),
         axis({ values: (u, ticks) => ticks.map((at) => `${at} ${chart.unit}`), size: 58 }),
       ],
-      series: [{ label: "time", value: (u, at) => (at === null ? "–" : `${at.toFixed(1)} s`) },
+      series: [{ label: "time", value: (u, at) => (at === null ? "–" : `${at.toFixed(own ? 2 : 1)} s`) },
         ...series],
-      legend: { markers: { width: (u, at) => (at ? Math.max(2, series[at - 1].width) : 0) } },
+      legend: { markers: {
+        width: (u, at) => (at ? Math.max(2, series[at - 1].width) : 0),
+        dash: (u, at) => (at && series[at - 1].dash.length ? "dashed" : "solid"),
+      } },
       hooks: { setCursor: [(u) => {
         const index = u.cursor.idx;
-        if (u.cursor.event && index !== null && index !== undefined && index !== shownIndex) show(index);
+        if (!own && u.cursor.event && index !== null && index !== undefined && index !== shownIndex) show(index);
       }] },
-    }, [data.time_s, ...chart.series.map((item) => item.values)], place);
+    }, [chart.along_s || data.time_s, ...chart.series.map((item) => item.values)], place);
     all(".u-legend th", place).slice(1).forEach((head) => {
       head.tabIndex = 0;
       head.setAttribute("role", "button");
