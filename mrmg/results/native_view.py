@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+import warnings
 
 import mujoco
 import numpy as np
@@ -13,11 +14,15 @@ from mrmg.execution.world_model import MujocoWorld, build_world
 from mrmg.results import style
 from mrmg.results.ground_image import paint_ground
 from mrmg.results.replay import SPEEDS, Replay, spoken
-from mrmg.results.world_view import drawable_model, floor_frame
+from mrmg.results.world_view import drawable_spec, floor_frame
 from mrmg.scene.types import Scene
 
 KEYS = "space: play or pause, arrows left and right: 5 s, up and down: speed"
+HINT = "Alt+C opens the panel Control, with a slider for the time"
 """How the replay is steered."""
+
+TIME = "time [s]"
+"""Name of the slider in the panel "Control"."""
 
 _FRAME_S = 1.0 / 60.0
 _JUMP_S = 5.0
@@ -25,6 +30,7 @@ _TAG_LIFT_M = 0.6
 _LINE_LIFT_M = 0.06
 _LINE_PIXELS = 3.0
 _LEAST_STRIDE = 10
+_HIDDEN_GROUP = 5
 _SPACE, _RIGHT, _LEFT, _DOWN, _UP = 32, 262, 263, 264, 265
 
 
@@ -40,26 +46,20 @@ def open_window(scene: Scene, replay: Replay | None) -> None:
     """
     import mujoco.viewer
 
+    _refuse_without_screen()
     world = replay.film.world if replay else build_world(scene)
-    plan = replay.film.plan if replay else None
-    ground = paint_ground(scene, plan, floor_frame(world))
-    model = drawable_model(world, ground, (1280, 720))
+    model = viewed_model(scene, world, replay)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     if replay is not None:
         replay.playing = True
-    try:
-        window = mujoco.viewer.launch_passive(
-            model,
-            data,
-            key_callback=lambda key: steer(replay, key),
-            show_left_ui=False,
-            show_right_ui=False,
-        )
-    except Exception as error:
-        raise MachineError(
-            f"no window could be opened ({error}); 'mrmg view --in browser' needs none"
-        ) from error
+    window = mujoco.viewer.launch_passive(
+        model,
+        data,
+        key_callback=lambda key: steer(replay, key),
+        show_left_ui=False,
+        show_right_ui=replay is not None,
+    )
     with window:
         _look_from_above(window.cam, scene)
         before = time.monotonic()
@@ -70,10 +70,59 @@ def open_window(scene: Scene, replay: Replay | None) -> None:
                 with window.lock():
                     _place(world, model, data, replay)
                     annotate(window.user_scn, scene, replay)
+                    data.ctrl[0] = replay.time_s
                 window.set_texts(_texts(scene, replay))
             window.sync()
+            if replay is not None:
+                follow_slider(replay, float(data.ctrl[0]))
             before = now
             time.sleep(_FRAME_S)
+
+
+def _refuse_without_screen() -> None:
+    # The viewer would end the whole process without a word of what to do.
+    import glfw
+
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        opened = glfw.init()
+    if not opened:
+        reasons = "; ".join(str(item.message) for item in told) or "no reason given"
+        raise MachineError(
+            f"no window could be opened ({reasons}); 'mrmg view --in browser' needs "
+            "none"
+        )
+
+
+def viewed_model(
+    scene: Scene, world: MujocoWorld, replay: Replay | None
+) -> mujoco.MjModel:
+    """Return the model of the window; its one control is the time of the replay.
+
+    The viewer draws a slider for every control and for every joint it is to show. The
+    robots are placed and not driven here, so that theirs would have nothing to say.
+    """
+    plan = replay.film.plan if replay else None
+    ground = paint_ground(scene, plan, floor_frame(world))
+    spec = drawable_spec(world, ground, (1280, 720))
+    for actuator in list(spec.actuators):
+        spec.delete(actuator)
+    for joint in spec.joints:
+        joint.group = _HIDDEN_GROUP
+    for light in spec.lights:
+        light.castshadow = False  # over so wide a map it would be a coarse pattern
+    if replay is not None:
+        slider = spec.add_actuator(name=TIME, target=spec.joints[0].name)
+        slider.trntype = mujoco.mjtTrn.mjTRN_JOINT
+        slider.ctrllimited = True
+        slider.ctrlrange = [0.0, max(replay.end_s, _FRAME_S)]
+    return spec.compile()
+
+
+def follow_slider(replay: Replay, control: float) -> None:
+    """Go to the time a person has slid to; `control` is what the slider now says."""
+    if control != replay.time_s:
+        replay.seek(control)
 
 
 def steer(replay: Replay | None, key: int) -> None:
@@ -111,7 +160,7 @@ def _place(
 def _look_from_above(camera: mujoco.MjvCamera, scene: Scene) -> None:
     x_min, y_min, x_max, y_max = scene.bounds
     camera.lookat[:] = [(x_min + x_max) / 2, (y_min + y_max) / 2, 0.0]
-    camera.distance = 1.2 * max(x_max - x_min, y_max - y_min)
+    camera.distance = 1.35 * max(x_max - x_min, y_max - y_min)
     camera.azimuth, camera.elevation = 90.0, -58.0
 
 
@@ -171,6 +220,7 @@ def _add_line(
             np.array([*start, _LINE_LIFT_M]),
             np.array([*end, _LINE_LIFT_M]),
         )
+        geom.emission = 0.0  # the lights alone show its colour as it is
         extra.ngeom += 1
 
 
@@ -182,5 +232,10 @@ def _texts(scene: Scene, replay: Replay) -> list[tuple[int, int, str, str]]:
     right = "\n".join([mission, *(words for _, words in robots)])
     return [
         (font, corner.mjGRID_TOPLEFT.value, left, right),
-        (font, corner.mjGRID_BOTTOMLEFT.value, f"speed {replay.speed:g}", KEYS),
+        (
+            font,
+            corner.mjGRID_BOTTOMLEFT.value,
+            f"speed {replay.speed:g}\n ",
+            f"{KEYS}\n{HINT}",
+        ),
     ]

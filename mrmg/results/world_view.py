@@ -185,7 +185,7 @@ def open_view(
         MachineError: if this machine has no OpenGL that draws offscreen.
     """
     with offscreen_context(*size):
-        model = drawable_model(world, ground, size)
+        model = drawable_spec(world, ground, size).compile()
         model.vis.quality.offsamples = _SMOOTH_SAMPLES if smooth else 0
         try:
             view = WorldView(world, model, size)
@@ -203,10 +203,10 @@ def floor_frame(world: MujocoWorld) -> GroundFrame:
     return GroundFrame(center_m=floor.pos[:2].copy(), half_m=floor.size[:2].copy())
 
 
-def drawable_model(
+def drawable_spec(
     world: MujocoWorld, ground: np.ndarray, size: tuple[int, int]
-) -> mujoco.MjModel:
-    """Return the world's model as it is drawn: its floor painted, round things lean.
+) -> mujoco.MjSpec:
+    """Return the world as it is drawn: its floor painted, round things lean.
 
     Args:
         world: what to draw.
@@ -222,4 +222,4 @@ def drawable_model(
     quality.numslices, quality.numstacks, quality.numquads = _SLICES, _STACKS, 1
     quality.shadowsize = _SHADOW_PIXELS
     spec.visual.global_.offwidth, spec.visual.global_.offheight = size
-    return spec.compile()
+    return spec

@@ -128,6 +128,52 @@ def test_the_window_s_notes_fit_its_room(replay, room: int) -> None:
         assert drawn_m == pytest.approx(driven_m, rel=0.02)
 
 
+def test_the_window_s_only_control_is_the_time(replay) -> None:
+    film = replay.film
+    model = native_view.viewed_model(film.scene, film.world, replay)
+    assert [model.actuator(at).name for at in range(model.nu)] == [native_view.TIME]
+    assert model.actuator_ctrlrange.tolist() == [[0.0, replay.end_s]]
+    # Joints would have sliders that do nothing.
+    assert not mujoco.MjvOption().jointgroup[model.jnt_group].any()
+    drawn, driven = mujoco.MjData(model), mujoco.MjData(film.world.model)
+    drawn.qpos[:] = driven.qpos[:] = film.log.qpos[-1]
+    mujoco.mj_kinematics(model, drawn)
+    mujoco.mj_kinematics(film.world.model, driven)
+    assert np.array_equal(drawn.xpos, driven.xpos)
+
+
+def test_a_scene_s_window_has_no_controls() -> None:
+    scene = load_scene("quickstart")
+    model = native_view.viewed_model(scene, build_world(scene), None)
+    assert model.nu == 0
+
+
+def test_the_time_follows_the_slider_where_a_person_moved_it(replay) -> None:
+    replay.seek(5.0)
+    native_view.follow_slider(replay, 5.0)
+    assert replay.time_s == 5.0
+    native_view.follow_slider(replay, 12.5)
+    assert replay.time_s == 12.5
+
+
+def test_without_a_screen_the_window_is_refused(quickstart_run: Path) -> None:
+    screenless = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("DISPLAY", "WAYLAND_DISPLAY")
+    }
+    answer = subprocess.run(
+        [sys.executable, "-m", "mrmg", "view", str(quickstart_run), "--in", "window"],
+        capture_output=True,
+        text=True,
+        env=screenless,
+        check=False,
+    )
+    assert answer.returncode == ExitCode.MACHINE
+    assert "'mrmg view --in browser' needs none" in answer.stderr
+    assert len(answer.stderr.splitlines()) == 1
+
+
 def test_shapes_are_where_mujoco_has_them() -> None:
     spec = mujoco.MjSpec.from_string("""
       <mujoco><worldbody><body pos="0 0 5">
