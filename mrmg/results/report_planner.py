@@ -26,6 +26,7 @@ _NAMES = {
     "groups": "Groups of vertices",
     "dead_ends": "Expansions that led nowhere",
 }
+_TOLD_IN_WORDS = ("bound_J", "gap")
 _ROOM = (0.9, 1.05)
 """Room below and above the courses, as factors."""
 
@@ -37,6 +38,7 @@ def planner(record: RunRecord) -> list[str]:
     rows = [
         [html.text(_NAMES.get(place, place)), html.text(_said(place, value, times))]
         for place, value in _flat(statistics)
+        if place not in _TOLD_IN_WORDS
     ]
     chart = cost_chart(record)
     return [
@@ -96,7 +98,7 @@ def _in_kJ(value_J: float | None) -> float:
 
 def _quality(figures: Mapping[str, Any] | None) -> str:
     """Return how far the plan can be from the cheapest there is, if it is known."""
-    if figures is None or figures.get("bound_J") is None:
+    if figures is None or figures.get("gap") is None:
         return ""
     return html.paragraph(
         f"No plan for this mission needs less than {kJ(figures['bound_J'])}: this one "

@@ -69,6 +69,14 @@ def test_the_section_tells_quality_shares_and_what_it_has_no_name_for() -> None:
     assert "<td>37.5 %</td>" in said
     assert "of_a_kind_unheard_of" in said
     assert "dearer" not in "".join(planner(record(FOUND)))
+    bounded = record(FOUND)
+    bounded.planning["statistics"]["bound_J"] = 46e3
+    assert "bound_J" not in "".join(planner(bounded))
+
+
+def test_a_mission_that_costs_nothing_has_no_gap() -> None:
+    free = record([{"time_s": 0.1, "cost_J": 0.0}], cost_J=0.0, bound_J=0.0, gap=None)
+    assert "dearer" not in "".join(planner(free))
 
 
 def test_bounds_never_fall() -> None:
