@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 from mrmg import __version__
-from mrmg.cli import commands, scene_commands, show_commands
+from mrmg.cli import calibrate_command, commands, scene_commands, show_commands
 
 EXIT_CODES = """\
 exit codes:
@@ -37,6 +37,7 @@ def make_parser() -> argparse.ArgumentParser:
     _add_figure(verbs)
     _add_view(verbs)
     _add_scene(verbs)
+    _add_calibrate(verbs)
     doctor = verbs.add_parser("doctor", help="check this machine, with cures")
     _add_json(doctor, "the findings")
     doctor.set_defaults(command=commands.doctor)
@@ -245,6 +246,35 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     )
     _add_scene_out(populate)
     populate.set_defaults(command=scene_commands.populate)
+
+
+def _add_calibrate(verbs: _Verbs) -> None:  # type: ignore[type-arg]
+    verb = verbs.add_parser(
+        "calibrate",
+        help="measure a robot's energy parameters in MuJoCo",
+        description="Drive manoeuvres with a robot in MuJoCo, fit its rolling and "
+        "turning coefficients and its inertia to the work of the drives, and leave a "
+        "calibrated copy of the model with the figures and a plot of the fit.",
+    )
+    verb.add_argument(
+        "model", metavar="MODEL", help="name of a shipped model, or a model's folder"
+    )
+    verb.add_argument(
+        "-o", "--out", type=Path, metavar="DIR", help="default calibrated-MODEL"
+    )
+    verb.add_argument(
+        "--plot",
+        type=Path,
+        metavar="PICTURE.png",
+        help="PNG, SVG or PDF by its suffix; default calibration.png in DIR",
+    )
+    verb.add_argument(
+        "--in-place",
+        action="store_true",
+        help="change the model's own robot.yaml, too",
+    )
+    _add_json(verb, "calibration.json")
+    verb.set_defaults(command=calibrate_command.calibrate)
 
 
 def _add_scene_out(verb: argparse.ArgumentParser) -> None:

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from mrmg import storage
 
 if TYPE_CHECKING:
+    from rich.progress import Progress
+
     from mrmg.planning import Improvement
     from mrmg.run_folder import Step
     from mrmg.steps import StepProgress
@@ -28,6 +30,37 @@ _DOING = {
 @contextmanager
 def progress() -> Iterator[StepProgress | None]:
     """Yield a callback that draws one bar per step; None away from a terminal."""
+    with _bars() as bars:
+        if bars is None:
+            yield None
+            return
+        tasks: dict[Step, Any] = {}
+
+        def told(step: Step, fraction: float, text: str) -> None:
+            if step not in tasks:
+                tasks[step] = bars.add_task(_DOING[step], total=1.0, note="")
+            bars.update(tasks[step], completed=fraction, note=text)
+
+        yield told
+
+
+@contextmanager
+def progress_of(doing: str) -> Iterator[Callable[[float, str], None] | None]:
+    """Yield a callback (fraction, text) that draws a bar; None away from a terminal.
+
+    Args:
+        doing: what the bar calls the work.
+    """
+    with _bars() as bars:
+        if bars is None:
+            yield None
+            return
+        task = bars.add_task(doing, total=1.0, note="")
+        yield lambda done, text: bars.update(task, completed=done, note=text)
+
+
+@contextmanager
+def _bars() -> Iterator[Progress | None]:
     if not sys.stderr.isatty():
         yield None
         return
@@ -41,14 +74,7 @@ def progress() -> Iterator[StepProgress | None]:
         TextColumn("{task.fields[note]}", markup=False),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
-        tasks: dict[Step, Any] = {}
-
-        def told(step: Step, fraction: float, text: str) -> None:
-            if step not in tasks:
-                tasks[step] = bars.add_task(_DOING[step], total=1.0, note="")
-            bars.update(tasks[step], completed=fraction, note=text)
-
-        yield told
+        yield bars
 
 
 def improvement_teller(

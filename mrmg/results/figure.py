@@ -30,13 +30,13 @@ KINDS = tuple(_DRAW)
 """What a figure can show."""
 FORMATS = (".pdf", ".svg", ".png")
 
-# Journals want text as text, in embedded TrueType fonts.
-_FOR_PRINT: Any = {
+FOR_PRINT: Any = {
     "pdf.fonttype": 42,
     "svg.fonttype": "none",
     "svg.hashsalt": "mrmg",
     "savefig.dpi": 300,
 }
+"""Text stays text, in embedded TrueType fonts, as journals want it."""
 
 
 def draw_figure(run_folder: Path, kind: str, path: Path) -> None:
@@ -53,12 +53,21 @@ def draw_figure(run_folder: Path, kind: str, path: Path) -> None:
     """
     if kind not in _DRAW:
         raise UsageError(f"kind {kind!r} is unknown; use one of {', '.join(KINDS)}")
-    if path.suffix.lower() not in FORMATS:
-        raise UsageError(f"{path} must end in one of {', '.join(FORMATS)}")
+    require_format(path)
     record = read_record(run_folder)
     if record.plan is None:
         reason = f"there is no plan to draw ({record.planning['reason']})"
         reason += "; 'mrmg scene draw' draws the scene"
         raise RunFolderError(str(run_folder), [Fault("planning.json", reason)])
-    with rc_context(_FOR_PRINT):
+    with rc_context(FOR_PRINT):
         _DRAW[kind](record.scene, record.plan, record.log, path)
+
+
+def require_format(path: Path) -> None:
+    """Refuse a file name whose suffix names no format of `FORMATS`.
+
+    Raises:
+        UsageError: naming the formats.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise UsageError(f"{path} must end in one of {', '.join(FORMATS)}")

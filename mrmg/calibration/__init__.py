@@ -1,0 +1,9 @@
+"""Measuring what the energy model of a robot should say, by driving it in MuJoCo.
+
+`calibrate` drives and fits, `write_calibration` leaves a calibrated copy of the model.
+"""
+
+from mrmg.calibration.calibrate import Calibration, Estimate, calibrate, fit_legs
+from mrmg.calibration.files import write_calibration
+
+__all__ = ["Calibration", "Estimate", "calibrate", "fit_legs", "write_calibration"]
