@@ -20,8 +20,11 @@ from mrmg.energy import PARTS
 from mrmg.ledger import EnergyLedger, LedgerEntry
 from mrmg.mission import Visit
 from mrmg.motion.dynamics import TURN_SPEEDS
-from mrmg.scene.types import Scene, Station
+from mrmg.scene.types import Robot, Scene, Station
 from mrmg.world.terrain import multiplier_at
+
+MEASURED_PARTS = ("drive", "idle", "device")
+"""The parts that work at the wheels can be split into."""
 
 
 class Motion(Protocol):
@@ -75,6 +78,30 @@ def step_energy_parts(scene: Scene, motion: Motion) -> np.ndarray:
     """Return the battery energy of each interval by part [J], shape (n, len(PARTS))."""
     duration_s = np.diff(motion.time_s)
     return step_power_parts(scene, motion) * duration_s[:, None]
+
+
+def measured_energy_parts(
+    robot: Robot, work_J: np.ndarray, time_s: np.ndarray
+) -> np.ndarray:
+    """Return what a battery lost over each tick by part [J].
+
+    Args:
+        robot: whose battery is drawn from.
+        work_J: work at the wheels, driving (>= 0) and braking (<= 0), shape (n, 2).
+        time_s: of the ticks' ends, shape (n + 1,).
+
+    Returns:
+        By tick and part of `MEASURED_PARTS`, shape (n, 3).
+    """
+    model = robot.model.energy_model
+    driving_J, braking_J = work_J.T
+    drive_J = (
+        driving_J / model.drive_efficiency + braking_J * model.regeneration_efficiency
+    )
+    duration_s = np.diff(time_s)
+    idle_J = model.idle_power_W * duration_s
+    device_J = model.device_power_W * duration_s
+    return np.stack([drive_J, idle_J, device_J], axis=-1)
 
 
 def find_visits(scene: Scene, motion: Motion, tour: Sequence[str]) -> tuple[Visit, ...]:

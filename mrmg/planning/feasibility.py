@@ -13,27 +13,36 @@ import numpy as np
 import shapely
 from shapely.geometry import Point, Polygon, box
 
-from mrmg.scene.types import Region, Robot, Scene
+from mrmg.scene.types import Goal, Region, Robot, Scene
 
 
 def proof_of_infeasibility(scene: Scene) -> str | None:
     """Return why the mission has no solution, or None if no proof is known."""
+    return next(iter(impossible_goals(scene).values()), None)
+
+
+def impossible_goals(scene: Scene) -> dict[str, str]:
+    """Return the goals that no robot can visit, each with the proof's sentence."""
     proofs = [_Reach.of(scene, robot) for robot in scene.robots]
-    for goal in scene.goals:
-        connected = [reach for reach in proofs if reach.is_connected(goal.region)]
-        if not connected:
-            return (
-                f"goal {goal.id} is unreachable: for every robot it is cut off from "
-                "the start by obstacles with no gap as wide as the robot"
-            )
-        missing_J = min(reach.missing_energy_J(goal.region) for reach in connected)
-        if missing_J > 0.0:
-            return (
-                f"goal {goal.id} is out of energy's reach: even on the shortest way, "
-                "over every station that can be reached, each robot that can get there "
-                f"lacks at least {missing_J:.0f} J above its reserve"
-            )
-    return None
+    reasons = {goal.id: _why_impossible(goal, proofs) for goal in scene.goals}
+    return {name: reason for name, reason in reasons.items() if reason}
+
+
+def _why_impossible(goal: Goal, proofs: list[_Reach]) -> str:
+    connected = [reach for reach in proofs if reach.is_connected(goal.region)]
+    if not connected:
+        return (
+            f"goal {goal.id} is unreachable: for every robot it is cut off from "
+            "the start by obstacles with no gap as wide as the robot"
+        )
+    missing_J = min(reach.missing_energy_J(goal.region) for reach in connected)
+    if missing_J > 0.0:
+        return (
+            f"goal {goal.id} is out of energy's reach: even on the shortest way, "
+            "over every station that can be reached, each robot that can get there "
+            f"lacks at least {missing_J:.0f} J above its reserve"
+        )
+    return ""
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrmg.accounting import (
+    MEASURED_PARTS,
     LoggedMotion,
     battery_content,
     find_visits,
     leg_entries,
+    measured_energy_parts,
     plan_ledger,
 )
 from mrmg.errors import Fault, RunFolderError
@@ -39,9 +41,6 @@ _TROUBLE = {
     "stalled": "the fleet did not get on",
     "restless": "the fleet did not come to rest",
 }
-
-MEASURED_PARTS = ("drive", "idle", "device")
-"""The parts that work at the wheels can be split into."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,15 +163,7 @@ def measured_step_energy(robot: Robot, log: ExecutionLog, index: int) -> np.ndar
     Returns:
         By tick and part of `MEASURED_PARTS`, shape (n - 1, 3).
     """
-    model = robot.model.energy_model
-    driving_J, braking_J = log.work_J[index].T
-    drive_J = (
-        driving_J / model.drive_efficiency + braking_J * model.regeneration_efficiency
-    )
-    duration_s = np.diff(log.time_s)
-    idle_J = model.idle_power_W * duration_s
-    device_J = model.device_power_W * duration_s
-    return np.stack([drive_J, idle_J, device_J], axis=-1)
+    return measured_energy_parts(robot, log.work_J[index], log.time_s)
 
 
 def _measured_entries(item: _Measured) -> list[LedgerEntry]:

@@ -139,6 +139,9 @@ class Assembly:
                 self.faults += battery
                 continue
             x, y, yaw = entry.pose
+            if entry.rolling_factor is not None:
+                rolling = model.rolling_coefficient * entry.rolling_factor
+                model = replace(model, rolling_coefficient=rolling)
             yield Robot(id=entry.id, model=model, pose=(x, y, yaw), battery=battery)
 
     def _model(self, robot_id: str, reference: str, path: str) -> RobotModel | None:

@@ -35,6 +35,8 @@ Details:
   full battery drives straight on at constant speed). A robot's own `battery` replaces
   what it names; without any capacity the model's standard battery counts.
 - `start_energy` is a share of the capacity (0..1), or one of {J: }, {Wh: }, {m: }.
+- `rolling_factor` multiplies the rolling resistance a robot is reckoned with, as one
+  measures it of a loaded or worn one; metres in `battery` stay those of the model.
 - `model` is the name of a shipped model, or a folder (with a `/` in it), relative to
   the scene file, that holds a `robot.yaml`.
 - `energy: paper` (of a robot here, or in its `robot.yaml`) charges only distance times
@@ -198,6 +200,10 @@ class RobotEntry(Strict):
     battery: BatteryEntry | None = None
     energy: EnergyPreset | None = Field(
         default=None, description="which parts of the energy model count"
+    )
+    rolling_factor: Positive | None = Field(
+        default=None,
+        description="rolling resistance to reckon with, relative to the model",
     )
 
 

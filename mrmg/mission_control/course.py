@@ -1,0 +1,206 @@
+"""The course of a mission: the plans it went by, one after another, as one plan.
+
+A course begins as the mission's plan. When the fleet is stopped, what was planned after
+the next step is replaced by braking and standing; a new plan is then joined to that.
+The clock of the simulation runs through all of it, so that log, audit and pictures need
+to know of a single plan only: the one that was in force at each time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrmg.accounting import find_visits, leg_entries, step_energy_parts
+from mrmg.energy import PARTS
+from mrmg.ledger import EnergyLedger, LedgerEntry
+from mrmg.mission import Plan, Visit
+from mrmg.mission_control.braking import brake_to_rest
+from mrmg.scene.types import Scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Course:
+    """Plans in force, joined.
+
+    Attributes:
+        scene: the mission as it began.
+        plan: the joined plan, of all robots of the scene.
+        parts_J: planned energy of each step by robot, shape (n, len(PARTS)) each; under
+            the energy model that was believed when the step was planned.
+        charge_J: (step, battery contents by robot) from which the batteries were
+            reckoned on, in order.
+    """
+
+    scene: Scene
+    plan: Plan
+    parts_J: Mapping[str, np.ndarray]
+    charge_J: tuple[tuple[int, Mapping[str, float]], ...]
+
+    @staticmethod
+    def of(scene: Scene, plan: Plan) -> Course:
+        """Return the course that is a single plan."""
+        return Course(
+            scene=scene,
+            plan=plan,
+            parts_J={
+                item.robot: step_energy_parts(scene, item) for item in plan.trajectories
+            },
+            charge_J=(
+                (0, {robot.id: robot.battery.start_J for robot in scene.robots}),
+            ),
+        )
+
+    @property
+    def steps(self) -> int:
+        """Number of steps."""
+        return len(self.plan.trajectories[0].control)
+
+    def stopped(
+        self, step: int, states: Mapping[str, np.ndarray], pause_s: float
+    ) -> Course:
+        """Return the course that is left at a step to come to rest.
+
+        Args:
+            step: after which the fleet brakes.
+            states: of all robots at that step, shape (5,) each.
+            pause_s: how long the fleet stands at least.
+        """
+        dt_s = self.plan.dt_s
+        brakings = {
+            robot.id: brake_to_rest(robot.model, states[robot.id], dt_s)
+            for robot in self.scene.robots
+        }
+        longest = max(len(state) for state, _ in brakings.values())
+        length = longest + round(pause_s / dt_s)
+        ways = {}
+        for name, (state, control) in brakings.items():
+            way = np.concatenate([states[name][None], state])
+            ways[name] = _held(way, control, length)
+        return self._continued(step, ways, self.scene).with_tours(self.plan.tours)
+
+    def resumed(
+        self,
+        rest: Scene,
+        plan: Plan,
+        charge_J: Mapping[str, float],
+        tours: Mapping[str, Sequence[str]],
+    ) -> Course:
+        """Return the course that goes on by a new plan from its end.
+
+        Args:
+            rest: the remaining scene the plan was made for; robots that it does not
+                have stay where they are.
+            plan: from where the fleet stands.
+            charge_J: battery contents the plan starts from, by robot.
+            tours: of the whole course.
+        """
+        planned = {item.robot: item for item in plan.trajectories}
+        length = max(len(item.control) for item in plan.trajectories)
+        ways = {}
+        for item in self.plan.trajectories:
+            if item.robot in planned:
+                new = planned[item.robot]
+                ways[item.robot] = (new.state, new.control)
+            else:
+                ways[item.robot] = _held(item.state[-1:], np.zeros((0, 2)), length)
+        joined = self._continued(self.steps, ways, rest)
+        anew = (*self.charge_J, (self.steps, dict(charge_J)))
+        return replace(joined, charge_J=anew).with_tours(tours)
+
+    def with_tours(self, tours: Mapping[str, Sequence[str]]) -> Course:
+        """Return the course with the given tours, and all that follows from them."""
+        visits: list[Visit] = []
+        entries: list[LedgerEntry] = []
+        for item in self.plan.trajectories:
+            own = find_visits(self.scene, item, tours[item.robot])
+            arrival_J = self._arrival_J(item.robot, own)
+            visits += [
+                replace(visit, energy_J=energy_J)
+                for visit, energy_J in zip(own, arrival_J, strict=True)
+            ]
+            entries += leg_entries(item.robot, self.parts_J[item.robot], PARTS, own)
+        visits.sort(key=lambda visit: (visit.step, visit.robot))
+        plan = replace(
+            self.plan,
+            tours={name: tuple(tour) for name, tour in tours.items()},
+            visits=tuple(visits),
+            ledger=EnergyLedger(tuple(entries)),
+        )
+        return replace(self, plan=plan)
+
+    def content_J(
+        self, robot: str, visits: Sequence[Visit]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the planned battery content at each state, before and after recharges.
+
+        Args:
+            robot: id of the robot.
+            visits: of this robot.
+        """
+        capacity_J = self.scene.robot(robot).battery.capacity_J
+        stations = {visit.step for visit in visits if visit.kind == "station"}
+        anew = {step: charge_J[robot] for step, charge_J in self.charge_J}
+        draw_J = self.parts_J[robot].sum(axis=1)
+        before, after = np.zeros(self.steps + 1), np.zeros(self.steps + 1)
+        content_J = 0.0
+        for step in range(self.steps + 1):
+            content_J = anew.get(step, content_J)
+            before[step] = content_J
+            if step in stations:
+                content_J = capacity_J
+            after[step] = content_J
+            if step < self.steps:
+                content_J = min(content_J - float(draw_J[step]), capacity_J)
+        return before, after
+
+    def _arrival_J(self, robot: str, visits: Sequence[Visit]) -> list[float]:
+        before, _ = self.content_J(robot, visits)
+        return [float(before[visit.step]) for visit in visits]
+
+    def _continued(
+        self,
+        step: int,
+        ways: Mapping[str, tuple[np.ndarray, np.ndarray]],
+        believed: Scene,
+    ) -> Course:
+        """Return the course up to `step`, then the given states and controls.
+
+        Args:
+            step: whose state is replaced by the first of the new ones.
+            ways: states, shape (n + 1, 5), and controls, shape (n, 2), by robot.
+            believed: whose energy models the new steps are reckoned with.
+        """
+        known = {robot.id for robot in believed.robots}
+        trajectories, parts_J = [], {}
+        for item in self.plan.trajectories:
+            state, control = ways[item.robot]
+            new = replace(item, state=state.copy(), control=control.copy())
+            scene = believed if item.robot in known else self.scene
+            parts_J[item.robot] = np.concatenate(
+                [self.parts_J[item.robot][:step], step_energy_parts(scene, new)]
+            )
+            trajectories.append(
+                replace(
+                    item,
+                    state=np.concatenate([item.state[:step], state]),
+                    control=np.concatenate([item.control[:step], control]),
+                )
+            )
+        plan = replace(self.plan, trajectories=tuple(trajectories))
+        return replace(self, plan=plan, parts_J=parts_J)
+
+
+def _held(
+    state: np.ndarray, control: np.ndarray, length: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a motion lengthened to `length` steps by standing at its end."""
+    rest = state[-1].copy()
+    rest[3:] = 0.0
+    missing = length - len(control)
+    return (
+        np.concatenate([state, np.repeat(rest[None], missing, axis=0)]),
+        np.concatenate([control, np.zeros((missing, 2))]),
+    )

@@ -1,0 +1,64 @@
+"""Injected faults: a robot that stops on the way and stays where it is."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from mrmg.errors import UsageError
+from mrmg.scene.types import Scene
+
+_FORM = re.compile(r"(?P<robot>[^@\s]+)@(?P<time>[^@\s]+?)s?")
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class StopFault:
+    """A robot brakes as hard as its plan ever does, and never moves again.
+
+    Attributes:
+        time_s: simulated time at which it happens.
+        robot: id of the robot.
+    """
+
+    time_s: float
+    robot: str
+
+    def __str__(self) -> str:
+        return f"{self.robot}@{self.time_s:g}s"
+
+
+def parse_fault(text: str) -> StopFault:
+    """Read a fault such as `r2@40s`.
+
+    Raises:
+        UsageError: if it is not of that form, or the time is not one.
+    """
+    match = _FORM.fullmatch(text.strip())
+    try:
+        time_s = float(match["time"]) if match else math.nan
+    except ValueError:
+        time_s = math.nan
+    if match is None or not 0.0 <= time_s < math.inf:
+        raise UsageError(
+            f"fault {text!r} is not understood; expected ROBOT@TIME with a time in "
+            "seconds that is not negative, such as r2@40s"
+        )
+    return StopFault(time_s=time_s, robot=match["robot"])
+
+
+def checked_faults(scene: Scene, texts: tuple[str, ...]) -> tuple[StopFault, ...]:
+    """Return the faults in order of time.
+
+    Raises:
+        UsageError: if one cannot be read, or names a robot the scene does not have.
+    """
+    faults = sorted(parse_fault(text) for text in texts)
+    robots = [robot.id for robot in scene.robots]
+    for fault in faults:
+        if fault.robot not in robots:
+            raise UsageError(
+                f"fault '{fault}' names robot '{fault.robot}'; robots of "
+                f"'{scene.name}': {', '.join(robots)}"
+            )
+    return tuple(faults)

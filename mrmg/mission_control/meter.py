@@ -1,0 +1,117 @@
+"""What the batteries of a driving fleet lose, and what that says of its tyres.
+
+The meter of one robot sums the energy its actuators took, follows its battery over the
+recharges of its tour, and estimates by recursive least squares the factor f by which
+its rolling resistance differs from its model's: over each second under power,
+
+    measured energy - metered energy of all other parts = f * metered rolling energy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mrmg.accounting import (
+    MEASURED_PARTS,
+    LoggedMotion,
+    measured_energy_parts,
+    step_energy_parts,
+)
+from mrmg.energy import PARTS
+from mrmg.scene.types import Robot, Scene
+
+_ROLLING = PARTS.index("rolling")
+_CONSUMERS = [PARTS.index("idle"), PARTS.index("device")]
+_DRIVE = MEASURED_PARTS.index("drive")
+_PRIOR_M = 1.0
+_SPAN_S = 1.0
+
+
+class RollingEstimate:
+    """Recursive least squares of y = f x with a prior of f = 1.
+
+    Attributes:
+        factor: the estimate of f.
+    """
+
+    def __init__(self, prior: float) -> None:
+        """Start at 1, as sure of it as one observation of x = `prior` makes."""
+        self.factor = 1.0
+        self._information = prior**2
+
+    def observe(self, x: float, y: float) -> None:
+        """Take in one pair."""
+        self._information += x * x
+        self.factor += x / self._information * (y - self.factor * x)
+
+
+class RobotMeter:
+    """Everything measured of one robot since the mission began.
+
+    Attributes:
+        robot: whose energies are measured.
+        used_J: drawn from the battery so far.
+        charge_J: battery content now.
+        rolling: estimate of the rolling resistance.
+    """
+
+    def __init__(self, scene: Scene, robot: Robot) -> None:
+        """Start with the robot's start energy."""
+        self.robot = robot
+        self.used_J = 0.0
+        self.charge_J = robot.battery.start_J
+        model = robot.model.energy_model
+        self.rolling = RollingEstimate(_PRIOR_M * model.plain_ground_J_per_m())
+        self._scene = scene
+        self._tour: list[str] = []
+        self._regions = {target.id: target.region for target in scene.targets()}
+        self._fills = {station.id for station in scene.stations}
+
+    def follow(self, tour: Sequence[str]) -> None:
+        """Expect the visits of a tour from now on."""
+        self._tour = list(tour)
+
+    def add(self, time_s: np.ndarray, state: np.ndarray, work_J: np.ndarray) -> None:
+        """Take in some ticks.
+
+        Args:
+            time_s: of the state before the first tick and after each, shape (n + 1,).
+            state: at these times, shape (n + 1, 5).
+            work_J: at the wheels over each tick, driving and braking, shape (n, 2).
+        """
+        parts_J = measured_energy_parts(self.robot, work_J, time_s)
+        draw_J = parts_J.sum(axis=1)
+        self.used_J += float(draw_J.sum())
+        self._draw(draw_J, state[1:, :2])
+        self._estimate(time_s, state, parts_J[:, _DRIVE])
+
+    def _draw(self, draw_J: np.ndarray, points: np.ndarray) -> None:
+        """Take energies from the battery; a station of the tour fills it."""
+        capacity_J = self.robot.battery.capacity_J
+        first = start = 0
+        while self._tour:
+            inside = self._regions[self._tour[0]].depth(points[start:]) >= 0.0
+            if not inside.any():
+                break
+            start += int(inside.argmax())
+            if self._tour.pop(0) in self._fills:
+                self.charge_J, first = capacity_J, start + 1
+        self.charge_J = min(self.charge_J - float(draw_J[first:].sum()), capacity_J)
+
+    def _estimate(
+        self, time_s: np.ndarray, state: np.ndarray, drive_J: np.ndarray
+    ) -> None:
+        motion = LoggedMotion(robot=self.robot.id, time_s=time_s, state=state)
+        parts_J = step_energy_parts(self._scene, motion)
+        driving_J = parts_J.sum(axis=1) - parts_J[:, _CONSUMERS].sum(axis=1)
+        others_J = driving_J - parts_J[:, _ROLLING]
+        # While a robot coasts or brakes, its battery tells nothing of its tyres.
+        pulls = np.flatnonzero((driving_J > 0.0) & (drive_J > 0.0))
+        spans = max(1, round((time_s[-1] - time_s[0]) / _SPAN_S))
+        for ticks in np.array_split(pulls, spans):
+            self.rolling.observe(
+                float(parts_J[ticks, _ROLLING].sum()),
+                float(drive_J[ticks].sum() - others_J[ticks].sum()),
+            )

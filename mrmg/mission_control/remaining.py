@@ -1,0 +1,129 @@
+"""The rest of a mission as a scene of its own, so that it can be planned anew."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.types import Robot, Scene
+
+_LEAST_J = 1e-9
+"""A start energy in a scene must be positive."""
+
+_ROOM_SHARE = 0.02
+"""Share of the capacity above the reserve with which a robot can still do something."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FleetCondition:
+    """Where a fleet at rest has got to.
+
+    Attributes:
+        pose: (x [m], y [m], yaw [rad]) of every robot.
+        energy_J: battery content of every robot.
+        rolling_factor: rolling resistance of every robot as measured, relative to its
+            model's.
+        out_of_service: ids of robots that will not move any more.
+        visited: ids of goals that need no more visit.
+    """
+
+    pose: Mapping[str, tuple[float, float, float]]
+    energy_J: Mapping[str, float]
+    rolling_factor: Mapping[str, float]
+    out_of_service: frozenset[str] = frozenset()
+    visited: frozenset[str] = frozenset()
+
+
+def remaining_scene(
+    scene: Scene, condition: FleetCondition, *, reserve_share: float = 1.0
+) -> Scene:
+    """Return what is left of a mission: same ids, same map, from where the fleet is.
+
+    Robots out of service are obstacles of their footprints' shape for the others, under
+    their own ids. A scene may be left without goals or without robots.
+
+    Args:
+        scene: the mission as it began.
+        condition: of the fleet, at rest.
+        reserve_share: share of the batteries' reserves that is still kept; a battery
+            that is down to that has none left to keep.
+
+    Raises:
+        SceneError: if robots touch each other or an obstacle.
+    """
+    document = copy.deepcopy(scene.document)
+    gone = condition.out_of_service
+    document["goals"] = [
+        goal for goal in document["goals"] if goal["id"] not in condition.visited
+    ]
+    document["obstacles"] = [
+        *_obstacles_for_others(document["obstacles"], gone),
+        *(
+            _wreck(robot, condition.pose[robot.id])
+            for robot in scene.robots
+            if robot.id in gone
+        ),
+    ]
+    document["robots"] = [
+        _continued(entry, scene.robot(entry["id"]), condition, reserve_share)
+        for entry in document["robots"]
+        if entry["id"] not in gone
+    ]
+    return scene_from_document(document, source=f"rest of {scene.name}")
+
+
+def _obstacles_for_others(
+    obstacles: list[dict[str, Any]], gone: frozenset[str]
+) -> list[dict[str, Any]]:
+    """Return the obstacles that stop a robot in service."""
+    kept = []
+    for number, obstacle in enumerate(obstacles):
+        # Named by place in the list as long as that is the scene's.
+        entry = {"id": f"obstacle_{number}", **obstacle}
+        if "blocks" in entry:
+            entry["blocks"] = [name for name in entry["blocks"] if name not in gone]
+        if entry.get("blocks", True):
+            kept.append(entry)
+    return kept
+
+
+def _wreck(robot: Robot, pose: tuple[float, float, float]) -> dict[str, Any]:
+    """Return the obstacle that a standing robot is."""
+    x, y, yaw = pose
+    turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+    corners = robot.model.footprint_m @ turn.T + (x, y)
+    return {
+        "id": robot.id,
+        "polygon": corners.tolist(),
+        "height": float(robot.model.height_m),
+    }
+
+
+def _continued(
+    entry: dict[str, Any],
+    robot: Robot,
+    condition: FleetCondition,
+    reserve_share: float,
+) -> dict[str, Any]:
+    battery = robot.battery
+    energy_J = min(max(condition.energy_J[robot.id], _LEAST_J), battery.capacity_J)
+    # A scene's own factor is in the robot's model already.
+    factor = entry.get("rolling_factor", 1.0) * condition.rolling_factor[robot.id]
+    reserve = battery.reserve_fraction * reserve_share
+    if energy_J < (reserve + _ROOM_SHARE) * battery.capacity_J:
+        reserve = 0.0
+    return {
+        **entry,
+        "pose": [float(value) for value in condition.pose[robot.id]],
+        "start_energy": {"J": float(energy_J)},
+        "battery": {
+            "capacity_J": battery.capacity_J,
+            "reserve": reserve,
+        },
+        "rolling_factor": float(factor),
+    }

@@ -1,0 +1,120 @@
+"""Finding a plan for the rest of a mission, or for as much of it as can be had."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from mrmg import seeding
+from mrmg.errors import SceneError
+from mrmg.mission import Plan
+from mrmg.mission_control.parameters import ControlParams
+from mrmg.mission_control.remaining import FleetCondition, remaining_scene
+from mrmg.planning import PlannerParams, plan_mission
+from mrmg.planning.feasibility import impossible_goals
+from mrmg.results.verify import verify
+from mrmg.scene.types import Scene
+
+_GIVEN_UP_AT_ONCE = 3
+"""One in this many goals is given up when no plan is found and no proof says why."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Replan:
+    """The outcome of planning the rest of a mission.
+
+    Attributes:
+        scene: what is left of the mission without the goals given up; None where no
+            goal is.
+        plan: of that scene; None if nothing more can be done.
+        reserve_share: share of the reserves the plan keeps.
+        given_up: why goals are left out, by id.
+        reason: why there is no plan; "" with one.
+    """
+
+    scene: Scene | None = None
+    plan: Plan | None = None
+    reserve_share: float = 1.0
+    given_up: Mapping[str, str] = field(default_factory=dict)
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Replanner:
+    """Plans the rests of one mission.
+
+    Attributes:
+        scene: the mission as it began.
+        seed: of all random streams.
+        planner: parameters of the planner.
+        control: how hard to try.
+    """
+
+    scene: Scene
+    seed: int
+    planner: PlannerParams
+    control: ControlParams
+
+    def replan(self, condition: FleetCondition, number: int) -> Replan:
+        """Return the outcome of the `number`th new planning.
+
+        If no plan keeps the reserves they may be used: that is what they are for. Goals
+        for which there is no plan even then are given up: those proven impossible, else
+        some that are farthest from all robots.
+        """
+        given_up: dict[str, str] = {}
+        draws = self.control.draws
+        try:
+            while True:
+                left = replace(condition, visited=condition.visited | set(given_up))
+                tried = self._tried(left, number, draws)
+                if tried.plan is not None or tried.scene is None:
+                    reasons = "; ".join(dict.fromkeys(given_up.values()))
+                    reason = "" if tried.plan else reasons
+                    return replace(tried, given_up=given_up, reason=reason)
+                given_up |= tried.given_up or _farthest_goals(tried.scene)
+                # What is hopeless in full need not be tried as hard in part.
+                draws = 1
+        except SceneError as error:
+            reason = "; ".join(fault.message for fault in error.faults)
+            return Replan(given_up=given_up, reason=reason)
+
+    def _tried(self, left: FleetCondition, number: int, draws: int) -> Replan:
+        """Return a plan for all goals that are left, or those proven impossible."""
+        shares = self.control.reserves
+        last = remaining_scene(self.scene, left, reserve_share=shares[-1])
+        if not last.goals:
+            return Replan()
+        for share in shares:
+            rest = remaining_scene(self.scene, left, reserve_share=share)
+            plan = self._plan(rest, number, draws)
+            if plan is not None:
+                return Replan(scene=rest, plan=plan, reserve_share=share)
+            impossible = impossible_goals(last) if share == shares[0] else {}
+            if impossible:
+                return Replan(scene=last, given_up=impossible)
+        return Replan(scene=last)
+
+    def _plan(self, rest: Scene, number: int, draws: int) -> Plan | None:
+        """Return a plan that the verifier accepts, or None."""
+        for draw in range(draws):
+            seed = seeding.stream_seed(self.seed, "replan", number, draw)
+            plan = plan_mission(rest, seed=seed, params=self.planner).plan
+            if plan is not None and verify(rest, plan).ok:
+                return plan
+        return None
+
+
+def _farthest_goals(rest: Scene) -> dict[str, str]:
+    """Return some goals that are farthest from all robots, as given up."""
+    starts = np.array([robot.pose[:2] for robot in rest.robots])
+    distance_m = {
+        goal.id: float(np.hypot(*(starts - goal.region.center).T).min())
+        for goal in rest.goals
+    }
+    count = math.ceil(len(distance_m) / _GIVEN_UP_AT_ONCE)
+    farthest = sorted(distance_m, key=lambda name: -distance_m[name])[:count]
+    return {name: f"no plan was found that visits goal {name}" for name in farthest}
