@@ -79,7 +79,6 @@ class Manoeuvre:
 def manoeuvres_of(model: RobotModel) -> tuple[Manoeuvre, ...]:
     """Return everything a robot of `model` drives to be calibrated."""
     limits = model.limits.scaled(model.planning_share)
-    circle = _spinning_circle if model.motion_model == "unicycle" else _steered_circle
     straights = [
         _straight(limits, share * limits.v_max_m_s, multiplier)
         for multiplier in MULTIPLIERS
@@ -89,7 +88,7 @@ def manoeuvres_of(model: RobotModel) -> tuple[Manoeuvre, ...]:
         straights.append(_straight(limits, limits.v_min_m_s, 1.0))
     cycles = [_cycle(limits, share * limits.u1_max_m_s2) for share in _ACCELERATIONS]
     circles = [
-        circle(limits, share * limits.v_max_m_s, sign * turn * limits.w_max)
+        circle(model, limits, share * limits.v_max_m_s, sign * turn * limits.w_max)
         for share in _CIRCLE_SPEEDS
         for turn, sign in zip(_TURNS, (1.0, -1.0, 1.0, -1.0), strict=True)
     ]
@@ -99,6 +98,21 @@ def manoeuvres_of(model: RobotModel) -> tuple[Manoeuvre, ...]:
         else []
     )
     return (*straights, *cycles, *circles, *spins)
+
+
+def circle(
+    model: RobotModel, limits: Limits, speed_m_s: float, second: float
+) -> Manoeuvre:
+    """Return a circle that `model` drives.
+
+    Args:
+        model: whose motion model tells how it gets on a circle.
+        limits: of its ramps.
+        speed_m_s: while cruising.
+        second: psi [rad] or omega [rad/s] while cruising.
+    """
+    drive = _spinning_circle if model.motion_model == "unicycle" else _steered_circle
+    return drive(limits, speed_m_s, second)
 
 
 def _straight(limits: Limits, speed: float, multiplier: float) -> Manoeuvre:

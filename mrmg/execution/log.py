@@ -64,8 +64,9 @@ class ExecutionLog:
         qpos: MuJoCo's positions, shape (n, nq); what a video is drawn from.
         contacts: every contact other than wheel and floor.
         events: what a supervisor saw and did, in order of time.
-        timing: wall-clock figures: wall_s, realtime_factor, controller_ms
-            {median, p99}. Kept apart: all else is equal between equal runs.
+        timing: wall_s and realtime_factor by the clock, controller_ms {median, p99} a
+            robot and call by the processor. Kept apart: all else is equal between
+            equal runs.
     """
 
     scene_digest: str

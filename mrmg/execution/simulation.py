@@ -269,12 +269,13 @@ class _Run:
         clock = self._clock
         clock.pace(self._sensing.state, self._planned, self._period_s)
         if self.ticks % TICKS_PER_CORRECTION == 0:
-            started = time.perf_counter()
+            # Of this thread: what other processes do on its processor does not count.
+            started = time.thread_time()
             calls = self._set_points.correct(
                 self._sensing.state, clock.time_s, clock.rate
             )
             if calls:
-                self._call_s.append((time.perf_counter() - started) / calls)
+                self._call_s.append((time.thread_time() - started) / calls)
         self._set_points.advance(
             self._sensing.axle_speed_m_s, clock.time_s, clock.rate, self._period_s
         )
