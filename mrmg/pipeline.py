@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from mrmg.errors import ExitCode
+from mrmg.execution.disturbance_spec import written_out
 from mrmg.mission import PlanStatus
 from mrmg.results.gl_backend import choose_backend
 from mrmg.run_folder import RunFolder, Step
@@ -49,6 +50,8 @@ def run(
     workers: int = 1,
     profile: str = "default",
     controller: str = "mpc",
+    disturb: str | None = None,
+    disturb_seed: int = 0,
     video: VideoArguments | None = DEFAULT_VIDEO,
     on_progress: StepProgress | None = None,
     on_improvement: OnImprovement | None = None,
@@ -64,6 +67,9 @@ def run(
         workers: threads that grow them.
         profile: "default" or "paper".
         controller: name of the tracking controller.
+        disturb: disturbances to drive under, as `execution.disturbance_spec` reads
+            them; "" for the default ones, None for none.
+        disturb_seed: of what is drawn from them.
         video: how the video is made; None for no video.
         on_progress: told (step, fraction, text).
         on_improvement: told of every plan that is cheaper than all before it.
@@ -80,6 +86,8 @@ def run(
         trees=trees,
         workers=workers,
         controller=controller,
+        disturb=None if disturb is None else written_out(disturb),
+        disturb_seed=disturb_seed,
         video=video or DEFAULT_VIDEO,
     )
     folder = RunFolder(out or default_folder(scene, seed))

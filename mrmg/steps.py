@@ -75,6 +75,8 @@ class RunArguments:
         trees: number of motion trees to grow; None for the profile's.
         workers: threads that grow them; without a time limit they decide nothing.
         controller: name of the tracking controller.
+        disturb: specification of the disturbances driven under; None for none.
+        disturb_seed: of what is drawn from them.
         video: how the video is made.
     """
 
@@ -84,6 +86,8 @@ class RunArguments:
     trees: int | None = None
     workers: int = 1
     controller: str = "mpc"
+    disturb: str | None = None
+    disturb_seed: int = 0
     video: VideoArguments = DEFAULT_VIDEO
 
     def to_json(self) -> dict[str, Any]:
@@ -142,7 +146,11 @@ class Run:
                 self.arguments.budget_s,
                 self.arguments.trees,
             ],
-            Step.EXECUTE: [self.arguments.controller],
+            Step.EXECUTE: [
+                self.arguments.controller,
+                self.arguments.disturb,
+                self.arguments.disturb_seed,
+            ],
             Step.RENDER: asdict(self.arguments.video),
         }
         needs = [self.fingerprint(need) for need in NEEDS[step]]
@@ -241,15 +249,33 @@ def _verify(run: Run) -> Write:
     return lambda: verdict.save(run.folder.path)
 
 
-def _execute(run: Run) -> Write:
+def drive(
+    scene: Scene,
+    plan: Plan,
+    arguments: RunArguments,
+    on_progress: Callable[[float, str], None] | None = None,
+) -> ExecutionLog:
+    """Drive a plan in MuJoCo as the arguments of its run want it."""
     from mrmg.execution import simulate
+    from mrmg.execution.disturbance_spec import parse_disturbance
 
-    log = simulate(
-        run.scene,
-        run.plan(),
-        controller=run.arguments.controller,
-        on_progress=run.progress_of(Step.EXECUTE),
+    disturbance = None
+    if arguments.disturb is not None:
+        ranges = parse_disturbance(arguments.disturb)
+        ids = [robot.id for robot in scene.robots]
+        disturbance = ranges.draw(arguments.disturb_seed, ids)
+    return simulate(
+        scene,
+        plan,
+        controller=arguments.controller,
+        disturbance=disturbance,
+        on_progress=on_progress,
     )
+
+
+def _execute(run: Run) -> Write:
+    progress = run.progress_of(Step.EXECUTE)
+    log = drive(run.scene, run.plan(), run.arguments, progress)
     return lambda: log.save(run.folder.path)
 
 

@@ -29,6 +29,8 @@ def run(options: argparse.Namespace) -> int:
             trees=options.trees,
             workers=options.workers,
             profile=options.profile,
+            disturb=options.disturb,
+            disturb_seed=options.disturb_seed,
             video=None if options.no_video else DEFAULT_VIDEO,
             on_progress=told,
             on_improvement=terminal.improvement_teller(told),
@@ -90,9 +92,15 @@ def verify(options: argparse.Namespace) -> int:
 
 def execute(options: argparse.Namespace) -> int:
     """Drive the plan of a run folder in MuJoCo."""
+    from mrmg.execution.disturbance_spec import written_out
     from mrmg.run_folder import Step
 
-    work = _make(options.run, Step.EXECUTE, controller=options.controller)
+    changes = {"disturb": None, "disturb_seed": options.disturb_seed}
+    if options.disturb is not None:
+        changes["disturb"] = written_out(options.disturb)
+    if options.controller is not None:
+        changes["controller"] = options.controller
+    work = _make(options.run, Step.EXECUTE, **changes)
     log = work.folder.read_json("log.json", cure="mrmg execute")
     ended = "driven to the end" if log["completed"] else "given up on the way"
     touches = [
@@ -164,8 +172,8 @@ def doctor(options: argparse.Namespace) -> int:
 def _make(
     path: Path,
     *steps: Any,
-    controller: str | None = None,
     video: dict[str, Any] | None = None,
+    **changes: Any,
 ) -> Run:
     """Make steps of the run in `path` anew, with some of its arguments changed."""
     from mrmg.run_folder import existing
@@ -175,8 +183,8 @@ def _make(
         work = taken_up(folder, told)
         changed = replace(
             work.arguments,
-            controller=controller or work.arguments.controller,
             video=replace(work.arguments.video, **(video or {})),
+            **changes,
         )
         work = replace(work, arguments=changed)
         for step in steps:

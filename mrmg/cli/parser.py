@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 
 from mrmg import __version__
-from mrmg.cli import calibrate_command, commands, scene_commands, show_commands
+from mrmg.cli import (
+    calibrate_command,
+    commands,
+    robustness_commands,
+    scene_commands,
+    show_commands,
+    values,
+)
 
 EXIT_CODES = """\
 exit codes:
@@ -32,6 +38,7 @@ def make_parser() -> argparse.ArgumentParser:
     _add_run(verbs)
     _add_plan(verbs)
     _add_steps(verbs)
+    robustness_commands.add_robustness(verbs)
     _add_render(verbs)
     _add_compare(verbs)
     _add_figure(verbs)
@@ -50,6 +57,7 @@ _Verbs = argparse._SubParsersAction
 def _add_run(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     run = verbs.add_parser("run", help="the whole mission, from scene to report")
     _add_planning(run)
+    robustness_commands.add_disturbance(run)
     run.add_argument("--no-video", action="store_true", help="leave out the video")
     run.set_defaults(command=commands.run)
 
@@ -62,26 +70,28 @@ def _add_plan(verbs: _Verbs) -> None:  # type: ignore[type-arg]
 
 def _add_planning(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("scene", metavar="SCENE", help="path, or name of a shipped scene")
-    verb.add_argument("--seed", type=_seed, default=0, metavar="N", help="default 0")
+    verb.add_argument(
+        "--seed", type=values.seed, default=0, metavar="N", help="default 0"
+    )
     verb.add_argument(
         "--out", type=Path, metavar="DIR", help="run folder; default runs/SCENE-sN"
     )
     limit = verb.add_mutually_exclusive_group()
     limit.add_argument(
         "--budget",
-        type=_positive,
+        type=values.positive,
         metavar="SECONDS",
         help="go on improving the plan for so long; Ctrl-C ends it earlier",
     )
     limit.add_argument(
         "--trees",
-        type=_count,
+        type=values.count,
         metavar="N",
         help="go on improving for so many motion trees: the same plan every time",
     )
     verb.add_argument(
         "--workers",
-        type=_count,
+        type=values.count,
         default=1,
         metavar="N",
         help="threads that plan; default 1",
@@ -109,6 +119,7 @@ def _add_steps(verbs: _Verbs) -> None:  # type: ignore[type-arg]
             verb.add_argument(
                 "--controller", metavar="NAME", help="tracking controller; default mpc"
             )
+            robustness_commands.add_disturbance(verb)
         _add_json(verb, output)
         verb.set_defaults(command=command)
 
@@ -119,18 +130,24 @@ def _add_render(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     render.add_argument("--view", choices=("top", "chase", "split"))
     render.add_argument(
         "--speed",
-        type=_positive,
+        type=values.positive,
         metavar="FACTOR",
         help="simulated seconds shown per second",
     )
-    render.add_argument("--size", type=_size, metavar="WxH", help="such as 1280x720")
-    render.add_argument("--fps", type=_fps, metavar="N", help="frames per second")
+    render.add_argument(
+        "--size", type=values.size, metavar="WxH", help="such as 1280x720"
+    )
+    render.add_argument("--fps", type=values.fps, metavar="N", help="frames per second")
     render.add_argument("--robot", metavar="ID", help="followed by the chase camera")
     render.add_argument(
-        "--from", dest="from_s", type=_time, metavar="SECONDS", help="mission time"
+        "--from",
+        dest="from_s",
+        type=values.time,
+        metavar="SECONDS",
+        help="mission time",
     )
     render.add_argument(
-        "--to", dest="to_s", type=_time, metavar="SECONDS", help="mission time"
+        "--to", dest="to_s", type=values.time, metavar="SECONDS", help="mission time"
     )
     render.add_argument(
         "--gif",
@@ -191,7 +208,7 @@ def _add_view(verbs: _Verbs) -> None:  # type: ignore[type-arg]
         "--host", default="127.0.0.1", help="address the page is served on"
     )
     view.add_argument(
-        "--port", type=_count, default=8080, help="port of the page; default 8080"
+        "--port", type=values.count, default=8080, help="port of the page; default 8080"
     )
     view.set_defaults(command=show_commands.view)
 
@@ -213,7 +230,9 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
 
     roadmap = acts.add_parser("roadmap", help="write the roadmap as GraphML")
     roadmap.add_argument("scene", metavar="SCENE")
-    roadmap.add_argument("--seed", type=_seed, default=0, metavar="N", help="default 0")
+    roadmap.add_argument(
+        "--seed", type=values.seed, default=0, metavar="N", help="default 0"
+    )
     roadmap.add_argument(
         "-o", "--out", type=Path, metavar="OUT.graphml", help="default NAME.graphml"
     )
@@ -223,7 +242,7 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     imported.add_argument("map", type=Path, metavar="MAP")
     imported.add_argument(
         "--longest-side",
-        type=_positive,
+        type=values.positive,
         default=100.0,
         metavar="METRES",
         help="scale the map so that its longest side measures this; default 100",
@@ -236,13 +255,13 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     for name, count in (("robots", 2), ("goals", 14), ("stations", 5)):
         populate.add_argument(
             f"--{name}",
-            type=_count,
+            type=values.count,
             default=count,
             metavar="N",
             help=f"default {count}",
         )
     populate.add_argument(
-        "--seed", type=_seed, default=3, metavar="N", help="default 3"
+        "--seed", type=values.seed, default=3, metavar="N", help="default 3"
     )
     _add_scene_out(populate)
     populate.set_defaults(command=scene_commands.populate)
@@ -289,51 +308,3 @@ def _add_scene_out(verb: argparse.ArgumentParser) -> None:
 
 def _add_json(verb: argparse.ArgumentParser, what: str) -> None:
     verb.add_argument("--json", action="store_true", help=f"print {what} alone")
-
-
-def _seed(text: str) -> int:
-    return _whole(text, at_least=0)
-
-
-def _count(text: str) -> int:
-    return _whole(text, at_least=1)
-
-
-def _fps(text: str) -> int:
-    return _whole(text, at_least=1)
-
-
-def _whole(text: str, *, at_least: int) -> int:
-    try:
-        value = int(text)
-    except ValueError:
-        value = at_least - 1
-    if value < at_least:
-        raise argparse.ArgumentTypeError(
-            f"{text!r} is not a whole number of at least {at_least}"
-        )
-    return value
-
-
-def _positive(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0.0 < value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a positive number")
-    return value
-
-
-def _time(text: str) -> float:
-    return 0.0 if text.strip() in {"0", "0.0"} else _positive(text)
-
-
-def _size(text: str) -> tuple[int, int]:
-    try:
-        width, height = (int(part) for part in text.lower().split("x"))
-    except ValueError:
-        width = height = 0
-    if min(width, height) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 1280x720")
-    return width, height

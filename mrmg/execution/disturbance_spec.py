@@ -95,6 +95,15 @@ def parse_disturbance(spec: str) -> DisturbanceRanges:
     return _amended(ranges, pairs)
 
 
+def written_out(spec: str) -> str:
+    """Return a specification that does not depend on a file, equal for equal ranges.
+
+    Raises:
+        UsageError, FileError: as `parse_disturbance` does.
+    """
+    return disturbance_text(parse_disturbance(spec))
+
+
 def disturbance_text(ranges: DisturbanceRanges) -> str:
     """Return the shortest specification of `ranges`: what strays from the defaults."""
     words = [

@@ -1,0 +1,136 @@
+"""Driving under disturbances: the arguments for it, and the verb `robustness`."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mrmg.cli import terminal, values
+from mrmg.errors import ExitCode
+
+if TYPE_CHECKING:
+    from mrmg.results.robustness import Study
+
+_SPEC_HELP = (
+    "drive robots that differ from their models: in mass, friction, rolling, "
+    "drive_gain, steering_gain, lag, position_noise, heading_noise, speed_noise, "
+    "delay, start_x, start_y, start_heading, capacity; SPEC is key=value,... such as "
+    "rolling=+30%%,lag=0..80ms, or a YAML file of such keys, and changes the defaults "
+    "(mass=+-5%%,friction=+-20%%,rolling=+-10%%,lag=50ms,position_noise=2cm); "
+    "a leading 'none' starts from no disturbance"
+)
+
+
+_COLUMNS = ("worst", "p05", "median", "p95")
+
+
+def add_disturbance(verb: argparse.ArgumentParser) -> None:
+    """Add the arguments of one disturbed execution."""
+    verb.add_argument("--disturb", nargs="?", const="", metavar="SPEC", help=_SPEC_HELP)
+    verb.add_argument(
+        "--disturb-seed",
+        type=values.seed,
+        default=0,
+        metavar="N",
+        help="of what is drawn from the disturbances; default 0",
+    )
+
+
+def add_robustness(verbs: Any) -> None:
+    """Add the verb `robustness`."""
+    verb = verbs.add_parser(
+        "robustness",
+        help="how probable it is that a plan is feasible under disturbances",
+        description="Drive the plan of a run folder many times, each time under other "
+        "disturbances. Trials that are done are kept: the same command goes on where "
+        "it was stopped.",
+    )
+    verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    verb.add_argument(
+        "--trials", type=values.count, default=100, metavar="N", help="default 100"
+    )
+    verb.add_argument(
+        "--workers",
+        type=values.count,
+        default=1,
+        metavar="N",
+        help="processes that drive; default 1, and no influence on the result",
+    )
+    verb.add_argument("--disturb", default="", metavar="SPEC", help=_SPEC_HELP)
+    verb.add_argument(
+        "--seed",
+        type=values.seed,
+        default=0,
+        metavar="N",
+        help="--disturb-seed of the first trial, the next have N+1, ...; default 0",
+    )
+    verb.add_argument(
+        "--controller", metavar="NAME", help="tracking controller; default the run's"
+    )
+    verb.add_argument(
+        "--json", action="store_true", help="print the study of robustness.json alone"
+    )
+    verb.set_defaults(command=robustness)
+
+
+def robustness(options: argparse.Namespace) -> int:
+    """Drive a plan under many disturbances."""
+    from dataclasses import replace
+
+    from mrmg.robustness import study_robustness
+    from mrmg.run_folder import Step, existing
+    from mrmg.steps import taken_up
+
+    with existing(options.run).opened_for_writing() as folder:
+        run = taken_up(folder)
+        driven = run
+        if options.controller is not None:
+            changed = replace(run.arguments, controller=options.controller)
+            driven = replace(run, arguments=changed)
+        with terminal.trial_progress() as told:
+            study = study_robustness(
+                driven,
+                trials=options.trials,
+                seed=options.seed,
+                disturb=options.disturb,
+                workers=options.workers,
+                on_trial=told,
+            )
+        if folder.file("report.html").exists():
+            run.make(Step.REPORT)
+    if options.json:
+        terminal.print_json(study.to_json())
+    else:
+        sys.stdout.write("".join(f"{line}\n" for line in _lines(study, options.run)))
+    return ExitCode.OK
+
+
+def _lines(study: Study, run: Path) -> Iterator[str]:
+    figures = study.to_json()
+    low, high = figures["interval"]
+    yield (
+        f"{figures['feasible']} of {figures['trials']} trials feasible: probability "
+        f"{figures['probability']:.1%}, {figures['confidence']:.0%} interval "
+        f"{low:.1%} to {high:.1%}"
+    )
+    for cause, count in sorted(figures["failures"].items()):
+        yield f"  failed     {count} x {cause}"
+    yield "  margins      worst      5 %   median     95 %"
+    for name, label, factor in (
+        ("charge_fraction", "charge %", 100.0),
+        ("obstacle_clearance_m", "obstacle m", 1.0),
+        ("robot_distance_m", "robots m", 1.0),
+        ("tracking_max_m", "tracking m", 1.0),
+    ):
+        if name in figures["margins"]:
+            margin = figures["margins"][name]
+            numbers = (
+                margin[key] * factor for key in ("worst", "p05", "median", "p95")
+            )
+            yield f"  {label:<10}" + "".join(f"{number:9.3g}" for number in numbers)
+    words = ["mrmg", "execute", str(run), *study.replay_options(study.worst)]
+    yield f"  worst case {shlex.join(words)}"
