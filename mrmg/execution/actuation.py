@@ -11,6 +11,8 @@ import numpy as np
 
 from mrmg.execution.disturbance import Disturbance
 
+_SHORTEST_S = 1e-9
+
 
 class Actuation:
     """Lag and gain of all robots' actuators."""
@@ -32,8 +34,6 @@ class Actuation:
     def force_N(self, commanded_N: np.ndarray, period_s: float) -> np.ndarray:
         """Return the mean force over a tick in which one force is commanded, (R,)."""
         wanted = self._drive_gain * commanded_N
-        if not self._lag_s.any():
-            return np.asarray(wanted)
         gone, mean_gone = self._decay(period_s)
         mean = wanted + (self._force_N - wanted) * mean_gone
         self._force_N = wanted + (self._force_N - wanted) * gone
@@ -61,6 +61,5 @@ class Actuation:
 
     def _decay(self, period_s: float) -> tuple[np.ndarray, np.ndarray]:
         """Return exp(-T / tau) and its mean over the tick; 0 where there is no lag."""
-        tau = np.maximum(self._lag_s, 1e-9)
-        gone = np.exp(-period_s / tau)
-        return gone, (1.0 - gone) * tau / period_s
+        gone = np.exp(-period_s / np.maximum(self._lag_s, _SHORTEST_S))
+        return gone, (1.0 - gone) * self._lag_s / period_s
