@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,7 @@ from mrmg.errors import ExitCode
 
 if TYPE_CHECKING:
     from mrmg.results.robustness import Study
+    from mrmg.robustness.study import OnTrial
 
 _SPEC_HELP = (
     "drive robots that differ from their models: in mass, friction, rolling, "
@@ -91,14 +92,14 @@ def robustness(options: argparse.Namespace) -> int:
         if options.controller is not None:
             changed = replace(run.arguments, controller=options.controller)
             driven = replace(run, arguments=changed)
-        with terminal.trial_progress() as told:
+        with terminal.progress_of("driving") as told:
             study = study_robustness(
                 driven,
                 trials=options.trials,
                 seed=options.seed,
                 disturb=options.disturb,
                 workers=options.workers,
-                on_trial=told,
+                on_trial=_trial_teller(told),
             )
         if folder.file("report.html").exists():
             run.make(Step.REPORT)
@@ -107,6 +108,14 @@ def robustness(options: argparse.Namespace) -> int:
     else:
         sys.stdout.write("".join(f"{line}\n" for line in _lines(study, options.run)))
     return ExitCode.OK
+
+
+def _trial_teller(told: Callable[[float, str], None] | None) -> OnTrial | None:
+    if told is None:
+        return None
+    return lambda done, trials, feasible: told(
+        done / trials, f"{done} of {trials} trials, {feasible} feasible"
+    )
 
 
 def _lines(study: Study, run: Path) -> Iterator[str]:

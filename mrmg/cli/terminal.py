@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
     from mrmg.planning import Improvement
-    from mrmg.robustness.study import OnTrial
     from mrmg.run_folder import Step
     from mrmg.steps import StepProgress
 
@@ -76,31 +75,6 @@ def _bars() -> Iterator[Progress | None]:
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
         yield bars
-
-
-@contextmanager
-def trial_progress() -> Iterator[OnTrial | None]:
-    """Yield a callback that draws a bar of trials; None away from a terminal."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (
-        TextColumn("{task.completed:.0f} of {task.total:.0f} trials"),
-        BarColumn(),
-        TimeRemainingColumn(),
-        TextColumn("{task.fields[note]}", markup=False),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
-        task = bars.add_task("trials", total=None, note="")
-
-        def told(done: int, trials: int, feasible: int) -> None:
-            note = f"{feasible} feasible"
-            bars.update(task, completed=done, total=trials, note=note)
-
-        yield told
 
 
 def improvement_teller(
