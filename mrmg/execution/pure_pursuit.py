@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from mrmg.execution.controller import HORIZON_STEP_S
 from mrmg.scene.robot_model import RobotModel
+
+_TIGHT_RADIUS_M = 0.3
+"""Radius of a turn below which no point is pursued round it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +26,11 @@ class PurePursuitParams:
     Attributes:
         least_lookahead_m: distance of the point ahead at standstill.
         lookahead_s: further distance per speed.
-        steering_s: time in which the wheels shall be turned to the arc's angle.
+        steering_s: time in which psi, or omega, shall be brought to the arc's.
         along_per_s2: acceleration per error along the way.
         speed_per_s: acceleration per error of the speed.
+        heading_per_s: yaw rate per error of the heading where nothing is ahead; of
+            robots that turn on the spot.
     """
 
     least_lookahead_m: float = 0.4
@@ -32,6 +38,13 @@ class PurePursuitParams:
     steering_s: float = 0.15
     along_per_s2: float = 2.0
     speed_per_s: float = 2.5
+    heading_per_s: float = 3.0
+
+
+TURNING_PARAMS = PurePursuitParams(
+    least_lookahead_m=0.15, lookahead_s=0.2, steering_s=0.1
+)
+"""Of robots that turn by themselves: their curvature changes sooner than a car's."""
 
 
 class PurePursuit:
@@ -41,9 +54,14 @@ class PurePursuit:
         self, model: RobotModel, params: PurePursuitParams | None = None
     ) -> None:
         """Follow with a robot of `model`."""
-        self._wheelbase_m = model.wheelbase_m
-        self._psi_limit = model.limits.w_max
-        self._params = params or PurePursuitParams()
+        self._w_limit = model.limits.w_max
+        self._steering: _Steering
+        if model.motion_model == "car":
+            self._params = params or PurePursuitParams()
+            self._steering = _Wheels(model.wheelbase_m)
+        else:
+            self._params = params or TURNING_PARAMS
+            self._steering = _Turning(self._params.heading_per_s)
 
     def correct(self, state: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """Return the controls towards the point ahead, less the reference's."""
@@ -52,25 +70,86 @@ class PurePursuit:
         planned_u2 = (reference[1, 4] - reference[0, 4]) / HORIZON_STEP_S
         speed_error = reference[0, 3] - state[3]
         u1 = params.along_per_s2 * ahead[0, 0] + params.speed_per_s * speed_error
-        u2 = (self._pursued_psi(state, reference, ahead) - state[4]) / params.steering_s
+        u2 = (self._pursued_w(state, reference, ahead) - state[4]) / params.steering_s
         return np.array([u1, u2 - planned_u2])
 
-    def _pursued_psi(
+    def _pursued_w(
         self, state: np.ndarray, reference: np.ndarray, ahead: np.ndarray
     ) -> float:
-        """Return the steering angle of the arc; without a point, the plan's."""
+        """Return psi or omega of the arc; without a point, what the plan suggests."""
         params = self._params
         lookahead_m = params.least_lookahead_m + params.lookahead_s * abs(state[3])
         direction = np.sign(reference[:, 3].sum())
         far = (direction * ahead[:, 0] > 0.0) & (np.hypot(*ahead.T) >= lookahead_m)
-        turning_back = np.flatnonzero(reference[:, 3] * direction < 0.0)
+        turning_back = np.flatnonzero(
+            self._steering.ends_arc(reference, reference[:, 3] * direction)
+        )
         if len(turning_back):
             far[turning_back[0] :] = False
         if not far.any():
-            return float(reference[0, 4])
-        a, b = ahead[np.argmax(far)]
-        psi = math.atan(self._wheelbase_m * 2.0 * b / (a * a + b * b))
-        return min(max(psi, -self._psi_limit), self._psi_limit)
+            w = self._steering.without_arc(state, reference)
+        else:
+            a, b = ahead[np.argmax(far)]
+            w = self._steering.on_arc(2.0 * b / (a * a + b * b), state[3])
+        return min(max(w, -self._w_limit), self._w_limit)
+
+
+class _Steering(Protocol):
+    """How robots of one motion model follow an arc."""
+
+    def ends_arc(self, reference: np.ndarray, along_m_s: np.ndarray) -> np.ndarray:
+        """Tell from where on the reference is on another arc, shape (HORIZON + 1,).
+
+        Args:
+            reference: the states ahead, shape (HORIZON + 1, 5).
+            along_m_s: their speeds in the direction of driving.
+        """
+
+    def on_arc(self, curvature_per_m: float, speed_m_s: float) -> float:
+        """Return psi or omega of an arc."""
+
+    def without_arc(self, state: np.ndarray, reference: np.ndarray) -> float:
+        """Return psi or omega where there is no point to drive at."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Wheels:
+    """A car's: psi = atan(L kappa)."""
+
+    wheelbase_m: float
+
+    def ends_arc(self, reference: np.ndarray, along_m_s: np.ndarray) -> np.ndarray:
+        """It ends where the robot turns back."""
+        return np.asarray(along_m_s < 0.0)
+
+    def on_arc(self, curvature_per_m: float, speed_m_s: float) -> float:
+        """Return the steering angle."""
+        return math.atan(self.wheelbase_m * curvature_per_m)
+
+    def without_arc(self, state: np.ndarray, reference: np.ndarray) -> float:
+        """Return the plan's steering angle."""
+        return float(reference[0, 4])
+
+
+@dataclass(frozen=True, slots=True)
+class _Turning:
+    """A differential drive's: omega = kappa v; on the spot it follows the heading."""
+
+    heading_per_s: float
+
+    def ends_arc(self, reference: np.ndarray, along_m_s: np.ndarray) -> np.ndarray:
+        """It ends where the robot turns back, or turns on the spot."""
+        spins = np.abs(reference[:, 4]) * _TIGHT_RADIUS_M > along_m_s
+        return np.asarray(spins | (along_m_s < 0.0))
+
+    def on_arc(self, curvature_per_m: float, speed_m_s: float) -> float:
+        """Return the yaw rate."""
+        return curvature_per_m * speed_m_s
+
+    def without_arc(self, state: np.ndarray, reference: np.ndarray) -> float:
+        """Return the plan's yaw rate, corrected by the heading."""
+        error = math.remainder(reference[0, 2] - state[2], math.tau)
+        return float(reference[0, 4]) + self.heading_per_s * error
 
 
 def _in_frame_of(state: np.ndarray, reference: np.ndarray) -> np.ndarray:

@@ -9,6 +9,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from mrmg import shipped
 from mrmg.errors import UsageError
 from mrmg.execution.controller import (
     HORIZON,
@@ -19,17 +20,16 @@ from mrmg.execution.controller import (
 from mrmg.execution.mpc import MpcParams, TrackingMpc
 from mrmg.execution.reference import FleetReference
 from mrmg.mission import Plan
-from mrmg.motion.dynamics import DERIVATIVES, NU, NX, car_derivative, rk4_step
+from mrmg.motion.dynamics import DERIVATIVES, NU, NX, rk4_step
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
 
-STEP = rk4_step(car_derivative(math.sin, math.cos, math.tan))
 TICK_S = 0.04
 
 
-@pytest.fixture(scope="module")
-def scene(driving: SimpleNamespace) -> Scene:
-    return driving.open_ground([(0.0, 0.0, 0.4)])
+@pytest.fixture(scope="module", params=shipped.model_names())
+def scene(request: pytest.FixtureRequest, driving: SimpleNamespace) -> Scene:
+    return driving.open_ground([(0.0, 0.0, 0.4)], models=[request.param])
 
 
 @pytest.fixture(scope="module")
@@ -51,11 +51,18 @@ def moving_reference(speed: float) -> np.ndarray:
     return reference
 
 
+def share_of_limit(model: RobotModel, share: float) -> float:
+    """A share of the top speed; of the reverse one where it is negative."""
+    limits = model.limits
+    return share * (limits.v_max_m_s if share > 0.0 else -limits.v_min_m_s)
+
+
 def drive(
     name: str, scene: Scene, plan: Plan, offset: tuple[float, ...]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Follow a plan with the motion model alone; return errors and corrections."""
     model = scene.robots[0].model
+    step = rk4_step(DERIVATIVES[model.motion_model](math.sin, math.cos, math.tan))
     controller = controller_maker(name)(model)
     reference = FleetReference(scene, plan)
     state = tuple(reference.at(np.zeros(1))[0, 0] + offset)
@@ -70,7 +77,7 @@ def drive(
         control = np.clip(control, np.negative(bound), bound)
         errors.append(math.dist(state[:2], ahead[0, :2]))
         corrections.append(correction)
-        state = STEP(*state, *control, model.wheelbase_m, TICK_S)
+        state = step(*state, *control, model.wheelbase_m, TICK_S)
     return np.array(errors), np.array(corrections)
 
 
@@ -81,28 +88,34 @@ def test_names_are_listed_and_unknown_ones_refused() -> None:
 
 
 @pytest.mark.parametrize("name", controller_names())
-@pytest.mark.parametrize("speed", [1.5, 0.0, -1.0])
+@pytest.mark.parametrize("share", [0.75, 0.0, -0.75])
 def test_on_a_straight_reference_nothing_is_corrected(
-    name: str, model: RobotModel, speed: float
+    name: str, model: RobotModel, share: float
 ) -> None:
-    reference = moving_reference(speed)
+    reference = moving_reference(share_of_limit(model, share))
     correction = controller_maker(name)(model).correct(reference[0], reference)
     np.testing.assert_allclose(correction, 0.0, atol=1e-4)
 
 
 @pytest.mark.parametrize("name", controller_names())
-@pytest.mark.parametrize("speed", [1.5, -1.0])
-def test_steers_back_to_the_way(name: str, model: RobotModel, speed: float) -> None:
-    """Left of the way: turn the wheels to the right, forwards and backwards."""
+@pytest.mark.parametrize("share", [0.75, -0.75])
+def test_steers_back_to_the_way(name: str, model: RobotModel, share: float) -> None:
+    """Left of the way: turn a car's wheels to the right, forwards and backwards.
+
+    A differential drive turns itself to the right, and backwards to the left.
+    """
+    speed = share_of_limit(model, share)
     reference = moving_reference(speed)
     state = reference[0] + [0.0, 0.2, 0.0, 0.0, 0.0]
     correction = controller_maker(name)(model).correct(state, reference)
-    assert correction[1] < 0.0
+    turns = model.motion_model == "unicycle"
+    assert correction[1] * (np.sign(speed) if turns else 1.0) < 0.0
 
 
 @pytest.mark.parametrize("name", controller_names())
-@pytest.mark.parametrize("speed", [1.5, -1.0])
-def test_speeds_up_when_behind(name: str, model: RobotModel, speed: float) -> None:
+@pytest.mark.parametrize("share", [0.75, -0.75])
+def test_speeds_up_when_behind(name: str, model: RobotModel, share: float) -> None:
+    speed = share_of_limit(model, share)
     reference = moving_reference(speed)
     state = reference[0] - [0.2 * np.sign(speed), 0.0, 0.0, 0.0, 0.0]
     correction = controller_maker(name)(model).correct(state, reference)
@@ -136,7 +149,7 @@ def converged(
 ) -> np.ndarray:
     """The first control of the nonlinear problem, by an interior point method."""
     params, limits = MpcParams(), model.limits
-    step = rk4_step(DERIVATIVES["car"](ca.sin, ca.cos, ca.tan))
+    step = rk4_step(DERIVATIVES[model.motion_model](ca.sin, ca.cos, ca.tan))
     problem = ca.Opti()
     x, u = problem.variable(NX, HORIZON + 1), problem.variable(NU, HORIZON)
     planned = np.diff(reference[:, 3:], axis=0) / HORIZON_STEP_S

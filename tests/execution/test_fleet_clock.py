@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from mrmg.execution.fleet_clock import ClockParams, FleetClock, lag_s
+from mrmg.execution.fleet_clock import (
+    ClockParams,
+    FleetClock,
+    lag_s,
+    turning_lag_s,
+)
 
 TICK_S = 0.02
 
@@ -37,6 +42,35 @@ def test_sideways_error_is_no_lag() -> None:
     assert lag_s(state, reference, 0.5)[0] == pytest.approx(0.0)
 
 
+@pytest.mark.parametrize(
+    ("omega", "behind_rad", "late_s"),
+    [
+        (1.0, 0.3, 0.3),  # to the left
+        (-0.8, -0.4, 0.5),  # to the right, behind means to the left
+        (1.0, -0.2, -0.2),  # early
+        (0.1, 0.1, 0.2),  # slow: as if at 0.5 rad/s
+        (0.0, 0.3, 0.0),  # not turning is never late
+    ],
+)
+def test_lag_of_a_turn(omega: float, behind_rad: float, late_s: float) -> None:
+    state = np.array([[0.0, 0.0, 2.0, 0.0, omega]])
+    reference = state + [0.0, 0.0, behind_rad, 0.0, 0.0]
+    assert turning_lag_s(state, reference, 0.5)[0] == pytest.approx(late_s)
+
+
+def test_waits_for_robots_that_turn_and_not_for_wheels_that_are_turned() -> None:
+    """The fifth state is a yaw rate of some robots, a steering angle of others."""
+    planned = np.array([[0.0, 0.0, 0.0, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0, 0.5]])
+    behind = planned - [0.0, 0.0, 1.0, 0.0, 0.0]
+    waiting = FleetClock(np.array([False, True]))
+    going = FleetClock(np.array([False, False]))
+    for _ in range(40):
+        waiting.pace(behind, planned, TICK_S)
+        going.pace(behind, planned, TICK_S)
+    assert waiting.rate == 0.0
+    assert going.rate == 1.0
+
+
 def test_runs_at_full_rate_on_time() -> None:
     clock = FleetClock()
     on_time = np.array([moving(1.0, 1.0), moving(3.0, 2.0)])
@@ -49,7 +83,7 @@ def test_runs_at_full_rate_on_time() -> None:
 def test_waits_for_the_last_robot_and_recovers() -> None:
     """One late robot stops the clock of all; the rate changes within its slew."""
     params = ClockParams()
-    clock = FleetClock(params)
+    clock = FleetClock(params=params)
     on_time = np.array([moving(1.0, 1.0), moving(3.0, 1.0)])
     late = on_time.copy()
     late[1, 0] -= 2.0

@@ -11,15 +11,15 @@ import pytest
 
 from mrmg.execution.reference import FleetReference
 from mrmg.mission import Plan
-from mrmg.motion.dynamics import car_derivative, rk4_step
+from mrmg.motion.dynamics import DERIVATIVES, rk4_step
 from mrmg.scene.types import Scene
 
-STEP = rk4_step(car_derivative(math.sin, math.cos, math.tan))
 
-
-@pytest.fixture(scope="module")
-def scene(driving: SimpleNamespace) -> Scene:
-    return driving.open_ground([(-20.0, 0.0, 0.3), (20.0, 0.0, 2.0)])
+@pytest.fixture(scope="module", params=["car", "diffdrive"])
+def scene(request: pytest.FixtureRequest, driving: SimpleNamespace) -> Scene:
+    """A car, and a robot of each kind."""
+    poses = [(-20.0, 0.0, 0.3), (20.0, 0.0, 2.0)]
+    return driving.open_ground(poses, models=["car", request.param])
 
 
 @pytest.fixture(scope="module")
@@ -41,13 +41,14 @@ def test_between_states_it_is_the_exact_motion(
     scene: Scene, plan: Plan, share: float
 ) -> None:
     """Oracle: a fine integration from the state before."""
-    item = plan.trajectories[1]
+    item, model = plan.trajectories[1], scene.robots[1].model
+    step = rk4_step(DERIVATIVES[model.motion_model](math.sin, math.cos, math.tan))
     times = item.time_s[:-1] + share * plan.dt_s
     states = FleetReference(scene, plan).at(times)[:, 1]
     for start, control, state in zip(item.state, item.control, states, strict=False):
         exact = tuple(start)
         for _ in range(8):
-            exact = STEP(*exact, *control, 1.2, share * plan.dt_s / 8)
+            exact = step(*exact, *control, model.wheelbase_m, share * plan.dt_s / 8)
         np.testing.assert_allclose(state, exact, atol=1e-4)
 
 
@@ -59,12 +60,15 @@ def test_rests_after_the_end(scene: Scene, plan: Plan) -> None:
 
 
 def test_at_half_the_pace_speeds_are_halved(scene: Scene, plan: Plan) -> None:
-    """The way is the same; the speed matches the way per real time."""
+    """The way is the same; speeds and yaw rates match the way per real time."""
     reference = FleetReference(scene, plan)
     full = reference.paced(4.0, 1.0, 0.02, 11)
     half = reference.paced(4.0, 0.5, 0.04, 11)
-    np.testing.assert_allclose(half[..., [0, 1, 2, 4]], full[..., [0, 1, 2, 4]])
+    np.testing.assert_allclose(half[..., :3], full[..., :3])
     np.testing.assert_allclose(half[..., 3], 0.5 * full[..., 3])
+    turns = [robot.model.motion_model == "unicycle" for robot in scene.robots]
+    share = np.where(turns, 0.5, 1.0)
+    np.testing.assert_allclose(half[..., 4], share * full[..., 4])
     np.testing.assert_allclose(reference.paced(4.0, 0.0, 0.1, 3)[..., 3], 0.0)
 
 
