@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,11 @@ from mrmg.errors import ExitCode, Fault, RunFolderError
 from mrmg.ledger import EnergyLedger
 
 PLAN_FORMAT = 1
+
+DRIVEN_PLAN = "driven_plan"
+"""Name of the files of a plan that was joined on the way."""
+
+_CONTENT = ".content"
 
 
 class PlanStatus(Enum):
@@ -102,6 +107,9 @@ class Plan:
         tours: targets of each robot in the order of its visits.
         visits: in order of time.
         ledger: predicted energy.
+        content_J: planned battery content at each state by robot, shape (n + 1,), where
+            it is not what the scene's energy models say: in plans that were joined on
+            the way, after more was known.
     """
 
     scene_name: str
@@ -115,6 +123,7 @@ class Plan:
     tours: Mapping[str, tuple[str, ...]]
     visits: tuple[Visit, ...]
     ledger: EnergyLedger
+    content_J: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def cost_J(self) -> float:
@@ -141,14 +150,16 @@ class Plan:
         """Return one robot's trajectory."""
         return next(item for item in self.trajectories if item.robot == robot_id)
 
-    def save(self, folder: Path) -> None:
-        """Write `plan.npz`, then `plan.json`; equal plans give equal bytes."""
-        arrays = {}
+    def save(self, folder: Path, name: str = "plan") -> None:
+        """Write `<name>.npz`, then `<name>.json`; equal plans give equal bytes."""
+        arrays = {
+            f"{robot}{_CONTENT}": value for robot, value in self.content_J.items()
+        }
         for trajectory in self.trajectories:
             arrays[f"{trajectory.robot}.state"] = trajectory.state
             arrays[f"{trajectory.robot}.control"] = trajectory.control
-        storage.write_arrays(folder / "plan.npz", arrays)
-        storage.write_json(folder / "plan.json", self._header())
+        storage.write_arrays(folder / f"{name}.npz", arrays)
+        storage.write_json(folder / f"{name}.json", self._header())
 
     def _header(self) -> dict[str, Any]:
         return {
@@ -170,23 +181,35 @@ class Plan:
         }
 
     @staticmethod
-    def load(folder: Path) -> Plan:
+    def load(folder: Path, name: str = "plan") -> Plan:
         """Read a plan that `save` wrote.
 
         Raises:
             RunFolderError: if a file is missing or not a plan of this format.
         """
         try:
-            header = storage.read_json(folder / "plan.json")
-            arrays = storage.read_arrays(folder / "plan.npz")
+            header = storage.read_json(folder / f"{name}.json")
+            arrays = storage.read_arrays(folder / f"{name}.npz")
             if header["format"] != PLAN_FORMAT:
                 raise ValueError(
                     f"format is {header['format']}, this version reads {PLAN_FORMAT}"
                 )
             return _plan_from(header, arrays)
         except (OSError, ValueError, KeyError, TypeError) as error:
-            fault = Fault("plan.json", f"no readable plan ({error}); run 'mrmg plan'")
+            fault = Fault(
+                f"{name}.json", f"no readable plan ({error}); run 'mrmg plan'"
+            )
             raise RunFolderError(str(folder), [fault]) from error
+
+
+def plan_in_force(folder: Path) -> Plan:
+    """Return the plan that was driven: the first one, or what became of it on the way.
+
+    Raises:
+        RunFolderError: if a file is missing or not a plan of this format.
+    """
+    joined = (folder / f"{DRIVEN_PLAN}.json").exists()
+    return Plan.load(folder, DRIVEN_PLAN if joined else "plan")
 
 
 def _plan_from(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Plan:
@@ -210,6 +233,11 @@ def _plan_from(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Plan:
         tours={robot: tuple(tour) for robot, tour in header["tours"].items()},
         visits=tuple(Visit(**visit) for visit in header["visits"]),
         ledger=EnergyLedger.from_rows(header["ledger"]),
+        content_J={
+            name.removesuffix(_CONTENT): value
+            for name, value in arrays.items()
+            if name.endswith(_CONTENT)
+        },
     )
 
 

@@ -49,8 +49,11 @@ OUTPUTS: dict[Step, tuple[str, ...]] = {
 }
 """Files each step leaves; the last one is written last."""
 
-ON_REQUEST: dict[Step, tuple[str, ...]] = {Step.RENDER: ("mission.gif",)}
-"""Files a step leaves besides, when asked to."""
+ON_REQUEST: dict[Step, tuple[str, ...]] = {
+    Step.EXECUTE: ("driven_plan.npz", "driven_plan.json", "replans.json"),
+    Step.RENDER: ("mission.gif",),
+}
+"""Files a step leaves besides, when asked to or when there is reason to."""
 
 NEEDS: dict[Step, tuple[Step, ...]] = {
     Step.PLAN: (),

@@ -17,7 +17,7 @@ import mrmg
 from mrmg import storage
 from mrmg.errors import ExitCode
 from mrmg.execution.log import ExecutionLog
-from mrmg.mission import Plan, PlanStatus
+from mrmg.mission import Plan, PlanStatus, plan_in_force
 from mrmg.run_folder import NEEDS, RunFolder, Step
 from mrmg.scene.loading import dump_scene, load_scene
 from mrmg.scene.types import Scene
@@ -169,6 +169,10 @@ class Run:
         """Return the plan."""
         return Plan.load(self.folder.path)
 
+    def plan_in_force(self) -> Plan:
+        """Return the plan that was driven, joined where the mission was replanned."""
+        return plan_in_force(self.folder.path)
+
     def log(self) -> ExecutionLog:
         """Return the log of the simulation."""
         return ExecutionLog.load(self.folder.path)
@@ -282,7 +286,7 @@ def _execute(run: Run) -> Write:
 def _audit(run: Run) -> Write:
     from mrmg.results.audit import audit
 
-    account = audit(run.scene, run.plan(), run.log())
+    account = audit(run.scene, run.plan_in_force(), run.log())
     return lambda: account.save(run.folder.path)
 
 
@@ -293,7 +297,7 @@ def _draw(run: Run) -> Write:
     overview = run.folder.file("overview.png")
     if run.status() is not PlanStatus.SOLVED:
         return lambda: draw_overview(run.scene, path=overview)
-    plan, log = run.plan(), run.log()
+    plan, log = run.plan_in_force(), run.log()
 
     def write() -> None:
         draw_overview(run.scene, plan, log, path=overview)
@@ -307,7 +311,7 @@ def _render(run: Run) -> Write:
     from mrmg.results.video import render_video
 
     video = run.arguments.video
-    plan, log = run.plan(), run.log()
+    plan, log = run.plan_in_force(), run.log()
     part: dict[str, Any] = {
         "view": video.view,
         "robot": video.robot,

@@ -146,6 +146,8 @@ def _summary_lines(summary: dict[str, Any]) -> Iterator[str]:
             f"{tracking['rms_m']:.3f} m rms, {tracking['max_m']:.3f} m max, "
             f"{execution['realtime_factor']:.0f} x real time"
         )
+        for event in execution["events"]:
+            yield f"{event['time_s']:>7.1f} s  {event['message']}"
     if energy:
         yield (
             f"energy     metered {energy['metered_error_pct']:+.2f} %, measured "

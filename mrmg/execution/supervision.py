@@ -18,7 +18,7 @@ class Event:
         time_s: simulated time.
         cause: "fault", "energy", "tracking" or "rest", when the fleet had stopped.
         robot: id of the robot that caused it; "" for the fleet.
-        action: "stop", "replan", "continue" or "end".
+        action: "stop", "replan" or "end".
         message: one sentence for people.
     """
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -173,7 +173,11 @@ class MissionControl:
             self._tell(now, "rest", "", "end", over)
             return None
         assert self._replanner is not None
-        outcome = self._replanner.replan(condition, len(self.replans))
+        outcome = replace(
+            self._replanner.replan(condition, len(self.replans)),
+            time_s=now.time_s,
+            rolling_factor=condition.rolling_factor,
+        )
         self.replans.append(outcome)
         if outcome.scene is None or outcome.plan is None:
             text = f"no way to go on: {outcome.reason}; goals left: {_list(missing)}"

@@ -114,9 +114,11 @@ class Course:
         """Return the course with the given tours, and all that follows from them."""
         visits: list[Visit] = []
         entries: list[LedgerEntry] = []
+        content_J = {}
         for item in self.plan.trajectories:
             own = find_visits(self.scene, item, tours[item.robot])
-            arrival_J = self._arrival_J(item.robot, own)
+            before_J, content_J[item.robot] = self._content_J(item.robot, own)
+            arrival_J = [float(before_J[visit.step]) for visit in own]
             visits += [
                 replace(visit, energy_J=energy_J)
                 for visit, energy_J in zip(own, arrival_J, strict=True)
@@ -128,10 +130,11 @@ class Course:
             tours={name: tuple(tour) for name, tour in tours.items()},
             visits=tuple(visits),
             ledger=EnergyLedger(tuple(entries)),
+            content_J=content_J,
         )
         return replace(self, plan=plan)
 
-    def content_J(
+    def _content_J(
         self, robot: str, visits: Sequence[Visit]
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the planned battery content at each state, before and after recharges.
@@ -155,10 +158,6 @@ class Course:
             if step < self.steps:
                 content_J = min(content_J - float(draw_J[step]), capacity_J)
         return before, after
-
-    def _arrival_J(self, robot: str, visits: Sequence[Visit]) -> list[float]:
-        before, _ = self.content_J(robot, visits)
-        return [float(before[visit.step]) for visit in visits]
 
     def _continued(
         self,

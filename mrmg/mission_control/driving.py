@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
+from mrmg import storage
 from mrmg.execution import ExecutionLog, simulate
 from mrmg.execution.disturbance import Disturbance
-from mrmg.mission import Plan
+from mrmg.mission import DRIVEN_PLAN, Plan
 from mrmg.mission_control.control import MissionControl
 from mrmg.mission_control.faults import checked_faults
 from mrmg.mission_control.parameters import ControlParams
@@ -29,6 +31,14 @@ class Drive:
     log: ExecutionLog
     plan: Plan
     replans: tuple[Replan, ...]
+
+    def save(self, folder: Path) -> None:
+        """Write the log and, where the fleet was stopped, what it was driven by."""
+        if self.log.events:
+            outcomes = [outcome.to_json() for outcome in self.replans]
+            storage.write_json(folder / "replans.json", outcomes)
+            self.plan.save(folder, DRIVEN_PLAN)
+        self.log.save(folder)
 
 
 def drive_mission(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -33,6 +34,9 @@ class Replan:
         reserve_share: share of the reserves the plan keeps.
         given_up: why goals are left out, by id.
         reason: why there is no plan; "" with one.
+        time_s: simulated time at which the fleet stood.
+        rolling_factor: by which the rolling resistance of each robot was found to
+            differ from its model's.
     """
 
     scene: Scene | None = None
@@ -40,6 +44,28 @@ class Replan:
     reserve_share: float = 1.0
     given_up: Mapping[str, str] = field(default_factory=dict)
     reason: str = ""
+    time_s: float = 0.0
+    rolling_factor: Mapping[str, float] = field(default_factory=dict)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the outcome as JSON data; the scene as its document."""
+        plan = self.plan
+        return {
+            "time_s": self.time_s,
+            "rolling_factor": dict(self.rolling_factor),
+            "reserve_share": self.reserve_share,
+            "given_up": dict(self.given_up),
+            "reason": self.reason,
+            "scene": self.scene.document if self.scene else None,
+            "plan": {
+                "seed": plan.seed,
+                "cost_J": plan.cost_J,
+                "makespan_s": plan.makespan_s,
+                "tours": {robot: list(tour) for robot, tour in plan.tours.items()},
+            }
+            if plan
+            else None,
+        }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -94,6 +94,7 @@ def audit(scene: Scene, plan: Plan, log: ExecutionLog) -> EnergyAudit:
     goals_visited = _goals_visited(scene, log)
     reasons = (
         *_unfinished(log),
+        *_given_up(log, missed=len(goals_visited) < len(scene.goals)),
         *_goals_missed(scene, goals_visited),
         *_contacts(log),
         *_run_down(scene, log, measured),
@@ -225,6 +226,14 @@ def _unfinished(log: ExecutionLog) -> list[str]:
         return []
     why = f" ({_TROUBLE[log.gave_up]})" if log.gave_up in _TROUBLE else ""
     return [f"the simulation was ended early, at {log.time_s[-1]:.1f} s{why}"]
+
+
+def _given_up(log: ExecutionLog, *, missed: bool) -> list[str]:
+    return [
+        f"the mission was ended at {event.time_s:.1f} s: {event.message}"
+        for event in log.events
+        if event.action == "end" and missed
+    ]
 
 
 def _goals_missed(scene: Scene, visited: tuple[str, ...]) -> list[str]:

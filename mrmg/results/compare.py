@@ -143,6 +143,7 @@ _FIGURES: tuple[tuple[str, str, int, float, tuple[str, ...]], ...] = (
     ("recharges", "", 0, 1.0, ("energy", "recharges")),
     ("goals visited", "", 0, 1.0, ("execution", "goals_visited")),
     ("contacts", "", 0, 1.0, ("execution", "contacts")),
+    ("new plans on the way", "", 0, 1.0, ("execution", "replans")),
     ("tracking error, rms", "cm", 2, 100.0, ("execution", "tracking", "rms_m")),
     ("tracking error, largest", "cm", 2, 100.0, ("execution", "tracking", "max_m")),
 )

@@ -43,7 +43,9 @@ def planned_curves(scene: Scene, plan: Plan) -> tuple[BatteryCurve, ...]:
         BatteryCurve(
             robot=trajectory.robot,
             time_s=trajectory.time_s,
-            energy_J=battery_profile(scene, trajectory, plan.visits),
+            energy_J=plan.content_J[trajectory.robot]
+            if plan.content_J
+            else battery_profile(scene, trajectory, plan.visits),
             visits=tuple(v for v in plan.visits if v.robot == trajectory.robot),
         )
         for trajectory in plan.trajectories

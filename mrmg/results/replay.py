@@ -8,7 +8,7 @@ import numpy as np
 
 from mrmg.errors import Fault, RunFolderError
 from mrmg.execution.log import ExecutionLog
-from mrmg.mission import Plan
+from mrmg.mission import Plan, plan_in_force
 from mrmg.results.film import Film, VideoOptions
 from mrmg.results.overlay import Reading
 from mrmg.scene.loading import load_scene
@@ -73,7 +73,7 @@ def replay_of(run_folder: Path) -> Replay:
     if not (run_folder / "log.json").exists():
         fault = Fault("log.json", "missing: nothing was driven; run 'mrmg execute'")
         raise RunFolderError(str(run_folder), [fault])
-    return Replay(scene, Plan.load(run_folder), ExecutionLog.load(run_folder))
+    return Replay(scene, plan_in_force(run_folder), ExecutionLog.load(run_folder))
 
 
 def spoken(scene: Scene, reading: Reading) -> tuple[str, list[tuple[str, str]]]:

@@ -14,7 +14,7 @@ from mrmg.results.report_charts import chart_data
 from mrmg.results.report_map import mission_map
 from mrmg.results.report_planner import cost_chart, planner
 from mrmg.results.report_record import RunRecord, read_record
-from mrmg.results.report_timeline import timeline
+from mrmg.results.report_timeline import events, timeline
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
 
@@ -51,7 +51,11 @@ def report_html(record: RunRecord) -> str:
             _verdict_line(record),
             html.tiles(_main_figures(record)),
             html.section("Map", *_map(record)),
-            html.section("Timeline", timeline(scene, plan, log) if plan else ""),
+            html.section(
+                "Timeline",
+                timeline(scene, plan, log) if plan else "",
+                html.bullets(events(log)),
+            ),
             html.section("Video", html.video(record.folder / "mission.mp4")),
             html.section(
                 "State of charge", html.charts(places.get("charge", ()), columns=2)

@@ -10,7 +10,7 @@ from typing import Any
 from mrmg import storage
 from mrmg.errors import Fault, RunFolderError
 from mrmg.execution.log import ExecutionLog
-from mrmg.mission import Plan, PlanStatus
+from mrmg.mission import Plan, PlanStatus, plan_in_force
 from mrmg.results.energy_audit import EnergyAudit
 from mrmg.results.summary import summarize
 from mrmg.results.verdict import Verdict
@@ -28,7 +28,8 @@ class RunRecord:
         summary: content of `summary.json`, worked out anew where it is missing.
         planning: content of `planning.json`.
         arguments: what the run was started with.
-        plan, verdict, log, audit: outcomes of the steps.
+        plan: the first one, or the one in force where the mission was replanned.
+        verdict, log, audit: outcomes of the other steps.
     """
 
     folder: Path
@@ -68,7 +69,7 @@ def read_record(run_folder: Path) -> RunRecord:
         else summarize(scene, run_folder),
         planning=planning,
         arguments=run.get("arguments", {}),
-        plan=Plan.load(run_folder) if left("plan.json") else None,
+        plan=plan_in_force(run_folder) if left("plan.json") else None,
         verdict=Verdict.load(run_folder) if left("verdict.json") else None,
         log=ExecutionLog.load(run_folder) if left("log.json") else None,
         audit=EnergyAudit.load(run_folder) if left("audit.json") else None,

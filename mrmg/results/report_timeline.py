@@ -6,6 +6,7 @@ import math
 from html import escape
 
 from mrmg.execution.log import ExecutionLog
+from mrmg.execution.supervision import Event
 from mrmg.mission import Plan, Visit
 from mrmg.results import mission_series as series
 from mrmg.results import style
@@ -13,6 +14,8 @@ from mrmg.scene.types import Scene
 
 _MOST_TICKS = 10
 _SHORTEST_S = 0.1
+_EVENT_KEY = ' <i class="event"></i>the fleet is stopped, or planned for anew'
+_DONE = {"stop": "; the fleet stops", "end": "; the mission ends"}
 _SAID = {
     series.DRIVING: "drives",
     series.WAITING: "waits",
@@ -32,6 +35,7 @@ def timeline(scene: Scene, plan: Plan, log: ExecutionLog | None) -> str:
         spans = series.activities(scene, motion, visits)
         parts = [_span(motion.robot, span, end_s) for span in spans]
         parts += [_visit(visit, names[visit.target], end_s) for visit in visits]
+        parts += [_event(event, end_s) for event in log.events] if log else []
         shares = {
             kind: sum(span.end_s - span.start_s for span in spans if span.kind == kind)
             for kind in _SAID
@@ -50,7 +54,8 @@ def timeline(scene: Scene, plan: Plan, log: ExecutionLog | None) -> str:
         '<p class="soft key"><i class="act driving"></i>driving '
         '<i class="act waiting"></i>waiting <i class="act charging"></i>'
         'at a station ⚡ <i class="act finished"></i>finished '
-        "│ entering a goal</p>"
+        "│ entering a goal"
+        f"{_EVENT_KEY if log and log.events else ''}</p>"
     )
 
 
@@ -72,6 +77,22 @@ def _visit(visit: Visit, name: str, end_s: float) -> str:
         f'<i class="visit {visit.kind}" style="left:{100 * visit.time_s / end_s:.3f}%" '
         f'data-tip="{escape(tip)}"><s>{escape(label)}</s></i>'
     )
+
+
+def _event(event: Event, end_s: float) -> str:
+    tip = f"{event.time_s:.1f} s: {event.message}"
+    return (
+        f'<i class="event" style="left:{100 * event.time_s / end_s:.3f}%" '
+        f'data-tip="{escape(tip)}"></i>'
+    )
+
+
+def events(log: ExecutionLog | None) -> list[str]:
+    """Return what mission control saw and did, one sentence an event."""
+    return [
+        f"{event.time_s:.1f} s: {event.message}" + _DONE.get(event.action, "")
+        for event in (log.events if log else ())
+    ]
 
 
 def _shares(duration_s: dict[str, float]) -> str:

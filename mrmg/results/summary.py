@@ -132,6 +132,8 @@ def _execution_figures(log: ExecutionLog, audit: EnergyAudit) -> dict[str, Any]:
             "rms_m": (sum(squares) / len(squares)) ** 0.5,
             "max_m": max(robot.tracking_max_m for robot in audit.robots),
         },
+        "events": [event.to_json() for event in log.events],
+        "replans": sum(event.action == "replan" for event in log.events),
     }
 
 

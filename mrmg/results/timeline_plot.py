@@ -8,6 +8,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from mrmg.accounting import Motion
@@ -24,6 +25,11 @@ _WAITING: dict[str, Any] = {
     "facecolor": "white",
     "edgecolor": style.MUTED,
     "hatch": "////",
+}
+_EVENT: dict[str, Any] = {
+    "color": style.RESERVE,
+    "linewidth": 1.2,
+    "linestyle": ":",
 }
 _CHARGING: dict[str, Any] = {
     "facecolor": style.STATION,
@@ -53,6 +59,8 @@ def draw_timeline(
     axes = figure.add_subplot()
     for row, motion in enumerate(motions):
         _draw_row(axes, scene, plan, motion, row)
+    for event in log.events if log else ():
+        axes.axvline(event.time_s, **_EVENT)
     axes.set_ylim(len(motions) - 0.5, -0.75)
     axes.set_yticks(range(len(motions)), [motion.robot for motion in motions])
     axes.set_xlim(
@@ -62,13 +70,19 @@ def draw_timeline(
     for side in ("top", "right", "left"):
         axes.spines[side].set_visible(False)
     axes.tick_params(axis="y", length=0)
-    handles = [
+    handles: list[Patch | Line2D] = [
         Patch(facecolor=style.MUTED, label="driving"),
         Patch(**_WAITING, label="waiting"),
         Patch(**_CHARGING, label="at a station"),
     ]
+    if log and log.events:
+        handles.append(Line2D([], [], **_EVENT, label="stop or new plan"))
     figure.legend(
-        handles=handles, loc="outside upper right", ncols=3, frameon=False, fontsize=9.5
+        handles=handles,
+        loc="outside upper right",
+        ncols=len(handles),
+        frameon=False,
+        fontsize=9.5,
     )
     scene_drawing.write_figure(figure, path)
 

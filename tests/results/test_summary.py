@@ -40,6 +40,8 @@ SECTIONS = {
         "realtime_factor",
         "controller_ms",
         "tracking",
+        "events",
+        "replans",
     },
     "energy": {
         "planned_J",
