@@ -60,14 +60,31 @@ def parse_options() -> argparse.Namespace:
 
 def protocol(options: argparse.Namespace) -> str:
     """Return what was measured how and on what."""
+    seeds = f"{options.seeds.start}-{options.seeds.stop - 1}"
+    chosen = f"profile {options.profile}, seeds {seeds}"
+    return f"{__doc__}\n{chosen}\n{conditions(options)}\n"
+
+
+def conditions(options: argparse.Namespace) -> str:
+    """Return what times depend on: budget, versions, machine."""
     names = ("mrmg", "mujoco", "numba", "numpy", "casadi")
     versions = ", ".join(f"{name} {version(name)}" for name in names)
-    seeds = f"{options.seeds.start}-{options.seeds.stop - 1}"
-    chosen = f"profile {options.profile}, seeds {seeds}, budget {options.budget}"
-    return (
-        f"{__doc__}\n{chosen}\n"
-        f"{versions}, Python {platform.python_version()}, {cpu()}\n"
-    )
+    budget = f"budget {options.budget:g} s" if options.budget else "no time limit"
+    return f"{budget}; {versions}, Python {platform.python_version()}; {cpu()}"
+
+
+def problem_of(scene: Any, source: str) -> dict[str, Any]:
+    """Return what there is to be planned."""
+    robot = scene.robots[0]
+    metre_J = robot.model.energy_model.plain_ground_J_per_m()
+    return {
+        "source": source,
+        "robots": len(scene.robots),
+        "goals": len(scene.goals),
+        "stations": len(scene.stations),
+        "terrain_areas": len(scene.terrain),
+        "capacity_m": robot.battery.capacity_J / metre_J,
+    }
 
 
 def cpu() -> str:
@@ -91,6 +108,8 @@ def missions(source: str, options: argparse.Namespace) -> Iterator[dict[str, Any
         result = plan_mission(scene, seed=seed, params=params)
         row = {
             "scene": scene.name,
+            "problem": problem_of(scene, source),
+            "conditions": conditions(options),
             "seed": seed,
             "profile": options.profile,
             "status": result.status.value,

@@ -17,7 +17,7 @@ def calibrate(options: argparse.Namespace) -> int:
     """Calibrate a robot model, and leave a calibrated copy with the plot of the fit."""
     from mrmg.calibration import calibrate, write_calibration
     from mrmg.results.calibration_plot import draw_calibration
-    from mrmg.results.figure import require_format
+    from mrmg.results.print_style import require_format
     from mrmg.scene.loading.models import load_model
 
     folder = _folder_of(options.model)

@@ -155,11 +155,15 @@ class Growth:
         trajectories: of all robots, or empty if the tree found no solution.
         tours: targets each robot visited, in order.
         counts: vertices, groups, router_calls, expansions.
+        place: where the robots are at each vertex of the tree [m], shape (V, R, 2).
+        parent: of each vertex; -1 for the root, shape (V,).
     """
 
     trajectories: tuple[Trajectory, ...]
     tours: Mapping[str, tuple[str, ...]]
     counts: Mapping[str, int]
+    place: np.ndarray
+    parent: np.ndarray
 
     @property
     def solved(self) -> bool:
@@ -209,14 +213,18 @@ def grow_tree(
     )
     names = ("vertices", "groups", "router_calls", "expansions", "dead_ends")
     statistics = {name: int(n) for name, n in zip(names, counts, strict=True)}
+    size = statistics["vertices"]
+    place, parent = tree.state[:size, :, :2].copy(), tree.parent[:size].copy()
     if leaf < 0:
-        return Growth((), {}, statistics)
+        return Growth((), {}, statistics, place, parent)
     branch = _branch(tree, leaf)
     control = _controls(problem, params, tree, branch)
     return Growth(
         _replay(problem, params, control),
         _visited_tours(problem, tree, tours, branch),
         statistics,
+        place,
+        parent,
     )
 
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from mrmg.calibration import Calibration, Estimate
 from mrmg.results import scene_drawing, style
-from mrmg.results.figure import FOR_PRINT
+from mrmg.results.print_style import FOR_PRINT
 
 _LOOKS = {
     "straight": ("o", "#0072B2"),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from matplotlib import rc_context
 
@@ -13,6 +12,7 @@ from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan
 from mrmg.results.energy_plot import draw_energy
 from mrmg.results.overview import draw_overview
+from mrmg.results.print_style import FOR_PRINT, require_format
 from mrmg.results.report_record import read_record
 from mrmg.results.timeline_plot import draw_timeline
 from mrmg.scene.types import Scene
@@ -28,15 +28,6 @@ _DRAW: dict[str, Draw] = {
 }
 KINDS = tuple(_DRAW)
 """What a figure can show."""
-FORMATS = (".pdf", ".svg", ".png")
-
-FOR_PRINT: Any = {
-    "pdf.fonttype": 42,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "mrmg",
-    "savefig.dpi": 300,
-}
-"""Text stays text, in embedded TrueType fonts, as journals want it."""
 
 
 def draw_figure(run_folder: Path, kind: str, path: Path) -> None:
@@ -45,7 +36,7 @@ def draw_figure(run_folder: Path, kind: str, path: Path) -> None:
     Args:
         run_folder: the run; at least planned.
         kind: one of `KINDS`.
-        path: file to write; its suffix, one of `FORMATS`, gives the format.
+        path: file to write; its suffix, one of `print_style.FORMATS`, gives the format.
 
     Raises:
         UsageError: if kind or suffix is unknown.
@@ -61,13 +52,3 @@ def draw_figure(run_folder: Path, kind: str, path: Path) -> None:
         raise RunFolderError(str(run_folder), [Fault("planning.json", reason)])
     with rc_context(FOR_PRINT):
         _DRAW[kind](record.scene, record.plan, record.log, path)
-
-
-def require_format(path: Path) -> None:
-    """Refuse a file name whose suffix names no format of `FORMATS`.
-
-    Raises:
-        UsageError: naming the formats.
-    """
-    if path.suffix.lower() not in FORMATS:
-        raise UsageError(f"{path} must end in one of {', '.join(FORMATS)}")

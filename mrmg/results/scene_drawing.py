@@ -32,7 +32,8 @@ _TIMELESS: dict[str, dict[str, Any]] = {
     "svg": {"Date": None},
 }
 """Metadata by format, such that equal figures give equal files."""
-_HALO = [withStroke(linewidth=2.5, foreground="white")]
+HALO = [withStroke(linewidth=2.5, foreground="white")]
+"""What keeps text readable on anything."""
 
 
 def new_map_figure(scene: Scene) -> tuple[Figure, Axes]:
@@ -93,7 +94,11 @@ def draw_scene(scene: Scene, path: Path) -> None:
 
 
 def draw_ground(
-    axes: Axes, scene: Scene, *, hatched: bool = True, label_points: float = 9.0
+    axes: Axes,
+    scene: Scene,
+    *,
+    hatched: bool = True,
+    label_points: float | None = 9.0,
 ) -> None:
     """Draw bounds, terrain classes and obstacles.
 
@@ -101,7 +106,7 @@ def draw_ground(
         axes: where to draw, in metres.
         scene: what to draw.
         hatched: hatch the terrain classes.
-        label_points: size of the multipliers printed on terrain areas.
+        label_points: size of the multipliers printed on terrain areas; None for none.
     """
     bounds = box(*scene.bounds)
     _add_shape(
@@ -130,29 +135,39 @@ def draw_ground(
             linestyle="--" if partial else "-",
             zorder=3,
         )
-    _label_terrain(axes, scene, label_points)
+    if label_points is not None:
+        _label_terrain(axes, scene, label_points)
 
 
 def draw_goal(
-    axes: Axes, goal: Goal, label: str, *, color: str = style.GOAL_OPEN
+    axes: Axes,
+    goal: Goal,
+    label: str,
+    *,
+    color: str = style.GOAL_OPEN,
+    points: float = 10.0,
 ) -> None:
     """Draw a goal region and its label; a colour other than white means visited."""
-    draw_region(axes, goal.region, color, style.GOAL_EDGE, 1.3)
-    _draw_label(axes, goal.region, label, style.INK)
+    draw_region(axes, goal.region, color, style.GOAL_EDGE, 0.13 * points)
+    _draw_label(axes, goal.region, label, style.INK, points)
 
 
-def draw_station(axes: Axes, station: Station, label: str) -> None:
-    """Draw a recharging station: a yellow region with a square and its label."""
-    draw_region(axes, station.region, style.STATION, style.STATION_EDGE, 1.3)
+def draw_station(
+    axes: Axes, station: Station, label: str, *, points: float = 10.0
+) -> None:
+    """Draw a recharging station: its region with a square and its label."""
+    width = 0.13 * points
+    draw_region(axes, station.region, style.STATION, style.STATION_EDGE, width)
     axes.plot(
         *station.region.center,
         marker="s",
-        markersize=6,
+        markersize=0.6 * points,
         markerfacecolor=style.STATION,
         markeredgecolor=style.STATION_EDGE,
+        markeredgewidth=0.1 * points,
         zorder=6,
     )
-    _draw_label(axes, station.region, f"⚡{label}", style.STATION_EDGE)
+    _draw_label(axes, station.region, f"⚡{label}", style.STATION_EDGE, points)
 
 
 def draw_region(
@@ -185,7 +200,7 @@ def draw_robots(axes: Axes, scene: Scene) -> None:
             color=colors[robot.id],
             ha="center",
             va="top",
-            path_effects=_HALO,
+            path_effects=HALO,
             zorder=9,
         )
 
@@ -315,12 +330,14 @@ def _label_terrain(axes: Axes, scene: Scene, points: float) -> None:
             color=style.INK,
             ha="center",
             va="center",
-            path_effects=_HALO,
+            path_effects=HALO,
             zorder=4,
         )
 
 
-def _draw_label(axes: Axes, region: Region, text: str, color: str) -> None:
+def _draw_label(
+    axes: Axes, region: Region, text: str, color: str, points: float
+) -> None:
     x_min, _, x_max, y_max = region.shape.bounds
     # Towards the upper right corner of the region's box, where a circle leaves room.
     axes.annotate(
@@ -328,11 +345,11 @@ def _draw_label(axes: Axes, region: Region, text: str, color: str) -> None:
         (x_max - 0.12 * (x_max - x_min), y_max),
         xytext=(1, -1),
         textcoords="offset points",
-        fontsize=10,
+        fontsize=points,
         fontweight="bold",
         color=color,
         va="bottom",
-        path_effects=_HALO,
+        path_effects=HALO,
         zorder=8,
     )
 

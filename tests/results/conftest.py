@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from mrmg.accounting import find_visits, plan_ledger
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan, Trajectory
 from mrmg.motion.dynamics import DERIVATIVES, rk4_step
+from mrmg.results import print_style
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Robot, Scene
 
@@ -197,3 +200,17 @@ def _driven(
     force_N = model.effective_mass_kg * u1 + model.energy_model.rolling_force_N
     work_J = force_N * way_m
     return state, np.stack([np.maximum(work_J, 0), np.minimum(work_J, 0)], axis=-1)
+
+
+@pytest.fixture
+def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
+    """The figures that were written."""
+    figures: list[Figure] = []
+    write = print_style.scene_drawing.write_figure
+
+    def kept(figure: Figure, path: Path) -> None:
+        write(figure, path)
+        figures.append(figure)
+
+    monkeypatch.setattr(print_style.scene_drawing, "write_figure", kept)
+    return figures

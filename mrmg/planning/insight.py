@@ -1,0 +1,105 @@
+"""What planning makes on its way, as lines: the roadmap, the tours on it, the tree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrmg import seeding
+from mrmg.errors import UsageError
+from mrmg.mission import Trajectory
+from mrmg.planning.motion_tree import Problem, grow_tree, state_problem
+from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.roadmap import Roadmap, build_roadmap
+from mrmg.planning.routing import Routing, solve_routing
+from mrmg.scene.types import Scene
+from mrmg.world.world import World
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Insight:
+    """The ways of one attempt at a mission [m].
+
+    Attributes:
+        roadmap: edges of the first robot's roadmap, shape (E, 2, 2).
+        multiplier: energy of each edge over that of plain ground, shape (E,).
+        tours: each robot's tour along the roadmap, shape (n, 2), by robot.
+        tree: each robot's edges of the motion tree, shape (V - 1, 2, 2), by robot.
+        trajectories: the motions found.
+    """
+
+    roadmap: np.ndarray
+    multiplier: np.ndarray
+    tours: Mapping[str, np.ndarray]
+    tree: Mapping[str, np.ndarray]
+    trajectories: tuple[Trajectory, ...]
+
+
+def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
+    """Plan a mission, and keep what leads to its first plan.
+
+    Args:
+        scene: the mission.
+        seed: of all random streams.
+        params: parameters; at most `trees` attempts are made.
+
+    Raises:
+        UsageError: if no attempt finds a plan.
+    """
+    world = World.from_scene(scene)
+    roadmap = build_roadmap(
+        scene,
+        world,
+        samples=params.samples,
+        neighbours=params.neighbours,
+        rng=seeding.stream(seed, "roadmap", 0),
+    )
+    problem = state_problem(scene, world, roadmap, params)
+    for number in range(params.trees):
+        draw = seeding.stream_seed(seed, "insight", number)
+        routing = solve_routing(problem.mission.routing, params.router, draw)
+        if not routing.feasible:
+            continue
+        growth = grow_tree(problem, params, routing, draw, np.zeros(1, np.bool_))
+        if growth.solved:
+            first, second, weight = roadmap.edges[0]
+            edges = roadmap.arrays.vertex[np.stack([first, second], axis=1)]
+            length_m = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
+            long = length_m > 0.0  # vertices may lie on one another
+            child = np.flatnonzero(growth.parent >= 0)
+            pieces = growth.place[np.stack([growth.parent[child], child], axis=1)]
+            ids = [robot.id for robot in scene.robots]
+            return Insight(
+                roadmap=edges[long],
+                multiplier=weight[long] / length_m[long],
+                tours={
+                    name: tour_way(problem, routing, at) for at, name in enumerate(ids)
+                },
+                tree={name: pieces[:, :, at] for at, name in enumerate(ids)},
+                trajectories=growth.trajectories,
+            )
+    raise UsageError(f"{scene.name}: no plan was found in {params.trees} attempts")
+
+
+def tour_way(problem: Problem, routing: Routing, robot: int) -> np.ndarray:
+    """Return the points of the roadmap one robot's tour leads along, shape (n, 2)."""
+    roadmap = problem.roadmap
+    field = int(problem.mission.fleet[robot]["field"])
+    here = len(roadmap.targets) + robot
+    vertices = [here]
+    for target in routing.tours[robot]:
+        vertices += _way(roadmap, field, target, vertices[-1])
+    return np.asarray(roadmap.arrays.vertex[vertices])
+
+
+def _way(roadmap: Roadmap, field: int, target: int, start: int) -> list[int]:
+    """Return the vertices after `start` on the way to a target."""
+    successor = roadmap.arrays.successor[field, target]
+    way = []
+    vertex = int(successor[start])
+    while vertex >= 0:
+        way.append(vertex)
+        vertex = int(successor[vertex])
+    return way
