@@ -129,14 +129,15 @@ def _draw_boxes(axes: Axes, rows: Sequence[BenchRow], key: Key) -> None:
             if failed:
                 axes.annotate(
                     f"{failed}/{len(own)}\nfailed",
-                    (place + shift, 1.0),
+                    (place + shift, 1.02),
                     xycoords=("data", "axes fraction"),
                     ha="center",
-                    va="top",
+                    va="bottom",
                     fontsize=5.5,
                     color=style.RESERVE,
                 )
     axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")
     axes.set_xticks(range(len(groups)), groups)
     axes.set_xlim(-0.6, len(groups) - 0.4)
     axes.grid(axis="y", which="both", color="#E4E6EA", linewidth=0.5)
