@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from mrmg.results.report_charts import chart_data
 from mrmg.results.report_map import mission_map
 from mrmg.results.report_planner import cost_chart, planner
 from mrmg.results.report_record import RunRecord, read_record
+from mrmg.results.report_robustness import robustness
 from mrmg.results.report_timeline import events, timeline
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
@@ -68,6 +70,7 @@ def report_html(record: RunRecord) -> str:
                 "Distances", html.charts(places.get("distance", ()), columns=2)
             ),
             html.section("Checks", *sections.checks(record)),
+            html.section("Robustness", *robustness(record)),
             html.section("Planner", *planner(record)),
             html.section("Reproduce", *_reproduce(record)),
         ],
@@ -199,7 +202,11 @@ def command(record: RunRecord) -> str:
         words += ["--profile", str(record.arguments["profile"])]
     if record.arguments.get("budget_s") is not None:
         words += ["--budget", f"{record.arguments['budget_s']:g}"]
-    return " ".join(words)
+    if record.arguments.get("disturb") is not None:
+        spec = str(record.arguments["disturb"])
+        words += ["--disturb", *([spec] if spec else [])]
+        words += ["--disturb-seed", str(record.arguments["disturb_seed"])]
+    return shlex.join(words)
 
 
 def _source(scene: Scene) -> str:
