@@ -9,6 +9,11 @@ The verbs of the command line are the functions of this package:
     account = mrmg.audit(scene, result.plan, log)
     mrmg.render(scene, result.plan, log, Path("mission.mp4"))
 
+A mission that may go wrong is driven under mission control, which plans anew:
+
+    driven = mrmg.drive(scene, result.plan, faults=["r2@40s"])
+    account = mrmg.audit(scene, driven.plan, driven.log)
+
 or all of it, with a run folder: `mrmg.run("quickstart", out=Path("runs/first"))`.
 Everything is imported on first use, so that importing the package stays cheap.
 """
@@ -20,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mrmg.execution import simulate as execute
+    from mrmg.mission_control import drive_mission as drive
     from mrmg.pipeline import run
     from mrmg.planning import plan_mission as plan
     from mrmg.results.audit import audit
@@ -32,6 +38,7 @@ __version__ = "0.1.0"
 __all__ = [
     "__version__",
     "audit",
+    "drive",
     "execute",
     "load_scene",
     "plan",
@@ -42,6 +49,7 @@ __all__ = [
 
 _HOME = {
     "audit": ("mrmg.results.audit", "audit"),
+    "drive": ("mrmg.mission_control", "drive_mission"),
     "execute": ("mrmg.execution", "simulate"),
     "load_scene": ("mrmg.scene.loading", "load_scene"),
     "plan": ("mrmg.planning", "plan_mission"),

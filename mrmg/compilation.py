@@ -13,8 +13,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from mrmg import storage
-
 F = TypeVar("F", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).resolve().parent
@@ -33,7 +31,8 @@ def cache_folder() -> Path:
     state = hashlib.sha256()
     for path in kernel_sources():
         state.update(path.read_bytes())
-    return storage.user_cache_folder() / "kernels" / state.hexdigest()[:16]
+    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "mrmg" / "kernels" / state.hexdigest()[:16]
 
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -52,6 +53,8 @@ def run(
     controller: str = "mpc",
     disturb: str | None = None,
     disturb_seed: int = 0,
+    replan: bool = False,
+    faults: Sequence[str] = (),
     video: VideoArguments | None = DEFAULT_VIDEO,
     on_progress: StepProgress | None = None,
     on_improvement: OnImprovement | None = None,
@@ -70,6 +73,8 @@ def run(
         disturb: disturbances to drive under, as `execution.disturbance_spec` reads
             them; "" for the default ones, None for none.
         disturb_seed: of what is drawn from them.
+        replan: whether to plan anew where the mission leaves its plan.
+        faults: robots that break down on the way, such as `r2@40s`.
         video: how the video is made; None for no video.
         on_progress: told (step, fraction, text).
         on_improvement: told of every plan that is cheaper than all before it.
@@ -78,6 +83,8 @@ def run(
         MrmgError: for everything that keeps the run from starting. A mission that
             cannot be planned, or fails, is a result and not an error.
     """
+    from mrmg.mission_control.faults import checked_faults
+
     scene = source if isinstance(source, Scene) else load_scene(source)
     arguments = RunArguments(
         seed=seed,
@@ -88,6 +95,8 @@ def run(
         controller=controller,
         disturb=None if disturb is None else written_out(disturb),
         disturb_seed=disturb_seed,
+        replan=replan,
+        faults=tuple(str(fault) for fault in checked_faults(scene, tuple(faults))),
         video=video or DEFAULT_VIDEO,
     )
     folder = RunFolder(out or default_folder(scene, seed))

@@ -24,6 +24,7 @@ from mrmg.scene.types import Scene
 from mrmg.shipped import models_folder
 
 if TYPE_CHECKING:
+    from mrmg.mission_control import Drive
     from mrmg.planning import Improvement
 
 StepProgress = Callable[[Step, float, str], None]
@@ -77,6 +78,8 @@ class RunArguments:
         controller: name of the tracking controller.
         disturb: specification of the disturbances driven under; None for none.
         disturb_seed: of what is drawn from them.
+        replan: whether to plan anew where the mission leaves its plan.
+        faults: robots that break down on the way, such as `r2@40s`.
         video: how the video is made.
     """
 
@@ -88,6 +91,8 @@ class RunArguments:
     controller: str = "mpc"
     disturb: str | None = None
     disturb_seed: int = 0
+    replan: bool = False
+    faults: tuple[str, ...] = ()
     video: VideoArguments = DEFAULT_VIDEO
 
     def to_json(self) -> dict[str, Any]:
@@ -100,7 +105,10 @@ class RunArguments:
         video = data.get("video", {})
         if "size" in video:
             video = {**video, "size": tuple(video["size"])}
-        return RunArguments(**{**data, "video": VideoArguments(**video)})
+        faults = tuple(data.get("faults", ()))
+        return RunArguments(
+            **{**data, "video": VideoArguments(**video), "faults": faults}
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,6 +158,8 @@ class Run:
                 self.arguments.controller,
                 self.arguments.disturb,
                 self.arguments.disturb_seed,
+                self.arguments.replan,
+                self.arguments.faults,
             ],
             Step.RENDER: asdict(self.arguments.video),
         }
@@ -258,29 +268,34 @@ def drive(
     plan: Plan,
     arguments: RunArguments,
     on_progress: Callable[[float, str], None] | None = None,
-) -> ExecutionLog:
+) -> Drive:
     """Drive a plan in MuJoCo as the arguments of its run want it."""
-    from mrmg.execution import simulate
     from mrmg.execution.disturbance_spec import parse_disturbance
+    from mrmg.mission_control import drive_mission
+    from mrmg.planning import profile_params
 
     disturbance = None
     if arguments.disturb is not None:
         ranges = parse_disturbance(arguments.disturb)
         ids = [robot.id for robot in scene.robots]
         disturbance = ranges.draw(arguments.disturb_seed, ids)
-    return simulate(
+    return drive_mission(
         scene,
         plan,
         controller=arguments.controller,
         disturbance=disturbance,
+        replan=arguments.replan,
+        faults=arguments.faults,
+        seed=arguments.seed,
+        planner=profile_params(arguments.profile),
         on_progress=on_progress,
     )
 
 
 def _execute(run: Run) -> Write:
     progress = run.progress_of(Step.EXECUTE)
-    log = drive(run.scene, run.plan(), run.arguments, progress)
-    return lambda: log.save(run.folder.path)
+    driven = drive(run.scene, run.plan(), run.arguments, progress)
+    return lambda: driven.save(run.folder.path)
 
 
 def _audit(run: Run) -> Write:

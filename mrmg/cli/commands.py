@@ -31,6 +31,8 @@ def run(options: argparse.Namespace) -> int:
             profile=options.profile,
             disturb=options.disturb,
             disturb_seed=options.disturb_seed,
+            replan=options.replan,
+            faults=options.fault,
             video=None if options.no_video else DEFAULT_VIDEO,
             on_progress=told,
             on_improvement=terminal.improvement_teller(told),
@@ -95,21 +97,29 @@ def execute(options: argparse.Namespace) -> int:
     from mrmg.execution.disturbance_spec import written_out
     from mrmg.run_folder import Step
 
-    changes = {"disturb": None, "disturb_seed": options.disturb_seed}
+    changes = {
+        "disturb": None,
+        "disturb_seed": options.disturb_seed,
+        "replan": options.replan,
+        "faults": tuple(options.fault),
+    }
     if options.disturb is not None:
         changes["disturb"] = written_out(options.disturb)
     if options.controller is not None:
         changes["controller"] = options.controller
     work = _make(options.run, Step.EXECUTE, **changes)
     log = work.folder.read_json("log.json", cure="mrmg execute")
-    ended = "driven to the end" if log["completed"] else "given up on the way"
+    lost = [item for item in log["events"] if item["action"] in ("end", "give_up")]
+    driven = log["completed"] and not lost
+    ended = "driven to the end" if driven else "given up on the way"
+    told = [f"{item['time_s']:>7.1f} s  {item['message']}" for item in log["events"]]
     touches = [
         f"  {touch['robot']} touched {touch['other']} at {touch['time_s']:.2f} s"
         for touch in log["contacts"]
     ]
-    _print(options, log, "\n".join([f"{ended}, {len(touches)} contacts", *touches]))
-    went_well = log["completed"] and not touches
-    return ExitCode.OK if went_well else ExitCode.MISSION_FAILED
+    lines = [f"{ended}, {len(touches)} contacts", *told, *touches]
+    _print(options, log, "\n".join(lines))
+    return ExitCode.OK if driven and not touches else ExitCode.MISSION_FAILED
 
 
 def audit(options: argparse.Namespace) -> int:

@@ -9,6 +9,7 @@ from mrmg import __version__
 from mrmg.cli import (
     calibrate_command,
     commands,
+    control_arguments,
     robustness_commands,
     scene_commands,
     show_commands,
@@ -58,6 +59,8 @@ def _add_run(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     run = verbs.add_parser("run", help="the whole mission, from scene to report")
     _add_planning(run)
     robustness_commands.add_disturbance(run)
+    control_arguments.add_faults(run)
+    control_arguments.add_replanning(run)
     run.add_argument("--no-video", action="store_true", help="leave out the video")
     run.set_defaults(command=commands.run)
 
@@ -120,6 +123,8 @@ def _add_steps(verbs: _Verbs) -> None:  # type: ignore[type-arg]
                 "--controller", metavar="NAME", help="tracking controller; default mpc"
             )
             robustness_commands.add_disturbance(verb)
+            control_arguments.add_faults(verb)
+            control_arguments.add_replanning(verb)
         _add_json(verb, output)
         verb.set_defaults(command=command)
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mrmg.cli import terminal, values
+from mrmg.cli import control_arguments, terminal, values
 from mrmg.errors import ExitCode
 
 if TYPE_CHECKING:
@@ -72,6 +72,7 @@ def add_robustness(verbs: Any) -> None:
     verb.add_argument(
         "--controller", metavar="NAME", help="tracking controller; default the run's"
     )
+    control_arguments.add_replanning(verb)
     verb.add_argument(
         "--json", action="store_true", help="print the study of robustness.json alone"
     )
@@ -88,10 +89,13 @@ def robustness(options: argparse.Namespace) -> int:
 
     with existing(options.run).opened_for_writing() as folder:
         run = taken_up(folder)
-        driven = run
-        if options.controller is not None:
-            changed = replace(run.arguments, controller=options.controller)
-            driven = replace(run, arguments=changed)
+        changed = replace(
+            run.arguments,
+            controller=options.controller or run.arguments.controller,
+            replan=options.replan,
+            faults=(),
+        )
+        driven = replace(run, arguments=changed)
         with terminal.progress_of("driving") as told:
             study = study_robustness(
                 driven,

@@ -18,7 +18,8 @@ class Event:
         time_s: simulated time.
         cause: "fault", "energy", "tracking" or "rest", when the fleet had stopped.
         robot: id of the robot that caused it; "" for the fleet.
-        action: "stop", "replan" or "end".
+        action: "stop"; "replan", go on by a new plan; "give_up" some goals; "finish"
+            with all goals visited; "end" without.
         message: one sentence for people.
     """
 

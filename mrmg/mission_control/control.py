@@ -168,6 +168,9 @@ class MissionControl:
         missing = [
             goal.id for goal in self._scene.goals if goal.id not in condition.visited
         ]
+        if not missing:
+            self._tell(now, "rest", "", "finish", "all goals have been visited")
+            return None
         over = self._why_over(missing)
         if over:
             self._tell(now, "rest", "", "end", over)
@@ -195,13 +198,13 @@ class MissionControl:
             meter.follow(outcome.plan.tours.get(name, ()))
         self._energy.follow(self.course, step, self._meters)
         self._tracking.reset(now.time_s)
+        for reason in dict.fromkeys(outcome.given_up.values()):
+            self._tell(now, "rest", "", "give_up", reason)
         self._tell(now, "rest", "", "replan", _said(outcome, len(missing), condition))
         return Orders(plan=self.course.plan, clock_s=step * self.course.plan.dt_s)
 
     def _why_over(self, missing: Sequence[str]) -> str:
         """Return why the mission ends where the fleet rests; "" if it need not."""
-        if not missing:
-            return "all goals have been visited"
         left = f"goals left: {_list(missing)}"
         if self._replanner is None:
             return f"replanning is off; {left}"
@@ -270,9 +273,6 @@ def _said(outcome: Replan, missing: int, condition: FleetCondition) -> str:
     words.append(f"rolling resistance {', '.join(factors)} of the model's")
     if outcome.reserve_share < 1.0:
         words.append(f"keeps {outcome.reserve_share:.0%} of the reserves")
-    if outcome.given_up:
-        reasons = dict.fromkeys(outcome.given_up.values())
-        words.append(f"given up: {'; '.join(reasons)}")
     return "; ".join(words)
 
 

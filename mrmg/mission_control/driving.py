@@ -91,7 +91,7 @@ def drive_mission(
         plan,
         controller=controller,
         disturbance=disturbance,
-        supervisor=control,
+        supervisor=control if replan or faults else None,
         on_progress=on_progress,
     )
     return Drive(log=log, plan=control.course.plan, replans=tuple(control.replans))

@@ -229,10 +229,11 @@ def _unfinished(log: ExecutionLog) -> list[str]:
 
 
 def _given_up(log: ExecutionLog, *, missed: bool) -> list[str]:
+    said = {"end": "the mission was ended", "give_up": "goals were given up"}
     return [
-        f"the mission was ended at {event.time_s:.1f} s: {event.message}"
+        f"{said[event.action]} at {event.time_s:.1f} s: {event.message}"
         for event in log.events
-        if event.action == "end" and missed
+        if event.action in said and missed
     ]
 
 

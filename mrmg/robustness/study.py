@@ -76,6 +76,8 @@ def execute_options(arguments: RunArguments) -> dict[str, str | bool]:
     options: dict[str, str | bool] = {"disturb": arguments.disturb or ""}
     if arguments.controller != RunArguments().controller:
         options["controller"] = arguments.controller
+    if arguments.replan:
+        options["replan"] = True
     return options
 
 

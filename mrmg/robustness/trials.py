@@ -69,7 +69,8 @@ def jobs_of(
 def make_trial(job: TrialJob) -> Trial:
     """Drive, judge, and write the outcome."""
     scene, plan = _mission(job.folder)
-    trial = assess_trial(scene, plan, drive(scene, plan, job.arguments))
+    driven = drive(scene, plan, job.arguments)
+    trial = assess_trial(scene, driven.plan, driven.log)
     storage.write_json(job.path, trial.to_json())
     return trial
 

@@ -62,8 +62,8 @@ def test_the_worst_case_is_repeated_by_its_seed(
 
     worst = three[0].worst
     arguments = replace(run.arguments, disturb="", disturb_seed=worst.seed)
-    log = drive(run.scene, run.plan(), arguments)
-    assert assess_trial(run.scene, run.plan(), log) == worst
+    driven = drive(run.scene, run.plan(), arguments)
+    assert assess_trial(run.scene, driven.plan, driven.log) == worst
 
 
 def test_a_stopped_study_is_taken_up(run: Run, three: tuple[Study, str]) -> None:
