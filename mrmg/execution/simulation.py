@@ -42,7 +42,7 @@ _LOST_M = 2.0
 _SETTLING_STEPS = 50
 _REST_S = 1.0
 _LONGEST_REST_S = 5.0
-_AT_REST_M_S = 0.005
+_AT_REST = 0.005
 _STALLED_RATE = 0.1
 _LONGEST_STALL_S = 5.0
 _PROGRESS_TICKS = 50
@@ -142,7 +142,8 @@ class _Run:
         self._world, self._plan = world, plan
         self._period_s = STEPS_PER_TICK * world.model.opt.timestep
         self._reference = FleetReference(world.scene, plan)
-        self._clock = FleetClock(speed_states(world.scene)[:, 4])
+        self._is_speed = speed_states(world.scene)
+        self._clock = FleetClock(self._is_speed[:, 4])
         self._set_points = SetPoints(world.scene, self._reference, controllers)
         self._drive = DriveControl(world.scene)
         self._believed = believed_resistance(world.scene)
@@ -322,7 +323,7 @@ class _Run:
 
     def _completed(self) -> bool:
         rested_s = self.data.time - self._finished_s
-        at_rest = (np.abs(self._state[:, 3]) < _AT_REST_M_S).all()
+        at_rest = np.abs(self._state[self._is_speed]).max() < _AT_REST
         return bool(rested_s >= _REST_S and at_rest)
 
     def _trouble(self) -> str:
