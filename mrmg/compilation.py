@@ -13,6 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
+from mrmg import storage
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 _PACKAGE = Path(__file__).resolve().parent
@@ -31,8 +33,7 @@ def cache_folder() -> Path:
     state = hashlib.sha256()
     for path in kernel_sources():
         state.update(path.read_bytes())
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return base / "mrmg" / "kernels" / state.hexdigest()[:16]
+    return storage.user_cache_folder() / "kernels" / state.hexdigest()[:16]
 
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))

@@ -81,6 +81,12 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
         raise ValueError(f"{path.name} is damaged: {error}") from error
 
 
+def user_cache_folder() -> Path:
+    """Return the folder for what this machine need not work out twice."""
+    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "mrmg"
+
+
 def digest(text: str) -> str:
     """Return a short hexadecimal fingerprint of `text`."""
     return hashlib.sha256(text.encode()).hexdigest()[:16]

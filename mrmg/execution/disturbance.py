@@ -96,7 +96,7 @@ class Disturbance:
 
     def to_json(self) -> dict[str, Any]:
         """Return the disturbance as JSON data."""
-        return asdict(self)
+        return {"seed": self.seed, "robots": [asdict(item) for item in self.robots]}
 
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> Disturbance:

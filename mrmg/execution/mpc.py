@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 
 from mrmg.execution.controller import HORIZON, HORIZON_STEP_S
+from mrmg.execution.native_code import compiled
 from mrmg.motion.dynamics import DERIVATIVES, NU, NX, rk4_step
 from mrmg.scene.robot_model import Limits, RobotModel
 
@@ -107,7 +108,7 @@ def _solver(motion_model: str, wheelbase_m: float, params: MpcParams) -> ca.Func
     lower = ca.MX.sym("lower", _SIZE)
     upper = ca.MX.sym("upper", _SIZE)
     weight = _weights(params)
-    linearise = _linearised_gaps(motion_model, wheelbase_m)
+    linearise = compiled(_linearised_gaps(motion_model, wheelbase_m))
     jacobian, gap = linearise(guess)
     # J z = J z_guess - gap(z_guess): the gaps close to first order.
     right_side = jacobian @ guess - gap
@@ -139,12 +140,17 @@ def _weights(params: MpcParams) -> np.ndarray:
 def _linearised_gaps(motion_model: str, wheelbase_m: float) -> ca.Function:
     """Return z -> (Jacobian, value) of the gaps x_{k+1} - f(x_k, u_k)."""
     step = rk4_step(DERIVATIVES[motion_model](ca.sin, ca.cos, ca.tan))
-    z = ca.SX.sym("z", _SIZE)
-    gaps = []
-    for k in range(HORIZON):
-        stage = ca.vertsplit(z[k * _STAGE : (k + 1) * _STAGE])
-        following = z[(k + 1) * _STAGE : (k + 1) * _STAGE + NX]
-        reached = step(*stage, wheelbase_m, HORIZON_STEP_S)
-        gaps.append(following - ca.vertcat(*reached))
-    gap = ca.vertcat(*gaps)
-    return ca.Function("gaps", [z], [ca.jacobian(gap, z), gap])
+    now = ca.SX.sym("now", _STAGE)
+    reached = ca.vertcat(*step(*ca.vertsplit(now), wheelbase_m, HORIZON_STEP_S))
+    stage = ca.Function("stage", [now], [reached, ca.jacobian(reached, now)])
+    z = ca.MX.sym("z", _SIZE)
+    stages = ca.reshape(z[:-NX], _STAGE, HORIZON)
+    after, slopes = stage.map(HORIZON)(stages)
+    following = ca.horzcat(stages[:NX, 1:], z[-NX:])
+    last = ca.MX(NX * HORIZON, NX)
+    slope = ca.horzcat(ca.diagcat(*ca.horzsplit(slopes, _STAGE)), last)
+    selected = [ca.horzcat(ca.DM.eye(NX), ca.DM(NX, NU))] * (HORIZON - 1)
+    first = ca.DM(NX * HORIZON, _STAGE)
+    identity = ca.horzcat(first, ca.diagcat(*selected, ca.DM.eye(NX)))
+    name = f"gaps_{motion_model}"
+    return ca.Function(name, [z], [identity - slope, ca.vec(following - after)])

@@ -15,6 +15,7 @@ from mrmg.results.report_charts import chart_data
 from mrmg.results.report_map import mission_map
 from mrmg.results.report_planner import cost_chart, planner
 from mrmg.results.report_record import RunRecord, read_record
+from mrmg.results.report_robustness import robustness
 from mrmg.results.report_timeline import events, timeline
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
@@ -69,6 +70,7 @@ def report_html(record: RunRecord) -> str:
                 "Distances", html.charts(places.get("distance", ()), columns=2)
             ),
             html.section("Checks", *sections.checks(record)),
+            html.section("Robustness", *robustness(record)),
             html.section("Planner", *planner(record)),
             html.section("Reproduce", *_reproduce(record)),
         ],
@@ -201,7 +203,8 @@ def command(record: RunRecord) -> str:
     if record.arguments.get("budget_s") is not None:
         words += ["--budget", f"{record.arguments['budget_s']:g}"]
     if record.arguments.get("disturb") is not None:
-        words += ["--disturb", str(record.arguments["disturb"])]
+        spec = str(record.arguments["disturb"])
+        words += ["--disturb", *([spec] if spec else [])]
         words += ["--disturb-seed", str(record.arguments["disturb_seed"])]
     for fault in record.arguments.get("faults", ()):
         words += ["--fault", str(fault)]

@@ -12,6 +12,7 @@ from mrmg.errors import Fault, RunFolderError
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan, PlanStatus, plan_in_force
 from mrmg.results.energy_audit import EnergyAudit
+from mrmg.results.robustness import ROBUSTNESS_FILE, Study, load_studies
 from mrmg.results.summary import summarize
 from mrmg.results.verdict import Verdict
 from mrmg.scene.loading import load_scene
@@ -30,6 +31,7 @@ class RunRecord:
         arguments: what the run was started with.
         plan: the first one, or the one in force where the mission was replanned.
         verdict, log, audit: outcomes of the other steps.
+        studies: trials of the first plan under disturbances.
     """
 
     folder: Path
@@ -41,6 +43,7 @@ class RunRecord:
     verdict: Verdict | None
     log: ExecutionLog | None
     audit: EnergyAudit | None
+    studies: tuple[Study, ...] = ()
 
 
 def read_record(run_folder: Path) -> RunRecord:
@@ -73,6 +76,9 @@ def read_record(run_folder: Path) -> RunRecord:
         verdict=Verdict.load(run_folder) if left("verdict.json") else None,
         log=ExecutionLog.load(run_folder) if left("log.json") else None,
         audit=EnergyAudit.load(run_folder) if left("audit.json") else None,
+        studies=load_studies(run_folder, Plan.load(run_folder))
+        if left(ROBUSTNESS_FILE)
+        else (),
     )
 
 

@@ -126,6 +126,8 @@ def _execution_figures(log: ExecutionLog, audit: EnergyAudit) -> dict[str, Any]:
     return {
         "goals_visited": len(audit.goals_visited),
         "contacts": len(log.contacts),
+        "gave_up": log.gave_up,
+        "disturbance": log.disturbance.to_json() if log.disturbance else None,
         "realtime_factor": log.timing["realtime_factor"],
         "controller_ms": {name: controller_ms[name] for name in ("median", "p99")},
         "tracking": {

@@ -19,6 +19,7 @@ from mrmg.results.energy_plot import draw_energy
 from mrmg.results.overview import draw_overview
 from mrmg.results.report import command, write_report
 from mrmg.results.report_record import read_record
+from mrmg.results.robustness import Study, Trial, save_study
 from mrmg.results.summary import summary_of
 from mrmg.results.verify import verify
 from mrmg.scene.loading import dump_scene, load_scene
@@ -230,3 +231,54 @@ def test_a_run_that_was_not_summed_up_has_a_report_all_the_same(
     (tmp_path / "summary.json").unlink()
     write_report(tmp_path)
     assert (tmp_path / "report.html").read_text() == whole
+
+
+def test_trials_under_disturbances_have_a_section(mission, tmp_path) -> None:
+    scene, plan, log = mission
+    fill(tmp_path, scene, plan, log)
+    write_report(tmp_path)
+    assert "Robustness" not in page_of(tmp_path).headings
+    good = Trial(
+        seed=0,
+        feasible=True,
+        causes=(),
+        reasons=(),
+        goals_visited=1,
+        charge_fraction=0.21,
+        charge_J=4200.0,
+        charge_robot="r1",
+        obstacle_clearance_m=1.234,
+        robot_distance_m=None,
+        tracking_max_m=0.03,
+        duration_s=60.0,
+    )
+    bad = replace(
+        good, seed=8, feasible=False, causes=("battery empty",), charge_fraction=-0.034
+    )
+    for disturb in ("", "rolling=+30%"):
+        study = Study(options={"disturb": disturb}, trials=(good, good, good, bad))
+        save_study(tmp_path, scene, plan, study)
+    write_report(tmp_path)
+    page = page_of(tmp_path)
+    assert "Robustness" in page.headings
+    for cell in (
+        "default disturbances",
+        "default disturbances, rolling=+30%",
+        "3 of 4",
+        "30.1 to 95.4 %",
+        "-3.4 %",
+        "1.23 m",
+        "battery empty 1",
+    ):
+        assert cell in page.cells, cell
+    assert "mrmg execute RUN --disturb rolling=+30% --disturb-seed 8" in page.words
+
+
+def test_a_disturbed_run_is_reproduced_with_its_disturbance(mission, tmp_path) -> None:
+    scene, plan, log = mission
+    fill(tmp_path, scene, plan, log)
+    arguments = {"disturb": "rolling=+30%", "disturb_seed": 7}
+    record = replace(read_record(tmp_path), arguments=arguments)
+    assert command(record).endswith("--disturb rolling=+30% --disturb-seed 7")
+    by_default = replace(record, arguments={"disturb": "", "disturb_seed": 2})
+    assert command(by_default).endswith("--disturb --disturb-seed 2")

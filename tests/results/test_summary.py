@@ -11,6 +11,7 @@ import pytest
 
 from mrmg import storage
 from mrmg.errors import RunFolderError
+from mrmg.execution.disturbance import DEFAULT_RANGES
 from mrmg.mission import PlanStatus
 from mrmg.results.audit import audit
 from mrmg.results.summary import summarize, summary_of, summary_schema
@@ -37,6 +38,8 @@ SECTIONS = {
     "execution": {
         "goals_visited",
         "contacts",
+        "gave_up",
+        "disturbance",
         "realtime_factor",
         "controller_ms",
         "tracking",
@@ -207,3 +210,21 @@ def test_folder_of_an_infeasible_run_passes_over_files_of_older_ones(
 def test_empty_folder_names_the_cure(parts: Any, tmp_path: Path) -> None:
     with pytest.raises(RunFolderError, match="mrmg plan"):
         summarize(parts[0], tmp_path)
+
+
+def test_disturbed_execution_says_how(parts: Any) -> None:
+    scene, planning, plan, verdict, log, account = parts
+    disturbance = DEFAULT_RANGES.draw(4, ["r1"])
+    disturbed = replace(log, disturbance=disturbance, gave_up="lost", completed=False)
+    summary = summary_of(
+        scene,
+        planning,
+        seed=3,
+        plan=plan,
+        verdict=verdict,
+        log=disturbed,
+        audit=account,
+    )
+    check(summary)
+    assert summary["execution"]["disturbance"] == disturbance.to_json()
+    assert summary["execution"]["gave_up"] == "lost"
