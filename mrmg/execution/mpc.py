@@ -6,10 +6,14 @@
 
 with r the reference and w its mean controls (Diehl et al. 2005; Gros et al. 2020). v
 and psi are pure integrals of u, so that u = 0 is feasible and no slack is needed.
+
+Most often no bound is active. The problem is therefore solved without them first, by a
+Riccati recursion; only a solution that breaks a bound is found anew with them.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -18,6 +22,7 @@ import numpy as np
 
 from mrmg.execution.controller import HORIZON, HORIZON_STEP_S
 from mrmg.execution.native_code import compiled
+from mrmg.execution.riccati import unbounded_solver
 from mrmg.motion.dynamics import DERIVATIVES, NU, NX, rk4_step
 from mrmg.scene.robot_model import Limits, RobotModel
 
@@ -45,19 +50,21 @@ class TrackingMpc:
 
     def __init__(self, model: RobotModel, params: MpcParams | None = None) -> None:
         """Set up the problem for a robot of `model`."""
-        solver = _solver(model.motion_model, model.wheelbase_m, params or MpcParams())
+        kind = (model.motion_model, model.wheelbase_m, params or MpcParams())
         self._lower, self._upper = _bounds(model.limits)
         self._limits = model.limits
         self._deviation = np.zeros(_SIZE)
         self._guess = np.zeros(_SIZE)
         self._target = np.zeros(_SIZE)
         self._solution = np.zeros(_SIZE)
-        # The buffer must outlive the call that works on it.
-        self._buffer, self._call = solver.buffer()
-        arguments = (self._guess, self._target, self._lower, self._upper)
-        for index, array in enumerate(arguments):
-            self._buffer.set_arg(index, memoryview(array))  # type: ignore
-        self._buffer.set_res(0, memoryview(self._solution))  # type: ignore
+        question = (self._guess, self._target)
+        bounds = (self._lower, self._upper)
+        self._solve_unbounded = _BufferedCall(
+            _unbounded_solver(*kind), question, self._solution
+        )
+        self._solve_bounded = _BufferedCall(
+            _solver(*kind), (*question, *bounds), self._solution
+        )
 
     def correct(self, state: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """Return the first control of the optimum less the reference's."""
@@ -77,16 +84,45 @@ class TrackingMpc:
         """Solve the QP; tell whether question and answer are all numbers."""
         if not np.isfinite(self._guess).all():
             return False
-        self._call()
+        self._solve_unbounded()
+        if self._keeps_bounds():
+            return True
+        self._solve_bounded()
         return bool(np.isfinite(self._solution).all())
+
+    def _keeps_bounds(self) -> bool:
+        """Tell whether the solution keeps all bounds, which nan does not."""
+        above, below = self._solution >= self._lower, self._solution <= self._upper
+        return bool((above & below).all())
 
     def _fix_first_state(self, state: np.ndarray) -> None:
         limits = self._limits
         self._lower[:NX] = state
-        self._lower[3] = np.clip(state[3], limits.v_min_m_s, limits.v_max_m_s)
-        self._lower[4] = np.clip(state[4], -limits.w_max, limits.w_max)
+        self._lower[3] = min(max(state[3], limits.v_min_m_s), limits.v_max_m_s)
+        self._lower[4] = min(max(state[4], -limits.w_max), limits.w_max)
         self._upper[:NX] = self._lower[:NX]
         self._guess[:NX] = self._lower[:NX]
+
+
+class _BufferedCall:
+    """A CasADi function that works on arrays in place."""
+
+    def __init__(
+        self,
+        function: ca.Function,
+        arguments: Sequence[np.ndarray],
+        result: np.ndarray,
+    ) -> None:
+        """Bind the function's arguments and its only result."""
+        # The buffer must outlive the call that works on it.
+        self._buffer, self._call = function.buffer()
+        for index, array in enumerate(arguments):
+            self._buffer.set_arg(index, memoryview(array))  # type: ignore
+        self._buffer.set_res(0, memoryview(result))  # type: ignore
+
+    def __call__(self) -> None:
+        """Work out the result."""
+        self._call()
 
 
 def _bounds(limits: Limits) -> tuple[np.ndarray, np.ndarray]:
@@ -98,6 +134,14 @@ def _bounds(limits: Limits) -> tuple[np.ndarray, np.ndarray]:
         np.array([*lower, *(-bound for bound in control)] * HORIZON + lower),
         np.array([*upper, *control] * HORIZON + upper),
     )
+
+
+@cache
+def _unbounded_solver(
+    motion_model: str, wheelbase_m: float, params: MpcParams
+) -> ca.Function:
+    """Return (guess, target) -> solution where no bound is active."""
+    return compiled(unbounded_solver(motion_model, wheelbase_m, _weights(params)))
 
 
 @cache

@@ -65,8 +65,11 @@ def _agree(function: ca.Function, native: ca.Function) -> bool:
     """Tell whether both give the same bits."""
     rng = np.random.default_rng(0)
     for _ in range(_PROBES):
-        probe = rng.uniform(-1.5, 1.5, function.numel_in(0))
-        answers = zip(function.call([probe]), native.call([probe]), strict=True)
+        probe = [
+            rng.uniform(-1.5, 1.5, function.numel_in(index))
+            for index in range(function.n_in())
+        ]
+        answers = zip(function.call(probe), native.call(probe), strict=True)
         if any(
             one.full().tobytes() != other.full().tobytes() for one, other in answers
         ):
