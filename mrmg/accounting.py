@@ -64,11 +64,17 @@ def step_power_parts(scene: Scene, motion: Motion) -> np.ndarray:
     before, after = motion.state[:-1], motion.state[1:]
     middle = 0.5 * (before + after)
     acceleration_m_s2 = (after[:, 3] - before[:, 3]) / np.diff(motion.time_s)
-    turn_speed = TURN_SPEEDS[robot.model.motion_model](np.tan)
+    track_m = robot.model.track_m
+    if robot.model.motion_model in TURN_SPEEDS:
+        turn_speed = TURN_SPEEDS[robot.model.motion_model](np.tan)
+        turn_speed_m_s = turn_speed(middle[:, 3], middle[:, 4], track_m)
+    else:
+        turn_rad = after[:, 2] - before[:, 2]
+        turn_speed_m_s = track_m * np.abs(turn_rad) / np.diff(motion.time_s)
     return robot.model.energy_model.power_parts(
         speed_m_s=middle[:, 3],
         acceleration_m_s2=acceleration_m_s2,
-        turn_speed_m_s=turn_speed(middle[:, 3], middle[:, 4], robot.model.track_m),
+        turn_speed_m_s=turn_speed_m_s,
         multiplier=multiplier_at(scene, middle[:, :2]),
         climb_m_s=np.zeros(len(middle)),
     )

@@ -55,6 +55,24 @@ def kernel(function: F) -> F:
     return numba.njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
 
 
+def leaf_kernel(function: F) -> F:
+    """Compile a function that neither makes nor returns arrays: no reference counting.
+
+    Counting the references of every array handed on is a good part of the time of a
+    short function, and of the time it takes to compile. What it calls is compiled the
+    same way, so that must be leaf kernels and views.
+    """
+    return numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=False)(function)  # type: ignore[no-any-return]
+
+
+def view(function: F) -> F:
+    """Compile a function that returns parts of its arguments: into its callers.
+
+    An array handed back by a function would have to be counted.
+    """
+    return numba.njit(inline="always", error_model="numpy")(function)  # type: ignore[no-any-return]
+
+
 def kernels_are_compiled() -> bool:
     """Tell whether this machine already holds compiled kernels of these sources."""
     folder = Path(os.environ["NUMBA_CACHE_DIR"])

@@ -6,7 +6,8 @@ from math import cos, sin, tan
 
 import numba
 
-from mrmg.compilation import kernel
+from mrmg.compilation import leaf_kernel
+from mrmg.motion._pointer_kernels import call_steer, call_step
 from mrmg.motion.dynamics import (
     car_derivative,
     car_turn_speed,
@@ -15,8 +16,9 @@ from mrmg.motion.dynamics import (
     unicycle_turn_speed,
 )
 
-CAR = 0
-UNICYCLE = 1
+CAR, UNICYCLE, USER = range(3)
+"""Motion models: the shipped ones, and any that is called through its addresses."""
+
 MODEL_ID = {"car": CAR, "unicycle": UNICYCLE}
 
 # Closures cannot be cached on their own (their cells hold compiled functions); the
@@ -27,23 +29,56 @@ _car_turn_speed = numba.njit(car_turn_speed(tan))
 _unicycle_turn_speed = numba.njit(unicycle_turn_speed(tan))
 
 
-@kernel
-def step(model, state, u1, u2, wheelbase, dt, out):
-    """Write the state after `dt` under held controls into `out`, shape (5,)."""
-    if model == CAR:
+@leaf_kernel
+def step(robot, state, u1, u2, dt, out):
+    """Write the state after `dt` under held controls into `out`, shape (5,).
+
+    `robot` is a record with `model`, `wheelbase` and, for a user's model, `step_at`.
+    """
+    if robot.model == USER:
+        x, y, theta, v, w = call_step(
+            robot.step_at, state[0], state[1], state[2], state[3], state[4], u1, u2,
+            robot.wheelbase, dt,
+        )  # fmt: skip
+    elif robot.model == CAR:
         x, y, theta, v, w = _car_step(
-            state[0], state[1], state[2], state[3], state[4], u1, u2, wheelbase, dt
-        )
+            state[0], state[1], state[2], state[3], state[4], u1, u2,
+            robot.wheelbase, dt,
+        )  # fmt: skip
     else:
         x, y, theta, v, w = _unicycle_step(
-            state[0], state[1], state[2], state[3], state[4], u1, u2, wheelbase, dt
-        )
+            state[0], state[1], state[2], state[3], state[4], u1, u2,
+            robot.wheelbase, dt,
+        )  # fmt: skip
     out[0], out[1], out[2], out[3], out[4] = x, y, theta, v, w
 
 
-@kernel
+@leaf_kernel
 def turn_speed(model, v, w, track):
     """Return L |theta'| for the energy model's turning part [m/s]."""
     if model == CAR:
         return _car_turn_speed(v, w, track)
     return _unicycle_turn_speed(v, w, track)
+
+
+@leaf_kernel
+def copy_numbers(source, target):
+    """Copy numbers element by element into an array that is at least as long.
+
+    Assigning to a slice would compile the text of an error for arrays that do not fit,
+    which takes longer than all the rest.
+    """
+    for i in range(len(source)):
+        target[i] = source[i]
+
+
+@leaf_kernel
+def steer_user(robot, state, wx, wy, share, dt):
+    """Return a user's model's control (u1, u2) towards a waypoint.
+
+    `share` of the top speed is wanted; 0 asks to brake.
+    """
+    return call_steer(
+        robot.steer_at, state[0], state[1], state[2], state[3], state[4], wx, wy,
+        share, robot.wheelbase, dt,
+    )  # fmt: skip

@@ -7,9 +7,10 @@ from math import atan2
 import numba
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, leaf_kernel
 from mrmg.energy import battery_power
-from mrmg.motion._kernels import UNICYCLE, turn_speed
+from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, turn_speed
+from mrmg.planning._finish_kernels import at_finish, turn_at_finish
 from mrmg.planning._fleet_kernels import space_of
 from mrmg.planning._maneuver_kernels import best_maneuver
 from mrmg.planning._mission_kernels import in_target, look_ahead
@@ -52,7 +53,7 @@ ATTEMPTS = 5
 """Controls tried before a robot brakes as committed."""
 
 
-@kernel
+@leaf_kernel
 def choose_modes(tree, v, target, params, steer, random, stuck, mode):
     """Draw what each robot does next: steer, or random controls when that has failed.
 
@@ -80,7 +81,7 @@ def choose_modes(tree, v, target, params, steer, random, stuck, mode):
             mode[r] = RANDOM if blocked and draw < 0.5 else WAIT
         elif draw >= steer:
             mode[r] = RANDOM
-        elif stuck[r] < 2 or params.hold_control:
+        elif stuck[r] < 2 or params.literal:
             mode[r] = STEER
         else:
             pick = random_unit(random)
@@ -94,12 +95,16 @@ def choose_modes(tree, v, target, params, steer, random, stuck, mode):
                 mode[r] = WAIT
 
 
-@kernel
+@leaf_kernel
 def draw_motion(fleet, r, mode, gear, random):
     """Return a random wanted (v, w): any, or one that backs off from where it heads."""
     low, high = fleet[r].limit[0], fleet[r].limit[1]
     unit = random_unit(random)
     side = (2.0 * random_unit(random) - 1.0) * fleet[r].limit[2]
+    if fleet[r].model == USER:
+        # Nothing is known of its inside: a random control.
+        share = side / fleet[r].limit[2]
+        return (2.0 * unit - 1.0) * fleet[r].limit[3], share * fleet[r].limit[4]
     if mode == RANDOM:
         return low + unit * (high - low), side
     back = low if gear > 0 else high
@@ -115,7 +120,7 @@ def choose_motion(mission, r, target, state, waypoint, stuck, gear, random, moti
     """
     off = abs(wrap(atan2(waypoint[1] - state[1], waypoint[0] - state[0]) - state[2]))
     gear[r] = 1
-    if mission.fleet[r].model == UNICYCLE or mission.params.hold_control:
+    if mission.fleet[r].model != CAR or mission.params.literal:
         return False
     if off < AHEAD and stuck == 0:
         return False
@@ -125,7 +130,7 @@ def choose_motion(mission, r, target, state, waypoint, stuck, gear, random, moti
     return not (motion[0] < 0.0 and off > BEHIND and stuck < 2)
 
 
-@kernel
+@leaf_kernel
 def attempt_control(fleet, r, state, v, w, attempt, dt):
     """Return the control of the n-th attempt to get on: ever slower and wider.
 
@@ -145,22 +150,43 @@ def attempt_control(fleet, r, state, v, w, attempt, dt):
     return control_towards(fleet, r, state, v, w, dt)
 
 
+@leaf_kernel
+def attempt_user_control(fleet, r, state, wx, wy, held, attempt, dt):
+    """Return the n-th attempt of a user's model: a held control, or ever slower."""
+    if held:
+        return wx, wy
+    share = 1.0 if attempt == 0 else (0.5 if attempt == 1 else 0.25)
+    return steer_user(fleet[r], state, wx, wy, share, dt)
+
+
 @kernel
-def drive_step(mission, commitment, decided, r, v, w, attempts):
-    """Drive one robot one step as near to (v, w) as is safe; return its control."""
+def drive_step(mission, commitment, decided, r, v, w, held, attempts):
+    """Drive one robot one step as near to (v, w) as is safe.
+
+    For a user's model (v, w) is the waypoint, or the control that is held.
+
+    Returns:
+        (u1, u2, whether it was safe; if not, the robot follows its commitment).
+    """
     dt = mission.params.dt
     state = present_state(commitment, r).copy()
     for attempt in range(attempts):
-        u1, u2 = attempt_control(mission.fleet, r, state, v, w, attempt, dt)
+        if mission.fleet[r].model == USER:
+            u1, u2 = attempt_user_control(
+                mission.fleet, r, state, v, w, held, attempt, dt
+            )
+        else:
+            u1, u2 = attempt_control(mission.fleet, r, state, v, w, attempt, dt)
         if try_control(
             mission.fleet, mission.spaces, commitment, decided, r, u1, u2, dt
         ):
-            return u1, u2
+            return u1, u2, True
     follow_braking(commitment, r)
-    return braking_control(mission.fleet, r, state, dt)
+    u1, u2 = braking_control(mission.fleet, r, state, dt)
+    return u1, u2, False
 
 
-@kernel
+@leaf_kernel
 def step_energy(mission, r, before, after, u1):
     """Return the battery energy of one step [J], charged at its midpoint."""
     robot = mission.fleet[r]
@@ -168,17 +194,23 @@ def step_energy(mission, r, before, after, u1):
     k = multiplier_in(
         mission.terrain, 0.5 * (before[0] + after[0]), 0.5 * (before[1] + after[1])
     )
+    acceleration = u1
+    if robot.model == USER:
+        acceleration = (after[3] - before[3]) / mission.params.dt
+        turn = robot.track * abs(after[2] - before[2]) / mission.params.dt
+    else:
+        turn = turn_speed(robot.model, v, 0.5 * (before[4] + after[4]), robot.track)
     return mission.params.dt * _battery_power(
         v,
-        u1,
-        turn_speed(robot.model, v, 0.5 * (before[4] + after[4]), robot.track),
+        acceleration,
+        turn,
         k,
         0.0,
         robot.energy,
     )
 
 
-@kernel
+@leaf_kernel
 def note_arrivals(mission, state, energy, visited, target):
     """Mark goals that robots have entered and refill at stations they drove to.
 
@@ -193,7 +225,9 @@ def note_arrivals(mission, state, energy, visited, target):
                 visited[g] = True
                 event = True
         t = target[r]
-        if t >= targets.goals and in_target(targets, t, state[r, 0], state[r, 1]):
+        if targets.goals <= t < targets.places and in_target(
+            targets, t, state[r, 0], state[r, 1]
+        ):
             energy[r] = mission.fleet[r].capacity
             event = True
     return event
@@ -221,7 +255,7 @@ def expand(
     """
     fleet, params = mission.fleet, mission.params
     robots = len(target)
-    commitment = new_commitment(fleet, params.dt)
+    commitment = new_commitment(fleet, params.dt, not params.literal)
     wanted = np.zeros((robots, 2))
     held = np.zeros(robots, np.bool_)
     for r in range(robots):
@@ -232,11 +266,15 @@ def expand(
     waypoint = np.zeros((robots, 2))
     decided = np.zeros(robots, np.bool_)
     for n in range(params.steps):
-        decided[:] = False
+        for r in range(robots):
+            decided[r] = False
         for i in range(robots):
             r = order[i]
             before = present_state(commitment, r).copy()
-            if mode[r] == WAIT:
+            if mode[r] == STEER and at_finish(mission, r, target[r], before):
+                mode[r] = WAIT
+            safe = True
+            if mode[r] == WAIT and not params.literal:
                 u1, u2 = braking_control(fleet, r, before, params.dt)
                 follow_braking(commitment, r)
             else:
@@ -247,21 +285,27 @@ def expand(
                             mission, r, target[r], before, waypoint[r], stuck[r], gear,
                             random, wanted[r],
                         )  # fmt: skip
-                if not held[r]:
-                    wanted[r, 0], wanted[r, 1] = pursue(
-                        fleet, r, before, waypoint[r, 0], waypoint[r, 1], gear[r]
-                    )
-                    held[r] = params.hold_control
-                u1, u2 = drive_step(
+                if mode[r] == WAIT:
+                    wanted[r, 0] = wanted[r, 1] = 0.0
+                elif not held[r]:
+                    set_out(mission, r, target[r], before, waypoint[r], gear, wanted[r])
+                    held[r] = params.literal and fleet[r].model != USER
+                attempts = ATTEMPTS
+                if held[r]:
+                    attempts = 1 if params.literal else 2
+                u1, u2, safe = drive_step(
                     mission, commitment, decided, r, wanted[r, 0], wanted[r, 1],
-                    2 if held[r] else ATTEMPTS,
+                    held[r], attempts,
                 )  # fmt: skip
+            if params.literal and not safe:
+                # The paper's expansion ends before the first collision.
+                return n, False, True
             decided[r] = True
             after = present_state(commitment, r)
             energy[r] -= step_energy(mission, r, before, after, u1)
             control[n, r, 0], control[n, r, 1] = u1, u2
         for r in range(robots):
-            state[r] = present_state(commitment, r)
+            copy_numbers(present_state(commitment, r), state[r])
             if energy[r] < fleet[r].reserve:
                 return n + 1, False, False
         if note_arrivals(mission, state, energy, visited, target):
@@ -269,11 +313,22 @@ def expand(
     return params.steps, False, True
 
 
+@leaf_kernel
+def set_out(mission, r, target, state, waypoint, gear, wanted):
+    """Write what a steering robot wants: (v, w), or a user's model's waypoint."""
+    if mission.fleet[r].model == USER:
+        copy_numbers(waypoint, wanted)
+    elif not turn_at_finish(mission, r, target, state, wanted):
+        wanted[0], wanted[1] = pursue(
+            mission.fleet, r, state, waypoint[0], waypoint[1], gear[r]
+        )
+
+
 @kernel
 def _look(mission, r, target, state, waypoint):
     """Write the point robot r drives at: its way's, or aside of a robot in the way."""
     ahead = np.empty(2)
     if look_ahead(mission, r, target, state[r], VIEW_M, ahead) == np.inf:
-        ahead[:] = mission.targets.center[target]
+        copy_numbers(mission.targets.center[target], ahead)
     space = space_of(mission.spaces, mission.fleet[r].space)
     sidestep(mission.fleet, r, state[r], space, state, ahead[0], ahead[1], waypoint)

@@ -6,20 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import view
 from mrmg.energy import N_COEFFICIENTS
 from mrmg.world._kernels import FreeSpace
-
-PLANNING_MARGIN_M = 0.25
-"""Distance the planner keeps from obstacles at its time steps.
-
-Between two steps of 0.1 s no corner of a car moves more than 0.16 m from both ends, so
-this also keeps the motion between the steps clear, and leaves room for tracking errors.
-"""
-
-ROBOT_MARGIN_M = 0.5
-"""Distance the planner keeps between robots at its time steps."""
-
 
 MOST_CORNERS = 12
 """Most corners a footprint may have."""
@@ -27,22 +16,19 @@ MOST_CORNERS = 12
 FLEET = np.dtype(
     [
         ("model", np.int64),  # motion model id
+        ("step_at", np.int64),  # address of a user's compiled step, else 0
+        ("steer_at", np.int64),  # address of a user's compiled steering, else 0
         ("wheelbase", np.float64),  # [m]
         ("track", np.float64),  # [m]
         ("limit", np.float64, (5,)),  # planner's v_min, v_max, w_max, u1_max, u2_max
         ("corner", np.float64, (MOST_CORNERS, 2)),  # footprint [m], padded
         ("corners", np.int64),  # number of corners
-        (
-            "middle",
-            np.float64,
-            (2,),
-        ),  # middle of the footprint in the robot's frame [m]
+        ("middle", np.float64, (2,)),  # of the footprint, in the robot's frame [m]
         ("radius", np.float64),  # of the farthest corner from the middle [m]
         ("turning_radius", np.float64),  # [m]
-        (
-            "passage",
-            np.float64,
-        ),  # clearance of the reference point's line of travel [m]
+        ("passage", np.float64),  # clearance of the reference point's way [m]
+        ("margin", np.float64),  # distance kept from obstacles [m]
+        ("spacing", np.float64),  # distance kept from other robots [m]
         ("space", np.int64),  # index of the free space
         ("field", np.int64),  # index of the cost-to-go fields
         ("energy", np.float64, (N_COEFFICIENTS,)),  # coefficients of the energy model
@@ -70,7 +56,7 @@ class Spaces(NamedTuple):
     edge: np.ndarray
 
 
-@kernel
+@view
 def space_of(spaces, index):
     """Return one free space of the stack."""
     return FreeSpace(

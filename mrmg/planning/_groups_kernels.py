@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, leaf_kernel
 from mrmg.planning._random_kernels import random_below, random_unit
 
 AGAIN = 0.005
@@ -100,7 +100,7 @@ def new_groups(n):
     )
 
 
-@kernel
+@leaf_kernel
 def group_key(state, visited, region):
     """Return the hash of the robots' regions and the visited goals."""
     key = np.uint64(0xCBF29CE484222325)
@@ -113,7 +113,7 @@ def group_key(state, visited, region):
     return key ^ (key >> np.uint64(29))
 
 
-@kernel
+@leaf_kernel
 def add_to_group(groups, tree, n_groups, v, region):
     """Put a vertex into its group, a new one if need be; return their number."""
     key = group_key(tree.state[v], tree.visited[v], region)
@@ -138,7 +138,7 @@ def add_to_group(groups, tree, n_groups, v, region):
     return n_groups
 
 
-@kernel
+@leaf_kernel
 def group_weight(groups, g, params, initial):
     """Return eq. (5): w = lambda^visits (alpha / |unvisited| + beta dist).
 
@@ -151,7 +151,7 @@ def group_weight(groups, g, params, initial):
     )
 
 
-@kernel
+@leaf_kernel
 def select_vertex(groups, tree, n_groups, params, initial, random):
     """Choose a group by weight, then a vertex in it by distance to its target."""
     chosen = 0

@@ -12,14 +12,15 @@ from math import atan2, cos, pi, sin
 
 import numpy as np
 
-from mrmg.compilation import kernel
-from mrmg.motion._kernels import step
-from mrmg.planning._fleet_kernels import PLANNING_MARGIN_M, space_of
+from mrmg.compilation import kernel, leaf_kernel
+from mrmg.motion._kernels import copy_numbers, step
+from mrmg.planning._fleet_kernels import space_of
 from mrmg.planning._mission_kernels import look_ahead
 from mrmg.planning._random_kernels import random_unit
 from mrmg.planning._safety_kernels import toward_zero
 from mrmg.planning._steering_kernels import control_towards, wrap
 from mrmg.world._kernels import (
+    clearance_at_least,
     clearance_estimate,
     footprint_is_clear,
     place_footprint,
@@ -43,6 +44,9 @@ TAIL_REACH_M = 20.0
 SWITCH_M = 1.0
 """Way that stopping to change the direction is counted as [m]."""
 
+
+LEAST_WAY_M = 0.05
+"""A motion that gets no farther than this leads nowhere [m]."""
 
 MANEUVER_STEPS = 20
 """Length of each motion, in steps."""
@@ -70,28 +74,27 @@ def hold_motion(mission, r, first, v, w, state):
     corners = fleet[r].corners
     placed = np.empty((corners, 2))
     after = np.empty(5)
-    state[:] = first
+    copy_numbers(first, state)
     way = 0.0
     for _ in range(MANEUVER_STEPS):
         u1, u2 = control_towards(fleet, r, state, v, w, dt)
         if state[3] * v < 0.0:
             u1 = toward_zero(state[3], fleet[r].limit[3], dt)
-        step(fleet[r].model, state, u1, u2, fleet[r].wheelbase, dt, after)
-        place_footprint(fleet[r].corner[:corners], after[0], after[1], after[2], placed)
+        step(fleet[r], state, u1, u2, dt, after)
         c, s = cos(after[2]), sin(after[2])
         mx, my = fleet[r].middle[0], fleet[r].middle[1]
-        if not footprint_is_clear(
-            space,
-            placed,
-            after[0] + c * mx - s * my,
-            after[1] + s * mx + c * my,
-            fleet[r].radius,
-            PLANNING_MARGIN_M,
-        ):
-            state[3] = 0.0
-            return way
+        cx, cy = after[0] + c * mx - s * my, after[1] + s * mx + c * my
+        if clearance_at_least(space, cx, cy) <= fleet[r].radius + fleet[r].margin:
+            place_footprint(
+                fleet[r].corner[:corners], after[0], after[1], after[2], placed
+            )
+            if not footprint_is_clear(
+                space, placed, cx, cy, fleet[r].radius, fleet[r].margin
+            ):
+                state[3] = 0.0
+                return way
         way += 0.5 * abs(state[3] + after[3]) * dt
-        state[:] = after
+        copy_numbers(after, state)
     return way
 
 
@@ -115,12 +118,20 @@ def way_left(mission, r, target, state, waypoint):
     return to_go, min(turn * off, tail)
 
 
+@leaf_kernel
+def _motion(limit, i, steerings):
+    """Return the (v, w) of the i-th of 2 x `steerings` motions, forward ones first."""
+    v = 0.7 * limit[1] if i < steerings else limit[0]
+    return v, (2.0 * (i % steerings) / (steerings - 1) - 1.0) * limit[2]
+
+
 @kernel
 def best_maneuver(mission, r, target, start, stuck, random, out):
     """Find the first of the held motions that bring the robot on its way best.
 
-    Depth-first over sequences of two motions, or of three coarser ones for a robot that
-    has been stuck; ratings of a stuck robot get a random part, so that it tries others.
+    Looks at all first motions, then at what may follow them, the promising ones first.
+    For a robot that has been stuck there are three motions, coarser ones, and ratings
+    get a random part, so that it tries others.
 
     Args:
         mission, r, target: the problem, the robot and where it wants to go.
@@ -136,41 +147,82 @@ def best_maneuver(mission, r, target, start, stuck, random, out):
     depth = 3 if stuck > 1 else 2
     steerings = 3 if stuck > 1 else 5
     noise = min(1.0 * stuck, 5.0)
-    states = np.empty((depth + 1, 5))
-    states[0] = start
-    motion = np.zeros(depth, np.int64)
-    driven = np.zeros(depth + 1)
-    speed = np.zeros(depth + 1)
-    speed[0] = start[3]
-    first = np.zeros(2)
+    ends = np.empty((2 * steerings, 5))
+    driven = np.empty(2 * steerings)
+    least = np.full(2 * steerings, np.inf)
     waypoint = np.zeros(2)
     best = np.inf
+    for i in range(2 * steerings):
+        v, w = _motion(limit, i, steerings)
+        way = hold_motion(mission, r, start, v, w, ends[i])
+        if way < LEAST_WAY_M:
+            continue
+        driven[i] = way + noise * random_unit(random)
+        if start[3] * v < -1e-6:
+            driven[i] += SWITCH_M
+        to_go, turning = way_left(mission, r, target, ends[i], waypoint)
+        least[i] = driven[i] + (to_go if to_go < np.inf else 0.0)
+        if driven[i] + to_go + turning < best:
+            best = driven[i] + to_go + turning
+            out[0], out[1] = v, w
+    while True:
+        i = np.argmin(least)
+        if least[i] >= best:
+            return best < np.inf
+        least[i] = np.inf
+        v, w = _motion(limit, i, steerings)
+        rating = best_sequel(
+            mission, r, target, ends[i], v, driven[i], depth - 1, steerings, best
+        )
+        if rating < best:
+            best = rating
+            out[0], out[1] = v, w
+
+
+@kernel
+def best_sequel(mission, r, target, start, gear, before, depth, steerings, best):
+    """Return the best rating of up to `depth` motions after `start`, if below `best`.
+
+    Depth-first; what cannot beat the best by driving on is not looked into.
+
+    Args:
+        mission, r, target: the problem, the robot and where it wants to go.
+        start: state to begin with.
+        gear: sign of the speed it came with.
+        before: way driven up to there [m].
+        depth: number of motions.
+        steerings: steering angles of a motion.
+        best: best rating so far.
+    """
+    limit = mission.fleet[r].limit
+    states = np.empty((depth + 1, 5))
+    copy_numbers(start, states[0])
+    motion = np.zeros(depth, np.int64)
+    driven = np.zeros(depth + 1)
+    driven[0] = before
+    speed = np.zeros(depth + 1)
+    speed[0] = gear
+    waypoint = np.zeros(2)
     level = 0
     while level >= 0:
         if motion[level] == 2 * steerings:
             motion[level] = 0
             level -= 1
             continue
-        i = motion[level]
+        v, w = _motion(limit, motion[level], steerings)
         motion[level] += 1
-        v = 0.7 * limit[1] if i < steerings else limit[0]
-        w = (2.0 * (i % steerings) / (steerings - 1) - 1.0) * limit[2]
-        if level == 0:
-            first[0], first[1] = v, w
         end = states[level + 1]
         way = hold_motion(mission, r, states[level], v, w, end)
-        if way < 0.05:
+        if way < LEAST_WAY_M:
             continue
-        extra = SWITCH_M if speed[level] * v < -1e-6 else 0.0
-        if level == 0:
-            extra += noise * random_unit(random)
-        driven[level + 1] = driven[level] + way + extra
+        driven[level + 1] = driven[level] + way
+        if speed[level] * v < 0.0:
+            driven[level + 1] += SWITCH_M
         speed[level + 1] = v
+        if driven[level + 1] >= best:
+            continue
         to_go, turning = way_left(mission, r, target, end, waypoint)
-        rating = driven[level + 1] + to_go + turning
-        if rating < best:
-            best = rating
-            out[0], out[1] = first[0], first[1]
-        if level + 1 < depth:
+        best = min(best, driven[level + 1] + to_go + turning)
+        if level + 1 < depth and driven[level + 1] + to_go < best:
             level += 1
-    return best < np.inf
+    return best

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, leaf_kernel
 from mrmg.planning._fleet_kernels import Spaces, space_of
 from mrmg.planning._nrpa_kernels import RoutingArrays
 from mrmg.planning._roadmap_kernels import RoadmapArrays, find_waypoint
@@ -15,10 +15,14 @@ from mrmg.world._kernels import TerrainGrid, point_in_convex
 
 
 class Targets(NamedTuple):
-    """Goals and stations: convex regions; T targets, goals first.
+    """Goals, stations and finishes: convex regions; T targets, in that order.
 
     Attributes:
         goals: number of goals.
+        places: number of goals and stations.
+        finish: target in which each robot must end, -1 for anywhere, shape (R,).
+        heading: heading with which it must end there [rad], shape (R,).
+        tolerance: allowed deviation from that [rad]; at least pi for any, shape (R,).
         center: shape (T, 2).
         reach: radius of the circle about the centre that holds the region, shape (T,).
         corner: padded corners of polygons, shape (T, M, 2).
@@ -26,6 +30,10 @@ class Targets(NamedTuple):
     """
 
     goals: int
+    places: int
+    finish: np.ndarray
+    heading: np.ndarray
+    tolerance: np.ndarray
     center: np.ndarray
     reach: np.ndarray
     corner: np.ndarray
@@ -48,7 +56,7 @@ class TreeParams(NamedTuple):
     region: float
     route_margin: float
     reroute_always: bool
-    hold_control: bool
+    literal: bool
     levels: int
     iterations: int
     alpha: float
@@ -61,6 +69,8 @@ class Mission(NamedTuple):
     Attributes:
         fleet, spaces, terrain, roadmap, targets: robots, world and where to go.
         routing: the routing problem at the start; costs include the route margin.
+        last_leg: energy from each place (the start last) to each robot's finish [J],
+            shape (R, G + S + 1); zero where a robot may end anywhere.
         params: numbers the tree is grown by.
     """
 
@@ -70,10 +80,11 @@ class Mission(NamedTuple):
     roadmap: RoadmapArrays
     targets: Targets
     routing: RoutingArrays
+    last_leg: np.ndarray
     params: TreeParams
 
 
-@kernel
+@leaf_kernel
 def in_target(targets, t, x, y):
     """Tell whether a point lies in a target's region."""
     far = hypot(x - targets.center[t, 0], y - targets.center[t, 1])

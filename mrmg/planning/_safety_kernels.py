@@ -15,15 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
-from mrmg.motion._kernels import UNICYCLE, step
-from mrmg.planning._fleet_kernels import (
-    MOST_CORNERS,
-    PLANNING_MARGIN_M,
-    ROBOT_MARGIN_M,
-    space_of,
-)
+from mrmg.compilation import kernel, leaf_kernel, view
+from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, step
+from mrmg.planning._fleet_kernels import MOST_CORNERS, space_of
 from mrmg.world._kernels import (
+    clearance_at_least,
     convex_convex_distance,
     footprint_is_clear,
     place_footprint,
@@ -38,42 +34,49 @@ class Commitment(NamedTuple):
 
     Attributes:
         state: shape (R, 2, K, 5).
-        corner: placed footprints, shape (R, 2, K, M, 2).
+        corner: placed footprints, shape (R, 2, K, M, 2); only where `placed`, as most
+            are far from everything.
+        placed: shape (R, 2, K).
         middle: middles of the footprints, shape (R, 2, K, 2).
         length: number of states in each slot, shape (R, 2).
         active: slot in force, shape (R,).
         now: index of the present state in the active slot, shape (R,).
+        braking: False commits to nothing: only present states are kept clear.
     """
 
     state: np.ndarray
     corner: np.ndarray
+    placed: np.ndarray
     middle: np.ndarray
     length: np.ndarray
     active: np.ndarray
     now: np.ndarray
+    braking: bool
 
 
 @kernel
-def new_commitment(fleet, dt):
+def new_commitment(fleet, dt, braking):
     """Return an empty commitment large enough for the fleet's longest braking."""
     robots = len(fleet)
     longest = 0
     for r in range(robots):
-        fastest = max(fleet[r].limit[1], -fleet[r].limit[0]) / fleet[r].limit[3]
-        if fleet[r].model == UNICYCLE:
-            fastest = max(fastest, fleet[r].limit[2] / fleet[r].limit[4])
-        longest = max(longest, int(ceil(fastest / dt)) + 3)
+        slowing_s = max(fleet[r].limit[1], -fleet[r].limit[0]) / fleet[r].limit[3]
+        if fleet[r].model != CAR:
+            slowing_s = max(slowing_s, fleet[r].limit[2] / fleet[r].limit[4])
+        longest = max(longest, int(ceil(slowing_s / dt)) + 3)
     return Commitment(
         np.zeros((robots, 2, longest, 5)),
-        np.zeros((robots, 2, longest, MOST_CORNERS, 2)),
+        np.empty((robots, 2, longest, MOST_CORNERS, 2)),
+        np.zeros((robots, 2, longest), np.bool_),
         np.zeros((robots, 2, longest, 2)),
         np.zeros((robots, 2), np.int64),
         np.zeros(robots, np.int64),
         np.zeros(robots, np.int64),
+        braking,
     )
 
 
-@kernel
+@leaf_kernel
 def toward_zero(value, bound, dt):
     """Return the rate that brings `value` to 0 as fast as `bound` allows."""
     if abs(value) < REST:
@@ -81,61 +84,73 @@ def toward_zero(value, bound, dt):
     return max(-bound, min(bound, -value / dt))
 
 
-@kernel
+@leaf_kernel
 def braking_control(fleet, r, state, dt):
     """Return the control (u1, u2) of full braking; a car holds its steering."""
+    if fleet[r].model == USER:
+        return steer_user(fleet[r], state, state[0], state[1], 0.0, dt)
     u1 = toward_zero(state[3], fleet[r].limit[3], dt)
     u2 = 0.0
-    if fleet[r].model == UNICYCLE:
+    if fleet[r].model != CAR:
         u2 = toward_zero(state[4], fleet[r].limit[4], dt)
     return u1, u2
 
 
-@kernel
+@leaf_kernel
 def stands(fleet, r, state):
     """Tell whether a robot is at rest."""
-    return abs(state[3]) < REST and (fleet[r].model != UNICYCLE or abs(state[4]) < REST)
+    return abs(state[3]) < REST and (fleet[r].model == CAR or abs(state[4]) < REST)
 
 
-@kernel
+@leaf_kernel
 def write_braking(fleet, r, first, dt, commitment, slot):
     """Fill a slot with `first` and the braking that follows it."""
     states = commitment.state[r, slot]
-    states[0] = first
+    copy_numbers(first, states[0])
     n = 1
-    while n < len(states) and not stands(fleet, r, states[n - 1]):
+    most = len(states) if commitment.braking else 1
+    while n < most and not stands(fleet, r, states[n - 1]):
         u1, u2 = braking_control(fleet, r, states[n - 1], dt)
-        step(fleet[r].model, states[n - 1], u1, u2, fleet[r].wheelbase, dt, states[n])
+        step(fleet[r], states[n - 1], u1, u2, dt, states[n])
         n += 1
-    outline = fleet[r].corner[: fleet[r].corners]
     mx, my = fleet[r].middle[0], fleet[r].middle[1]
     for k in range(n):
         x, y, theta = states[k, 0], states[k, 1], states[k, 2]
-        place_footprint(outline, x, y, theta, commitment.corner[r, slot, k])
         c, s = cos(theta), sin(theta)
         commitment.middle[r, slot, k, 0] = x + c * mx - s * my
         commitment.middle[r, slot, k, 1] = y + s * mx + c * my
+        commitment.placed[r, slot, k] = False
     commitment.length[r, slot] = n
 
 
-@kernel
+@leaf_kernel
+def place(fleet, commitment, r, slot, k):
+    """Place a committed footprint, if it is not yet."""
+    if not commitment.placed[r, slot, k]:
+        state = commitment.state[r, slot, k]
+        outline = fleet[r].corner[: fleet[r].corners]
+        corners = commitment.corner[r, slot, k]
+        place_footprint(outline, state[0], state[1], state[2], corners)
+        commitment.placed[r, slot, k] = True
+
+
+@leaf_kernel
 def clear_of_obstacles(fleet, spaces, commitment, r, slot, first):
     """Tell whether a slot's states from `first` on keep the margin from obstacles."""
     space = space_of(spaces, fleet[r].space)
+    radius, margin = fleet[r].radius, fleet[r].margin
     for k in range(first, commitment.length[r, slot]):
-        if not footprint_is_clear(
-            space,
-            commitment.corner[r, slot, k, : fleet[r].corners],
-            commitment.middle[r, slot, k, 0],
-            commitment.middle[r, slot, k, 1],
-            fleet[r].radius,
-            PLANNING_MARGIN_M,
-        ):
+        cx, cy = commitment.middle[r, slot, k, 0], commitment.middle[r, slot, k, 1]
+        if clearance_at_least(space, cx, cy) > radius + margin:
+            continue
+        place(fleet, commitment, r, slot, k)
+        corners = commitment.corner[r, slot, k, : fleet[r].corners]
+        if not footprint_is_clear(space, corners, cx, cy, radius, margin):
             return False
     return True
 
 
-@kernel
+@leaf_kernel
 def clear_of_robot(fleet, commitment, r, slot, first, other, other_first, margin):
     """Tell whether two committed motions keep `margin`, step by step.
 
@@ -156,14 +171,15 @@ def clear_of_robot(fleet, commitment, r, slot, first, other, other_first, margin
             commitment.middle[r, slot, i, 1]
             - commitment.middle[other, other_slot, j, 1],
         )
-        if (
-            apart < reach
-            and convex_convex_distance(
-                commitment.corner[r, slot, i, : fleet[r].corners],
-                commitment.corner[other, other_slot, j, : fleet[other].corners],
-            )
-            < margin
-        ):
+        if apart >= reach:
+            continue
+        place(fleet, commitment, r, slot, i)
+        place(fleet, commitment, other, other_slot, j)
+        between = convex_convex_distance(
+            commitment.corner[r, slot, i, : fleet[r].corners],
+            commitment.corner[other, other_slot, j, : fleet[other].corners],
+        )
+        if between < margin:
             return False
     return True
 
@@ -187,7 +203,7 @@ def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):
     slot = 1 - active
     state = commitment.state[r, active, commitment.now[r]]
     after = np.empty(5)
-    step(fleet[r].model, state, u1, u2, fleet[r].wheelbase, dt, after)
+    step(fleet[r], state, u1, u2, dt, after)
     write_braking(fleet, r, after, dt, commitment, slot)
     if not clear_of_obstacles(fleet, spaces, commitment, r, slot, 0):
         return False
@@ -196,8 +212,9 @@ def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):
             continue
         # A robot that has not moved yet is met where its braking takes it.
         other_first = commitment.now[other] + (0 if decided[other] else 1)
+        spacing = max(fleet[r].spacing, fleet[other].spacing)
         if not clear_of_robot(
-            fleet, commitment, r, slot, 0, other, other_first, ROBOT_MARGIN_M
+            fleet, commitment, r, slot, 0, other, other_first, spacing
         ):
             return False
     commitment.active[r] = slot
@@ -205,14 +222,14 @@ def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):
     return True
 
 
-@kernel
+@leaf_kernel
 def follow_braking(commitment, r):
     """Advance robot r one step along its commitment."""
     last = commitment.length[r, commitment.active[r]] - 1
     commitment.now[r] = min(commitment.now[r] + 1, last)
 
 
-@kernel
+@view
 def present_state(commitment, r):
     """Return robot r's present state, a view of shape (5,)."""
     return commitment.state[r, commitment.active[r], commitment.now[r]]

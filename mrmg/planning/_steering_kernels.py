@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import atan, atan2, cos, hypot, pi, sin
 
-from mrmg.compilation import kernel
+from mrmg.compilation import leaf_kernel
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.world._kernels import segment_is_clear
 
@@ -23,7 +23,7 @@ SIGHT_M = 9.0
 """Distance within which other robots are steered round."""
 
 
-@kernel
+@leaf_kernel
 def wrap(angle):
     """Return the angle in (-pi, pi]."""
     while angle > pi:
@@ -33,7 +33,7 @@ def wrap(angle):
     return angle
 
 
-@kernel
+@leaf_kernel
 def pursue(fleet, r, state, wx, wy, gear):
     """Return the wanted (v, w) to drive at a waypoint in a gear by pure pursuit."""
     dx = wx - state[0]
@@ -66,7 +66,7 @@ def pursue(fleet, r, state, wx, wy, gear):
     return fastest * max(0.6, min(1.0, 1.2 - error)), psi
 
 
-@kernel
+@leaf_kernel
 def sidestep(fleet, r, state, space, others, wx, wy, out):
     """Move a waypoint aside where a slower or oncoming robot is in the way.
 
@@ -108,7 +108,7 @@ def sidestep(fleet, r, state, space, others, wx, wy, out):
             side = -side
 
 
-@kernel
+@leaf_kernel
 def control_towards(fleet, r, state, v, w, dt):
     """Return the control (u1, u2) that brings speed and steering to (v, w)."""
     v = max(fleet[r].limit[0], min(fleet[r].limit[1], v))

@@ -7,8 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, leaf_kernel
+from mrmg.motion._kernels import copy_numbers
 from mrmg.planning._expansion_kernels import choose_modes, expand
+from mrmg.planning._finish_kernels import all_finished, at_finish
 from mrmg.planning._groups_kernels import add_to_group, new_groups, select_vertex
 from mrmg.planning._maneuver_kernels import way_left
 from mrmg.planning._mission_kernels import in_target, look_ahead
@@ -18,6 +20,8 @@ from mrmg.planning._refuel_kernels import IMPOSSIBLE
 from mrmg.planning._routing_kernels import solve_routing
 from mrmg.planning._safety_kernels import (
     braking_control,
+    clear_of_obstacles,
+    clear_of_robot,
     new_commitment,
     write_braking,
 )
@@ -50,16 +54,20 @@ class Tours(NamedTuple):
     length: np.ndarray
 
 
-@kernel
-def next_targets(tree, tours, v, target):
+@leaf_kernel
+def next_targets(mission, tree, tours, v, target):
     """Write each robot's next target at a vertex, -1 for none."""
     row = tree.tour[v]
     for r in range(len(target)):
         p = tree.position[v, r]
-        target[r] = tours.target[row, r, p] if p < tours.length[row, r] else -1
+        target[r] = mission.targets.finish[r]
+        if p < tours.length[row, r]:
+            target[r] = tours.target[row, r, p]
+        elif target[r] >= 0 and at_finish(mission, r, target[r], tree.state[v, r]):
+            target[r] = -1
 
 
-@kernel
+@leaf_kernel
 def skip_visited(mission, tree, tours, v):
     """Advance a vertex's places in its tours past goals somebody has visited."""
     row = tree.tour[v]
@@ -71,13 +79,37 @@ def skip_visited(mission, tree, tours, v):
             tree.position[v, r] += 1
 
 
-@kernel
+@leaf_kernel
 def goals_left(tree, v):
     """Return the number of goals not visited at a vertex."""
     left = 0
     for g in range(tree.visited.shape[1]):
         left += not tree.visited[v, g]
     return left
+
+
+@kernel
+def is_over(mission, tree, v):
+    """Tell whether the mission may end at a vertex, all robots braking from there."""
+    if goals_left(tree, v) > 0 or not all_finished(mission, tree.state[v]):
+        return False
+    return not mission.params.literal or stops_clear(mission, tree.state[v])
+
+
+@kernel
+def stops_clear(mission, state):
+    """Tell whether all robots can brake at once without touching anything."""
+    fleet = mission.fleet
+    commitment = new_commitment(fleet, mission.params.dt, True)
+    for r in range(len(fleet)):
+        write_braking(fleet, r, state[r], mission.params.dt, commitment, 0)
+        if not clear_of_obstacles(fleet, mission.spaces, commitment, r, 0, 0):
+            return False
+        for other in range(r):
+            spacing = max(fleet[r].spacing, fleet[other].spacing)
+            if not clear_of_robot(fleet, commitment, r, 0, 0, other, 0, spacing):
+                return False
+    return True
 
 
 @kernel
@@ -116,6 +148,16 @@ def rest_of_tours(mission, tree, tours, v, otherwise):
             if t >= mission.targets.goals:
                 left = fleet[r].capacity - fleet[r].reserve
             place = t
+        finish = mission.targets.finish[r]
+        if finish >= 0:
+            leg = mission.last_leg[r, place]
+            if place < 0:
+                to_go, turning = way_left(
+                    mission, r, finish, tree.state[v, r], waypoint
+                )
+                leg = to_go * fleet[r].plain if to_go < np.inf else otherwise
+            total += leg
+            enough &= left >= leg
     return total, enough
 
 
@@ -152,11 +194,12 @@ def route_from(mission, tree, v, random, tour, length):
     )
 
 
-@kernel
+@leaf_kernel
 def plant(mission, tree, tours, start, energy):
     """Write the root of the tree; return the energy of the first tours [J]."""
-    tree.state[0] = start
-    tree.energy[0] = energy
+    for r in range(len(start)):
+        copy_numbers(start[r], tree.state[0, r])
+    copy_numbers(energy, tree.energy[0])
     for g in range(mission.targets.goals):
         for r in range(len(start)):
             if in_target(mission.targets, g, start[r, 0], start[r, 1]):
@@ -168,6 +211,7 @@ def plant(mission, tree, tours, start, energy):
         for p in range(tours.length[0, r]):
             initial += mission.routing.cost[r, place, tours.target[0, r, p]]
             place = tours.target[0, r, p]
+        initial += mission.last_leg[r, place]
     tree.remaining[0] = initial
     return initial
 
@@ -190,12 +234,13 @@ def extend(mission, tree, v, n, target, steer, random):
             other = random_below(random, r + 1)
             order[r], order[other] = order[other], order[r]
     tree.parent[n] = v
-    tree.state[n] = tree.state[v]
-    tree.energy[n] = tree.energy[v]
-    tree.visited[n] = tree.visited[v]
     tree.tour[n] = tree.tour[v]
-    tree.position[n] = tree.position[v]
-    tree.gear[n] = tree.gear[v]
+    for r in range(robots):
+        copy_numbers(tree.state[v, r], tree.state[n, r])
+    copy_numbers(tree.energy[v], tree.energy[n])
+    copy_numbers(tree.visited[v], tree.visited[n])
+    copy_numbers(tree.position[v], tree.position[n])
+    copy_numbers(tree.gear[v], tree.gear[n])
     tree.steps[n], event, alive = expand(
         mission,
         tree.state[n],
@@ -235,12 +280,12 @@ def insert(mission, tree, tours, n, n_tours, target, event, random, counts):
     v = tree.parent[n]
     for r in range(len(target)):
         t = target[r]
-        if t >= mission.targets.goals and in_target(
+        if mission.targets.goals <= t < mission.targets.places and in_target(
             mission.targets, t, tree.state[n, r, 0], tree.state[n, r, 1]
         ):
             tree.position[n, r] += 1
     skip_visited(mission, tree, tours, n)
-    if goals_left(tree, n) == 0:
+    if is_over(mission, tree, n):
         tree.remaining[n] = 0.0
         return True, n_tours
     tree.remaining[n], enough = rest_of_tours(
@@ -248,7 +293,7 @@ def insert(mission, tree, tours, n, n_tours, target, event, random, counts):
     )
     if enough and not (mission.params.reroute_always and event):
         return True, n_tours
-    if n_tours == len(tours.target):
+    if n_tours == len(tours.target) or goals_left(tree, n) == 0:
         return enough, n_tours
     cost = route_from(
         mission, tree, n, random, tours.target[n_tours], tours.length[n_tours]
@@ -258,7 +303,8 @@ def insert(mission, tree, tours, n, n_tours, target, event, random, counts):
         counts[ROUTER_FAILURES] += not enough
         return enough, n_tours
     tree.tour[n] = n_tours
-    tree.position[n] = 0
+    for r in range(len(target)):
+        tree.position[n, r] = 0
     tree.remaining[n] = cost
     return True, n_tours + 1
 
@@ -284,7 +330,7 @@ def grow(mission, start, energy, random, tree, tours, counts, halt):
     groups = new_groups(params.max_vertices)
     target = np.zeros(len(start), np.int64)
     initial = plant(mission, tree, tours, start, energy)
-    if goals_left(tree, np.int64(0)) == 0:
+    if is_over(mission, tree, np.int64(0)):
         return 0
     n_groups = add_to_group(groups, tree, np.int64(0), np.int64(0), params.region)
     n_tours = n = np.int64(1)  # typed: a literal would be compiled for on its own
@@ -299,7 +345,7 @@ def grow(mission, start, energy, random, tree, tours, counts, halt):
     ):
         counts[EXPANSIONS] += 1
         v = select_vertex(groups, tree, n_groups, params, initial, random)
-        next_targets(tree, tours, v, target)
+        next_targets(mission, tree, tours, v, target)
         moved, event, alive = extend(mission, tree, v, n, target, steer, random)
         steer = max(params.steer_least, steer * params.steer_decay)
         if not alive:
@@ -314,7 +360,7 @@ def grow(mission, start, energy, random, tree, tours, counts, halt):
         )
         if not kept:
             continue
-        if goals_left(tree, n) == 0:
+        if is_over(mission, tree, n):
             counts[VERTICES] = n + 1
             counts[GROUPS] = n_groups
             return n
@@ -332,7 +378,7 @@ def stop_all(fleet, state, dt):
     The commitments of the vertex are what is carried out, so this is always safe.
     """
     robots = len(state)
-    commitment = new_commitment(fleet, dt)
+    commitment = new_commitment(fleet, dt, True)
     longest = 0
     for r in range(robots):
         write_braking(fleet, r, state[r], dt, commitment, 0)

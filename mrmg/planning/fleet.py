@@ -5,16 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from mrmg.errors import Fault, SceneError
-from mrmg.motion._kernels import MODEL_ID
+from mrmg.motion._kernels import MODEL_ID, USER
+from mrmg.motion.user_motion import user_motion
 from mrmg.planning._fleet_kernels import FLEET, MOST_CORNERS, Spaces
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Robot, Scene
 from mrmg.world.world import World
 
 RESERVE_MARGIN = 0.01
 """Share of the capacity the planner keeps above the reserve, for execution to use."""
 
-ROADMAP_MARGIN_M = 0.3
-"""Clearance of roadmap edges beyond half the robot's width."""
+PASSAGE_SLACK_M = 0.05
+"""Clearance of roadmap edges beyond half the robot's width and its margin."""
 
 
 def stack_spaces(world: World) -> Spaces:
@@ -43,57 +44,72 @@ def stack_spaces(world: World) -> Spaces:
     )
 
 
+def passage_m(robot: Robot, margin_m: float) -> float:
+    """Return the clearance the line of a robot's reference point needs [m]."""
+    return round(robot.model.half_width_m + margin_m + PASSAGE_SLACK_M, 6)
+
+
 def travel_classes(
-    scene: Scene, world: World
+    scene: Scene, world: World, margin_m: float
 ) -> tuple[list[tuple[int, float]], list[int]]:
     """Return the distinct (free space, passage clearance) pairs and robots' indices.
 
     Robots of one class share a roadmap and its cost-to-go fields.
+
+    Args:
+        scene: the scene.
+        world: its geometry.
+        margin_m: distance robots keep from obstacles.
     """
     keys = [
-        (
-            int(world.space_of_robot[i]),
-            round(robot.model.half_width_m + ROADMAP_MARGIN_M, 6),
-        )
+        (int(world.space_of_robot[i]), passage_m(robot, margin_m))
         for i, robot in enumerate(scene.robots)
     ]
     distinct = list(dict.fromkeys(keys))
     return distinct, [distinct.index(key) for key in keys]
 
 
-def fleet_array(scene: Scene, world: World) -> np.ndarray:
+def fleet_array(
+    scene: Scene, world: World, *, obstacle_margin_m: float, robot_margin_m: float
+) -> np.ndarray:
     """Return the scene's robots as records of FLEET, shape (R,).
 
+    Args:
+        scene: the scene.
+        world: its geometry.
+        obstacle_margin_m: distance robots keep from obstacles.
+        robot_margin_m: distance robots keep from each other.
+
     Raises:
-        SceneError: if a footprint has more corners than the kernels hold.
+        SceneError: if a footprint has more corners than the kernels hold, or a user's
+            motion model cannot be used.
     """
     fleet = np.zeros(len(scene.robots), FLEET)
-    _, fields = travel_classes(scene, world)
+    _, fields = travel_classes(scene, world, obstacle_margin_m)
     for r, robot in enumerate(scene.robots):
         model, battery = robot.model, robot.battery
+        limits = model.limits.scaled(model.planning_share)
         outline = model.footprint_m
         if len(outline) > MOST_CORNERS:
             message = f"has {len(outline)} corners, at most {MOST_CORNERS} are allowed"
             raise SceneError(model.name, [Fault("footprint", message)])
-        limits = model.limits.scaled(model.planning_share)
         middle = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
         one = fleet[r]
-        one["model"] = MODEL_ID[model.motion_model]
+        one["model"] = MODEL_ID.get(model.motion_model, USER)
+        if model.motion_model not in MODEL_ID:
+            motion = user_motion(model.motion_model)
+            one["step_at"], one["steer_at"] = motion.compiled(limits.as_tuple())
         one["wheelbase"] = model.wheelbase_m
         one["track"] = model.track_m
-        one["limit"] = (
-            limits.v_min_m_s,
-            limits.v_max_m_s,
-            limits.w_max,
-            limits.u1_max_m_s2,
-            limits.u2_max,
-        )
+        one["limit"] = limits.as_tuple()
         one["corner"][: len(outline)] = outline
         one["corners"] = len(outline)
         one["middle"] = middle
         one["radius"] = np.hypot(*(outline - middle).T).max()
         one["turning_radius"] = model.turning_radius_m
-        one["passage"] = model.half_width_m + ROADMAP_MARGIN_M
+        one["passage"] = passage_m(robot, obstacle_margin_m)
+        one["margin"] = obstacle_margin_m
+        one["spacing"] = robot_margin_m
         one["space"] = world.space_of_robot[r]
         one["field"] = fields[r]
         one["energy"] = model.energy_model.coefficients()

@@ -20,13 +20,16 @@ from mrmg.planning._mission_kernels import Mission, Targets, TreeParams, in_targ
 from mrmg.planning._tree_kernels import Tours
 from mrmg.planning.fleet import fleet_array, stack_spaces
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.roadmap import Roadmap
+from mrmg.planning.roadmap import Roadmap, planned_regions
 from mrmg.planning.routing import Routing, routing_arrays
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
 
 TARGET_MARGIN_M = 0.2
 """How deep inside a region the planner drives, so that a tracked path enters it too."""
+
+FINISH_SHARE = 0.8
+"""Share of a finish's heading tolerance that planning uses."""
 
 TOUR_ROWS = 2000
 """Most tours one tree may hold."""
@@ -69,7 +72,13 @@ def state_problem(
     scene: Scene, world: World, roadmap: Roadmap, params: PlannerParams
 ) -> Problem:
     """Return the scene's problem; routing costs include the route margin."""
-    fleet = fleet_array(scene, world)
+    fleet = fleet_array(
+        scene,
+        world,
+        obstacle_margin_m=params.obstacle_margin_m,
+        robot_margin_m=params.robot_margin_m,
+    )
+    places = len(scene.targets())
     energy = np.array([robot.battery.start_J for robot in scene.robots])
     start = np.zeros((len(scene.robots), 5))
     start[:, :3] = [robot.pose for robot in scene.robots]
@@ -81,20 +90,39 @@ def state_problem(
         targets=_target_arrays(scene),
         routing=routing_arrays(
             goals=len(scene.goals),
-            distance=roadmap.distance[fleet["field"]],
-            start_distance=roadmap.start_distance,
+            distance=roadmap.distance[fleet["field"], :places, :places],
+            start_distance=roadmap.start_distance[:, :places],
             plain=fleet["plain"] * (1.0 + params.route_margin),
             energy=energy,
             capacity=fleet["capacity"],
             reserve=fleet["reserve"],
         ),
+        last_leg=_last_legs(scene, roadmap, fleet),
         params=tree_params(params),
     )
     return Problem(scene, roadmap, mission, start, energy)
 
 
+def _finish_of(scene: Scene) -> np.ndarray:
+    """Return the target in which each robot must end, -1 for none, shape (R,)."""
+    must = np.array([robot.finish is not None for robot in scene.robots], bool)
+    return np.where(must, len(scene.targets()) + np.cumsum(must) - 1, -1)
+
+
+def _last_legs(scene: Scene, roadmap: Roadmap, fleet: np.ndarray) -> np.ndarray:
+    """Return the energy from each place to each robot's finish [J], (R, G + S + 1)."""
+    places = len(scene.targets())
+    legs = np.zeros((len(fleet), places + 1))
+    for r, finish in enumerate(_finish_of(scene)):
+        if finish >= 0:
+            legs[r, :places] = roadmap.distance[fleet[r]["field"], :places, finish]
+            legs[r, places] = roadmap.start_distance[r, finish]
+            legs[r] *= fleet[r]["plain"]
+    return legs
+
+
 def _target_arrays(scene: Scene) -> Targets:
-    regions = [target.region for target in scene.targets()]
+    regions = planned_regions(scene)
     shrunk = []
     for region in regions:
         corners = region.corners
@@ -112,8 +140,20 @@ def _target_arrays(scene: Scene) -> Targets:
             reach[i] = np.hypot(*(corners - region.center).T).max()
         else:
             reach[i] = max(region.radius_m - TARGET_MARGIN_M, 0.5 * region.radius_m)
+    finishes = [robot.finish for robot in scene.robots]
     return Targets(
         goals=len(scene.goals),
+        places=len(scene.targets()),
+        finish=_finish_of(scene),
+        heading=np.array([(f and f.heading_rad) or 0.0 for f in finishes]),
+        tolerance=np.array(
+            [
+                2.0 * np.pi
+                if f is None or f.heading_rad is None
+                else FINISH_SHARE * f.heading_tolerance_rad
+                for f in finishes
+            ]
+        ),
         center=np.array([region.center for region in regions], float).reshape(-1, 2),
         reach=reach,
         corner=corner,
@@ -139,7 +179,7 @@ def tree_params(params: PlannerParams) -> TreeParams:
         region=params.region_m,
         route_margin=params.route_margin,
         reroute_always=paper,
-        hold_control=paper,
+        literal=paper,
         levels=router.levels,
         iterations=router.iterations,
         alpha=router.alpha,
@@ -260,15 +300,7 @@ def _replay(
         state = np.zeros((len(control) + 1, 5))
         state[0] = problem.start[r]
         for k, (u1, u2) in enumerate(control[:, r]):
-            motion_step(
-                fleet[r]["model"],
-                state[k],
-                u1,
-                u2,
-                fleet[r]["wheelbase"],
-                params.dt_s,
-                state[k + 1],
-            )
+            motion_step(fleet[r], state[k], u1, u2, params.dt_s, state[k + 1])
         trajectories.append(
             Trajectory(
                 robot=robot.id,
@@ -298,7 +330,8 @@ def _visited_tours(
                     seen[g] = True
             if parent >= 0:
                 t = _target_at(tree, tours, parent, r)
-                if t >= targets.goals and in_target(targets, t, x, y):
+                is_station = targets.goals <= t < targets.places
+                if is_station and in_target(targets, t, x, y):
                     found[r].append(t)
     names = [target.id for target in problem.scene.targets()]
     return {

@@ -32,6 +32,11 @@ class PlannerParams:
         steer_start, steer_decay, steer_least: probability that an expansion steers
             instead of applying random controls: first value, factor per expansion,
                 floor.
+        obstacle_margin_m: distance kept from obstacles at the time steps [m]. Between
+            two steps of 0.1 s no corner of the car moves more than 0.16 m from both
+            ends, so the default also keeps the motion in between clear, and leaves room
+            for tracking errors.
+        robot_margin_m: distance kept between robots at the time steps [m].
         region_m: side of the square regions that tell groups apart [m].
         route_margin: surcharge on roadmap energies in routing, for what the roadmap
             does
@@ -56,6 +61,8 @@ class PlannerParams:
     steer_start: float = 1.0
     steer_decay: float = 0.9995
     steer_least: float = 0.97
+    obstacle_margin_m: float = 0.25
+    robot_margin_m: float = 0.5
     region_m: float = 6.0
     route_margin: float = 0.08
     budget_s: float | None = None
@@ -75,6 +82,8 @@ class PlannerParams:
             "steer_start": 0.0 <= self.steer_start <= 1.0,
             "steer_decay": 0.0 < self.steer_decay <= 1.0,
             "steer_least": 0.0 <= self.steer_least <= 1.0,
+            "obstacle_margin_m": 0.0 <= self.obstacle_margin_m <= 1.0,
+            "robot_margin_m": 0.0 <= self.robot_margin_m <= 2.0,
             "region_m": self.region_m > 0.0,
             "route_margin": 0.0 <= self.route_margin <= 1.0,
             "budget_s": self.budget_s is None or self.budget_s > 0.0,

@@ -137,6 +137,7 @@ def _problem(scene: Scene, seed: int, params: PlannerParams) -> Problem:
             world,
             samples=samples,
             neighbours=params.neighbours,
+            margin_m=params.obstacle_margin_m,
             rng=seeding.stream(seed, "roadmap", attempt),
         )
         if not unjoined_goals(scene, roadmap):

@@ -83,6 +83,7 @@ def build_roadmap(
     *,
     samples: int,
     neighbours: int,
+    margin_m: float,
     rng: np.random.Generator,
 ) -> Roadmap:
     """Build the roadmap of a scene.
@@ -92,12 +93,13 @@ def build_roadmap(
         world: its geometry.
         samples: number of free samples tried.
         neighbours: number of nearest vertices each vertex is joined to.
+        margin_m: distance robots keep from obstacles.
         rng: source of the samples.
     """
-    classes, class_of_robot = travel_classes(scene, world)
+    classes, class_of_robot = travel_classes(scene, world, margin_m)
     vertex = _vertices(scene, world, classes, samples, rng)
     first, second = _candidate_edges(vertex, neighbours)
-    n_targets = len(scene.targets())
+    n_targets = len(planned_regions(scene))
     fields, successors, distances, edges = [], [], [], []
     for space, passage in classes:
         weight = _roadmap_kernels.edge_costs(
@@ -121,8 +123,17 @@ def build_roadmap(
             [fields[c][:, v] for c, v in zip(class_of_robot, starts, strict=True)]
         ),
         edges=tuple(edges),
-        targets=tuple(target.id for target in scene.targets()),
+        targets=(
+            *(target.id for target in scene.targets()),
+            *(f"finish of {robot.id}" for robot in scene.robots if robot.finish),
+        ),
     )
+
+
+def planned_regions(scene: Scene) -> list[Region]:
+    """Return the regions the planner numbers: goals, stations, finishes of robots."""
+    finishes = [robot.finish.region for robot in scene.robots if robot.finish]
+    return [*(target.region for target in scene.targets()), *finishes]
 
 
 def _entries(scene: Scene, graph: csr_array, vertex: np.ndarray) -> list[np.ndarray]:
@@ -133,10 +144,10 @@ def _entries(scene: Scene, graph: csr_array, vertex: np.ndarray) -> list[np.ndar
     """
     _, part = connected_components(graph, directed=False)
     entries = []
-    for t, target in enumerate(scene.targets()):
-        near = np.hypot(*(vertex - target.region.center).T)
-        inside = np.flatnonzero(near < _reach(target.region))
-        inside = inside[target.region.depth(vertex[inside]) >= ENTRY_DEPTH_M]
+    for t, region in enumerate(planned_regions(scene)):
+        near = np.hypot(*(vertex - region.center).T)
+        inside = np.flatnonzero(near < _reach(region))
+        inside = inside[region.depth(vertex[inside]) >= ENTRY_DEPTH_M]
         others = inside[part[inside] != part[t]]
         entries.append(np.concatenate([[t], others[others != t]]))
     return entries
@@ -176,7 +187,7 @@ def _vertices(
 ) -> np.ndarray:
     x_min, y_min, x_max, y_max = scene.bounds
     fixed = [
-        _anchor(scene, world, classes, target.region) for target in scene.targets()
+        _anchor(scene, world, classes, region) for region in planned_regions(scene)
     ]
     fixed += [np.array(robot.pose[:2]) for robot in scene.robots]
     unit = (rng.random(2) + np.arange(samples)[:, None] * SPREAD) % 1.0
@@ -194,7 +205,7 @@ def _vertices(
         [shapely.segmentize(ring, 8.0) for ring in rings if not ring.is_empty]
     )
     ridges = [_ridge(world.spaces[space]) for space, _ in classes]
-    inner = [_inner_points(target.region) for target in scene.targets()]
+    inner = [_inner_points(region) for region in planned_regions(scene)]
     loose = np.concatenate([spread, corners.reshape(-1, 2), *ridges, *inner])
     inside = (
         (loose[:, 0] > x_min)
@@ -270,9 +281,9 @@ def _candidate_edges(
     _, index = cKDTree(vertex).query(vertex, k=k)
     first = np.repeat(np.arange(len(vertex)), k)
     second = index.reshape(-1)
-    pair = np.stack([np.minimum(first, second), np.maximum(first, second)], axis=1)
-    pair = np.unique(pair[pair[:, 0] != pair[:, 1]], axis=0)
-    return np.ascontiguousarray(pair[:, 0]), np.ascontiguousarray(pair[:, 1])
+    low, high = np.minimum(first, second), np.maximum(first, second)
+    pair = np.unique((low * len(vertex) + high)[low < high])
+    return pair // len(vertex), pair % len(vertex)
 
 
 def _with_buckets(

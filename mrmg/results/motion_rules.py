@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from mrmg.mission import Trajectory
-from mrmg.motion.dynamics import DERIVATIVES, rk4_step
+from mrmg.motion.dynamics import DERIVATIVES, Derivative, rk4_step
+from mrmg.motion.user_motion import user_motion
 from mrmg.results.verdict import Violation, ViolationKind
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Robot
@@ -22,6 +23,10 @@ _COMPONENTS = {
     "car": ("x", "y", "theta", "v", "psi"),
     "unicycle": ("x", "y", "theta", "v", "omega"),
 }
+_USER_COMPONENTS = ("x", "y", "theta", "v", "w")
+
+USER_TOLERANCE = 1e-9
+"""By how much a user's compiled motion may differ from its plain Python form."""
 
 
 def check_motion(robot: Robot, trajectory: Trajectory) -> list[Violation]:
@@ -29,6 +34,7 @@ def check_motion(robot: Robot, trajectory: Trajectory) -> list[Violation]:
     return [
         *_check_start(robot, trajectory),
         *_check_final_rest(robot, trajectory),
+        *_check_finish(robot, trajectory),
         *_check_dynamics(robot.model, trajectory),
         *_check_state_limits(robot.model, trajectory),
         *_check_control_limits(robot.model, trajectory),
@@ -71,7 +77,8 @@ def _check_start(robot: Robot, trajectory: Trajectory) -> list[Violation]:
     worst = int(error.argmax())
     if error[worst] == 0.0:
         return []
-    name = _COMPONENTS[robot.model.motion_model][worst]
+    names = _COMPONENTS.get(robot.model.motion_model, _USER_COMPONENTS)
+    name = names[worst]
     message = (
         f"the plan starts with {name} = {trajectory.state[0, worst]:.6g}, "
         f"the scene with {expected[worst]:.6g}"
@@ -81,7 +88,9 @@ def _check_start(robot: Robot, trajectory: Trajectory) -> list[Violation]:
 
 
 def _check_final_rest(robot: Robot, trajectory: Trajectory) -> list[Violation]:
-    rates = {"v": 3, "omega": 4} if _is_unicycle(robot.model) else {"v": 3}
+    rates = {"v": 3}
+    if robot.model.motion_model != "car":
+        rates["omega" if _is_unicycle(robot.model) else "w"] = 4
     last = len(trajectory.state) - 1
     return [
         violation_at(
@@ -96,6 +105,32 @@ def _check_final_rest(robot: Robot, trajectory: Trajectory) -> list[Violation]:
     ]
 
 
+def _check_finish(robot: Robot, trajectory: Trajectory) -> list[Violation]:
+    """Check that the robot ends in its finish, with the heading asked for."""
+    if robot.finish is None:
+        return []
+    violations = []
+    last = len(trajectory.state) - 1
+    x, y, yaw = trajectory.state[-1, :3]
+    missed_m = -float(robot.finish.region.depth(np.array([[x, y]]))[0])
+    if missed_m > 0.0:
+        message = f"ends {missed_m:.3g} m outside its finish"
+        violations.append((ViolationKind.FINISH, message, missed_m))
+    if robot.finish.heading_rad is not None:
+        off = abs(math.remainder(yaw - robot.finish.heading_rad, math.tau))
+        excess = off - robot.finish.heading_tolerance_rad
+        if excess > 0.0:
+            message = (
+                f"ends {off:.3g} rad off its finish's heading, "
+                f"{robot.finish.heading_tolerance_rad:g} are allowed"
+            )
+            violations.append((ViolationKind.FINISH, message, excess))
+    return [
+        violation_at(trajectory, last, kind, message, amount=amount)
+        for kind, message, amount in violations
+    ]
+
+
 def _is_unicycle(model: RobotModel) -> bool:
     return model.motion_model == "unicycle"
 
@@ -106,8 +141,7 @@ def replay(model: RobotModel, trajectory: Trajectory) -> np.ndarray:
     Runs the plain Python form of the motion model, one step at a time, so that a valid
     plan is met bit for bit and a defect stays in its own step.
     """
-    derivative = DERIVATIVES[model.motion_model](math.sin, math.cos, math.tan)
-    step = rk4_step(derivative)
+    step = plain_step(model)
     length_m, dt_s = float(model.wheelbase_m), float(trajectory.dt_s)
     states, controls = trajectory.state[:-1].tolist(), trajectory.control.tolist()
     return np.array(
@@ -118,8 +152,21 @@ def replay(model: RobotModel, trajectory: Trajectory) -> np.ndarray:
     ).reshape(len(states), 5)
 
 
+def plain_step(model: RobotModel) -> Derivative:
+    """Return step(x, y, theta, v, w, u1, u2, L, dt) of a model in plain Python."""
+    if model.motion_model in DERIVATIVES:
+        return rk4_step(DERIVATIVES[model.motion_model](math.sin, math.cos, math.tan))
+    motion = user_motion(model.motion_model)
+
+    def step(*arguments: float) -> tuple[float, ...]:
+        return motion.step(arguments[:5], arguments[5:7], *arguments[7:])
+
+    return step
+
+
 def _check_dynamics(model: RobotModel, trajectory: Trajectory) -> list[Violation]:
     defect = np.abs(replay(model, trajectory) - trajectory.state[1:]).max(axis=1)
+    tolerance = 0.0 if model.motion_model in DERIVATIVES else USER_TOLERANCE
     return [
         violation_at(
             trajectory,
@@ -129,14 +176,14 @@ def _check_dynamics(model: RobotModel, trajectory: Trajectory) -> list[Violation
             f"which is {defect[step]:.3g} off",
             amount=float(defect[step]),
         )
-        for step in worst_of_runs(defect, defect != 0.0)
+        for step in worst_of_runs(defect, defect > tolerance)
     ]
 
 
 def _check_state_limits(model: RobotModel, trajectory: Trajectory) -> list[Violation]:
     limits = model.limits
     v, w = trajectory.state[:, 3], trajectory.state[:, 4]
-    name = "omega" if _is_unicycle(model) else "psi"
+    name = _COMPONENTS.get(model.motion_model, _USER_COMPONENTS)[4]
     rules = (
         ("v", v, v - limits.v_max_m_s, limits.v_max_m_s),
         ("v", v, limits.v_min_m_s - v, limits.v_min_m_s),

@@ -14,13 +14,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrmg.mission import Trajectory
-from mrmg.motion.dynamics import DERIVATIVES, Derivative, rk4_step
+from mrmg.motion.dynamics import DERIVATIVES, rk4_step
+from mrmg.motion.user_motion import user_motion
 from mrmg.scene.robot_model import RobotModel
 
 # Covers the integrator's own error, which the bound on the exact motion leaves out:
 # some 1e-7 m at a sagitta of 1e-3 m, and of higher order in the step than the sagitta.
 _SAGITTA_FACTOR = 1.01
 _SAGITTA_SLACK_M = 1e-9
+
+SAMPLES = 8
+"""Parts of a step at whose ends a user's motion is looked at."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,9 +58,7 @@ class SweptFootprint:
 
     def states_at(self, step: np.ndarray, time_s: np.ndarray) -> np.ndarray:
         """Return the states `time_s` after the start of each step, shape (k, 5)."""
-        advance = _vectorised_step(self.model.motion_model)
-        start, held = self.state[step].T, self.control[step].T
-        return np.stack(advance(*start, *held, self.model.wheelbase_m, time_s), axis=-1)
+        return _states_after(self.model, self.state[step], self.control[step], time_s)
 
     def corners_at(self, step: np.ndarray, time_s: np.ndarray) -> np.ndarray:
         """Return the footprint's corners at those instants [m], shape (k, m, 2)."""
@@ -76,16 +78,35 @@ def footprint_corners(model: RobotModel, state: np.ndarray) -> np.ndarray:
     return np.asarray(corners + state[:, None, :2])
 
 
-def _vectorised_step(motion_model: str) -> Derivative:
-    return rk4_step(DERIVATIVES[motion_model](np.sin, np.cos, np.tan))
+def _states_after(
+    model: RobotModel, state: np.ndarray, control: np.ndarray, time_s: np.ndarray
+) -> np.ndarray:
+    """Return the states after given times under held controls, shape (k, 5)."""
+    if model.motion_model in DERIVATIVES:
+        advance = rk4_step(DERIVATIVES[model.motion_model](np.sin, np.cos, np.tan))
+        length_m = model.wheelbase_m
+        return np.stack(advance(*state.T, *control.T, length_m, time_s), axis=-1)
+    motion = user_motion(model.motion_model)
+    return np.array(
+        [
+            motion.step(tuple(before), tuple(held), model.wheelbase_m, duration)
+            for before, held, duration in zip(
+                state.tolist(), control.tolist(), np.asarray(time_s).tolist(),
+                strict=True,
+            )
+        ]
+    ).reshape(-1, 5)  # fmt: skip
 
 
 def _acceleration_bound(model: RobotModel, trajectory: Trajectory) -> np.ndarray:
     """Bound |p''| of all footprint points p = r + R(theta) b in each step, shape (n,).
 
     |p''| <= |u1| + |v theta'| + |b| (|theta''| + theta'^2), each factor at its largest
-    in the step: v and w are linear in time, so their magnitudes peak at the ends.
+    in the step: v and w are linear in time, so their magnitudes peak at the ends. Of a
+    user's motion nothing is known but what it does: see `_sampled_acceleration`.
     """
+    if model.motion_model not in DERIVATIVES:
+        return _sampled_acceleration(model, trajectory)
     size = np.abs(trajectory.state[:, 3:])
     speed, w = np.maximum(size[:-1], size[1:]).T
     u1, u2 = np.abs(trajectory.control).T
@@ -95,6 +116,28 @@ def _acceleration_bound(model: RobotModel, trajectory: Trajectory) -> np.ndarray
     reach = model.circumscribed_radius_m
     turning = reach * (yaw_acceleration + yaw_rate**2)
     return np.asarray(u1 + speed * yaw_rate + turning)
+
+
+def _sampled_acceleration(model: RobotModel, trajectory: Trajectory) -> np.ndarray:
+    """Return the largest |p''| of the corners at instants of each step, with a margin.
+
+    An estimate and no bound: second differences over a 1/SAMPLES of the step.
+    """
+    state, control = trajectory.state[:-1], trajectory.control
+    interval_s = trajectory.dt_s / SAMPLES
+    corners = np.stack(
+        [
+            footprint_corners(
+                model,
+                _states_after(
+                    model, state, control, np.full(len(state), i * interval_s)
+                ),
+            )
+            for i in range(SAMPLES + 1)
+        ]
+    )
+    second = np.diff(corners, 2, axis=0) / interval_s**2
+    return np.asarray(1.5 * np.hypot(*np.moveaxis(second, -1, 0)).max(axis=(0, 2)))
 
 
 def _car_yaw_bounds(

@@ -21,6 +21,7 @@ class ViolationKind(Enum):
     MALFORMED = "malformed"
     START = "start"
     FINAL_REST = "final_rest"
+    FINISH = "finish"
     DYNAMICS = "dynamics"
     STATE_LIMIT = "state_limit"
     CONTROL_LIMIT = "control_limit"
@@ -42,6 +43,7 @@ class ViolationKind(Enum):
             ViolationKind.MALFORMED: "1",
             ViolationKind.START: "SI",
             ViolationKind.FINAL_REST: "SI",
+            ViolationKind.FINISH: "SI",
             ViolationKind.DYNAMICS: "SI",
             ViolationKind.STATE_LIMIT: "SI",
             ViolationKind.CONTROL_LIMIT: "SI",

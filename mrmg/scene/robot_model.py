@@ -33,6 +33,16 @@ class Limits:
     u1_max_m_s2: float
     u2_max: float
 
+    def as_tuple(self) -> tuple[float, float, float, float, float]:
+        """Return (v_min, v_max, w_max, u1_max, u2_max)."""
+        return (
+            self.v_min_m_s,
+            self.v_max_m_s,
+            self.w_max,
+            self.u1_max_m_s2,
+            self.u2_max,
+        )
+
     def scaled(self, share: float) -> Limits:
         """Return the limits times `share`; the planner leaves the rest to control."""
         return Limits(
@@ -50,7 +60,8 @@ class RobotModel:
 
     Attributes:
         name: folder name of the model.
-        motion_model: key of `motion.dynamics.DERIVATIVES`.
+        motion_model: key of `motion.dynamics.DERIVATIVES`, or the path of a Python file
+            that defines the motion (`motion.user_motion`).
         footprint_m: convex outline in the robot's frame, counter-clockwise, shape
             (m, 2). The frame's origin is the reference point (x, y): the middle of the
             rear axle.
@@ -73,7 +84,7 @@ class RobotModel:
         device_power_W: what it carries.
         energy_preset: which parts of the energy model count.
         battery_capacity_J: of the standard battery.
-        mjcf: path of the MJCF file.
+        mjcf: path of the MJCF file; None for a model that is only planned for.
     """
 
     name: str
@@ -97,7 +108,7 @@ class RobotModel:
     device_power_W: float
     energy_preset: EnergyPreset
     battery_capacity_J: float
-    mjcf: Path
+    mjcf: Path | None
 
     @property
     def effective_mass_kg(self) -> float:
@@ -144,6 +155,6 @@ class RobotModel:
     @property
     def turning_radius_m(self) -> float:
         """Smallest turning radius of the reference point in the planner's limits."""
-        if self.motion_model == "unicycle":
+        if self.motion_model != "car":
             return 0.0
         return self.wheelbase_m / math.tan(self.planning_share * self.limits.w_max)

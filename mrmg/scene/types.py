@@ -120,6 +120,21 @@ class Battery:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Finish:
+    """Where a robot must be at rest when the mission ends.
+
+    Attributes:
+        region: must hold the reference point.
+        heading_rad: its yaw there; None for any.
+        heading_tolerance_rad: allowed deviation from the heading.
+    """
+
+    region: Region
+    heading_rad: float | None
+    heading_tolerance_rad: float
+
+
+@dataclass(frozen=True, kw_only=True)
 class Robot:
     """One robot of the fleet: a model, where it starts and with what energy.
 
@@ -128,12 +143,14 @@ class Robot:
         model: its kind.
         pose: start (x [m], y [m], yaw [rad]) of the reference point, at rest.
         battery: its energy store.
+        finish: where it must end; None for anywhere.
     """
 
     id: str
     model: RobotModel
     pose: tuple[float, float, float]
     battery: Battery
+    finish: Finish | None = None
 
 
 @dataclass(frozen=True, kw_only=True)

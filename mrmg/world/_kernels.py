@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import leaf_kernel
 
 
 class FreeSpace(NamedTuple):
@@ -54,7 +54,7 @@ class TerrainGrid(NamedTuple):
     multiplier: np.ndarray
 
 
-@kernel
+@leaf_kernel
 def point_segment_distance(px, py, ax, ay, bx, by):
     """Return the distance of a point from a segment."""
     dx = bx - ax
@@ -67,7 +67,7 @@ def point_segment_distance(px, py, ax, ay, bx, by):
     return hypot(px - ax - t * dx, py - ay - t * dy)
 
 
-@kernel
+@leaf_kernel
 def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
     """Tell whether segments ab and cd properly cross."""
     d1 = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
@@ -77,7 +77,7 @@ def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
     return (d1 > 0.0) != (d2 > 0.0) and (d3 > 0.0) != (d4 > 0.0)
 
 
-@kernel
+@leaf_kernel
 def point_in_convex(px, py, corners):
     """Tell whether a point lies in a convex counter-clockwise polygon."""
     n = len(corners)
@@ -90,7 +90,7 @@ def point_in_convex(px, py, corners):
     return True
 
 
-@kernel
+@leaf_kernel
 def convex_segment_distance(corners, ax, ay, bx, by):
     """Return the distance of a convex polygon from a segment; 0 where they meet."""
     if point_in_convex(ax, ay, corners):
@@ -109,7 +109,7 @@ def convex_segment_distance(corners, ax, ay, bx, by):
     return best
 
 
-@kernel
+@leaf_kernel
 def convex_convex_distance(first, second):
     """Return the distance of two convex polygons; 0 where they meet."""
     if point_in_convex(second[0, 0], second[0, 1], first):
@@ -131,7 +131,7 @@ def convex_convex_distance(first, second):
     return best
 
 
-@kernel
+@leaf_kernel
 def place_footprint(footprint, x, y, theta, out):
     """Write the footprint's corners at a pose into `out`, shape (m, 2)."""
     c = cos(theta)
@@ -141,7 +141,7 @@ def place_footprint(footprint, x, y, theta, out):
         out[i, 1] = y + s * footprint[i, 0] + c * footprint[i, 1]
 
 
-@kernel
+@leaf_kernel
 def clearance_at_least(space, x, y):
     """Return a lower bound of the signed distance from obstacles [m]; -inf off grid."""
     rows, columns = space.distance.shape
@@ -154,7 +154,7 @@ def clearance_at_least(space, x, y):
     return space.distance[row, column] - sqrt(dx * dx + dy * dy)
 
 
-@kernel
+@leaf_kernel
 def clearance_estimate(space, x, y):
     """Return the signed distance from obstacles [m], bilinear in the field."""
     rows, columns = space.distance.shape
@@ -170,7 +170,7 @@ def clearance_estimate(space, x, y):
     return low * (1.0 - fy) + high * fy
 
 
-@kernel
+@leaf_kernel
 def footprint_is_clear(space, placed, cx, cy, radius, margin):
     """Tell whether a placed footprint keeps `margin` [m] from every obstacle; exact.
 
@@ -210,7 +210,7 @@ def footprint_is_clear(space, placed, cx, cy, radius, margin):
     return clearance_estimate(space, cx, cy) > 0.0
 
 
-@kernel
+@leaf_kernel
 def multiplier_in(terrain, x, y):
     """Return the terrain's energy multiplier of the cell that holds a point."""
     rows, columns = terrain.multiplier.shape
@@ -221,7 +221,7 @@ def multiplier_in(terrain, x, y):
     return terrain.multiplier[row, column]
 
 
-@kernel
+@leaf_kernel
 def segment_clearance(space, ax, ay, bx, by, enough):
     """Return the smallest clearance [m] along a segment, capped at `enough`.
 
@@ -240,7 +240,7 @@ def segment_clearance(space, ax, ay, bx, by, enough):
     return best
 
 
-@kernel
+@leaf_kernel
 def segment_is_clear(space, ax, ay, bx, by, needed):
     """Tell whether a segment keeps `needed` clearance [m]."""
     length = hypot(bx - ax, by - ay)
@@ -256,7 +256,7 @@ def segment_is_clear(space, ax, ay, bx, by, needed):
     return True
 
 
-@kernel
+@leaf_kernel
 def segment_weighted_length(terrain, ax, ay, bx, by):
     """Return the integral of the multiplier along a segment [m], by midpoints."""
     length = hypot(bx - ax, by - ay)

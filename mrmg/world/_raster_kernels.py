@@ -9,7 +9,7 @@ from math import ceil, floor, hypot, sqrt
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, leaf_kernel
 from mrmg.world._kernels import point_segment_distance
 
 
@@ -82,10 +82,12 @@ def fill_rings(ring_start, point, x_min, y_min, cell, rows, columns):
 def edge_distance_field(edge, x_min, y_min, cell, rows, columns):
     """Return the distance of each cell centre from the nearest edge [m].
 
-    Cells crossed by an edge know it exactly; sweeps in four directions hand the index
-    of the nearest edge on to the neighbours, which measure their own distance from it.
+    Cells crossed by an edge know it exactly; one sweep up and one down (rows there and
+    back; Danielsson 1980) hand the index of the nearest edge on to the neighbours,
+    which measure their own distance from it.
     Where many edges crowd, the nearest one may not get through: centimetres too far.
     """
+    grid = (x_min, y_min, cell)
     nearest = np.full((rows, columns), -1, np.int64)
     distance = np.full((rows, columns), np.inf)
     for e in range(len(edge)):
@@ -100,38 +102,33 @@ def edge_distance_field(edge, x_min, y_min, cell, rows, columns):
             for r in range(max(0, r0 - 1), min(rows, r0 + 2)):
                 for c in range(max(0, c0 - 1), min(columns, c0 + 2)):
                     _offer(edge, e, r, c, x_min, y_min, cell, nearest, distance)
-    for _ in range(2):
-        for direction in range(4):
-            down = direction & 1
-            left = direction >> 1
-            for i in range(rows):
-                r = rows - 1 - i if down else i
-                for j in range(columns):
-                    c = columns - 1 - j if left else j
-                    for dr in range(-1, 2):
-                        for dc in range(-1, 2):
-                            rr, cc = r + dr, c + dc
-                            if (
-                                0 <= rr < rows
-                                and 0 <= cc < columns
-                                and nearest[rr, cc] >= 0
-                                and nearest[rr, cc] != nearest[r, c]
-                            ):
-                                _offer(
-                                    edge,
-                                    nearest[rr, cc],
-                                    r,
-                                    c,
-                                    x_min,
-                                    y_min,
-                                    cell,
-                                    nearest,
-                                    distance,
-                                )
+    for sweep in range(2):
+        ahead = 1 if sweep == 0 else -1
+        for i in range(rows):
+            r = i if sweep == 0 else rows - 1 - i
+            for j in range(columns):
+                c = j if sweep == 0 else columns - 1 - j
+                for dc in range(-1, 2):
+                    _hand_on(edge, r - ahead, c + dc, r, c, grid, nearest, distance)
+                _hand_on(edge, r, c - ahead, r, c, grid, nearest, distance)
+            for j in range(columns):
+                c = columns - 1 - j if sweep == 0 else j
+                _hand_on(edge, r, c + ahead, r, c, grid, nearest, distance)
     return distance
 
 
-@kernel
+@leaf_kernel
+def _hand_on(edge, from_row, from_column, r, c, grid, nearest, distance):
+    """Offer a cell the edge its neighbour is nearest to."""
+    rows, columns = distance.shape
+    if 0 <= from_row < rows and 0 <= from_column < columns:
+        e = nearest[from_row, from_column]
+        if e >= 0 and e != nearest[r, c]:
+            x_min, y_min, cell = grid
+            _offer(edge, e, r, c, x_min, y_min, cell, nearest, distance)
+
+
+@leaf_kernel
 def _offer(edge, e, r, c, x_min, y_min, cell, nearest, distance):
     d = point_segment_distance(
         x_min + (c + 0.5) * cell,
@@ -146,7 +143,7 @@ def _offer(edge, e, r, c, x_min, y_min, cell, nearest, distance):
         nearest[r, c] = e
 
 
-@kernel
+@leaf_kernel
 def correct_near(
     distance, edge, bucket_start, bucket_edge, x_min, y_min, cell, bucket, columns
 ):

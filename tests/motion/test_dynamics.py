@@ -15,6 +15,7 @@ import pytest
 
 from mrmg.motion import _kernels
 from mrmg.motion.dynamics import DERIVATIVES, NU, NX, TURN_SPEEDS, rk4_step
+from mrmg.planning._fleet_kernels import FLEET
 
 WHEELBASE_M = 1.2
 DT_S = 0.1
@@ -23,6 +24,13 @@ MODELS = sorted(DERIVATIVES)
 
 def python_step(model: str) -> Callable[..., tuple[float, ...]]:
     return rk4_step(DERIVATIVES[model](math.sin, math.cos, math.tan))
+
+
+def record(model: str) -> np.void:
+    """One robot of the fleet as the kernels know it."""
+    robot = np.zeros(1, FLEET)
+    robot["model"], robot["wheelbase"] = _kernels.MODEL_ID[model], WHEELBASE_M
+    return robot[0]
 
 
 def integrate(
@@ -54,7 +62,7 @@ def test_numba_and_python_agree_to_the_last_bit(model: str) -> None:
     step = python_step(model)
     out = np.empty(NX)
     for state, control, dt_s in random_cases(1, 5000):
-        _kernels.step(_kernels.MODEL_ID[model], state, *control, WHEELBASE_M, dt_s, out)
+        _kernels.step(record(model), state, *control, dt_s, out)
         plain = step(*state.tolist(), *control.tolist(), WHEELBASE_M, dt_s)
         assert out.tolist() == list(plain)
 
@@ -81,8 +89,8 @@ def test_every_model_is_known_to_the_planner() -> None:
 def test_step_may_write_over_its_own_state(model: str) -> None:
     state, control, dt_s = random_cases(3, 1)[0]
     out = np.empty(NX)
-    _kernels.step(_kernels.MODEL_ID[model], state, *control, WHEELBASE_M, dt_s, out)
-    _kernels.step(_kernels.MODEL_ID[model], state, *control, WHEELBASE_M, dt_s, state)
+    _kernels.step(record(model), state, *control, dt_s, out)
+    _kernels.step(record(model), state, *control, dt_s, state)
     assert state.tolist() == out.tolist()
 
 

@@ -78,7 +78,7 @@ def test_robots_that_meet_the_same_obstacles_travel_alike(
     blocks: list[list[str] | None], expected: list[int]
 ) -> None:
     scene = make_scene(blocks)
-    classes, of_robot = travel_classes(scene, World.from_scene(scene))
+    classes, of_robot = travel_classes(scene, World.from_scene(scene), 0.25)
     assert of_robot == expected
     assert len(classes) == max(expected) + 1
     half_width = scene.robots[0].model.half_width_m

@@ -11,7 +11,6 @@ import pytest
 import shapely
 
 from mrmg.motion.dynamics import car_derivative, rk4_step
-from mrmg.planning._fleet_kernels import PLANNING_MARGIN_M
 from mrmg.planning._maneuver_kernels import (
     MANEUVER_STEPS,
     SWITCH_M,
@@ -20,7 +19,10 @@ from mrmg.planning._maneuver_kernels import (
     way_left,
 )
 from mrmg.planning.motion_tree import Problem
+from mrmg.planning.parameters import PlannerParams
 from mrmg.scene.types import Scene
+
+PLANNING_MARGIN_M = PlannerParams().obstacle_margin_m
 
 DT_S = 0.1
 DEAD_END = [  # 3 m wide, open to the west, its end at x = 20

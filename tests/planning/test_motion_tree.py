@@ -131,11 +131,10 @@ def replay(grown: Grown, v: int) -> np.ndarray:
         for r, one in enumerate(fleet):
             u1, u2 = tree.control[v, k, r]
             step(
-                one["model"],
+                one,
                 states[k, r],
                 u1,
                 u2,
-                one["wheelbase"],
                 grown.params.dt_s,
                 states[k + 1, r],
             )

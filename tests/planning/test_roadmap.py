@@ -51,6 +51,7 @@ def make_roadmap(
         World.from_scene(scene),
         samples=samples,
         neighbours=neighbours,
+        margin_m=0.25,
         rng=seeding.stream(seed, "roadmap"),
     )
 
@@ -219,7 +220,7 @@ def test_successors_lead_to_the_target_at_the_stated_cost(
 def test_edges_keep_the_passage_clear(walled: tuple[Scene, Roadmap]) -> None:
     scene, roadmap = walled
     world = World.from_scene(scene)
-    (_, passage), *_ = travel_classes(scene, world)[0]
+    (_, passage), *_ = travel_classes(scene, world, 0.25)[0]
     walls = shapely.union_all([world.obstacles[0], shapely.box(*scene.bounds).exterior])
     first, second, weight = roadmap.edges[0]
     lines = shapely.linestrings(

@@ -54,6 +54,7 @@ class Place:
             self.world,
             samples=800,
             neighbours=12,
+            margin_m=0.25,
             rng=seeding.stream(0, "roadmap"),
         )
         frame = shapely.box(*self.scene.bounds)

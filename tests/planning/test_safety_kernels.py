@@ -13,7 +13,6 @@ import pytest
 import shapely
 
 from mrmg.motion._kernels import CAR, UNICYCLE, step
-from mrmg.planning._fleet_kernels import PLANNING_MARGIN_M, ROBOT_MARGIN_M
 from mrmg.planning._safety_kernels import (
     Commitment,
     braking_control,
@@ -28,7 +27,11 @@ from mrmg.planning._safety_kernels import (
 from mrmg.planning._steering_kernels import control_towards
 from mrmg.planning._tree_kernels import stop_all
 from mrmg.planning.motion_tree import Problem
+from mrmg.planning.parameters import PlannerParams
 from mrmg.scene.types import Scene
+
+PLANNING_MARGIN_M = PlannerParams().obstacle_margin_m
+ROBOT_MARGIN_M = PlannerParams().robot_margin_m
 
 DT_S = 0.1
 OBSTACLES = [
@@ -70,7 +73,7 @@ def crowd(yard: MakeScene, state: MakeProblem) -> Callable[..., Problem]:
 def committed(problem: Problem) -> Commitment:
     """Return the commitment of robots that stand at their start."""
     fleet = problem.mission.fleet
-    commitment = new_commitment(fleet, DT_S)
+    commitment = new_commitment(fleet, DT_S, True)
     for r in range(len(fleet)):
         write_braking(fleet, r, problem.start[r], DT_S, commitment, 0)
     return commitment
@@ -102,7 +105,7 @@ def drive_at_random(
                 follow_braking(commitment, r)
             after = np.empty(5)
             wheelbase = fleet[r]["wheelbase"]
-            step(fleet[r]["model"], before, u1, u2, wheelbase, DT_S, after)
+            step(fleet[r], before, u1, u2, DT_S, after)
             assert present_state(commitment, r) == pytest.approx(after, abs=1e-9)
             decided[r] = True
         yield granted
@@ -223,10 +226,7 @@ def test_stopping_from_any_moment_is_safe_and_ends_at_rest(
                 u1, u2 = held[r]
                 assert abs(u1) <= fleet[r]["limit"][3] + 1e-12
                 assert abs(u2) <= fleet[r]["limit"][4] + 1e-12
-                wheelbase = fleet[r]["wheelbase"]
-                step(
-                    fleet[r]["model"], states[-1][r], u1, u2, wheelbase, DT_S, after[r]
-                )
+                step(fleet[r], states[-1][r], u1, u2, DT_S, after[r])
             states.append(after)
         assert all(stands(fleet, r, states[-1][r]) for r in range(4))
         moments += len(control) > 3

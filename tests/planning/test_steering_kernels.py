@@ -36,7 +36,7 @@ def open_yard(yard: MakeScene, state: MakeProblem) -> Problem:
 
 def moved(fleet: np.ndarray, state: np.ndarray, u1: float, u2: float) -> np.ndarray:
     after = np.empty(5)
-    step(fleet[0]["model"], state, u1, u2, fleet[0]["wheelbase"], DT_S, after)
+    step(fleet[0], state, u1, u2, DT_S, after)
     return after
 
 

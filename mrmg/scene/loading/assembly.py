@@ -22,9 +22,16 @@ from mrmg.scene.loading.batteries import battery_of
 from mrmg.scene.loading.faults import nearest
 from mrmg.scene.loading.geometry import footprint_at, region_of, shape_of
 from mrmg.scene.loading.models import load_model, model_folder
-from mrmg.scene.loading.schema import SECTIONS, BatteryEntry, SceneDocument
+from mrmg.scene.loading.schema import (
+    SECTIONS,
+    BatteryEntry,
+    CircleEntry,
+    FinishEntry,
+    SceneDocument,
+)
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import (
+    Finish,
     Goal,
     Obstacle,
     Region,
@@ -33,6 +40,9 @@ from mrmg.scene.types import (
     Station,
     TerrainArea,
 )
+
+HOME_RADIUS_M = 1.0
+"""How near a robot that must return ends to its start."""
 
 RESERVED_IDS = ("bounds", "floor", "world")
 """Names that logs and the simulated world use for other things."""
@@ -138,11 +148,38 @@ class Assembly:
             if isinstance(battery, list):
                 self.faults += battery
                 continue
+            finish = self._finish(entry, model, f"{path}.finish")
             x, y, yaw = entry.pose
             if entry.rolling_factor is not None:
                 rolling = model.rolling_coefficient * entry.rolling_factor
                 model = replace(model, rolling_coefficient=rolling)
-            yield Robot(id=entry.id, model=model, pose=(x, y, yaw), battery=battery)
+            yield Robot(
+                id=entry.id,
+                model=model,
+                pose=(x, y, yaw),
+                battery=battery,
+                finish=finish,
+            )
+
+    def _finish(self, entry: Any, model: RobotModel, path: str) -> Finish | None:
+        if entry.finish is None:
+            return None
+        wanted = entry.finish
+        if wanted == "start":
+            circle = CircleEntry(center=list(entry.pose[:2]), radius=HOME_RADIUS_M)
+            wanted = FinishEntry(circle=circle)
+        region = region_of(wanted, path)
+        if isinstance(region, list):
+            self.faults += region
+            return None
+        if wanted.heading is not None and model.motion_model == "car":
+            message = "a car cannot be given one; leave it out"
+            self._fault(f"{path}.heading", message)
+        return Finish(
+            region=region,
+            heading_rad=wanted.heading,
+            heading_tolerance_rad=wanted.heading_tolerance,
+        )
 
     def _model(self, robot_id: str, reference: str, path: str) -> RobotModel | None:
         folder = model_folder(reference, self._base)

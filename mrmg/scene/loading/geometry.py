@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from mrmg.errors import Fault
-from mrmg.scene.loading.schema import RegionEntry, ShapedEntry
+from mrmg.scene.loading.schema import FinishEntry, RegionEntry, ShapedEntry
 from mrmg.scene.types import Region, Robot
 
 CIRCLE_SIDES = 32
@@ -53,8 +53,8 @@ def shape_of(entry: ShapedEntry, path: str) -> Polygon | list[Fault]:
     return shapely.orient_polygons(shape)
 
 
-def region_of(entry: RegionEntry, path: str) -> Region | list[Fault]:
-    """Return the convex region of a goal or station, or its faults."""
+def region_of(entry: RegionEntry | FinishEntry, path: str) -> Region | list[Fault]:
+    """Return the convex region of a goal, station or finish, or its faults."""
     given = [key for key in ("circle", "polygon") if getattr(entry, key)]
     if len(given) != 1:
         return [_not_one_of(path, "circle, polygon", given)]

@@ -1,7 +1,9 @@
 """Robot models: `robot.yaml` to `RobotModel`.
 
 A model is a folder with `robot.yaml`, whose keys are those of `ModelDocument`, and the
-MJCF file it names. Units: m, kg, s, rad, J.
+MJCF file it names. Without an MJCF file, or with a motion of the user's own
+(`motion_model: FILE.py`), it can be planned for and verified, but not driven in MuJoCo.
+Units: m, kg, s, rad, J.
 """
 
 from __future__ import annotations
@@ -13,13 +15,16 @@ import numpy as np
 import shapely
 from pydantic import Field, ValidationError
 
-from mrmg import shipped
+from mrmg import shipped, storage
 from mrmg.energy import EnergyPreset
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.loading.faults import faults_of, nearest
 from mrmg.scene.loading.schema import Positive, Ring, Strict
 from mrmg.scene.loading.yaml_text import read_yaml
 from mrmg.scene.robot_model import Limits, RobotModel
+
+SHIPPED_MOTIONS = ("car", "unicycle")
+"""Motion models that need no file of their own."""
 
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Share = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
@@ -48,7 +53,9 @@ class ModelDocument(Strict):
     """The content of `robot.yaml`."""
 
     format: Literal[1]
-    motion_model: Literal["car", "unicycle"]
+    motion_model: Annotated[str, Field(min_length=1)] = Field(
+        description="'car', 'unicycle', or a Python file of the model's folder"
+    )
     footprint: Ring
     height: Positive
     wheelbase: Positive
@@ -66,7 +73,7 @@ class ModelDocument(Strict):
     device_power: NotNegative = 0.0
     energy: EnergyPreset = "full"
     battery_capacity: Positive
-    mjcf: Annotated[str, Field(min_length=1)]
+    mjcf: Annotated[str, Field(min_length=1)] | None = None
 
 
 def model_folder(reference: str, base: Path | None) -> Path | str:
@@ -108,14 +115,34 @@ def load_model(
         entry = ModelDocument.model_validate(document)
     except ValidationError as error:
         raise SceneError(source, faults_of(error, ModelDocument)) from error
-    faults = _geometry_faults(entry)
-    if not (folder / entry.mjcf).is_file():
+    faults = [*_motion_faults(entry, folder), *_geometry_faults(entry)]
+    if entry.mjcf is not None and not (folder / entry.mjcf).is_file():
         message = f"got '{entry.mjcf}'; no such file in the folder"
         faults.append(Fault("mjcf", message))
     if faults:
         raise SceneError(source, faults)
     # Keys left at their defaults stay out: files without them keep their digests.
-    return _model(folder, entry), entry.model_dump(mode="json", exclude_defaults=True)
+    parameters = entry.model_dump(mode="json", exclude_defaults=True)
+    if entry.motion_model not in SHIPPED_MOTIONS:
+        # What the file says counts for a digest, not what it is called.
+        source_text = (folder / entry.motion_model).read_text(encoding="utf-8")
+        parameters["motion_model"] = storage.digest(source_text)
+    return _model(folder, entry), parameters
+
+
+def _motion_faults(entry: ModelDocument, folder: Path) -> list[Fault]:
+    name = entry.motion_model
+    if name in SHIPPED_MOTIONS:
+        return []
+    if not name.endswith(".py"):
+        message = (
+            f"got '{name}'; must be 'car' or 'unicycle', or the name of a Python file "
+            "in the model's folder"
+        )
+        return [Fault("motion_model", message)]
+    if not (folder / name).is_file():
+        return [Fault("motion_model", f"got '{name}'; no such file in the folder")]
+    return []
 
 
 def _geometry_faults(entry: ModelDocument) -> list[Fault]:
@@ -140,7 +167,11 @@ def _model(folder: Path, entry: ModelDocument) -> RobotModel:
     footprint.setflags(write=False)
     return RobotModel(
         name=folder.name,
-        motion_model=entry.motion_model,
+        motion_model=(
+            entry.motion_model
+            if entry.motion_model in SHIPPED_MOTIONS
+            else str((folder / entry.motion_model).resolve())
+        ),
         footprint_m=footprint,
         height_m=entry.height,
         wheelbase_m=entry.wheelbase,
@@ -166,5 +197,5 @@ def _model(folder: Path, entry: ModelDocument) -> RobotModel:
         device_power_W=entry.device_power,
         energy_preset=entry.energy,
         battery_capacity_J=entry.battery_capacity,
-        mjcf=folder / entry.mjcf,
+        mjcf=None if entry.mjcf is None else folder / entry.mjcf,
     )

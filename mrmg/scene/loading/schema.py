@@ -37,6 +37,10 @@ Details:
 - `start_energy` is a share of the capacity (0..1), or one of {J: }, {Wh: }, {m: }.
 - `rolling_factor` multiplies the rolling resistance a robot is reckoned with, as one
   measures it of a loaded or worn one; metres in `battery` stay those of the model.
+- `finish` says where a robot must be at rest when the mission ends: `start` (within 1 m
+  of where it started), or one of circle, polygon, with `heading` (and
+  `heading_tolerance`, default 0.2) if it matters. Robots that turn on the spot can be
+  given a heading, cars cannot.
 - `model` is the name of a shipped model, or a folder (with a `/` in it), relative to
   the scene file, that holds a `robot.yaml`.
 - `energy: paper` (of a robot here, or in its `robot.yaml`) charges only distance times
@@ -183,6 +187,15 @@ StartEnergy = Annotated[
 ]
 
 
+class FinishEntry(Strict):
+    """Exactly one of circle, polygon; convex; perhaps with a heading."""
+
+    circle: CircleEntry | None = None
+    polygon: Ring | None = Field(default=None, description=_RING)
+    heading: Number | None = Field(default=None, description="yaw in rad")
+    heading_tolerance: Positive = Field(default=0.2, description="in rad")
+
+
 class RobotEntry(Strict):
     """One robot of the fleet."""
 
@@ -204,6 +217,9 @@ class RobotEntry(Strict):
     rolling_factor: Positive | None = Field(
         default=None,
         description="rolling resistance to reckon with, relative to the model",
+    )
+    finish: Literal["start"] | FinishEntry | None = Field(
+        default=None, description="start, or a circle or polygon to end in"
     )
 
 

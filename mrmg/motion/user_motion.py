@@ -1,0 +1,148 @@
+"""A motion model defined in a user's own Python file.
+
+The file defines two functions of plain numbers, written with `math`:
+
+    def step(state, control, length, dt):
+        '''Return the state after `dt` under a held control.'''
+
+    def steer(state, waypoint, share, limits, length, dt):
+        '''Return the control towards a waypoint at `share` of the top speed.'''
+
+State is (x, y, theta, v, w): position, heading, speed and one number that is the
+model's own; control is (u1, u2); waypoint (x, y); limits (v_min, v_max, w_max, u1_max,
+u2_max); length is the model's `wheelbase`. `share` 0 asks to brake: under it the robot
+must come to rest, v and w at 0, within a second or so from any state. Units are SI.
+
+The planner compiles both and calls them by address, so that they run as fast as the
+shipped models; the verifier runs `step` as it is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from mrmg.errors import Fault, SceneError
+
+_PARAMETERS = {
+    "step": ("state", "control", "length", "dt"),
+    "steer": ("state", "waypoint", "share", "limits", "length", "dt"),
+}
+
+
+@dataclass(frozen=True)
+class UserMotion:
+    """A motion model of a user.
+
+    Attributes:
+        source: path of its file.
+        step: (state, control, length, dt) -> state, five numbers.
+        steer: (state, waypoint, share, limits, length, dt) -> control, two numbers.
+    """
+
+    source: str
+    step: Callable[..., tuple[float, ...]]
+    steer: Callable[..., tuple[float, ...]]
+
+    def advance(self, state: np.ndarray, control: np.ndarray, length: float, dt: float):  # type: ignore[no-untyped-def]
+        """Return the state after `dt` as an array, shape (5,)."""
+        return np.array(self.step(tuple(state), tuple(control), length, dt))
+
+    def compiled(self, limits: tuple[float, ...]) -> tuple[int, int]:
+        """Return the addresses of compiled step and steer, valid while the process is.
+
+        Raises:
+            SceneError: if numba cannot compile them.
+        """
+        return _addresses(self, limits)
+
+
+@cache
+def user_motion(path: str) -> UserMotion:
+    """Import a user's motion model.
+
+    Raises:
+        SceneError: naming what the file lacks.
+    """
+    module = _imported(path)
+    faults = []
+    for name, parameters in _PARAMETERS.items():
+        function = getattr(module, name, None)
+        wanted = f"{name}({', '.join(parameters)})"
+        if not inspect.isfunction(function):
+            faults.append(Fault(name, f"is not defined; expected a function {wanted}"))
+        elif len(inspect.signature(function).parameters) != len(parameters):
+            given = f"{name}{inspect.signature(function)}"
+            faults.append(Fault(name, f"is {given}; expected {wanted}"))
+    if faults:
+        raise SceneError(path, faults)
+    return UserMotion(source=path, step=module.step, steer=module.steer)
+
+
+def _imported(path: str) -> ModuleType:
+    # Named after its place, so that files of the same name do not get mixed up.
+    name = f"mrmg_user_motion_{hashlib.sha256(path.encode()).hexdigest()[:12]}"
+    spec = importlib.util.spec_from_file_location(name, Path(path))
+    if spec is None or spec.loader is None:
+        raise SceneError(path, [Fault("", "is no Python file")])
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # a user's file may do anything
+        reason = f"cannot be imported: {type(error).__name__}: {error}"
+        raise SceneError(path, [Fault("", reason)]) from error
+    return module
+
+
+@cache
+def _addresses(motion: UserMotion, limits: tuple[float, ...]) -> tuple[int, int]:
+    import numba
+    from numba import carray, types
+
+    step, steer = numba.njit(motion.step), numba.njit(motion.steer)
+    number, numbers = types.float64, types.CPointer(types.float64)
+
+    def call_step(inputs: Any, length: float, dt: float, outputs: Any) -> None:
+        i, o = carray(inputs, 7), carray(outputs, 5)
+        o[0], o[1], o[2], o[3], o[4] = step(
+            (i[0], i[1], i[2], i[3], i[4]), (i[5], i[6]), length, dt
+        )
+
+    def call_steer(
+        inputs: Any, share: float, length: float, dt: float, outputs: Any
+    ) -> None:
+        i, o = carray(inputs, 7), carray(outputs, 2)
+        o[0], o[1] = steer(
+            (i[0], i[1], i[2], i[3], i[4]), (i[5], i[6]), share, limits, length, dt
+        )
+
+    signatures = (
+        types.void(numbers, number, number, numbers),
+        types.void(numbers, number, number, number, numbers),
+    )
+    addresses = []
+    for name, function, signature in zip(
+        ("step", "steer"), (call_step, call_steer), signatures, strict=True
+    ):
+        try:
+            compiled = numba.cfunc(signature)(function)
+        except numba.core.errors.NumbaError as error:
+            reason = " ".join(str(error).split())
+            message = f"cannot be compiled by numba: {reason[:400]}"
+            raise SceneError(motion.source, [Fault(name, message)]) from error
+        _kept_alive.append(compiled)
+        addresses.append(int(compiled.address))
+    return addresses[0], addresses[1]
+
+
+_kept_alive: list[Any] = []
+"""Compiled functions: their addresses are only good while they exist."""
