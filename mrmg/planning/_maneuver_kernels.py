@@ -166,13 +166,21 @@ def best_maneuver(mission, r, target, start, stuck, random, out):
             best = driven[i] + to_go + turning
             out[0], out[1] = v, w
     while True:
-        i = np.argmin(least)
-        if least[i] >= best:
+        likeliest = np.argmin(least)
+        if least[likeliest] >= best:
             return best < np.inf
-        least[i] = np.inf
-        v, w = _motion(limit, i, steerings)
+        least[likeliest] = np.inf
+        v, w = _motion(limit, likeliest, steerings)
         rating = best_sequel(
-            mission, r, target, ends[i], v, driven[i], depth - 1, steerings, best
+            mission,
+            r,
+            target,
+            ends[likeliest],
+            v,
+            driven[likeliest],
+            depth - 1,
+            steerings,
+            best,
         )
         if rating < best:
             best = rating

@@ -82,7 +82,9 @@ class Grown:
     def targets(self, v: int) -> np.ndarray:
         """Return each robot's next target at a vertex."""
         target = np.zeros(len(self.problem.start), np.int64)
-        _tree_kernels.next_targets(self.tree, self.tours, np.int64(v), target)
+        _tree_kernels.next_targets(
+            self.problem.mission, self.tree, self.tours, np.int64(v), target
+        )
         return target
 
 

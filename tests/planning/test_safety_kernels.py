@@ -104,7 +104,6 @@ def drive_at_random(
                 u1, u2 = braking_control(fleet, r, before, DT_S)
                 follow_braking(commitment, r)
             after = np.empty(5)
-            wheelbase = fleet[r]["wheelbase"]
             step(fleet[r], before, u1, u2, DT_S, after)
             assert present_state(commitment, r) == pytest.approx(after, abs=1e-9)
             decided[r] = True
