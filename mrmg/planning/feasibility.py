@@ -1,6 +1,6 @@
 """Proofs that a mission cannot be solved; nothing is called infeasible without one.
 
-Both proofs relax the problem: robots become discs that fit inside their footprints,
+All proofs relax the problem: robots become discs that fit inside their footprints,
 their dynamics and each other are ignored, and ways are as short as the obstacles allow
 at all. What is impossible then is impossible.
 """
@@ -8,6 +8,7 @@ at all. What is impossible then is impossible.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 import shapely
@@ -18,7 +19,8 @@ from mrmg.scene.types import Goal, Region, Robot, Scene
 
 def proof_of_infeasibility(scene: Scene) -> str | None:
     """Return why the mission has no solution, or None if no proof is known."""
-    return next(iter(impossible_goals(scene).values()), None)
+    goals = next(iter(impossible_goals(scene).values()), None)
+    return goals or _unreachable_finish(scene) or _crowded_finish(scene)
 
 
 def impossible_goals(scene: Scene) -> dict[str, str]:
@@ -43,6 +45,47 @@ def _why_impossible(goal: Goal, proofs: list[_Reach]) -> str:
             f"lacks at least {missing_J:.0f} J above its reserve"
         )
     return ""
+
+
+def _unreachable_finish(scene: Scene) -> str | None:
+    """Return which robot's finish it cannot get to."""
+    for robot in scene.robots:
+        if robot.finish and not _Reach.of(scene, robot).is_connected(
+            robot.finish.region
+        ):
+            return (
+                f"the finish of {robot.id} is unreachable: it is cut off from the "
+                "start by obstacles with no gap as wide as the robot"
+            )
+    return None
+
+
+def _crowded_finish(scene: Scene) -> str | None:
+    """Return which two robots cannot both be at their finishes.
+
+    The discs about the reference points inside both footprints would overlap wherever
+    in their finishes the two stand.
+    """
+    bound = [robot for robot in scene.robots if robot.finish]
+    for first, second in combinations(bound, 2):
+        assert first.finish and second.finish
+        regions = [_whole(robot.finish.region) for robot in (first, second)]
+        widest_m = _longest_distance_m(*regions)
+        needed_m = first.model.inscribed_radius_m + second.model.inscribed_radius_m
+        if widest_m < needed_m:
+            return (
+                f"{first.id} and {second.id} cannot both stand at their finishes: no "
+                f"two points of these are {needed_m:.2f} m apart, as the robots' "
+                "bodies need"
+            )
+    return None
+
+
+def _longest_distance_m(first: shapely.Geometry, second: shapely.Geometry) -> float:
+    """Return the largest distance of a point of one convex set from one of another."""
+    corners = [shapely.get_coordinates(one) for one in (first, second)]
+    offset = corners[0][:, None] - corners[1][None]
+    return float(np.hypot(offset[..., 0], offset[..., 1]).max())
 
 
 @dataclass(frozen=True)

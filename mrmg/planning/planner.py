@@ -79,6 +79,10 @@ def plan_mission(
         if with_bound:
             bounding.append(beside.submit(state_bound))
 
+    @cache
+    def proof() -> str | None:
+        return proof_of_infeasibility(scene)
+
     with ThreadPoolExecutor(1) as beside:
         best = Search(
             attempt=partial(attempt_plan, problem, seed, params),
@@ -88,6 +92,7 @@ def plan_mission(
             on_progress=tell,
             on_improvement=on_improvement or (lambda improvement: None),
             on_first=begin_bound,
+            proof=proof,
         ).run()
         for future in bounding:
             future.result()
@@ -98,11 +103,10 @@ def plan_mission(
             reason="",
             statistics=statistics.as_dict(),
         )
-    proof = proof_of_infeasibility(scene)
     return PlanResult(
-        status=PlanStatus.TIMEOUT if proof is None else PlanStatus.INFEASIBLE,
+        status=PlanStatus.INFEASIBLE if proof() else PlanStatus.TIMEOUT,
         plan=None,
-        reason=proof or _why_not(problem, statistics),
+        reason=proof() or _why_not(problem, statistics),
         statistics=statistics.as_dict(),
     )
 

@@ -41,6 +41,8 @@ class Search:
         workers: threads.
         on_progress, on_improvement: told how it goes.
         on_first: called when the first plan has been found.
+        proof: asked, once an attempt has failed, why the mission has no solution; None
+            if that is not known.
         best: the cheapest plan so far.
     """
 
@@ -51,6 +53,7 @@ class Search:
     on_progress: Progress
     on_improvement: OnImprovement
     on_first: Callable[[], object]
+    proof: Callable[[], str | None]
     best: Plan | None = None
     halt: np.ndarray = field(default_factory=lambda: np.zeros(1, np.bool_))
 
@@ -73,6 +76,8 @@ class Search:
                         self._take(attempt.plan, attempt.found_at)
                     self.on_progress(self._fraction(number, found), f"{found} plans")
                     if self._enough(number, found):
+                        break
+                    if number == 1 and not found and self.proof():
                         break
             except KeyboardInterrupt:
                 if self.best is None or self.params.budget_s is None:

@@ -22,7 +22,7 @@ from mrmg.mission import Plan, Trajectory
 from mrmg.results.swept_footprint import footprint_corners
 from mrmg.results.verdict import Verdict, Violation, ViolationKind
 from mrmg.results.verify import verify
-from mrmg.scene.types import Battery, Scene
+from mrmg.scene.types import Battery, Finish, Region, Scene
 
 Kind = ViolationKind
 Case = tuple[Scene, Plan]
@@ -77,6 +77,14 @@ def broken_start(case: Any, drive: Any) -> Case:
 
 def broken_final_rest(case: Any, drive: Any) -> Case:
     return with_controls(case(), drive, lambda controls: controls.pop())
+
+
+def broken_finish(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    ring = np.zeros((0, 2))
+    region = Region(center=np.array([1.0, 1.0]), radius_m=0.1, corners=ring)
+    finish = Finish(region=region, heading_rad=None, heading_tolerance_rad=0.1)
+    return replace(scene, robots=(replace(scene.robots[0], finish=finish),)), plan
 
 
 def broken_dynamics(case: Any, drive: Any) -> Case:

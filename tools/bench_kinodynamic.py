@@ -1,0 +1,206 @@
+"""Plan the kinodynamic multi-robot benchmarks of a folder; print a table.
+
+Protocol: one process, one thread; every file is planned once before anything is timed.
+Every robot must be at rest within its own goal at the end (0.5 m; unicycles within
+0.2 m and 0.2 rad of the pose), and nothing may overlap at any time, in between steps
+and with robots that have arrived included: `mrmg.verify` judges that, with true
+headings. As the files bound only the centres of robots, the bounds are wider by half a
+robot, so that centres stay within the file's. A file that is called infeasible must be
+answered so.
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+import mrmg
+from mrmg.mission import PlanStatus
+from mrmg.planning import PlannerParams, plan_mission
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.types import Scene
+
+FOLDER = Path(__file__).resolve().parents[2] / "shared" / "kinodynamic"
+
+PARAMS = PlannerParams(
+    samples=600, region_m=2.0, obstacle_margin_m=0.08, robot_margin_m=0.15,
+    improvements=0, trees=40, max_vertices=3000,
+)  # fmt: skip
+
+COMMON = {
+    "format": 1, "height": 0.3, "track": 0.3, "mass": 20.0,
+    "wheel": {"radius": 0.1, "inertia": 0.01, "count": 4, "mass": 0.5},
+    "planning_share": 1.0, "rolling_coefficient": 0.03, "turning_coefficient": 0.0,
+    "friction_coefficient": 1.0, "drive_efficiency": 1.0,
+    "regeneration_efficiency": 0.0, "idle_power": 0.0, "battery_capacity": 1e6,
+}  # fmt: skip
+
+LIMITS = {
+    "car": {"v_min": -1.0, "v_max": 1.0, "w_max": float(np.pi / 3)},
+    "unicycle": {"v_min": -0.5, "v_max": 0.5, "w_max": 0.5},
+}
+
+FIRST_ORDER = '''\
+"""A unicycle of first order: the control is its speed and yaw rate."""
+
+from math import atan2, cos, hypot, pi, sin
+
+
+def step(state, control, length, dt):
+    x, y, theta, _, _ = state
+    v, w = control
+    middle = theta + 0.5 * w * dt
+    return x + v * dt * cos(middle), y + v * dt * sin(middle), theta + w * dt, v, w
+
+
+def steer(state, waypoint, share, limits, length, dt):
+    if share == 0.0:
+        return 0.0, 0.0
+    x, y, theta, _, _ = state
+    dx, dy = waypoint[0] - x, waypoint[1] - y
+    off = atan2(dy, dx) - theta
+    off -= 2.0 * pi * round(off / (2.0 * pi))
+    v = share * limits[1] * max(0.0, cos(off)) ** 3
+    w = max(-limits[2], min(limits[2], off / dt))
+    return min(v, hypot(dx, dy) / dt), w
+'''
+
+
+def main() -> int:
+    """Run the bench; return 1 if any run failed."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, prog="tools/bench_kinodynamic"
+    )
+    parser.add_argument("--folder", type=Path, default=FOLDER)
+    parser.add_argument("--only", default="", help="part of the file's name")
+    parser.add_argument("--seeds", default="0-9", help="first-last, default 0-9")
+    options = parser.parse_args()
+    files = sorted(p for p in options.folder.glob("*.yaml") if options.only in p.name)
+    if not files:
+        print(f"no benchmark files in {options.folder}", file=sys.stderr)
+        return 1
+    first, _, last = options.seeds.partition("-")
+    seeds = range(int(first), int(last or first) + 1)
+    print(__doc__)
+    print("file | solved | plan_s median | p95 | makespan_s median | / straight line")
+    with tempfile.TemporaryDirectory() as folder:
+        return 0 if all([bench(path, seeds, Path(folder)) for path in files]) else 1
+
+
+def bench(path: Path, seeds: range, folder: Path) -> bool:
+    """Plan one file for all seeds; tell whether all answers were right."""
+    scene = benchmark_scene(path, folder)
+    plan_mission(scene, seed=seeds.start, params=PARAMS)
+    infeasible = path.stem.startswith("infeasible")
+    times, makespans, right = [], [], 0
+    for seed in seeds:
+        began = time.perf_counter()
+        result = plan_mission(scene, seed=seed, params=PARAMS)
+        times.append(time.perf_counter() - began)
+        if infeasible:
+            right += result.status is PlanStatus.INFEASIBLE
+        elif result.plan is not None:
+            verdict = mrmg.verify(scene, result.plan)
+            right += verdict.ok
+            makespans.append(result.plan.makespan_s)
+            if not verdict.ok:
+                print(f"seed {seed}: {verdict.violations[0].message}", file=sys.stderr)
+        else:
+            print(f"seed {seed}: {result.reason}", file=sys.stderr)
+    late = sorted(times)[int(0.95 * (len(times) - 1))]
+    middle_s = statistics.median(times)
+    row = f"{path.stem} | {right}/{len(times)} | {middle_s:.2f} | {late:.2f}"
+    if infeasible:
+        print(f"{row} | {result.status.value}: {result.reason}", flush=True)
+    else:
+        middle = statistics.median(makespans) if makespans else float("nan")
+        share = middle / straight_line_s(scene)
+        print(f"{row} | {middle:.1f} | {share:.2f}", flush=True)
+    return right == len(times)
+
+
+def straight_line_s(scene: Scene) -> float:
+    """Return the longest way as the crow flies at top speed [s]."""
+    times = []
+    for robot in scene.robots:
+        assert robot.finish is not None
+        way = np.hypot(*(np.array(robot.pose[:2]) - robot.finish.region.center))
+        times.append((way - 0.5) / robot.model.limits.v_max_m_s)
+    return float(max(times))
+
+
+def benchmark_scene(path: Path, folder: Path) -> Scene:
+    """Return a benchmark file as a scene; writes robot models into `folder`."""
+    content = yaml.safe_load(path.read_text())
+    world = content["environment"]
+    robots, half = [], 0.0
+    for number, entry in enumerate(content["robots"]):
+        model, width = robot_model(entry, folder)
+        half = max(half, 0.5 * width + PARAMS.obstacle_margin_m)
+        robots.append(robot_entry(f"r{number}", entry, model))
+    low, high = world["min"], world["max"]
+    document = {
+        "format": 1,
+        "name": path.stem,
+        "bounds": [*(float(x) - half for x in low), *(float(x) + half for x in high)],
+        "obstacles": [
+            {"box": {"center": list(map(float, box["center"])),
+                     "size": list(map(float, box["size"]))}}
+            for box in world["obstacles"]
+        ],
+        "robots": robots,
+    }  # fmt: skip
+    return scene_from_document(document, source=str(path))
+
+
+def robot_entry(name: str, entry: dict[str, Any], model: str) -> dict[str, Any]:
+    """Return a robot of the scene: where it starts and must end."""
+    start, goal = list(map(float, entry["start"])), list(map(float, entry["goal"]))
+    # Cars: x y v phi theta; unicycles: x y theta v omega.
+    car = "car" in entry["type"]
+    yaw = start[4] if car else start[2]
+    radius = 0.5 if car else (0.05 if "first" in entry["type"] else 0.2)
+    finish: dict[str, Any] = {"circle": {"center": goal[:2], "radius": radius}}
+    if not car:
+        finish["heading"] = goal[2]
+    return {"id": name, "model": model, "pose": [*start[:2], yaw], "finish": finish}
+
+
+def robot_model(entry: dict[str, Any], folder: Path) -> tuple[str, float]:
+    """Write a robot's model; return its folder and its longer side [m]."""
+    kind = entry["type"]
+    length, width = entry.get("size", (0.5, 0.25))
+    base = folder / f"{kind}_{length}_{width}"
+    base.mkdir(exist_ok=True)
+    car = "car" in kind
+    rate = 1.0 if car else 0.25
+    document = {
+        **COMMON,
+        "motion_model": "car" if car else "unicycle",
+        "wheelbase": 0.5,
+        "footprint": [
+            [sx * length / 2, sy * width / 2]
+            for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+        ],
+        "limits": {
+            **LIMITS["car" if car else "unicycle"], "u1_max": rate, "u2_max": rate,
+        },
+    }  # fmt: skip
+    if "first_order" in kind:
+        document["motion_model"] = "motion.py"
+        document["limits"] |= {"u1_max": 0.5, "u2_max": 0.5}
+        (base / "motion.py").write_text(FIRST_ORDER)
+    (base / "robot.yaml").write_text(yaml.safe_dump(document))
+    return str(base), float(max(length, width))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
