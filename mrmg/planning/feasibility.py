@@ -66,11 +66,11 @@ def _crowded_finish(scene: Scene) -> str | None:
     The discs about the reference points inside both footprints would overlap wherever
     in their finishes the two stand.
     """
-    bound = [robot for robot in scene.robots if robot.finish]
-    for first, second in combinations(bound, 2):
-        assert first.finish and second.finish
-        regions = [_whole(robot.finish.region) for robot in (first, second)]
-        widest_m = _longest_distance_m(*regions)
+    bound = [
+        (robot, _whole(robot.finish.region)) for robot in scene.robots if robot.finish
+    ]
+    for (first, first_region), (second, second_region) in combinations(bound, 2):
+        widest_m = _longest_distance_m(first_region, second_region)
         needed_m = first.model.inscribed_radius_m + second.model.inscribed_radius_m
         if widest_m < needed_m:
             return (

@@ -41,6 +41,7 @@ def search(
         on_progress=lambda fraction, text: None,
         on_improvement=more.get("on_improvement", lambda improvement: None),
         on_first=more.get("on_first", lambda: None),
+        proof=lambda: None,
     )
 
 
