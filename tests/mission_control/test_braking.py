@@ -34,7 +34,7 @@ def test_braking_is_what_the_planner_committed_to(model: str, speed: float) -> N
     state = np.array([10.0, 10.0, 0.4, speed, 0.37])
     states, controls = brake_to_rest(scene.robots[0].model, state, DT_S)
     fleet = fleet_array(scene, World.from_scene(scene))
-    commitment = new_commitment(fleet, DT_S)
+    commitment = new_commitment(fleet, DT_S, True)
     write_braking(fleet, 0, state, DT_S, commitment, 0)
     promised = commitment.state[0, 0, : commitment.length[0, 0]]
     np.testing.assert_allclose(states[: len(promised) - 1], promised[1:], atol=1e-12)
