@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
@@ -17,6 +15,7 @@ from mrmg.results.ground_image import TrailPainter
 from mrmg.results.overlay import Panel, Reading, RobotReading
 from mrmg.results.tags import Label, Tag
 from mrmg.results.top_view import TopView
+from mrmg.results.video_options import VideoOptions
 from mrmg.results.world_view import (
     CHASE_FOVY_DEG,
     WorldView,
@@ -32,23 +31,6 @@ _CHASE_SHARE = 0.35
 _TAG_LIFT_M = 0.5
 _NAMED_WITHIN_M = 40.0
 _OPEN = (1.0, 1.0, 1.0, 0.9)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VideoOptions:
-    """How a video is to look.
-
-    Attributes:
-        view, robot, speed, size, fps, from_s, to_s: as in `render_video`.
-    """
-
-    view: str
-    robot: str | None
-    speed: float
-    size: tuple[int, int]
-    fps: int
-    from_s: float
-    to_s: float
 
 
 class Film:

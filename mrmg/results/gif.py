@@ -12,8 +12,9 @@ from mrmg import storage
 from mrmg.errors import UsageError
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan
-from mrmg.results.film import Film, VideoOptions
-from mrmg.results.video import Progress, fitting_speed, frame_ticks, pictures
+from mrmg.results.film import Film
+from mrmg.results.video import Progress, pictures
+from mrmg.results.video_options import frame_ticks, video_options
 from mrmg.scene.types import Scene
 
 LARGEST_BYTES = 5_000_000
@@ -50,11 +51,11 @@ def render_gif(
         plan: adds the planned paths and tours.
         log: what is shown.
         path: file to write, atomically.
-        view: one of `video.VIEWS`.
-        robot: id of the robot the chase camera follows; None takes the first.
+        view: as in `video.render_video`, like `robot`, `from_s` and `to_s`.
+        robot: followed by the chase camera.
         speed: mission seconds per second; None fits the window to twelve seconds.
         from_s: mission time of the first picture.
-        to_s: mission time of the last picture at the latest; None is the log's end.
+        to_s: mission time of the last one.
         on_progress: called with the share done and a text.
 
     Raises:
@@ -62,17 +63,19 @@ def render_gif(
             however small its pictures.
         MachineError: if this machine has no OpenGL that draws offscreen.
     """
-    end_s = float(log.time_s[-1]) if to_s is None else to_s
-    options = VideoOptions(
+    options = video_options(
+        scene,
+        log,
         view=view,
         robot=robot,
-        speed=fitting_speed(end_s - from_s, _FITTING_S) if speed is None else speed,
+        speed=speed,
         size=_SIZE,
         fps=_FPS,
         from_s=from_s,
-        to_s=end_s,
+        to_s=to_s,
+        fitting_s=_FITTING_S,
     )
-    ticks = frame_ticks(scene, log, options)
+    ticks = frame_ticks(log, options)
     if len(ticks) > _MOST_FRAMES:
         raise UsageError(
             f"a GIF of {len(ticks)} pictures would be too large; choose a higher "

@@ -9,8 +9,9 @@ import numpy as np
 from mrmg.errors import Fault, RunFolderError
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan, plan_in_force
-from mrmg.results.film import Film, VideoOptions
+from mrmg.results.film import Film
 from mrmg.results.overlay import Reading
+from mrmg.results.video_options import VideoOptions
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
 

@@ -9,16 +9,13 @@ import av
 import numpy as np
 
 from mrmg import storage
-from mrmg.errors import UsageError
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan
-from mrmg.results.film import Film, Stage, VideoOptions
+from mrmg.results.film import Film, Stage
 from mrmg.results.ground_image import paint_ground
+from mrmg.results.video_options import frame_ticks, video_options
 from mrmg.results.world_view import open_view
 from mrmg.scene.types import Scene
-
-VIEWS = ("top", "chase", "split")
-"""What a video can show."""
 
 Progress = Callable[[float, str], None]
 
@@ -48,7 +45,7 @@ def render_video(
         plan: adds the planned paths and tours.
         log: what is shown.
         path: file to write, atomically.
-        view: one of `VIEWS`.
+        view: one of `video_options.VIEWS`.
         robot: id of the robot the chase camera follows; None takes the first.
         speed: mission seconds per second of video; None fits the window to half a
             minute.
@@ -62,65 +59,21 @@ def render_video(
         UsageError: if an option is out of its range; names it.
         MachineError: if this machine has no OpenGL that draws offscreen.
     """
-    end_s = float(log.time_s[-1]) if to_s is None else to_s
-    options = VideoOptions(
+    options = video_options(
+        scene,
+        log,
         view=view,
         robot=robot,
-        speed=fitting_speed(end_s - from_s, _FITTING_S) if speed is None else speed,
+        speed=speed,
         size=size,
         fps=fps,
         from_s=from_s,
-        to_s=end_s,
+        to_s=to_s,
+        fitting_s=_FITTING_S,
     )
-    ticks = frame_ticks(scene, log, options)
+    ticks = frame_ticks(log, options)
     with storage.atomic_path(path) as temporary:
         _write_video(temporary, Film(scene, plan, log, options), ticks, on_progress)
-
-
-def frame_ticks(scene: Scene, log: ExecutionLog, options: VideoOptions) -> np.ndarray:
-    """Return the tick of the log each frame shows, shape (frames,).
-
-    Raises:
-        UsageError: if an option is out of its range.
-    """
-    _check(scene, log, options)
-    end_s = min(options.to_s, float(log.time_s[-1]))
-    step_s = options.speed / options.fps
-    count = int((end_s - options.from_s) / step_s + 1e-9) + 1
-    time_s = options.from_s + step_s * np.arange(count)
-    after = np.searchsorted(log.time_s, time_s + 1e-9, side="right")
-    return np.asarray(np.maximum(after - 1, 0))
-
-
-def fitting_speed(window_s: float, video_s: float) -> float:
-    """Return the least whole speed that fits a window of the mission to `video_s`."""
-    return float(max(np.ceil(window_s / video_s), 1.0))
-
-
-def _check(scene: Scene, log: ExecutionLog, options: VideoOptions) -> None:
-    ids = [robot.id for robot in scene.robots]
-    end_s = float(log.time_s[-1])
-    width, height = options.size
-    faults = {
-        f"view {options.view!r} is unknown; use one of {', '.join(VIEWS)}": (
-            options.view not in VIEWS
-        ),
-        f"robot {options.robot!r} is not in the scene; use one of {', '.join(ids)}": (
-            options.robot is not None and options.robot not in ids
-        ),
-        f"speed {options.speed:g} must be greater than 0": not options.speed > 0.0,
-        f"fps {options.fps} must be 1 to 120": not 1 <= options.fps <= 120,
-        f"size {width}x{height} must be even numbers, 320x240 to 3840x2160": (
-            width % 2 != 0
-            or height % 2 != 0
-            or not (320 <= width <= 3840 and 240 <= height <= 2160)
-        ),
-        f"the time window {options.from_s:g} to {options.to_s:g} s must lie within "
-        f"0 to {end_s:g} s": not 0.0 <= options.from_s <= min(options.to_s, end_s),
-    }
-    for message, wrong in faults.items():
-        if wrong:
-            raise UsageError(message)
 
 
 def pictures(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import av
@@ -12,9 +12,15 @@ import pytest
 from mrmg.errors import UsageError
 from mrmg.execution import simulate
 from mrmg.results import style
-from mrmg.results.film import Film, Stage, VideoOptions
+from mrmg.results.film import Film, Stage
 from mrmg.results.ground_image import paint_ground
-from mrmg.results.video import VIEWS, frame_ticks, render_video
+from mrmg.results.video import render_video
+from mrmg.results.video_options import (
+    VIEWS,
+    VideoOptions,
+    frame_ticks,
+    video_options,
+)
 from mrmg.results.world_view import open_view, top_camera
 
 OPTIONS = VideoOptions(
@@ -73,10 +79,10 @@ def test_file_plays_with_all_frames_and_is_not_blank(mission, view, tmp_path) ->
 
 def test_frames_show_the_log_at_their_time(mission) -> None:
     scene, _, log = mission
-    ticks = frame_ticks(scene, log, replace(OPTIONS, from_s=1.0, to_s=3.0))
+    ticks = frame_ticks(log, replace(OPTIONS, from_s=1.0, to_s=3.0))
     expected_s = 1.0 + 0.2 * np.arange(11)
     assert log.time_s[ticks] == pytest.approx(expected_s, abs=log.control_period_s)
-    whole = frame_ticks(scene, log, OPTIONS)
+    whole = frame_ticks(log, OPTIONS)
     assert log.time_s[whole[-1]] == pytest.approx(log.time_s[-1], abs=0.2)
 
 
@@ -172,4 +178,4 @@ def test_options_out_of_range_are_refused(
     controls = {"r1": straight(12.0), "r2": straight(12.0)}
     log = make_log(scene, make_plan(scene, controls, {"r1": ("g",), "r2": ()}))
     with pytest.raises(UsageError, match=words):
-        frame_ticks(scene, log, replace(OPTIONS, **change))
+        video_options(scene, log, fitting_s=30.0, **{**asdict(OPTIONS), **change})
