@@ -6,6 +6,7 @@ trails are painted into it as the mission goes on.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,7 @@ _DPI = 100
 _TRAIL_SHARE = 0.0045
 _PLANNED_PIXELS = 4.0
 _SPACING_M = 0.3
+_SUPERSAMPLING = 4
 _LABEL_PIXELS = 40.0
 
 
@@ -90,8 +92,7 @@ class TrailPainter:
 
     def __init__(self, ground: np.ndarray, frame: GroundFrame) -> None:
         """Start on a ground image, which is copied."""
-        self._image = Image.fromarray(ground)
-        self._brush = ImageDraw.Draw(self._image)
+        self._image = ground.copy()
         self._frame = frame
         self._width = max(round(_TRAIL_SHARE * PIXELS), 3)
 
@@ -106,19 +107,46 @@ class TrailPainter:
         if len(points) < 2:
             return
         pixels = self._frame.to_pixels(_spaced(points, _SPACING_M))
-        self._brush.line(
-            [tuple(pixel) for pixel in pixels.tolist()],
-            fill=style.rgb(color),
-            width=self._width,
-            joint="curve",
-        )
-        rows, columns = target.shape[:2]
-        low = np.floor(pixels.min(axis=0)).astype(int) - self._width
-        high = np.ceil(pixels.max(axis=0)).astype(int) + self._width
-        left, top = np.clip(low, 0, [columns, rows])
-        right, bottom = np.clip(high, 0, [columns, rows])
-        patch = self._image.crop((left, top, right, bottom))
-        target[top:bottom, left:right] = np.asarray(patch)
+        changed = paint_line(self._image, pixels, self._width, color)
+        target[changed] = self._image[changed]
+
+
+def paint_line(
+    image: np.ndarray, pixels: np.ndarray, width: float, color: str
+) -> tuple[slice, slice]:
+    """Paint a line with smooth edges into an image; return the part that changed.
+
+    Args:
+        image: shape (height, width, 3) of bytes, changed in place.
+        pixels: corners of the line as (column, row), shape (n, 2).
+        width: of the line [pixels].
+        color: `#RRGGBB`.
+    """
+    size, reach = (image.shape[1], image.shape[0]), math.ceil(width)
+    low = np.floor(pixels.min(axis=0)).astype(int) - reach
+    high = np.ceil(pixels.max(axis=0)).astype(int) + reach
+    left, top = np.clip(low, 0, size)
+    right, bottom = np.clip(high, 0, size)
+    changed = slice(top, bottom), slice(left, right)
+    if left < right and top < bottom:
+        patch = image[changed]
+        cover = _line_cover(pixels - (left, top), (right - left, bottom - top), width)
+        paint = np.array(style.rgb(color)) - patch.astype(float)
+        patch[:] = np.round(patch + cover[:, :, None] * paint)
+    return changed
+
+
+def _line_cover(pixels: np.ndarray, size: tuple[int, int], width: float) -> np.ndarray:
+    """Return how much of each pixel a line covers, 0..1, shape (height, width)."""
+    fine = _SUPERSAMPLING
+    image = Image.new("L", (int(size[0]) * fine, int(size[1]) * fine))
+    pen = ImageDraw.Draw(image)
+    corners = [(float(x), float(y)) for x, y in pixels * fine]
+    pen.line(corners, fill=255, width=round(width * fine), joint="curve")
+    radius = 0.5 * width * fine
+    for x, y in (corners[0], corners[-1]):
+        pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=255)
+    return np.asarray(image.reduce(fine)) / 255.0
 
 
 def _spaced(points: np.ndarray, spacing_m: float) -> np.ndarray:

@@ -12,13 +12,11 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from PIL import Image, ImageDraw
 
-from mrmg.results import style
+from mrmg.results.ground_image import paint_line
 from mrmg.results.tags import Label
 from mrmg.results.world_view import WorldView, top_camera
 
-_SUPERSAMPLING = 4
 _TRAIL_PIXELS = 3.2
 _MARGIN_M = 0.3
 _DIFFERENCE = 10
@@ -85,20 +83,7 @@ class TopView:
 
     def extend_trail(self, points: np.ndarray, color: str) -> None:
         """Paint a driven way through points [m], shape (n, 2), onto the background."""
-        pixels = self.to_pixels(points)
-        reach = math.ceil(self._trail_width)
-        low = np.floor(pixels.min(axis=0)).astype(int) - reach
-        high = np.ceil(pixels.max(axis=0)).astype(int) + reach
-        left, top = np.clip(low, 0, self._size)
-        right, bottom = np.clip(high, 0, self._size)
-        if left >= right or top >= bottom:
-            return
-        cover = _line_cover(
-            pixels - (left, top), (right - left, bottom - top), self._trail_width
-        )
-        patch = self._background[top:bottom, left:right]
-        paint = np.array(style.rgb(color)) - patch.astype(float)
-        patch[:] = np.round(patch + cover[:, :, None] * paint)
+        paint_line(self._background, self.to_pixels(points), self._trail_width, color)
 
     def draw(
         self, qpos: np.ndarray, points: Sequence[np.ndarray], out: np.ndarray
@@ -136,16 +121,3 @@ class TopView:
         still = self._still[top:bottom, left:right]
         moved = np.abs(inner.astype(np.int16) - still).max(axis=2) > _DIFFERENCE
         out[top:bottom, left:right][moved] = inner[moved]
-
-
-def _line_cover(pixels: np.ndarray, size: tuple[int, int], width: float) -> np.ndarray:
-    """Return how much of each pixel a line covers, 0..1, shape (height, width)."""
-    fine = _SUPERSAMPLING
-    image = Image.new("L", (int(size[0]) * fine, int(size[1]) * fine))
-    pen = ImageDraw.Draw(image)
-    corners = [(float(x), float(y)) for x, y in pixels * fine]
-    pen.line(corners, fill=255, width=round(width * fine), joint="curve")
-    radius = 0.5 * width * fine
-    for x, y in (corners[0], corners[-1]):
-        pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=255)
-    return np.asarray(image.reduce(fine)) / 255.0
