@@ -16,6 +16,7 @@ from mrmg.results import scene_drawing, style
 from mrmg.scene.types import Scene
 
 _ARROW_SPACING_M = 18.0
+_SHORTEST_NAMED_M = 15.0
 
 
 def draw_overview(
@@ -59,6 +60,7 @@ def draw_mission(
     scene_drawing.draw_robots(axes, scene)
     if plan is not None:
         _draw_ends(axes, scene, plan, log)
+        _name_paths(axes, scene, plan)
     return _legend(scene, plan, log)
 
 
@@ -84,14 +86,53 @@ def _draw_planned(axes: Axes, state: np.ndarray, color: str) -> None:
     _draw_arrows(axes, state, color)
 
 
+def _name_paths(axes: Axes, scene: Scene, plan: Plan) -> None:
+    """Write its robot's name on each path, for those who see no colours."""
+    colors = style.scene_robot_colors(scene)
+    for robot, (x_m, y_m) in name_spots(scene, plan).items():
+        axes.text(
+            x_m,
+            y_m,
+            robot,
+            fontsize=9,
+            fontweight="bold",
+            color=colors[robot],
+            ha="center",
+            va="center",
+            path_effects=scene_drawing.HALO,
+            zorder=8.6,
+        )
+
+
+def name_spots(scene: Scene, plan: Plan) -> dict[str, tuple[float, float]]:
+    """Return where each path has most room for its robot's name [m], by robot.
+
+    Paths that are too short for one are left out.
+    """
+    names = [target.region.center for target in scene.targets()]
+    names += [np.array(robot.pose[:2]) for robot in scene.robots]
+    spots = {}
+    for trajectory in plan.trajectories:
+        if way_to(trajectory.state)[-1] > _SHORTEST_NAMED_M:
+            points = trajectory.state[:, :2]
+            apart_m = np.hypot(*(points[:, None] - np.array(names)).T).min(axis=0)
+            x_m, y_m = points[int(np.argmax(apart_m))].tolist()
+            spots[trajectory.robot] = (x_m, y_m)
+    return spots
+
+
+def way_to(states: np.ndarray) -> np.ndarray:
+    """Return the way driven up to each state [m], shape (n,)."""
+    steps_m = np.hypot(*np.diff(states[:, :2], axis=0).T)
+    return np.concatenate([[0.0], np.cumsum(steps_m)])
+
+
 def _draw_driven(axes: Axes, state: np.ndarray, color: str) -> None:
     axes.plot(state[:, 0], state[:, 1], color=color, linewidth=1.2, zorder=4.4)
 
 
 def _draw_arrows(axes: Axes, state: np.ndarray, color: str) -> None:
-    way_m = np.concatenate(
-        [[0.0], np.cumsum(np.hypot(*np.diff(state[:, :2], axis=0).T))]
-    )
+    way_m = way_to(state)
     marks_m = np.arange(_ARROW_SPACING_M / 2, way_m[-1], _ARROW_SPACING_M)
     for index in np.searchsorted(way_m, marks_m):
         step = state[index, :2] - state[index - 1, :2]
@@ -206,7 +247,8 @@ def _legend(
     for robot in scene.robots:
         tour = plan.tours.get(robot.id, ()) if plan is not None else ()
         goals = sum(target in {goal.id for goal in scene.goals} for target in tour)
-        text = robot.id if plan is None else f"{robot.id}: {goals} goals"
+        text = f"{robot.id}: {goals} goal{'' if goals == 1 else 's'}"
+        text = robot.id if plan is None else text
         handles.append(Patch(facecolor=colors[robot.id], label=text))
     if plan is not None:
         handles += [

@@ -12,12 +12,11 @@ from shapely.geometry import Polygon
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan
 from mrmg.results import style
-from mrmg.results.overview import visit_ranks
+from mrmg.results.overview import name_spots, visit_ranks, way_to
 from mrmg.results.scene_drawing import polygons_of, terrain_spots
 from mrmg.scene.types import Goal, Robot, Scene, Station
 
 _PATH_SPACING_M = 0.25
-_SHORTEST_NAMED_M = 15.0
 
 
 def mission_map(scene: Scene, plan: Plan | None, log: ExecutionLog | None) -> str:
@@ -123,17 +122,15 @@ class _Canvas:
         )
 
     def owners(self, plan: Plan | None) -> Iterable[str]:
-        """Name each path's robot half way along it, for those who see no colours."""
-        for item in plan.trajectories if plan else ():
-            way_m = _way_m(item.state)
-            if way_m[-1] > _SHORTEST_NAMED_M:
-                middle = int(np.searchsorted(way_m, 0.5 * way_m[-1]))
-                x, y = self._point(*item.state[middle, :2])
-                yield (
-                    f'<text class="whose" data-robot="{escape(item.robot)}" x="{x}" '
-                    f'y="{y}" style="--c:var(--r{self._index[item.robot]})">'
-                    f"{escape(item.robot)}</text>"
-                )
+        """Write its robot's name on each path, for those who see no colours."""
+        spots = name_spots(self._scene, plan) if plan else {}
+        for robot, spot in spots.items():
+            x, y = self._point(*spot)
+            yield (
+                f'<text class="whose" data-robot="{escape(robot)}" x="{x}" '
+                f'y="{y}" style="--c:var(--r{self._index[robot]})">'
+                f"{escape(robot)}</text>"
+            )
 
     def robots(self) -> Iterable[str]:
         for at, robot in enumerate(self._scene.robots):
@@ -152,7 +149,7 @@ class _Canvas:
     def _path(self, robot: str, state: np.ndarray, look: str) -> str:
         points = _thinned(state[:, :2])
         corners = " ".join("{},{}".format(*self._point(x, y)) for x, y in points)
-        way_m = float(_way_m(state)[-1])
+        way_m = float(way_to(state)[-1])
         return (
             f'<polyline class="path {look}" data-robot="{escape(robot)}" '
             f'style="--c:var(--r{self._index[robot]})" points="{corners}" '
@@ -183,13 +180,7 @@ def _about(robot: Robot) -> str:
 
 def _thinned(points: np.ndarray) -> np.ndarray:
     """Return points of a path about `_PATH_SPACING_M` apart, both ends included."""
-    way_m = _way_m(points)
+    way_m = way_to(points)
     marks = np.diff(np.floor(way_m / _PATH_SPACING_M), prepend=-1.0) > 0.0
     marks[-1] = True
     return np.asarray(points[marks])
-
-
-def _way_m(states: np.ndarray) -> np.ndarray:
-    """Return the way driven up to each state [m], shape (n,)."""
-    steps_m = np.hypot(*np.diff(states[:, :2], axis=0).T)
-    return np.concatenate([[0.0], np.cumsum(steps_m)])

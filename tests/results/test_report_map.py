@@ -10,6 +10,7 @@ import pytest
 
 from mrmg.execution.log import Contact
 from mrmg.results.mission_series import activities, logged_motions, shown_visits
+from mrmg.results.overview import name_spots
 from mrmg.results.report_map import mission_map
 from mrmg.results.report_timeline import timeline
 
@@ -50,6 +51,29 @@ def tips(element: ElementTree.Element) -> list[str]:
 
 def corners(path: ElementTree.Element) -> list[tuple[float, float]]:
     return [tuple(map(float, xy.split(","))) for xy in path.get("points").split()]
+
+
+def test_long_paths_bear_their_robot_s_name_away_from_other_names(
+    make_scene, make_plan, make_log, straight
+) -> None:
+    scene = make_scene(
+        robots=[
+            {"id": "r1", "model": "car", "pose": [5, 10, 0]},
+            {"id": "r2", "model": "car", "pose": [5, 5, 0]},
+        ]
+    )
+    controls = {"r1": straight(30.0), "r2": straight(4.0)}
+    plan = make_plan(scene, controls, {"r1": ("g",), "r2": ()})
+    spots = name_spots(scene, plan)
+    assert list(spots) == ["r1"]  # the other path is too short
+    x_m, y_m = spots["r1"]
+    assert (x_m, y_m) == pytest.approx((35.0, 10.0), abs=0.5)  # far from the goal
+    robots = layers(mission_map(scene, plan, None))["robots"]
+    (name,) = [item for item in robots if item.get("class") == "whose"]
+    assert (name.get("data-robot"), name.text) == ("r1", "r1")
+    assert (float(name.get("x")), float(name.get("y"))) == pytest.approx(
+        (x_m, 20.0 - y_m), abs=0.01
+    )
 
 
 def test_everything_on_the_map_says_what_it_is(mission) -> None:
