@@ -4,6 +4,10 @@ Protocol: one process, one thread; every scene is planned once before anything i
 timed, so that kernels are compiled and caches warm. Times are wall-clock, of planning
 in process. The runs of one call are comparable with each other; figures of different
 machines are not.
+
+With --bound, costs are compared with a proven lower bound: that of the first plan, and
+with --budget S those of the best plans after each of 5 s and 30 s that S reaches. The
+quality protocol is `tools/bench --bound --budget 30 --seeds 0-9`.
 """
 
 from __future__ import annotations
@@ -14,7 +18,7 @@ import platform
 import statistics
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -22,6 +26,9 @@ from typing import Any
 import mrmg
 from mrmg.planning import plan_mission, profile_params
 from mrmg.planning.bound import lower_bound_J
+
+MOMENTS_S = (5.0, 30.0)
+"""Times after which a budget's plans are compared with the bound."""
 
 TABLE = ("scene1", "scene2", "scene3", "scene4", "scene5", "scene6")
 
@@ -36,6 +43,8 @@ def main() -> int:
         of_scene = list(missions(scene, options))
         rows += of_scene
         print(table_row(scene, of_scene, options), flush=True)
+    if len(options.scenes) > 1:
+        print(table_row("all", rows, options))
     if options.output:
         text = "".join(json.dumps(row, sort_keys=True) + "\n" for row in rows)
         options.output.write_text(text)
@@ -101,7 +110,8 @@ def missions(source: str, options: argparse.Namespace) -> Iterator[dict[str, Any
     """Yield one row for each seed."""
     scene = mrmg.load_scene(source)
     params = profile_params(options.profile, budget_s=options.budget)
-    plan_mission(scene, seed=options.seeds.start, params=params)
+    warm = profile_params(options.profile)
+    plan_mission(scene, seed=options.seeds.start, params=warm)
     bound_J = lower_bound_J(scene, step_s=params.dt_s) if options.bound else None
     for seed in options.seeds:
         began = time.perf_counter()
@@ -130,11 +140,30 @@ def missions(source: str, options: argparse.Namespace) -> Iterator[dict[str, Any
             }
             if bound_J is not None:
                 row |= {"bound_J": bound_J, "cost_to_bound": row["cost_J"] / bound_J}
+                row["cost_to_bound_after"] = {
+                    name: cost_after(result.statistics, time_s) / bound_J
+                    for name, time_s in moments(options).items()
+                }
             if options.execute:
                 row |= driven(scene, result.plan, verdict.ok)
         if not row["ok"]:
             print(f"FAILED {scene.name} seed {seed}: {row}", file=sys.stderr)
         yield row
+
+
+def moments(options: argparse.Namespace) -> dict[str, float | None]:
+    """Return the times whose best plans are compared with the bound; None: first."""
+    reached = [time_s for time_s in MOMENTS_S if time_s <= (options.budget or 0.0)]
+    return {"first": None, **{f"{time_s:g} s": time_s for time_s in reached}}
+
+
+def cost_after(statistics: Mapping[str, Any], time_s: float | None) -> float:
+    """Return the cost of the best plan by a time, or of the first one [J]."""
+    found = statistics["improvements"]
+    costs = [
+        row["cost_J"] for row in found if time_s is not None and row["time_s"] <= time_s
+    ]
+    return float(min(costs, default=found[0]["cost_J"]))
 
 
 def driven(scene: Any, plan: Any, plan_ok: bool) -> dict[str, Any]:
@@ -161,7 +190,11 @@ DRIVEN = ("rms_m worst", "max_m worst", "metered% worst", "measured% worst", "x 
 def header(options: argparse.Namespace) -> str:
     """Return the table's head."""
     driven_names = DRIVEN if options.execute else ()
-    bound_names = ("cost/bound median",) if options.bound else ()
+    bound_names = (
+        [f"cost/bound {name}" for name in (*moments(options), "median")]
+        if options.bound
+        else []
+    )
     return " | ".join(("scene", "ok", *COLUMNS, *bound_names, *driven_names))
 
 
@@ -180,6 +213,9 @@ def table_row(
             f"{statistics.median(row['cost_m'] for row in solved):.1f}",
         ]
     if solved and options.bound:
+        for name in moments(options):
+            of_moment = [row["cost_to_bound_after"][name] for row in solved]
+            cells.append(f"{statistics.median(of_moment):.3f}")
         cells.append(f"{statistics.median(row['cost_to_bound'] for row in solved):.3f}")
     if solved and options.execute:
         cells += [

@@ -26,6 +26,8 @@ class PlannerParams:
         trees: trees grown at most; a tree that fails is followed by one with new draws.
         improvements: further trees grown after the first plan; the cheapest plan
             counts.
+        refinements: times that the plan of each tree is drawn tight and driven again,
+            as long as that saves energy.
         group_alpha, group_beta, group_lambda: alpha, beta, lambda of eq. (5).
         group_bias: probability of taking the group of largest weight instead of
             drawing.
@@ -53,7 +55,8 @@ class PlannerParams:
     steps: int = 15
     max_vertices: int = 6000
     trees: int = 12
-    improvements: int = 3
+    improvements: int = 1
+    refinements: int = 2
     group_alpha: float = 1.0
     group_beta: float = 4.0
     group_lambda: float = 0.98
@@ -77,6 +80,7 @@ class PlannerParams:
             "max_vertices": self.max_vertices >= 2,
             "trees": self.trees >= 1,
             "improvements": self.improvements >= 0,
+            "refinements": self.refinements >= 0,
             "group_lambda": 0.0 < self.group_lambda <= 1.0,
             "group_bias": 0.0 <= self.group_bias <= 1.0,
             "steer_start": 0.0 <= self.steer_start <= 1.0,
@@ -131,6 +135,7 @@ def _profile(profile: str, budget_s: float | None) -> PlannerParams:
             max_vertices=60_000,
             trees=2,
             improvements=0,
+            refinements=0,
             steer_decay=0.9999,
             steer_least=0.5,
         )

@@ -66,7 +66,7 @@ def plan_mission(
         raise UsageError(f"workers = {workers}; planning needs at least 1")
     compile_kernels()
     statistics = Statistics()
-    problem = _problem(scene, seed, params)
+    problem = state_mission(scene, seed, params)
     statistics.time_s["init"] = statistics.elapsed()
     tell(0.1, "roadmap built")
 
@@ -127,11 +127,14 @@ def compile_kernels() -> None:
         "robots": [{"id": "r", "model": "car", "pose": [5, 5, 0]}],
     }
     scene = scene_from_document(document, source="smallest mission")
-    attempt_plan(_problem(scene, 0, params), 0, params, 0, np.zeros(1, np.bool_))
+    attempt = attempt_plan(
+        state_mission(scene, 0, params), 0, params, 0, np.zeros(1, np.bool_)
+    )
+    assert attempt.plans, "the smallest mission has a plan, or not all is compiled"
     lower_bound_J(scene)
 
 
-def _problem(scene: Scene, seed: int, params: PlannerParams) -> Problem:
+def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
     """Build the roadmap, denser while it does not join all goals, and the problem."""
     world = World.from_scene(scene)
     samples = params.samples

@@ -71,9 +71,9 @@ class Search:
                 for attempt in self._attempts(pool):
                     number += 1
                     self.statistics.add(dict(attempt.counts), attempt.routing_s)
-                    if attempt.plan is not None:
-                        found += 1
-                        self._take(attempt.plan, attempt.found_at)
+                    found += bool(attempt.plans)
+                    for found_at, plan in attempt.plans:
+                        self._take(plan, found_at)
                     self.on_progress(self._fraction(number, found), f"{found} plans")
                     if self._enough(number, found):
                         break

@@ -109,7 +109,7 @@ def test_statistics_have_all_counts_and_times(name: str) -> None:
     if name == "two_swap":
         assert statistics["vertices"] >= statistics["groups"] > 0
         assert statistics["expansions"] >= statistics["vertices"] - 4
-        assert statistics["router_calls"] >= 4
+        assert statistics["router_calls"] >= 2
 
 
 def test_progress_grows_from_the_roadmap_to_the_end() -> None:

@@ -49,8 +49,10 @@ def made(number: int, halt: np.ndarray) -> Attempt:
     """Return the given outcome, late attempts sooner than early ones."""
     time.sleep(0.02 / (1 + number))
     cost_J = COSTS[number % len(COSTS)]
-    plan: Any = None if cost_J is None else Priced(number, cost_J)
-    return Attempt(plan, time.perf_counter(), 0.001, {"vertices": 1})
+    if cost_J is None:
+        return Attempt(counts={"vertices": 1})
+    found: Any = Priced(number, cost_J)
+    return Attempt([(time.perf_counter(), found)], 0.001, {"vertices": 1})
 
 
 @pytest.mark.parametrize("workers", [1, 2, 5])
@@ -91,7 +93,7 @@ def test_no_time_means_no_attempt() -> None:
 
 def test_finding_nothing_ends_even_with_time_left() -> None:
     def nothing(number: int, halt: np.ndarray) -> Attempt:
-        return Attempt(None, time.perf_counter(), 0.0, {"vertices": 1})
+        return Attempt(counts={"vertices": 1})
 
     work = search(PlannerParams(budget_s=600.0, trees=2), 1, nothing)
     assert work.run() is None

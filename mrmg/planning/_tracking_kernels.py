@@ -1,0 +1,211 @@
+"""Driving a fleet along given paths in closed loop, safely."""
+
+from __future__ import annotations
+
+from math import atan, atan2, hypot, pi, sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.compilation import kernel
+from mrmg.motion._kernels import UNICYCLE, step
+from mrmg.planning._safety_kernels import (
+    braking_control,
+    follow_braking,
+    new_commitment,
+    present_state,
+    stands,
+    try_control,
+    write_braking,
+)
+from mrmg.planning._steering_kernels import control_towards, wrap
+
+STIFFNESS = 0.8
+"""How fast a robot returns to its path: errors decay over about 1 / STIFFNESS [1/m]."""
+
+PREVIEW_S = 0.2
+"""How far ahead the path's curvature is read."""
+
+ARRIVED_M = 0.03
+"""Way left at which a robot stops."""
+
+ALIGNED = 0.15
+"""Steering error up to which a standing robot sets out [rad]."""
+
+STRAYED_M = 1.0
+"""Distance from the path at which driving is given up."""
+
+STUCK_STEPS = 150
+"""Steps without anybody getting on after which driving is given up."""
+
+ATTEMPTS = 3
+"""Controls tried before a robot brakes as committed."""
+
+
+class Courses(NamedTuple):
+    """The fleet's paths, padded to one length.
+
+    Attributes:
+        node: shape (R, N, 2).
+        gear: of each segment, shape (R, N).
+        bend: curvature at each node, left positive in the direction of travel (R, N).
+        way: way to each node [m], shape (R, N).
+        end: number of the node at which the segment's stretch of one gear ends, (R, N).
+        nodes: number of nodes of each path, shape (R,).
+        ease: deceleration that costs nothing [m/s^2], shape (R,).
+    """
+
+    node: np.ndarray
+    gear: np.ndarray
+    bend: np.ndarray
+    way: np.ndarray
+    end: np.ndarray
+    nodes: np.ndarray
+    ease: np.ndarray
+
+
+@kernel
+def advance(courses, r, i, x, y):
+    """Return (segment, way along the path) nearest to a point, from segment i on."""
+    while True:
+        ax, ay = courses.node[r, i, 0], courses.node[r, i, 1]
+        bx, by = courses.node[r, i + 1, 0] - ax, courses.node[r, i + 1, 1] - ay
+        size = hypot(bx, by)
+        along = ((x - ax) * bx + (y - ay) * by) / max(size, 1e-9)
+        if along < size or i + 1 >= courses.end[r, i]:
+            return i, courses.way[r, i] + along
+        i += 1
+
+
+@kernel
+def bend_at(courses, r, i, s):
+    """Return the curvature of the path at a way, within the stretch of segment i."""
+    last = courses.end[r, i]
+    while i + 1 < last and courses.way[r, i + 1] < s:
+        i += 1
+    size = courses.way[r, i + 1] - courses.way[r, i]
+    t = min(1.0, max(0.0, (s - courses.way[r, i]) / max(size, 1e-9)))
+    return courses.bend[r, i] + t * (courses.bend[r, i + 1] - courses.bend[r, i])
+
+
+@kernel
+def follow(fleet, courses, r, i, state):
+    """Return (segment, way left in this gear, off the path, wanted v, wanted w)."""
+    i, s = advance(courses, r, i, state[0], state[1])
+    ax, ay = courses.node[r, i, 0], courses.node[r, i, 1]
+    bx, by = courses.node[r, i + 1, 0] - ax, courses.node[r, i + 1, 1] - ay
+    size = max(hypot(bx, by), 1e-9)
+    tx, ty = bx / size, by / size
+    gear = courses.gear[r, i]
+    off = tx * (state[1] - ay) - ty * (state[0] - ax)
+    heading = state[2] if gear > 0 else state[2] + pi
+    # The chord's direction, turned to the tangent's at this place.
+    t = min(1.0, max(0.0, (s - courses.way[r, i]) / size))
+    first, second = courses.bend[r, i], courses.bend[r, i + 1]
+    swing = 0.5 * size * (t * t * second - (1.0 - t) ** 2 * first)
+    tangent = atan2(ty, tx) + swing
+    askew = wrap(heading - tangent)
+    left = courses.way[r, courses.end[r, i]] - s
+    top = fleet[r].limit[1] if gear > 0 else -fleet[r].limit[0]
+    ease = courses.ease[r]
+    v = min(top, sqrt(2.0 * ease * max(left - 0.5 * ARRIVED_M, 0.0)) + 0.02)
+    ahead = s + max(abs(state[3]), 0.2) * PREVIEW_S
+    bend = bend_at(courses, r, i, ahead)
+    bend -= STIFFNESS * STIFFNESS * off + 2.0 * STIFFNESS * sin(askew)
+    if fleet[r].model == UNICYCLE:
+        v = min(v, fleet[r].limit[2] / max(abs(bend), 1e-9))
+        w = bend * v
+    else:
+        w = atan(gear * fleet[r].wheelbase * bend)
+    w = max(-fleet[r].limit[2], min(fleet[r].limit[2], w))
+    standing = abs(state[3]) < 0.05 and fleet[r].model != UNICYCLE
+    if standing and abs(w - state[4]) > ALIGNED:
+        v = 0.0
+    return i, left, off, gear * v, w
+
+
+@kernel
+def track_step(fleet, spaces, commitment, decided, r, v, w, dt):
+    """Drive one robot one step as near to (v, w) as is safe; return its control."""
+    state = present_state(commitment, r).copy()
+    for attempt in range(ATTEMPTS):
+        slower = 1.0 - 0.5 * attempt
+        u1, u2 = control_towards(fleet, r, state, v * slower, w, dt)
+        if try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):
+            return u1, u2
+    u1, u2 = braking_control(fleet, r, state, dt)
+    follow_braking(commitment, r)
+    return u1, u2
+
+
+@kernel
+def drive(fleet, spaces, courses, given, start, order, dt, control, halt):
+    """Drive the fleet to the ends of its paths.
+
+    Args:
+        fleet, spaces: robots and their free spaces.
+        courses: their paths.
+        given: number of steps for which each robot follows the controls that it finds
+            in `control`, before it takes to its path, shape (R,).
+        start: state of each robot, shape (R, 5).
+        order: robots in order of right of way, shape (R,).
+        dt: step [s].
+        control: receives the controls, shape (K, R, 2).
+        halt: shape (1,); driving ends once it has turned true.
+
+    Returns:
+        (steps until all stand at their ends, -1) or, if it fails, (steps, the robot
+        that did not get on).
+    """
+    robots = len(fleet)
+    commitment = new_commitment(fleet, dt)
+    decided = np.zeros(robots, np.bool_)
+    segment = np.zeros(robots, np.int64)
+    still = np.zeros(robots, np.int64)
+    done = courses.nodes < 2
+    for r in range(robots):
+        write_braking(fleet, r, start[r], dt, commitment, 0)
+    for n in range(len(control)):
+        rest = True
+        for r in range(robots):
+            rest &= done[r] and n >= given[r]
+            rest &= stands(fleet, r, present_state(commitment, r))
+        if rest:
+            return n, -1
+        if halt[0]:
+            break
+        decided[:] = False
+        for k in range(robots):
+            r = order[k]
+            state = present_state(commitment, r).copy()
+            still[r] = 0 if abs(state[3]) > 1e-3 or done[r] else still[r] + 1
+            if n < given[r]:
+                still[r] = 0
+                u1, u2 = control[n, r, 0], control[n, r, 1]
+                if not try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):
+                    return n, r
+            elif done[r]:
+                u1, u2 = braking_control(fleet, r, state, dt)
+                follow_braking(commitment, r)
+            else:
+                i, left, off, v, w = follow(fleet, courses, r, segment[r], state)
+                segment[r] = i
+                if abs(off) > STRAYED_M or still[r] > STUCK_STEPS:
+                    return n, r
+                if left < ARRIVED_M:
+                    v = 0.0
+                    if stands(fleet, r, state):
+                        still[r] = 0
+                        done[r] = courses.end[r, i] + 1 >= courses.nodes[r]
+                        segment[r] = i if done[r] else courses.end[r, i]
+                u1, u2 = track_step(fleet, spaces, commitment, decided, r, v, w, dt)
+            control[n, r, 0], control[n, r, 1] = u1, u2
+            decided[r] = True
+    return len(control), order[robots - 1]
+
+
+@kernel
+def write_states(model, wheelbase, dt, control, state):
+    """Write the states that controls, shape (n, 2), lead to from state[0]."""
+    for k in range(len(control)):
+        step(model, state[k], control[k, 0], control[k, 1], wheelbase, dt, state[k + 1])

@@ -1,0 +1,49 @@
+"""Putting a plan together from the trajectories that were found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib.metadata import version
+
+from mrmg.accounting import battery_profile, find_visits, plan_ledger
+from mrmg.mission import Plan, Trajectory, Visit
+from mrmg.planning.motion_tree import Problem
+from mrmg.planning.parameters import PlannerParams
+
+
+def make_plan(
+    problem: Problem,
+    seed: int,
+    params: PlannerParams,
+    trajectories: Sequence[Trajectory],
+    tours: Mapping[str, tuple[str, ...]],
+) -> Plan | None:
+    """Return the plan of trajectories, or None if exact accounting refuses it.
+
+    Kernels meter terrain on a grid; the ledger uses the exact areas.
+    """
+    scene = problem.scene
+    visits: list[Visit] = []
+    for trajectory in trajectories:
+        own = find_visits(scene, trajectory, tours[trajectory.robot])
+        battery = scene.robot(trajectory.robot).battery
+        if battery_profile(scene, trajectory, own).min() < battery.reserve_J:
+            return None
+        visits += own
+    visits.sort(key=lambda visit: (visit.step, visit.robot))
+    return Plan(
+        scene_name=scene.name,
+        scene_digest=scene.digest,
+        seed=seed,
+        profile=params.profile,
+        parameters_digest=params.digest,
+        versions={
+            name: version(name)
+            for name in ("mrmg", "numba", "numpy", "scipy", "shapely")
+        },
+        dt_s=params.dt_s,
+        trajectories=tuple(trajectories),
+        tours=tours,
+        visits=tuple(visits),
+        ledger=plan_ledger(scene, trajectories, visits),
+    )
