@@ -27,8 +27,10 @@ RESERVE = "#B00020"
 _HATCHES = ("..", "//", "xx", "\\\\", "++")
 _PALENESS = 0.25
 _WHITE = (1.0, 1.0, 1.0)
-_DARKEST_LUMINANCE = 0.26
-"""Lines of it have a contrast of 3.4 on white."""
+_LUMINANCES = (0.26, 0.26, 0.26, 0.26, 0.10, 0.10, 0.06, 0.26)
+"""How light the robots' colours may be, in the palette's order. Lines of 0.26 have a
+contrast of 3.4 on white; those of hues that colour-blind eyes would take for another
+are darker, so that lightness tells them apart."""
 _LIGHTEST_LUMINANCE = 0.22
 """Lines of it have a contrast of 4.3 on the dark page's cards."""
 
@@ -71,7 +73,10 @@ def terrain_classes(scene: Scene) -> dict[float, TerrainClass]:
 
 def robot_colors(robots: Sequence[str]) -> dict[str, str]:
     """Return a colour by robot id (scene's order) that is dark enough for lines."""
-    return {robot: _ink(palette.robot_colour(at)) for at, robot in enumerate(robots)}
+    return {
+        robot: _ink(palette.robot_colour(at), _LUMINANCES[at % len(_LUMINANCES)])
+        for at, robot in enumerate(robots)
+    }
 
 
 def robot_colors_on_dark(robots: Sequence[str]) -> dict[str, str]:
@@ -105,9 +110,9 @@ def rgb(color: str) -> tuple[int, int, int]:
     return int(color[1:3], 16), int(color[3:5], 16), int(color[5:7], 16)
 
 
-def _ink(color: palette.Rgb) -> str:
+def _ink(color: palette.Rgb, luminance: float) -> str:
     red, green, blue = color
-    scale = min(1.0, (_DARKEST_LUMINANCE / _luminance(color)) ** (1 / 2.2))
+    scale = min(1.0, (luminance / _luminance(color)) ** (1 / 2.2))
     return _hex((red * scale, green * scale, blue * scale))
 
 
