@@ -9,8 +9,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from mrmg.errors import Fault, FileError
+from mrmg.errors import Fault, FileError, UsageError
 from mrmg.execution import palette, scenery
+from mrmg.motion.dynamics import DERIVATIVES
 from mrmg.scene.types import Robot, Scene
 
 PHYSICS_STEP_S = 0.004
@@ -136,6 +137,12 @@ def _set_appearance(spec: mujoco.MjSpec, scene: Scene) -> None:
 def _attach(spec: mujoco.MjSpec, robot: Robot, colour: palette.Rgb) -> None:
     """Attach the robot's MJCF at its start pose, its names prefixed with `<id>/`."""
     path = robot.model.mjcf
+    if path is None or robot.model.motion_model not in DERIVATIVES:
+        lacking = "no MJCF file" if path is None else "a motion of its own"
+        raise UsageError(
+            f"{robot.id}: model '{robot.model.name}' has {lacking}; its missions can "
+            "be planned for and verified, but not driven in MuJoCo"
+        )
     try:
         car = mujoco.MjSpec.from_file(str(path))
     except (ValueError, OSError) as error:

@@ -13,8 +13,9 @@ model's own; control is (u1, u2); waypoint (x, y); limits (v_min, v_max, w_max, 
 u2_max); length is the model's `wheelbase`. `share` 0 asks to brake: under it the robot
 must come to rest, v and w at 0, within a second or so from any state. Units are SI.
 
-The planner compiles both and calls them by address, so that they run as fast as the
-shipped models; the verifier runs `step` as it is.
+The planner compiles both with numba and calls them by address, so that they run as fast
+as the shipped models; other functions of the file that they call need `numba.njit`. The
+verifier runs `step` as it is.
 """
 
 from __future__ import annotations

@@ -361,3 +361,30 @@ def test_between_regions_it_is_no_longer_than_between_their_points() -> None:
                 shapely.get_point(s.exterior, int(rng.integers(0, 60))) for s in (a, b)
             )
             assert between <= shortest_way_m(p, q, wall) + 1e-9
+
+
+# --- finishes ----------------------------------------------------------------------
+
+
+def finish(x: float, y: float, radius: float = 0.1) -> dict[str, Any]:
+    return {"finish": {"circle": {"center": [x, y], "radius": radius}}}
+
+
+def test_a_finish_inside_a_ring_is_unreachable_and_named(yard: MakeScene) -> None:
+    robots = [car("r1", 4, 10, **finish(16, 10))]
+    scene = yard(obstacles=[RING], robots=robots)
+    assert "finish of r1 is unreachable" in str(proof_of_infeasibility(scene))
+
+
+@pytest.mark.parametrize(("apart_m", "crowded"), [(0.0, True), (0.4, True), (3, False)])
+def test_two_robots_cannot_end_in_one_place(
+    yard: MakeScene, apart_m: float, crowded: bool
+) -> None:
+    robots = [
+        car("r1", 4, 5, **finish(20, 10)),
+        car("r2", 4, 15, **finish(20 + apart_m, 10)),
+    ]
+    proof = proof_of_infeasibility(yard(robots=robots))
+    assert (proof is not None) == crowded
+    if crowded:
+        assert "r1 and r2 cannot both stand at their finishes" in str(proof)
