@@ -376,7 +376,7 @@ def test_a_finish_inside_a_ring_is_unreachable_and_named(yard: MakeScene) -> Non
     assert "finish of r1 is unreachable" in str(proof_of_infeasibility(scene))
 
 
-@pytest.mark.parametrize(("apart_m", "crowded"), [(0.0, True), (0.4, True), (3, False)])
+@pytest.mark.parametrize(("apart_m", "crowded"), [(0.0, True), (0.3, True), (3, False)])
 def test_two_robots_cannot_end_in_one_place(
     yard: MakeScene, apart_m: float, crowded: bool
 ) -> None:
