@@ -11,16 +11,14 @@ from mrmg.errors import ExitCode
 from mrmg.execution.disturbance_spec import written_out
 from mrmg.mission import PlanStatus
 from mrmg.results.gl_backend import choose_backend
+from mrmg.run_arguments import DEFAULT_VIDEO, RunArguments, VideoArguments
 from mrmg.run_folder import RunFolder, Step
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
 from mrmg.steps import (
-    DEFAULT_VIDEO,
     OnImprovement,
     Run,
-    RunArguments,
     StepProgress,
-    VideoArguments,
 )
 
 

@@ -50,7 +50,12 @@ OUTPUTS: dict[Step, tuple[str, ...]] = {
 """Files each step leaves; the last one is written last."""
 
 ON_REQUEST: dict[Step, tuple[str, ...]] = {
-    Step.EXECUTE: ("driven_plan.npz", "driven_plan.json", "replans.json"),
+    Step.EXECUTE: (
+        "driven_plan.npz",
+        "driven_plan.json",
+        "replans.json",
+        "capsule.zip",
+    ),
     Step.RENDER: ("mission.gif",),
 }
 """Files a step leaves besides, when asked to or when there is reason to."""

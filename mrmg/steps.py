@@ -15,15 +15,17 @@ from typing import TYPE_CHECKING, Any
 
 import mrmg
 from mrmg import storage
-from mrmg.errors import ExitCode
+from mrmg.errors import ExitCode, MrmgError
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan, PlanStatus, plan_in_force
+from mrmg.run_arguments import RunArguments
 from mrmg.run_folder import NEEDS, RunFolder, Step
 from mrmg.scene.loading import dump_scene, load_scene
 from mrmg.scene.types import Scene
 from mrmg.shipped import models_folder
 
 if TYPE_CHECKING:
+    from mrmg.capsule import Failure
     from mrmg.mission_control import Drive
     from mrmg.planning import Improvement
 
@@ -35,80 +37,6 @@ OnImprovement = Callable[["Improvement"], None]
 
 Write = Callable[[], None]
 """Puts the outcome of a step that has been worked out into the run folder."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class VideoArguments:
-    """How the video is made.
-
-    Attributes:
-        view: "top", "chase" or "split".
-        speed: simulated seconds shown per second; None fits the mission to half a
-            minute.
-        size: width and height in pixels.
-        fps: frames per second.
-        robot: id of the robot a chase camera follows; None takes the first.
-        from_s, to_s: the part of the mission; None goes to its end.
-        gif: make a GIF, too.
-    """
-
-    view: str = "top"
-    speed: float | None = None
-    size: tuple[int, int] = (1280, 720)
-    fps: int = 30
-    robot: str | None = None
-    from_s: float = 0.0
-    to_s: float | None = None
-    gif: bool = False
-
-
-DEFAULT_VIDEO = VideoArguments()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunArguments:
-    """Everything but the scene that decides what a run leaves.
-
-    Attributes:
-        seed: of all random streams.
-        profile: "default" or "paper".
-        budget_s: wall-clock limit of planning; None for none.
-        trees: number of motion trees to grow; None for the profile's.
-        workers: threads that grow them; without a time limit they decide nothing.
-        controller: name of the tracking controller.
-        disturb: specification of the disturbances driven under; None for none.
-        disturb_seed: of what is drawn from them.
-        replan: whether to plan anew where the mission leaves its plan.
-        faults: robots that break down on the way, such as `r2@40s`.
-        video: how the video is made.
-    """
-
-    seed: int = 0
-    profile: str = "default"
-    budget_s: float | None = None
-    trees: int | None = None
-    workers: int = 1
-    controller: str = "mpc"
-    disturb: str | None = None
-    disturb_seed: int = 0
-    replan: bool = False
-    faults: tuple[str, ...] = ()
-    video: VideoArguments = DEFAULT_VIDEO
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the arguments as JSON data."""
-        return asdict(self)
-
-    @staticmethod
-    def from_json(data: dict[str, Any]) -> RunArguments:
-        """Rebuild arguments from `to_json`."""
-        video = data.get("video", {})
-        if "size" in video:
-            video = {**video, "size": tuple(video["size"])}
-        faults = tuple(data.get("faults", ()))
-        return RunArguments(
-            **{**data, "video": VideoArguments(**video), "faults": faults}
-        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -293,9 +221,36 @@ def drive(
 
 
 def _execute(run: Run) -> Write:
+    from mrmg.capsule import Failure
+
     progress = run.progress_of(Step.EXECUTE)
-    driven = drive(run.scene, run.plan(), run.arguments, progress)
-    return lambda: driven.save(run.folder.path)
+    try:
+        driven = drive(run.scene, run.plan(), run.arguments, progress)
+    except MrmgError:
+        raise
+    except Exception as error:
+        path = _keep(run, Failure.of_crash(error))
+        error.add_note(f"{path} keeps all that is needed to make this happen again")
+        raise
+
+    def write() -> None:
+        from mrmg.results.audit import audit
+
+        driven.save(run.folder.path)
+        account = audit(run.scene, driven.plan, driven.log)
+        if not account.mission_ok:
+            _keep(run, Failure.of(driven.log, account.causes, account.reasons))
+
+    return write
+
+
+def _keep(run: Run, failure: Failure) -> Path:
+    """Leave a capsule of an execution that failed."""
+    from mrmg.capsule import CAPSULE_FILE, Capsule
+
+    path = run.folder.file(CAPSULE_FILE)
+    Capsule.of_run(run.folder.path, run.arguments.to_json(), failure).save(path)
+    return path
 
 
 def _audit(run: Run) -> Write:

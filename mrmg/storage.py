@@ -62,9 +62,14 @@ def read_json(path: Path) -> Any:
 
 def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
     """Write named arrays to an `.npz` without pickle, atomically and byte-stable."""
+    write_bytes(path, array_bytes(arrays))
+
+
+def array_bytes(arrays: Mapping[str, np.ndarray]) -> bytes:
+    """Return named arrays as the content of an `.npz` without pickle, byte-stable."""
     buffer = io.BytesIO()
     np.savez_compressed(buffer, allow_pickle=False, **dict(sorted(arrays.items())))
-    write_bytes(path, buffer.getvalue())
+    return buffer.getvalue()
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
@@ -73,12 +78,25 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
     Raises:
         ValueError: if the file is damaged.
     """
+    return arrays_of(path.read_bytes(), path.name)
+
+
+def arrays_of(content: bytes, name: str) -> dict[str, np.ndarray]:
+    """Return the arrays of an `.npz`; refuses pickled content.
+
+    Args:
+        content: of the file.
+        name: what an error calls it.
+
+    Raises:
+        ValueError: if it is damaged.
+    """
     try:
-        with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[name] for name in archive.files}
+        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
+            return {key: archive[key] for key in archive.files}
     except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError) as error:
         # RuntimeError covers a flipped flag that makes a member look encrypted.
-        raise ValueError(f"{path.name} is damaged: {error}") from error
+        raise ValueError(f"{name} is damaged: {error}") from error
 
 
 def user_cache_folder() -> Path:

@@ -10,9 +10,10 @@ from mrmg import pipeline
 from mrmg.errors import ExitCode
 from mrmg.mission import Plan
 from mrmg.results.summary import summary_schema
+from mrmg.run_arguments import RunArguments, VideoArguments
 from mrmg.run_folder import OUTPUTS, RunFolder, Step
 from mrmg.scene.loading import load_scene
-from mrmg.steps import RunArguments, VideoArguments, taken_up
+from mrmg.steps import taken_up
 
 MADE_WITHOUT_VIDEO = [step for step in Step if step is not Step.RENDER]
 

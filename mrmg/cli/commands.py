@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def run(options: argparse.Namespace) -> int:
     """Do the whole mission."""
     from mrmg import pipeline
-    from mrmg.steps import DEFAULT_VIDEO
+    from mrmg.run_arguments import DEFAULT_VIDEO
 
     terminal.announce_compilation()
     with terminal.progress() as told:
@@ -48,9 +48,10 @@ def run(options: argparse.Namespace) -> int:
 def plan(options: argparse.Namespace) -> int:
     """Plan, and start a run folder."""
     from mrmg.pipeline import default_folder
+    from mrmg.run_arguments import RunArguments
     from mrmg.run_folder import RunFolder, Step
     from mrmg.scene.loading import load_scene
-    from mrmg.steps import Run, RunArguments
+    from mrmg.steps import Run
 
     terminal.announce_compilation()
     scene = load_scene(options.scene)

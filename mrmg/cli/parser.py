@@ -10,6 +10,7 @@ from mrmg.cli import (
     calibrate_command,
     commands,
     control_arguments,
+    replay_command,
     robustness_commands,
     scene_commands,
     show_commands,
@@ -40,6 +41,7 @@ def make_parser() -> argparse.ArgumentParser:
     _add_plan(verbs)
     _add_steps(verbs)
     robustness_commands.add_robustness(verbs)
+    replay_command.add_replay(verbs)
     _add_render(verbs)
     _add_compare(verbs)
     _add_figure(verbs)
@@ -210,10 +212,13 @@ def _add_view(verbs: _Verbs) -> None:  # type: ignore[type-arg]
         help="default: window where there is a screen, else browser",
     )
     view.add_argument(
-        "--host", default="127.0.0.1", help="address the page is served on"
+        "--host", default=show_commands.LOCAL_HOST, help="address the page is served on"
     )
     view.add_argument(
-        "--port", type=values.count, default=8080, help="port of the page; default 8080"
+        "--port",
+        type=values.count,
+        default=show_commands.PORT,
+        help="port of the page; default 8080",
     )
     view.set_defaults(command=show_commands.view)
 

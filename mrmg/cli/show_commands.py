@@ -10,6 +10,9 @@ from pathlib import Path
 from mrmg.cli import terminal
 from mrmg.errors import ExitCode
 
+LOCAL_HOST = "127.0.0.1"
+PORT = 8080
+
 
 def compare(options: argparse.Namespace) -> int:
     """Set runs side by side: a table, and a page with their courses."""
@@ -37,22 +40,38 @@ def figure(options: argparse.Namespace) -> int:
 
 def view(options: argparse.Namespace) -> int:
     """Show a run or a scene in three dimensions, until told to stop."""
+    return watch(
+        options.source, place=options.place, host=options.host, port=options.port
+    )
+
+
+def watch(
+    source: str, *, place: str | None = None, host: str = LOCAL_HOST, port: int = PORT
+) -> int:
+    """Show a run or a scene until told to stop.
+
+    Args:
+        source: run folder, scene file or name of a shipped scene.
+        place: "window" or "browser"; None for a window where there is a screen.
+        host: address a page is served on.
+        port: of the page.
+    """
     from mrmg.results.replay import replay_of
     from mrmg.scene.loading import load_scene
 
-    if (Path(options.source) / "run.json").exists():
-        replay = replay_of(Path(options.source))
+    if (Path(source) / "run.json").exists():
+        replay = replay_of(Path(source))
         scene = replay.film.scene
     else:
-        replay, scene = None, load_scene(options.source)
-    if (options.place or ("window" if _has_screen() else "browser")) == "window":
+        replay, scene = None, load_scene(source)
+    if (place or ("window" if _has_screen() else "browser")) == "window":
         from mrmg.results.native_view import open_window
 
         open_window(scene, replay)
         return ExitCode.OK
     from mrmg.results.browser_view import BrowserView
 
-    page = BrowserView(scene, replay, host=options.host, port=options.port)
+    page = BrowserView(scene, replay, host=host, port=port)
     print(f"{scene.name}: open {page.address} in a browser; Ctrl-C ends", flush=True)
     try:
         page.run()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,14 @@ from mrmg.execution.supervision import Event
 LOG_FORMAT = 1
 
 _NOT_PLAIN = ("contacts", "disturbance", "events", "timing")
+
+
+_DECIDING = ("mujoco", "casadi", "numpy", "scipy", "shapely")
+
+
+def package_versions() -> dict[str, str]:
+    """Return the versions of the packages that decide what a simulation gives."""
+    return {name: version(name) for name in _DECIDING}
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from importlib.metadata import version
 
 import mujoco
 import numpy as np
@@ -21,7 +20,7 @@ from mrmg.execution.drive import DriveControl
 from mrmg.execution.fleet import Fleet
 from mrmg.execution.fleet_clock import FleetClock
 from mrmg.execution.ground import believed_resistance, true_resistance
-from mrmg.execution.log import ExecutionLog
+from mrmg.execution.log import ExecutionLog, package_versions
 from mrmg.execution.recording import Recording
 from mrmg.execution.reference import FleetReference, speed_states
 from mrmg.execution.sensing import sensing_of
@@ -52,7 +51,6 @@ _DIVERGED = (
     mujoco.mjtWarning.mjWARN_BADQACC,
     mujoco.mjtWarning.mjWARN_BADCTRL,
 )
-_VERSIONED = ("mujoco", "casadi", "numpy", "scipy", "shapely")
 
 Progress = Callable[[float, str], None]
 
@@ -158,6 +156,7 @@ class _Run:
         self._actuation = Actuation(disturbance, self._set_points.following[:, 1])
         self._settle()
         self._observe()
+        self._record()
 
     def tick(self) -> None:
         """Advance the simulation by one control period."""
@@ -179,10 +178,13 @@ class _Run:
         work = self._fleet.drive(force, steer_from, steer_to, STEPS_PER_TICK)
         self._clock.advance(self._period_s)
         self.ticks += 1
-        self._recording.add(force_N=force, work_J=work)
         self._work_J = work
-        self._contacts.look(self.data)
         self._observe()
+        # A state that is no number ends the run; the log keeps what came before it.
+        if self._sound():
+            self._recording.add(force_N=force, work_J=work)
+            self._contacts.look(self.data)
+            self._record()
 
     def ended(self) -> bool:
         """Tell whether the fleet is at rest after its plan, or is past helping."""
@@ -232,7 +234,7 @@ class _Run:
             gave_up="" if self._completed() else self._trouble(),
             disturbance=self._disturbance,
             robots=tuple(robot.id for robot in scene.robots),
-            versions={name: version(name) for name in _VERSIONED},
+            versions=package_versions(),
             time_s=recording.in_time("time_s"),
             clock_s=recording.in_time("clock_s"),
             state=state,
@@ -309,6 +311,12 @@ class _Run:
             self._finished_s = min(self._finished_s, self.data.time)
         if finished or self._clock.rate > _STALLED_RATE:
             self._got_on_s = self.data.time
+
+    def _sound(self) -> bool:
+        """Tell whether robots and plan are at places that are numbers."""
+        return bool(np.isfinite(self._state).all() and np.isfinite(self._planned).all())
+
+    def _record(self) -> None:
         self._recording.add(
             time_s=self.data.time,
             clock_s=self._clock_s(),
@@ -329,10 +337,10 @@ class _Run:
     def _trouble(self) -> str:
         """Return why the fleet is past helping, in the log's words; "" if it is not."""
         off_m = np.hypot(*(self._state - self._planned)[:, :2].T)
-        if any(self.data.warning[kind].number for kind in _DIVERGED):
+        warned = any(self.data.warning[kind].number for kind in _DIVERGED)
+        if warned or not self._sound():
             return "diverged"
-        # Written so that a state that is not a number counts as lost.
-        if not (off_m <= _LOST_M).all():
+        if (off_m > _LOST_M).any():
             return "lost"
         if self.data.time - self._got_on_s > _LONGEST_STALL_S:
             return "stalled"

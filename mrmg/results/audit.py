@@ -92,15 +92,19 @@ def audit(scene: Scene, plan: Plan, log: ExecutionLog) -> EnergyAudit:
         tuple(entry for item in measured for entry in _measured_entries(item))
     )
     goals_visited = _goals_visited(scene, log)
-    reasons = (
-        *_unfinished(log),
-        *_given_up(log, missed=len(goals_visited) < len(scene.goals)),
-        *_goals_missed(scene, goals_visited),
-        *_contacts(log),
-        *_run_down(scene, log, measured),
-    )
+    failures = {
+        log.gave_up or "unfinished": _unfinished(log),
+        "ended": _given_up(log, missed=len(goals_visited) < len(scene.goals)),
+        "goal missed": _goals_missed(scene, goals_visited),
+        "contact": _contacts(log),
+        "battery empty" if log.disturbance else "below reserve": _run_down(
+            scene, log, measured
+        ),
+    }
+    reasons = tuple(reason for found in failures.values() for reason in found)
     return EnergyAudit(
         mission_ok=not reasons,
+        causes=tuple(cause for cause, found in failures.items() if found),
         reasons=reasons,
         robots=tuple(
             _robot_audit(

@@ -68,6 +68,9 @@ class EnergyAudit:
         mission_ok: all goals visited, no contact, no battery below its reserve (under
             disturbances: none empty), and the simulation ran to the end.
         reasons: why not, one sentence each.
+        causes: the kinds of these reasons: why the simulation was given up
+            (`ExecutionLog.gave_up`), "ended" by mission control, "goal missed",
+            "contact", "below reserve" or, under disturbances, "battery empty".
         robots: one account per robot, in the scene's order.
         visits: of tours' targets in the simulation, in order of time.
         goals_visited: ids of the goals some robot entered, in the scene's order.
@@ -83,6 +86,7 @@ class EnergyAudit:
     planned: EnergyLedger
     metered: EnergyLedger
     measured: EnergyLedger
+    causes: tuple[str, ...] = ()
 
     @property
     def recharges(self) -> tuple[SimulatedVisit, ...]:
@@ -101,6 +105,7 @@ class EnergyAudit:
             {
                 "format": AUDIT_FORMAT,
                 "mission_ok": self.mission_ok,
+                "causes": list(self.causes),
                 "reasons": list(self.reasons),
                 "robots": [asdict(item) for item in self.robots],
                 "visits": [asdict(item) for item in self.visits],
@@ -134,6 +139,7 @@ def _audit_from(content: Mapping[str, Any]) -> EnergyAudit:
     ledgers = {name: EnergyLedger.from_rows(content[name]) for name in _LEDGERS}
     return EnergyAudit(
         mission_ok=content["mission_ok"],
+        causes=tuple(content.get("causes", ())),
         reasons=tuple(content["reasons"]),
         robots=tuple(RobotAudit(**row) for row in content["robots"]),
         visits=tuple(SimulatedVisit(**row) for row in content["visits"]),

@@ -43,8 +43,7 @@ class Trial:
     Attributes:
         seed: of its disturbance.
         feasible: whether the mission was done.
-        causes: kinds of failure: "contact", "battery empty", "goal missed", or why the
-            simulation was given up (`ExecutionLog.gave_up`).
+        causes: kinds of failure, as in `EnergyAudit`.
         reasons: the audit's sentences.
         goals_visited: number of goals.
         charge_fraction: least content of any battery over its actual capacity;
@@ -98,15 +97,12 @@ def assess_trial(scene: Scene, plan: Plan, log: ExecutionLog) -> Trial:
     actual = log.disturbance.actual_scene(scene)
     weakest = min(account.robots, key=lambda robot: robot.min_charge_fraction)
     capacity_J = actual.robot(weakest.robot).battery.capacity_J
-    visited = len(account.goals_visited)
     return Trial(
         seed=log.disturbance.seed,
         feasible=account.mission_ok,
-        causes=_causes(
-            scene, log, len(account.goals_visited), weakest.min_charge_fraction
-        ),
+        causes=account.causes,
         reasons=account.reasons,
-        goals_visited=visited,
+        goals_visited=len(account.goals_visited),
         charge_fraction=weakest.min_charge_fraction,
         charge_J=weakest.min_charge_fraction * capacity_J,
         charge_robot=weakest.robot,
@@ -122,18 +118,6 @@ def assess_trial(scene: Scene, plan: Plan, log: ExecutionLog) -> Trial:
         tracking_max_m=max(robot.tracking_max_m for robot in account.robots),
         duration_s=float(log.time_s[-1]),
     )
-
-
-def _causes(
-    scene: Scene, log: ExecutionLog, goals_visited: int, charge_fraction: float
-) -> tuple[str, ...]:
-    found = {
-        "contact": bool(log.contacts),
-        "battery empty": charge_fraction < 0.0,
-        "goal missed": goals_visited < len(scene.goals),
-        log.gave_up: not log.completed,
-    }
-    return tuple(cause for cause, holds in found.items() if holds)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

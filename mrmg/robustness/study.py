@@ -16,8 +16,9 @@ from mrmg.execution.disturbance_spec import written_out
 from mrmg.mission import PlanStatus
 from mrmg.results.robustness import Study, Trial, save_study
 from mrmg.robustness.trials import TrialJob, jobs_of, make_trial
+from mrmg.run_arguments import RunArguments
 from mrmg.run_folder import Step
-from mrmg.steps import Run, RunArguments
+from mrmg.steps import Run
 
 TRIALS_FOLDER = "trials"
 

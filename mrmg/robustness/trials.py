@@ -13,9 +13,10 @@ from pathlib import Path
 from mrmg import storage
 from mrmg.mission import Plan
 from mrmg.results.robustness import Trial, assess_trial
+from mrmg.run_arguments import RunArguments
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
-from mrmg.steps import RunArguments, drive
+from mrmg.steps import drive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

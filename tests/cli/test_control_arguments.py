@@ -18,8 +18,8 @@ from mrmg.results.compare import compare_runs
 from mrmg.results.figure import draw_figure
 from mrmg.results.replay import replay_of
 from mrmg.results.summary import summary_schema
+from mrmg.run_arguments import RunArguments
 from mrmg.scene.loading import scene_from_document
-from mrmg.steps import RunArguments
 
 CONTROL_FILES = ("driven_plan.json", "driven_plan.npz", "replans.json")
 

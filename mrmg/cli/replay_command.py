@@ -1,0 +1,75 @@
+"""The verb that makes a failed execution fail again."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mrmg.cli import show_commands, terminal
+from mrmg.errors import ExitCode
+
+if TYPE_CHECKING:
+    from mrmg.reproduction import Reproduction
+
+
+def add_replay(verbs: Any) -> None:
+    """Add the verb `replay`."""
+    verb = verbs.add_parser(
+        "replay",
+        help="repeat a failed execution from its capsule",
+        description="Repeat the execution of a capsule, which every failed execution "
+        "leaves as capsule.zip in its run folder, and tell whether it fails again in "
+        "the same way. Exit code 0 if it does, 6 if not.",
+    )
+    verb.add_argument("capsule", type=Path, metavar="CAPSULE", help="capsule.zip")
+    verb.add_argument(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="run folder for what is repeated; default 'replay' beside the capsule",
+    )
+    verb.add_argument("--render", action="store_true", help="make the video, too")
+    verb.add_argument(
+        "--view", action="store_true", help="watch it in three dimensions"
+    )
+    verb.add_argument("--json", action="store_true", help="print the outcome as JSON")
+    verb.set_defaults(command=replay)
+
+
+def replay(options: argparse.Namespace) -> int:
+    """Repeat a failed execution, and compare."""
+    from mrmg.reproduction import reproduce
+
+    out = options.out or options.capsule.parent / "replay"
+    with terminal.progress() as told:
+        outcome = reproduce(options.capsule, out, told)
+    if options.json:
+        terminal.print_json(outcome.to_json())
+    else:
+        print("\n".join(_lines(outcome, out)))
+    if options.render:
+        _render(out)
+    if options.view:
+        show_commands.watch(str(out))
+    return ExitCode.OK if outcome.same_causes else ExitCode.MISSION_FAILED
+
+
+def _render(folder: Path) -> None:
+    from mrmg.run_folder import Step, existing
+    from mrmg.steps import taken_up
+
+    with existing(folder).opened_for_writing() as opened, terminal.progress() as told:
+        taken_up(opened, told).make(Step.RENDER)
+    print(folder / "mission.mp4")
+
+
+def _lines(outcome: Reproduction, folder: Path) -> Iterator[str]:
+    yield f"{outcome.verdict()}; {folder}"
+    for reason in outcome.before.reasons:
+        yield f"  then  {reason}"
+    for reason in outcome.after.reasons if outcome.after else ():
+        yield f"  now   {reason}"
+    for name, (then, now) in outcome.changed_versions.items():
+        yield f"  {name} {then} then, {now} now"
