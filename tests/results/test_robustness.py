@@ -121,7 +121,7 @@ def test_failures_are_told_apart(driven: tuple[Scene, Plan, ExecutionLog]) -> No
             state=log.state[:, :1] + 0.0 * log.state,
         ),
     )
-    assert stuck.causes == ("goal missed", "stalled")
+    assert stuck.causes == ("stalled", "goal missed")
 
 
 def test_a_log_without_disturbance_is_no_trial(
