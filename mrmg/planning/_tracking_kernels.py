@@ -158,7 +158,7 @@ def drive(fleet, spaces, courses, given, start, order, dt, control, halt):
         that did not get on).
     """
     robots = len(fleet)
-    commitment = new_commitment(fleet, dt)
+    commitment = new_commitment(fleet, dt, True)
     decided = np.zeros(robots, np.bool_)
     segment = np.zeros(robots, np.int64)
     still = np.zeros(robots, np.int64)
@@ -205,7 +205,7 @@ def drive(fleet, spaces, courses, given, start, order, dt, control, halt):
 
 
 @kernel
-def write_states(model, wheelbase, dt, control, state):
-    """Write the states that controls, shape (n, 2), lead to from state[0]."""
+def write_states(fleet, r, dt, control, state):
+    """Write the states that controls, shape (n, 2), lead robot r to from state[0]."""
     for k in range(len(control)):
-        step(model, state[k], control[k, 0], control[k, 1], wheelbase, dt, state[k + 1])
+        step(fleet[r], state[k], control[k, 0], control[k, 1], dt, state[k + 1])

@@ -16,7 +16,6 @@ from mrmg.mission import Trajectory
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning import _relax_kernels
 from mrmg.planning._band_kernels import Stops, Surface
-from mrmg.planning._fleet_kernels import PLANNING_MARGIN_M
 from mrmg.planning._mission_kernels import Targets, in_target
 from mrmg.planning.motion_tree import Problem
 
@@ -238,7 +237,7 @@ def surface_of(problem: Problem, r: int, smooth: np.ndarray) -> Surface:
         distance=spaces.distance[robot["space"]],
         multiplier=smooth,
         disc=low[0] + length * (np.arange(pieces) + 0.5),
-        room=float(np.hypot(0.5 * length, half) + PLANNING_MARGIN_M),
+        room=float(np.hypot(0.5 * length, half) + robot["margin"]),
         curvature=float(CURVATURE_SHARE * curvature),
         curvature_rate=float(CURVATURE_SHARE * rate),
         scrub=arm * energy.turning_force_N / max(energy.rolling_force_N, 1e-9),

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from mrmg.mission import Plan, Trajectory
+from mrmg.motion._kernels import USER
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.band import (
     Path,
@@ -61,6 +62,9 @@ def refine(
         halt: shape (1,); refinement ends soon after it has turned true.
     """
     targets = problem.mission.targets
+    # A band knows neither finishes nor how a model of a user's own turns.
+    if (targets.finish >= 0).any() or (problem.mission.fleet["model"] == USER).any():
+        return plan
     smooth = smooth_terrain(problem.mission.terrain.multiplier)
     surfaces = [surface_of(problem, r, smooth) for r in range(len(plan.trajectories))]
     tours = tour_numbers(problem, plan)

@@ -73,13 +73,11 @@ def redriven(
     )
     steps = max(steps, 1)
     states = []
-    for r, one in enumerate(mission.fleet):
+    for r in range(len(mission.fleet)):
         state = np.zeros((steps + 1, 5))
         state[0] = problem.start[r]
         own = np.ascontiguousarray(control[:steps, r])
-        _tracking_kernels.write_states(
-            one["model"], one["wheelbase"], params.dt_s, own, state
-        )
+        _tracking_kernels.write_states(mission.fleet, r, params.dt_s, own, state)
         states.append((own, state))
     if stuck >= 0:
         return Drive((), int(stuck), states[stuck][1][-1, :2])
