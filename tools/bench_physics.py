@@ -8,6 +8,10 @@ building of the world to the log, and over the time on the clock, which other pr
 stretch; the former is judged. Controllers are set up and kernels compiled before
 anything is timed. Every circle of the second table is driven alone on plain ground. A
 row that misses a figure is marked, and the exit code is 1.
+
+With --disturb, scenes 1 and 4 are planned once and driven many times: under the default
+disturbances, and with the rolling resistance raised by 30 % besides, once by the plan
+alone and once with replanning. Trials are kept in a folder, and are not made twice.
 """
 
 from __future__ import annotations
@@ -18,6 +22,7 @@ import platform
 import statistics
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from importlib.metadata import version
@@ -34,8 +39,12 @@ from mrmg.calibration.measurement import drive, yaw_rate
 from mrmg.execution.controller import controller_maker
 from mrmg.execution.log import ExecutionLog
 from mrmg.planning import plan_mission
+from mrmg.results.robustness import Study, wilson_interval
+from mrmg.robustness import study_robustness
+from mrmg.run_folder import RunFolder, Step
 from mrmg.scene.loading.models import load_model
 from mrmg.scene.robot_model import Limits, RobotModel
+from mrmg.steps import Run, RunArguments
 
 Row = dict[str, Any]
 
@@ -46,6 +55,12 @@ CONTROLLER_MS = {"median": 1.0, "p99": 5.0}
 REALTIME = {2: 40.0, 8: 12.0}
 """Least speed of the simulation by the largest fleet it is asked of."""
 YAW_ERROR_PCT = 0.5
+
+DISTURBED_SCENES = ("scene1", "scene4")
+TRIALS = (("", False, 0.95), ("rolling=+30%", False, 0.0), ("rolling=+30%", True, 0.9))
+"""Disturbances over the default ones, replanning, least share of feasible trials."""
+VISIBLE_GAIN = 0.05
+"""By how much replanning must raise that share."""
 
 SPEEDS_M_S = (0.5, 1.0, 2.0, 3.0)
 STEERS_RAD = (0.05, 0.2, 0.35, 0.5)
@@ -59,6 +74,8 @@ def main() -> int:
     tables = [mission_table(options)] if options.scenes else []
     if not options.no_yaw:
         tables.append(yaw_table())
+    if options.disturb:
+        tables.append(disturbance_table(options))
     misses = sum(tables)
     print(f"\n{misses} rows miss a figure" if misses else "\nall rows hold")
     return 1 if misses else 0
@@ -72,6 +89,16 @@ def parse_options() -> argparse.Namespace:
     )
     parser.add_argument("--seeds", default="0-9", help="first-last, default 0-9")
     parser.add_argument("--no-yaw", action="store_true", help="leave out yaw rates")
+    parser.add_argument("--disturb", action="store_true", help="robustness, too")
+    parser.add_argument("--trials", type=int, default=100, help="of each row of it")
+    parser.add_argument("--workers", type=int, default=2, help="that make the trials")
+    parser.add_argument("--plan-seed", type=int, default=0, help="of the plans in it")
+    parser.add_argument(
+        "--runs",
+        type=Path,
+        default=Path("runs/bench_physics"),
+        help="folder of the trials, default runs/bench_physics",
+    )
     parser.add_argument("--output", type=Path, help="JSONL file, one line a mission")
     options = parser.parse_args()
     first, _, last = options.seeds.partition("-")
@@ -282,6 +309,64 @@ def rolled_rad(model: RobotModel, log: ExecutionLog, first: int, last: int) -> f
         return float((right - left) * model.wheel_radius_m / model.track_m)
     rate = yaw_rate(model, log.state[0, first : last + 1])
     return float(np.trapezoid(rate, log.time_s[first : last + 1]))
+
+
+def disturbance_table(options: argparse.Namespace) -> int:
+    """Print a row per scene and kind of disturbance; return how many rows miss."""
+    head = (
+        "scene", "disturbance", "replanning", "feasible", "95 % interval",
+        "least charge: worst, median", "failures", "",
+    )  # fmt: skip
+    print("\n" + " | ".join(head))
+    misses = 0
+    for source in DISTURBED_SCENES:
+        alone: float | None = None
+        for disturb, replan, least in TRIALS:
+            study = study_of(source, disturb, replan, options)
+            share = study.feasible / len(study.trials)
+            low, high = wilson_interval(study.feasible, len(study.trials))
+            faults = [f"{share:.0%} < {least:.0%}"] if share < least else []
+            if replan and alone is not None:
+                # A plan that carries its energy anyway leaves nothing to be gained.
+                wanted = alone if alone == 1.0 else min(alone + VISIBLE_GAIN, 1.0)
+                if share < wanted:
+                    faults.append(f"{share - alone:+.0%} by replanning")
+            alone = share if disturb and not replan else alone
+            charges = [trial.charge_fraction for trial in study.trials]
+            misses += bool(faults)
+            shown = (
+                source,
+                f"default, {disturb}" if disturb else "default",
+                "yes" if replan else "no",
+                f"{study.feasible}/{len(study.trials)}",
+                f"{low:.3f}-{high:.3f}",
+                f"{min(charges):.2f}, {statistics.median(charges):.2f}",
+                ", ".join(f"{n} {cause}" for cause, n in causes(study).items()),
+                verdict(faults),
+            )
+            print(" | ".join(shown), flush=True)
+    return misses
+
+
+def study_of(
+    source: str, disturb: str, replan: bool, options: argparse.Namespace
+) -> Study:
+    """Return all trials of one row, making those that are missing."""
+    scene = mrmg.load_scene(source)
+    seed = options.plan_seed
+    folder = RunFolder(options.runs / f"{source}-s{seed}")
+    with folder.opened_for_writing():
+        run = Run(scene=scene, arguments=RunArguments(seed=seed), folder=folder)
+        run.ensure(Step.PLAN)
+        driven = replace(run, arguments=replace(run.arguments, replan=replan))
+        return study_robustness(
+            driven, trials=options.trials, disturb=disturb, workers=options.workers
+        )
+
+
+def causes(study: Study) -> dict[str, int]:
+    """Return how many trials failed by each cause; one may fail by several."""
+    return Counter(cause for trial in study.trials for cause in trial.causes)
 
 
 def verdict(faults: list[str]) -> str:
