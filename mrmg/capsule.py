@@ -7,7 +7,6 @@ packages that decide them.
 
 from __future__ import annotations
 
-import hashlib
 import io
 import json
 import zipfile
@@ -44,7 +43,7 @@ class Failure:
         causes: kinds of failure, as the audit tells them; "crash" where the program
             itself broke down.
         reasons: one sentence each.
-        log_digest: fingerprint of all states and forces; "" after a crash.
+        log_digest: of the execution's log; "" after a crash.
         last: the last states by name of the log's arrays, up to `LAST_TICKS` of them.
         versions: of the packages that decided the outcome.
     """
@@ -71,7 +70,7 @@ class Failure:
         return Failure(
             causes=causes,
             reasons=reasons,
-            log_digest=_digest(log),
+            log_digest=log.digest,
             last=last,
             versions=log.versions,
         )
@@ -181,10 +180,3 @@ def _members(path: Path) -> dict[str, bytes]:
 def _refused(path: Path, message: str) -> FileError:
     cure = f"a failed execution leaves one as {CAPSULE_FILE} in its run folder"
     return FileError(str(path), [Fault("", f"{message}; {cure}")])
-
-
-def _digest(log: ExecutionLog) -> str:
-    digest = hashlib.sha256()
-    for name in (*_STATES, "force_N", "work_J"):
-        digest.update(np.ascontiguousarray(getattr(log, name)).tobytes())
-    return digest.hexdigest()[:16]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from importlib.metadata import version
@@ -100,6 +101,15 @@ class ExecutionLog:
     events: tuple[Event, ...] = ()
     gave_up: str = ""
     disturbance: Disturbance | None = None
+
+    @property
+    def digest(self) -> str:
+        """Fingerprint of all arrays: equal for runs that are equal to the last bit."""
+        digest = hashlib.sha256()
+        for name, values in sorted(self._arrays().items()):
+            digest.update(name.encode())
+            digest.update(np.ascontiguousarray(values).tobytes())
+        return digest.hexdigest()[:16]
 
     def save(self, folder: Path) -> None:
         """Write `log.npz`, `timing.json`, then `log.json`, whose presence says done."""

@@ -163,7 +163,8 @@ class _Run:
         self._command()
         now, following = self._set_points.now, self._set_points.following
         steer, period_s = following[:, 1], self._period_s
-        believed = self._believed.force_N(*self._ground(self._sensing.state, steer))
+        ground = self._ground(self._sensing.state, steer)
+        believed = self._believed.force_N(*ground)
         wanted = self._drive.force_N(
             self._sensing.axle_speed_m_s,
             now[:, 0],
@@ -173,7 +174,8 @@ class _Run:
         )
         force = self._actuation.force_N(wanted, period_s)
         steer_from, steer_to = self._actuation.steer(now[:, 1], steer, period_s)
-        ground = self._ground(self._state, steer_to)
+        if self._disturbance is not None:
+            ground = self._ground(self._state, steer_to)
         self._fleet.set_resistance(self._true.force_N(*ground), self._true.swing_N)
         work = self._fleet.drive(force, steer_from, steer_to, STEPS_PER_TICK)
         self._clock.advance(self._period_s)
@@ -181,7 +183,7 @@ class _Run:
         self._work_J = work
         self._observe()
         # A state that is no number ends the run; the log keeps what came before it.
-        if self._sound():
+        if self._sound:
             self._recording.add(force_N=force, work_J=work)
             self._contacts.look(self.data)
             self._record()
@@ -306,15 +308,12 @@ class _Run:
             self._state, self._fleet.axle_speed_m_s(), self._set_points.following[:, 0]
         )
         self._planned = self._reference.at(np.array([self._clock.time_s]))[0]
+        self._sound = bool(np.isfinite(self._state.sum() + self._planned.sum()))
         finished = self._clock.time_s >= self._reference.duration_s - 1e-9
         if finished:
             self._finished_s = min(self._finished_s, self.data.time)
         if finished or self._clock.rate > _STALLED_RATE:
             self._got_on_s = self.data.time
-
-    def _sound(self) -> bool:
-        """Tell whether robots and plan are at places that are numbers."""
-        return bool(np.isfinite(self._state).all() and np.isfinite(self._planned).all())
 
     def _record(self) -> None:
         self._recording.add(
@@ -338,7 +337,7 @@ class _Run:
         """Return why the fleet is past helping, in the log's words; "" if it is not."""
         off_m = np.hypot(*(self._state - self._planned)[:, :2].T)
         warned = any(self.data.warning[kind].number for kind in _DIVERGED)
-        if warned or not self._sound():
+        if warned or not self._sound:
             return "diverged"
         if (off_m > _LOST_M).any():
             return "lost"

@@ -54,6 +54,7 @@ class Trial:
         robot_distance_m: least distance of two robots at any tick; None for one robot.
         tracking_max_m: largest distance from the plan.
         duration_s: simulated time.
+        log_digest: `ExecutionLog.digest`.
     """
 
     seed: int
@@ -68,6 +69,7 @@ class Trial:
     robot_distance_m: float | None
     tracking_max_m: float
     duration_s: float
+    log_digest: str
 
     def to_json(self) -> dict[str, Any]:
         """Return the trial as JSON data."""
@@ -117,6 +119,7 @@ def assess_trial(scene: Scene, plan: Plan, log: ExecutionLog) -> Trial:
         ),
         tracking_max_m=max(robot.tracking_max_m for robot in account.robots),
         duration_s=float(log.time_s[-1]),
+        log_digest=log.digest,
     )
 
 

@@ -251,6 +251,7 @@ def test_trials_under_disturbances_have_a_section(mission, tmp_path) -> None:
         robot_distance_m=None,
         tracking_max_m=0.03,
         duration_s=60.0,
+        log_digest="0",
     )
     bad = replace(
         good, seed=8, feasible=False, causes=("battery empty",), charge_fraction=-0.034

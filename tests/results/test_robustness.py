@@ -39,6 +39,7 @@ GOOD = Trial(
     robot_distance_m=2.0,
     tracking_max_m=0.03,
     duration_s=60.0,
+    log_digest="0",
 )
 EMPTY = replace(
     GOOD,
