@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, leaf_kernel
 
 SOFT_TURN = 0.05
 """Angle below which the scrub of turning is rounded off [rad]."""
@@ -99,7 +99,7 @@ class Shape(NamedTuple):
     d_size: np.ndarray
 
 
-@kernel
+@leaf_kernel
 def value_and_slope(grid, x_min, y_min, cell, x, y):
     """Return (value, d/dx, d/dy) of a grid of cell values, bilinear."""
     rows, columns = grid.shape
@@ -117,7 +117,7 @@ def value_and_slope(grid, x_min, y_min, cell, x, y):
     return low + (high - low) * fy, slope_x, (high - low) / cell
 
 
-@kernel
+@leaf_kernel
 def outside(stops, i, x, y):
     """Return (distance outside a stop's region, drawn in, d/dx, d/dy); 0 inside."""
     if stops.corners[i] == 0:
@@ -139,7 +139,7 @@ def outside(stops, i, x, y):
     return worst, nx, ny
 
 
-@kernel
+@leaf_kernel
 def add_terrain_and_clearance(surface, p, gear, gradient):
     """Add the cost of the ground under each segment and of what it comes near to."""
     total = 0.0
@@ -181,7 +181,7 @@ def add_terrain_and_clearance(surface, p, gear, gradient):
     return total
 
 
-@kernel
+@leaf_kernel
 def write_turns(p, gear, ux, uy, shape):
     """Write the length of each segment, and the turn and curvature at its first node.
 
@@ -199,7 +199,7 @@ def write_turns(p, gear, ux, uy, shape):
         ax, ay, last = bx, by, gear[i]
 
 
-@kernel
+@leaf_kernel
 def bending_cost(surface, gear, shape):
     """Return the cost of turning, of too much curvature and of its changes.
 
@@ -241,7 +241,7 @@ def bending_cost(surface, gear, shape):
     return total
 
 
-@kernel
+@leaf_kernel
 def add_bending(surface, p, gear, shape, gradient):
     """Add the cost of turning, of too much curvature and of its changes."""
     total = bending_cost(surface, gear, shape)
@@ -265,7 +265,7 @@ def add_bending(surface, p, gear, shape, gradient):
     return total
 
 
-@kernel
+@leaf_kernel
 def add_evenness(p, gear, size, gradient):
     """Add the cost of unequal neighbours, which keeps nodes from gathering."""
     total = 0.0
@@ -284,7 +284,7 @@ def add_evenness(p, gear, size, gradient):
     return total
 
 
-@kernel
+@leaf_kernel
 def band_cost(surface, stops, p, gear, ux, uy, shape, gradient):
     """Return a path's cost [m of plain ground] and write its gradient, shape (n, 2)."""
     gradient[:] = 0.0

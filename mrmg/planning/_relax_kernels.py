@@ -9,7 +9,7 @@ from math import hypot
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, leaf_kernel
 from mrmg.planning._band_kernels import band_cost, new_shape
 
 MEMORY = 8
@@ -25,7 +25,7 @@ LEAST_GAIN = 1e-6
 """Share of the cost that a step must gain to be followed by another."""
 
 
-@kernel
+@leaf_kernel
 def dot(a, b):
     """Return the scalar product of two arrays of shape (n, 2)."""
     total = 0.0
@@ -34,7 +34,7 @@ def dot(a, b):
     return total
 
 
-@kernel
+@leaf_kernel
 def add_scaled(a, factor, b, out):
     """Write a + factor b, shapes (n, 2)."""
     for i in range(len(a)):
@@ -60,7 +60,7 @@ def descent(gradient, steps, changes, scale, pairs, out):
         add_scaled(out, weight[m] - scale[m] * dot(changes[m], out), steps[m], out)
 
 
-@kernel
+@leaf_kernel
 def longest_row(a):
     """Return the length of the longest row, shape (n, 2)."""
     most = 0.0

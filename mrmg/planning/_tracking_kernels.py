@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, leaf_kernel
 from mrmg.motion._kernels import UNICYCLE, step
 from mrmg.planning._safety_kernels import (
     braking_control,
@@ -64,7 +64,7 @@ class Courses(NamedTuple):
     ease: np.ndarray
 
 
-@kernel
+@leaf_kernel
 def advance(courses, r, i, x, y):
     """Return (segment, way along the path) nearest to a point, from segment i on."""
     while True:
@@ -77,7 +77,7 @@ def advance(courses, r, i, x, y):
         i += 1
 
 
-@kernel
+@leaf_kernel
 def bend_at(courses, r, i, s):
     """Return the curvature of the path at a way, within the stretch of segment i."""
     last = courses.end[r, i]
@@ -88,7 +88,7 @@ def bend_at(courses, r, i, s):
     return courses.bend[r, i] + t * (courses.bend[r, i + 1] - courses.bend[r, i])
 
 
-@kernel
+@leaf_kernel
 def follow(fleet, courses, r, i, state):
     """Return (segment, way left in this gear, off the path, wanted v, wanted w)."""
     i, s = advance(courses, r, i, state[0], state[1])
@@ -204,7 +204,7 @@ def drive(fleet, spaces, courses, given, start, order, dt, control, halt):
     return len(control), order[robots - 1]
 
 
-@kernel
+@leaf_kernel
 def write_states(fleet, r, dt, control, state):
     """Write the states that controls, shape (n, 2), lead robot r to from state[0]."""
     for k in range(len(control)):

@@ -15,6 +15,7 @@ import numpy as np
 
 from mrmg.mission import Plan, Trajectory
 from mrmg.motion._kernels import USER
+from mrmg.planning._mission_kernels import in_target
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.band import (
     Path,
@@ -27,6 +28,7 @@ from mrmg.planning.band import (
 )
 from mrmg.planning.motion_tree import TARGET_MARGIN_M, Problem
 from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.roadmap import planned_regions
 from mrmg.planning.tracking import redriven
 
 TRIES = 12
@@ -62,9 +64,6 @@ def refine(
         halt: shape (1,); refinement ends soon after it has turned true.
     """
     targets = problem.mission.targets
-    # A band knows neither finishes nor how a model of a user's own turns.
-    if (targets.finish >= 0).any() or (problem.mission.fleet["model"] == USER).any():
-        return plan
     smooth = smooth_terrain(problem.mission.terrain.multiplier)
     surfaces = [surface_of(problem, r, smooth) for r in range(len(plan.trajectories))]
     tours = tour_numbers(problem, plan)
@@ -74,7 +73,7 @@ def refine(
     ]
     if any(len(v) < len(tour) for v, tour in zip(visits, tours, strict=True)):
         return plan
-    given = np.zeros(len(tours), np.int64)
+    given = np.where(_drives_as_before(problem), len(plan.trajectories[0].control), 0)
     swerves: list[list[np.ndarray]] = [[] for _ in tours]
     paths: list[Path | None] = [None] * len(tours)
     for _ in range(TRIES):
@@ -111,12 +110,20 @@ def refine(
 
 
 def tour_numbers(problem: Problem, plan: Plan) -> list[list[int]]:
-    """Return the plan's tours as numbers of targets, in the order of the robots."""
+    """Return each robot's targets by number; where it must end comes last."""
     number = {target.id: i for i, target in enumerate(problem.scene.targets())}
+    finish = problem.mission.targets.finish
     return [
-        [number[name] for name in plan.tours[trajectory.robot]]
-        for trajectory in plan.trajectories
+        [number[name] for name in plan.tours[trajectory.robot]] + [int(f)] * int(f >= 0)
+        for trajectory, f in zip(plan.trajectories, finish, strict=True)
     ]
+
+
+def _drives_as_before(problem: Problem) -> np.ndarray:
+    """Tell which robots' ways are kept: a user's models, and ends with a heading."""
+    targets = problem.mission.targets
+    turned = (targets.finish >= 0) & (targets.tolerance < np.pi)
+    return np.asarray(turned | (problem.mission.fleet["model"] == USER))
 
 
 def _behind(trajectory: Trajectory, place: np.ndarray, given: int) -> int | None:
@@ -140,7 +147,7 @@ def _deeper(
     if len(visits) == len(tour):
         return path
     t = tour[len(visits)]
-    region = problem.scene.targets()[t].region
+    region = planned_regions(problem.scene)[t]
     first = visits[-1] if visits else 0
     reached = float(region.depth(trajectory.state[first:, :2]).max())
     i = len(visits) - (len(tour) - len(path.target))
@@ -157,6 +164,10 @@ def _cheaper(
     trajectories: Sequence[Trajectory],
 ) -> Plan:
     """Return the plan of new trajectories if it is valid and cheaper, else `plan`."""
+    targets = problem.mission.targets
+    for trajectory, finish in zip(trajectories, targets.finish, strict=True):
+        if finish >= 0 and not in_target(targets, finish, *trajectory.state[-1, :2]):
+            return plan
     found = make_plan(problem, plan.seed, params, trajectories, plan.tours)
     if found is None or found.cost_J >= plan.cost_J:
         return plan

@@ -73,7 +73,7 @@ def redriven(
     )
     steps = max(steps, 1)
     states = []
-    for r in range(len(mission.fleet)):
+    for r in range(len(paths)):
         state = np.zeros((steps + 1, 5))
         state[0] = problem.start[r]
         own = np.ascontiguousarray(control[:steps, r])
