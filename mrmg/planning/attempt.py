@@ -20,7 +20,7 @@ MARGINS = (1.0, 0.0, 2.0)
 """Multiples of the route margin that successive trees are grown with."""
 
 
-LEAST_GAIN = 0.002
+LEAST_GAIN = 0.001
 """Share of the cost that a refinement must save to be followed by another."""
 
 

@@ -10,6 +10,9 @@ from mrmg.planning.routing import RouterParams
 
 PROFILES = ("default", "paper")
 
+THOROUGH = 6
+"""Refinements of each plan when there is a budget to be spent."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlannerParams:
@@ -119,6 +122,8 @@ def profile_params(
         UsageError: if the profile is unknown, or a number is out of range.
     """
     params = _profile(profile, budget_s)
+    if params.refinements and (budget_s is not None or trees is not None):
+        params = replace(params, refinements=THOROUGH)
     if trees is not None:
         return replace(params, trees=trees, improvements=trees)
     return params

@@ -188,3 +188,20 @@ def test_moving_the_scene_by_whole_cells_changes_no_gain(
     }
     other = refined(scene_from_document(moved, source="moved"))
     assert other.after.cost_J == pytest.approx(one.after.cost_J, rel=5e-3)
+
+
+def test_robots_still_end_where_they_must(yard: Callable[..., Scene]) -> None:
+    """A car drives back to its start; a robot that turns ends with its heading."""
+    goals = [
+        {"id": "g1", "circle": {"center": [24, 6], "radius": 1.5}},
+        {"id": "g2", "circle": {"center": [24, 15], "radius": 1.5}},
+    ]
+    finish = {"circle": {"center": [10, 15], "radius": 1.0}, "heading": 1.0}
+    robots = [
+        {"id": "r1", "model": "car", "pose": [4, 5, 0], "finish": "start"},
+        {"id": "r2", "model": "diffdrive", "pose": [4, 15, 0], "finish": finish},
+    ]
+    one = refined(yard(goals=goals, robots=robots))
+    assert one.after.cost_J <= one.before.cost_J
+    assert mrmg.verify(one.scene, one.before).violations == ()
+    assert mrmg.verify(one.scene, one.after).violations == ()
