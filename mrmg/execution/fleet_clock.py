@@ -60,10 +60,11 @@ class FleetClock:
         """Set the rate from where the robots are and should be, both (R, 5)."""
         params = self._params
         worst_s = float(lag_s(state, reference, params.least_speed_m_s).max())
-        turning_s = turning_lag_s(
-            state[self._turns], reference[self._turns], params.least_yaw_rate_rad_s
-        )
-        worst_s = max(worst_s, float(turning_s.max(initial=-np.inf)))
+        if len(self._turns):
+            turning_s = turning_lag_s(
+                state[self._turns], reference[self._turns], params.least_yaw_rate_rad_s
+            )
+            worst_s = max(worst_s, float(turning_s.max()))
         target = 1.0 - params.gain_per_s * max(worst_s - params.tolerated_lag_s, 0.0)
         lowest = self.rate - params.slowing_per_s * period_s
         highest = self.rate + params.recovery_per_s * period_s
