@@ -121,6 +121,97 @@ def test_speeding_up_costs_its_kinetic_energy(accel: float, n: int) -> None:
     assert energy_J[ROLLING] == pytest.approx(rolling_J)
 
 
+@pytest.mark.parametrize("multiplier", [1.0, 2.0, 4.0])
+def test_a_straight_line_costs_by_the_terrain(multiplier: float) -> None:
+    field = {"id": "field", "polygon": _stripe(0, 100), "multiplier": multiplier}
+    scene = make_scene(terrain=[field])
+    energy_J = step_energy_parts(scene, cruise(5, 45)).sum()
+    per_m_J = scene.robots[0].model.energy_model.plain_ground_J_per_m()
+    assert energy_J == pytest.approx(multiplier * 40 * per_m_J)
+
+
+@pytest.mark.parametrize("regeneration", [0.0, 0.5])
+def test_a_drive_cycle_pays_for_its_top_speed_once(regeneration: float) -> None:
+    """Speed up at 1 m/s^2 to 1.5 m/s, go on for 8 s, brake at 1 m/s^2."""
+    scene = with_model(make_scene(terrain=[]), regeneration_efficiency=regeneration)
+    model = scene.robots[0].model
+    time_s = np.arange(0.0, 11.05, 0.1)
+    v_m_s = np.minimum(np.minimum(time_s, 1.5), np.maximum(11.0 - time_s, 0.0))
+    x_m = 5 + np.concatenate([[0.0], np.cumsum(0.05 * (v_m_s[1:] + v_m_s[:-1]))])
+    energy_J = step_energy_parts(scene, along(x_m, v_m_s, time_s)).sum()
+    kinetic_J = 0.5 * model.effective_mass_kg * 1.5**2
+    rolling_N = model.energy_model.rolling_force_N
+    pulled_J = kinetic_J + rolling_N * (x_m[-1] - 5 - 1.125)
+    braked_J = kinetic_J - rolling_N * 1.125
+    expected_J = pulled_J / model.drive_efficiency - regeneration * braked_J
+    assert energy_J == pytest.approx(expected_J)
+
+
+def with_model(scene: Scene, **changes: float) -> Scene:
+    model = replace(scene.robots[0].model, **changes)  # type: ignore[arg-type]
+    return replace(scene, robots=(replace(scene.robots[0], model=model),))
+
+
+def sloping(grade: float, **changes: float) -> Scene:
+    """The strip without mud, rising evenly from west to east."""
+    ramp = {"grid": [[0.0, 100.0 * grade]] * 2}
+    return with_model(make_scene(terrain=[], elevation=ramp), **changes)
+
+
+@pytest.mark.parametrize("grade", [0.04, 0.15])
+def test_climbing_a_ramp_costs_its_height(grade: float) -> None:
+    scene = sloping(grade)
+    model = scene.robots[0].model.energy_model
+    energy_J = step_energy_parts(scene, cruise(5, 45)).sum(axis=0)
+    assert energy_J[ROLLING] == pytest.approx(40 * model.plain_ground_J_per_m())
+    expected_J = model.weight_N * 40 * grade / model.drive_efficiency
+    assert energy_J[GRADE] == pytest.approx(expected_J)
+    assert np.abs(energy_J[[TURNING, INERTIA, IDLE, DEVICE]]).max() < 1e-6
+
+
+@pytest.mark.parametrize("regeneration", [0.0, 0.6])
+@pytest.mark.parametrize("grade", [-0.04, -0.15])
+def test_rolling_down_a_ramp_never_earns_more_than_is_fed_back(
+    grade: float, regeneration: float
+) -> None:
+    """4 % down still pulls; 15 % down brakes."""
+    scene = sloping(grade, regeneration_efficiency=regeneration)
+    model = scene.robots[0].model.energy_model
+    energy_J = step_energy_parts(scene, cruise(5, 45)).sum(axis=0)
+    mechanical_J = 40 * (model.rolling_force_N + model.weight_N * grade)
+    expected_J = (
+        mechanical_J / model.drive_efficiency
+        if mechanical_J > 0.0
+        else regeneration * mechanical_J
+    )
+    assert energy_J.sum() == pytest.approx(expected_J, abs=1e-6)
+    assert energy_J[ROLLING] == pytest.approx(40 * model.plain_ground_J_per_m())
+
+
+def test_over_a_hill_what_is_not_braked_away_comes_back() -> None:
+    """On gentle slopes a way over a hill costs what it costs on the flat."""
+    hill = {"hills": [{"center": [30, 0], "height": 0.5, "radius": 20}]}
+    scene = make_scene(terrain=[], elevation=hill)
+    per_m_J = scene.robots[0].model.energy_model.plain_ground_J_per_m()
+    energy_J = step_energy_parts(scene, cruise(5, 55)).sum(axis=0)
+    assert energy_J.sum() == pytest.approx(50 * per_m_J)
+    assert energy_J[GRADE] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_on_slopes_shaking_within_a_step_does_not_count() -> None:
+    """Down 5 %, speed shakes by 1 cm/s from tick to tick."""
+    scene = sloping(-0.05)
+    steady = cruise(5, 45)
+    fine_s = np.arange(0.0, 40.001, 0.02)
+    shaking = np.ones(len(fine_s))
+    shaking[1::2] += 0.01
+    shaking[::5] = 1.0
+    motion = along(5 + fine_s, shaking, fine_s)
+    expected_J = step_energy_parts(scene, steady).sum()
+    assert step_energy_parts(scene, motion).sum() == pytest.approx(expected_J, rel=1e-3)
+    assert len(step_energy_parts(scene, motion)) == len(fine_s) - 1
+
+
 def test_hard_braking_costs_nothing_without_regeneration(scene: Scene) -> None:
     time_s = np.linspace(0.0, 1.0, 11)
     motion = along(10 + 1.2 * time_s - 0.6 * time_s**2, 1.2 - 1.2 * time_s, time_s)

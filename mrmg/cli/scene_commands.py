@@ -61,7 +61,7 @@ def roadmap(options: argparse.Namespace) -> int:
     out = options.out or Path(f"{scene.name}.graphml")
     with storage.atomic_path(out) as temporary:
         nx.write_graphml(graph, temporary)
-    parts = nx.number_connected_components(graph)
+    parts = nx.number_connected_components(graph.to_undirected(as_view=True))
     print(
         f"{out}: {graph.number_of_nodes()} vertices, {graph.number_of_edges()} edges, "
         f"{parts} connected parts"

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from mrmg.execution.disturbance import Disturbance, RobotDisturbance
+from mrmg.execution.incline import standing_pose
 from mrmg.execution.world_model import MujocoWorld
 
 
@@ -34,10 +35,12 @@ def move_starts(
         if not (item.start_x_m or item.start_y_m or item.start_heading_rad):
             continue
         root = world.model.joint(f"{robot.id}/root")
+        x, y, yaw = robot.pose
+        position, orientation = standing_pose(
+            world.scene,
+            x + item.start_x_m,
+            y + item.start_y_m,
+            yaw + item.start_heading_rad,
+        )
         pose = data.qpos[int(root.qposadr[0]) :][:7]
-        pose[:2] += item.start_x_m, item.start_y_m
-        half = 0.5 * item.start_heading_rad
-        turn = np.array([np.cos(half), 0.0, 0.0, np.sin(half)])
-        turned = np.empty(4)
-        mujoco.mju_mulQuat(turned, turn, pose[3:].copy())
-        pose[3:] = turned
+        pose[:3], pose[3:] = position, orientation

@@ -12,7 +12,7 @@ import numpy as np
 
 from mrmg.energy import GRAVITY_M_S2
 from mrmg.execution.speed_loop import SpeedLoop, SpeedLoopParams
-from mrmg.scene.robot_model import RobotModel
+from mrmg.scene.robot_model import DRIVEN_LOAD_SHARE, GRIP_SHARE, RobotModel
 from mrmg.scene.types import Scene
 
 
@@ -26,7 +26,7 @@ class DriveParams:
     """
 
     loop: SpeedLoopParams = field(default_factory=SpeedLoopParams)
-    grip_share: float = 0.8
+    grip_share: float = GRIP_SHARE
 
 
 class DriveControl:
@@ -36,6 +36,7 @@ class DriveControl:
         """Control the robots of `scene`, all at rest."""
         params = params or DriveParams()
         models = [robot.model for robot in scene.robots]
+        self._weight_N = np.array([item.mass_kg for item in models]) * GRAVITY_M_S2
         self._loop = SpeedLoop(
             inertia=np.array([item.effective_mass_kg for item in models]),
             limit=params.grip_share * np.array([axle_grip_N(item) for item in models]),
@@ -49,8 +50,11 @@ class DriveControl:
         next_m_s: np.ndarray,
         resistance_N: np.ndarray,
         period_s: float,
+        slope: np.ndarray | float = 0.0,
     ) -> np.ndarray:
         """Return the force to hold for `period_s`, shape (R,).
+
+        On a slope the weight is carried at all times, also by a robot that stands.
 
         Args:
             speed_m_s: speed of the axle now.
@@ -58,10 +62,20 @@ class DriveControl:
             next_m_s: speed asked for at the end of the period.
             resistance_N: force the ground is believed to take.
             period_s: how long the force will be held.
+            slope: sine of the slope along the heading.
         """
-        return self._loop.force(speed_m_s, wanted_m_s, next_m_s, resistance_N, period_s)
+        force_N = self._loop.force(
+            speed_m_s,
+            wanted_m_s,
+            next_m_s,
+            resistance_N,
+            period_s,
+            brakes=np.not_equal(slope, 0.0),
+        )
+        return np.asarray(force_N + self._weight_N * slope)
 
 
 def axle_grip_N(model: RobotModel) -> float:
-    """Return the static grip of the driven axle, which carries half the weight."""
-    return 0.5 * model.friction_coefficient * model.mass_kg * GRAVITY_M_S2
+    """Return the static grip of the driven axle under its least load."""
+    share = DRIVEN_LOAD_SHARE * model.friction_coefficient
+    return share * model.mass_kg * GRAVITY_M_S2

@@ -15,6 +15,12 @@ from shapely.geometry import Polygon
 
 from mrmg.execution import palette
 from mrmg.execution.convex import convex_pieces, triangles
+from mrmg.execution.ground_shape import (
+    FOUNDATION_M,
+    add_height_field,
+    draped_mark,
+    height_span,
+)
 from mrmg.scene.types import Obstacle, Region, Scene
 from mrmg.world.terrain import multiplier_at
 
@@ -33,7 +39,7 @@ _TARGET_THICKNESS_M = 0.03
 
 
 def add_floor(spec: mujoco.MjSpec, scene: Scene) -> None:
-    """Add the ground plane, coloured by the terrain's multiplier."""
+    """Add the ground, coloured by the terrain: a plane, or a field of heights."""
     x_min, y_min, x_max, y_max = scene.bounds
     half = np.array([x_max - x_min, y_max - y_min]) / 2 + _FLOOR_MARGIN_M
     center = np.array([x_min + x_max, y_min + y_max]) / 2
@@ -49,15 +55,27 @@ def add_floor(spec: mujoco.MjSpec, scene: Scene) -> None:
     texture.data = image.tobytes()
     material = spec.add_material(name=FLOOR, specular=0.0, shininess=0.0)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = FLOOR
+    options = {
+        "name": FLOOR,
+        "material": FLOOR,
+        "contype": _FLOOR_BIT,
+        "conaffinity": 0,
+        "castshadow": False,
+    }
+    if scene.elevation is None:
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            pos=[*center, 0.0],
+            size=[*half, 1.0],
+            **options,
+        )
+        return
+    foot_m = add_height_field(spec, FLOOR, scene, center, half)
     spec.worldbody.add_geom(
-        name=FLOOR,
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        pos=[*center, 0.0],
-        size=[*half, 1.0],
-        material=FLOOR,
-        contype=_FLOOR_BIT,
-        conaffinity=0,
-        castshadow=False,
+        type=mujoco.mjtGeom.mjGEOM_HFIELD,
+        hfieldname=FLOOR,
+        pos=[*center, foot_m],
+        **options,
     )
 
 
@@ -86,16 +104,26 @@ def _bytes(colours: np.ndarray) -> np.ndarray:
     return np.asarray(np.round(255.0 * colours), dtype=np.uint8)
 
 
-def add_obstacle(spec: mujoco.MjSpec, obstacle: Obstacle) -> mujoco.MjsBody:
+def add_obstacle(
+    spec: mujoco.MjSpec, scene: Scene, obstacle: Obstacle
+) -> mujoco.MjsBody:
     """Add one obstacle as a body: hidden convex solids and one drawn mesh.
+
+    On a slope it is founded in its lowest ground and rises its height above the
+    highest.
 
     Obstacles stay bodies of their own, even where they overlap, so that a contact can
     name what was touched and so that an exclusion can let single robots through.
     """
-    body = spec.worldbody.add_body(name=f"obstacle:{obstacle.id}")
+    low, high = height_span(scene, obstacle.shape)
+    foot_m = 0.0 if scene.elevation is None else low - FOUNDATION_M
+    height_m = high - foot_m + obstacle.height_m
+    body = spec.worldbody.add_body(
+        name=f"obstacle:{obstacle.id}", pos=[0.0, 0.0, foot_m]
+    )
     for number, ring in enumerate(convex_pieces(obstacle.shape)):
         name = f"solid:{obstacle.id}:{number}"
-        spec.add_mesh(name=name, uservert=_prism(ring, obstacle.height_m).ravel())
+        spec.add_mesh(name=name, uservert=_prism(ring, height_m).ravel())
         body.add_geom(
             name=name,
             type=mujoco.mjtGeom.mjGEOM_MESH,
@@ -106,7 +134,7 @@ def add_obstacle(spec: mujoco.MjSpec, obstacle: Obstacle) -> mujoco.MjsBody:
         )
     colour = palette.OBSTACLE if obstacle.blocks is None else palette.PARTIAL_OBSTACLE
     name = f"obstacle:{obstacle.id}"
-    _add_drawn_mesh(spec, name, obstacle.shape, obstacle.height_m)
+    _add_drawn_mesh(spec, name, obstacle.shape, height_m)
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_MESH,
@@ -125,6 +153,9 @@ def add_bounds(spec: mujoco.MjSpec, scene: Scene) -> None:
     center = np.array([x_min + x_max, y_min + y_max]) / 2
     half = np.array([x_max - x_min, y_max - y_min]) / 2
     thick = _WALL_THICKNESS_M / 2
+    low, high = height_span(scene, shapely.box(*scene.bounds))
+    foot_m = 0.0 if scene.elevation is None else low - FOUNDATION_M
+    tall = (high - foot_m + _WALL_HEIGHT_M) / 2
     body = spec.worldbody.add_body(name=BOUNDS)
     for axis in (0, 1):
         for side in (-1.0, 1.0):
@@ -133,8 +164,8 @@ def add_bounds(spec: mujoco.MjSpec, scene: Scene) -> None:
             size[axis] = thick
             body.add_geom(
                 type=mujoco.mjtGeom.mjGEOM_BOX,
-                pos=[*at, _WALL_HEIGHT_M / 2],
-                size=[*size, _WALL_HEIGHT_M / 2],
+                pos=[*at, foot_m + tall],
+                size=[*size, tall],
                 contype=_OBSTACLE_BIT,
                 conaffinity=0,
                 group=_DRAWN_GROUP,
@@ -145,13 +176,14 @@ def add_bounds(spec: mujoco.MjSpec, scene: Scene) -> None:
 def add_targets(spec: mujoco.MjSpec, scene: Scene) -> None:
     """Add goals and stations as flat marks named `goal:<id>` and `station:<id>`."""
     for station in scene.stations:
-        _add_mark(spec, f"station:{station.id}", station.region, palette.STATION)
+        name = f"station:{station.id}"
+        _add_mark(spec, scene, name, station.region, palette.STATION)
     for goal in scene.goals:
-        _add_mark(spec, f"goal:{goal.id}", goal.region, palette.GOAL)
+        _add_mark(spec, scene, f"goal:{goal.id}", goal.region, palette.GOAL)
 
 
 def _add_mark(
-    spec: mujoco.MjSpec, name: str, region: Region, colour: palette.Rgb
+    spec: mujoco.MjSpec, scene: Scene, name: str, region: Region, colour: palette.Rgb
 ) -> None:
     options = {
         "name": name,
@@ -161,6 +193,12 @@ def _add_mark(
         "rgba": [*colour, 0.8],
         "castshadow": False,
     }
+    if scene.elevation is not None:
+        _add_mesh(spec, name, *draped_mark(scene, region))
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **options
+        )
+        return
     if len(region.corners):
         _add_drawn_mesh(spec, name, region.shape, _TARGET_THICKNESS_M)
         spec.worldbody.add_geom(
@@ -199,9 +237,15 @@ def _add_drawn_mesh(
     )
     # Shared corners would make MuJoCo smooth the edges away.
     solid.unmerge_vertices()
+    _add_mesh(spec, name, solid.vertices, solid.faces)
+
+
+def _add_mesh(
+    spec: mujoco.MjSpec, name: str, corners: np.ndarray, faces: np.ndarray
+) -> None:
     spec.add_mesh(
         name=name,
-        uservert=solid.vertices.ravel(),
-        userface=solid.faces.ravel(),
+        uservert=corners.ravel(),
+        userface=faces.ravel(),
         inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
     )

@@ -20,6 +20,7 @@ from mrmg.execution.drive import DriveControl
 from mrmg.execution.fleet import Fleet
 from mrmg.execution.fleet_clock import FleetClock
 from mrmg.execution.ground import believed_resistance, true_resistance
+from mrmg.execution.incline import Incline
 from mrmg.execution.log import ExecutionLog, package_versions
 from mrmg.execution.recording import Recording
 from mrmg.execution.reference import FleetReference, speed_states
@@ -152,6 +153,7 @@ class _Run:
         self._call_s: list[float] = []
         self._got_on_s, self._finished_s = 0.0, np.inf
         self._fleet = Fleet(world, self.data)
+        self._incline = Incline(world.scene)
         self._sensing = sensing_of(world.scene, disturbance, self._period_s)
         self._actuation = Actuation(disturbance, self._set_points.following[:, 1])
         self._settle()
@@ -163,20 +165,26 @@ class _Run:
         self._command()
         now, following = self._set_points.now, self._set_points.following
         steer, period_s = following[:, 1], self._period_s
-        ground = self._ground(self._sensing.state, steer)
+        seen, true = self._sensing.state, self._state
+        level, slope = self._incline.under(seen)
+        ground = self._ground(seen, steer)
         believed = self._believed.force_N(*ground)
         wanted = self._drive.force_N(
             self._sensing.axle_speed_m_s,
             now[:, 0],
             following[:, 0],
-            believed,
+            level * believed,
             period_s,
+            slope,
         )
         force = self._actuation.force_N(wanted, period_s)
         steer_from, steer_to = self._actuation.steer(now[:, 1], steer, period_s)
         if self._disturbance is not None:
-            ground = self._ground(self._state, steer_to)
-        self._fleet.set_resistance(self._true.force_N(*ground), self._true.swing_N)
+            ground = self._ground(true, steer_to)
+            level, _ = self._incline.under(true)
+        # The slope carries a part of the weight that the tyres then need not.
+        resistance = level * self._true.force_N(*ground)
+        self._fleet.set_resistance(resistance, self._true.swing_N)
         work = self._fleet.drive(force, steer_from, steer_to, STEPS_PER_TICK)
         self._clock.advance(self._period_s)
         self.ticks += 1
@@ -261,9 +269,11 @@ class _Run:
     def _settle(self) -> None:
         """Let the tyres take the weight, then start the time."""
         still = np.zeros(len(self._world.scene.robots))
+        _, slope = self._incline.under(self._fleet.state())
+        parked = self._drive.force_N(still, still, still, still, self._period_s, slope)
         force = self._true.force_N(still + 1.0, still)
         self._fleet.set_resistance(force, self._true.swing_N)
-        self._fleet.drive(still, still, still, _SETTLING_STEPS)
+        self._fleet.drive(parked, still, still, _SETTLING_STEPS)
         self.data.time = 0.0
 
     def _command(self) -> None:
@@ -304,9 +314,9 @@ class _Run:
 
     def _observe(self) -> None:
         self._state = self._fleet.state()
-        self._sensing.look(
-            self._state, self._fleet.axle_speed_m_s(), self._set_points.following[:, 0]
-        )
+        level, _ = self._incline.under(self._state)
+        over_map = level * self._fleet.axle_speed_m_s()
+        self._sensing.look(self._state, over_map, self._set_points.following[:, 0])
         self._planned = self._reference.at(np.array([self._clock.time_s]))[0]
         self._sound = bool(np.isfinite(self._state.sum() + self._planned.sum()))
         finished = self._clock.time_s >= self._reference.duration_s - 1e-9

@@ -53,6 +53,8 @@ class SpeedLoop:
         following: np.ndarray,
         resistance: np.ndarray,
         period_s: float,
+        *,
+        brakes: np.ndarray | bool = False,
     ) -> np.ndarray:
         """Return the force [N] or moment [N m] to hold for `period_s`, shape (n,).
 
@@ -62,13 +64,15 @@ class SpeedLoop:
             following: speed asked for at the end of the period.
             resistance: what the ground takes [N or N m].
             period_s: how long the force will be held.
+            brakes: where standing takes more than friction, as on a slope.
         """
         params = self._params
         error = wanted - speed
         middle = 0.5 * (wanted + following)
         direction = np.sign(middle) * (np.abs(middle) > params.standstill_m_s)
         # A robot that shall stand is held by friction; what was learnt is forgotten.
-        self._integral_m_s2 = np.abs(direction) * np.clip(
+        keeps = np.maximum(np.abs(direction), brakes)
+        self._integral_m_s2 = keeps * np.clip(
             self._integral_m_s2 + period_s * params.integral_per_s2 * error,
             -params.integral_limit_m_s2,
             params.integral_limit_m_s2,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from dataclasses import dataclass
 
 import mujoco
@@ -11,6 +10,7 @@ import numpy as np
 
 from mrmg.errors import Fault, FileError, UsageError
 from mrmg.execution import palette, scenery
+from mrmg.execution.incline import standing_pose
 from mrmg.motion.dynamics import DERIVATIVES
 from mrmg.scene.types import Robot, Scene
 
@@ -60,9 +60,9 @@ def build_world(scene: Scene) -> MujocoWorld:
     scenery.add_bounds(spec, scene)
     scenery.add_targets(spec, scene)
     for index, robot in enumerate(scene.robots):
-        _attach(spec, robot, palette.robot_colour(index))
+        _attach(spec, scene, robot, palette.robot_colour(index))
     for obstacle in scene.obstacles:
-        body = scenery.add_obstacle(spec, obstacle)
+        body = scenery.add_obstacle(spec, scene, obstacle)
         for robot in scene.robots:
             if not obstacle.stops(robot.id):
                 spec.add_exclude(bodyname1=body.name, bodyname2=f"{robot.id}/chassis")
@@ -134,7 +134,9 @@ def _set_appearance(spec: mujoco.MjSpec, scene: Scene) -> None:
     )
 
 
-def _attach(spec: mujoco.MjSpec, robot: Robot, colour: palette.Rgb) -> None:
+def _attach(
+    spec: mujoco.MjSpec, scene: Scene, robot: Robot, colour: palette.Rgb
+) -> None:
     """Attach the robot's MJCF at its start pose, its names prefixed with `<id>/`."""
     path = robot.model.mjcf
     if path is None or robot.model.motion_model not in DERIVATIVES:
@@ -148,10 +150,8 @@ def _attach(spec: mujoco.MjSpec, robot: Robot, colour: palette.Rgb) -> None:
     except (ValueError, OSError) as error:
         fault = Fault("", f"no usable MJCF for model '{robot.model.name}' ({error})")
         raise FileError(str(path), [fault]) from error
-    x, y, yaw = robot.pose
-    frame = spec.worldbody.add_frame(
-        pos=[x, y, 0.0], quat=[math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)]
-    )
+    position, orientation = standing_pose(scene, *robot.pose)
+    frame = spec.worldbody.add_frame(pos=position, quat=orientation)
     spec.attach(car, prefix=f"{robot.id}/", frame=frame)
     paint = spec.material(f"{robot.id}/paint")
     if paint is not None:

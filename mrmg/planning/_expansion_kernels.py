@@ -13,7 +13,7 @@ from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, turn_speed
 from mrmg.planning._finish_kernels import at_finish, turn_at_finish
 from mrmg.planning._fleet_kernels import space_of
 from mrmg.planning._maneuver_kernels import best_maneuver
-from mrmg.planning._mission_kernels import in_target, look_ahead
+from mrmg.planning._mission_kernels import in_target, load_height, look_ahead
 from mrmg.planning._random_kernels import random_unit
 from mrmg.planning._safety_kernels import (
     braking_control,
@@ -200,12 +200,16 @@ def step_energy(mission, r, before, after, u1):
         turn = robot.track * abs(after[2] - before[2]) / mission.params.dt
     else:
         turn = turn_speed(robot.model, v, 0.5 * (before[4] + after[4]), robot.track)
+    climb = 0.0
+    if mission.terrain.height.shape[0] > 0:
+        rise = load_height(mission, r, after) - load_height(mission, r, before)
+        climb = rise / mission.params.dt
     return mission.params.dt * _battery_power(
         v,
         acceleration,
         turn,
         k,
-        0.0,
+        climb,
         robot.energy,
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import hypot
+from math import cos, hypot, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +11,7 @@ from mrmg.compilation import kernel, leaf_kernel
 from mrmg.planning._fleet_kernels import Spaces, space_of
 from mrmg.planning._nrpa_kernels import RoutingArrays
 from mrmg.planning._roadmap_kernels import RoadmapArrays, find_waypoint
-from mrmg.world._kernels import TerrainGrid, point_in_convex
+from mrmg.world._kernels import TerrainGrid, height_in, point_in_convex
 
 
 class Targets(NamedTuple):
@@ -96,7 +96,9 @@ def in_target(targets, t, x, y):
 
 @kernel
 def look_ahead(mission, r, target, state, view, waypoint):
-    """Write robot r's waypoint towards a target; return the way to go [m].
+    """Write robot r's waypoint towards a target; return the cost of the way [m].
+
+    It is in metres of plain ground, with heights as a potential (`slopes`).
 
     Args:
         mission: the problem.
@@ -119,3 +121,28 @@ def look_ahead(mission, r, target, state, view, waypoint):
         view,
         waypoint,
     )
+
+
+@leaf_kernel
+def load_height(mission, r, state):
+    """Return the height of the ground below robot r's centre of mass [m]."""
+    lead = mission.fleet[r].lead
+    return height_in(
+        mission.terrain,
+        state[0] + lead * cos(state[2]),
+        state[1] + lead * sin(state[2]),
+    )
+
+
+@leaf_kernel
+def leg_energy(mission, r, target, state, way):
+    """Return the energy of the way to a target, of the cost `look_ahead` found [J]."""
+    robot = mission.fleet[r]
+    refund = mission.roadmap.slope_refund[robot.field]
+    if refund > 0.0:
+        center = mission.targets.center[target]
+        rise = height_in(mission.terrain, center[0], center[1]) - height_in(
+            mission.terrain, state[0], state[1]
+        )
+        way = max(0.0, way + refund * rise)
+    return way * robot.plain

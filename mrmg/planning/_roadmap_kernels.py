@@ -10,9 +10,11 @@ import numpy as np
 from mrmg.compilation import kernel
 from mrmg.world._kernels import (
     clearance_estimate,
+    height_in,
     segment_clearance,
+    segment_cost,
     segment_is_clear,
-    segment_weighted_length,
+    sloped_length,
 )
 
 
@@ -21,10 +23,12 @@ class RoadmapArrays(NamedTuple):
 
     Attributes:
         vertex: positions [m], shape (V, 2); the first T are the targets' centres.
-        cost_to_go: weighted length to each target [m], shape (F, T, V); inf where cut
-            off.
+        cost_to_go: cost to each target [m of plain ground], shape (F, T, V); inf where
+            cut off.
         successor: next vertex on the way to each target, -1 at the end, shape (F, T,
             V).
+        slope_price, slope_floor, slope_refund: `slopes.SlopeCost` of each class, shape
+            (F,).
         x_min, y_min, bucket, columns, rows, bucket_start, bucket_vertex: a coarse grid
             of the vertices.
     """
@@ -32,6 +36,9 @@ class RoadmapArrays(NamedTuple):
     vertex: np.ndarray
     cost_to_go: np.ndarray
     successor: np.ndarray
+    slope_price: np.ndarray
+    slope_floor: np.ndarray
+    slope_refund: np.ndarray
     x_min: float
     y_min: float
     bucket: float
@@ -49,20 +56,28 @@ TIGHT_SHARE = 0.35
 
 
 @kernel
-def edge_costs(space, terrain, vertex, first, second, passage):
-    """Return the weighted length [m] of candidate edges; inf where they are blocked.
+def edge_costs(space, terrain, vertex, first, second, passage, price, floor):
+    """Return the costs of candidate edges there and back; inf where they are blocked.
+
+    They are metres of plain ground, with heights as a potential (`slopes`). Shape
+    (n, 2).
 
     An edge through a tight passage costs up to TIGHT_SHARE more: driving there takes
     corrections the roadmap does not see, and a detour of equal length is safer.
     """
-    cost = np.full(len(first), np.inf)
+    cost = np.full((len(first), 2), np.inf)
     for i in range(len(first)):
         ax, ay = vertex[first[i], 0], vertex[first[i], 1]
         bx, by = vertex[second[i], 0], vertex[second[i], 1]
         clearance = segment_clearance(space, ax, ay, bx, by, passage + TIGHT_M)
         if clearance >= passage:
             tight = TIGHT_SHARE * (1.0 - (clearance - passage) / TIGHT_M)
-            cost[i] = segment_weighted_length(terrain, ax, ay, bx, by) * (1.0 + tight)
+            there = segment_cost(terrain, ax, ay, bx, by, price, floor)
+            back = there
+            if terrain.height.shape[0] > 0:
+                back = segment_cost(terrain, bx, by, ax, ay, price, floor)
+            cost[i, 0] = there * (1.0 + tight)
+            cost[i, 1] = back * (1.0 + tight)
     return cost
 
 
@@ -94,7 +109,8 @@ def find_waypoint(space, terrain, roadmap, field, target, x, y, passage, view, o
         out: receives the waypoint (x, y).
 
     Returns:
-        Weighted length [m] from (x, y) to the target; inf if no vertex is in sight.
+        Cost [m of plain ground] from (x, y) to the target, heights as a potential; inf
+        if no vertex is in sight.
     """
     here = 0.95 * clearance_estimate(space, x, y)
     successor = roadmap.successor[field, target]
@@ -114,7 +130,15 @@ def find_waypoint(space, terrain, roadmap, field, target, x, y, passage, view, o
             space, x, y, ax, ay, min(passage, here) if near else comfortable
         ):
             break
-        straight = segment_weighted_length(terrain, x, y, ax, ay) + cost_to_go[after]
+        straight = cost_to_go[after] + segment_cost(
+            terrain,
+            x,
+            y,
+            ax,
+            ay,
+            roadmap.slope_price[field],
+            roadmap.slope_floor[field],
+        )
         if straight > cost * (1.0 + 1e-9) + 0.02:
             break
         cost = min(cost, straight)
@@ -131,6 +155,8 @@ def best_vertex(space, terrain, roadmap, field, target, x, y, comfortable, neede
     before those seen with the needed one. Returns (-1, inf) if none is in sight.
     """
     cost_to_go = roadmap.cost_to_go[field, target]
+    price, floor = roadmap.slope_price[field], roadmap.slope_floor[field]
+    here = height_in(terrain, x, y)
     column = int((x - roadmap.x_min) / roadmap.bucket)
     row = int((y - roadmap.y_min) / roadmap.bucket)
     candidate = np.empty(256, np.int64)
@@ -148,8 +174,13 @@ def best_vertex(space, terrain, roadmap, field, target, x, y, comfortable, neede
                     v = roadmap.bucket_vertex[i]
                     if n < 256 and cost_to_go[v] < np.inf:
                         candidate[n] = v
-                        cost[n] = cost_to_go[v] + hypot(
-                            roadmap.vertex[v, 0] - x, roadmap.vertex[v, 1] - y
+                        vx, vy = roadmap.vertex[v, 0], roadmap.vertex[v, 1]
+                        # Pieces add up to no less than the whole, which is convex.
+                        cost[n] = cost_to_go[v] + sloped_length(
+                            hypot(vx - x, vy - y),
+                            height_in(terrain, vx, vy) - here,
+                            price,
+                            floor,
                         )
                         n += 1
         best = -1
@@ -162,7 +193,9 @@ def best_vertex(space, terrain, roadmap, field, target, x, y, comfortable, neede
             cost[cheapest] = np.inf
             vx, vy = roadmap.vertex[v, 0], roadmap.vertex[v, 1]
             if segment_is_clear(space, x, y, vx, vy, clearance):
-                exact = cost_to_go[v] + segment_weighted_length(terrain, x, y, vx, vy)
+                exact = cost_to_go[v] + segment_cost(
+                    terrain, x, y, vx, vy, price, floor
+                )
                 if exact < best_cost:
                     best_cost = exact
                     best = v

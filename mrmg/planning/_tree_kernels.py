@@ -13,7 +13,7 @@ from mrmg.planning._expansion_kernels import choose_modes, expand
 from mrmg.planning._finish_kernels import all_finished, at_finish
 from mrmg.planning._groups_kernels import add_to_group, new_groups, select_vertex
 from mrmg.planning._maneuver_kernels import way_left
-from mrmg.planning._mission_kernels import in_target, look_ahead
+from mrmg.planning._mission_kernels import in_target, leg_energy, look_ahead
 from mrmg.planning._nrpa_kernels import RoutingArrays
 from mrmg.planning._random_kernels import random_below, random_unit
 from mrmg.planning._refuel_kernels import IMPOSSIBLE
@@ -139,7 +139,9 @@ def rest_of_tours(mission, tree, tours, v, otherwise):
                 leg = mission.routing.cost[r, place, t] / surcharge
             else:
                 to_go, turning = way_left(mission, r, t, tree.state[v, r], waypoint)
-                leg = to_go * fleet[r].plain if to_go < np.inf else otherwise
+                leg = otherwise
+                if to_go < np.inf:
+                    leg = leg_energy(mission, r, t, tree.state[v, r], to_go)
                 # Turning ranks vertices; it takes less energy than it is counted as.
                 total += turning * fleet[r].plain if to_go < np.inf else 0.0
             total += leg
@@ -155,7 +157,9 @@ def rest_of_tours(mission, tree, tours, v, otherwise):
                 to_go, turning = way_left(
                     mission, r, finish, tree.state[v, r], waypoint
                 )
-                leg = to_go * fleet[r].plain if to_go < np.inf else otherwise
+                leg = otherwise
+                if to_go < np.inf:
+                    leg = leg_energy(mission, r, finish, tree.state[v, r], to_go)
             total += leg
             enough &= left >= leg
     return total, enough
@@ -169,10 +173,10 @@ def route_from(mission, tree, v, random, tour, length):
     cost = problem.cost.copy()
     waypoint = np.empty(2)
     for r in range(robots):
-        joules = mission.fleet[r].plain * (1.0 + params.route_margin)
         for t in range(n_targets):
             way = look_ahead(mission, r, t, tree.state[v, r], 0.0, waypoint)
-            cost[r, n_targets, t] = way * joules
+            leg = leg_energy(mission, r, t, tree.state[v, r], way)
+            cost[r, n_targets, t] = leg * (1.0 + params.route_margin)
     now = RoutingArrays(
         problem.goals,
         cost,

@@ -5,6 +5,12 @@ energy of that is at least the rolling resistance on the shortest ways (`geodesi
 a robot that starts and ends at rest gets no inertia for nothing, and turning, idling
 and other robots only cost more. The least over all orders is the bound.
 
+On slopes the battery also pays for climbing and is paid for rolling down, at most what
+that is worth without losses (`slopes.climb_J`). Along a way this adds up to the
+difference of heights between its ends, so the bound of flat ground less the descent
+from each start to the lowest ground on which a mission can end is a bound, with
+batteries that hold as much more.
+
 Charges are taken at the middle of each planning step. In a step in which the robot
 turns round, the way back is not charged; that is worth less than 0.01 mm.
 """
@@ -14,11 +20,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import shapely
+from shapely.geometry import Point
 
 from mrmg.planning import _bound_kernels
 from mrmg.planning._nrpa_kernels import RoutingArrays
 from mrmg.planning.geodesic import Ground, least_ways_m
 from mrmg.planning.routing import Routing, routing_arrays
+from mrmg.planning.slopes import climb_J, height_span_m
 from mrmg.scene.types import Robot, Scene
 
 MOST_GOALS = 14
@@ -35,6 +44,10 @@ SPANNING_ROUNDS = 400
 
 ROUNDING_SHARE = 1e-9
 """What rounding may add to a bound; taken off."""
+
+
+ROUND_SHARE = 0.002
+"""What a circle reaches beyond the polygon that stands for it, over its radius."""
 
 
 def exact_routing(problem: RoutingArrays) -> Routing | None:
@@ -138,7 +151,8 @@ def lower_bound_J(scene: Scene, *, step_s: float = 0.1, cells: int = CELLS) -> f
     problem = relaxed_problem(scene, step_s=step_s, cells=cells)
     routing = exact_routing(problem)
     bound = relaxed_routing_J(problem) if routing is None else routing.cost_J
-    return bound * (1.0 - ROUNDING_SHARE)
+    bound -= sum(_most_descent_J(scene, robot) for robot in scene.robots)
+    return max(0.0, bound) * (1.0 - ROUNDING_SHARE)
 
 
 def relaxed_problem(
@@ -146,8 +160,8 @@ def relaxed_problem(
 ) -> RoutingArrays:
     """Return the routing problem in which every leg costs at most what it must.
 
-    Between recharges a robot may bring kinetic energy along, which is added to its
-    capacity.
+    Between recharges a robot may bring kinetic energy along and use its height, which
+    is added to its capacity and to its energy at the start.
     """
     x_min, y_min, x_max, y_max = scene.bounds
     cell_m = math.sqrt((x_max - x_min) * (y_max - y_min) / cells)
@@ -161,8 +175,14 @@ def relaxed_problem(
             ground = Ground.of(scene, robot, cell_m=cell_m, step_m=step_m)
             ways[key] = least_ways_m(ground, regions, starts)
     batteries = [robot.battery for robot in scene.robots]
+    descents = [_descents_J(scene, robot) for robot in scene.robots]
     capacity_J = [
-        robot.battery.capacity_J + _most_kinetic_J(robot) for robot in scene.robots
+        robot.battery.capacity_J + _most_kinetic_J(robot) + from_top_J
+        for robot, (_, from_top_J) in zip(scene.robots, descents, strict=True)
+    ]
+    energy_J = [
+        battery.start_J + from_start_J
+        for battery, (from_start_J, _) in zip(batteries, descents, strict=True)
     ]
     return routing_arrays(
         goals=len(scene.goals),
@@ -171,10 +191,34 @@ def relaxed_problem(
         plain=np.array(
             [r.model.energy_model.plain_ground_J_per_m() for r in scene.robots]
         ),
-        energy=np.array([battery.start_J for battery in batteries]),
+        energy=np.array(energy_J),
         capacity=np.array(capacity_J),
         reserve=np.array([battery.reserve_J - 1e-3 for battery in batteries]),
     )
+
+
+def _most_descent_J(scene: Scene, robot: Robot) -> float:
+    """Return the battery energy that a start above the mission's end is worth.
+
+    Without regeneration the battery never gains, so the mission counts as ended at a
+    robot's last goal; with it, the robot may roll down to the lowest place there is.
+    """
+    _, start_m = height_span_m(scene, robot, Point(*robot.pose[:2]))
+    ends = [shapely.box(*scene.bounds)]
+    if robot.model.regeneration_efficiency == 0.0:
+        ends = [
+            goal.region.shape.buffer(ROUND_SHARE * goal.region.radius_m)
+            for goal in scene.goals
+        ]
+    lowest_m = min(height_span_m(scene, robot, end)[0] for end in ends)
+    return climb_J(robot, max(0.0, start_m - lowest_m))
+
+
+def _descents_J(scene: Scene, robot: Robot) -> tuple[float, float]:
+    """Return what rolling down from the start, and from the top, is worth at most."""
+    _, start_m = height_span_m(scene, robot, Point(*robot.pose[:2]))
+    low_m, high_m = height_span_m(scene, robot, shapely.box(*scene.bounds))
+    return climb_J(robot, start_m - low_m), climb_J(robot, high_m - low_m)
 
 
 def _travel_key(scene: Scene, robot: Robot) -> tuple[object, ...]:

@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 from shapely.geometry import Point, Polygon, box
 
+from mrmg.planning.slopes import climb_J, height_span_m
 from mrmg.scene.types import Goal, Region, Robot, Scene
 
 
@@ -172,7 +173,11 @@ class _Reach:
         cheapest = min([1.0, *(area.multiplier for area in self.scene.terrain)])
         joules = cheapest * self.robot.model.energy_model.plain_ground_J_per_m()
         start = place if isinstance(place, Point) else _whole(place)
-        return joules * shortest_way_m(start, _whole(region), self.blocked)
+        end = _whole(region)
+        _, high_m = height_span_m(self.scene, self.robot, start)
+        low_m, _ = height_span_m(self.scene, self.robot, end)
+        way_J = joules * shortest_way_m(start, end, self.blocked)
+        return way_J + climb_J(self.robot, low_m - high_m)
 
 
 def shortest_way_m(

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from mrmg.errors import Fault, SceneError
 from mrmg.motion._kernels import MODEL_ID, USER
 from mrmg.motion.user_motion import user_motion
 from mrmg.planning._fleet_kernels import FLEET, MOST_CORNERS, Spaces
+from mrmg.planning.slopes import SlopeCost
 from mrmg.scene.types import Robot, Scene
 from mrmg.world.world import World
 
@@ -49,12 +52,24 @@ def passage_m(robot: Robot, margin_m: float) -> float:
     return round(robot.model.half_width_m + margin_m + PASSAGE_SLACK_M, 6)
 
 
+class TravelClass(NamedTuple):
+    """Robots that share a roadmap and its cost-to-go fields.
+
+    Attributes:
+        space: index of their free space.
+        passage: clearance of their line of travel [m].
+        slope: what slopes cost them.
+    """
+
+    space: int
+    passage: float
+    slope: SlopeCost
+
+
 def travel_classes(
     scene: Scene, world: World, margin_m: float
-) -> tuple[list[tuple[int, float]], list[int]]:
-    """Return the distinct (free space, passage clearance) pairs and robots' indices.
-
-    Robots of one class share a roadmap and its cost-to-go fields.
+) -> tuple[list[TravelClass], list[int]]:
+    """Return the distinct travel classes and each robot's index among them.
 
     Args:
         scene: the scene.
@@ -62,7 +77,11 @@ def travel_classes(
         margin_m: distance robots keep from obstacles.
     """
     keys = [
-        (int(world.space_of_robot[i]), passage_m(robot, margin_m))
+        TravelClass(
+            space=int(world.space_of_robot[i]),
+            passage=passage_m(robot, margin_m),
+            slope=SlopeCost.of(scene, robot.model),
+        )
         for i, robot in enumerate(scene.robots)
     ]
     distinct = list(dict.fromkeys(keys))
@@ -101,6 +120,7 @@ def fleet_array(
             one["step_at"], one["steer_at"] = motion.compiled(limits.as_tuple())
         one["wheelbase"] = model.wheelbase_m
         one["track"] = model.track_m
+        one["lead"] = model.center_of_mass_m
         one["limit"] = limits.as_tuple()
         one["corner"][: len(outline)] = outline
         one["corners"] = len(outline)

@@ -3,9 +3,9 @@
 Vertices are goals, stations, robot starts, points around obstacle corners and terrain
 borders, and free samples. An edge's weight is the integral of the terrain multiplier
 along it, in metres of plain ground (a robot's energy is that times its J/m on plain
-ground); dynamics are neglected, obstacles and clearance are not. One Dijkstra per
-target gives the cost-to-go fields the steering descends and the distance matrix the
-router needs.
+ground), and on slopes depends on the direction (`slopes`); dynamics are neglected,
+obstacles and clearance are not. One Dijkstra per target, against the edges, gives the
+cost-to-go fields the steering descends and the distance matrix the router needs.
 """
 
 from __future__ import annotations
@@ -22,9 +22,11 @@ from scipy.spatial import cKDTree
 
 from mrmg.planning import _roadmap_kernels
 from mrmg.planning._roadmap_kernels import RoadmapArrays
-from mrmg.planning.fleet import travel_classes
+from mrmg.planning.fleet import TravelClass, travel_classes
+from mrmg.planning.slopes import SlopeCost
 from mrmg.scene.types import Region, Scene
 from mrmg.world._kernels import FreeSpace
+from mrmg.world.relief import height_at
 from mrmg.world.world import World
 
 BUCKET_M = 4.0
@@ -46,11 +48,13 @@ class Roadmap:
 
     Attributes:
         arrays: what the kernels use.
-        distance: the distance matrix: weighted length from target to target,
+        distance: the distance matrix: cost from target to target [m of plain ground],
             shape (F, T, T).
         start_distance: from each robot's start to each target, shape (R, T).
-        edges: (first, second) vertex and weighted length of each class's edges.
+        edges: (first, second) vertex and cost of each class's edges there and back,
+            shape (n,), (n,) and (n, 2).
         targets: ids of the targets, which are the first vertices.
+        height_m: of the vertices, shape (V,); None on flat ground.
     """
 
     arrays: RoadmapArrays
@@ -58,22 +62,35 @@ class Roadmap:
     start_distance: np.ndarray
     edges: tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...]
     targets: tuple[str, ...]
+    height_m: np.ndarray | None
 
     def graph(self, travel_class: int = 0) -> nx.Graph:
         """Return one class's roadmap as a networkx graph for analysis and export.
 
         Nodes have `x_m` and `y_m`, and targets a `target`; edges have `weight`, metres
-        of plain ground.
+        of plain ground. On slopes the graph is directed and nodes have `z_m`; a weight
+        is negative where regeneration feeds back more than driving takes.
         """
-        graph = nx.Graph()
+        graph = nx.Graph() if self.height_m is None else nx.DiGraph()
         for i, (x, y) in enumerate(self.arrays.vertex):
             graph.add_node(i, x_m=float(x), y_m=float(y))
         for i, name in enumerate(self.targets):
             graph.nodes[i]["target"] = name
         first, second, weight = self.edges[travel_class]
-        graph.add_weighted_edges_from(
-            zip(first.tolist(), second.tolist(), weight.tolist(), strict=True)
-        )
+        ways = [(first, second, weight[:, 0])]
+        if self.height_m is not None:
+            for i, z in enumerate(self.height_m):
+                graph.nodes[i]["z_m"] = float(z)
+            rise = self.height_m[second] - self.height_m[first]
+            potential = self.arrays.slope_refund[travel_class] * rise
+            ways = [
+                (first, second, weight[:, 0] + potential),
+                (second, first, weight[:, 1] - potential),
+            ]
+        for start, end, cost in ways:
+            graph.add_weighted_edges_from(
+                zip(start.tolist(), end.tolist(), cost.tolist(), strict=True)
+            )
         return graph
 
 
@@ -100,34 +117,61 @@ def build_roadmap(
     vertex = _vertices(scene, world, classes, samples, rng)
     first, second = _candidate_edges(vertex, neighbours)
     n_targets = len(planned_regions(scene))
-    fields, successors, distances, edges = [], [], [], []
-    for space, passage in classes:
+    fields, successors, distances, edges, ways_from = [], [], [], [], []
+    height_m = None if scene.elevation is None else height_at(scene, vertex)
+    for space, passage, slope in classes:
         weight = _roadmap_kernels.edge_costs(
-            world.spaces[space], world.terrain, vertex, first, second, passage
+            world.spaces[space],
+            world.terrain,
+            vertex,
+            first,
+            second,
+            passage,
+            slope.price,
+            slope.floor,
         )
-        usable = np.isfinite(weight)
-        edges.append((first[usable], second[usable], weight[usable]))
-        graph = csr_array(
-            (weight[usable], (first[usable], second[usable])), shape=(len(vertex),) * 2
-        )
+        usable = np.isfinite(weight[:, 0])
+        low, high, weight = first[usable], second[usable], weight[usable]
+        edges.append((low, high, weight))
+        ways = np.concatenate([low, high]), np.concatenate([high, low])
+        graph = csr_array((weight.T.ravel(), ways), shape=(len(vertex),) * 2)
         entries = _entries(scene, graph, vertex)
         cost, successor = _cost_to_go(graph, entries)
         fields.append(cost)
         successors.append(successor)
-        distances.append([cost[:, sources].min(axis=1) for sources in entries])
+        energies = _with_potential(cost, height_m, slope.refund)
+        distances.append([energies[:, sources].min(axis=1) for sources in entries])
+        ways_from.append(energies)
     starts = n_targets + np.arange(len(scene.robots))
     return Roadmap(
-        arrays=_with_buckets(scene, vertex, np.stack(fields), np.stack(successors)),
+        arrays=_with_buckets(
+            scene,
+            vertex,
+            np.stack(fields),
+            np.stack(successors),
+            [slope for _, _, slope in classes],
+        ),
         distance=np.array(distances).reshape(len(classes), n_targets, n_targets),
         start_distance=np.stack(
-            [fields[c][:, v] for c, v in zip(class_of_robot, starts, strict=True)]
+            [ways_from[c][:, v] for c, v in zip(class_of_robot, starts, strict=True)]
         ),
         edges=tuple(edges),
         targets=(
             *(target.id for target in scene.targets()),
             *(f"finish of {robot.id}" for robot in scene.robots if robot.finish),
         ),
+        height_m=height_m,
     )
+
+
+def _with_potential(
+    cost: np.ndarray, height_m: np.ndarray | None, refund: float
+) -> np.ndarray:
+    """Return what the ways of reduced costs really take, at least 0, (T, V)."""
+    if height_m is None or refund == 0.0:
+        return cost
+    rise = height_m[: len(cost), None] - height_m
+    return np.asarray(np.maximum(cost + refund * rise, 0.0))
 
 
 def planned_regions(scene: Scene) -> list[Region]:
@@ -163,13 +207,13 @@ def _reach(region: Region) -> float:
 def _cost_to_go(
     graph: csr_array, entries: list[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return each target's weighted length and successor for all vertices, (T, V)."""
+    """Return each target's cost and successor for all vertices, (T, V)."""
+    against = csr_array(graph.T)
     shape = (len(entries), graph.shape[0])
     cost, successor = np.empty(shape), np.empty(shape, np.int32)
     for t, sources in enumerate(entries):
         cost[t], previous, _ = dijkstra(
-            graph,
-            directed=False,
+            against,
             indices=sources,
             min_only=True,
             return_predecessors=True,
@@ -181,7 +225,7 @@ def _cost_to_go(
 def _vertices(
     scene: Scene,
     world: World,
-    classes: Sequence[tuple[int, float]],
+    classes: Sequence[TravelClass],
     samples: int,
     rng: np.random.Generator,
 ) -> np.ndarray:
@@ -192,7 +236,7 @@ def _vertices(
     fixed += [np.array(robot.pose[:2]) for robot in scene.robots]
     unit = (rng.random(2) + np.arange(samples)[:, None] * SPREAD) % 1.0
     spread = unit * (x_max - x_min, y_max - y_min) + (x_min, y_min)
-    passage = min(passage for _, passage in classes)
+    passage = min(item.passage for item in classes)
     rings = [
         *(
             union.simplify(0.05).buffer(passage + 0.15, quad_segs=2)
@@ -204,7 +248,7 @@ def _vertices(
     corners = shapely.get_coordinates(
         [shapely.segmentize(ring, 8.0) for ring in rings if not ring.is_empty]
     )
-    ridges = [_ridge(world.spaces[space]) for space, _ in classes]
+    ridges = [_ridge(world.spaces[item.space]) for item in classes]
     inner = [_inner_points(region) for region in planned_regions(scene)]
     loose = np.concatenate([spread, corners.reshape(-1, 2), *ridges, *inner])
     inside = (
@@ -215,7 +259,7 @@ def _vertices(
     )
     loose = loose[inside]
     widest = np.max(
-        [_field_at(world.spaces[space], loose) for space, _ in classes], axis=0
+        [_field_at(world.spaces[item.space], loose) for item in classes], axis=0
     )
     return np.concatenate([np.array(fixed).reshape(-1, 2), loose[widest >= passage]])
 
@@ -247,11 +291,11 @@ def _ridge(space: FreeSpace) -> np.ndarray:
 def _anchor(
     scene: Scene,
     world: World,
-    classes: Sequence[tuple[int, float]],
+    classes: Sequence[TravelClass],
     region: Region,
 ) -> np.ndarray:
     """Return a region's centre, or its clearest point where the centre is tight."""
-    space, passage = classes[0]
+    space, passage, _ = classes[0]
     centre = np.asarray(region.center, dtype=float)
     if _field_at(world.spaces[space], centre[None])[0] >= passage:
         return centre
@@ -287,7 +331,11 @@ def _candidate_edges(
 
 
 def _with_buckets(
-    scene: Scene, vertex: np.ndarray, cost_to_go: np.ndarray, successor: np.ndarray
+    scene: Scene,
+    vertex: np.ndarray,
+    cost_to_go: np.ndarray,
+    successor: np.ndarray,
+    slopes: Sequence[SlopeCost],
 ) -> RoadmapArrays:
     x_min, y_min, x_max, y_max = scene.bounds
     columns = int(np.ceil((x_max - x_min) / BUCKET_M))
@@ -300,6 +348,9 @@ def _with_buckets(
         vertex=vertex,
         cost_to_go=cost_to_go,
         successor=successor,
+        slope_price=np.array([slope.price for slope in slopes]),
+        slope_floor=np.array([slope.floor for slope in slopes]),
+        slope_refund=np.array([slope.refund for slope in slopes]),
         x_min=float(x_min),
         y_min=float(y_min),
         bucket=BUCKET_M,

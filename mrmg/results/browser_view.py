@@ -16,11 +16,12 @@ from mrmg.errors import MachineError
 from mrmg.execution.world_model import build_world
 from mrmg.mission import Plan
 from mrmg.results import style
-from mrmg.results.ground_image import paint_ground
+from mrmg.results.ground_image import paint_ground, painted_relief
 from mrmg.results.replay import SPEEDS, Replay, spoken
 from mrmg.results.solid_shapes import body_meshes, geom_mesh
 from mrmg.results.world_view import floor_frame
 from mrmg.scene.types import Scene
+from mrmg.world.relief import lifted
 
 _FRAME_S = 1.0 / 30.0
 _TAG_LIFT_M = 0.6
@@ -123,6 +124,11 @@ class BrowserView:
 
     def _add_ground(self, plan: Plan | None) -> None:
         frame = floor_frame(self._world)
+        if self._scene.elevation is not None:
+            self._server.scene.add_mesh_trimesh(
+                "/ground", painted_relief(self._scene, plan, frame), cast_shadow=False
+            )
+            return
         width_m, height_m = 2.0 * frame.half_m
         self._server.scene.add_image(
             "/ground",
@@ -154,7 +160,7 @@ class BrowserView:
             self._server.scene.add_label(
                 f"/targets/{target.id}/name",
                 f"⚡{names[target.id]}" if station else names[target.id],
-                position=(*target.region.center, 0.5),
+                position=tuple(lifted(self._scene, target.region.center, 0.5)[0]),
                 anchor="bottom-center",
             )
         return handles
@@ -194,7 +200,13 @@ class BrowserView:
             tags[robot.id] = self._server.scene.add_label(
                 f"/tags/{robot.id}",
                 f"{robot.id} {100.0 * start:.0f} %",
-                position=(*robot.pose[:2], robot.model.height_m + _TAG_LIFT_M),
+                position=tuple(
+                    lifted(
+                        self._scene,
+                        np.array(robot.pose[:2]),
+                        robot.model.height_m + _TAG_LIFT_M,
+                    )[0]
+                ),
                 anchor="bottom-center",
             )
         return tags
@@ -204,7 +216,7 @@ class BrowserView:
         for robot, state in zip(
             replay.film.log.robots, replay.film.log.state, strict=True
         ):
-            points = np.insert(state[::10, :2], 2, _PATH_LIFT_M, axis=1)
+            points = lifted(self._scene, state[::10, :2], _PATH_LIFT_M)
             pieces = np.stack([points[:-1], points[1:]], axis=1)
             self._driven.append(
                 self._server.scene.add_line_segments(

@@ -23,6 +23,7 @@ from mrmg.results.world_view import (
     floor_frame,
 )
 from mrmg.scene.types import Scene
+from mrmg.world.relief import height_at, lifted
 
 _TRAIL_AHEAD_M = 1.2
 _YAW_SMOOTHING_S = 0.8
@@ -201,17 +202,18 @@ class Stage:
         film = self._film
         self._view.place(film.log.qpos[tick])
         x_m, y_m = film.log.state[film.followed, tick, :2]
-        camera = chase_camera(float(x_m), float(y_m), float(film.yaw[tick]))
+        z_m = height_at(film.scene, np.array([[x_m, y_m]]))[0]
+        camera = chase_camera(float(x_m), float(y_m), float(z_m), float(film.yaw[tick]))
         self._view.draw(camera, fovy=CHASE_FOVY_DEG, shadows=True, out=pane)
         near_m = np.array([x_m, y_m])
         for label, spot in self._labels:
             if np.hypot(*(spot - near_m)) < _NAMED_WITHIN_M:
-                label.blit(pane, self._view.project(np.array([[*spot, 0.0]]))[0])
+                label.blit(pane, self._view.project(lifted(film.scene, spot, 0.0))[0])
         tops = [
-            [*state[tick, :2], robot.model.height_m + _TAG_LIFT_M]
+            lifted(film.scene, state[tick, :2], robot.model.height_m + _TAG_LIFT_M)
             for robot, state in zip(film.scene.robots, film.log.state, strict=True)
         ]
-        self._lay_tags(pane, self._view.project(np.array(tops)), reading)
+        self._lay_tags(pane, self._view.project(np.concatenate(tops)), reading)
 
     def _lay_tags(self, pane: np.ndarray, spots: np.ndarray, reading: Reading) -> None:
         for tag, spot, robot in zip(self._tags, spots, reading.robots, strict=True):

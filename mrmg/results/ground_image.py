@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import trimesh
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -18,6 +19,7 @@ from PIL import Image, ImageDraw
 from mrmg.mission import Plan
 from mrmg.results import scene_drawing, style
 from mrmg.scene.types import Scene
+from mrmg.world.relief import lifted
 
 PIXELS = 2048
 """Longer side of the image."""
@@ -28,6 +30,7 @@ _PLANNED_PIXELS = 4.0
 _SPACING_M = 0.3
 _SUPERSAMPLING = 4
 _LABEL_PIXELS = 40.0
+_RELIEF_CELL_M = 0.25
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,6 +88,31 @@ def paint_ground(scene: Scene, plan: Plan | None, frame: GroundFrame) -> np.ndar
     canvas.draw()  # type: ignore[no-untyped-call]
     pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
     return np.array(pixels[:, :, :3])
+
+
+def painted_relief(
+    scene: Scene, plan: Plan | None, frame: GroundFrame
+) -> trimesh.Trimesh:
+    """Return the ground as a mesh whose corners have the colours of its image."""
+    image = paint_ground(scene, plan, frame)
+    columns, rows = np.ceil(2.0 * frame.half_m / _RELIEF_CELL_M).astype(int) + 1
+    low, high = frame.center_m - frame.half_m, frame.center_m + frame.half_m
+    x, y = np.meshgrid(
+        np.linspace(low[0], high[0], columns), np.linspace(low[1], high[1], rows)
+    )
+    points = np.stack([x.ravel(), y.ravel()], axis=1)
+    pixel = np.floor(frame.to_pixels(points)).astype(int)
+    limit = np.array([image.shape[1], image.shape[0]]) - 1
+    column, row = np.clip(pixel, 0, limit).T
+    corner = np.arange(rows * columns).reshape(rows, columns)
+    a, b = corner[:-1, :-1].ravel(), corner[:-1, 1:].ravel()
+    c, d = corner[1:, :-1].ravel(), corner[1:, 1:].ravel()
+    return trimesh.Trimesh(
+        vertices=lifted(scene, points, 0.0),
+        faces=np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)]),
+        vertex_colors=image[row, column],
+        process=False,
+    )
 
 
 class TrailPainter:

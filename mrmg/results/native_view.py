@@ -16,6 +16,7 @@ from mrmg.results.ground_image import paint_ground
 from mrmg.results.replay import SPEEDS, Replay, spoken
 from mrmg.results.world_view import drawable_spec, floor_frame
 from mrmg.scene.types import Scene
+from mrmg.world.relief import lifted
 
 KEYS = "space: play or pause, arrows left and right: 5 s, up and down: speed"
 HINT = "Alt+C opens the panel Control, with a slider for the time"
@@ -169,30 +170,30 @@ def annotate(extra: mujoco.MjvScene, scene: Scene, replay: Replay) -> None:
     extra.ngeom = 0
     names = {**style.goal_labels(scene), **style.station_labels(scene)}
     for target in scene.targets():
-        _add_label(extra, (*target.region.center, 0.3), names[target.id])
+        at = lifted(scene, target.region.center, 0.3)[0]
+        _add_label(extra, at, names[target.id])
     log, reading = replay.film.log, replay.reading()
     for robot, state, said in zip(scene.robots, log.state, reading.robots, strict=True):
-        at = (*state[replay.tick, :2], robot.model.height_m + _TAG_LIFT_M)
+        above = robot.model.height_m + _TAG_LIFT_M
+        at = lifted(scene, state[replay.tick, :2], above)[0]
         _add_label(extra, at, f"{robot.id} {100.0 * said.charge:.0f} %")
     room = (extra.maxgeom - extra.ngeom) // len(scene.robots)
     for robot, state in zip(scene.robots, log.state, strict=True):
         color = np.array([*style.rgb(replay.film.colors[robot.id]), 255.0]) / 255.0
         stride = max(math.ceil(len(state) / max(room, 1)), _LEAST_STRIDE)
-        driven = state[: replay.tick + 1 : stride, :2]
+        driven = lifted(scene, state[: replay.tick + 1 : stride, :2], _LINE_LIFT_M)
         for start, end in zip(driven[:-1], driven[1:], strict=True):
             _add_line(extra, start, end, color)
 
 
-def _add_label(
-    extra: mujoco.MjvScene, at: tuple[float, float, float], text: str
-) -> None:
+def _add_label(extra: mujoco.MjvScene, at: np.ndarray, text: str) -> None:
     if extra.ngeom < extra.maxgeom:
         geom = extra.geoms[extra.ngeom]
         mujoco.mjv_initGeom(
             geom,
             mujoco.mjtGeom.mjGEOM_LABEL,
             np.zeros(3),
-            np.array(at, dtype=float),
+            at,
             np.eye(3).ravel(),
             np.array([1.0, 1.0, 1.0, 1.0], dtype=np.float32),
         )
@@ -217,8 +218,8 @@ def _add_line(
             geom,
             mujoco.mjtGeom.mjGEOM_LINE,
             _LINE_PIXELS,
-            np.array([*start, _LINE_LIFT_M]),
-            np.array([*end, _LINE_LIFT_M]),
+            start,
+            end,
         )
         geom.emission = 0.0  # the lights alone show its colour as it is
         extra.ngeom += 1

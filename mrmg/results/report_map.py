@@ -12,6 +12,7 @@ from shapely.geometry import Polygon
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan
 from mrmg.results import style
+from mrmg.results.contours import contour_lines, label_spot
 from mrmg.results.overview import name_spots, visit_ranks, way_to
 from mrmg.results.scene_drawing import polygons_of, terrain_spots
 from mrmg.scene.types import Goal, Robot, Scene, Station
@@ -66,6 +67,16 @@ class _Canvas:
             fill = f"--c:{classes[area.multiplier].color}"
             for part in polygons_of(area.shape.intersection(bounds)):
                 yield self._shape(part, "terrain", tip, fill)
+        for level_m, line in contour_lines(self._scene):
+            points = " ".join("{},{}".format(*self._point(x, y)) for x, y in line)
+            yield (
+                f'<polyline class="contour" points="{points}" '
+                f'data-tip="{level_m:g} m high"/>'
+            )
+            spot = label_spot(line)
+            if spot is not None:
+                x, y = self._point(*spot)
+                yield f'<text class="height" x="{x}" y="{y}">{level_m:g}</text>'
         for obstacle in self._scene.obstacles:
             look, tip = "obstacle", f"{obstacle.id}: obstacle"
             if obstacle.blocks is not None:

@@ -19,6 +19,7 @@ from shapely.geometry.base import BaseGeometry
 
 from mrmg import storage
 from mrmg.results import style
+from mrmg.results.contours import draw_contours
 from mrmg.scene.types import Goal, Region, Robot, Scene, Station
 
 DPI = 110
@@ -100,13 +101,14 @@ def draw_ground(
     hatched: bool = True,
     label_points: float | None = 9.0,
 ) -> None:
-    """Draw bounds, terrain classes and obstacles.
+    """Draw bounds, terrain classes, contour lines and obstacles.
 
     Args:
         axes: where to draw, in metres.
         scene: what to draw.
         hatched: hatch the terrain classes.
-        label_points: size of the multipliers printed on terrain areas; None for none.
+        label_points: size of the multipliers printed on terrain areas, and nearly that
+            of heights; None for neither.
     """
     bounds = box(*scene.bounds)
     _add_shape(
@@ -135,6 +137,7 @@ def draw_ground(
             linestyle="--" if partial else "-",
             zorder=3,
         )
+    draw_contours(axes, scene, label_points)
     if label_points is not None:
         _label_terrain(axes, scene, label_points)
 
@@ -263,6 +266,8 @@ def map_legend(scene: Scene) -> list[Patch | Line2D]:
             facecolor=style.GROUND, edgecolor=style.MUTED, label="plain ground ×1"
         )
         handles.append(plain)
+    if scene.elevation is not None:
+        handles.append(Line2D([], [], color=style.CONTOUR, label="contour line"))
     handles += [
         Patch(
             facecolor=look.color,

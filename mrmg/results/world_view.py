@@ -38,14 +38,16 @@ def top_camera(scene_center: np.ndarray) -> mujoco.MjvCamera:
     return camera
 
 
-def chase_camera(x_m: float, y_m: float, yaw_rad: float) -> mujoco.MjvCamera:
+def chase_camera(
+    x_m: float, y_m: float, z_m: float, yaw_rad: float
+) -> mujoco.MjvCamera:
     """Return a camera behind and above a robot at a pose."""
     camera = mujoco.MjvCamera()
     camera.type = mujoco.mjtCamera.mjCAMERA_FREE
     camera.lookat[:] = [
         x_m + _CHASE_AHEAD_M * math.cos(yaw_rad),
         y_m + _CHASE_AHEAD_M * math.sin(yaw_rad),
-        0.4,
+        z_m + 0.4,
     ]
     camera.azimuth = math.degrees(yaw_rad)
     camera.elevation = _CHASE_ELEVATION_DEG

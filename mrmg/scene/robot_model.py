@@ -14,6 +14,12 @@ import numpy as np
 
 from mrmg.energy import GRAVITY_M_S2, EnergyModel, EnergyPreset
 
+GRIP_SHARE = 0.8
+"""Share of the driven axle's static grip that is used."""
+
+DRIVEN_LOAD_SHARE = 0.5
+"""Share of the weight the driven axle carries at least."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
@@ -72,6 +78,8 @@ class RobotModel:
         planning_share: share of the limits the planner uses; the controller keeps the
             rest.
         mass_kg: whole robot, wheels included.
+        center_of_mass_m: how far ahead of the reference point the mass lies; what it
+            climbs is the height of the ground there.
         wheel_radius_m: rolling radius.
         wheel_inertia_kg_m2: spin inertia of one wheel, armature included.
         wheel_count: number of wheels.
@@ -96,6 +104,7 @@ class RobotModel:
     limits: Limits
     planning_share: float
     mass_kg: float
+    center_of_mass_m: float
     wheel_radius_m: float
     wheel_inertia_kg_m2: float
     wheel_count: int
@@ -131,6 +140,11 @@ class RobotModel:
             device_power_W=self.device_power_W,
         )
         return full.with_preset(self.energy_preset)
+
+    @property
+    def usable_grip(self) -> float:
+        """Force the driven axle may transmit, as a share of the weight."""
+        return GRIP_SHARE * DRIVEN_LOAD_SHARE * self.friction_coefficient
 
     @property
     def inscribed_radius_m(self) -> float:

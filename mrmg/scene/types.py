@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from shapely.geometry import Polygon
 
+from mrmg.scene.elevation import Elevation
 from mrmg.scene.robot_model import RobotModel
 
 
@@ -165,6 +166,7 @@ class Scene:
         document: the scene file's content with defaults filled in, as plain data: what
             `scene.loading.scene_from_document` turns back into an equal scene.
         digest: fingerprint of the content, models included.
+        elevation: the relief; None is flat ground at height 0.
     """
 
     name: str
@@ -176,6 +178,7 @@ class Scene:
     robots: tuple[Robot, ...]
     document: dict[str, Any]
     digest: str
+    elevation: Elevation | None = None
 
     def robot(self, robot_id: str) -> Robot:
         """Return the robot of that id."""

@@ -45,13 +45,28 @@ class FreeSpace(NamedTuple):
     edge: np.ndarray
 
 
+NO_RELIEF = np.zeros((0, 0))
+"""The heights of flat ground."""
+
+
 class TerrainGrid(NamedTuple):
-    """Energy multiplier at cell centres, shape (ny, nx)."""
+    """What the ground costs.
+
+    Attributes:
+        x_min, y_min: corner of the grids [m].
+        cell: side of a cell of multipliers [m].
+        multiplier: energy multiplier at cell centres, shape (ny, nx).
+        height: heights at the nodes of a grid of its own [m]; `NO_RELIEF` if flat.
+        height_dx, height_dy: extent of a cell of that grid [m].
+    """
 
     x_min: float
     y_min: float
     cell: float
     multiplier: np.ndarray
+    height: np.ndarray = NO_RELIEF
+    height_dx: float = 1.0
+    height_dy: float = 1.0
 
 
 @leaf_kernel
@@ -222,6 +237,24 @@ def multiplier_in(terrain, x, y):
 
 
 @leaf_kernel
+def height_in(terrain, x, y):
+    """Return the height of the ground [m], bilinear; 0 on flat ground."""
+    rows, columns = terrain.height.shape
+    if rows == 0:
+        return 0.0
+    fx = min(max((x - terrain.x_min) / terrain.height_dx, 0.0), columns - 1.0)
+    fy = min(max((y - terrain.y_min) / terrain.height_dy, 0.0), rows - 1.0)
+    column = min(int(fx), columns - 2)
+    row = min(int(fy), rows - 2)
+    u = fx - column
+    v = fy - row
+    h = terrain.height
+    low = h[row, column] * (1.0 - u) + h[row, column + 1] * u
+    high = h[row + 1, column] * (1.0 - u) + h[row + 1, column + 1] * u
+    return low * (1.0 - v) + high * v
+
+
+@leaf_kernel
 def segment_clearance(space, ax, ay, bx, by, enough):
     """Return the smallest clearance [m] along a segment, capped at `enough`.
 
@@ -266,3 +299,39 @@ def segment_weighted_length(terrain, ax, ay, bx, by):
         t = (i + 0.5) / n
         total += multiplier_in(terrain, ax + t * (bx - ax), ay + t * (by - ay))
     return total * length / n
+
+
+@leaf_kernel
+def sloped_length(way, rise, slope_price, floor):
+    """Return what a way costs on a slope [m of plain ground]; see `planning.slopes`.
+
+    Args:
+        way: weighted length on the map [m].
+        rise: difference of heights [m].
+        slope_price: metres of plain ground per metre of rise.
+        floor: least cost, as a share of `way`.
+    """
+    return max(way + slope_price * rise, floor * way)
+
+
+@leaf_kernel
+def segment_cost(terrain, ax, ay, bx, by, slope_price, floor):
+    """Return the cost of driving along a segment [m of plain ground].
+
+    On flat ground that is the weighted length. On slopes it depends on the direction,
+    and pieces that lead down count at least `floor` times their weighted length.
+    """
+    if terrain.height.shape[0] == 0:
+        return segment_weighted_length(terrain, ax, ay, bx, by)
+    length = hypot(bx - ax, by - ay)
+    n = max(1, int(ceil(length / (2.0 * terrain.cell))))
+    total = 0.0
+    before = height_in(terrain, ax, ay)
+    for i in range(n):
+        t = (i + 0.5) / n
+        k = multiplier_in(terrain, ax + t * (bx - ax), ay + t * (by - ay))
+        t = (i + 1.0) / n
+        after = height_in(terrain, ax + t * (bx - ax), ay + t * (by - ay))
+        total += sloped_length(k * length / n, after - before, slope_price, floor)
+        before = after
+    return total

@@ -27,7 +27,7 @@ class World:
         spaces: one free space per distinct set of obstacles.
         space_of_robot: index into `spaces` for each robot of the scene, shape (R,).
         obstacles: union of the obstacles of each space.
-        terrain: energy multiplier.
+        terrain: energy multiplier and relief.
     """
 
     spaces: tuple[FreeSpace, ...]
@@ -153,4 +153,16 @@ def _terrain_grid(scene: Scene) -> TerrainGrid:
             columns,
         )
         multiplier[inside] = area.multiplier
-    return TerrainGrid(float(x_min), float(y_min), CELL_M, multiplier)
+    if scene.elevation is None:
+        return TerrainGrid(float(x_min), float(y_min), CELL_M, multiplier)
+    dx, dy = scene.elevation.cell_m
+    return TerrainGrid(
+        x_min=float(x_min),
+        y_min=float(y_min),
+        cell=CELL_M,
+        multiplier=multiplier,
+        # A read-only array would be another type, and compiled for on its own.
+        height=scene.elevation.height_m.copy(),
+        height_dx=dx,
+        height_dy=dy,
+    )

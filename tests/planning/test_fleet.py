@@ -9,6 +9,7 @@ import pytest
 
 from mrmg.planning._fleet_kernels import space_of
 from mrmg.planning.fleet import stack_spaces, travel_classes
+from mrmg.planning.slopes import SlopeCost
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.world import _kernels
@@ -79,7 +80,8 @@ def test_robots_that_meet_the_same_obstacles_travel_alike(
 ) -> None:
     scene = make_scene(blocks)
     classes, of_robot = travel_classes(scene, World.from_scene(scene), 0.25)
+    assert all(item.slope == SlopeCost() for item in classes)
     assert of_robot == expected
     assert len(classes) == max(expected) + 1
     half_width = scene.robots[0].model.half_width_m
-    assert all(half_width < passage < 2.0 * half_width for _, passage in classes)
+    assert all(half_width < passage < 2.0 * half_width for _, passage, _ in classes)

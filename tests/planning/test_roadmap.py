@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+from pathlib import Path
 from typing import Any
 
 import networkx as nx
@@ -9,11 +11,12 @@ import numpy as np
 import pytest
 import shapely
 
-from mrmg import seeding
+from mrmg import seeding, shipped
 from mrmg.planning.fleet import travel_classes
 from mrmg.planning.roadmap import Roadmap, build_roadmap
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
+from mrmg.world.relief import height_at
 from mrmg.world.world import CELL_M, World
 
 
@@ -220,14 +223,15 @@ def test_successors_lead_to_the_target_at_the_stated_cost(
 def test_edges_keep_the_passage_clear(walled: tuple[Scene, Roadmap]) -> None:
     scene, roadmap = walled
     world = World.from_scene(scene)
-    (_, passage), *_ = travel_classes(scene, world, 0.25)[0]
+    (_, passage, _), *_ = travel_classes(scene, world, 0.25)[0]
     walls = shapely.union_all([world.obstacles[0], shapely.box(*scene.bounds).exterior])
     first, second, weight = roadmap.edges[0]
     lines = shapely.linestrings(
         np.stack([roadmap.arrays.vertex[first], roadmap.arrays.vertex[second]], axis=1)
     )
     assert shapely.distance(lines, walls).min() >= passage - 0.5 * CELL_M
-    assert (weight >= shapely.length(lines) - 1e-9).all()
+    assert (weight >= shapely.length(lines)[:, None] - 1e-9).all()
+    assert np.array_equal(weight[:, 0], weight[:, 1])
     assert len(weight) > len(roadmap.arrays.vertex)
 
 
@@ -277,6 +281,91 @@ def test_the_same_stream_gives_the_same_roadmap() -> None:
     assert np.array_equal(first.arrays.cost_to_go, second.arrays.cost_to_go)
     assert np.array_equal(first.arrays.successor, second.arrays.successor)
     assert not np.array_equal(first.arrays.vertex, other.arrays.vertex)
+
+
+# --- slopes ------------------------------------------------------------------------
+
+RIDGE = {"hills": [{"center": [28, 20], "height": 1.9, "radius": 15}]}
+
+
+def regenerating(tmp_path: Path, share: float) -> str:
+    """Return a model like the car that feeds back a share of what it brakes."""
+    folder = tmp_path / f"car{share:g}"
+    shutil.copytree(shipped.models_folder() / "car", folder)
+    text = (folder / "robot.yaml").read_text()
+    old = "regeneration_efficiency: 0.0"
+    assert old in text
+    (folder / "robot.yaml").write_text(text.replace(old, f"{old[:-3]}{share}"))
+    return str(folder)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.6])
+def test_ways_up_and_down_a_ramp_in_closed_form(tmp_path: Path, share: float) -> None:
+    """5 % up or down; rolling takes 6 %, so that no way brakes."""
+    robots = [{"id": "r", "model": regenerating(tmp_path, share), "pose": [5, 20, 0]}]
+    goals = [circle("low", 8, 20), circle("high", 52, 20)]
+    ramp = {"grid": [[0, 3.0]] * 2}
+    scene = make_scene(goals=goals, stations=[], robots=robots, elevation=ramp)
+    d = make_roadmap(scene).distance[0]
+    climb_m = 44.0 * 0.05 / 0.06
+    detour_m = 2.0  # as on the flat, ways over vertices are not quite straight
+    assert 44.0 + climb_m - 1e-6 <= d[0, 1] <= 44.0 + climb_m + detour_m
+    assert 44.0 - climb_m - 1e-6 <= d[1, 0] <= 44.0 - climb_m + detour_m
+
+
+def test_steep_descents_count_little_without_and_nothing_with_regeneration(
+    tmp_path: Path,
+) -> None:
+    """10 % down, more than rolling takes."""
+    goals = [circle("low", 8, 20), circle("high", 52, 20)]
+    for share, expected_m in ((0.0, 0.1 * 44.0), (0.6, 0.0)):
+        model = regenerating(tmp_path, share)
+        robots = [{"id": "r", "model": model, "pose": [5, 20, 0]}]
+        ramp = {"grid": [[0, 6.0]] * 2}
+        scene = make_scene(goals=goals, stations=[], robots=robots, elevation=ramp)
+        roadmap = make_roadmap(scene)
+        assert roadmap.distance[0, 1, 0] == pytest.approx(expected_m, rel=0.05)
+        assert (roadmap.arrays.cost_to_go >= 0.0).all()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.6])
+def test_fields_are_shortest_ways_of_the_directed_graph(
+    tmp_path: Path, share: float
+) -> None:
+    """Against Bellman-Ford on the exported graph, whose weights may be negative."""
+    robots = [{"id": "r", "model": regenerating(tmp_path, share), "pose": [5, 20, 0]}]
+    scene = make_scene(robots=robots, elevation=RIDGE)
+    roadmap = make_roadmap(scene, samples=150)
+    graph = roadmap.graph()
+    assert graph.is_directed()
+    weights = [weight for *_, weight in graph.edges.data("weight")]
+    assert (min(weights) < 0.0) == (share > 0.0)
+    start = len(scene.targets())
+    against = graph.reverse(copy=False)
+    heights = np.array([graph.nodes[v]["z_m"] for v in graph])
+    refund = roadmap.arrays.slope_refund[0]
+    for target in range(len(scene.targets())):
+        exact = nx.single_source_bellman_ford_path_length(against, target)
+        field = roadmap.arrays.cost_to_go[0, target]
+        for vertex, cost in exact.items():
+            rise = heights[target] - heights[vertex]
+            assert field[vertex] + refund * rise == pytest.approx(cost, abs=1e-6)
+        told = roadmap.start_distance[0, target]
+        assert told == pytest.approx(max(exact[start], 0.0))
+
+
+def test_a_way_leads_round_a_hill_where_that_is_cheaper() -> None:
+    scene = make_scene(elevation=RIDGE)
+    flat, hilly = make_roadmap(make_scene()), make_roadmap(scene)
+    start = len(scene.targets())
+    over, around = (
+        line_of(roadmap, way_to(roadmap, 0, start)) for roadmap in (flat, hilly)
+    )
+    points = shapely.get_coordinates(shapely.segmentize(over, 1.0))
+    assert height_at(scene, points).max() > 1.7
+    points = shapely.get_coordinates(shapely.segmentize(around, 1.0))
+    assert height_at(scene, points).max() < 0.9
+    assert around.length > over.length + 1.0
 
 
 # --- special scenes ----------------------------------------------------------------

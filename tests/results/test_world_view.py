@@ -18,7 +18,7 @@ SIZE = (320, 240)
 RED = (1.0, 0.0, 0.0, 1.0)
 POSES = {
     "top": (top_camera(np.array([20.0, 10.0])), 24.0),
-    "chase": (chase_camera(3.0, 8.0, 0.3), CHASE_FOVY_DEG),
+    "chase": (chase_camera(3.0, 8.0, 0.0, 0.3), CHASE_FOVY_DEG),
 }
 
 

@@ -31,6 +31,7 @@ TABLE = {
     "quickstart": (2, 4, 1, 1, 48),
     "mixed": (3, 10, 3, 2, 70),
     "diffdrive": (2, 6, 2, 1, 45),
+    "hills": (2, 8, 2, 3, 95),
 }
 MARGIN_M = 0.1
 """Beside half the robot's width: what a road must at least leave."""

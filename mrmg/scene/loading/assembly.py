@@ -18,7 +18,10 @@ from shapely.geometry import Polygon
 
 from mrmg import storage
 from mrmg.errors import Fault, SceneError
+from mrmg.scene.elevation import Elevation
 from mrmg.scene.loading.batteries import battery_of
+from mrmg.scene.loading.climbing import slope_faults
+from mrmg.scene.loading.elevation import elevation_of
 from mrmg.scene.loading.faults import nearest
 from mrmg.scene.loading.geometry import footprint_at, region_of, shape_of
 from mrmg.scene.loading.models import load_model, model_folder
@@ -26,6 +29,7 @@ from mrmg.scene.loading.schema import (
     SECTIONS,
     BatteryEntry,
     CircleEntry,
+    ElevationEntry,
     FinishEntry,
     SceneDocument,
 )
@@ -58,11 +62,13 @@ class Assembly:
         self._base = base
         self._models: dict[str, tuple[RobotModel, dict[str, Any]]] = {}
         self._references: dict[str, str] = {}
+        self._elevation_document: dict[str, Any] = {}
         self.ids = self._unique_ids()
         self.bounds = self._bounds()
         self.robots = list(self._robots())
         self.obstacles = list(self._obstacles())
         self.terrain = list(self._terrain())
+        self.elevation = self._elevation()
         self.goals = [Goal(id=i, region=r) for i, r in self._regions("goals")]
         self.stations = [Station(id=i, region=r) for i, r in self._regions("stations")]
         self._check_starts()
@@ -74,6 +80,8 @@ class Assembly:
         )
         for robot in document["robots"]:
             robot["model"] = self._references[robot["id"]]
+        if self.elevation is not None:
+            document["elevation"] = self._elevation_document
         # What a model says counts, not the folder it lies in.
         parameters = {robot.id: self._models[robot.id][1] for robot in self.robots}
         content = {**document, "robots": []}
@@ -88,6 +96,7 @@ class Assembly:
             goals=tuple(self.goals),
             stations=tuple(self.stations),
             robots=tuple(self.robots),
+            elevation=self.elevation,
             document=document,
             digest=storage.digest(storage.canonical_json(content)),
         )
@@ -227,6 +236,20 @@ class Assembly:
                     shape=shape,
                     multiplier=entry.multiplier,
                 )
+
+    def _elevation(self) -> Elevation | None:
+        entry = _parsed(ElevationEntry, self._document.get("elevation"))
+        if entry is None or self.bounds is None:
+            return None
+        found = elevation_of(entry, self.bounds, self._base)
+        if isinstance(found, list):
+            self.faults += found
+            return None
+        elevation, self._elevation_document = found
+        self.faults += slope_faults(
+            elevation, self.robots, self.obstacles, self.terrain
+        )
+        return elevation
 
     def _shape(self, entry: Any, path: str) -> Polygon | None:
         shape = shape_of(entry, path)

@@ -61,6 +61,7 @@ class ModelDocument(Strict):
     wheelbase: Positive
     track: Positive
     mass: Positive
+    center_of_mass: Annotated[float, Field(allow_inf_nan=False)] = 0.0
     wheel: WheelEntry
     limits: LimitsEntry
     planning_share: Share
@@ -185,6 +186,7 @@ def _model(folder: Path, entry: ModelDocument) -> RobotModel:
         ),
         planning_share=entry.planning_share,
         mass_kg=entry.mass,
+        center_of_mass_m=entry.center_of_mass,
         wheel_radius_m=entry.wheel.radius,
         wheel_inertia_kg_m2=entry.wheel.inertia,
         wheel_count=entry.wheel.count,

@@ -11,6 +11,7 @@ A scene is one YAML file (scalars as in YAML 1.2; metres, radians, joules):
       - {circle: {center: [70, 30], radius: 3}}
     terrain:                          # where areas overlap, the later entry counts
       - {id: mud, polygon: [[0, 0], [20, 0], [20, 20]], multiplier: 2.5}
+    elevation: {hills: [{center: [60, 60], height: 4, radius: 25}]}   # default: flat
     goals:                            # convex: circle or polygon; each visited once
       - {id: g1, circle: {center: [20, 30], radius: 1.5}}
     stations:                         # convex; entering one fills the battery
@@ -27,6 +28,13 @@ Details:
   cross itself; it is closed implicitly. A box is [length, width] about its centre,
   turned by yaw. A circle becomes the regular polygon of 32 sides around it, so that no
   robot is let into it; circles of goals and stations stay exact.
+- `elevation` is one of `hills` (round, height and radius in m; they add up, negative
+  ones are hollows; sampled every `cell` metres, default 0.5), `grid` (rows of heights
+  in m) or `file`: an .npy file of heights in m, or a grey .png whose
+  `range: [low, high]` says the heights in m of black and white; relative to the scene
+  file. Grids are read like a map, the first row in the north, and reach from bound to
+  bound; between their nodes the ground is bilinear. Saved scenes hold a file's heights
+  as `packed`.
 - Ids are letters, digits, `_`, `.` and `-`, unique in the whole file (they name bodies,
   arrays and tour targets); an obstacle or terrain area without one is named after its
   place in the list, `obstacle_0`, `terrain_0`.
@@ -145,6 +153,41 @@ class BatteryEntry(Strict):
     )
 
 
+class HillEntry(Strict):
+    """A round hill; hollow if its height is negative."""
+
+    center: Point
+    height: Number = Field(description="height of the top in m")
+    radius: Positive = Field(description="radius of the foot in m")
+
+
+class PackedEntry(Strict):
+    """Heights as saved scenes hold them: a compressed grid."""
+
+    rows: Annotated[int, Field(ge=2)]
+    columns: Annotated[int, Field(ge=2)]
+    heights: str = Field(description="tenths of mm, int32, zlib, base64")
+
+
+class ElevationEntry(Strict):
+    """The relief: exactly one of file, grid, hills, packed."""
+
+    file: Annotated[str, Field(min_length=1)] | None = Field(
+        default=None, description="path of an .npy or .png file"
+    )
+    range: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = Field(
+        default=None, description="[height of black in m, height of white in m]"
+    )
+    grid: Annotated[list[list[Number]], Field(min_length=2)] | None = Field(
+        default=None, description="rows of heights in m, from north to south"
+    )
+    hills: Annotated[list[HillEntry], Field(min_length=1)] | None = None
+    cell: Positive | None = Field(
+        default=None, description="distance of the samples of hills in m"
+    )
+    packed: PackedEntry | None = None
+
+
 class StartEnergyEntry(Strict):
     """Exactly one of the four."""
 
@@ -233,6 +276,7 @@ class SceneDocument(Strict):
     )
     obstacles: list[ObstacleEntry] = []
     terrain: list[TerrainEntry] = []
+    elevation: ElevationEntry | None = None
     goals: list[RegionEntry] = []
     stations: list[RegionEntry] = []
     battery: BatteryEntry = BatteryEntry()

@@ -1,0 +1,110 @@
+"""Heights of the ground on a grid over a scene's bounds, bilinear between nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Elevation:
+    """The relief of a scene.
+
+    Attributes:
+        bounds: (x_min, y_min, x_max, y_max) [m]; the outermost nodes lie on them.
+        height_m: of the nodes, rows from south to north, columns from west to east,
+            read-only, shape (ny, nx), both at least 2.
+    """
+
+    bounds: tuple[float, float, float, float]
+    height_m: np.ndarray
+
+    @property
+    def cell_m(self) -> tuple[float, float]:
+        """Extent (x, y) of a cell between nodes [m]."""
+        x_min, y_min, x_max, y_max = self.bounds
+        rows, columns = self.height_m.shape
+        return (x_max - x_min) / (columns - 1), (y_max - y_min) / (rows - 1)
+
+    def height_at(self, points: np.ndarray) -> np.ndarray:
+        """Return the height [m] at each point, shape (n, 2) -> (n,).
+
+        Outside the bounds it is that of the nearest point of the bounds.
+        """
+        low, high, v, _ = self._about(points)
+        return np.asarray(low * (1.0 - v) + high * v)
+
+    def gradient_at(self, points: np.ndarray) -> np.ndarray:
+        """Return the slope (dh/dx, dh/dy) at each point, shape (n, 2) -> (n, 2).
+
+        On a line between cells it is that of the cell to the north or east.
+        """
+        low, high, v, (south, north) = self._about(points)
+        dx, dy = self.cell_m
+        rise = (1.0 - v) * south + v * north
+        return np.stack([rise / dx, (high - low) / dy], axis=-1)
+
+    def span_within(
+        self, box: tuple[float, float, float, float]
+    ) -> tuple[float, float]:
+        """Return bounds of the heights in a box (x_min, y_min, x_max, y_max) [m].
+
+        They are the extremes of the nodes about it, so nothing lies beyond them.
+        """
+        x_min, y_min, _, _ = self.bounds
+        rows, columns = self.height_m.shape
+        dx, dy = self.cell_m
+        west, east = ((x - x_min) / dx for x in (box[0], box[2]))
+        south, north = ((y - y_min) / dy for y in (box[1], box[3]))
+        first_column = min(max(int(np.floor(west)), 0), columns - 1)
+        last_column = min(max(int(np.ceil(east)), 0), columns - 1)
+        first_row = min(max(int(np.floor(south)), 0), rows - 1)
+        last_row = min(max(int(np.ceil(north)), 0), rows - 1)
+        within = self.height_m[first_row : last_row + 1, first_column : last_column + 1]
+        return float(within.min()), float(within.max())
+
+    def steepest(self) -> np.ndarray:
+        """Return the largest slope in each cell, shape (ny - 1, nx - 1).
+
+        Each partial derivative lies between its values on two opposite sides.
+        """
+        dx, dy = self.cell_m
+        across = np.abs(np.diff(self.height_m, axis=1)) / dx
+        along = np.abs(np.diff(self.height_m, axis=0)) / dy
+        return np.hypot(
+            np.maximum(across[:-1], across[1:]),
+            np.maximum(along[:, :-1], along[:, 1:]),
+        )
+
+    def cell_centres(self) -> np.ndarray:
+        """Return the middle of each cell [m], shape (ny - 1, nx - 1, 2)."""
+        x_min, y_min, _, _ = self.bounds
+        rows, columns = self.height_m.shape
+        dx, dy = self.cell_m
+        x = x_min + (np.arange(columns - 1) + 0.5) * dx
+        y = y_min + (np.arange(rows - 1) + 0.5) * dy
+        return np.stack(np.meshgrid(x, y), axis=-1)
+
+    def _about(
+        self, points: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[np.ndarray, np.ndarray]]:
+        """Return heights south and north of points, the share of the north, and rises.
+
+        The rises are the differences of height across the cell on its south and north
+        sides.
+        """
+        points = np.atleast_2d(points)
+        x_min, y_min, _, _ = self.bounds
+        rows, columns = self.height_m.shape
+        dx, dy = self.cell_m
+        fx = np.clip((points[:, 0] - x_min) / dx, 0.0, columns - 1.0)
+        fy = np.clip((points[:, 1] - y_min) / dy, 0.0, rows - 1.0)
+        column = np.minimum(fx.astype(int), columns - 2)
+        row = np.minimum(fy.astype(int), rows - 2)
+        u, v = fx - column, fy - row
+        height = self.height_m
+        a, b = height[row, column], height[row, column + 1]
+        c, d = height[row + 1, column], height[row + 1, column + 1]
+        low, high = a * (1.0 - u) + b * u, c * (1.0 - u) + d * u
+        return low, high, v, (b - a, d - c)

@@ -1,0 +1,40 @@
+"""How high the ground lies at a place, and how it slopes; 0 where a scene is flat."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrmg.scene.robot_model import RobotModel
+from mrmg.scene.types import Scene
+
+
+def height_at(scene: Scene, points: np.ndarray) -> np.ndarray:
+    """Return the height [m] at each point, shape (n, 2) -> (n,)."""
+    points = np.atleast_2d(points)
+    if scene.elevation is None:
+        return np.zeros(len(points))
+    return scene.elevation.height_at(points)
+
+
+def lifted(scene: Scene, points: np.ndarray, lift_m: float) -> np.ndarray:
+    """Return points `lift_m` above the ground, shape (n, 2) -> (n, 3)."""
+    points = np.atleast_2d(points)
+    return np.column_stack([points, height_at(scene, points) + lift_m])
+
+
+def load_points(model: RobotModel, state: np.ndarray) -> np.ndarray:
+    """Return the points below a robot's centre of mass, (n, >= 3) -> (n, 2).
+
+    What it climbs is the ground there, not at its reference point.
+    """
+    x, y, theta = state[:, 0], state[:, 1], state[:, 2]
+    lead_m = model.center_of_mass_m
+    return np.stack([x + lead_m * np.cos(theta), y + lead_m * np.sin(theta)], axis=-1)
+
+
+def gradient_at(scene: Scene, points: np.ndarray) -> np.ndarray:
+    """Return the slope (dh/dx, dh/dy) at each point, shape (n, 2) -> (n, 2)."""
+    points = np.atleast_2d(points)
+    if scene.elevation is None:
+        return np.zeros((len(points), 2))
+    return scene.elevation.gradient_at(points)

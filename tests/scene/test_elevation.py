@@ -1,0 +1,81 @@
+"""The relief between its nodes, against scipy and finite differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import RegularGridInterpolator
+
+from mrmg.scene.elevation import Elevation
+
+BOUNDS = (-3.0, 2.0, 9.0, 10.0)
+
+
+@pytest.fixture
+def rough() -> Elevation:
+    heights = np.random.default_rng(1).normal(size=(9, 7))
+    return Elevation(bounds=BOUNDS, height_m=heights)
+
+
+def inside(n: int, seed: int) -> np.ndarray:
+    low, high = np.array(BOUNDS[:2]), np.array(BOUNDS[2:])
+    return np.random.default_rng(seed).uniform(low, high, (n, 2))
+
+
+def test_it_is_bilinear_between_nodes_that_reach_from_bound_to_bound(
+    rough: Elevation,
+) -> None:
+    x, y = np.linspace(-3.0, 9.0, 7), np.linspace(2.0, 10.0, 9)
+    expected = RegularGridInterpolator((y, x), rough.height_m)
+    points = inside(500, 2)
+    np.testing.assert_allclose(
+        rough.height_at(points), expected(points[:, ::-1]), atol=1e-12
+    )
+    assert rough.height_at(np.array([[9.0, 10.0]])) == rough.height_m[-1, -1]
+    assert rough.height_at(np.array([-3.0, 2.0])) == rough.height_m[0, 0]
+
+
+def test_outside_the_bounds_it_goes_on_level(rough: Elevation) -> None:
+    beyond = np.array([[-9.0, 5.0], [4.0, 99.0], [20.0, -4.0]])
+    edge = np.clip(beyond, BOUNDS[:2], BOUNDS[2:])
+    np.testing.assert_array_equal(rough.height_at(beyond), rough.height_at(edge))
+
+
+def test_gradients_are_those_of_the_heights(rough: Elevation) -> None:
+    points, h = inside(300, 3), 1e-6
+    dx, dy = rough.cell_m
+    place = (points - BOUNDS[:2]) / (dx, dy)
+    clear = (np.abs(place - np.round(place)) > 1e-3).all(axis=1)
+    points = points[clear]
+    for axis, step in enumerate(([h, 0.0], [0.0, h])):
+        rise = rough.height_at(points + step) - rough.height_at(points - step)
+        slope = rough.gradient_at(points)[:, axis]
+        np.testing.assert_allclose(slope, rise / (2.0 * h), atol=1e-8)
+
+
+def test_no_place_of_a_cell_is_steeper_than_said(rough: Elevation) -> None:
+    points = inside(5000, 4)
+    dx, dy = rough.cell_m
+    column, row = np.floor((points - BOUNDS[:2]) / (dx, dy)).astype(int).T
+    slope = np.hypot(*rough.gradient_at(points).T)
+    said = rough.steepest()
+    assert (slope <= said[row, column] + 1e-12).all()
+    assert slope.max() > 0.9 * said.max()
+
+
+def test_boxes_hold_no_higher_and_no_lower_ground_than_said(rough: Elevation) -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        corners = np.sort(rng.uniform((-5.0, 0.0), (11.0, 12.0), (2, 2)), axis=0)
+        low, high = rough.span_within((*corners[0], *corners[1]))
+        heights = rough.height_at(rng.uniform(*corners, (400, 2)))
+        assert low <= heights.min()
+        assert heights.max() <= high
+    assert rough.span_within(BOUNDS) == (rough.height_m.min(), rough.height_m.max())
+
+
+def test_cell_centres_lie_amid_their_nodes(rough: Elevation) -> None:
+    heights = rough.height_at(rough.cell_centres().reshape(-1, 2)).reshape(8, 6)
+    h = rough.height_m
+    means = (h[:-1, :-1] + h[:-1, 1:] + h[1:, :-1] + h[1:, 1:]) / 4.0
+    np.testing.assert_allclose(heights, means)
