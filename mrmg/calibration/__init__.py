@@ -4,6 +4,13 @@
 """
 
 from mrmg.calibration.calibrate import Calibration, Estimate, calibrate, fit_legs
-from mrmg.calibration.files import write_calibration
+from mrmg.calibration.files import require_other_folder, write_calibration
 
-__all__ = ["Calibration", "Estimate", "calibrate", "fit_legs", "write_calibration"]
+__all__ = [
+    "Calibration",
+    "Estimate",
+    "calibrate",
+    "fit_legs",
+    "require_other_folder",
+    "write_calibration",
+]

@@ -29,11 +29,7 @@ def write_calibration(
         UsageError: if both folders are the same.
         SceneError: if `robot.yaml` cannot be changed.
     """
-    if folder.resolve() == model_folder.resolve():
-        raise UsageError(
-            f"{folder} is the model itself; name another folder, and use --in-place "
-            "to change the model"
-        )
+    require_other_folder(model_folder, folder)
     source = model_folder / MODEL_FILE
     text = with_values(
         source.read_text(encoding="utf-8"), calibration.changes(), source=str(source)
@@ -46,3 +42,16 @@ def write_calibration(
     storage.write_json(folder / RESULT_FILE, calibration.to_json())
     if in_place:
         storage.write_text(source, text)
+
+
+def require_other_folder(model_folder: Path, folder: Path) -> None:
+    """Refuse to write the calibrated copy over the model.
+
+    Raises:
+        UsageError: if both folders are the same.
+    """
+    if folder.resolve() == model_folder.resolve():
+        raise UsageError(
+            f"{folder} is the model itself; name another folder, and use --in-place "
+            "to change the model"
+        )

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def calibrate(options: argparse.Namespace) -> int:
     """Calibrate a robot model, and leave a calibrated copy with the plot of the fit."""
-    from mrmg.calibration import calibrate, write_calibration
+    from mrmg.calibration import calibrate, require_other_folder, write_calibration
     from mrmg.results.calibration_plot import draw_calibration
     from mrmg.results.print_style import require_format
     from mrmg.scene.loading.models import load_model
@@ -24,6 +24,7 @@ def calibrate(options: argparse.Namespace) -> int:
     out = options.out or Path(f"calibrated-{folder.name}")
     plot = options.plot or out / "calibration.png"
     require_format(plot)
+    require_other_folder(folder, out)
     model, _ = load_model(folder)
     with terminal.progress_of("measuring") as told:
         calibration = calibrate(model, on_progress=told)

@@ -15,12 +15,14 @@ from mrmg.cli import main
 from mrmg.errors import ExitCode
 from mrmg.scene.loading.models import load_model
 
+CAR = shipped.models_folder() / "car"
+
 
 @pytest.fixture
 def model_folder(tmp_path: Path) -> Path:
     """A car whose robot.yaml is wrong about its rolling."""
     folder = tmp_path / "buggy"
-    shutil.copytree(shipped.models_folder() / "car", folder)
+    shutil.copytree(CAR, folder)
     text = (folder / "robot.yaml").read_text()
     wrong = text.replace("rolling_coefficient: 0.06 ", "rolling_coefficient: 0.04 ")
     assert wrong != text
@@ -55,6 +57,7 @@ def test_a_wrong_model_is_put_right(model_folder: Path) -> None:
         (["calibrate", "kar"], "unknown model 'kar'"),
         (["calibrate", "no/such/folder"], "no such folder"),
         (["calibrate", "car", "--plot", "fit.bmp"], ".png"),
+        (["calibrate", "car", "-o", str(CAR)], "name another folder"),
     ],
 )
 def test_wrong_usage_is_told_before_anything_is_driven(
