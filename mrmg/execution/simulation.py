@@ -94,18 +94,21 @@ def simulate(
         chassis_maker(robot)
     controllers = [maker(robot.model) for robot in scene.robots]
     run = _Run(build_world(scene), plan, controllers, disturbance)
-    started = time.perf_counter()
+    started, watched_s = time.perf_counter(), 0.0
     with _no_warning_file():
         while not run.ended():
             run.tick()
             if supervisor is not None:
+                watching = time.perf_counter()
                 orders = supervisor.watch(run.observation())
+                watched_s += time.perf_counter() - watching
                 if orders is not None:
                     run.obey(orders)
             if on_progress is not None and run.ticks % _PROGRESS_TICKS == 0:
                 on_progress(run.fraction(), f"driven {run.data.time:.0f} s")
     events = () if supervisor is None else supervisor.events
-    return run.log(controller, events, time.perf_counter() - started)
+    # What a supervisor thinks about, new plans above all, is no part of driving.
+    return run.log(controller, events, time.perf_counter() - started - watched_s)
 
 
 @contextmanager

@@ -34,6 +34,9 @@ from mrmg.scene.types import Scene
 _VISITED_DEPTH_M = 0.05
 """How deep in a goal a robot must have been seen, as places are seen with noise."""
 
+_STUCK_M = 1.0
+"""Way between two hold-ups below which a robot counts as stuck."""
+
 
 @dataclass
 class _History:
@@ -79,6 +82,7 @@ class MissionControl:
         self._robots = [robot.id for robot in scene.robots]
         self._faults = list(faults)
         self._out_of_service: set[str] = set()
+        self._held_up_at: dict[str, np.ndarray] = {}
         self._meters = {robot.id: RobotMeter(scene, robot) for robot in scene.robots}
         for name, meter in self._meters.items():
             meter.follow(plan.tours[name])
@@ -99,6 +103,8 @@ class MissionControl:
         if departure is None:
             return None
         self._tell(now, departure.cause, departure.robot, "stop", departure.message)
+        if departure.cause == "tracking":
+            self._give_up_if_stuck(now, departure.robot)
         return self._stop(now)
 
     def _note(self, now: Observation) -> None:
@@ -131,6 +137,16 @@ class MissionControl:
                 text = f"{fault.robot} has broken down"
                 self._tell(now, "fault", fault.robot, "stop", text)
         return bool(due)
+
+    def _give_up_if_stuck(self, now: Observation, robot: str) -> None:
+        """Take a robot out of service that has not got on since it last held up all."""
+        place = now.state[self._robots.index(robot), :2]
+        before = self._held_up_at.get(robot)
+        self._held_up_at[robot] = place
+        if before is not None and np.hypot(*(place - before)) < _STUCK_M:
+            self._out_of_service.add(robot)
+            text = f"{robot} does not get on and is taken out of service"
+            self._tell(now, "tracking", robot, "stop", text)
 
     def _departure(self, now: Observation) -> Departure | None:
         """Return the corridor that was left, if replanning could help."""

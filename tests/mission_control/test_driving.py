@@ -11,7 +11,7 @@ import pytest
 from mrmg.accounting import battery_profile
 from mrmg.errors import UsageError
 from mrmg.execution import simulate
-from mrmg.execution.disturbance import Disturbance
+from mrmg.execution.disturbance import Disturbance, RobotDisturbance
 from mrmg.execution.disturbance_spec import parse_disturbance
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan
@@ -247,6 +247,26 @@ def test_stopping_is_safe_at_any_time(
     drive = drive_mission(scene, plan, faults=[f"{robot}@{time_s}s"])
     assert drive.log.contacts == ()
     assert drive.log.completed
+
+
+def test_a_robot_that_is_stuck_is_done_without(yard: Scene, yard_plan: Plan) -> None:
+    powerless = Disturbance(
+        seed=0,
+        robots=(
+            RobotDisturbance(robot="r1", drive_gain=-0.9),
+            RobotDisturbance(robot="r2"),
+        ),
+    )
+    alone = simulate(yard, yard_plan, disturbance=powerless)
+    assert alone.gave_up == "stalled"
+    drive = drive_mission(yard, yard_plan, disturbance=powerless)
+    account = audit(yard, drive.plan, drive.log)
+    assert account.mission_ok, account.reasons
+    told = [(e.cause, e.robot, e.action) for e in drive.log.events]
+    assert told[0] == ("tracking", "r1", "stop")
+    assert told[-1] == ("rest", "", "replan")
+    assert any("out of service" in event.message for event in drive.log.events)
+    assert np.hypot(*np.ptp(drive.log.state[0, :, :2], axis=0)) < 1.0
 
 
 def test_wrong_faults_are_refused(yard: Scene, yard_plan: Plan) -> None:
