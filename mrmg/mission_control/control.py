@@ -27,7 +27,7 @@ from mrmg.mission_control.course import Course
 from mrmg.mission_control.faults import StopFault
 from mrmg.mission_control.meter import RobotMeter
 from mrmg.mission_control.parameters import ControlParams
-from mrmg.mission_control.remaining import FleetCondition
+from mrmg.mission_control.remaining import FleetCondition, is_over, remaining_scene
 from mrmg.mission_control.replanning import Replan, Replanner
 from mrmg.scene.types import Scene
 
@@ -172,7 +172,9 @@ class MissionControl:
             stalled = now.rate < 0.5
             on_plan = tracked and not stalled
             states[item.robot] = item.state[step] if on_plan else now.state[index]
-        self.course = self.course.stopped(step, states, self._params.pause_s)
+        self.course = self.course.stopped(
+            step, states, self._out_of_service, self._params.pause_s
+        )
         clock_s = now.clock_s if now.rate >= 0.5 else step * dt_s
         return Orders(plan=self.course.plan, clock_s=clock_s)
 
@@ -184,7 +186,7 @@ class MissionControl:
         missing = [
             goal.id for goal in self._scene.goals if goal.id not in condition.visited
         ]
-        if not missing:
+        if self._is_done(condition):
             self._tell(now, "rest", "", "finish", "all goals have been visited")
             return None
         over = self._why_over(missing)
@@ -218,6 +220,12 @@ class MissionControl:
             self._tell(now, "rest", "", "give_up", reason)
         self._tell(now, "rest", "", "replan", _said(outcome, len(missing), condition))
         return Orders(plan=self.course.plan, clock_s=step * self.course.plan.dt_s)
+
+    def _is_done(self, condition: FleetCondition) -> bool:
+        finishing = any(robot.finish is not None for robot in self._scene.robots)
+        if len(condition.visited) < len(self._scene.goals):
+            return False
+        return not finishing or is_over(remaining_scene(self._scene, condition))
 
     def _why_over(self, missing: Sequence[str]) -> str:
         """Return why the mission ends where the fleet rests; "" if it need not."""
@@ -293,4 +301,4 @@ def _said(outcome: Replan, missing: int, condition: FleetCondition) -> str:
 
 
 def _list(names: Sequence[str]) -> str:
-    return ", ".join(names)
+    return ", ".join(names) or "none"

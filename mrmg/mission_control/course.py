@@ -8,7 +8,7 @@ to know of a single plan only: the one that was in force at each time.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from mrmg.accounting import find_visits, leg_entries, step_energy_parts
 from mrmg.energy import PARTS
 from mrmg.ledger import EnergyLedger, LedgerEntry
 from mrmg.mission import Plan, Visit
-from mrmg.mission_control.braking import brake_to_rest
+from mrmg.mission_control.stopping import Departing
 from mrmg.scene.types import Scene
 
 
@@ -59,26 +59,31 @@ class Course:
         return len(self.plan.trajectories[0].control)
 
     def stopped(
-        self, step: int, states: Mapping[str, np.ndarray], pause_s: float
+        self,
+        step: int,
+        states: Mapping[str, np.ndarray],
+        broken: Set[str],
+        pause_s: float,
     ) -> Course:
         """Return the course that is left at a step to come to rest.
 
         Args:
             step: after which the fleet brakes.
             states: of all robots at that step, shape (5,) each.
+            broken: ids of robots that can but brake in full.
             pause_s: how long the fleet stands at least.
         """
-        dt_s = self.plan.dt_s
-        brakings = {
-            robot.id: brake_to_rest(robot.model, states[robot.id], dt_s)
-            for robot in self.scene.robots
-        }
-        longest = max(len(state) for state, _ in brakings.values())
-        length = longest + round(pause_s / dt_s)
-        ways = {}
-        for name, (state, control) in brakings.items():
-            way = np.concatenate([states[name][None], state])
-            ways[name] = _held(way, control, length)
+        departing = Departing(
+            scene=self.scene,
+            trajectories=self.plan.trajectories,
+            step=step,
+            states=states,
+            broken=broken,
+        )
+        ways = departing.ways_to_rest()
+        longest = max(len(control) for _, control in ways.values())
+        length = longest + round(pause_s / self.plan.dt_s)
+        ways = {name: _held(*way, length) for name, way in ways.items()}
         return self._continued(step, ways, self.scene).with_tours(self.plan.tours)
 
     def resumed(

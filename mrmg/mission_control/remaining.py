@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mrmg.scene.loading import scene_from_document
-from mrmg.scene.types import Robot, Scene
+from mrmg.scene.types import Finish, Robot, Scene
 
 _LEAST_J = 1e-9
 """A start energy in a scene must be positive."""
@@ -126,4 +126,31 @@ def _continued(
             "reserve": reserve,
         },
         "rolling_factor": float(factor),
+        **_home(entry, robot),
     }
+
+
+def _home(entry: dict[str, Any], robot: Robot) -> dict[str, Any]:
+    """Return where a robot must end that is to end where it once started."""
+    if entry.get("finish") != "start" or robot.finish is None:
+        return {}
+    region = robot.finish.region
+    circle = {"center": region.center.tolist(), "radius": region.radius_m}
+    return {"finish": {"circle": circle}}
+
+
+def is_over(rest: Scene) -> bool:
+    """Tell whether nothing is left to do: no goal, and all robots where they end."""
+    return not rest.goals and all(
+        robot.finish is None or _at_finish(robot.pose, robot.finish)
+        for robot in rest.robots
+    )
+
+
+def _at_finish(pose: tuple[float, float, float], finish: Finish) -> bool:
+    if float(finish.region.depth(np.array(pose[:2]))[0]) < 0.0:
+        return False
+    if finish.heading_rad is None:
+        return True
+    off_rad = (pose[2] - finish.heading_rad + np.pi) % (2.0 * np.pi) - np.pi
+    return bool(abs(off_rad) <= finish.heading_tolerance_rad)

@@ -13,7 +13,11 @@ from mrmg import seeding
 from mrmg.errors import SceneError
 from mrmg.mission import Plan
 from mrmg.mission_control.parameters import ControlParams
-from mrmg.mission_control.remaining import FleetCondition, remaining_scene
+from mrmg.mission_control.remaining import (
+    FleetCondition,
+    is_over,
+    remaining_scene,
+)
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.feasibility import impossible_goals
 from mrmg.results.verify import verify
@@ -101,6 +105,9 @@ class Replanner:
                     reasons = "; ".join(dict.fromkeys(given_up.values()))
                     reason = "" if tried.plan else reasons
                     return replace(tried, given_up=given_up, reason=reason)
+                if not tried.scene.goals:
+                    reason = "no plan was found that ends where the robots must end"
+                    return Replan(given_up=given_up, reason=reason)
                 given_up |= tried.given_up or _farthest_goals(tried.scene)
                 # What is hopeless in full need not be tried as hard in part.
                 draws = 1
@@ -112,7 +119,7 @@ class Replanner:
         """Return a plan for all goals that are left, or those proven impossible."""
         shares = self.control.reserves
         last = remaining_scene(self.scene, left, reserve_share=shares[-1])
-        if not last.goals:
+        if is_over(last):
             return Replan()
         for share in shares:
             rest = remaining_scene(self.scene, left, reserve_share=share)

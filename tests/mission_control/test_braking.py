@@ -33,7 +33,9 @@ def test_braking_is_what_the_planner_committed_to(model: str, speed: float) -> N
     scene = one_robot(model)
     state = np.array([10.0, 10.0, 0.4, speed, 0.37])
     states, controls = brake_to_rest(scene.robots[0].model, state, DT_S)
-    fleet = fleet_array(scene, World.from_scene(scene))
+    fleet = fleet_array(
+        scene, World.from_scene(scene), obstacle_margin_m=0.25, robot_margin_m=0.5
+    )
     commitment = new_commitment(fleet, DT_S, True)
     write_braking(fleet, 0, state, DT_S, commitment, 0)
     promised = commitment.state[0, 0, : commitment.length[0, 0]]
