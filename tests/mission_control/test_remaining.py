@@ -10,7 +10,11 @@ import pytest
 from shapely.geometry import Polygon
 
 from mrmg.errors import SceneError
-from mrmg.mission_control.remaining import FleetCondition, remaining_scene
+from mrmg.mission_control.remaining import (
+    FleetCondition,
+    is_over,
+    remaining_scene,
+)
 from mrmg.scene.loading import dump_scene, scene_from_document
 from mrmg.scene.types import Scene
 
@@ -139,3 +143,36 @@ def test_robots_that_touch_cannot_be_planned_for(
     at = dict.fromkeys(("r1", "r2"), (12.0, 17.0, 0.3))
     with pytest.raises(SceneError, match="r2 starts where r1 stands"):
         remaining_scene(yard, replace(condition, pose=at))
+
+
+def test_who_is_to_end_at_its_start_still_is(
+    make_yard: Callable[..., Scene], condition: FleetCondition
+) -> None:
+    robots = [
+        {"id": "r1", "model": "car", "pose": [5, 18, 0], "finish": "start"},
+        {"id": "r2", "model": "car", "pose": [5, 5, 0]},
+    ]
+    scene = make_yard(robots=robots)
+    rest = remaining_scene(scene, condition)
+    before, after = scene.robot("r1").finish, rest.robot("r1").finish
+    assert before is not None and after is not None
+    np.testing.assert_array_equal(after.region.center, before.region.center)
+    assert after.region.radius_m == before.region.radius_m
+    assert rest.robot("r2").finish is None
+
+
+def test_a_mission_is_over_when_all_is_visited_and_all_are_home(
+    make_yard: Callable[..., Scene], condition: FleetCondition
+) -> None:
+    robots = [
+        {"id": "r1", "model": "car", "pose": [5, 18, 0], "finish": "start"},
+        {"id": "r2", "model": "car", "pose": [5, 5, 0]},
+    ]
+    scene = make_yard(robots=robots)
+    done = replace(condition, visited=frozenset({"g1", "g2", "g3"}))
+    home = replace(done, pose={**done.pose, "r1": (5.3, 18.2, 1.0)})
+    away = replace(done, out_of_service=frozenset({"r1"}))
+    assert not is_over(remaining_scene(scene, condition))
+    assert not is_over(remaining_scene(scene, done))
+    assert is_over(remaining_scene(scene, home))
+    assert is_over(remaining_scene(scene, away))
