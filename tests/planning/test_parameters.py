@@ -61,3 +61,16 @@ def test_the_digest_tells_apart_what_decides_the_plan() -> None:
         profile_params("paper"),
     ]
     assert len({base.digest, *(params.digest for params in others)}) == 4
+
+
+def test_a_number_of_trees_is_grown_to_the_last() -> None:
+    params = profile_params("default", trees=7)
+    assert (params.trees, params.improvements, params.budget_s) == (7, 7, None)
+    assert params.digest != profile_params("default").digest
+
+
+def test_only_the_default_profile_refines_and_more_so_with_a_budget() -> None:
+    assert profile_params("paper", budget_s=9.0).refinements == 0
+    assert profile_params("paper", trees=9).refinements == 0
+    plain = profile_params("default").refinements
+    assert 0 < plain < profile_params("default", budget_s=9.0).refinements
