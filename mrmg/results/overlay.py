@@ -204,7 +204,10 @@ class Panel:
             (look.label, look.color)
             for look in style.terrain_classes(self._scene).values()
         ]
-        return [*entries, ("obstacle", style.OBSTACLE)]
+        entries.append(("obstacle", style.OBSTACLE))
+        if any(obstacle.blocks is not None for obstacle in self._scene.obstacles):
+            entries.append(("... for some robots", style.PARTIAL_OBSTACLE))
+        return entries
 
     @property
     def _legend_height(self) -> float:

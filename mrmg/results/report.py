@@ -91,6 +91,8 @@ def _map(record: RunRecord) -> list[str]:
             for index, robot in enumerate(record.scene.robots)
         ]
     lines = "Wide line: planned. Thin line: driven. " if record.plan else ""
+    some = any(obstacle.blocks is not None for obstacle in record.scene.obstacles)
+    partial = "Pale and dashed: an obstacle for some robots only. " if some else ""
     return [
         html.player() if record.plan else "",
         html.controls(*boxes),
@@ -98,7 +100,7 @@ def _map(record: RunRecord) -> list[str]:
         html.note(
             f"{lines}Circle: goal, filled with its robot's colour once visited. "
             "⚡: recharging station. ×: the energy of driving there against plain "
-            "ground. Point at anything for its name."
+            f"ground. {partial}Point at anything for its name."
         ),
     ]
 
@@ -129,8 +131,17 @@ def _verdict_line(record: RunRecord) -> str:
         f"{energy['measured_J'] / 1000:.1f} kJ "
         f"({sections.signed(energy['measured_error_pct'], 1)} % against plan for the "
         f"worst robot) and never fell below "
-        f"{100 * energy['min_charge_fraction']:.0f} % charge.",
+        f"{100 * energy['min_charge_fraction']:.0f} % charge{_on_the_way(summary)}.",
     )
+
+
+def _on_the_way(summary: Mapping[str, Any]) -> str:
+    replans = summary["execution"].get("replans", 0)
+    return f"; planned anew {_times(replans)}, see Timeline" if replans else ""
+
+
+def _times(number: int) -> str:
+    return "once" if number == 1 else f"{number} times"
 
 
 def _main_figures(record: RunRecord) -> list[tuple[str, str, str]]:
@@ -142,7 +153,7 @@ def _main_figures(record: RunRecord) -> list[tuple[str, str, str]]:
     done = f"{execution['goals_visited']} / " if execution else ""
     figures = [
         ("Goals visited", f"{done}{len(scene.goals)}", kinds),
-        ("Planned energy", sections.kJ(record.plan.cost_J), _above_bound(summary)),
+        ("Planned energy", sections.kJ(record.plan.cost_J), _above_bound(record)),
         ("Planned duration", f"{record.plan.makespan_s:.0f} s", "last robot at rest"),
     ]
     if execution and energy:
@@ -171,9 +182,12 @@ def _main_figures(record: RunRecord) -> list[tuple[str, str, str]]:
     return figures
 
 
-def _above_bound(summary: Mapping[str, Any]) -> str:
-    gap = summary["plan"].get("gap")
-    if gap is None:
+def _above_bound(record: RunRecord) -> str:
+    figures = record.summary["plan"]
+    gap = figures.get("gap")
+    # Where the fleet was planned for anew, the bound is not one of what was driven.
+    planned_anew = record.plan is None or record.plan.cost_J != figures["cost_J"]
+    if gap is None or planned_anew:
         return "whole fleet"
     return f"whole fleet; at most {100 * gap:.0f} % above the least"
 

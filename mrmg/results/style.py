@@ -25,6 +25,9 @@ STATION = "#7FD6CF"
 STATION_EDGE = "#06504C"
 RESERVE = "#B00020"
 
+PARTIAL_OBSTACLE = "#9E8CAD"
+"""As `palette.PARTIAL_OBSTACLE`, which videos show."""
+
 _HATCHES = ("..", "//", "xx", "\\\\", "++")
 _PALENESS = 0.25
 _WHITE = (1.0, 1.0, 1.0)

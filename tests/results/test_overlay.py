@@ -61,3 +61,14 @@ def test_eight_robots_fit_above_the_legend(make_scene) -> None:
     for color in style.scene_robot_colors(scene).values():
         rows = np.nonzero((drawn == style.rgb(color)).all(axis=2).any(axis=1))[0]
         assert 15 <= np.ptp(rows) <= 60
+
+
+def test_the_legend_names_obstacles_for_some_robots_where_there_are_any(
+    make_scene,
+) -> None:
+    color = style.rgb(style.PARTIAL_OBSTACLE)
+    box = {"box": {"center": [30, 5], "size": [4, 4]}}
+    for blocks, shown in (({}, False), ({"blocks": ["r1"]}, True)):
+        scene = make_scene(obstacles=[{**box, **blocks}])
+        drawn = Panel(scene, (330, 720), 8.0, 720).draw(reading())
+        assert (count(drawn, color) > 100) is shown

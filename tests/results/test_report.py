@@ -17,7 +17,7 @@ from mrmg.results import report_page as html
 from mrmg.results.audit import audit
 from mrmg.results.energy_plot import draw_energy
 from mrmg.results.overview import draw_overview
-from mrmg.results.report import command, write_report
+from mrmg.results.report import command, report_html, write_report
 from mrmg.results.report_record import read_record
 from mrmg.results.robustness import Study, Trial, save_study
 from mrmg.results.summary import summary_of
@@ -164,6 +164,26 @@ def test_page_of_a_good_run_says_what_the_files_say(mission, tmp_path) -> None:
     routing = page.cells.index("Time of the discrete solver")
     assert page.cells[routing + 1] == "0.020 s (8 % of all)"
     assert scene.digest in page.words
+
+
+def test_the_bound_is_set_against_the_plan_it_was_computed_for(
+    mission, tmp_path
+) -> None:
+    fill(tmp_path, *mission)
+    record = read_record(tmp_path)
+    figures = {**record.summary["plan"], "bound_J": 1.0, "gap": 0.204}
+
+    def page_with(**changes) -> Page:
+        plan = {**figures, **changes.pop("plan", {})}
+        execution = {**record.summary["execution"], **changes}
+        summary = {**record.summary, "plan": plan, "execution": execution}
+        return Page(report_html(replace(record, summary=summary)))
+
+    assert "whole fleet; at most 20 % above the least" in page_with().words
+    assert "planned anew" not in page_with().words
+    anew = page_with(plan={"cost_J": 1.5 * figures["cost_J"]}, replans=1)
+    assert "above the least" not in anew.words
+    assert "charge; planned anew once, see Timeline." in anew.words
 
 
 def test_page_of_a_failed_run_names_the_reasons(mission, tmp_path) -> None:

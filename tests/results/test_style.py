@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from mrmg.execution import palette
 from mrmg.results import style
 from mrmg.scene.types import Scene
 
@@ -96,3 +97,8 @@ def test_long_ids_are_numbered_and_short_ones_kept(make_scene: MakeScene) -> Non
     assert style.goal_labels(short) == {"a1": "a1", "b": "b"}
     long = make_scene(goals=[goal("loading_bay", 5), goal("b", 20)])
     assert style.goal_labels(long) == {"loading_bay": "1", "b": "2"}
+
+
+def test_obstacles_for_some_robots_have_the_colour_of_the_simulated_world() -> None:
+    shown = np.array(style.rgb(style.PARTIAL_OBSTACLE)) / 255.0
+    assert shown == pytest.approx(np.array(palette.PARTIAL_OBSTACLE), abs=0.01)
