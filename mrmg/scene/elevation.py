@@ -48,21 +48,17 @@ class Elevation:
     def span_within(
         self, box: tuple[float, float, float, float]
     ) -> tuple[float, float]:
-        """Return bounds of the heights in a box (x_min, y_min, x_max, y_max) [m].
+        """Return least and greatest height in a box (x_min, y_min, x_max, y_max) [m].
 
-        They are the extremes of the nodes about it, so nothing lies beyond them.
+        Bilinear ground has its extremes at corners: of the box, and of the cells that
+        it cuts.
         """
-        x_min, y_min, _, _ = self.bounds
         rows, columns = self.height_m.shape
-        dx, dy = self.cell_m
-        west, east = ((x - x_min) / dx for x in (box[0], box[2]))
-        south, north = ((y - y_min) / dy for y in (box[1], box[3]))
-        first_column = min(max(int(np.floor(west)), 0), columns - 1)
-        last_column = min(max(int(np.ceil(east)), 0), columns - 1)
-        first_row = min(max(int(np.floor(south)), 0), rows - 1)
-        last_row = min(max(int(np.ceil(north)), 0), rows - 1)
-        within = self.height_m[first_row : last_row + 1, first_column : last_column + 1]
-        return float(within.min()), float(within.max())
+        x_min, y_min, x_max, y_max = self.bounds
+        x = _cuts(np.linspace(x_min, x_max, columns), box[0], box[2])
+        y = _cuts(np.linspace(y_min, y_max, rows), box[1], box[3])
+        height = self.height_at(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2))
+        return float(height.min()), float(height.max())
 
     def steepest(self) -> np.ndarray:
         """Return the largest slope in each cell, shape (ny - 1, nx - 1).
@@ -108,3 +104,8 @@ class Elevation:
         c, d = height[row + 1, column], height[row + 1, column + 1]
         low, high = a * (1.0 - u) + b * u, c * (1.0 - u) + d * u
         return low, high, v, (b - a, d - c)
+
+
+def _cuts(lines: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Return an interval's ends and the lines between them."""
+    return np.concatenate([[low], lines[(lines > low) & (lines < high)], [high]])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -268,6 +269,41 @@ def test_no_goal_costs_nothing() -> None:
         "robots": [{"id": "r1", "model": "car", "pose": [4, 10, 0]}],
     }
     assert lower_bound_J(scene_from_document(document, source="idle")) == 0.0
+
+
+def test_slopes_lower_the_bound_by_what_starting_high_is_worth(yard: Yard) -> None:
+    """20.5 m of way; half a metre of height is worth 8.3 m of plain ground."""
+    joules = yard().robots[0].model.energy_model.plain_ground_J_per_m()
+    flat_J = lower_bound_J(yard())
+    up_J, down_J = (
+        lower_bound_J(yard(elevation={"grid": [[a, b]] * 2}))
+        for a, b in ((0.0, 0.6), (0.6, 0.0))
+    )
+    assert up_J == pytest.approx(flat_J)
+    # From x = 4, and half a metre before it, down to the far side of the goal.
+    drop_m = 0.02 * (27.5 - 4.0 + 1.2)
+    worth_J = drop_m / 0.06 * joules
+    assert flat_J - 1.1 * worth_J <= down_J <= flat_J - 0.85 * worth_J
+    exact_J = (20.5 - 20.5 * 0.02 / 0.06) * joules
+    assert down_J <= exact_J
+
+
+@pytest.mark.parametrize("regeneration", [0.0, 0.7])
+def test_plans_over_hills_cost_no_less_than_the_bound(
+    yard: Yard, regeneration: float
+) -> None:
+    """Down from a hill through a hollow, where much is to be had for nothing."""
+    hills = [
+        {"center": [5, 10], "height": 1.2, "radius": 9},
+        {"center": [22, 10], "height": -0.8, "radius": 7},
+    ]
+    scene = yard(elevation={"hills": hills})
+    model = replace(scene.robots[0].model, regeneration_efficiency=regeneration)
+    scene = replace(scene, robots=(replace(scene.robots[0], model=model),))
+    bound_J = lower_bound_J(scene)
+    result = plan_mission(scene, seed=1)
+    assert result.plan is not None
+    assert 0.0 <= bound_J <= result.plan.cost_J
 
 
 def test_a_start_inside_the_goal_costs_nothing(yard: Yard) -> None:

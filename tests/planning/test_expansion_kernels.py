@@ -8,6 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from mrmg.accounting import LoggedMotion, step_energy_parts
+from mrmg.energy import PARTS
 from mrmg.planning._expansion_kernels import (
     attempt_control,
     choose_modes,
@@ -169,6 +171,29 @@ def test_a_step_costs_what_the_energy_model_says_of_its_midpoint(
         assert joules == pytest.approx(DT_S * watts, abs=1e-9)
         compared.add(float(k[0]))
     assert compared == {1.0, 2.5}
+
+
+def test_a_step_on_a_slope_is_charged_as_the_accounts_charge_it(
+    yard: MakeScene, state: MakeProblem
+) -> None:
+    """Climbing by the ground below the centre of mass, away from terrain borders."""
+    hill = {"hills": [{"center": [18, 5], "height": 0.6, "radius": 8}]}
+    problem = state(yard(**{**SCENE, "terrain": []}, elevation=hill))
+    low, high, side = problem.mission.fleet[0]["limit"][:3]
+    rng = np.random.default_rng(4)
+    climbed = 0
+    for _ in range(300):
+        before = rng.uniform((9, 1, -3, low, -side), (27, 14, 3, high, side))
+        after = before + rng.uniform(-0.1, 0.1, 5)
+        motion = LoggedMotion(
+            robot="r1", time_s=np.array([0.0, DT_S]), state=np.stack([before, after])
+        )
+        expected = step_energy_parts(problem.scene, motion)
+        u1 = (after[3] - before[3]) / DT_S
+        joules = step_energy(problem.mission, 0, before, after, u1)
+        assert joules == pytest.approx(expected.sum(), abs=1e-9)
+        climbed += abs(expected[0, PARTS.index("grade")]) > 0.1
+    assert climbed > 150
 
 
 # --- arriving ----------------------------------------------------------------------

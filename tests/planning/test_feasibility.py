@@ -173,6 +173,26 @@ def test_the_missing_energy_is_that_of_the_missing_way(yard: MakeScene) -> None:
     assert f"at least {10.0 * joules:.0f} J" in proof
 
 
+def test_climbing_counts_and_rolling_down_is_paid_back(yard: MakeScene) -> None:
+    """100 m of plain ground; 3 m of height are worth 50 m of it."""
+    rising, falling = ({"grid": [[a, b]] * 2} for a, b in ((0, 3.6), (3.6, 0)))
+    climb_m = 100.0 / 120.0 * 3.6 / 0.06
+    assert proof_of_infeasibility(long_scene(yard, 120.0, [])) is None
+    proof = proof_of_infeasibility(long_scene(yard, 120.0, [], elevation=rising))
+    assert proof is not None
+    assert "far is out of energy's reach" in proof
+    for elevation, needed_m in (
+        (rising, (100.0 + climb_m) / 0.9),
+        (falling, (100.0 - climb_m) / 0.9),
+    ):
+        rich, poor = (
+            long_scene(yard, needed_m + more_m, [], elevation=elevation)
+            for more_m in (2.0, -3.0)
+        )
+        assert proof_of_infeasibility(rich) is None
+        assert proof_of_infeasibility(poor) is not None
+
+
 def test_easy_ground_anywhere_weakens_the_bound(yard: MakeScene) -> None:
     """Ground of multiplier 0.8 might lie on the way: 100 m may cost as little as 80."""
     area = {

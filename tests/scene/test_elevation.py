@@ -69,9 +69,16 @@ def test_boxes_hold_no_higher_and_no_lower_ground_than_said(rough: Elevation) ->
         corners = np.sort(rng.uniform((-5.0, 0.0), (11.0, 12.0), (2, 2)), axis=0)
         low, high = rough.span_within((*corners[0], *corners[1]))
         heights = rough.height_at(rng.uniform(*corners, (400, 2)))
-        assert low <= heights.min()
-        assert heights.max() <= high
+        assert low - 1e-12 <= heights.min()
+        assert heights.max() <= high + 1e-12
     assert rough.span_within(BOUNDS) == (rough.height_m.min(), rough.height_m.max())
+
+
+def test_a_small_box_in_a_large_cell_has_its_own_heights() -> None:
+    ramp = Elevation(
+        bounds=(0.0, 0.0, 100.0, 10.0), height_m=np.array([[0.0, 10.0]] * 2)
+    )
+    assert ramp.span_within((20.0, 2.0, 30.0, 4.0)) == pytest.approx((2.0, 3.0))
 
 
 def test_cell_centres_lie_amid_their_nodes(rough: Elevation) -> None:
