@@ -22,6 +22,9 @@ LOOKAHEAD_M = 3.5
 SIGHT_M = 9.0
 """Distance within which other robots are steered round."""
 
+NARROWER = 10
+"""Smaller offsets tried in passing a robot where there is no room for the full one."""
+
 
 @leaf_kernel
 def wrap(angle):
@@ -71,8 +74,8 @@ def sidestep(fleet, r, state, space, others, wx, wy, out):
     """Move a waypoint aside where a slower or oncoming robot is in the way.
 
     Passes on the right when meeting head on, else on the side the other leaves free;
-    keeps the waypoint where neither side is clear. `others` holds the present states of
-    all robots, shape (R, 5).
+    keeps to the right in a passage too narrow for that. `others` holds the present
+    states of all robots, shape (R, 5).
     """
     out[0], out[1] = wx, wy
     dx = wx - state[0]
@@ -99,9 +102,14 @@ def sidestep(fleet, r, state, space, others, wx, wy, out):
             continue
         nearest = along
         side = -1.0 if lateral > -0.3 else 1.0
-        for _ in range(2):
-            px = ox - side * dy * (wide + 0.3)
-            py = oy + side * dx * (wide + 0.3)
+        for attempt in range(2 + NARROWER):
+            # Either side; if neither is clear, as far right as there is room.
+            offset = wide + 0.3
+            if attempt >= 2:
+                side = -1.0
+                offset *= 1.0 - (attempt - 1) / (NARROWER + 1)
+            px = ox - side * dy * offset
+            py = oy + side * dx * offset
             if segment_is_clear(space, state[0], state[1], px, py, fleet[r].passage):
                 out[0], out[1] = px, py
                 break
