@@ -294,7 +294,7 @@ def test_plans_over_hills_cost_no_less_than_the_bound(
 ) -> None:
     """Down from a hill through a hollow, where much is to be had for nothing."""
     hills = [
-        {"center": [5, 10], "height": 1.2, "radius": 9},
+        {"center": [5, 10], "height": 1.0, "radius": 9},
         {"center": [22, 10], "height": -0.8, "radius": 7},
     ]
     scene = yard(elevation={"hills": hills})
