@@ -263,16 +263,38 @@ def subset_labels(problem, r, hop, goal_list, most_labels):
 
 
 @kernel
-def cheapest_labels(label, start_of, n):
-    """Return the cost of every subset and the label that ends it, shape (2^n,) each."""
+def cheapest_labels(problem, r, goal_list, label, start_of, station):
+    """Return the cost of every subset, to the finish, and what the finish follows.
+
+    Args:
+        problem, r, goal_list: as of `subset_labels`.
+        label, start_of, station: as `subset_labels` returned them.
+
+    Returns:
+        (cost, last), shape (2^n,) each; last is a label (>= 0), the start (-1) or the
+        station s (-2 - s).
+    """
+    n = len(goal_list)
+    targets = problem.cost.shape[2]
     cost = np.full(1 << n, np.inf)
     last = np.full(1 << n, -1, np.int64)
-    cost[0] = 0.0
-    for mask in range(1, 1 << n):
-        for k in range(start_of[mask * n], start_of[mask * n + n]):
-            if label[k, 0] < cost[mask]:
-                cost[mask] = label[k, 0]
-                last[mask] = k
+    leg = problem.finish[r, targets]
+    if leg == 0.0 or problem.energy[r] - leg >= problem.reserve[r]:
+        cost[0] = leg
+    for mask in range(1 << n):
+        for g in range(n):
+            leg = problem.finish[r, goal_list[g]]
+            for k in range(start_of[mask * n + g], start_of[mask * n + g + 1]):
+                enough = label[k, 1] - leg >= problem.reserve[r]
+                if enough and label[k, 0] + leg < cost[mask]:
+                    cost[mask] = label[k, 0] + leg
+                    last[mask] = k
+        for s in range(targets - problem.goals):
+            leg = problem.finish[r, problem.goals + s]
+            enough = problem.capacity[r] - leg >= problem.reserve[r]
+            if enough and station[mask, s] + leg < cost[mask]:
+                cost[mask] = station[mask, s] + leg
+                last[mask] = -2 - s
     return cost, last
 
 

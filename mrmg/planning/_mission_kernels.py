@@ -60,7 +60,7 @@ class TreeParams(NamedTuple):
     levels: int
     iterations: int
     alpha: float
-    kicks: int
+    rounds: int
 
 
 class Mission(NamedTuple):

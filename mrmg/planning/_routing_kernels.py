@@ -1,198 +1,158 @@
-"""The router: nested rollout policy adaptation, then iterated local search.
+"""The router: nested rollout policy adaptation, then ruin and recreate.
 
-The local search moves goals; the stations between them are placed exactly.
+The search takes goals that lie together out of the routes and puts each back where it
+costs least, stations placed exactly (slack induction by string removals, Christiaens
+and Vanden Berghe 2020). Goals that fit nowhere are absent until they do.
 """
 
 from __future__ import annotations
 
+from math import log
+
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, leaf_kernel
+from mrmg.planning._legs_kernels import new_legs
 from mrmg.planning._nrpa_kernels import nrpa
-from mrmg.planning._random_kernels import random_below
-from mrmg.planning._refuel_kernels import refuel_route, route_length
+from mrmg.planning._random_kernels import random_unit
+from mrmg.planning._refuel_kernels import new_labels, write_tour
+from mrmg.planning._routes_kernels import (
+    COST,
+    IMPOSSIBLE,
+    LABEL,
+    copy_routes,
+    new_routes,
+    objective,
+    put_goal,
+    remove_goals,
+    update,
+)
+from mrmg.planning._ruin_kernels import choose_ruin, order_absent, round_trips
+
+BLINK = 0.01
+"""How often a place for a goal is overlooked, so that it goes elsewhere."""
+
+HOT, COLD = 0.3, 0.003
+"""First and last temperature of the search, as shares of a goal's mean cost."""
 
 
 @kernel
-def _route_cost(problem, r, route, length, scratch):
-    cost, _ = refuel_route(problem, r, route, length, scratch)
-    return cost
+def search(legs, routes, labels, near, rounds, random):
+    """Improve routes by ruin and recreate with simulated annealing; keep the best.
 
-
-@kernel
-def _without(route, length, position, out):
-    for i in range(length - 1):
-        out[i] = route[i] if i < position else route[i + 1]
-
-
-@kernel
-def _with(route, length, position, goal, out):
-    for i in range(length + 1):
-        if i < position:
-            out[i] = route[i]
-        elif i == position:
-            out[i] = goal
-        else:
-            out[i] = route[i - 1]
-
-
-@kernel
-def improve_routes(problem, route, length, cost, scratch):
-    """Local search: relocate a goal, or reverse a piece of a route, while it pays.
-
-    Args:
-        problem: the problem.
-        route: goals of each robot, shape (R, G); changed in place.
-        length: number of goals of each robot, shape (R,); changed in place.
-        cost: cost of each route with its stations, shape (R,); changed in place.
-        scratch: for `refuel_route`.
+    Before the first round, routes that cannot be driven are emptied, and absent goals
+    put where they fit.
     """
-    robots = len(length)
-    size = route.shape[1]
-    shorter = np.empty(size + 1, np.int64)
-    longer = np.empty(size + 1, np.int64)
-    improved = True
-    while improved:
-        improved = False
-        for a in range(robots):
-            i = 0
-            while i < length[a]:
-                goal = route[a, i]
-                _without(route[a], length[a], i, shorter)
-                cost_a = _route_cost(problem, a, shorter, length[a] - 1, scratch)
-                best_gain = 1e-6
-                best_b = -1
-                best_j = -1
-                for b in range(robots):
-                    base = shorter if a == b else route[b]
-                    n = length[a] - 1 if a == b else length[b]
-                    saved = cost[a] - cost_a + (0.0 if a == b else cost[b])
-                    if a == b:
-                        saved = cost[a]
-                    for j in range(n + 1):
-                        if a == b and j == i:
-                            continue
-                        _with(base, n, j, goal, longer)
-                        # Stations only add to the length, so that bounds the gain.
-                        if saved - route_length(problem, b, longer, n + 1) <= best_gain:
-                            continue
-                        gain = saved - _route_cost(problem, b, longer, n + 1, scratch)
-                        if gain > best_gain:
-                            best_gain = gain
-                            best_b = b
-                            best_j = j
-                if best_b >= 0:
-                    improved = True
-                    route[a, : length[a] - 1] = shorter[: length[a] - 1]
-                    length[a] -= 1
-                    b = best_b
-                    _with(route[b], length[b], best_j, goal, longer)
-                    length[b] += 1
-                    route[b, : length[b]] = longer[: length[b]]
-                    cost[a] = _route_cost(problem, a, route[a], length[a], scratch)
-                    cost[b] = _route_cost(problem, b, route[b], length[b], scratch)
-                else:
-                    i += 1
-            for i in range(length[a] - 1):
-                for j in range(i + 1, length[a]):
-                    for k in range(length[a]):
-                        inside = i <= k <= j
-                        longer[k] = route[a, i + j - k] if inside else route[a, k]
-                    if route_length(problem, a, longer, length[a]) >= cost[a]:
-                        continue
-                    new = _route_cost(problem, a, longer, length[a], scratch)
-                    if new < cost[a] - 1e-6:
-                        cost[a] = new
-                        route[a, : length[a]] = longer[: length[a]]
-                        improved = True
+    robots, goals = len(routes.length) - 1, routes.goal.shape[1]
+    present, best = new_routes(robots, goals), new_routes(robots, goals)
+    gone, home = np.zeros(goals, np.int64), np.zeros(goals, np.int64)
+    key = np.zeros(goals)
+    value = best_value = np.inf
+    hot = 0.0
+    update(legs, routes, labels)
+    for k in range(rounds + 1):
+        if k > 0:
+            choose_ruin(routes, near, random, home, gone)
+        else:
+            for r in range(robots):
+                for i in range(routes.length[r]):
+                    gone[routes.goal[r, i]] = routes.known[r, COST] == np.inf
+        remove_goals(routes, gone)
+        update(legs, routes, labels)
+        order_absent(legs, routes, random, key)
+        n = routes.length[robots]
+        routes.length[robots] = 0
+        for i in range(n):
+            goal = routes.goal[robots, i]
+            if put_goal(legs, routes, labels, goal, random, BLINK if k > 0 else 0.0):
+                update(legs, routes, labels)
+            else:
+                routes.goal[robots, routes.length[robots]] = goal
+                routes.length[robots] += 1
+        found = objective(legs, routes)
+        if k == 0:
+            hot = HOT * (found - IMPOSSIBLE * routes.length[robots]) / max(1, goals)
+        warmth = hot * (COLD / HOT) ** (k / (rounds + 1))
+        if k == 0 or found < value - warmth * log(1.0 - random_unit(random)):
+            value = found
+            copy_routes(routes, present, routes.changed)
+            if found < best_value:
+                best_value = found
+                routes.changed[:] = 1
+                copy_routes(routes, best, routes.changed)
+        else:
+            copy_routes(present, routes, routes.changed)
+            update(legs, routes, labels)
+        routes.changed[:] = 0
+    routes.changed[:] = 1
+    copy_routes(best, routes, routes.changed)
+    update(legs, routes, labels)
+
+
+@leaf_kernel
+def read_playout(problem, sequence, moves, routes, seen):
+    """Turn the moves of a playout into routes; what it has not `seen` is absent."""
+    robots, _, targets = problem.cost.shape
+    for k in range(moves):
+        r = sequence[k] // targets
+        t = sequence[k] % targets
+        if t < problem.goals:
+            routes.goal[r, routes.length[r]] = t
+            routes.length[r] += 1
+            seen[t] = True
+    for g in range(problem.goals):
+        if problem.open_goal[g] and not seen[g]:
+            routes.goal[robots, routes.length[robots]] = g
+            routes.length[robots] += 1
 
 
 @kernel
-def solve_routing(problem, levels, iterations, alpha, kicks, random, tour, tour_length):
-    """Solve a routing problem: NRPA, then iterated local search around its answer.
+def solve_routing(
+    problem, levels, iterations, alpha, rounds, random, tour, tour_length
+):
+    """Solve a routing problem: NRPA, then ruin and recreate from its answer on.
 
     Args:
         problem: `RoutingArrays`.
         levels, iterations, alpha: of NRPA.
-        kicks: number of times local search is restarted from a disturbed best.
+        rounds: of ruin and recreate.
         random: state of the generator.
         tour: receives goals and stations of each robot in order, shape (R, >= 3 G).
         tour_length: receives their number, shape (R,).
 
     Returns:
-        Cost [J] of the tours; at least IMPOSSIBLE if none was found.
+        Energy [J] of the tours; at least IMPOSSIBLE if none was found.
     """
-    robots, places, targets = problem.cost.shape
+    robots = len(problem.energy)
     goals = problem.goals
-    left = 0
-    for g in range(goals):
-        left += problem.open_goal[g]
-    tour_length[:] = 0
-    if left == 0:
-        return 0.0
+    routes = new_routes(robots, goals)
     sequence = np.zeros(3 * goals + 4 * robots, np.int64)
     _, moves = nrpa(problem, levels, iterations, alpha, random, sequence)
-    route = np.zeros((robots, goals + 1), np.int64)
-    length = np.zeros(robots, np.int64)
-    seen = np.zeros(goals, np.bool_)
-    for k in range(moves):
-        r = sequence[k] // targets
-        t = sequence[k] % targets
-        if t < goals:
-            route[r, length[r]] = t
-            length[r] += 1
-            seen[t] = True
-    for g in range(goals):
-        if problem.open_goal[g] and not seen[g]:
-            r = np.argmin(problem.cost[:, targets, g])
-            route[r, length[r]] = g
-            length[r] += 1
-    scratch = np.empty(3 * goals + 3, np.int64)
-    cost = np.empty(robots)
-    for r in range(robots):
-        cost[r] = _route_cost(problem, r, route[r], length[r], scratch)
-    if kicks > 0:
-        improve_routes(problem, route, length, cost, scratch)
-    trial = route.copy()
-    trial_length = length.copy()
-    trial_cost = cost.copy()
-    for _ in range(kicks):
-        trial[:] = route
-        trial_length[:] = length
-        trial_cost[:] = cost
-        _kick(problem, trial, trial_length, trial_cost, random, scratch)
-        improve_routes(problem, trial, trial_length, trial_cost, scratch)
-        if trial_cost.sum() < cost.sum() - 1e-6:
-            route[:] = trial
-            length[:] = trial_length
-            cost[:] = trial_cost
-    total = 0.0
-    for r in range(robots):
-        part, n = refuel_route(problem, r, route[r], length[r], scratch)
-        total += part
-        tour[r, :n] = scratch[:n]
-        tour_length[r] = n
-    return total
+    read_playout(problem, sequence, moves, routes, np.zeros(goals, np.int64))
+    legs = new_legs(problem)
+    labels = new_labels(legs)
+    near = np.zeros((goals, goals))
+    round_trips(problem, near)
+    search(legs, routes, labels, near, rounds, random)
+    return write_tours(legs, routes, labels, tour, tour_length)
 
 
-@kernel
-def _kick(problem, route, length, cost, random, scratch):
-    """Move three random goals to random places of random routes."""
-    robots = len(length)
-    buffer = np.empty(route.shape[1] + 1, np.int64)
-    for _ in range(3):
-        a = random_below(random, robots)
-        if length[a] == 0:
-            continue
-        i = random_below(random, length[a])
-        goal = route[a, i]
-        _without(route[a], length[a], i, buffer)
-        length[a] -= 1
-        route[a, : length[a]] = buffer[: length[a]]
-        b = random_below(random, robots)
-        j = random_below(random, length[b] + 1)
-        _with(route[b], length[b], j, goal, buffer)
-        length[b] += 1
-        route[b, : length[b]] = buffer[: length[b]]
+@leaf_kernel
+def write_tours(legs, routes, labels, tour, tour_length):
+    """Write the tours of up-to-date routes; return their energy [J]."""
+    robots = len(routes.length) - 1
+    total = IMPOSSIBLE * routes.length[robots]
     for r in range(robots):
-        cost[r] = _route_cost(problem, r, route[r], length[r], scratch)
+        n = write_tour(
+            legs,
+            labels,
+            r,
+            routes.goal[r],
+            routes.length[r],
+            int(routes.known[r, LABEL]),
+            tour[r],
+        )
+        fits = n <= tour.shape[1]
+        tour_length[r] = n if fits else 0
+        total += routes.known[r, COST] if fits else IMPOSSIBLE
+    return min(total, IMPOSSIBLE * (1 + robots + legs.goals))

@@ -14,7 +14,7 @@ from mrmg.planning.assembly import make_plan
 from mrmg.planning.motion_tree import Problem, grow_tree
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.refine import refine
-from mrmg.planning.routing import solve_routing
+from mrmg.planning.routers import route
 
 MARGINS = (1.0, 0.0, 2.0)
 """Multiples of the route margin that successive trees are grown with."""
@@ -59,7 +59,7 @@ def attempt_plan(
     margin = MARGINS[number % len(MARGINS)] * params.route_margin
     problem = problem.with_margin(margin)
     draw = seeding.stream_seed(seed, "tours", number)
-    routing = solve_routing(problem.mission.routing, params.router, draw)
+    routing = route(problem.mission.routing, params.router, draw)
     routing_s = time.perf_counter() - began
     if not routing.feasible or halt[0]:
         return Attempt(routing_s=routing_s)

@@ -59,10 +59,12 @@ def exact_routing(problem: RoutingArrays) -> Routing | None:
 
     Returns:
         The tours, with infinite cost if there are none; None if the mission is too
-        large: more than MOST_GOALS open goals or MOST_LABELS labels.
+        large (more than MOST_GOALS open goals or MOST_LABELS labels), or if time
+        matters in it.
     """
     goal_list = np.flatnonzero(problem.open_goal)
-    if len(goal_list) > MOST_GOALS:
+    timed = problem.makespan_weight > 0.0 or bool((problem.limit < np.inf).any())
+    if timed or len(goal_list) > MOST_GOALS:
         return None
     fleet = np.full(1 << len(goal_list), np.inf)
     fleet[0] = 0.0
@@ -95,27 +97,28 @@ class _RobotWays:
             _bound_kernels.subset_labels(problem, r, self.hop, goal_list, MOST_LABELS)
         )
         self.cost, self.last = _bound_kernels.cheapest_labels(
-            self.label, self.start_of, len(goal_list)
+            problem, r, goal_list, self.label, self.start_of, station
         )
         self.complete = int(self.start_of[-1]) == len(self.label)
 
     def tour(self, mask: int) -> tuple[int, ...]:
         """Return the cheapest tour through a subset of the goals."""
         backwards: list[int] = []
-        label = int(self.last[mask]) if mask else -1
-        while label >= 0:
-            state = int(np.searchsorted(self.start_of, label, side="right")) - 1
-            goal = state % len(self.goal_list)
-            before = state // len(self.goal_list) ^ (1 << goal)
-            backwards.append(int(self.goal_list[goal]))
-            label = int(self.parent[label])
+        label = int(self.last[mask])
+        while label != -1:
             if label <= -2:
                 station = -2 - label
-                label, first = (int(i) for i in self.came[before, station])
+                label, first = (int(i) for i in self.came[mask, station])
                 chain = [first]
                 while chain[-1] != station:
                     chain.append(int(self.next_station[chain[-1], station]))
                 backwards += [self.goals + s for s in reversed(chain)]
+                continue
+            state = int(np.searchsorted(self.start_of, label, side="right")) - 1
+            goal = state % len(self.goal_list)
+            mask = state // len(self.goal_list) ^ (1 << goal)
+            backwards.append(int(self.goal_list[goal]))
+            label = int(self.parent[label])
         return tuple(reversed(backwards))
 
 

@@ -13,7 +13,8 @@ from mrmg.mission import Trajectory
 from mrmg.planning.motion_tree import Problem, grow_tree, state_problem
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.roadmap import Roadmap, build_roadmap
-from mrmg.planning.routing import Routing, solve_routing
+from mrmg.planning.routers import route
+from mrmg.planning.routing import Routing
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
 
@@ -60,7 +61,7 @@ def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
     problem = state_problem(scene, world, roadmap, params)
     for number in range(params.trees):
         draw = seeding.stream_seed(seed, "insight", number)
-        routing = solve_routing(problem.mission.routing, params.router, draw)
+        routing = route(problem.mission.routing, params.router, draw)
         if not routing.feasible:
             continue
         growth = grow_tree(problem, params, routing, draw, np.zeros(1, np.bool_))

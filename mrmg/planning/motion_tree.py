@@ -21,7 +21,7 @@ from mrmg.planning._tree_kernels import Tours
 from mrmg.planning.fleet import fleet_array, stack_spaces
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.roadmap import Roadmap, planned_regions
-from mrmg.planning.routing import Routing, routing_arrays
+from mrmg.planning.routing import Routing, routing_arrays, tour_room
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
 
@@ -61,7 +61,9 @@ class Problem:
             self,
             mission=self.mission._replace(
                 routing=routing._replace(
-                    cost=routing.cost * share, escape=routing.escape * share
+                    cost=routing.cost * share,
+                    escape=routing.escape * share,
+                    finish=routing.finish * share,
                 ),
                 params=self.mission.params._replace(route_margin=margin),
             ),
@@ -79,6 +81,7 @@ def state_problem(
         robot_margin_m=params.robot_margin_m,
     )
     places = len(scene.targets())
+    last_leg = _last_legs(scene, roadmap, fleet)
     energy = np.array([robot.battery.start_J for robot in scene.robots])
     start = np.zeros((len(scene.robots), 5))
     start[:, :3] = [robot.pose for robot in scene.robots]
@@ -96,8 +99,9 @@ def state_problem(
             energy=energy,
             capacity=fleet["capacity"],
             reserve=fleet["reserve"],
+            finish_distance=last_leg / fleet["plain"][:, None],
         ),
-        last_leg=_last_legs(scene, roadmap, fleet),
+        last_leg=last_leg,
         params=tree_params(params),
     )
     return Problem(scene, roadmap, mission, start, energy)
@@ -183,7 +187,7 @@ def tree_params(params: PlannerParams) -> TreeParams:
         levels=router.levels,
         iterations=router.iterations,
         alpha=router.alpha,
-        kicks=router.kicks,
+        rounds=router.rounds,
     )
 
 
@@ -229,7 +233,7 @@ def grow_tree(
     """
     mission = problem.mission
     robots = len(problem.scene.robots)
-    width = 3 * mission.targets.goals + 3
+    width = tour_room(mission.targets.goals, mission.targets.places)
     tree = _groups_kernels.new_tree(
         params.max_vertices, robots, mission.targets.goals, params.steps
     )

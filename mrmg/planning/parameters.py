@@ -135,7 +135,7 @@ def _profile(profile: str, budget_s: float | None) -> PlannerParams:
         # A new tour at every reached goal, one control held for the whole expansion.
         return replace(
             base,
-            router=RouterParams(levels=2, iterations=20, kicks=0),
+            router=RouterParams(levels=2, iterations=20, rounds=0),
             steps=5,
             max_vertices=60_000,
             trees=2,

@@ -44,7 +44,7 @@ def check(problem: RoutingArrays, cost: float, moves: list[tuple[int, int]]) -> 
         else:
             energy[r] = problem.capacity[r]
             recharges[r] += 1
-            assert recharges[r] <= 2
+            assert recharges[r] <= problem.cost.shape[2] - problem.goals
     assert cost == pytest.approx(spent + UNVISITED * len(unvisited))
     return len(unvisited)
 

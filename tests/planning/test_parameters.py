@@ -57,7 +57,7 @@ def test_the_digest_tells_apart_what_decides_the_plan() -> None:
     assert replace(base, budget_s=5.0).digest == base.digest
     others = [
         replace(base, samples=base.samples + 1),
-        replace(base, router=RouterParams(kicks=base.router.kicks + 1)),
+        replace(base, router=RouterParams(rounds=base.router.rounds + 1)),
         profile_params("paper"),
     ]
     assert len({base.digest, *(params.digest for params in others)}) == 4

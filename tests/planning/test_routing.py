@@ -106,10 +106,10 @@ def test_tours_are_valid_and_near_the_optimum(
     assert near >= NEAR_SHARE * feasible
 
 
-@pytest.mark.parametrize("kicks", [0, 20])
-def test_the_same_seed_gives_the_same_tours(mission: Mission, kicks: int) -> None:
+@pytest.mark.parametrize("rounds", [0, 100])
+def test_the_same_seed_gives_the_same_tours(mission: Mission, rounds: int) -> None:
     problem = mission(3, goals=12, stations=4, robots=3, range_m=(150.0, 250.0))
-    params = RouterParams(iterations=10, kicks=kicks)
+    params = RouterParams(iterations=10, rounds=rounds)
     first = solve_routing(problem, params, 5)
     assert solve_routing(problem, params, 5) == first
     others = {solve_routing(problem, params, seed).tours for seed in range(6)}
@@ -129,7 +129,7 @@ def test_large_missions_are_valid_and_gain_from_local_search(
     mission: Mission, replay: Replay, seed: int
 ) -> None:
     problem = mission(seed, goals=20, stations=4, robots=4, range_m=(200.0, 300.0))
-    alone = solve_routing(problem, RouterParams(kicks=0), seed)
+    alone = solve_routing(problem, RouterParams(rounds=0), seed)
     searched = solve_routing(problem, RouterParams(), seed)
     assert_valid(problem, searched, replay)
     if alone.feasible:

@@ -1,0 +1,231 @@
+"""Compare the routers with exact tours and proven optima; print tables, write JSONL.
+
+Protocol: one process, one thread, kernels compiled before anything is timed. The first
+table is of generated missions on 100 x 100 m of uneven ground whose cheapest tours
+recharge at least once, against exact tours. The second is of Green VRP instances
+(closed routes of any number of vehicles, dwell and route time limits, stations
+revisited freely) against proven optima; it needs their folder.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrmg.planning._nrpa_kernels import RoutingArrays
+from mrmg.planning.bound import exact_routing
+from mrmg.planning.routers import route
+from mrmg.planning.routing import RouterParams, routing_arrays
+
+PROVEN = {
+    "S1_2i6s": 1578.12,
+    "S1_4i2s": 1582.21,
+    "S1_4i4s": 1460.09,
+    "S1_4i6s": 1397.27,
+}
+"""Least distances of the Green VRP instances [miles]."""
+
+COMPARED = (
+    RouterParams(method="nrpa", levels=2),
+    RouterParams(method="search"),
+    RouterParams(method="exact"),
+)
+"""Routers of the first table."""
+
+EARTH_RADIUS = 4182.44949
+"""As the instances' authors have it [miles]."""
+
+TANK, SPEED = 300.0, 40.0
+"""Range of a full tank [miles] and speed [miles/h]."""
+
+CUSTOMER_STOP, STATION_STOP, LONGEST_ROUTE = 0.5, 0.25, 10.75
+"""Hours."""
+
+VEHICLES = 10
+"""More than any of the optima uses."""
+
+FOLDER = Path(__file__).resolve().parents[1] / ".." / "shared" / "routing"
+
+
+def main() -> int:
+    """Run the bench; return 1 if a target is missed."""
+    options = parse_options()
+    print(f"{__doc__}\n")
+    rows = against_exact(options.instances)
+    if options.folder.is_dir():
+        rows += against_proven(options.folder, RouterParams(rounds=options.rounds))
+    else:
+        print(f"\nno Green VRP instances: {options.folder} is not there")
+    if options.output:
+        text = "".join(json.dumps(row, sort_keys=True) + "\n" for row in rows)
+        options.output.write_text(text)
+    held = [row for row in rows if row["router"] != "nrpa"]
+    return 0 if all(row["gap"] <= row["allowed"] for row in held) else 1
+
+
+def against_exact(instances: int) -> list[dict[str, Any]]:
+    """Compare the routers on generated missions; print and return their rows."""
+    cases = list(generated(instances))
+    rows = []
+    print("router | within 1 % | optimal | worst gap | median s | slowest s")
+    for params in COMPARED:
+        route(cases[0][1], params, 0)
+        of_router = [compared(params, *case) for case in cases]
+        rows += of_router
+        print(generated_row(params.method, of_router), flush=True)
+    return rows
+
+
+def against_proven(folder: Path, params: RouterParams) -> list[dict[str, Any]]:
+    """Solve the Green VRP instances; print and return their rows."""
+    rows = []
+    print("\ninstance | proven | found | routes | s")
+    for name, optimum in PROVEN.items():
+        row = green_row(folder / f"{name}.txt", optimum, params)
+        rows.append(row)
+        print(
+            f"{name} | {optimum} | {row['found']:.2f} | {row['routes']} | "
+            f"{row['seconds']:.2f}",
+            flush=True,
+        )
+    return rows
+
+
+def parse_options() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, prog="tools/bench_routing")
+    parser.add_argument("--instances", type=int, default=100, help="default 100")
+    parser.add_argument("--folder", type=Path, default=FOLDER, help="of Green VRP")
+    parser.add_argument(
+        "--rounds", type=int, default=10_000, help="of the search on Green VRP"
+    )
+    parser.add_argument("--output", type=Path, help="JSONL file")
+    return parser.parse_args()
+
+
+def generated(number: int) -> Iterator[tuple[int, RoutingArrays, float]]:
+    """Yield (seed, mission, least cost) of missions that cannot do without stations."""
+    seed = found = 0
+    while found < number:
+        seed += 1
+        problem = generate(seed)
+        best = exact_routing(problem)
+        if best is None or not best.feasible:
+            continue
+        if any(target >= problem.goals for tour in best.tours for target in tour):
+            found += 1
+            yield seed, problem, best.cost_J
+
+
+def generate(seed: int) -> RoutingArrays:
+    """Return a mission of 6-10 goals, 1-3 robots and 2-4 stations."""
+    rng = np.random.default_rng(seed)
+    goals, robots, stations = (int(rng.integers(*n)) for n in ((6, 11), (1, 4), (2, 5)))
+    targets = goals + stations
+    point = rng.uniform(0.0, 100.0, (targets + robots, 2))
+    way = np.hypot(*(point[:, None] - point[None]).transpose(2, 0, 1))
+    rough = rng.uniform(1.0, 1.6, way.shape)
+    way *= np.maximum(rough, rough.T)
+    for k in range(len(way)):
+        way = np.minimum(way, way[:, k : k + 1] + way[k : k + 1])
+    plain = rng.uniform(80.0, 120.0, robots)
+    capacity = plain * rng.uniform(90.0, 200.0, robots)
+    return routing_arrays(
+        goals=goals,
+        distance=np.repeat(way[None, :targets, :targets], robots, axis=0),
+        start_distance=way[targets:, :targets],
+        plain=plain,
+        energy=capacity * rng.uniform(0.5, 1.0, robots),
+        capacity=capacity,
+        reserve=0.05 * capacity,
+    )
+
+
+def compared(
+    params: RouterParams, seed: int, problem: RoutingArrays, optimum: float
+) -> dict[str, Any]:
+    """Solve one mission."""
+    began = time.perf_counter()
+    routing = route(problem, params, seed)
+    return {
+        "router": params.method,
+        "seed": seed,
+        "seconds": time.perf_counter() - began,
+        "gap": routing.cost_J / optimum - 1.0,
+        "allowed": 0.01,
+    }
+
+
+def generated_row(name: str, rows: list[dict[str, Any]]) -> str:
+    """Return one router's line of the table."""
+    gap = np.array([row["gap"] for row in rows])
+    seconds = np.array([row["seconds"] for row in rows])
+    return (
+        f"{name} | {(gap <= 0.01).sum()}/{len(gap)} | {(gap <= 1e-9).sum()} | "
+        f"{100 * gap.max():.2f} % | {np.median(seconds):.4f} | {seconds.max():.4f}"
+    )
+
+
+def green_row(path: Path, optimum: float, params: RouterParams) -> dict[str, Any]:
+    """Solve a Green VRP instance."""
+    problem = read_green_vrp(path)
+    began = time.perf_counter()
+    routing = route(problem, params, 0)
+    return {
+        "router": params.method,
+        "instance": path.stem,
+        "proven": optimum,
+        "gap": routing.cost_J / optimum - 1.0,
+        "allowed": 0.005 / optimum,
+        "found": routing.cost_J,
+        "routes": sum(bool(tour) for tour in routing.tours),
+        "seconds": time.perf_counter() - began,
+    }
+
+
+def read_green_vrp(path: Path, *, vehicles: int = VEHICLES) -> RoutingArrays:
+    """Read a Green VRP instance: distances [miles] are energies, times are hours."""
+    rows = [line.split() for line in path.read_text().splitlines()]
+    places = [row for row in rows if len(row) == 4 and row[1] in ("d", "f", "c")]
+    of_kind = {
+        kind: [(float(x), float(y)) for _, k, x, y in places if k == kind]
+        for kind in ("d", "f", "c")
+    }
+    customers, stations = of_kind["c"], of_kind["f"]
+    way = haversine(np.radians(np.array(customers + stations + of_kind["d"])))
+    targets = len(customers) + len(stations)
+    stop = np.repeat([CUSTOMER_STOP, STATION_STOP], [len(customers), len(stations)])
+    hours = way[:, :targets] / SPEED + stop
+    fleet = np.ones(vehicles)
+    return routing_arrays(
+        goals=len(customers),
+        distance=np.tile(way[:targets, :targets], (vehicles, 1, 1)),
+        start_distance=np.tile(way[targets, :targets], (vehicles, 1)),
+        plain=fleet,
+        energy=TANK * fleet,
+        capacity=TANK * fleet,
+        reserve=0.0 * fleet,
+        finish_distance=np.tile(way[:, targets], (vehicles, 1)),
+        time=np.tile(hours, (vehicles, 1, 1)),
+        finish_time=np.tile(way[:, targets] / SPEED, (vehicles, 1)),
+        limit=LONGEST_ROUTE * fleet,
+    )
+
+
+def haversine(point: np.ndarray) -> np.ndarray:
+    """Return great-circle distances [miles] of (longitude, latitude) [rad], (n, n)."""
+    east, north = np.sin((point[:, None] - point[None]) / 2.0).transpose(2, 0, 1) ** 2
+    across = np.cos(point[:, 1])
+    arc = north + across[:, None] * across[None] * east
+    return np.asarray(2.0 * EARTH_RADIUS * np.arcsin(np.sqrt(arc)))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
