@@ -13,11 +13,10 @@ from mrmg.planning._expansion_kernels import choose_modes, expand
 from mrmg.planning._finish_kernels import all_finished, at_finish
 from mrmg.planning._groups_kernels import add_to_group, new_groups, select_vertex
 from mrmg.planning._maneuver_kernels import way_left
-from mrmg.planning._mission_kernels import in_target, leg_energy, look_ahead
-from mrmg.planning._nrpa_kernels import RoutingArrays
+from mrmg.planning._mission_kernels import in_target, leg_energy
 from mrmg.planning._random_kernels import random_below, random_unit
+from mrmg.planning._rerouting_kernels import route_from
 from mrmg.planning._routes_kernels import IMPOSSIBLE
-from mrmg.planning._routing_kernels import solve_routing
 from mrmg.planning._safety_kernels import (
     braking_control,
     clear_of_obstacles,
@@ -163,52 +162,6 @@ def rest_of_tours(mission, tree, tours, v, otherwise):
             total += leg
             enough &= left >= leg
     return total, enough
-
-
-@kernel
-def route_from(mission, tree, v, random, tour, length):
-    """Solve the routing problem from a vertex; return the cost [J]."""
-    problem, params = mission.routing, mission.params
-    robots, _, n_targets = problem.cost.shape
-    cost = problem.cost.copy()
-    ending = problem.finish.copy()
-    waypoint = np.empty(2)
-    for r in range(robots):
-        for t in range(n_targets):
-            way = look_ahead(mission, r, t, tree.state[v, r], 0.0, waypoint)
-            leg = leg_energy(mission, r, t, tree.state[v, r], way)
-            cost[r, n_targets, t] = leg * (1.0 + params.route_margin)
-        finish = mission.targets.finish[r]
-        if finish >= 0:
-            way = look_ahead(mission, r, finish, tree.state[v, r], 0.0, waypoint)
-            leg = leg_energy(mission, r, finish, tree.state[v, r], way)
-            ending[r, n_targets] = leg * (1.0 + params.route_margin)
-    now = RoutingArrays(
-        problem.goals,
-        cost,
-        tree.energy[v],
-        problem.capacity,
-        problem.reserve,
-        problem.escape,
-        ~tree.visited[v],
-        ending,
-        problem.time,
-        problem.finish_time,
-        problem.limit,
-        problem.charge_power,
-        problem.energy_weight,
-        problem.makespan_weight,
-    )
-    return solve_routing(
-        now,
-        params.levels,
-        params.iterations,
-        params.alpha,
-        params.rounds,
-        random,
-        tour,
-        length,
-    )
 
 
 @leaf_kernel
