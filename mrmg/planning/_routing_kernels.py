@@ -27,10 +27,18 @@ from mrmg.planning._routes_kernels import (
     remove_goals,
     update,
 )
-from mrmg.planning._ruin_kernels import choose_ruin, order_absent, round_trips
+from mrmg.planning._ruin_kernels import (
+    choose_ruin,
+    order_absent,
+    round_trips,
+    swap_tails,
+)
 
 BLINK = 0.01
 """How often a place for a goal is overlooked, so that it goes elsewhere."""
+
+SWAPS = 0.15
+"""How often two robots exchange the ends of their routes instead."""
 
 HOT, COLD = 0.3, 0.003
 """First and last temperature of the search, as shares of a goal's mean cost."""
@@ -51,7 +59,10 @@ def search(legs, routes, labels, near, rounds, random):
     hot = 0.0
     update(legs, routes, labels)
     for k in range(rounds + 1):
-        if k > 0:
+        if k > 0 and robots > 1 and random_unit(random) < SWAPS:
+            gone[:] = 0
+            swap_tails(routes, random)
+        elif k > 0:
             choose_ruin(routes, near, random, home, gone)
         else:
             for r in range(robots):

@@ -10,6 +10,9 @@ from mrmg.planning._random_kernels import random_below, random_unit
 MOST_RUINED = 10
 """Mean number of goals taken out at a time, and longest string of them."""
 
+WHOLE = 0.5
+"""How often routes are exchanged as a whole when their ends could be."""
+
 STRINGS = 0.6
 """How often strings of routes are taken out instead of a seed's nearest goals."""
 
@@ -93,6 +96,25 @@ def cut_string(routes, r, goal, longest, random, gone):
     for i in range(size + kept):
         if i < skip or i >= skip + kept:
             gone[routes.goal[r, first + i]] = 1
+
+
+@leaf_kernel
+def swap_tails(routes, random):
+    """Exchange the ends of two routes from drawn places on, or all of both."""
+    robots = len(routes.length) - 1
+    a = random_below(random, robots)
+    b = (a + 1 + random_below(random, robots - 1)) % robots
+    cut_a = random_below(random, routes.length[a] + 1)
+    cut_b = random_below(random, routes.length[b] + 1)
+    if random_unit(random) < WHOLE:
+        cut_a = cut_b = 0
+    tail_a, tail_b = routes.length[a] - cut_a, routes.length[b] - cut_b
+    for k in range(max(tail_a, tail_b)):
+        i, j = cut_a + k, cut_b + k
+        routes.goal[a, i], routes.goal[b, j] = routes.goal[b, j], routes.goal[a, i]
+    routes.length[a], routes.length[b] = cut_a + tail_b, cut_b + tail_a
+    routes.front[a], routes.front[b] = cut_a + 1, cut_b + 1
+    routes.back[a] = routes.back[b] = 1
 
 
 @leaf_kernel

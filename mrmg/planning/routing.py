@@ -37,7 +37,7 @@ class RouterParams:
     levels: int = 1
     iterations: int = 20
     alpha: float = 1.0
-    rounds: int = 1000
+    rounds: int = 600
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:

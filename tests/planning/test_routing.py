@@ -17,10 +17,10 @@ from mrmg.planning.routing import RouterParams, Routing, routing_arrays, solve_r
 
 SLACK_J = 1e-6
 
-MISSED_SHARE = 0.06
-"""Feasible missions the router may fail on, as a share: it is a heuristic."""
+MISSED_SHARE = 0.0
+"""Feasible missions the router may fail on, as a share."""
 
-NEAR_SHARE = 0.8
+NEAR_SHARE = 0.95
 """Share of feasible missions it must solve within 1 % of the optimum."""
 
 Mission = Callable[..., RoutingArrays]
@@ -112,8 +112,12 @@ def test_the_same_seed_gives_the_same_tours(mission: Mission, rounds: int) -> No
     params = RouterParams(iterations=10, rounds=rounds)
     first = solve_routing(problem, params, 5)
     assert solve_routing(problem, params, 5) == first
-    others = {solve_routing(problem, params, seed).tours for seed in range(6)}
-    assert len(others) > 1, "the seed must matter"
+
+
+def test_the_seed_matters(mission: Mission) -> None:
+    problem = mission(3, goals=12, stations=4, robots=3, range_m=(150.0, 250.0))
+    params = RouterParams(iterations=10, rounds=0)
+    assert len({solve_routing(problem, params, seed).tours for seed in range(6)}) > 1
 
 
 def test_the_problem_is_left_as_it_was(mission: Mission) -> None:
