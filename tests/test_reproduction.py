@@ -191,7 +191,7 @@ def test_a_state_that_is_no_number_ends_in_a_readable_run(
     assert result.summary["execution"]["gave_up"] == "diverged"
     log = ExecutionLog.load(folder)
     assert np.isfinite(log.state).all()
-    assert log.time_s[-1] == pytest.approx(4.0)
+    assert log.time_s[-1] == pytest.approx(4.0, abs=0.05)  # some 200 ticks
     assert len(log.time_s) == log.force_N.shape[1] + 1
     capsule = Capsule.load(folder / CAPSULE_FILE)
     assert capsule.failure.causes == ("diverged", "goal missed")

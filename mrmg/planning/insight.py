@@ -75,7 +75,7 @@ def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
             ids = [robot.id for robot in scene.robots]
             return Insight(
                 roadmap=edges[long],
-                multiplier=weight[long] / length_m[long],
+                multiplier=weight[long].mean(axis=1) / length_m[long],  # there and back
                 tours={
                     name: tour_way(problem, routing, at) for at, name in enumerate(ids)
                 },

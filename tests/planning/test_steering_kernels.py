@@ -161,4 +161,12 @@ def test_the_other_side_is_taken_where_a_wall_is(
     half = state(yard(robots=TWO_CARS, obstacles=[south]), samples=20)
     assert aside(half, (10.0, 10.0, pi, 0.0))[1] > 12.0
     lane = state(yard(robots=TWO_CARS, obstacles=[south, north]), samples=20)
+    right = aside(lane, (10.0, 10.0, pi, 0.0))[1]
+    passage_m = lane.mission.fleet[0]["passage"]
+    assert 8.0 + passage_m <= right < 8.0 + passage_m + 0.4
+    tight = [
+        {**south, "box": {"center": [15, 4.45], "size": [30, 8.9]}},
+        {**north, "box": {"center": [15, 15.55], "size": [30, 8.9]}},
+    ]
+    lane = state(yard(robots=TWO_CARS, obstacles=tight), samples=20)
     assert aside(lane, (10.0, 10.0, pi, 0.0)).tolist() == [24.0, 10.0]
