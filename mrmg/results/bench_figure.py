@@ -16,6 +16,9 @@ from mrmg.results.bench_record import BenchRow
 from mrmg.results.print_style import PAGE_IN, print_figure
 from mrmg.results.problem_figure import add_legend
 
+MOST_LETTERS = 45
+"""Letters of all names under one panel up to which they stand level."""
+
 Key = Callable[[BenchRow], str]
 _HEIGHT_IN = 2.5
 _LOOKS: dict[str, dict[str, Any]] = {
@@ -138,7 +141,11 @@ def _draw_boxes(axes: Axes, rows: Sequence[BenchRow], key: Key) -> None:
                 )
     axes.set_yscale("log")
     axes.yaxis.set_major_formatter("{x:g}")
-    axes.set_xticks(range(len(groups)), groups)
+    # Many names side by side would run into each other.
+    slope = 30 if sum(map(len, groups)) > MOST_LETTERS else 0
+    axes.set_xticks(
+        range(len(groups)), groups, rotation=slope, ha="right" if slope else "center"
+    )
     axes.set_xlim(-0.6, len(groups) - 0.4)
     axes.grid(axis="y", which="both", color="#E4E6EA", linewidth=0.5)
     axes.set_axisbelow(True)

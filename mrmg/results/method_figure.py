@@ -57,7 +57,7 @@ def draw_method(
         path: file to write (PDF, SVG or PNG by its suffix).
     """
     map_in = PAGE_IN / _PANELS
-    with print_figure((PAGE_IN, map_in * aspect(scene) + 0.4), path) as own:
+    with print_figure((PAGE_IN, map_in * aspect(scene) + 0.6), path) as own:
         panels = own.subplots(1, _PANELS)
         for axes, title in zip(panels, _TITLES, strict=True):
             prepare_map(axes, scene)
