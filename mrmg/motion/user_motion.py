@@ -30,8 +30,6 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import numpy as np
-
 from mrmg.errors import Fault, SceneError
 
 _PARAMETERS = {
@@ -53,10 +51,6 @@ class UserMotion:
     source: str
     step: Callable[..., tuple[float, ...]]
     steer: Callable[..., tuple[float, ...]]
-
-    def advance(self, state: np.ndarray, control: np.ndarray, length: float, dt: float):  # type: ignore[no-untyped-def]
-        """Return the state after `dt` as an array, shape (5,)."""
-        return np.array(self.step(tuple(state), tuple(control), length, dt))
 
     def compiled(self, limits: tuple[float, ...]) -> tuple[int, int]:
         """Return the addresses of compiled step and steer, valid while the process is.
