@@ -8,6 +8,10 @@ machines are not.
 With --bound, costs are compared with a proven lower bound: that of the first plan, and
 with --budget S those of the best plans after each of 5 s and 30 s that S reaches. The
 quality protocol is `tools/bench --bound --budget 30 --seeds 0-9`.
+
+With more than one profile each seed is planned with all of them in turn, and a second
+table has the ratios to the first profile, seed by seed, where both have a plan: of the
+time to the first plan, and of the cost of the final one.
 """
 
 from __future__ import annotations
@@ -34,7 +38,7 @@ TABLE = ("scene1", "scene2", "scene3", "scene4", "scene5", "scene6")
 
 
 def main() -> int:
-    """Run the bench; return 1 if any mission failed."""
+    """Run the bench; return 1 if any mission of the first profile failed."""
     options = parse_options()
     print(protocol(options))
     rows = []
@@ -42,13 +46,16 @@ def main() -> int:
     for scene in options.scenes:
         of_scene = list(missions(scene, options))
         rows += of_scene
-        print(table_row(scene, of_scene, options), flush=True)
+        print_scene(scene, of_scene, options)
     if len(options.scenes) > 1:
-        print(table_row("all", rows, options))
+        print_scene("all", rows, options)
+    for profile in options.profile[1:]:
+        print(ratio_table(rows, options, profile))
     if options.output:
         text = "".join(json.dumps(row, sort_keys=True) + "\n" for row in rows)
         options.output.write_text(text)
-    return 0 if all(row["ok"] for row in rows) else 1
+    of_first = [row for row in rows if row["profile"] == options.profile[0]]
+    return 0 if all(row["ok"] for row in of_first) else 1
 
 
 def parse_options() -> argparse.Namespace:
@@ -56,7 +63,9 @@ def parse_options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, prog="tools/bench")
     parser.add_argument("--scenes", nargs="+", default=list(TABLE), metavar="SCENE")
     parser.add_argument("--seeds", default="0-9", help="first-last, default 0-9")
-    parser.add_argument("--profile", default="default", choices=("default", "paper"))
+    parser.add_argument(
+        "--profile", nargs="+", default=["default"], choices=("default", "paper")
+    )
     parser.add_argument("--budget", type=float, help="seconds of planning")
     parser.add_argument("--execute", action="store_true", help="drive in MuJoCo too")
     parser.add_argument("--bound", action="store_true", help="compare with a bound")
@@ -70,7 +79,7 @@ def parse_options() -> argparse.Namespace:
 def protocol(options: argparse.Namespace) -> str:
     """Return what was measured how and on what."""
     seeds = f"{options.seeds.start}-{options.seeds.stop - 1}"
-    chosen = f"profile {options.profile}, seeds {seeds}"
+    chosen = f"profile {', '.join(options.profile)}, seeds {seeds}"
     return f"{__doc__}\n{chosen}\n{conditions(options)}\n"
 
 
@@ -107,48 +116,64 @@ def cpu() -> str:
 
 
 def missions(source: str, options: argparse.Namespace) -> Iterator[dict[str, Any]]:
-    """Yield one row for each seed."""
+    """Yield one row for each seed and profile."""
     scene = mrmg.load_scene(source)
-    params = profile_params(options.profile, budget_s=options.budget)
-    warm = profile_params(options.profile)
-    plan_mission(scene, seed=options.seeds.start, params=warm)
-    bound_J = lower_bound_J(scene, step_s=params.dt_s) if options.bound else None
+    # All profiles run the same kernels, and the default one is the quickest to warm.
+    plan_mission(scene, seed=options.seeds.start)
+    step_s = profile_params(options.profile[0]).dt_s
+    bound_J = lower_bound_J(scene, step_s=step_s) if options.bound else None
     for seed in options.seeds:
-        began = time.perf_counter()
-        result = plan_mission(scene, seed=seed, params=params)
-        row = {
-            "scene": scene.name,
-            "problem": problem_of(scene, source),
-            "conditions": conditions(options),
-            "seed": seed,
-            "profile": options.profile,
-            "status": result.status.value,
-            "reason": result.reason,
-            "plan_s": time.perf_counter() - began,
-            "statistics": dict(result.statistics),
-            "ok": False,
+        for profile in options.profile:
+            row = planned(source, scene, seed, profile, bound_J, options)
+            if not row["ok"]:
+                print(f"FAILED {scene.name} seed {seed}: {row}", file=sys.stderr)
+            yield row
+
+
+def planned(
+    source: str,
+    scene: Any,
+    seed: int,
+    profile: str,
+    bound_J: float | None,
+    options: argparse.Namespace,
+) -> dict[str, Any]:
+    """Plan, verify and, if asked to, drive a mission; return its row."""
+    params = profile_params(profile, budget_s=options.budget)
+    began = time.perf_counter()
+    result = plan_mission(scene, seed=seed, params=params)
+    row = {
+        "scene": scene.name,
+        "problem": problem_of(scene, source),
+        "conditions": conditions(options),
+        "seed": seed,
+        "profile": profile,
+        "status": result.status.value,
+        "reason": result.reason,
+        "plan_s": time.perf_counter() - began,
+        "statistics": dict(result.statistics),
+        "ok": False,
+    }
+    if result.plan is None:
+        return row
+    verdict = mrmg.verify(scene, result.plan)
+    metre = scene.robots[0].model.energy_model.plain_ground_J_per_m()
+    row |= {
+        "cost_J": result.plan.cost_J,
+        "cost_m": result.plan.cost_J / metre,
+        "makespan_s": result.plan.makespan_s,
+        "violations": len(verdict.violations),
+        "ok": verdict.ok,
+    }
+    if bound_J is not None:
+        row |= {"bound_J": bound_J, "cost_to_bound": row["cost_J"] / bound_J}
+        row["cost_to_bound_after"] = {
+            name: cost_after(result.statistics, time_s) / bound_J
+            for name, time_s in moments(options).items()
         }
-        if result.plan is not None:
-            verdict = mrmg.verify(scene, result.plan)
-            metre = scene.robots[0].model.energy_model.plain_ground_J_per_m()
-            row |= {
-                "cost_J": result.plan.cost_J,
-                "cost_m": result.plan.cost_J / metre,
-                "makespan_s": result.plan.makespan_s,
-                "violations": len(verdict.violations),
-                "ok": verdict.ok,
-            }
-            if bound_J is not None:
-                row |= {"bound_J": bound_J, "cost_to_bound": row["cost_J"] / bound_J}
-                row["cost_to_bound_after"] = {
-                    name: cost_after(result.statistics, time_s) / bound_J
-                    for name, time_s in moments(options).items()
-                }
-            if options.execute:
-                row |= driven(scene, result.plan, verdict.ok)
-        if not row["ok"]:
-            print(f"FAILED {scene.name} seed {seed}: {row}", file=sys.stderr)
-        yield row
+    if options.execute:
+        row |= driven(scene, result.plan, verdict.ok)
+    return row
 
 
 def moments(options: argparse.Namespace) -> dict[str, float | None]:
@@ -198,6 +223,48 @@ def header(options: argparse.Namespace) -> str:
     return " | ".join(("scene", "ok", *COLUMNS, *bound_names, *driven_names))
 
 
+def print_scene(
+    scene: str, rows: list[dict[str, Any]], options: argparse.Namespace
+) -> None:
+    """Print one line of the table for each profile."""
+    for profile in options.profile:
+        name = f"{scene} {profile}" if len(options.profile) > 1 else scene
+        of_profile = [row for row in rows if row["profile"] == profile]
+        print(table_row(name, of_profile, options), flush=True)
+
+
+def ratio_table(
+    rows: list[dict[str, Any]], options: argparse.Namespace, profile: str
+) -> str:
+    """Return how a profile compares with the first one, seed by seed."""
+    base = options.profile[0]
+    solved = {
+        (row["scene"], row["seed"], row["profile"]): row for row in rows if row["ok"]
+    }
+    lines = [f"\n{profile} / {base}", "scene | both ok | first plan | cost"]
+    scenes = sorted({row["scene"] for row in rows})
+    for names in [*([scene] for scene in scenes), scenes]:
+        pairs = [
+            (solved[scene, seed, profile], solved[scene, seed, base])
+            for scene in names
+            for seed in options.seeds
+            if {(scene, seed, profile), (scene, seed, base)} <= solved.keys()
+        ]
+        cells = [names[0] if len(names) == 1 else "all", f"{len(pairs)}"]
+        if pairs:
+            cells += [
+                f"{statistics.median(first_s(a) / first_s(b) for a, b in pairs):.1f}",
+                f"{statistics.median(a['cost_J'] / b['cost_J'] for a, b in pairs):.3f}",
+            ]
+        lines.append(" | ".join(cells))
+    return "\n".join(lines if len(scenes) > 1 else lines[:-1])
+
+
+def first_s(row: Mapping[str, Any]) -> float:
+    """Return the time to the first plan of a solved row [s]."""
+    return float(row["statistics"]["time_s"]["first_solution"])
+
+
 def table_row(
     scene: str, rows: list[dict[str, Any]], options: argparse.Namespace
 ) -> str:
@@ -205,7 +272,7 @@ def table_row(
     solved = [row for row in rows if "cost_m" in row]
     cells = [scene, f"{sum(row['ok'] for row in rows)}/{len(rows)}"]
     if solved:
-        first = sorted(row["statistics"]["time_s"]["first_solution"] for row in solved)
+        first = sorted(first_s(row) for row in solved)
         cells += [
             f"{statistics.median(first):.3f}",
             f"{first[min(len(first) - 1, int(0.95 * len(first)))]:.3f}",
