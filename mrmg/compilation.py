@@ -2,7 +2,8 @@
 
 numba's cache does not notice edits in other files: a cached caller keeps the old
 callee. The cache folder is therefore named after a digest of all sources that feed
-kernels, and is set before numba is imported anywhere.
+kernels, and is set before numba is imported anywhere. Whatever has the same sources,
+another copy or version of the package, finds the same compiled kernels.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -28,12 +30,19 @@ def kernel_sources() -> list[Path]:
     )
 
 
-def cache_folder() -> Path:
-    """Return the folder of compiled kernels that belongs to the present sources."""
+@cache
+def sources_digest() -> str:
+    """Return a fingerprint of the sources, wherever they lie and whenever written."""
     state = hashlib.sha256()
     for path in kernel_sources():
+        state.update(str(path.relative_to(_PACKAGE)).encode())
         state.update(path.read_bytes())
-    return storage.user_cache_folder() / "kernels" / state.hexdigest()[:16]
+    return state.hexdigest()[:16]
+
+
+def cache_folder() -> Path:
+    """Return the folder of compiled kernels that belongs to the present sources."""
+    return storage.user_cache_folder() / "kernels" / sources_digest()
 
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))
@@ -42,8 +51,41 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))
 os.environ.setdefault("NUMBA_OPT", "2")
 os.environ.setdefault("NUMBA_LOOP_VECTORIZE", "0")
 os.environ.setdefault("NUMBA_SLP_VECTORIZE", "0")
+# After the package's own kernels come numba's ways for users' functions.
+os.environ.setdefault(
+    "NUMBA_CACHE_LOCATOR_CLASSES",
+    f"{__name__}.KernelLocator,UserProvidedCacheLocator,InTreeCacheLocator,"
+    "UserWideCacheLocator,IPythonCacheLocator",
+)
 
 import numba  # noqa: E402  (must follow the cache setting)
+from numba.core import caching  # noqa: E402
+
+numba.core.config.reload_config()  # in case somebody imported numba before
+
+
+class KernelLocator(caching.UserProvidedCacheLocator):  # type: ignore[misc]
+    """Finds compiled kernels by their place in the package and its sources' digest.
+
+    numba goes by a file's full path and its date, which differ from copy to copy.
+    """
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> Any:
+        """Return a locator for a function of this package, None for any other."""
+        if not Path(py_file).resolve().is_relative_to(_PACKAGE):
+            return None
+        return super().from_function(py_func, py_file)
+
+    @classmethod
+    def get_suitable_cache_subpath(cls, py_file: str) -> str:
+        """Return the folder of a file's kernels below the cache folder."""
+        place = Path(py_file).resolve().relative_to(_PACKAGE)
+        return ".".join(place.with_suffix("").parts)
+
+    def get_source_stamp(self) -> str:
+        """Return what must not have changed for compiled kernels to be good."""
+        return sources_digest()
 
 
 def kernel(function: F) -> F:
