@@ -1,8 +1,15 @@
-"""The arguments for missions that go wrong: faults, and planning anew."""
+"""The arguments that say how a plan is driven: by whom, and what if it goes wrong."""
 
 from __future__ import annotations
 
 import argparse
+
+
+def add_controller(verb: argparse.ArgumentParser, *, default: str) -> None:
+    """Add the argument that names the tracking controller; `default` is told only."""
+    verb.add_argument(
+        "--controller", metavar="NAME", help=f"tracking controller; default {default}"
+    )
 
 
 def add_faults(verb: argparse.ArgumentParser) -> None:

@@ -121,9 +121,7 @@ def _add_steps(verbs: _Verbs) -> None:  # type: ignore[type-arg]
         verb = verbs.add_parser(name, help=what)
         verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
         if name == "execute":
-            verb.add_argument(
-                "--controller", metavar="NAME", help="tracking controller; default mpc"
-            )
+            control_arguments.add_controller(verb, default="mpc")
             robustness_commands.add_disturbance(verb)
             control_arguments.add_faults(verb)
             control_arguments.add_replanning(verb)

@@ -69,9 +69,7 @@ def add_robustness(verbs: Any) -> None:
         metavar="N",
         help="--disturb-seed of the first trial, the next have N+1, ...; default 0",
     )
-    verb.add_argument(
-        "--controller", metavar="NAME", help="tracking controller; default the run's"
-    )
+    control_arguments.add_controller(verb, default="the run's")
     control_arguments.add_replanning(verb)
     verb.add_argument(
         "--json", action="store_true", help="print the study of robustness.json alone"
@@ -141,9 +139,7 @@ def _lines(study: Study, run: Path) -> Iterator[str]:
     ):
         if name in figures["margins"]:
             margin = figures["margins"][name]
-            numbers = (
-                margin[key] * factor for key in ("worst", "p05", "median", "p95")
-            )
+            numbers = (margin[key] * factor for key in _COLUMNS)
             yield f"  {label:<10}" + "".join(f"{number:9.3g}" for number in numbers)
     words = ["mrmg", "execute", str(run), *study.replay_options(study.worst)]
     yield f"  worst case {shlex.join(words)}"

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 
 from mrmg.execution.chassis import part_ids
+from mrmg.execution.driven_wheels import DrivenWheels
 from mrmg.execution.recording import held_force_work_J
 from mrmg.scene.types import Robot
 
@@ -31,13 +32,10 @@ class AckermannChassis:
         models = [robot.model for robot in robots]
         self._wheelbase_m = np.array([item.wheelbase_m for item in models])
         self._half_track_m = np.array([item.track_m for item in models]) / 2
-        self._radius_m = np.array([item.wheel_radius_m for item in models])
+        self._wheels = DrivenWheels(model, data, robots, ("spin_rl", "spin_rr"))
         joint, actuator = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_ACTUATOR
         steer = part_ids(model, joint, robots, ("steer_fl", "steer_fr"))
-        spin = part_ids(model, joint, robots, ("spin_rl", "spin_rr"))
         self._steer_q = model.jnt_qposadr[steer]
-        self._spin_q = model.jnt_qposadr[spin]
-        self._spin_v = model.jnt_dofadr[spin]
         self._steer_ctrl = part_ids(model, actuator, robots, ("steer_l", "steer_r"))
         self._drive_ctrl = part_ids(model, actuator, robots, ("drive",))[:, 0]
         # A servo with stiffness kp and damping kv follows a ramp kv / kp late.
@@ -53,7 +51,7 @@ class AckermannChassis:
 
     def axle_speed_m_s(self) -> np.ndarray:
         """Return the speed the rear axle rolls at, shape (K,)."""
-        return self._mean_over_axle(self._data.qvel[self._spin_v])
+        return self._mean_over_axle(self._wheels.rate_rad_s())
 
     def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
         """Set the dry friction of the rear axle, shape (K,); its differential is free.
@@ -62,8 +60,8 @@ class AckermannChassis:
             resistance_N: against the way of its middle.
             swing_N: zero.
         """
-        torque = 0.5 * self._radius_m * resistance_N
-        self._model.dof_frictionloss[self._spin_v] = torque[:, None]
+        torque = 0.5 * self._wheels.radius_m * resistance_N
+        self._model.dof_frictionloss[self._wheels.dof] = torque[:, None]
 
     def command(
         self, force_N: np.ndarray, w_from: np.ndarray, w_to: np.ndarray, steps: int
@@ -93,11 +91,12 @@ class AckermannChassis:
 
     def _axle_way_m(self) -> np.ndarray:
         """Return the way the rear axle has rolled, forward less back, shape (K,)."""
-        return self._mean_over_axle(self._data.qpos[self._spin_q])
+        return self._mean_over_axle(self._wheels.angle_rad())
 
     def _mean_over_axle(self, wheels: np.ndarray) -> np.ndarray:
         """Return the axle's motion from that of its wheels, shape (K, 2) -> (K,)."""
-        return np.asarray(0.5 * self._radius_m * (wheels[:, 0] + wheels[:, 1]))
+        radius_m = self._wheels.radius_m
+        return np.asarray(0.5 * radius_m * (wheels[:, 0] + wheels[:, 1]))
 
     def _wheel_angles(self, steer: np.ndarray) -> np.ndarray:
         """Return left and right Ackermann angles, shape (n, K) -> (n, K, 2)."""

@@ -16,6 +16,7 @@ import numpy as np
 
 from mrmg.execution.chassis import part_ids
 from mrmg.execution.drive import DriveParams, axle_grip_N
+from mrmg.execution.driven_wheels import DrivenWheels
 from mrmg.execution.recording import held_force_work_J
 from mrmg.execution.speed_loop import SpeedLoop
 from mrmg.scene.types import Robot
@@ -35,10 +36,8 @@ class DifferentialChassis:
         self._model, self._data = model, data
         models = [robot.model for robot in robots]
         self._track_m = np.array([item.track_m for item in models])
-        self._radius_m = np.array([item.wheel_radius_m for item in models])
+        self._wheels = DrivenWheels(model, data, robots, ("spin_l", "spin_r"))
         joint, actuator = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_ACTUATOR
-        spin = part_ids(model, joint, robots, ("spin_l", "spin_r"))
-        self._spin_q, self._spin_v = model.jnt_qposadr[spin], model.jnt_dofadr[spin]
         root = part_ids(model, joint, robots, ("root",))[:, 0]
         self._yaw_v = model.jnt_dofadr[root] + 5
         self._drive_ctrl = part_ids(model, actuator, robots, ("drive_l", "drive_r"))
@@ -50,7 +49,7 @@ class DifferentialChassis:
         params = DriveParams()
         grip_N = params.grip_share * np.array([axle_grip_N(item) for item in models])
         spin = np.array([item.wheel_inertia_kg_m2 for item in models])
-        wheels_kg_m2 = 0.5 * spin * (self._track_m / self._radius_m) ** 2
+        wheels_kg_m2 = 0.5 * spin * (self._track_m / self._wheels.radius_m) ** 2
         yaw_kg_m2, self._lead_kg_m = self._inertia_about_axle(robots)
         self._loop = SpeedLoop(
             inertia=yaw_kg_m2 + wheels_kg_m2,
@@ -109,11 +108,11 @@ class DifferentialChassis:
 
     def _wheel_speed_m_s(self) -> np.ndarray:
         """Return the speed each wheel rolls at, left and right, shape (K, 2)."""
-        return np.asarray(self._data.qvel[self._spin_v] * self._radius_m[:, None])
+        return np.asarray(self._wheels.rate_rad_s() * self._wheels.radius_m[:, None])
 
     def _wheel_way_m(self) -> np.ndarray:
         """Return the way each wheel has rolled, left and right, shape (K, 2)."""
-        return np.asarray(self._data.qpos[self._spin_q] * self._radius_m[:, None])
+        return np.asarray(self._wheels.angle_rad() * self._wheels.radius_m[:, None])
 
     def _inertia_about_axle(
         self, robots: Sequence[Robot]

@@ -214,7 +214,7 @@ class MissionControl:
         )
         for name, meter in self._meters.items():
             meter.follow(outcome.plan.tours.get(name, ()))
-        self._energy.follow(self.course, step, self._meters)
+        self._energy.follow(self.course, step, self._meters, outcome.scene)
         self._tracking.reset(now.time_s)
         for reason in dict.fromkeys(outcome.given_up.values()):
             self._tell(now, "rest", "", "give_up", reason)

@@ -11,10 +11,11 @@ from mrmg.execution.supervision import Observation
 from mrmg.mission_control.course import Course
 from mrmg.mission_control.meter import RobotMeter
 from mrmg.mission_control.parameters import ControlParams
+from mrmg.scene.types import Scene
 
 _STANDING_RATE = 0.1
-_NOTICED_SHARE = 0.03
-"""Excess of energy that is more than what planned and measured always differ by."""
+_CHANCE_M = 1.0
+"""Way over plain ground; by its energy planned and measured may differ by chance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,18 +63,40 @@ class TrackingCorridor:
 
 
 class EnergyCorridor:
-    """Tells when a robot takes more energy than the plan in force allows for."""
+    """Tells when a robot takes more energy than the plan in force allows for.
+
+    Measured over planned energy since the plan began, less what may be chance, is how
+    much more than planned the rest is expected to take, too.
+    """
 
     def __init__(self, course: Course, params: ControlParams) -> None:
         """Reckon from the beginning of a course."""
         self._params = params
-        self.follow(course, 0, {})
+        self.follow(course, 0, {}, course.scene)
 
     def follow(
-        self, course: Course, step: int, meters: Mapping[str, RobotMeter]
+        self,
+        course: Course,
+        step: int,
+        meters: Mapping[str, RobotMeter],
+        planned_for: Scene,
     ) -> None:
-        """Reckon from a step of a course on."""
+        """Reckon from a step of a course on.
+
+        Args:
+            course: whose plan is in force.
+            step: of the course, at which that plan begins.
+            meters: of all robots at that step.
+            planned_for: the scene whose reserves that plan keeps.
+        """
         self._course, self._step = course, step
+        self._reserve_J = {
+            robot.id: min(
+                robot.battery.reserve_J,
+                course.scene.robot(robot.id).battery.reserve_J,
+            )
+            for robot in planned_for.robots
+        }
         self._used_J = {name: meter.used_J for name, meter in meters.items()}
         self._planned_J = {
             robot: np.concatenate([[0.0], np.cumsum(parts_J.sum(axis=1))])
@@ -96,20 +119,22 @@ class EnergyCorridor:
         params, capacity_J = self._params, meter.robot.battery.capacity_J
         planned_J = self._planned(robot, self._step * self._dt_s, clock_s)
         measured_J = meter.used_J - self._used_J.get(robot, 0.0)
-        floor_J = params.energy_floor * capacity_J
-        excess_J = measured_J - planned_J - floor_J
-        if excess_J > params.energy_share * planned_J:
+        excess_J = measured_J - planned_J
+        tolerated_J = params.energy_share * planned_J + params.energy_floor * capacity_J
+        if excess_J > tolerated_J:
             return Departure(
                 "energy",
                 robot,
                 f"{robot} has used {measured_J:.0f} J since its plan began, "
                 f"planned were {planned_J:.0f} J",
             )
-        if excess_J <= 0.0 or measured_J < (1.0 + _NOTICED_SHARE) * planned_J:
+        chance_J = _CHANCE_M * meter.robot.model.energy_model.plain_ground_J_per_m()
+        if excess_J <= chance_J or planned_J <= 0.0 or robot not in self._reserve_J:
             return None
+        more = 1.0 + (excess_J - chance_J) / planned_J
         target, arrival_s = self._next_recharge(robot, clock_s)
-        to_go_J = self._planned(robot, clock_s, arrival_s) * measured_J / planned_J
-        reserve_J = meter.robot.battery.reserve_J
+        to_go_J = more * self._planned(robot, clock_s, arrival_s)
+        reserve_J = self._reserve_J[robot]
         if meter.charge_J - to_go_J < reserve_J:
             return Departure(
                 "energy",

@@ -25,7 +25,7 @@ from mrmg.scene.types import Robot, Scene
 _ROLLING = PARTS.index("rolling")
 _CONSUMERS = [PARTS.index("idle"), PARTS.index("device")]
 _DRIVE = MEASURED_PARTS.index("drive")
-_PRIOR_M = 1.0
+_PRIOR_M = 0.3
 _SPAN_S = 1.0
 
 

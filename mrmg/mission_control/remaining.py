@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from mrmg.scene.loading import scene_from_document
-from mrmg.scene.types import Finish, Robot, Scene
+from mrmg.scene.types import Battery, Finish, Robot, Scene
 
 _LEAST_J = 1e-9
 """A start energy in a scene must be positive."""
@@ -50,8 +50,8 @@ def remaining_scene(
     Args:
         scene: the mission as it began.
         condition: of the fleet, at rest.
-        reserve_share: share of the batteries' reserves that is still kept; a battery
-            that is down to that has none left to keep.
+        reserve_share: share of the batteries' reserves that is still kept, or more of
+            them; a battery that is down to its reserve has none left to keep.
 
     Raises:
         SceneError: if robots touch each other or an obstacle.
@@ -114,9 +114,7 @@ def _continued(
     energy_J = min(max(condition.energy_J[robot.id], _LEAST_J), battery.capacity_J)
     # A scene's own factor is in the robot's model already.
     factor = entry.get("rolling_factor", 1.0) * condition.rolling_factor[robot.id]
-    reserve = battery.reserve_fraction * reserve_share
-    if energy_J < (reserve + _ROOM_SHARE) * battery.capacity_J:
-        reserve = 0.0
+    reserve = _reserve_left(battery, energy_J / battery.capacity_J, reserve_share)
     return {
         **entry,
         "pose": [float(value) for value in condition.pose[robot.id]],
@@ -128,6 +126,14 @@ def _continued(
         "rolling_factor": float(factor),
         **_home(entry, robot),
     }
+
+
+def _reserve_left(battery: Battery, charge: float, share: float) -> float:
+    """Return the reserve that a battery charged to a share of its capacity can keep."""
+    spare = charge - _ROOM_SHARE
+    if spare < min(share, 1.0) * battery.reserve_fraction:
+        return 0.0
+    return min(share * battery.reserve_fraction, spare)
 
 
 def _home(entry: dict[str, Any], robot: Robot) -> dict[str, Any]:

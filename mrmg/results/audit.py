@@ -8,9 +8,9 @@ the simulated motion, *measured* the work done at the simulated wheels,
 Planned to metered shows what tracking changed, metered to measured what the energy
 model misses of the physics.
 
-A battery may never fall below its reserve. Under disturbances it may: the reserve is
-there for them. A disturbed mission fails only where a battery runs empty, the battery
-taken as the disturbance has it, and by what was measured.
+No battery may fall below its reserve, by what was measured: the rule the verifier holds
+plans to, whether or not the robots are as modelled. Under disturbances a battery is as
+the disturbance has it.
 """
 
 from __future__ import annotations
@@ -97,9 +97,8 @@ def audit(scene: Scene, plan: Plan, log: ExecutionLog) -> EnergyAudit:
         "ended": _given_up(log, missed=len(goals_visited) < len(scene.goals)),
         "goal missed": _goals_missed(scene, goals_visited),
         "contact": _contacts(log),
-        "battery empty" if log.disturbance else "below reserve": _run_down(
-            scene, log, measured
-        ),
+        "below reserve": _below_reserve(scene, measured),
+        "battery empty": _ran_empty(measured),
     }
     reasons = tuple(reason for found in failures.values() for reason in found)
     return EnergyAudit(
@@ -257,17 +256,21 @@ def _contacts(log: ExecutionLog) -> list[str]:
     ]
 
 
-def _run_down(scene: Scene, log: ExecutionLog, measured: list[_Measured]) -> list[str]:
-    disturbed = log.disturbance is not None
+def _below_reserve(scene: Scene, measured: list[_Measured]) -> list[str]:
     reasons = []
     for item in measured:
         reserve_J = scene.robot(item.motion.robot).battery.reserve_J
-        name = item.motion.robot
-        if disturbed and item.least_J < 0.0:
-            reasons.append(f"{name}'s battery ran empty, {-item.least_J:.0f} J short")
-        elif not disturbed and item.least_J < reserve_J:
+        if 0.0 <= item.least_J < reserve_J:
             reasons.append(
-                f"{name}'s battery fell to {item.least_J:.0f} J, "
+                f"{item.motion.robot}'s battery fell to {item.least_J:.0f} J, "
                 f"below its reserve of {reserve_J:.0f} J"
             )
     return reasons
+
+
+def _ran_empty(measured: list[_Measured]) -> list[str]:
+    return [
+        f"{item.motion.robot}'s battery ran empty, {-item.least_J:.0f} J short"
+        for item in measured
+        if item.least_J < 0.0
+    ]

@@ -65,12 +65,12 @@ class EnergyAudit:
     """The account of a simulated mission.
 
     Attributes:
-        mission_ok: all goals visited, no contact, no battery below its reserve (under
-            disturbances: none empty), and the simulation ran to the end.
+        mission_ok: all goals visited, no contact, no battery below its reserve,
+            and the simulation ran to the end.
         reasons: why not, one sentence each.
         causes: the kinds of these reasons: why the simulation was given up
             (`ExecutionLog.gave_up`), "ended" by mission control, "goal missed",
-            "contact", "below reserve" or, under disturbances, "battery empty".
+            "contact", "below reserve", "battery empty".
         robots: one account per robot, in the scene's order.
         visits: of tours' targets in the simulation, in order of time.
         goals_visited: ids of the goals some robot entered, in the scene's order.

@@ -25,9 +25,9 @@ def robustness(record: RunRecord) -> list[str]:
         html.note(
             "Each trial drives the plan with robots that differ from their models "
             "in another way, and is feasible when all goals are visited without "
-            "contact and no battery runs empty: the reserve may be used. Charges "
-            "and distances are the least of a trial, over all robots. The worst "
-            "case of each row, repeated:"
+            "contact and no battery falls below its reserve. Charges and distances are "
+            "the least of a trial, over all robots. The worst case of each row, "
+            "repeated:"
         ),
         html.code("\n".join(commands)),
     ]

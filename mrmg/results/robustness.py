@@ -1,8 +1,8 @@
 """What many disturbed executions of one plan say about it.
 
 A trial is feasible when its audit says so: all goals visited, no contact, no battery
-empty, driven to the end. Out of n trials of which k were feasible, the probability of a
-feasible mission is k / n, with the interval of Wilson (1927),
+below its reserve, driven to the end. Out of n trials of which k were feasible, the
+probability of a feasible mission is k / n, with the interval of Wilson (1927),
 
     (p + z^2/2n -+ z sqrt(p (1 - p)/n + z^2/4n^2)) / (1 + z^2/n),    p = k/n,
 

@@ -89,7 +89,7 @@ def test_each_new_plan_is_one_the_verifier_accepts(
     assert [robot.id for robot in replan.scene.robots] == ["r2"]
     assert verify(replan.scene, replan.plan).ok
     assert replan.given_up == {}
-    assert replan.reserve_share == 1.0
+    assert replan.reserve_share >= 1.0
 
 
 def test_the_plan_in_force_is_one_continuous_motion(
@@ -220,7 +220,7 @@ def test_what_cannot_be_reached_any_more_is_given_up(
     assert account.reasons[1] == "goal far was entered by no robot"
     actions = [event.action for event in drive.log.events]
     assert actions == ["stop", "give_up", "replan"]
-    assert drive.replans[-1].reserve_share == 1.0
+    assert drive.replans[-1].reserve_share >= 1.0
 
 
 @pytest.mark.slow

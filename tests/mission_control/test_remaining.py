@@ -128,6 +128,17 @@ def test_reserves_can_be_lowered(yard: Scene, condition: FleetCondition) -> None
         assert after.battery.reserve_J == pytest.approx(0.5 * before.battery.reserve_J)
 
 
+def test_more_than_the_reserve_is_asked_for_where_it_is_there(
+    yard: Scene, condition: FleetCondition
+) -> None:
+    capacity_J = yard.robot("r1").battery.capacity_J
+    # Room to do something is 2 % of the capacity, the reserve 5 %.
+    low = replace(condition, energy_J={"r1": 0.08 * capacity_J, "r2": capacity_J})
+    rest = remaining_scene(yard, low, reserve_share=1.25)
+    fractions = [robot.battery.reserve_fraction for robot in rest.robots]
+    assert fractions == pytest.approx([0.06, 0.0625])
+
+
 def test_the_rest_can_be_saved_and_loaded(
     yard: Scene, condition: FleetCondition
 ) -> None:

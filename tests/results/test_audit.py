@@ -198,12 +198,21 @@ def test_contact_fails_the_mission(mission: Any) -> None:
 def test_battery_below_reserve_fails_the_mission(mission: Any) -> None:
     made = mission()
     work_J = made[2].work_J.copy()
-    work_J[0, 10, 0] += 0.85 * 19500.0
+    work_J[0, 10, 0] += 0.85 * 19000.0
     account = failed(made, work_J=work_J)
     (reason,) = account.reasons
     assert "r1's battery fell to" in reason
     assert "reserve of 1000 J" in reason
     assert account.robot("r1").min_charge_fraction < 0.05
+
+
+def test_an_empty_battery_fails_the_mission_and_is_told_as_such(mission: Any) -> None:
+    made = mission()
+    work_J = made[2].work_J.copy()
+    work_J[0, 10, 0] += 0.85 * 21000.0
+    account = failed(made, work_J=work_J)
+    assert account.causes == ("battery empty",)
+    assert "r1's battery ran empty" in account.reasons[0]
 
 
 def test_early_end_fails_the_mission(mission: Any) -> None:

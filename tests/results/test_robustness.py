@@ -89,7 +89,7 @@ def test_a_trial_that_went_well(driven: tuple[Scene, Plan, ExecutionLog]) -> Non
     assert trial.charge_fraction == pytest.approx(trial.charge_J / 20000.0)
 
 
-def test_the_reserve_may_be_used_but_no_more(
+def test_the_reserve_is_kept_under_disturbances_too(
     driven: tuple[Scene, Plan, ExecutionLog],
 ) -> None:
     scene, plan, log = driven
@@ -100,8 +100,14 @@ def test_the_reserve_may_be_used_but_no_more(
         disturbance = Disturbance(seed=4, robots=(weak,))
         return assess_trial(scene, plan, replace(log, disturbance=disturbance))
 
-    assert with_capacity(spent * 1.01).feasible
-    assert 0.0 < with_capacity(spent * 1.01).charge_fraction < 0.05
+    # The reserve is 1000 J, whatever the battery really holds.
+    kept = with_capacity(spent * 1.01 + 0.05)
+    assert kept.feasible
+    assert kept.charge_J > 1000.0
+    used = with_capacity(spent * 1.01)
+    assert (used.feasible, used.causes) == (False, ("below reserve",))
+    assert 0.0 < used.charge_J < 1000.0
+    assert "reserve of 1000 J" in used.reasons[0]
     flat = with_capacity(spent * 0.99)
     assert (flat.feasible, flat.causes) == (False, ("battery empty",))
     assert "ran empty" in flat.reasons[0]
