@@ -21,6 +21,7 @@ from mrmg.ledger import EnergyLedger, LedgerEntry
 from mrmg.mission import Visit
 from mrmg.motion.dynamics import TURN_SPEEDS
 from mrmg.scene.types import Robot, Scene, Station
+from mrmg.visiting import battery_contents, first_stay, recharging
 from mrmg.world.relief import height_at, load_points
 from mrmg.world.terrain import multiplier_at
 
@@ -136,11 +137,11 @@ def measured_energy_parts(
 
 
 def find_visits(scene: Scene, motion: Motion, tour: Sequence[str]) -> tuple[Visit, ...]:
-    """Return when `motion` enters the targets of `tour`, in the tour's order.
+    """Return when `motion` visits the targets of `tour`, in the tour's order.
 
-    A visit is the first state, not before the previous visit's, whose reference point
-    lies in the target's region; one state may serve several targets in turn. A target
-    that is not entered any more is left out.
+    A visit is the first stay at the target that is long enough and does not begin
+    before the previous visit is over (`visiting`); one state may serve several targets
+    without dwell time in turn. A target that is not visited any more is left out.
 
     Args:
         scene: names the targets.
@@ -155,17 +156,17 @@ def find_visits(scene: Scene, motion: Motion, tour: Sequence[str]) -> tuple[Visi
     step = 0
     for name in tour:
         target = targets[name]
-        inside = target.region.depth(motion.state[step:, :2]) >= 0.0
-        if not inside.any():
+        stay = first_stay(target, motion.time_s, motion.state[:, :2], step)
+        if stay is None:
             continue
-        step += int(inside.argmax())
+        step = stay.over
         visits.append(
             Visit(
                 robot=motion.robot,
                 target=name,
                 kind="station" if isinstance(target, Station) else "goal",
-                step=step,
-                time_s=float(motion.time_s[step]),
+                step=stay.first,
+                time_s=float(motion.time_s[stay.first]),
                 energy_J=0.0,
             )
         )
@@ -181,8 +182,9 @@ def battery_profile(
 ) -> np.ndarray:
     """Return the battery content at each state [J], shape (n + 1,).
 
-    At a station visit's step it is the content after the recharge; `Visit.energy_J`
-    keeps that on arrival. Energy fed back beyond a full battery is lost.
+    Where a station fills the battery at once it is the content after that;
+    `Visit.energy_J` keeps that on arrival. Energy fed back beyond a full battery is
+    lost.
 
     Args:
         scene: gives the battery and the terrain.
@@ -196,17 +198,17 @@ def _battery(
     scene: Scene, motion: Motion, visits: Sequence[Visit]
 ) -> tuple[np.ndarray, list[float]]:
     draw_J = step_energy_parts(scene, motion).sum(axis=1)
-    return battery_content(scene, motion.robot, draw_J, visits)
+    return battery_content(scene, motion, draw_J, visits)
 
 
 def battery_content(
-    scene: Scene, robot: str, draw_J: np.ndarray, visits: Sequence[Visit]
+    scene: Scene, motion: Motion, draw_J: np.ndarray, visits: Sequence[Visit]
 ) -> tuple[np.ndarray, list[float]]:
     """Return the battery content under any meter's draws, and that on each arrival.
 
     Args:
-        scene: gives the battery.
-        robot: id of the robot.
+        scene: gives the battery and the stations.
+        motion: planned or logged states of one robot, shape (n + 1, 5).
         draw_J: energy drawn over each interval, shape (n,).
         visits: of this robot, in order of steps.
 
@@ -214,17 +216,11 @@ def battery_content(
         Content at each state [J], shape (n + 1,), and content on arrival at each of the
         visits [J].
     """
-    battery = scene.robot(robot).battery
-    recharges = {visit.step for visit in visits if visit.kind == "station"}
-    arrivals = [battery.start_J]
-    contents = []
-    for step in range(len(draw_J) + 1):
-        recharged = step in recharges
-        contents.append(battery.capacity_J if recharged else arrivals[step])
-        if step < len(draw_J):
-            rest_J = contents[step] - float(draw_J[step])
-            arrivals.append(min(rest_J, battery.capacity_J))
-    return np.array(contents), [arrivals[visit.step] for visit in visits]
+    battery = scene.robot(motion.robot).battery
+    points = motion.state[:, :2]
+    given = recharging(scene, motion.robot, motion.time_s, points, visits)
+    before, after = battery_contents(battery, draw_J, given)
+    return after, [float(before[visit.step]) for visit in visits]
 
 
 def own_visits(motion: Motion, visits: Iterable[Visit]) -> list[Visit]:

@@ -29,7 +29,8 @@ from mrmg.mission_control.meter import RobotMeter
 from mrmg.mission_control.parameters import ControlParams
 from mrmg.mission_control.remaining import FleetCondition, is_over, remaining_scene
 from mrmg.mission_control.replanning import Replan, Replanner
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Goal, Scene
+from mrmg.visiting import first_stay
 
 _VISITED_DEPTH_M = 0.05
 """How deep in a goal a robot must have been seen, as places are seen with noise."""
@@ -245,7 +246,6 @@ class MissionControl:
             true = off_m > self._params.tracked_m or gone
             x, y, yaw = (now.state[index] if true else item.state[-1])[:3]
             poses[item.robot] = (float(x), float(y), float(yaw))
-        points = np.concatenate(self._seen.state)[:, :2]
         return FleetCondition(
             pose=poses,
             energy_J={name: meter.charge_J for name, meter in self._meters.items()},
@@ -254,10 +254,17 @@ class MissionControl:
             },
             out_of_service=frozenset(self._out_of_service),
             visited=frozenset(
-                goal.id
-                for goal in self._scene.goals
-                if (goal.region.depth(points) >= _VISITED_DEPTH_M).any()
+                goal.id for goal in self._scene.goals if self._is_visited(goal)
             ),
+        )
+
+    def _is_visited(self, goal: Goal) -> bool:
+        """Tell whether some robot has been deep inside a goal, for long enough."""
+        time_s, ways = np.array(self._seen.time_s), np.stack(self._seen.state, axis=1)
+        return any(
+            (goal.region.depth(way[:, :2]) >= _VISITED_DEPTH_M).any()
+            and first_stay(goal, time_s, way[:, :2], 0) is not None
+            for way in ways
         )
 
     def _entered(self) -> dict[str, tuple[str, ...]]:

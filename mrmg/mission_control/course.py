@@ -19,6 +19,7 @@ from mrmg.ledger import EnergyLedger, LedgerEntry
 from mrmg.mission import Plan, Visit
 from mrmg.mission_control.stopping import Departing
 from mrmg.scene.types import Scene
+from mrmg.visiting import battery_contents, recharging
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -148,21 +149,13 @@ class Course:
             robot: id of the robot.
             visits: of this robot.
         """
-        capacity_J = self.scene.robot(robot).battery.capacity_J
-        stations = {visit.step for visit in visits if visit.kind == "station"}
+        battery = self.scene.robot(robot).battery
+        motion = self.plan.trajectory(robot)
+        points = motion.state[:, :2]
+        given = recharging(self.scene, robot, motion.time_s, points, visits)
         anew = {step: charge_J[robot] for step, charge_J in self.charge_J}
         draw_J = self.parts_J[robot].sum(axis=1)
-        before, after = np.zeros(self.steps + 1), np.zeros(self.steps + 1)
-        content_J = 0.0
-        for step in range(self.steps + 1):
-            content_J = anew.get(step, content_J)
-            before[step] = content_J
-            if step in stations:
-                content_J = capacity_J
-            after[step] = content_J
-            if step < self.steps:
-                content_J = min(content_J - float(draw_J[step]), capacity_J)
-        return before, after
+        return battery_contents(battery, draw_J, given, anew)
 
     def _continued(
         self,

@@ -20,6 +20,7 @@ from mrmg.accounting import (
     step_energy_parts,
 )
 from mrmg.energy import PARTS
+from mrmg.mission_control.gauge import BatteryGauge
 from mrmg.scene.types import Robot, Scene
 
 _ROLLING = PARTS.index("rolling")
@@ -53,7 +54,6 @@ class RobotMeter:
     Attributes:
         robot: whose energies are measured.
         used_J: drawn from the battery so far.
-        charge_J: battery content now.
         rolling: estimate of the rolling resistance.
     """
 
@@ -61,17 +61,19 @@ class RobotMeter:
         """Start with the robot's start energy."""
         self.robot = robot
         self.used_J = 0.0
-        self.charge_J = robot.battery.start_J
         model = robot.model.energy_model
         self.rolling = RollingEstimate(_PRIOR_M * model.plain_ground_J_per_m())
         self._scene = scene
-        self._tour: list[str] = []
-        self._regions = {target.id: target.region for target in scene.targets()}
-        self._fills = {station.id for station in scene.stations}
+        self._gauge = BatteryGauge(scene, robot)
+
+    @property
+    def charge_J(self) -> float:
+        """Battery content now."""
+        return self._gauge.charge_J
 
     def follow(self, tour: Sequence[str]) -> None:
         """Expect the visits of a tour from now on."""
-        self._tour = list(tour)
+        self._gauge.follow(tour)
 
     def add(self, time_s: np.ndarray, state: np.ndarray, work_J: np.ndarray) -> None:
         """Take in some ticks.
@@ -84,21 +86,8 @@ class RobotMeter:
         parts_J = measured_energy_parts(self.robot, work_J, time_s)
         draw_J = parts_J.sum(axis=1)
         self.used_J += float(draw_J.sum())
-        self._draw(draw_J, state[1:, :2])
+        self._gauge.add(time_s, state[:, :2], draw_J)
         self._estimate(time_s, state, parts_J[:, _DRIVE])
-
-    def _draw(self, draw_J: np.ndarray, points: np.ndarray) -> None:
-        """Take energies from the battery; a station of the tour fills it."""
-        capacity_J = self.robot.battery.capacity_J
-        first = start = 0
-        while self._tour:
-            inside = self._regions[self._tour[0]].depth(points[start:]) >= 0.0
-            if not inside.any():
-                break
-            start += int(inside.argmax())
-            if self._tour.pop(0) in self._fills:
-                self.charge_J, first = capacity_J, start + 1
-        self.charge_J = min(self.charge_J - float(draw_J[first:].sum()), capacity_J)
 
     def _estimate(
         self, time_s: np.ndarray, state: np.ndarray, drive_J: np.ndarray

@@ -34,6 +34,7 @@ from mrmg.ledger import EnergyLedger, LedgerEntry
 from mrmg.mission import Plan, Visit
 from mrmg.results.energy_audit import EnergyAudit, RobotAudit, SimulatedVisit
 from mrmg.scene.types import Robot, Scene
+from mrmg.visiting import first_stay
 
 _TROUBLE = {
     "lost": "a robot was too far from its plan",
@@ -144,9 +145,7 @@ def _measure(scene: Scene, plan: Plan, log: ExecutionLog, index: int) -> _Measur
     motion = LoggedMotion(robot=robot.id, time_s=log.time_s, state=log.state[index])
     visits = find_visits(scene, motion, plan.tours[robot.id])
     energy_J = measured_step_energy(robot, log, index)
-    content_J, arrival_J = battery_content(
-        scene, robot.id, energy_J.sum(axis=1), visits
-    )
+    content_J, arrival_J = battery_content(scene, motion, energy_J.sum(axis=1), visits)
     return _Measured(
         motion=motion,
         visits=visits,
@@ -218,9 +217,13 @@ def _simulated_visits(measured: list[_Measured]) -> tuple[SimulatedVisit, ...]:
 
 
 def _goals_visited(scene: Scene, log: ExecutionLog) -> tuple[str, ...]:
-    points = log.state[:, :, :2].reshape(-1, 2)
     return tuple(
-        goal.id for goal in scene.goals if (goal.region.depth(points) >= 0.0).any()
+        goal.id
+        for goal in scene.goals
+        if any(
+            first_stay(goal, log.time_s, state[:, :2], 0) is not None
+            for state in log.state
+        )
     )
 
 
@@ -242,7 +245,7 @@ def _given_up(log: ExecutionLog, *, missed: bool) -> list[str]:
 
 def _goals_missed(scene: Scene, visited: tuple[str, ...]) -> list[str]:
     return [
-        f"goal {goal.id} was entered by no robot"
+        f"goal {goal.id} was visited by no robot"
         for goal in scene.goals
         if goal.id not in visited
     ]

@@ -12,7 +12,8 @@ from mrmg.ledger import EnergyLedger
 from mrmg.mission import Plan, Trajectory, Visit
 from mrmg.results.motion_rules import violation_at, worst_of_runs
 from mrmg.results.verdict import Violation, ViolationKind
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Goal, Scene
+from mrmg.visiting import ROUNDING_S, longest_stay_s
 
 ENERGY_TOLERANCE_J = 1e-6
 """Rounding that is forgiven in energies: a billionth of a metre's drive."""
@@ -54,7 +55,28 @@ def _check_goals(scene: Scene, plan: Plan) -> list[Violation]:
                     other=goal.id,
                 )
             )
+        elif goal.dwell_s > 0.0:
+            violations += _check_dwell(plan, goal)
     return violations
+
+
+def _check_dwell(plan: Plan, goal: Goal) -> list[Violation]:
+    """Check that some robot stays at a goal for its dwell time."""
+    stays_s = [
+        (longest_stay_s(goal, item.time_s, item.state[:, :2]), item)
+        for item in plan.trajectories
+    ]
+    stay_s, trajectory = max(stays_s, key=lambda pair: pair[0])
+    if stay_s >= goal.dwell_s - ROUNDING_S:
+        return []
+    step = int(goal.region.depth(trajectory.state[:, :2]).argmax())
+    message = (
+        f"stays at goal {goal.id} for {stay_s:.3g} s without a break, "
+        f"longer than others; it takes {goal.dwell_s:g} s"
+    )
+    amount = goal.dwell_s - stay_s
+    kind = ViolationKind.DWELL
+    return [violation_at(trajectory, step, kind, message, amount=amount, other=goal.id)]
 
 
 def _check_tour(

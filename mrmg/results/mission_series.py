@@ -17,6 +17,7 @@ from mrmg.mission import Plan, Visit
 from mrmg.results.audit import measured_step_energy
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Robot, Scene
+from mrmg.visiting import runs
 from mrmg.world.terrain import multiplier_at
 
 DRIVING, WAITING, CHARGING, FINISHED = "driving", "waiting", "charging", "finished"
@@ -74,7 +75,7 @@ def activities(
     """
     kinds = np.full(len(motion.time_s), DRIVING, dtype=object)
     standing = np.abs(motion.state[:, 3]) < _STANDING_M_S
-    for start, end in _runs(standing):
+    for start, end in runs(standing):
         if end == len(standing):
             kinds[start:] = FINISHED
         elif motion.time_s[end] - motion.time_s[start] >= _SHORTEST_WAIT_S:
@@ -99,12 +100,6 @@ def activities(
         for start, end in zip(edges, edges[1:], strict=False)
         if end > start
     )
-
-
-def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
-    """Return (start, end) of each run of true flags, the end excluded."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
-    return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
 
 
 def tracking_error(log: ExecutionLog) -> np.ndarray:

@@ -73,7 +73,7 @@ def measured_curves(
         visits = series.shown_visits(scene, plan, motion)
         draw_J = measured_step_energy(scene.robot(motion.robot), log, index)
         content_J, arrival_J = battery_content(
-            scene, motion.robot, draw_J.sum(axis=1), visits
+            scene, motion, draw_J.sum(axis=1), visits
         )
         curves.append(
             BatteryCurve(

@@ -29,6 +29,7 @@ class ViolationKind(Enum):
     BOUNDS = "bounds"
     ROBOT = "robot"
     GOAL_MISSED = "goal_missed"
+    DWELL = "dwell"
     TOUR = "tour"
     VISIT = "visit"
     RECHARGE = "recharge"
@@ -51,6 +52,7 @@ class ViolationKind(Enum):
             ViolationKind.BOUNDS: "m",
             ViolationKind.ROBOT: "m^2",
             ViolationKind.GOAL_MISSED: "m",
+            ViolationKind.DWELL: "s",
             ViolationKind.TOUR: "m",
             ViolationKind.VISIT: "s",
             ViolationKind.RECHARGE: "m",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -86,18 +87,34 @@ class Region:
 
 @dataclass(frozen=True, kw_only=True)
 class Goal:
-    """A region that some robot's reference point must enter once."""
+    """A region that some robot's reference point must enter once.
+
+    Attributes:
+        id: unique name.
+        region: where it is.
+        dwell_s: how long the robot must stay there without a break.
+    """
 
     id: str
     region: Region
+    dwell_s: float = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class Station:
-    """A region in which a robot's battery is reset to full on entering."""
+    """A region in which a robot's battery is filled.
+
+    Attributes:
+        id: unique name.
+        region: where it is.
+        dwell_s: how long a robot must stay there without a break for a visit.
+        capacity: how many robots may be there at a time; None for any number.
+    """
 
     id: str
     region: Region
+    dwell_s: float = 0.0
+    capacity: int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -108,16 +125,23 @@ class Battery:
         capacity_J: energy when full.
         start_J: energy at the start of the mission.
         reserve_fraction: share of the capacity that must always remain.
+        charging_power_W: with which stations fill it; inf for at once.
     """
 
     capacity_J: float
     start_J: float
     reserve_fraction: float
+    charging_power_W: float = math.inf
 
     @property
     def reserve_J(self) -> float:
         """Energy that must always remain."""
         return self.capacity_J * self.reserve_fraction
+
+    @property
+    def takes_time_to_fill(self) -> bool:
+        """Whether robots must stay at stations to recharge."""
+        return math.isfinite(self.charging_power_W)
 
 
 @dataclass(frozen=True, kw_only=True)

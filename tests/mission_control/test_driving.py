@@ -217,7 +217,7 @@ def test_what_cannot_be_reached_any_more_is_given_up(
     assert len(account.reasons) == 2
     assert "given up" in account.reasons[0]
     assert "goal far is unreachable" in account.reasons[0]
-    assert account.reasons[1] == "goal far was entered by no robot"
+    assert account.reasons[1] == "goal far was visited by no robot"
     actions = [event.action for event in drive.log.events]
     assert actions == ["stop", "give_up", "replan"]
     assert drive.replans[-1].reserve_share >= 1.0

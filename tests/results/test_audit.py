@@ -180,7 +180,7 @@ def test_goal_not_entered_fails_the_mission(mission: Any) -> None:
     state[0, :, 1] += 1.2
     account = failed(made, state=state)
     assert account.goals_visited == ()
-    assert account.reasons == ("goal g was entered by no robot",)
+    assert account.reasons == ("goal g was visited by no robot",)
 
 
 def test_goal_may_be_entered_by_another_robot(mission: Any) -> None:

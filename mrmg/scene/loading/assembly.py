@@ -69,8 +69,14 @@ class Assembly:
         self.obstacles = list(self._obstacles())
         self.terrain = list(self._terrain())
         self.elevation = self._elevation()
-        self.goals = [Goal(id=i, region=r) for i, r in self._regions("goals")]
-        self.stations = [Station(id=i, region=r) for i, r in self._regions("stations")]
+        self.goals = [
+            Goal(id=entry.id, region=region, dwell_s=entry.dwell or 0.0)
+            for entry, region in self._regions("goals")
+        ]
+        self.stations = [
+            Station(id=entry.id, region=region, dwell_s=entry.dwell or 0.0)
+            for entry, region in self._regions("stations")
+        ]
         self._check_starts()
 
     def scene(self) -> Scene:
@@ -258,7 +264,7 @@ class Assembly:
             return None
         return shape
 
-    def _regions(self, section: str) -> Iterator[tuple[str, Region]]:
+    def _regions(self, section: str) -> Iterator[tuple[Any, Region]]:
         walls = [wall.shape for wall in self.obstacles if wall.blocks is None]
         blocked = shapely.union_all(walls)
         for _, path, entry in self._entries(section):
@@ -275,7 +281,7 @@ class Assembly:
                     if wall.blocks is None and wall.shape.intersects(region.shape)
                 ]
                 self._fault(path, f"lies wholly inside {', '.join(names)}")
-            yield entry.id, region
+            yield entry, region
 
     def _check_starts(self) -> None:
         """Every robot must stand inside the bounds, clear of obstacles and others."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from mrmg.errors import Fault
 from mrmg.scene.loading.schema import BatteryEntry, RobotEntry, StartEnergyEntry
 from mrmg.scene.robot_model import RobotModel
@@ -41,7 +43,22 @@ def battery_of(
             f"{reserve * capacity_J:g} J"
         )
         return [Fault(f"{path}.start_energy", message)]
-    return Battery(capacity_J=capacity_J, start_J=start_J, reserve_fraction=reserve)
+    power_W = own.charging_power or fleet.charging_power or math.inf
+    energy = model.energy_model
+    least_W = energy.idle_power_W + energy.device_power_W
+    if power_W <= least_W:
+        message = (
+            f"got {power_W:g} W; {robot.id} itself draws {least_W:g} W at rest, so its "
+            "battery would never be full; give more"
+        )
+        where = f"{path}.battery" if own.charging_power else "battery"
+        return [Fault(f"{where}.charging_power", message)]
+    return Battery(
+        capacity_J=capacity_J,
+        start_J=start_J,
+        reserve_fraction=reserve,
+        charging_power_W=power_W,
+    )
 
 
 def _capacity(entry: BatteryEntry, unit: str) -> float | None:

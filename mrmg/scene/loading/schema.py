@@ -14,6 +14,7 @@ A scene is one YAML file (scalars as in YAML 1.2; metres, radians, joules):
     elevation: {hills: [{center: [60, 60], height: 4, radius: 25}]}   # default: flat
     goals:                            # convex: circle or polygon; each visited once
       - {id: g1, circle: {center: [20, 30], radius: 1.5}}
+      - {id: g2, circle: {center: [60, 30], radius: 1.5}, dwell: 20}
     stations:                         # convex; entering one fills the battery
       - {id: s1, polygon: [[40, 40], [43, 40], [43, 43], [40, 43]]}
     battery: {capacity_m: 240, reserve: 0.05}
@@ -42,6 +43,12 @@ Details:
 - A capacity is given in one of J, Wh or metres of plain ground (`capacity_m`: the way a
   full battery drives straight on at constant speed). A robot's own `battery` replaces
   what it names; without any capacity the model's standard battery counts.
+- A goal or station with `dwell` (s) counts as visited when the reference point of one
+  robot has been in its region for that long without a break. Time counts towards one
+  target of the robot's tour after the other.
+- `charging_power` of a battery (W) is what stations fill it with, as long as the robot
+  is at the station of its tour; what the robot itself draws meanwhile goes off. It may
+  leave before the battery is full. Without it a battery is full on arrival.
 - `start_energy` is a share of the capacity (0..1), or one of {J: }, {Wh: }, {m: }.
 - `rolling_factor` multiplies the rolling resistance a robot is reckoned with, as one
   measures it of a loaded or worn one; metres in `battery` stay those of the model.
@@ -69,6 +76,7 @@ from mrmg.energy import EnergyPreset
 SCENE_FORMAT = 1
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Identifier = Annotated[
     str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$", max_length=64)
@@ -137,6 +145,9 @@ class RegionEntry(Strict):
     id: Identifier
     circle: CircleEntry | None = None
     polygon: Ring | None = Field(default=None, description=_RING)
+    dwell: NotNegative | None = Field(
+        default=None, description="time in s that a visit takes"
+    )
 
 
 class BatteryEntry(Strict):
@@ -150,6 +161,9 @@ class BatteryEntry(Strict):
     reserve: Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)] | None = Field(
         default=None,
         description="share of the capacity that must always remain, in [0, 1)",
+    )
+    charging_power: Positive | None = Field(
+        default=None, description="power in W with which stations fill it"
     )
 
 
