@@ -4,15 +4,17 @@ A robot is at a goal or station while its reference point lies in the region. A 
 the first stay, after the visit before it is over, that lasts the target's dwell time
 without a break; it begins with the stay and is over when that time is. A station fills
 the battery at once as the visit begins, or with its charging power for as long as the
-robot is at the station, up to the beginning of its next visit.
+robot is at the station, up to the beginning of its next visit. A station for one robot
+at a time holds one reference point at any time.
 
 Planner, verifier, mission control and audit all judge by these functions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from types import MappingProxyType
 
 import numpy as np
@@ -77,6 +79,41 @@ def runs(flags: np.ndarray) -> list[tuple[int, int]]:
 
 
 @dataclass(frozen=True, slots=True)
+class Crowding:
+    """Two robots at a station for one at a time.
+
+    Attributes:
+        station: its id.
+        robots: their ids.
+        first, end: states at which both are there, the end excluded.
+    """
+
+    station: str
+    robots: tuple[str, str]
+    first: int
+    end: int
+
+
+def crowded_stations(
+    scene: Scene, points: Mapping[str, np.ndarray]
+) -> Iterator[Crowding]:
+    """Yield where two robots are at a station for one at a time.
+
+    Args:
+        scene: gives the stations.
+        points: positions of the reference points [m] by robot, at the same times,
+            shape (n, 2) each.
+    """
+    for station in scene.stations:
+        if not station.one_at_a_time:
+            continue
+        there = {name: station.region.depth(way) >= 0.0 for name, way in points.items()}
+        for one, other in combinations(there, 2):
+            for first, end in runs(there[one] & there[other]):
+                yield Crowding(station.id, (one, other), first, end)
+
+
+@dataclass(frozen=True, slots=True)
 class Recharging:
     """What stations give one battery.
 
@@ -112,7 +149,7 @@ def recharging(
         return Recharging(frozenset(visit.step for visit in at_stations), offered_J)
     regions = {station.id: station.region for station in scene.stations}
     ends = [visit.step for visit in visits[1:]] + [len(offered_J)]
-    for visit, end in zip(visits, ends, strict=True):
+    for visit, end in zip(visits, ends, strict=False):
         if visit.kind == "station":
             span = slice(visit.step, end + 1)
             inside = regions[visit.target].depth(points[span]) >= 0.0

@@ -23,11 +23,17 @@ class BatteryGauge:
         self.charge_J = robot.battery.start_J
         self._scene, self._robot = scene, robot
         self._targets = {target.id: target for target in scene.targets()}
-        self._begin(())
+        self._tour: list[str] = []
+        self._begun_J = self.charge_J
+        self._time_s = np.zeros(0)
+        self._points, self._draw_J = np.zeros((0, 2)), np.zeros(0)
 
     def follow(self, tour: Sequence[str]) -> None:
         """Expect the visits of a tour from now on."""
-        self._begin(tour)
+        self._tour = list(tour)
+        self._begun_J = self.charge_J
+        self._time_s = np.zeros(0)
+        self._points, self._draw_J = np.zeros((0, 2)), np.zeros(0)
 
     def add(self, time_s: np.ndarray, points: np.ndarray, draw_J: np.ndarray) -> None:
         """Take in some ticks.
@@ -62,12 +68,6 @@ class BatteryGauge:
             self._tour = self._tour[len(stays) :]
             over = stays[-1].over if stays else 0
             self._keep(max(over, self._since_when_at_target()), after_J)
-
-    def _begin(self, tour: Sequence[str]) -> None:
-        self._tour = list(tour)
-        self._begun_J = self.charge_J
-        self._time_s = np.zeros(0)
-        self._points, self._draw_J = np.zeros((0, 2)), np.zeros(0)
 
     def _keep(self, first: int, content_J: np.ndarray) -> None:
         """Forget what was before a state."""

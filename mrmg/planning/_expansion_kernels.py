@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan2
+from math import atan2, hypot
 
 import numba
 import numpy as np
@@ -10,19 +10,21 @@ import numpy as np
 from mrmg.compilation import kernel, leaf_kernel
 from mrmg.energy import battery_power
 from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, turn_speed
-from mrmg.planning._finish_kernels import at_finish, turn_at_finish
+from mrmg.planning._finish_kernels import may_stop, turn_at_finish
 from mrmg.planning._fleet_kernels import space_of
 from mrmg.planning._maneuver_kernels import best_maneuver
-from mrmg.planning._mission_kernels import in_target, load_height, look_ahead
+from mrmg.planning._mission_kernels import load_height, look_ahead
 from mrmg.planning._random_kernels import random_unit
 from mrmg.planning._safety_kernels import (
     braking_control,
     follow_braking,
+    gate_is_taken,
     new_commitment,
     present_state,
     try_control,
     write_braking,
 )
+from mrmg.planning._staying_kernels import note_arrivals
 from mrmg.planning._steering_kernels import (
     BACK_OFF,
     RANDOM,
@@ -48,6 +50,9 @@ AHEAD = 0.9
 
 BEHIND = 2.4
 """Bearing from which a waypoint counts as behind [rad]."""
+
+QUEUE = 4.0
+"""Radii of a robot before a taken station at which it waits for its turn."""
 
 ATTEMPTS = 5
 """Controls tried before a robot brakes as committed."""
@@ -79,6 +84,8 @@ def choose_modes(tree, v, target, params, steer, random, stuck, mode):
         if target[r] < 0:
             # A robot without a target gives way only when others are stuck.
             mode[r] = RANDOM if blocked and draw < 0.5 else WAIT
+        elif tree.serving[v, r] == target[r]:
+            mode[r] = STEER
         elif draw >= steer:
             mode[r] = RANDOM
         elif stuck[r] < 2 or params.literal:
@@ -215,37 +222,30 @@ def step_energy(mission, r, before, after, u1):
 
 
 @leaf_kernel
-def note_arrivals(mission, state, energy, visited, target):
-    """Mark goals that robots have entered and refill at stations they drove to.
-
-    Returns:
-        Whether anything was reached.
-    """
-    targets = mission.targets
-    event = False
-    for r in range(len(target)):
-        for g in range(targets.goals):
-            if not visited[g] and in_target(targets, g, state[r, 0], state[r, 1]):
-                visited[g] = True
-                event = True
-        t = target[r]
-        if targets.goals <= t < targets.places and in_target(
-            targets, t, state[r, 0], state[r, 1]
-        ):
-            energy[r] = mission.fleet[r].capacity
-            event = True
-    return event
+def must_queue(mission, commitment, r, target, state):
+    """Tell whether robot r is near a station that another one has taken."""
+    if target < 0 or mission.targets.gate[target] < 0:
+        return False
+    center = mission.targets.center[target]
+    limit = mission.fleet[r].limit
+    braking = 0.5 * state[3] * state[3] / limit[3]
+    room = mission.targets.reach[target] + QUEUE * mission.fleet[r].radius + braking
+    if hypot(state[0] - center[0], state[1] - center[1]) > room:
+        return False
+    return gate_is_taken(commitment, mission.targets.gate[target], r)
 
 
 @kernel
 def expand(
-    mission, state, energy, visited, target, mode, gear, stuck, order, random, control
-):
-    """Drive all robots for up to k steps; ends early when a target is reached.
+    mission, state, energy, visited, serving, spent, target, mode, gear, stuck, order,
+    random, control,
+):  # fmt: skip
+    """Drive all robots for up to k steps; ends early when a target is visited.
 
     Args:
         mission: the problem.
-        state, energy, visited: of the vertex; changed in place to those at the end.
+        state, energy, visited, serving, spent: of the vertex; changed in place to those
+            at the end.
         target: each robot's next target, -1 for none, shape (R,).
         mode: what each robot does, shape (R,).
         gear: each robot's gear; changed in place, shape (R,).
@@ -259,7 +259,7 @@ def expand(
     """
     fleet, params = mission.fleet, mission.params
     robots = len(target)
-    commitment = new_commitment(fleet, params.dt, not params.literal)
+    commitment = new_commitment(fleet, mission.gates, params.dt, not params.literal)
     wanted = np.zeros((robots, 2))
     held = np.zeros(robots, np.bool_)
     for r in range(robots):
@@ -275,7 +275,10 @@ def expand(
         for i in range(robots):
             r = order[i]
             before = present_state(commitment, r).copy()
-            if mode[r] == STEER and at_finish(mission, r, target[r], before):
+            if mode[r] == STEER and (
+                may_stop(mission, r, target[r], before)
+                or must_queue(mission, commitment, r, target[r], before)
+            ):
                 mode[r] = WAIT
             safe = True
             if mode[r] == WAIT and not params.literal:
@@ -312,7 +315,7 @@ def expand(
             copy_numbers(present_state(commitment, r), state[r])
             if energy[r] < fleet[r].reserve:
                 return n + 1, False, False
-        if note_arrivals(mission, state, energy, visited, target):
+        if note_arrivals(mission, state, energy, visited, serving, spent, target):
             return n + 1, True, True
     return params.steps, False, True
 

@@ -10,6 +10,7 @@ from mrmg.compilation import kernel
 from mrmg.motion._kernels import UNICYCLE, copy_numbers, step
 from mrmg.planning._mission_kernels import in_target
 from mrmg.planning._safety_kernels import braking_control, stands
+from mrmg.planning._staying_kernels import must_stay
 from mrmg.planning._steering_kernels import wrap
 
 MOST_BRAKING_STEPS = 200
@@ -32,10 +33,8 @@ def resting_state(mission, r, state):
 
 @kernel
 def _rests_inside(mission, r, target, state):
-    """Return (whether braking ends in the finish, the heading it lacks [rad])."""
+    """Return (whether braking ends in a target, the heading a finish lacks [rad])."""
     targets = mission.targets
-    if target < targets.places:
-        return False, 0.0
     dx = state[0] - targets.center[target, 0]
     dy = state[1] - targets.center[target, 1]
     braking = 0.5 * state[3] * state[3] / mission.fleet[r].limit[3]
@@ -49,8 +48,19 @@ def _rests_inside(mission, r, target, state):
 @kernel
 def at_finish(mission, r, target, state):
     """Tell whether `target` is a finish and the robot, braking now, ends there."""
+    if target < mission.targets.places:
+        return False
     inside, lacking = _rests_inside(mission, r, target, state)
     return inside and abs(lacking) <= mission.targets.tolerance[r]
+
+
+@kernel
+def may_stop(mission, r, target, state):
+    """Tell whether the robot, braking now, rests where it must stay or end."""
+    if must_stay(mission, r, target):
+        inside, _ = _rests_inside(mission, r, target, state)
+        return inside
+    return at_finish(mission, r, target, state)
 
 
 @kernel
@@ -59,7 +69,7 @@ def turn_at_finish(mission, r, target, state, wanted):
 
     Only a robot that turns on the spot can; returns whether it does.
     """
-    if mission.fleet[r].model != UNICYCLE:
+    if mission.fleet[r].model != UNICYCLE or target < mission.targets.places:
         return False
     inside, lacking = _rests_inside(mission, r, target, state)
     if not inside:

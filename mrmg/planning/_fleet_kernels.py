@@ -35,6 +35,7 @@ FLEET = np.dtype(
         ("energy", np.float64, (N_COEFFICIENTS,)),  # coefficients of the energy model
         ("plain", np.float64),  # battery energy per metre of plain ground [J/m]
         ("capacity", np.float64),  # [J]
+        ("charge", np.float64),  # power of recharging [W], inf for at once
         ("reserve", np.float64),  # energy the planner leaves [J]
     ]
 )

@@ -13,6 +13,9 @@ from mrmg.planning._random_kernels import random_below, random_unit
 AGAIN = 0.005
 """Share of the first tours' energy that each expansion a vertex has had counts as."""
 
+SPELL_S = 1.0
+"""Length of the spells that tell groups apart in which a robot stays somewhere."""
+
 NEAREST_SHARE = 0.7
 """How often the vertex nearest to its targets is taken from a group, not any."""
 
@@ -27,6 +30,8 @@ class Tree(NamedTuple):
         control: controls from the parent, shape (N, k, R, 2).
         steps: number of steps from the parent, shape (N,).
         visited: goals visited, shape (N, G).
+        serving: target at which each robot stays, -1 for none, shape (N, R).
+        spent: for how long it has stayed there [s], shape (N, R).
         tour: which row of the tour table a vertex follows, shape (N,).
         position: place in its tour each robot has reached, shape (N, R).
         gear: shape (N, R).
@@ -43,6 +48,8 @@ class Tree(NamedTuple):
     control: np.ndarray
     steps: np.ndarray
     visited: np.ndarray
+    serving: np.ndarray
+    spent: np.ndarray
     tour: np.ndarray
     position: np.ndarray
     gear: np.ndarray
@@ -75,6 +82,8 @@ def new_tree(n, robots, goals, steps):
         np.empty((n, steps, robots, 2)),
         np.zeros(n, np.int64),
         np.zeros((n, goals), np.bool_),
+        np.full((n, robots), -1, np.int64),
+        np.zeros((n, robots)),
         np.zeros(n, np.int64),
         np.zeros((n, robots), np.int64),
         np.ones((n, robots), np.int64),
@@ -101,8 +110,8 @@ def new_groups(n):
 
 
 @leaf_kernel
-def group_key(state, visited, region):
-    """Return the hash of the robots' regions and the visited goals."""
+def group_key(state, visited, spent, region):
+    """Return the hash of the robots' regions, the visited goals and what was stayed."""
     key = np.uint64(0xCBF29CE484222325)
     prime = np.uint64(0x100000001B3)
     for r in range(len(state)):
@@ -110,13 +119,17 @@ def group_key(state, visited, region):
         key = (key ^ np.uint64(int(floor(state[r, 1] / region)) + 32768)) * prime
     for g in range(len(visited)):
         key = (key ^ np.uint64(1 + visited[g])) * prime
+    for r in range(len(spent)):
+        if spent[r] > 0.0:
+            spell = np.uint64(int(spent[r] / SPELL_S) + 1)
+            key = (key ^ (spell * np.uint64(r + 3))) * prime
     return key ^ (key >> np.uint64(29))
 
 
 @leaf_kernel
 def add_to_group(groups, tree, n_groups, v, region):
     """Put a vertex into its group, a new one if need be; return their number."""
-    key = group_key(tree.state[v], tree.visited[v], region)
+    key = group_key(tree.state[v], tree.visited[v], tree.spent[v], region)
     place = np.int64(key % np.uint64(len(groups.slot)))
     while groups.slot[place] >= 0 and groups.key[groups.slot[place]] != key:
         place = (place + 1) % len(groups.slot)

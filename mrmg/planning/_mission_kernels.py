@@ -8,9 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel, leaf_kernel
+from mrmg.energy import CONSUMERS_W
 from mrmg.planning._fleet_kernels import Spaces, space_of
 from mrmg.planning._nrpa_kernels import RoutingArrays
 from mrmg.planning._roadmap_kernels import RoadmapArrays, find_waypoint
+from mrmg.planning._safety_kernels import Gates
 from mrmg.world._kernels import TerrainGrid, height_in, point_in_convex
 
 
@@ -27,6 +29,8 @@ class Targets(NamedTuple):
         reach: radius of the circle about the centre that holds the region, shape (T,).
         corner: padded corners of polygons, shape (T, M, 2).
         corners: number of corners; 0 for a circle, shape (T,).
+        dwell: how long a visit takes [s], shape (T,).
+        gate: number among the gates of the safety kernels, -1 for none, shape (T,).
     """
 
     goals: int
@@ -38,6 +42,8 @@ class Targets(NamedTuple):
     reach: np.ndarray
     corner: np.ndarray
     corners: np.ndarray
+    dwell: np.ndarray
+    gate: np.ndarray
 
 
 class TreeParams(NamedTuple):
@@ -57,6 +63,7 @@ class TreeParams(NamedTuple):
     route_margin: float
     reroute_always: bool
     literal: bool
+    optioned: bool
     levels: int
     iterations: int
     alpha: float
@@ -68,6 +75,7 @@ class Mission(NamedTuple):
 
     Attributes:
         fleet, spaces, terrain, roadmap, targets: robots, world and where to go.
+        gates: stations that one robot at a time may be at.
         routing: the routing problem at the start; costs include the route margin.
         last_leg: energy from each place (the start last) to each robot's finish [J],
             shape (R, G + S + 1); zero where a robot may end anywhere.
@@ -82,6 +90,7 @@ class Mission(NamedTuple):
     routing: RoutingArrays
     last_leg: np.ndarray
     params: TreeParams
+    gates: Gates
 
 
 @leaf_kernel
@@ -136,8 +145,17 @@ def load_height(mission, r, state):
 
 @leaf_kernel
 def leg_energy(mission, r, target, state, way):
-    """Return the energy of the way to a target, of the cost `look_ahead` found [J]."""
+    """Return the energy of the way to a target and of the stay there [J].
+
+    Args:
+        mission: the problem.
+        r: robot.
+        target: number of the target.
+        state: the robot's state.
+        way: cost of the way that `look_ahead` found [m].
+    """
     robot = mission.fleet[r]
+    stay = robot.energy[CONSUMERS_W] * mission.targets.dwell[target]
     refund = mission.roadmap.slope_refund[robot.field]
     if refund > 0.0:
         center = mission.targets.center[target]
@@ -145,4 +163,4 @@ def leg_energy(mission, r, target, state, way):
             mission.terrain, state[0], state[1]
         )
         way = max(0.0, way + refund * rise)
-    return way * robot.plain
+    return way * robot.plain + stay

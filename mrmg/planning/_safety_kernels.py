@@ -23,10 +23,27 @@ from mrmg.world._kernels import (
     convex_convex_distance,
     footprint_is_clear,
     place_footprint,
+    point_in_convex,
 )
 
 REST = 1e-9
 """Speed below which a robot counts as standing [m/s]."""
+
+
+class Gates(NamedTuple):
+    """Convex regions that one robot at a time may be in, or committed to enter.
+
+    Attributes:
+        center: shape (S, 2).
+        reach: radius of the circle about the centre that holds the region, shape (S,).
+        corner: padded corners of polygons, shape (S, M, 2).
+        corners: number of corners; 0 for a circle, shape (S,).
+    """
+
+    center: np.ndarray
+    reach: np.ndarray
+    corner: np.ndarray
+    corners: np.ndarray
 
 
 class Commitment(NamedTuple):
@@ -42,6 +59,7 @@ class Commitment(NamedTuple):
         active: slot in force, shape (R,).
         now: index of the present state in the active slot, shape (R,).
         braking: False commits to nothing: only present states are kept clear.
+        gates: where one robot at a time may be.
     """
 
     state: np.ndarray
@@ -52,10 +70,11 @@ class Commitment(NamedTuple):
     active: np.ndarray
     now: np.ndarray
     braking: bool
+    gates: Gates
 
 
 @kernel
-def new_commitment(fleet, dt, braking):
+def new_commitment(fleet, gates, dt, braking):
     """Return an empty commitment large enough for the fleet's longest braking."""
     robots = len(fleet)
     longest = 0
@@ -73,6 +92,7 @@ def new_commitment(fleet, dt, braking):
         np.zeros(robots, np.int64),
         np.zeros(robots, np.int64),
         braking,
+        gates,
     )
 
 
@@ -184,6 +204,43 @@ def clear_of_robot(fleet, commitment, r, slot, first, other, other_first, margin
     return True
 
 
+@leaf_kernel
+def passes_gate(commitment, gate, r, slot, first):
+    """Tell whether a slot's states from `first` on are in a gate at any time."""
+    gates = commitment.gates
+    n = gates.corners[gate]
+    for k in range(first, commitment.length[r, slot]):
+        x, y = commitment.state[r, slot, k, 0], commitment.state[r, slot, k, 1]
+        far = hypot(x - gates.center[gate, 0], y - gates.center[gate, 1])
+        if far > gates.reach[gate]:
+            continue
+        if n == 0 or point_in_convex(x, y, gates.corner[gate, :n]):
+            return True
+    return False
+
+
+@leaf_kernel
+def gate_is_taken(commitment, gate, r):
+    """Tell whether a robot other than r is in a gate or committed to enter it."""
+    for other in range(len(commitment.now)):
+        if other != r and passes_gate(
+            commitment, gate, other, commitment.active[other], commitment.now[other]
+        ):
+            return True
+    return False
+
+
+@leaf_kernel
+def clear_of_gates(commitment, r, slot):
+    """Tell whether a slot's states enter no gate that another robot has taken."""
+    for gate in range(len(commitment.gates.reach)):
+        if passes_gate(commitment, gate, r, slot, 0) and gate_is_taken(
+            commitment, gate, r
+        ):
+            return False
+    return True
+
+
 @kernel
 def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):
     """Replace robot r's commitment by one step of a control and braking, if it is safe.
@@ -206,6 +263,8 @@ def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):
     step(fleet[r], state, u1, u2, dt, after)
     write_braking(fleet, r, after, dt, commitment, slot)
     if not clear_of_obstacles(fleet, spaces, commitment, r, slot, 0):
+        return False
+    if not clear_of_gates(commitment, r, slot):
         return False
     for other in range(len(fleet)):
         if other == r:

@@ -139,11 +139,12 @@ def track_step(fleet, spaces, commitment, decided, r, v, w, dt):
 
 
 @kernel
-def drive(fleet, spaces, courses, given, start, order, dt, control, halt):
+def drive(fleet, spaces, gates, courses, given, start, order, dt, control, halt):
     """Drive the fleet to the ends of its paths.
 
     Args:
         fleet, spaces: robots and their free spaces.
+        gates: where one robot at a time may be.
         courses: their paths.
         given: number of steps for which each robot follows the controls that it finds
             in `control`, before it takes to its path, shape (R,).
@@ -158,7 +159,7 @@ def drive(fleet, spaces, courses, given, start, order, dt, control, halt):
         that did not get on).
     """
     robots = len(fleet)
-    commitment = new_commitment(fleet, dt, True)
+    commitment = new_commitment(fleet, gates, dt, True)
     decided = np.zeros(robots, np.bool_)
     segment = np.zeros(robots, np.int64)
     still = np.zeros(robots, np.int64)

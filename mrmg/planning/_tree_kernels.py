@@ -19,10 +19,17 @@ from mrmg.planning._rerouting_kernels import route_from
 from mrmg.planning._routes_kernels import IMPOSSIBLE
 from mrmg.planning._safety_kernels import (
     braking_control,
+    clear_of_gates,
     clear_of_obstacles,
     clear_of_robot,
     new_commitment,
     write_braking,
+)
+from mrmg.planning._staying_kernels import (
+    has_visited_station,
+    is_queuing,
+    must_stay,
+    staying_worth,
 )
 
 EXPANSIONS_PER_VERTEX = 8
@@ -99,10 +106,12 @@ def is_over(mission, tree, v):
 def stops_clear(mission, state):
     """Tell whether all robots can brake at once without touching anything."""
     fleet = mission.fleet
-    commitment = new_commitment(fleet, mission.params.dt, True)
+    commitment = new_commitment(fleet, mission.gates, mission.params.dt, True)
     for r in range(len(fleet)):
         write_braking(fleet, r, state[r], mission.params.dt, commitment, 0)
         if not clear_of_obstacles(fleet, mission.spaces, commitment, r, 0, 0):
+            return False
+        if not clear_of_gates(commitment, r, 0):
             return False
         for other in range(r):
             spacing = max(fleet[r].spacing, fleet[other].spacing)
@@ -134,8 +143,11 @@ def rest_of_tours(mission, tree, tours, v, otherwise):
             t = tours.target[row, r, p]
             if t < mission.targets.goals and tree.visited[v, t]:
                 continue
+            staying = place < 0 and tree.serving[v, r] == t
             if place >= 0:
                 leg = mission.routing.cost[r, place, t] / surcharge
+            elif staying:
+                leg = 0.0
             else:
                 to_go, turning = way_left(mission, r, t, tree.state[v, r], waypoint)
                 leg = otherwise
@@ -144,6 +156,10 @@ def rest_of_tours(mission, tree, tours, v, otherwise):
                 # Turning ranks vertices; it takes less energy than it is counted as.
                 total += turning * fleet[r].plain if to_go < np.inf else 0.0
             total += leg
+            if must_stay(mission, r, t):
+                spent = tree.spent[v, r] if staying else 0.0
+                content = tree.energy[v, r] if staying else 0.0
+                total += staying_worth(mission, r, t, spent, content)
             left -= leg
             enough &= left >= 0.0
             if t >= mission.targets.goals:
@@ -172,7 +188,8 @@ def plant(mission, tree, tours, start, energy):
     copy_numbers(energy, tree.energy[0])
     for g in range(mission.targets.goals):
         for r in range(len(start)):
-            if in_target(mission.targets, g, start[r, 0], start[r, 1]):
+            passing = mission.targets.dwell[g] == 0.0
+            if passing and in_target(mission.targets, g, start[r, 0], start[r, 1]):
                 tree.visited[0, g] = True
     skip_visited(mission, tree, tours, np.int64(0))
     initial = 1e-9
@@ -181,6 +198,8 @@ def plant(mission, tree, tours, start, energy):
         for p in range(tours.length[0, r]):
             initial += mission.routing.cost[r, place, tours.target[0, r, p]]
             place = tours.target[0, r, p]
+            if must_stay(mission, r, place):
+                initial += staying_worth(mission, r, place, 0.0, 0.0)
         initial += mission.last_leg[r, place]
     tree.remaining[0] = initial
     return initial
@@ -209,6 +228,8 @@ def extend(mission, tree, v, n, target, steer, random):
         copy_numbers(tree.state[v, r], tree.state[n, r])
     copy_numbers(tree.energy[v], tree.energy[n])
     copy_numbers(tree.visited[v], tree.visited[n])
+    copy_numbers(tree.serving[v], tree.serving[n])
+    copy_numbers(tree.spent[v], tree.spent[n])
     copy_numbers(tree.position[v], tree.position[n])
     copy_numbers(tree.gear[v], tree.gear[n])
     tree.steps[n], event, alive = expand(
@@ -216,6 +237,8 @@ def extend(mission, tree, v, n, target, steer, random):
         tree.state[n],
         tree.energy[n],
         tree.visited[n],
+        tree.serving[n],
+        tree.spent[n],
         target,
         mode,
         tree.gear[n],
@@ -230,9 +253,11 @@ def extend(mission, tree, v, n, target, steer, random):
             tree.state[n, r, 0] - tree.state[v, r, 0],
             tree.state[n, r, 1] - tree.state[v, r, 1],
         )
-        moved |= far > 0.02
+        moved |= far > 0.02 or tree.spent[n, r] > tree.spent[v, r]
         stands = far < STALLED_M and abs(tree.state[n, r, 3]) < STALLED_M
         held = target[r] >= 0 and stands and not event
+        held &= tree.serving[n, r] != target[r]
+        held &= not is_queuing(mission, tree.serving[n], r, target[r])
         tree.stalled[n, r] = tree.stalled[v, r] + 1 if held else 0
     return moved, event, alive
 
@@ -249,10 +274,10 @@ def insert(mission, tree, tours, n, n_tours, target, event, random, counts):
     """
     v = tree.parent[n]
     for r in range(len(target)):
-        t = target[r]
-        if mission.targets.goals <= t < mission.targets.places and in_target(
-            mission.targets, t, tree.state[n, r, 0], tree.state[n, r, 1]
-        ):
+        if has_visited_station(
+            mission, r, target[r], tree.state[n, r], tree.serving[n, r],
+            tree.spent[n, r], tree.energy[n, r],
+        ):  # fmt: skip
             tree.position[n, r] += 1
     skip_visited(mission, tree, tours, n)
     if is_over(mission, tree, n):
@@ -276,6 +301,9 @@ def insert(mission, tree, tours, n, n_tours, target, event, random, counts):
     for r in range(len(target)):
         tree.position[n, r] = 0
     tree.remaining[n] = cost
+    if mission.params.optioned:
+        # What the router minimises is then not what vertices are rated by.
+        tree.remaining[n], _ = rest_of_tours(mission, tree, tours, n, tree.remaining[v])
     return True, n_tours + 1
 
 
@@ -342,13 +370,13 @@ def grow(mission, start, energy, random, tree, tours, counts, halt):
 
 
 @kernel
-def stop_all(fleet, state, dt):
+def stop_all(fleet, gates, state, dt):
     """Return the controls that brake all robots to rest from a vertex, shape (n, R, 2).
 
     The commitments of the vertex are what is carried out, so this is always safe.
     """
     robots = len(state)
-    commitment = new_commitment(fleet, dt, True)
+    commitment = new_commitment(fleet, gates, dt, True)
     longest = 0
     for r in range(robots):
         write_braking(fleet, r, state[r], dt, commitment, 0)

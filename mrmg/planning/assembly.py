@@ -9,6 +9,7 @@ from mrmg.accounting import battery_profile, find_visits, plan_ledger
 from mrmg.mission import Plan, Trajectory, Visit
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.parameters import PlannerParams
+from mrmg.visiting import crowded_stations
 
 
 def make_plan(
@@ -26,10 +27,15 @@ def make_plan(
     visits: list[Visit] = []
     for trajectory in trajectories:
         own = find_visits(scene, trajectory, tours[trajectory.robot])
+        if len(own) < len(tours[trajectory.robot]):
+            return None
         battery = scene.robot(trajectory.robot).battery
         if battery_profile(scene, trajectory, own).min() < battery.reserve_J:
             return None
         visits += own
+    ways = {item.robot: item.state[:, :2] for item in trajectories}
+    if any(crowded_stations(scene, ways)):
+        return None
     visits.sort(key=lambda visit: (visit.step, visit.robot))
     return Plan(
         scene_name=scene.name,

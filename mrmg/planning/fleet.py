@@ -135,5 +135,6 @@ def fleet_array(
         one["energy"] = model.energy_model.coefficients()
         one["plain"] = model.energy_model.plain_ground_J_per_m()
         one["capacity"] = battery.capacity_J
+        one["charge"] = battery.charging_power_W
         one["reserve"] = battery.reserve_J + RESERVE_MARGIN * battery.capacity_J
     return fleet

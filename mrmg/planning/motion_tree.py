@@ -12,24 +12,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrmg import seeding
+from mrmg.energy import CONSUMERS_W
 from mrmg.mission import Trajectory
 from mrmg.motion._kernels import step as motion_step
 from mrmg.planning import _groups_kernels, _tree_kernels
 from mrmg.planning._groups_kernels import Tree
-from mrmg.planning._mission_kernels import Mission, Targets, TreeParams, in_target
+from mrmg.planning._mission_kernels import Mission, TreeParams, in_target
+from mrmg.planning._staying_kernels import has_visited_station
 from mrmg.planning._tree_kernels import Tours
 from mrmg.planning.fleet import fleet_array, stack_spaces
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.roadmap import Roadmap, planned_regions
+from mrmg.planning.roadmap import Roadmap
 from mrmg.planning.routing import Routing, routing_arrays, tour_room
+from mrmg.planning.targets import (
+    finish_of,
+    gate_arrays,
+    has_options,
+    target_arrays,
+)
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
-
-TARGET_MARGIN_M = 0.2
-"""How deep inside a region the planner drives, so that a tracked path enters it too."""
-
-FINISH_SHARE = 0.8
-"""Share of a finish's heading tolerance that planning uses."""
 
 TOUR_ROWS = 2000
 """Most tours one tree may hold."""
@@ -81,6 +83,10 @@ def state_problem(
         robot_margin_m=params.robot_margin_m,
     )
     places = len(scene.targets())
+    targets = target_arrays(scene)
+    # What robots draw while they stay counts as way.
+    idle_m = fleet["energy"][:, CONSUMERS_W] / fleet["plain"]
+    stay_m = idle_m[:, None] * targets.dwell[:places]
     last_leg = _last_legs(scene, roadmap, fleet)
     energy = np.array([robot.battery.start_J for robot in scene.robots])
     start = np.zeros((len(scene.robots), 5))
@@ -90,11 +96,12 @@ def state_problem(
         spaces=stack_spaces(world),
         terrain=world.terrain,
         roadmap=roadmap.arrays,
-        targets=_target_arrays(scene),
+        targets=targets,
         routing=routing_arrays(
             goals=len(scene.goals),
-            distance=roadmap.distance[fleet["field"], :places, :places],
-            start_distance=roadmap.start_distance[:, :places],
+            distance=roadmap.distance[fleet["field"], :places, :places]
+            + stay_m[:, None],
+            start_distance=roadmap.start_distance[:, :places] + stay_m,
             plain=fleet["plain"] * (1.0 + params.route_margin),
             energy=energy,
             capacity=fleet["capacity"],
@@ -102,67 +109,22 @@ def state_problem(
             finish_distance=last_leg / fleet["plain"][:, None],
         ),
         last_leg=last_leg,
-        params=tree_params(params),
+        params=tree_params(params)._replace(optioned=has_options(scene)),
+        gates=gate_arrays(scene),
     )
     return Problem(scene, roadmap, mission, start, energy)
-
-
-def _finish_of(scene: Scene) -> np.ndarray:
-    """Return the target in which each robot must end, -1 for none, shape (R,)."""
-    must = np.array([robot.finish is not None for robot in scene.robots], bool)
-    return np.where(must, len(scene.targets()) + np.cumsum(must) - 1, -1)
 
 
 def _last_legs(scene: Scene, roadmap: Roadmap, fleet: np.ndarray) -> np.ndarray:
     """Return the energy from each place to each robot's finish [J], (R, G + S + 1)."""
     places = len(scene.targets())
     legs = np.zeros((len(fleet), places + 1))
-    for r, finish in enumerate(_finish_of(scene)):
+    for r, finish in enumerate(finish_of(scene)):
         if finish >= 0:
             legs[r, :places] = roadmap.distance[fleet[r]["field"], :places, finish]
             legs[r, places] = roadmap.start_distance[r, finish]
             legs[r] *= fleet[r]["plain"]
     return legs
-
-
-def _target_arrays(scene: Scene) -> Targets:
-    regions = planned_regions(scene)
-    shrunk = []
-    for region in regions:
-        corners = region.corners
-        if len(corners):
-            smaller = region.shape.buffer(-TARGET_MARGIN_M, join_style="mitre")
-            if not smaller.is_empty and smaller.geom_type == "Polygon":
-                corners = np.asarray(smaller.normalize().exterior.coords)[:-1][::-1]
-        shrunk.append(corners)
-    most = max([3, *(len(corners) for corners in shrunk)])
-    corner = np.zeros((len(regions), most, 2))
-    reach = np.zeros(len(regions))
-    for i, (region, corners) in enumerate(zip(regions, shrunk, strict=True)):
-        corner[i, : len(corners)] = corners
-        if len(corners):
-            reach[i] = np.hypot(*(corners - region.center).T).max()
-        else:
-            reach[i] = max(region.radius_m - TARGET_MARGIN_M, 0.5 * region.radius_m)
-    finishes = [robot.finish for robot in scene.robots]
-    return Targets(
-        goals=len(scene.goals),
-        places=len(scene.targets()),
-        finish=_finish_of(scene),
-        heading=np.array([(f and f.heading_rad) or 0.0 for f in finishes]),
-        tolerance=np.array(
-            [
-                2.0 * np.pi
-                if f is None or f.heading_rad is None
-                else FINISH_SHARE * f.heading_tolerance_rad
-                for f in finishes
-            ]
-        ),
-        center=np.array([region.center for region in regions], float).reshape(-1, 2),
-        reach=reach,
-        corner=corner,
-        corners=np.array([len(corners) for corners in shrunk], np.int64),
-    )
 
 
 def tree_params(params: PlannerParams) -> TreeParams:
@@ -184,6 +146,7 @@ def tree_params(params: PlannerParams) -> TreeParams:
         route_margin=params.route_margin,
         reroute_always=paper,
         literal=paper,
+        optioned=False,
         levels=router.levels,
         iterations=router.iterations,
         alpha=router.alpha,
@@ -287,8 +250,9 @@ def _controls(
 
     A mission that is over before it begins still has one step, of standing.
     """
+    mission = problem.mission
     stop = _tree_kernels.stop_all(
-        problem.mission.fleet, tree.state[branch[-1]], params.dt_s
+        mission.fleet, mission.gates, tree.state[branch[-1]], params.dt_s
     )
     pieces = [tree.control[v, : tree.steps[v]] for v in branch[1:]]
     control = np.concatenate([*pieces, stop])
@@ -319,8 +283,8 @@ def _replay(
 def _visited_tours(
     problem: Problem, tree: Tree, tours: Tours, branch: list[int]
 ) -> dict[str, tuple[str, ...]]:
-    """Return what each robot visited: goals it entered first, stations it drove to."""
-    targets = problem.mission.targets
+    """Return what each robot visited: goals it was first at, stations it drove to."""
+    mission, targets = problem.mission, problem.mission.targets
     robots = problem.scene.robots
     found: list[list[int]] = [[] for _ in robots]
     seen = np.zeros(targets.goals, bool)
@@ -328,15 +292,21 @@ def _visited_tours(
         parent = int(tree.parent[v])
         for r in range(len(robots)):
             x, y = tree.state[v, r, :2]
+            t = _target_at(tree, tours, parent, r) if parent >= 0 else -1
             for g in np.flatnonzero(tree.visited[v] & ~seen):
-                if in_target(targets, g, x, y):
+                if in_target(targets, g, x, y) and (targets.dwell[g] == 0.0 or g == t):
                     found[r].append(int(g))
                     seen[g] = True
-            if parent >= 0:
-                t = _target_at(tree, tours, parent, r)
-                is_station = targets.goals <= t < targets.places
-                if is_station and in_target(targets, t, x, y):
-                    found[r].append(t)
+            if t >= 0 and has_visited_station(
+                mission,
+                r,
+                t,
+                tree.state[v, r],
+                tree.serving[v, r],
+                tree.spent[v, r],
+                tree.energy[v, r],
+            ):
+                found[r].append(t)
     names = [target.id for target in problem.scene.targets()]
     return {
         robot.id: tuple(names[t] for t in found[r]) for r, robot in enumerate(robots)

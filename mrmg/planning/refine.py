@@ -26,9 +26,10 @@ from mrmg.planning.band import (
     visit_steps,
     wary,
 )
-from mrmg.planning.motion_tree import TARGET_MARGIN_M, Problem
+from mrmg.planning.motion_tree import Problem
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.roadmap import planned_regions
+from mrmg.planning.targets import TARGET_MARGIN_M
 from mrmg.planning.tracking import redriven
 
 TRIES = 12
@@ -64,6 +65,8 @@ def refine(
         halt: shape (1,); refinement ends soon after it has turned true.
     """
     targets = problem.mission.targets
+    if _stays_somewhere(problem):
+        return plan
     smooth = smooth_terrain(problem.mission.terrain.multiplier)
     surfaces = [surface_of(problem, r, smooth) for r in range(len(plan.trajectories))]
     tours = tour_numbers(problem, plan)
@@ -107,6 +110,15 @@ def refine(
         if not missed:
             return _cheaper(problem, params, plan, outcome.trajectories)
     return plan
+
+
+def _stays_somewhere(problem: Problem) -> bool:
+    """Tell whether robots stay at targets: driving along paths knows no pauses."""
+    battery = [robot.battery for robot in problem.scene.robots]
+    return bool(
+        (problem.mission.targets.dwell > 0.0).any()
+        or any(item.takes_time_to_fill for item in battery)
+    )
 
 
 def tour_numbers(problem: Problem, plan: Plan) -> list[list[int]]:

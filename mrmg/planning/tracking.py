@@ -63,6 +63,7 @@ def redriven(
     steps, stuck = _tracking_kernels.drive(
         mission.fleet,
         mission.spaces,
+        mission.gates,
         courses_of(problem, paths),
         given,
         problem.start,

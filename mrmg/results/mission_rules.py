@@ -13,7 +13,7 @@ from mrmg.mission import Plan, Trajectory, Visit
 from mrmg.results.motion_rules import violation_at, worst_of_runs
 from mrmg.results.verdict import Violation, ViolationKind
 from mrmg.scene.types import Goal, Scene
-from mrmg.visiting import ROUNDING_S, longest_stay_s
+from mrmg.visiting import ROUNDING_S, crowded_stations, longest_stay_s
 
 ENERGY_TOLERANCE_J = 1e-6
 """Rounding that is forgiven in energies: a billionth of a metre's drive."""
@@ -21,7 +21,11 @@ ENERGY_TOLERANCE_J = 1e-6
 
 def check_mission(scene: Scene, plan: Plan) -> list[Violation]:
     """Return every broken rule of the mission as a whole."""
-    violations = [*_check_goals(scene, plan), *_check_recharges(scene, plan)]
+    violations = [
+        *_check_goals(scene, plan),
+        *_check_recharges(scene, plan),
+        *_check_stations(scene, plan),
+    ]
     known = {target.id for target in scene.targets()}
     visits: list[Visit] = []
     for trajectory in plan.trajectories:
@@ -185,6 +189,30 @@ def _check_recharges(scene: Scene, plan: Plan) -> list[Violation]:
                     other=visit.target,
                 )
             )
+    return violations
+
+
+def _check_stations(scene: Scene, plan: Plan) -> list[Violation]:
+    """Check that stations for one robot at a time hold one at any time."""
+    ways = {item.robot: item.state[:, :2] for item in plan.trajectories}
+    violations = []
+    for found in crowded_stations(scene, ways):
+        one, other = found.robots
+        shared_s = (found.end - found.first) * plan.dt_s
+        message = (
+            f"is at {found.station} for {shared_s:.3g} s together with {other}; it is "
+            "for one robot at a time"
+        )
+        violations.append(
+            violation_at(
+                plan.trajectory(one),
+                found.first,
+                ViolationKind.OCCUPIED,
+                message,
+                amount=shared_s,
+                other=found.station,
+            )
+        )
     return violations
 
 

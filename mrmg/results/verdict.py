@@ -28,6 +28,7 @@ class ViolationKind(Enum):
     OBSTACLE = "obstacle"
     BOUNDS = "bounds"
     ROBOT = "robot"
+    OCCUPIED = "occupied"
     GOAL_MISSED = "goal_missed"
     DWELL = "dwell"
     TOUR = "tour"
@@ -51,6 +52,7 @@ class ViolationKind(Enum):
             ViolationKind.OBSTACLE: "m^2",
             ViolationKind.BOUNDS: "m",
             ViolationKind.ROBOT: "m^2",
+            ViolationKind.OCCUPIED: "s",
             ViolationKind.GOAL_MISSED: "m",
             ViolationKind.DWELL: "s",
             ViolationKind.TOUR: "m",

@@ -108,13 +108,13 @@ class Station:
         id: unique name.
         region: where it is.
         dwell_s: how long a robot must stay there without a break for a visit.
-        capacity: how many robots may be there at a time; None for any number.
+        one_at_a_time: whether the reference points of two robots must never be there.
     """
 
     id: str
     region: Region
     dwell_s: float = 0.0
-    capacity: int | None = None
+    one_at_a_time: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,13 +15,14 @@ from mrmg.planning._expansion_kernels import (
     choose_modes,
     draw_motion,
     expand,
-    note_arrivals,
     step_energy,
 )
 from mrmg.planning._groups_kernels import Tree, new_tree
 from mrmg.planning._mission_kernels import in_target
+from mrmg.planning._staying_kernels import note_arrivals
 from mrmg.planning._steering_kernels import BACK_OFF, RANDOM, STEER, WAIT
-from mrmg.planning.motion_tree import TARGET_MARGIN_M, Problem
+from mrmg.planning.motion_tree import Problem
+from mrmg.planning.targets import TARGET_MARGIN_M
 from mrmg.scene.types import Scene
 from mrmg.world.terrain import multiplier_at
 
@@ -206,7 +207,15 @@ def arrive(
     state = np.zeros((2, 5))
     state[:, :2] = points
     energy, visited = problem.start_energy.copy(), np.zeros(2, bool)
-    event = note_arrivals(problem.mission, state, energy, visited, np.array(target))
+    event = note_arrivals(
+        problem.mission,
+        state,
+        energy,
+        visited,
+        np.full(2, -1),
+        np.zeros(2),
+        np.array(target),
+    )
     return bool(event), visited, energy
 
 
@@ -252,6 +261,8 @@ def run(
         state,
         energy,
         np.zeros(2, bool),
+        np.full(2, -1),
+        np.zeros(2),
         np.array(target),
         np.array(mode),
         np.ones(2, np.int64),

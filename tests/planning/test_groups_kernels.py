@@ -75,7 +75,7 @@ def test_keys_are_equal_exactly_where_regions_and_goals_are(
         for _ in range(4000):
             state = rng.uniform(-spread_m, spread_m, (robots, 5))
             visited = rng.random(goals) < 0.3
-            key = int(group_key(state, visited, REGION_M))
+            key = int(group_key(state, visited, np.zeros(robots), REGION_M))
             assert key_of.setdefault(meaning(state, visited), key) == key
     assert len(set(key_of.values())) == len(key_of)
     assert len(key_of) > 100
@@ -85,12 +85,14 @@ def test_the_order_of_robots_counts() -> None:
     """Two robots that have changed places are in another group."""
     state = np.array([[1.0, 2.0, 0, 0, 0], [20.0, 30.0, 0, 0, 0]])
     visited = np.zeros(1, bool)
-    assert group_key(state, visited, 6.0) != group_key(state[::-1], visited, 6.0)
+    still = np.zeros(2)
+    turned = group_key(state[::-1], visited, still, 6.0)
+    assert group_key(state, visited, still, 6.0) != turned
 
 
 def test_a_region_holds_its_lower_edge_and_not_its_upper() -> None:
     keys = [
-        group_key(np.array([[x, 0.0, 0, 0, 0]]), np.zeros(0, bool), 6.0)
+        group_key(np.array([[x, 0.0, 0, 0, 0]]), np.zeros(0, bool), np.zeros(1), 6.0)
         for x in (-6.0, -0.001, 0.0, 5.999, 6.0)
     ]
     assert keys[0] == keys[1]

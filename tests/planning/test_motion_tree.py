@@ -17,9 +17,10 @@ from mrmg.planning import _groups_kernels, _tree_kernels
 from mrmg.planning._groups_kernels import Tree
 from mrmg.planning._mission_kernels import in_target
 from mrmg.planning._tree_kernels import Tours
-from mrmg.planning.motion_tree import TARGET_MARGIN_M, Problem, grow_tree
+from mrmg.planning.motion_tree import Problem, grow_tree
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.routing import Routing, solve_routing
+from mrmg.planning.targets import TARGET_MARGIN_M
 from mrmg.scene.types import Scene
 
 MakeScene = Callable[..., Scene]

@@ -13,9 +13,10 @@ import mrmg
 from mrmg.mission import Plan
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.band import visit_steps
-from mrmg.planning.motion_tree import TARGET_MARGIN_M, Problem
+from mrmg.planning.motion_tree import Problem
 from mrmg.planning.planner import state_mission
 from mrmg.planning.refine import refine, tour_numbers
+from mrmg.planning.targets import TARGET_MARGIN_M
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 

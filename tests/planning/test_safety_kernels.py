@@ -73,7 +73,7 @@ def crowd(yard: MakeScene, state: MakeProblem) -> Callable[..., Problem]:
 def committed(problem: Problem) -> Commitment:
     """Return the commitment of robots that stand at their start."""
     fleet = problem.mission.fleet
-    commitment = new_commitment(fleet, DT_S, True)
+    commitment = new_commitment(fleet, problem.mission.gates, DT_S, True)
     for r in range(len(fleet)):
         write_braking(fleet, r, problem.start[r], DT_S, commitment, 0)
     return commitment
@@ -217,7 +217,7 @@ def test_stopping_from_any_moment_is_safe_and_ends_at_rest(
         if n % 10:
             continue
         now = np.stack([present_state(commitment, r) for r in range(4)])
-        control = stop_all(fleet, now, DT_S)
+        control = stop_all(fleet, problem.mission.gates, now, DT_S)
         states = [now]
         for held in control:
             after = np.empty((4, 5))

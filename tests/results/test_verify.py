@@ -126,6 +126,19 @@ def broken_goal_missed(case: Any, drive: Any) -> Case:
     return case(goals=[{"id": "g", "circle": {"center": [15, 14], "radius": 1}}])
 
 
+def broken_dwell(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    return replace(scene, goals=(replace(scene.goals[0], dwell_s=900.0),)), plan
+
+
+def broken_occupied(case: Any, drive: Any) -> Case:
+    station = {"id": "s", "circle": {"center": [5, 12], "radius": 3}}
+    scene, plan = case(robots=TWO_ROBOTS, stations=[station])
+    return replace(
+        scene, stations=(replace(scene.stations[0], one_at_a_time=True),)
+    ), plan
+
+
 def broken_tour(case: Any, drive: Any) -> Case:
     scene, plan = case(stations=[STATION], tour=("s", "g"))
     return scene, replace(plan, tours={"r1": ("g", "s")})
@@ -166,6 +179,7 @@ FOLLOWING = {
     Kind.CONTROL_LIMIT: {Kind.VISIT, Kind.LEDGER},
     Kind.TOUR: {Kind.VISIT, Kind.LEDGER},
     Kind.GOAL_MISSED: {Kind.TOUR},
+    Kind.DWELL: {Kind.TOUR, Kind.VISIT, Kind.LEDGER},
     Kind.RECHARGE: {Kind.VISIT},
     Kind.ENERGY: {Kind.VISIT},
 }

@@ -12,6 +12,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import shapely
 from pydantic import BaseModel, ValidationError
 from shapely.geometry import Polygon
@@ -74,7 +75,12 @@ class Assembly:
             for entry, region in self._regions("goals")
         ]
         self.stations = [
-            Station(id=entry.id, region=region, dwell_s=entry.dwell or 0.0)
+            Station(
+                id=entry.id,
+                region=region,
+                dwell_s=entry.dwell or 0.0,
+                one_at_a_time=entry.capacity == 1,
+            )
             for entry, region in self._regions("stations")
         ]
         self._check_starts()
@@ -299,6 +305,14 @@ class Assembly:
             if shapes[first.id].intersects(shapes[second.id]):
                 message = f"{second.id} starts where {first.id} stands"
                 self._fault(f"{self.ids[second.id]}.pose", message)
+            for station in self.stations:
+                both = np.array([first.pose[:2], second.pose[:2]])
+                if station.one_at_a_time and (station.region.depth(both) >= 0.0).all():
+                    message = (
+                        f"{first.id} and {second.id} both start in {station.id}, which "
+                        "is for one robot at a time"
+                    )
+                    self._fault(f"{self.ids[second.id]}.pose", message)
 
 
 def _parsed(model: type[BaseModel], item: Any) -> Any:

@@ -46,6 +46,9 @@ Details:
 - A goal or station with `dwell` (s) counts as visited when the reference point of one
   robot has been in its region for that long without a break. Time counts towards one
   target of the robot's tour after the other.
+- A station with `capacity: 1` is for one robot at a time: at no time are the reference
+  points of two robots in its region, not even of one that only passes through. Without
+  it any number of robots may be there.
 - `charging_power` of a battery (W) is what stations fill it with, as long as the robot
   is at the station of its tour; what the robot itself draws meanwhile goes off. It may
   leave before the battery is full. Without it a battery is full on arrival.
@@ -147,6 +150,14 @@ class RegionEntry(Strict):
     polygon: Ring | None = Field(default=None, description=_RING)
     dwell: NotNegative | None = Field(
         default=None, description="time in s that a visit takes"
+    )
+
+
+class StationEntry(RegionEntry):
+    """A station."""
+
+    capacity: Literal[1] | None = Field(
+        default=None, description="1: for one robot at a time"
     )
 
 
@@ -292,7 +303,7 @@ class SceneDocument(Strict):
     terrain: list[TerrainEntry] = []
     elevation: ElevationEntry | None = None
     goals: list[RegionEntry] = []
-    stations: list[RegionEntry] = []
+    stations: list[StationEntry] = []
     battery: BatteryEntry = BatteryEntry()
     robots: list[RobotEntry] = []
 
@@ -301,7 +312,7 @@ SECTIONS: dict[str, type[Strict]] = {
     "obstacles": ObstacleEntry,
     "terrain": TerrainEntry,
     "goals": RegionEntry,
-    "stations": RegionEntry,
+    "stations": StationEntry,
     "robots": RobotEntry,
 }
 """The lists of a scene file and the model of their entries."""
