@@ -279,7 +279,8 @@ def test_battery_falls_by_the_draw_and_is_full_after_the_station(scene: Scene) -
 
 
 def test_battery_never_holds_more_than_its_capacity(scene: Scene) -> None:
-    content_J, _ = battery_content(scene, "r", np.array([-50.0, 20.0, -50.0]), [])
+    still = LoggedMotion(robot="r", time_s=np.arange(4.0), state=np.zeros((4, 5)))
+    content_J, _ = battery_content(scene, still, np.array([-50.0, 20.0, -50.0]), [])
     assert content_J.tolist() == [30000.0, 30000.0, 29980.0, 30000.0]
 
 

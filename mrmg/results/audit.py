@@ -34,7 +34,7 @@ from mrmg.ledger import EnergyLedger, LedgerEntry
 from mrmg.mission import Plan, Visit
 from mrmg.results.energy_audit import EnergyAudit, RobotAudit, SimulatedVisit
 from mrmg.scene.types import Robot, Scene
-from mrmg.visiting import first_stay
+from mrmg.visiting import crowded_stations, first_stay
 
 _TROUBLE = {
     "lost": "a robot was too far from its plan",
@@ -98,6 +98,7 @@ def audit(scene: Scene, plan: Plan, log: ExecutionLog) -> EnergyAudit:
         "ended": _given_up(log, missed=len(goals_visited) < len(scene.goals)),
         "goal missed": _goals_missed(scene, goals_visited),
         "contact": _contacts(log),
+        "station shared": _crowded(scene, log),
         "below reserve": _below_reserve(scene, measured),
         "battery empty": _ran_empty(measured),
     }
@@ -248,6 +249,15 @@ def _goals_missed(scene: Scene, visited: tuple[str, ...]) -> list[str]:
         f"goal {goal.id} was visited by no robot"
         for goal in scene.goals
         if goal.id not in visited
+    ]
+
+
+def _crowded(scene: Scene, log: ExecutionLog) -> list[str]:
+    ways = dict(zip(log.robots, log.state[:, :, :2], strict=True))
+    return [
+        f"{' and '.join(found.robots)} were both at {found.station} at "
+        f"{log.time_s[found.first]:.1f} s, which is for one robot at a time"
+        for found in crowded_stations(scene, ways)
     ]
 
 

@@ -70,10 +70,10 @@ class EnergyAudit:
         reasons: why not, one sentence each.
         causes: the kinds of these reasons: why the simulation was given up
             (`ExecutionLog.gave_up`), "ended" by mission control, "goal missed",
-            "contact", "below reserve", "battery empty".
+            "contact", "station shared", "below reserve", "battery empty".
         robots: one account per robot, in the scene's order.
         visits: of tours' targets in the simulation, in order of time.
-        goals_visited: ids of the goals some robot entered, in the scene's order.
+        goals_visited: ids of the goals some robot visited, in the scene's order.
         planned, metered, measured: ledgers by robot, leg and part; the legs of the
             last two end where the simulation visits the target.
     """
