@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from mrmg import shipped
+from mrmg.results.robustness import Study, Trial
 from mrmg.scene.loading.models import load_model
 
 TOOL = Path(__file__).parents[2] / "tools" / "bench_physics.py"
@@ -91,6 +92,32 @@ def test_medians_count_where_figures_are_of_the_median(
 def test_larger_fleets_may_be_slower(bench: ModuleType) -> None:
     assert bench.faults_of([row(fleet=8, realtime=13.0)]) == []
     assert bench.faults_of([row(fleet=3, realtime=13.0)]) == []
+
+
+def study(feasible: int, trials: int) -> Study:
+    """Trials of which the first so many are feasible."""
+    blank = dict.fromkeys(Trial.__dataclass_fields__, 0)
+    return Study(
+        options={},
+        trials=tuple(
+            Trial(**{**blank, "seed": seed, "feasible": seed < feasible})
+            for seed in range(trials)
+        ),
+    )
+
+
+def test_the_gain_by_replanning_is_that_over_all_scenes(bench: ModuleType) -> None:
+    carried, failing, saved = study(10, 10), study(5, 10), study(9, 10)
+    assert bench.share([carried, failing]) == 0.75
+    assert bench.gain_faults([carried, failing], [carried, saved]) == []
+    assert bench.gain_faults([carried, carried], [carried, saved]) == [
+        "-5% by replanning"
+    ]
+
+
+def test_seeds_are_read(bench: ModuleType) -> None:
+    assert bench.seeds_of("2-4") == range(2, 5)
+    assert bench.seeds_of("7") == range(7, 8)
 
 
 def test_a_mission_without_plan_is_told_and_breaks_nothing(bench: ModuleType) -> None:
