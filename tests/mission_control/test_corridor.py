@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -44,9 +44,14 @@ class Way:
         """
         corridor = EnergyCorridor(self.course, ControlParams())
         corridor.follow(self.course, 0, {}, reserves)
-        meter = RobotMeter(self.scene, self.scene.robot("r1"))
-        meter.used_J = more * SPEED_M_S * clock_s * self.metre_J
-        meter.charge_J = start_m * self.metre_J - meter.used_J
+        robot = self.scene.robot("r1")
+        battery = replace(robot.battery, start_J=start_m * self.metre_J)
+        meter = RobotMeter(self.scene, replace(robot, battery=battery))
+        still = np.zeros((2, 5))
+        work_J = meter.robot.model.energy_model.drive_efficiency * (
+            more * SPEED_M_S * clock_s * self.metre_J
+        )
+        meter.add(np.array([0.0, 1.0]), still, np.array([[work_J, 0.0]]))
         return corridor.left(clock_s, {"r1": meter})
 
     def first_departure_s(
