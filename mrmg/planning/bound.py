@@ -5,6 +5,9 @@ energy of that is at least the rolling resistance on the shortest ways (`geodesi
 a robot that starts and ends at rest gets no inertia for nothing, and turning, idling
 and other robots only cost more. The least over all orders is the bound.
 
+Up to MOST_GOALS goals, orders are told apart by where each region is touched first
+(`touring`), as the way through a region is no more for nothing than any other.
+
 On slopes the battery also pays for climbing and is paid for rolling down, at most what
 that is worth without losses (`slopes.climb_J`). Along a way this adds up to the
 difference of heights between its ends, so the bound of flat ground less the descent
@@ -18,6 +21,7 @@ turns round, the way back is not charged; that is worth less than 0.01 mm.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -25,9 +29,11 @@ from shapely.geometry import Point
 
 from mrmg.planning import _bound_kernels
 from mrmg.planning._nrpa_kernels import RoutingArrays
-from mrmg.planning.geodesic import Ground, least_ways_m
+from mrmg.planning.arcs import ArcWays
+from mrmg.planning.geodesic import Ground, Ways
 from mrmg.planning.routing import Routing, routing_arrays
 from mrmg.planning.slopes import climb_J, height_span_m
+from mrmg.planning.touring import touring_bound_J
 from mrmg.scene.types import Robot, Scene
 
 MOST_GOALS = 14
@@ -36,11 +42,20 @@ MOST_GOALS = 14
 MOST_LABELS = 3_000_000
 """Labels per robot up to which tours are exact."""
 
-CELLS = 60_000
+CELLS = 30_000
 """Cells of the grid on which ways are bounded."""
 
 SPANNING_ROUNDS = 400
 """Changes of the prices in the bound of missions with more goals."""
+
+FINER = 3
+"""Parts into which cells are cut where ways are tightened."""
+
+ROUNDS = 20
+"""Times that the ways of the cheapest tours are tightened at most."""
+
+TravelKey = tuple[tuple[str, ...], float, float]
+"""What the ways of a robot depend on: obstacles, inscribed radius, top speed."""
 
 ROUNDING_SHARE = 1e-9
 """What rounding may add to a bound; taken off."""
@@ -137,7 +152,9 @@ def _station_closure(problem: RoutingArrays, r: int) -> tuple[np.ndarray, np.nda
     return np.ascontiguousarray(hop), follower
 
 
-def lower_bound_J(scene: Scene, *, step_s: float = 0.1, cells: int = CELLS) -> float:
+def lower_bound_J(
+    scene: Scene, *, step_s: float = 0.1, cells: int = CELLS, rounds: int = ROUNDS
+) -> float:
     """Return an energy [J] that no plan of a mission undercuts.
 
     Args:
@@ -145,59 +162,108 @@ def lower_bound_J(scene: Scene, *, step_s: float = 0.1, cells: int = CELLS) -> f
         step_s: time step of the plans.
         cells: cells of the grid on which ways are bounded; more bring the bound nearer
             to the truth.
+        rounds: how often the ways of the cheapest tours are tightened; as `cells`.
 
     Returns:
         The bound, at least 0; inf if the mission is proven to have no solution.
     """
     if not scene.goals:
         return 0.0
-    problem = relaxed_problem(scene, step_s=step_s, cells=cells)
-    routing = exact_routing(problem)
-    bound = relaxed_routing_J(problem) if routing is None else routing.cost_J
+    relaxed = Relaxation.of(scene, step_s=step_s, cells=cells)
+    routing = exact_routing(relaxed.problem)
+    if routing is None:
+        bound = relaxed_routing_J(relaxed.problem)
+    elif routing.feasible and rounds:
+        ways = relaxed.arc_ways()
+        bound = touring_bound_J(
+            relaxed.problem, routing.tours, ways, relaxed.price, rounds=rounds
+        )
+        bound = max(bound, routing.cost_J)
+    else:
+        bound = routing.cost_J
     bound -= sum(_most_descent_J(scene, robot) for robot in scene.robots)
     return max(0.0, bound) * (1.0 - ROUNDING_SHARE)
 
 
-def relaxed_problem(
-    scene: Scene, *, step_s: float = 0.1, cells: int = CELLS
-) -> RoutingArrays:
-    """Return the routing problem in which every leg costs at most what it must.
+@dataclass(frozen=True)
+class Relaxation:
+    """A mission in which every leg costs at most what it must.
 
-    Between recharges a robot may bring kinetic energy along and use its height, which
-    is added to its capacity and to its energy at the start.
+    Attributes:
+        scene, step_s: the mission and the time step of its plans.
+        problem: with the least ways from region to region.
+        keys: what the ways of each robot depend on.
+        ways: by key.
+        price: energy of a metre of plain ground of each robot [J/m], shape (R,).
     """
-    x_min, y_min, x_max, y_max = scene.bounds
-    cell_m = math.sqrt((x_max - x_min) * (y_max - y_min) / cells)
-    regions = [target.region for target in scene.targets()]
-    starts = np.array([robot.pose[:2] for robot in scene.robots])
-    keys = [_travel_key(scene, robot) for robot in scene.robots]
-    ways = {}
-    for key, robot in zip(keys, scene.robots, strict=True):
-        if key not in ways:
-            step_m = _top_speed_m_s(robot) * step_s
-            ground = Ground.of(scene, robot, cell_m=cell_m, step_m=step_m)
-            ways[key] = least_ways_m(ground, regions, starts)
-    batteries = [robot.battery for robot in scene.robots]
-    descents = [_descents_J(scene, robot) for robot in scene.robots]
-    capacity_J = [
-        robot.battery.capacity_J + _most_kinetic_J(robot) + from_top_J
-        for robot, (_, from_top_J) in zip(scene.robots, descents, strict=True)
-    ]
-    energy_J = [
-        battery.start_J + from_start_J
-        for battery, (from_start_J, _) in zip(batteries, descents, strict=True)
-    ]
-    return routing_arrays(
-        goals=len(scene.goals),
-        distance=np.stack([ways[key][0] for key in keys]),
-        start_distance=np.stack([ways[key][1][r] for r, key in enumerate(keys)]),
-        plain=np.array(
-            [r.model.energy_model.plain_ground_J_per_m() for r in scene.robots]
-        ),
-        energy=np.array(energy_J),
-        capacity=np.array(capacity_J),
-        reserve=np.array([battery.reserve_J - 1e-3 for battery in batteries]),
-    )
+
+    scene: Scene
+    step_s: float
+    problem: RoutingArrays
+    keys: list[TravelKey]
+    ways: dict[TravelKey, Ways]
+    price: np.ndarray
+
+    @staticmethod
+    def of(scene: Scene, *, step_s: float = 0.1, cells: int = CELLS) -> Relaxation:
+        """Relax a mission.
+
+        Between recharges a robot may bring kinetic energy along and use its height,
+        which is added to its capacity and to its energy at the start.
+        """
+        x_min, y_min, x_max, y_max = scene.bounds
+        cell_m = math.sqrt((x_max - x_min) * (y_max - y_min) / cells)
+        regions = [target.region for target in scene.targets()]
+        starts = _starts(scene)
+        keys = [_travel_key(scene, robot) for robot in scene.robots]
+        ways = {}
+        for key, robot in zip(keys, scene.robots, strict=True):
+            if key not in ways:
+                ground = _ground(scene, robot, cell_m, step_s)
+                ways[key] = Ways.of(ground, regions, starts)
+        batteries = [robot.battery for robot in scene.robots]
+        descents = [_descents_J(scene, robot) for robot in scene.robots]
+        capacity_J = [
+            robot.battery.capacity_J + _most_kinetic_J(robot) + from_top_J
+            for robot, (_, from_top_J) in zip(scene.robots, descents, strict=True)
+        ]
+        energy_J = [
+            battery.start_J + from_start_J
+            for battery, (from_start_J, _) in zip(batteries, descents, strict=True)
+        ]
+        price = [r.model.energy_model.plain_ground_J_per_m() for r in scene.robots]
+        problem = routing_arrays(
+            goals=len(scene.goals),
+            distance=np.stack([ways[key].between for key in keys]),
+            start_distance=np.stack(
+                [ways[key].from_start[r] for r, key in enumerate(keys)]
+            ),
+            plain=np.array(price),
+            energy=np.array(energy_J),
+            capacity=np.array(capacity_J),
+            reserve=np.array([battery.reserve_J - 1e-3 for battery in batteries]),
+        )
+        return Relaxation(scene, step_s, problem, keys, ways, np.array(price))
+
+    def arc_ways(self) -> list[ArcWays]:
+        """Return the ways of each robot between arcs; robots share what is equal."""
+        found = {}
+        for key, robot in zip(self.keys, self.scene.robots, strict=True):
+            if key not in found:
+                ways = self.ways[key]
+                cell_m = ways.ground.cell_m / FINER
+                fine = _ground(self.scene, robot, cell_m, self.step_s)
+                found[key] = ArcWays.of(ways, fine, _starts(self.scene))
+        return [found[key] for key in self.keys]
+
+
+def _starts(scene: Scene) -> np.ndarray:
+    return np.array([robot.pose[:2] for robot in scene.robots])
+
+
+def _ground(scene: Scene, robot: Robot, cell_m: float, step_s: float) -> Ground:
+    step_m = _top_speed_m_s(robot) * step_s
+    return Ground.of(scene, robot, cell_m=cell_m, step_m=step_m)
 
 
 def _most_descent_J(scene: Scene, robot: Robot) -> float:
@@ -224,7 +290,7 @@ def _descents_J(scene: Scene, robot: Robot) -> tuple[float, float]:
     return climb_J(robot, start_m - low_m), climb_J(robot, high_m - low_m)
 
 
-def _travel_key(scene: Scene, robot: Robot) -> tuple[object, ...]:
+def _travel_key(scene: Scene, robot: Robot) -> TravelKey:
     """Return what the ways of a robot depend on."""
     obstacles = tuple(o.id for o in scene.obstacles if o.stops(robot.id))
     return obstacles, robot.model.inscribed_radius_m, _top_speed_m_s(robot)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -18,6 +18,7 @@ from shapely.geometry import Point
 
 from mrmg.planning import _bound_kernels
 from mrmg.planning._bound_kernels import UNREACHED
+from mrmg.planning.prices import least_prices
 from mrmg.scene.types import Region, Robot, Scene
 
 ROUNDS = 4
@@ -35,8 +36,28 @@ ROUND_MARGIN = 1.02
 SPACING_M = 0.04
 """Distance of the points that stand for a region's border."""
 
+ARCS = 32
+"""Arcs into which borders are cut."""
+
 SEED_SHARE = 0.95
 """Steepness of a field next to its source, as a share of the price there."""
+
+
+class Look(NamedTuple):
+    """How values at points follow from those at nodes.
+
+    Attributes:
+        point: which of them, as each is looked at from several cells, shape (n,).
+        nodes, weights: flat indices and bilinear weights, shape (n, 4).
+        slack: how much a certified field can differ within reach, shape (n,).
+        arc: which of ARCS equal runs of points each belongs to, shape (n,).
+    """
+
+    point: np.ndarray
+    nodes: np.ndarray
+    weights: np.ndarray
+    slack: np.ndarray
+    arc: np.ndarray
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,9 +74,15 @@ class Field:
     level: np.ndarray
     certified: np.ndarray
 
-    def at(self, nodes: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """Return f(u) where u has the given nodes and weights, shape (n, 4) -> (n,)."""
-        raw = (self.values[nodes] * weights).sum(axis=1)
+    def at(self, look: Look) -> np.ndarray:
+        """Return f(u) at points, shape (n,)."""
+        return self._certified((self.values[look.nodes] * look.weights).sum(axis=1))
+
+    def at_nodes(self) -> np.ndarray:
+        """Return f(u) at all nodes, flat."""
+        return self._certified(self.values)
+
+    def _certified(self, raw: np.ndarray) -> np.ndarray:
         certified = np.interp(raw, self.level, self.certified)
         return np.where(raw < 0.5 * UNREACHED, certified, UNREACHED)
 
@@ -69,14 +96,12 @@ class Ground:
         cell_m: side of a cell.
         price: least multiplier within half a planning step of each cell, inf where the
             reference point cannot be, shape (Y, X).
-        blocked: where the reference point cannot be.
     """
 
     x_min: float
     y_min: float
     cell_m: float
     price: np.ndarray
-    blocked: shapely.Geometry
 
     @staticmethod
     def of(scene: Scene, robot: Robot, *, cell_m: float, step_m: float) -> Ground:
@@ -92,26 +117,26 @@ class Ground:
         radius = max(0.0, robot.model.inscribed_radius_m - CLEARANCE_TOLERANCE_M)
         shapes = [o.shape for o in scene.obstacles if o.stops(robot.id)]
         blocked = shapely.union_all(shapes).buffer(radius)
-        x_min, y_min, x_max, y_max = scene.bounds
-        x = np.arange(x_min, x_max, cell_m)
-        y = np.arange(y_min, y_max, cell_m)
-        low_x, low_y = np.meshgrid(x, y)
-        boxes = shapely.box(low_x, low_y, low_x + cell_m, low_y + cell_m)
-        price = _least_multiplier(scene, boxes, ROUND_MARGIN * 0.5 * step_m)
-        price[_covered(blocked, boxes)] = np.inf
-        return Ground(float(x_min), float(y_min), cell_m, price, blocked)
+        price = least_prices(
+            scene, blocked, cell_m=cell_m, reach_m=ROUND_MARGIN * 0.5 * step_m
+        )
+        x_min, y_min, _, _ = scene.bounds
+        return Ground(float(x_min), float(y_min), cell_m, price)
 
-    def weights_at(
-        self, points: np.ndarray, reach_m: float
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def part(self, rows: slice, columns: slice) -> Ground:
+        """Return the ground of a block of cells."""
+        return Ground(
+            x_min=self.x_min + columns.start * self.cell_m,
+            y_min=self.y_min + rows.start * self.cell_m,
+            cell_m=self.cell_m,
+            price=np.ascontiguousarray(self.price[rows, columns]),
+        )
+
+    def look_at(self, points: np.ndarray, reach_m: float) -> Look:
         """Return how a field's values at points follow from its nodes.
 
         A point stands for all free points within `reach_m`; it is looked at from every
         free cell that near, at that cell's nearest point.
-
-        Returns:
-            (nodes, weights, slack): flat indices and bilinear weights, shape (n, 4),
-            and how much a certified field can differ within reach, shape (n,).
         """
         rows, columns = self.price.shape
         place = (points - (self.x_min, self.y_min)) / self.cell_m
@@ -136,117 +161,154 @@ class Ground:
         weights = np.stack(
             [(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy], axis=1
         )
-        return nodes, weights, self.price[row, column] * reach_m
+        arc = index * ARCS // max(ARCS, len(points))
+        slack = self.price[row, column] * reach_m
+        return Look(index, nodes, weights, slack, arc)
 
     def field_from(self, region: Region) -> Field:
         """Return a certified field that grows away from a region."""
-        rows, columns = self.price.shape
-        y, x = np.mgrid[0 : rows + 1, 0 : columns + 1] * self.cell_m
-        points = np.stack([x + self.x_min, y + self.y_min], axis=-1).reshape(-1, 2)
-        away = -region.depth(points).reshape(y.shape)
+        points = self.nodes()
+        away = -region.depth(points.reshape(-1, 2)).reshape(points.shape[:2])
         band = np.sqrt(2.0) * self.cell_m
         near = away <= band
+        share = SEED_SHARE * self.least_price(near)
+        return self.field(np.where(near, share * np.maximum(away, -band), UNREACHED))
+
+    def wave_from(self, region: Region, heading: np.ndarray) -> Field | None:
+        """Return a certified field that is a plane wave in a region and spreads on.
+
+        It is the better a bound the more nearly ways leave with that heading, and tells
+        apart what parts of the region's border they leave from.
+
+        Args:
+            region: the source.
+            heading: unit vector, shape (2,).
+
+        Returns:
+            The field; None if the region is too small for the cells.
+        """
+        points = self.nodes()
+        inside = region.depth(points.reshape(-1, 2)).reshape(points.shape[:2]) >= 0.0
+        if not inside.any():
+            return None
+        share = self.least_price(inside)
+        along = share * ((points - region.center) @ heading)
+        return self.field(np.where(inside, along, UNREACHED))
+
+    def nodes(self) -> np.ndarray:
+        """Return the corners of all cells, shape (Y + 1, X + 1, 2)."""
+        rows, columns = self.price.shape
+        y, x = np.mgrid[0 : rows + 1, 0 : columns + 1] * self.cell_m
+        return np.stack([x + self.x_min, y + self.y_min], axis=-1)
+
+    def least_price(self, near: np.ndarray) -> float:
+        """Return the least price of cells with a corner among the given nodes."""
         touching = near[:-1, :-1] | near[1:, :-1] | near[:-1, 1:] | near[1:, 1:]
         prices = self.price[touching & np.isfinite(self.price)]
-        share = SEED_SHARE * prices.min() if prices.size else 1.0
-        seed = np.where(near, share * np.maximum(away, -band), UNREACHED)
+        return float(prices.min()) if prices.size else 1.0
+
+    def field(self, seed: np.ndarray) -> Field:
+        """Return the certified field that spreads from seeds."""
         values, level, certified = _bound_kernels.certified_field(
             self.price, self.cell_m, seed, ROUNDS, BAND_SHARE * self.cell_m
         )
         return Field(values.reshape(-1), level, certified)
 
 
-def _least_multiplier(scene: Scene, boxes: np.ndarray, reach_m: float) -> np.ndarray:
-    """Return the least multiplier within reach of each cell."""
-    price = np.ones(boxes.shape)
-    for area in scene.terrain:
-        near, sure = area.shape.buffer(reach_m), area.shape.buffer(-reach_m)
-        shapely.prepare(near)
-        touched = shapely.intersects(near, boxes)
-        inside = _covered(sure, boxes)
-        price[touched] = np.minimum(price[touched], area.multiplier)
-        price[inside] = area.multiplier
-    return price
-
-
-def _covered(shape: shapely.Geometry, boxes: np.ndarray) -> np.ndarray:
-    """Return which cells lie wholly in a shape."""
-    shapely.prepare(shape)
-    covered = np.zeros(boxes.shape, bool)
-    centre = shapely.centroid(boxes)
-    likely = shapely.contains_xy(shape, shapely.get_x(centre), shapely.get_y(centre))
-    covered[likely] = shapely.covers(shape, boxes[likely])
-    return covered
-
-
-def least_ways_m(
-    ground: Ground, regions: Sequence[Region], starts: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return lower bounds of the weighted length of ways between regions.
+@dataclass(frozen=True, slots=True)
+class Ways:
+    """Lower bounds of the weighted length of ways between regions [m of plain ground].
 
     A way between regions that do not overlap leads from the border of one to the border
     of the other.
 
-    Args:
+    Attributes:
         ground: prices of driving.
         regions: T convex sets.
-        starts: positions [m], shape (R, 2).
-
-    Returns:
-        From region to region [m of plain ground], shape (T, T), and from start to
-        region, shape (R, T); inf where obstacles leave no way.
+        fields: one from each region.
+        looks: at each region's border, `border` points of it.
+        highest: bound of each region's own field on its border, shape (T,).
+        between: from region to region, shape (T, T).
+        from_start: from start to region, shape (R, T); inf where there is no way.
     """
-    fields = [ground.field_from(region) for region in regions]
-    borders = [_border(region) for region in regions]
-    looks = [ground.weights_at(points, 0.5 * SPACING_M) for points in borders]
-    floor = float(np.min(ground.price, initial=1.0))
-    way = np.zeros((len(regions), len(regions)))
-    for i, field in enumerate(fields):
-        highest = _extreme(field, looks[i], np.max)
-        for j in range(len(regions)):
-            apart = _distance_m(regions[i], regions[j])
-            if apart > 0.0:
-                certified = _extreme(field, looks[j], np.min) - highest
-                way[i, j] = max(certified, floor * apart, 0.0)
-    way = np.maximum(way, way.T)
-    start_way = np.zeros((len(starts), len(regions)))
-    for r, start in enumerate(starts):
-        look = ground.weights_at(start[None], 0.0)
+
+    ground: Ground
+    regions: Sequence[Region]
+    fields: list[Field]
+    looks: list[Look]
+    highest: np.ndarray
+    between: np.ndarray
+    from_start: np.ndarray
+
+    @staticmethod
+    def of(ground: Ground, regions: Sequence[Region], starts: np.ndarray) -> Ways:
+        """Bound all ways between regions, and from starts (R, 2) to regions."""
+        fields = [ground.field_from(region) for region in regions]
+        looks = [ground.look_at(border(one), 0.5 * SPACING_M) for one in regions]
+        highest = np.array(
+            [highest_of(*pair) for pair in zip(fields, looks, strict=True)]
+        )
+        floor = float(np.min(ground.price, initial=1.0))
+        way = np.zeros((len(regions), len(regions)))
         for i, field in enumerate(fields):
-            apart = float(-regions[i].depth(start)[0])
-            if apart > 0.0:
-                highest = _extreme(field, looks[i], np.max)
-                certified = _extreme(field, look, np.min) - highest
-                start_way[r, i] = max(certified, floor * apart, 0.0)
-    for table in (way, start_way):
-        table[table > 0.5 * UNREACHED] = np.inf
-    return way, start_way
+            for j in range(len(regions)):
+                apart = distance_m(regions[i], regions[j])
+                if apart > 0.0:
+                    certified = lowest_of(field, looks[j]) - highest[i]
+                    way[i, j] = max(certified, floor * apart, 0.0)
+        way = np.maximum(way, way.T)
+        start_way = np.zeros((len(starts), len(regions)))
+        for r, start in enumerate(starts):
+            look = ground.look_at(start[None], 0.0)
+            for i, field in enumerate(fields):
+                apart = float(-regions[i].depth(start)[0])
+                if apart > 0.0:
+                    certified = lowest_of(field, look) - highest[i]
+                    start_way[r, i] = max(certified, floor * apart, 0.0)
+        for table in (way, start_way):
+            table[table > 0.5 * UNREACHED] = np.inf
+        return Ways(ground, regions, fields, looks, highest, way, start_way)
 
 
-def _extreme(field: Field, look: tuple[np.ndarray, ...], of: Any) -> float:
-    """Return a bound of the least or greatest value of a field over a border."""
-    nodes, weights, slack = look
-    if not len(nodes):  # no free point: nothing gets there
-        return UNREACHED if of is np.min else 0.0
-    value = field.at(nodes, weights)
-    if of is np.max:
-        value = value[value < 0.5 * UNREACHED] + slack[value < 0.5 * UNREACHED]
-        return float(value.max(initial=-UNREACHED)) if len(value) else 0.0
-    return float((value - slack).min())
+def lowest_of(field: Field, look: Look) -> float:
+    """Return a bound of the least value of a field over a border."""
+    return float((field.at(look) - look.slack).min(initial=UNREACHED))
 
 
-def _border(region: Region) -> np.ndarray:
-    """Return points on a region's border, SPACING_M apart at most."""
+def highest_of(field: Field, look: Look) -> float:
+    """Return a bound of the greatest value of a field over a border, if reached."""
+    value = field.at(look)
+    reached = value < 0.5 * UNREACHED
+    if not reached.any():  # no free point: nothing gets there
+        return 0.0
+    return float((value + look.slack)[reached].max())
+
+
+def border(region: Region) -> np.ndarray:
+    """Return points on a region's border, SPACING_M apart at most.
+
+    They lie in the middles of equal parts, whose number is a multiple of ARCS.
+    """
     if len(region.corners):
-        ring = shapely.segmentize(region.shape.exterior, SPACING_M)
-        return np.asarray(shapely.get_coordinates(ring))
-    count = max(8, int(np.ceil(2.0 * np.pi * region.radius_m / SPACING_M)))
-    angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+        ring = region.shape.exterior
+        share = _middles(ring.length)
+        return np.asarray(
+            shapely.get_coordinates(
+                shapely.line_interpolate_point(ring, share, normalized=True)
+            )
+        )
+    angle = 2.0 * np.pi * _middles(2.0 * np.pi * region.radius_m)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     return np.asarray(region.center + region.radius_m * ring)
 
 
-def _distance_m(first: Region, second: Region) -> float:
+def _middles(length_m: float) -> np.ndarray:
+    """Return the middles of equal parts of a border, as shares of its length."""
+    count = ARCS * max(1, int(np.ceil(length_m / SPACING_M / ARCS)))
+    return (np.arange(count) + 0.5) / count
+
+
+def distance_m(first: Region, second: Region) -> float:
     """Return the distance of two regions; not positive if they overlap."""
     cores = [
         region.shape if len(region.corners) else Point(*region.center)

@@ -16,9 +16,9 @@ from mrmg.planning._bound_kernels import UNREACHED, certified_field
 from mrmg.planning._nrpa_kernels import RoutingArrays
 from mrmg.planning.bound import (
     MOST_GOALS,
+    Relaxation,
     exact_routing,
     lower_bound_J,
-    relaxed_problem,
     relaxed_routing_J,
 )
 from mrmg.planning.routing import RouterParams, Routing, routing_arrays, solve_routing
@@ -198,7 +198,7 @@ def test_a_field_is_never_steeper_than_the_price(seed: int) -> None:
 
 def way_m(scene: Scene, **options: Any) -> float:
     """Return the bound of the way from the first robot to the first goal [m]."""
-    problem = relaxed_problem(scene, **options)
+    problem = Relaxation.of(scene, **options).problem
     joules = scene.robots[0].model.energy_model.plain_ground_J_per_m()
     return float(problem.cost[0, -1, 0]) / joules
 
