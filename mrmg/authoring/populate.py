@@ -31,7 +31,9 @@ _MARGINS_M = (1.3, 0.9, 0.6, 0.4)
 _LEAST_SHARE = 0.4
 """Share of the free ground that must hang together, or the map is too narrow."""
 
-_CANDIDATES = 150
+_LEAST_CANDIDATES = 150
+_CANDIDATES_PER_PLACE = 1.5
+"""More candidates than are wanted leave a choice."""
 
 
 def populate(
@@ -79,8 +81,9 @@ def populate(
     robot_model, _ = load_model(shipped.models_folder() / model)
     rng = stream(seed, "populate")
     ground = _drivable(scene, robot_model)
-    places = _candidates(ground, robot_model, rng)
     wanted = robots + goals + stations
+    count = max(_LEAST_CANDIDATES, math.ceil(_CANDIDATES_PER_PLACE * wanted))
+    places = _candidates(ground, robot_model, count, rng)
     if len(places) < wanted:
         message = (
             f"the map has room for {len(places)} places at most, {wanted} are wanted; "
@@ -130,9 +133,9 @@ def _largest(ground: Ground) -> np.ndarray:
 
 
 def _candidates(
-    ground: Ground, model: RobotModel, rng: np.random.Generator
+    ground: Ground, model: RobotModel, count: int, rng: np.random.Generator
 ) -> list[int]:
-    """Return grid points that are spread over the ground and good to stop at.
+    """Return up to `count` grid points, spread over the ground and good to stop at.
 
     Wanted is room about the point, and a wide place to turn round not far away by road.
     """
@@ -147,13 +150,18 @@ def _candidates(
         good = np.flatnonzero(turnable & (ground.clearance_m >= clearance_m))
         if len(good) >= 0.25 * connected.sum():
             break
-    spacing_m = math.sqrt(len(good) * ground.cell_m**2 / _CANDIDATES) * 0.8
+    # Many places must not crowd until goals overlap, nor be sparser than few are.
+    spacing_m, sparse_m = (
+        math.sqrt(len(good) * ground.cell_m**2 / number) * 0.8
+        for number in (count, _LEAST_CANDIDATES)
+    )
+    spacing_m = max(spacing_m, min(sparse_m, 2.0 * GOAL_RADIUS_M))
     chosen: list[int] = []
     for index in rng.permutation(good):
         gap = ground.points_m[chosen] - ground.points_m[index]
         if not chosen or (np.hypot(gap[:, 0], gap[:, 1]) >= spacing_m).all():
             chosen.append(int(index))
-        if len(chosen) == _CANDIDATES:
+        if len(chosen) == count:
             break
     return chosen
 

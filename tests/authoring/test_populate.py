@@ -120,6 +120,10 @@ def test_seeds(seed: int) -> None:
     assert document == populate(FIELD, goals=6, stations=3, seed=seed)
 
 
+def test_large_fleet() -> None:
+    check_mission(populate(FIELD, robots=8, goals=120, stations=30), 8, 120)
+
+
 def test_seeds_differ() -> None:
     documents = [populate(FIELD, goals=6, stations=3, seed=seed) for seed in range(3)]
     assert len({str(document["goals"]) for document in documents}) == 3
