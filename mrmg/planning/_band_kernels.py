@@ -153,7 +153,17 @@ def add_terrain_and_clearance(surface, p, gear, gradient):
         )
         # A cost per metre times the length of the segment: density and its gradient.
         density, gx, gy, across = k, kx, ky, 0.0
-        for j in range(len(surface.disc)):
+        middle = 0.5 * (surface.disc[0] + surface.disc[-1]) * gear[i]
+        free, _, _ = value_and_slope(
+            surface.distance,
+            surface.x_min,
+            surface.y_min,
+            surface.cell,
+            mx + middle * tx,
+            my + middle * ty,
+        )
+        wide = free > surface.room + surface.disc[-1] - surface.disc[0]
+        for j in range(0 if wide else len(surface.disc)):
             ahead = surface.disc[j] * gear[i]
             free, fx, fy = value_and_slope(
                 surface.distance,
@@ -200,10 +210,11 @@ def write_turns(p, gear, ux, uy, shape):
 
 
 @leaf_kernel
-def bending_cost(surface, gear, shape):
+def bending_cost(surface, gear, pivot, shape):
     """Return the cost of turning, of too much curvature and of its changes.
 
-    Writes its derivatives by turn and size.
+    Turns on the spot (`pivot`) have no curvature. Writes the cost's derivatives by turn
+    and size.
     """
     total = 0.0
     n = len(shape.turn)
@@ -214,6 +225,8 @@ def bending_cost(surface, gear, shape):
         total += surface.scrub * (rounded - SOFT_TURN)
         shape.d_turn[i] = surface.scrub * shape.turn[i] / rounded
     for i in range(n):
+        if pivot[i]:
+            continue
         at = max(i - 1, 0)
         sharp = abs(shape.bend[i]) / surface.curvature - 1.0
         if sharp > 0.0:
@@ -222,7 +235,7 @@ def bending_cost(surface, gear, shape):
             shape.d_bend[i] += slope if shape.bend[i] > 0.0 else -slope
             shape.d_size[at] += 0.5 * CURVATURE_WEIGHT * sharp * sharp
             shape.d_size[i] += 0.5 * CURVATURE_WEIGHT * sharp * sharp
-        if i == 0 or gear[i] != gear[at]:
+        if i == 0 or gear[i] != gear[at] or pivot[at]:
             continue
         rate = (shape.bend[i] - shape.bend[at]) / shape.size[at]
         fast = abs(rate) / surface.curvature_rate - 1.0
@@ -242,9 +255,9 @@ def bending_cost(surface, gear, shape):
 
 
 @leaf_kernel
-def add_bending(surface, p, gear, shape, gradient):
+def add_bending(surface, p, gear, pivot, shape, gradient):
     """Add the cost of turning, of too much curvature and of its changes."""
-    total = bending_cost(surface, gear, shape)
+    total = bending_cost(surface, gear, pivot, shape)
     for i in range(len(shape.turn)):
         bx, by = p[i + 1, 0] - p[i, 0], p[i + 1, 1] - p[i, 1]
         size = shape.size[i]
@@ -285,12 +298,12 @@ def add_evenness(p, gear, size, gradient):
 
 
 @leaf_kernel
-def band_cost(surface, stops, p, gear, ux, uy, shape, gradient):
+def band_cost(surface, stops, p, gear, pivot, ux, uy, shape, gradient):
     """Return a path's cost [m of plain ground] and write its gradient, shape (n, 2)."""
     gradient[:] = 0.0
     write_turns(p, gear, ux, uy, shape)
     total = add_terrain_and_clearance(surface, p, gear, gradient)
-    total += add_bending(surface, p, gear, shape, gradient)
+    total += add_bending(surface, p, gear, pivot, shape, gradient)
     total += add_evenness(p, gear, shape.size, gradient)
     for i in range(len(stops.node)):
         v = stops.node[i]

@@ -21,8 +21,11 @@ MOST_M = 0.5
 LEAST_M = 1e-6
 """Shortest step that counts [m]."""
 
-LEAST_GAIN = 1e-6
-"""Share of the cost that a step must gain to be followed by another."""
+WINDOW = 10
+"""Steps after which it is asked what they gained ..."""
+
+LEAST_GAIN = 2e-5
+"""... and the share of the cost that they must gain to be followed by more."""
 
 
 @leaf_kernel
@@ -70,13 +73,14 @@ def longest_row(a):
 
 
 @kernel
-def relax(surface, stops, p, gear, ux, uy, rounds):
+def relax(surface, stops, p, gear, pivot, ux, uy, rounds):
     """Let a path slip into the nearest minimum of its cost; return the cost.
 
     Args:
         surface, stops: what it is priced on and must pass.
         p: nodes, the first one fixed; changed in place, shape (n, 2).
         gear: of each segment, 1 or -1, shape (n - 1,).
+        pivot: whether the robot turns on the spot before it, shape (n - 1,).
         ux, uy: the robot's heading at the start.
         rounds: steps of L-BFGS at most.
     """
@@ -90,8 +94,9 @@ def relax(surface, stops, p, gear, ux, uy, rounds):
     changes = np.zeros((MEMORY, n, 2))
     scale = np.zeros(MEMORY)
     pairs = 0
-    cost = band_cost(surface, stops, p, gear, ux, uy, shape, gradient)
-    for _ in range(rounds):
+    cost = band_cost(surface, stops, p, gear, pivot, ux, uy, shape, gradient)
+    before = cost
+    for round in range(1, rounds + 1):
         descent(gradient, steps, changes, scale, pairs, direction)
         slope = dot(direction, gradient)
         if slope >= 0.0:
@@ -106,7 +111,7 @@ def relax(surface, stops, p, gear, ux, uy, rounds):
         while after > cost + 1e-4 * length * slope and length * longest > LEAST_M:
             add_scaled(p, length, direction, trial)
             after = band_cost(
-                surface, stops, trial, gear, ux, uy, shape, trial_gradient
+                surface, stops, trial, gear, pivot, ux, uy, shape, trial_gradient
             )
             length *= 0.4
         if after >= cost:
@@ -117,10 +122,11 @@ def relax(surface, stops, p, gear, ux, uy, rounds):
         along = dot(steps[m], changes[m])
         pairs = pairs + 1 if along > 1e-12 else 0
         scale[m] = 1.0 / along if along > 1e-12 else 0.0
-        gained = cost - after
         add_scaled(trial, 0.0, trial, p)
         add_scaled(trial_gradient, 0.0, trial_gradient, gradient)
         cost = after
-        if gained < LEAST_GAIN * cost:
-            break
+        if round % WINDOW == 0:
+            if before - cost < LEAST_GAIN * cost:
+                break
+            before = cost
     return cost

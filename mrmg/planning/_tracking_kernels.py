@@ -9,6 +9,7 @@ import numpy as np
 
 from mrmg.compilation import kernel, leaf_kernel
 from mrmg.motion._kernels import UNICYCLE, step
+from mrmg.planning._mission_kernels import in_target
 from mrmg.planning._safety_kernels import (
     braking_control,
     follow_braking,
@@ -32,11 +33,20 @@ ARRIVED_M = 0.03
 ALIGNED = 0.15
 """Steering error up to which a standing robot sets out [rad]."""
 
+ASKEW = 0.1
+"""Heading error up to which a standing robot that can turn on the spot sets out ..."""
+
+FAR_ASKEW = 1.0
+"""... and beyond which it stops to do so [rad]."""
+
 STRAYED_M = 1.0
 """Distance from the path at which driving is given up."""
 
 STUCK_STEPS = 150
 """Steps without anybody getting on after which driving is given up."""
+
+TURNING_SHARE = 0.5
+"""Share of the acceleration of turning with which a turn on the spot is slowed down."""
 
 ATTEMPTS = 3
 """Controls tried before a robot brakes as committed."""
@@ -50,7 +60,9 @@ class Courses(NamedTuple):
         gear: of each segment, shape (R, N).
         bend: curvature at each node, left positive in the direction of travel (R, N).
         way: way to each node [m], shape (R, N).
-        end: number of the node at which the segment's stretch of one gear ends, (R, N).
+        end: number of the node at which the segment's stretch ends, where the gear
+            changes or the robot turns on the spot, shape (R, N).
+        fastest: speed at which each node is passed at most [m/s], shape (R, N).
         nodes: number of nodes of each path, shape (R,).
         ease: deceleration that costs nothing [m/s^2], shape (R,).
     """
@@ -60,6 +72,7 @@ class Courses(NamedTuple):
     bend: np.ndarray
     way: np.ndarray
     end: np.ndarray
+    fastest: np.ndarray
     nodes: np.ndarray
     ease: np.ndarray
 
@@ -109,17 +122,24 @@ def follow(fleet, courses, r, i, state):
     top = fleet[r].limit[1] if gear > 0 else -fleet[r].limit[0]
     ease = courses.ease[r]
     v = min(top, sqrt(2.0 * ease * max(left - 0.5 * ARRIVED_M, 0.0)) + 0.02)
+    near = max(courses.way[r, i + 1] - s, 0.0)
+    v = min(v, sqrt(courses.fastest[r, i + 1] ** 2 + 2.0 * ease * near))
     ahead = s + max(abs(state[3]), 0.2) * PREVIEW_S
     bend = bend_at(courses, r, i, ahead)
+    standing = abs(state[3]) < 0.05
     bend -= STIFFNESS * STIFFNESS * off + 2.0 * STIFFNESS * sin(askew)
     if fleet[r].model == UNICYCLE:
         v = min(v, fleet[r].limit[2] / max(abs(bend), 1e-9))
+        # w is the rate of turning, which grows with v and not with the gear.
         w = bend * v
+        if abs(askew) > (ASKEW if standing else FAR_ASKEW):
+            v = 0.0
+            w = sqrt(2.0 * TURNING_SHARE * fleet[r].limit[4] * abs(askew))
+            w = -w if askew > 0.0 else w
     else:
         w = atan(gear * fleet[r].wheelbase * bend)
     w = max(-fleet[r].limit[2], min(fleet[r].limit[2], w))
-    standing = abs(state[3]) < 0.05 and fleet[r].model != UNICYCLE
-    if standing and abs(w - state[4]) > ALIGNED:
+    if standing and fleet[r].model != UNICYCLE and abs(w - state[4]) > ALIGNED:
         v = 0.0
     return i, left, off, gear * v, w
 
@@ -203,6 +223,22 @@ def drive(fleet, spaces, gates, courses, given, start, order, dt, control, halt)
             control[n, r, 0], control[n, r, 1] = u1, u2
             decided[r] = True
     return len(control), order[robots - 1]
+
+
+@leaf_kernel
+def first_inside(targets, t, state, first):
+    """Return the first of the states from `first` on in a target; their number if none.
+
+    Args:
+        targets: the targets.
+        t: number of the target.
+        state: shape (n, 5).
+        first: number of a state.
+    """
+    for k in range(first, len(state)):
+        if in_target(targets, t, state[k, 0], state[k, 1]):
+            return k
+    return len(state)
 
 
 @leaf_kernel

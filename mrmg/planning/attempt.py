@@ -1,4 +1,4 @@
-"""One attempt at a mission: tours, a motion tree along them, its plan, refined."""
+"""One attempt at a mission: tours, a draft or a motion tree along them, its plan."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import numpy as np
 from mrmg import seeding
 from mrmg.mission import Plan
 from mrmg.planning.assembly import make_plan
+from mrmg.planning.drafting import draft, draftable
 from mrmg.planning.motion_tree import Problem, grow_tree
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.refine import refine
@@ -19,6 +20,9 @@ from mrmg.planning.routers import route
 MARGINS = (1.0, 0.0, 2.0)
 """Multiples of the route margin that successive trees are grown with."""
 
+
+SPREADS = (0.0, 0.03, 0.08, 0.05)
+"""Spread of the random factors on the roadmap's energies for successive drafts."""
 
 LEAST_GAIN = 0.001
 """Share of the cost that a refinement must save to be followed by another."""
@@ -45,6 +49,10 @@ def attempt_plan(
 ) -> Attempt:
     """Draw tours and grow a tree along them; a function of seed and number alone.
 
+    All attempts but the first try to do without a tree (`drafting`), along tours for
+    energies that differ by chance: those of the roadmap are not quite what driving
+    takes.
+
     The surcharge on the roadmap's energies changes from draw to draw: batteries may
     leave no room for it, or driving may take more than it allows for.
 
@@ -56,6 +64,11 @@ def attempt_plan(
         halt: shape (1,); growing ends soon after it has turned true.
     """
     began = time.perf_counter()
+    if params.drafts and number > 0 and draftable(problem):
+        plan, routing_s = _drafted(problem, seed, params, number, halt)
+        if plan is not None or halt[0]:
+            plans = [] if plan is None else [(time.perf_counter(), plan)]
+            return Attempt(plans, routing_s)
     margin = MARGINS[number % len(MARGINS)] * params.route_margin
     problem = problem.with_margin(margin)
     draw = seeding.stream_seed(seed, "tours", number)
@@ -78,3 +91,22 @@ def attempt_plan(
         plan = better if better is not plan else None
         left = 0 if enough else left - 1
     return Attempt(plans, routing_s, growth.counts)
+
+
+def _drafted(
+    problem: Problem, seed: int, params: PlannerParams, number: int, halt: np.ndarray
+) -> tuple[Plan | None, float]:
+    """Return the plan driven straight along tours, if any, and the time they took."""
+    began = time.perf_counter()
+    problem = problem.with_margin(0.0)
+    draw = seeding.stream_seed(seed, "draft", number)
+    spread = SPREADS[number % len(SPREADS)]
+    shape = problem.mission.routing.cost.shape[1:]
+    noise = seeding.stream(seed, "costs", number).standard_normal(shape)
+    routing = problem.mission.routing
+    routing = routing._replace(cost=routing.cost * np.exp(spread * noise))
+    tours = route(routing, params.router, draw)
+    routing_s = time.perf_counter() - began
+    if not tours.feasible or halt[0]:
+        return None, routing_s
+    return draft(problem, params, tours, seed, halt), routing_s

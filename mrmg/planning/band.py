@@ -14,13 +14,16 @@ import numpy as np
 
 from mrmg.mission import Trajectory
 from mrmg.motion._kernels import UNICYCLE
-from mrmg.planning import _relax_kernels
+from mrmg.planning import _relax_kernels, _tracking_kernels
 from mrmg.planning._band_kernels import Stops, Surface
-from mrmg.planning._mission_kernels import Targets, in_target
+from mrmg.planning._mission_kernels import Targets
 from mrmg.planning.motion_tree import Problem
 
-SPACING_M = 0.8
-"""Distance of a path's nodes."""
+SPACINGS_M = (2.4, 0.8)
+"""Distance of a path's nodes, at first and in the end.
+
+Few nodes find the way sooner, and a shorter one: many stick where they lie.
+"""
 
 MERGED_M = 0.1
 """Distance within which places that must be nodes become one."""
@@ -28,10 +31,16 @@ MERGED_M = 0.1
 SHORTEST_M = 0.15
 """Way between two changes of gear below which there is none."""
 
+STAYING_M = 0.005
+"""Way of a step below which a robot stays where it is."""
+
+LEAST_PIVOT = 0.5
+"""Angle of a turn on the spot that counts as one [rad]."""
+
 DISCS_M = 0.4
 """Distance of the discs that cover a footprint."""
 
-TRACKING_M = 0.02
+TRACKING_M = 0.03
 """How much deeper than needed a path enters its targets, to begin with."""
 
 WARY_M = 4.0
@@ -49,7 +58,7 @@ SERIES = 200
 MOST_SERIES = 30
 """Series of steps at most ..."""
 
-LEAST_GAIN = 1e-4
+LEAST_GAIN = 3e-4
 """... and the share of the cost that one must gain to be followed by another."""
 
 
@@ -63,6 +72,7 @@ class Path:
         stop: numbers of the nodes at which a target is visited, shape (S,).
         target: those targets, shape (S,).
         deeper: how much deeper than needed the path enters them [m], shape (S,).
+        pivot: numbers of the nodes at which the robot turns on the spot, shape (P,).
         heading: of the robot at the start [rad].
     """
 
@@ -71,7 +81,20 @@ class Path:
     stop: np.ndarray
     target: np.ndarray
     deeper: np.ndarray
+    pivot: np.ndarray
     heading: float
+
+    @property
+    def way(self) -> np.ndarray:
+        """Way to each node [m], shape (n,)."""
+        size = np.hypot(*np.diff(self.node, axis=0).T)
+        return np.concatenate([[0.0], np.cumsum(size)])
+
+    @property
+    def edges(self) -> np.ndarray:
+        """Numbers of the nodes between which it is driven without a stop."""
+        changes = np.flatnonzero(np.diff(self.gear)) + 1
+        return np.unique([0, *changes.tolist(), *self.pivot, len(self.node) - 1])
 
 
 def visit_steps(
@@ -81,12 +104,11 @@ def visit_steps(
 
     The list ends before the first target that it does not.
     """
-    state = trajectory.state
+    state = np.ascontiguousarray(trajectory.state)
     visits: list[int] = []
     step = 0
     for t in tour:
-        while step < len(state) and not in_target(targets, t, *state[step, :2]):
-            step += 1
+        step = _tracking_kernels.first_inside(targets, t, state, step)
         if step == len(state):
             break
         visits.append(step)
@@ -109,19 +131,27 @@ def path_of(
     state = trajectory.state[first : first + last + 1]
     speed = 0.5 * (state[:-1, 3] + state[1:, 3])
     gear = _gears(speed * trajectory.dt_s)
-    changes = np.flatnonzero(np.diff(gear)) + 1
-    steps = [v for _, v in left]
-    keys = np.unique([0, *changes.tolist(), *steps])
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(state[:, :2], axis=0).T))])
     path = Path(
         node=state[:, :2],
         gear=gear,
-        stop=np.array(steps, np.int64),
+        stop=np.array([v for _, v in left], np.int64),
         target=np.array([t for t, _ in left], np.int64),
         deeper=np.full(len(left), TRACKING_M),
+        pivot=_pivots(state),
         heading=float(state[0, 2]),
     )
-    return _spread(path, way, keys)
+    return respaced(path)
+
+
+def _pivots(state: np.ndarray) -> np.ndarray:
+    """Return the steps at which turns on the spot end, shape (P,)."""
+    stays = np.hypot(*np.diff(state[:, :2], axis=0).T) < STAYING_M
+    turned = np.concatenate(
+        [[0.0], np.cumsum(np.where(stays, np.diff(state[:, 2]), 0))]
+    )
+    ends = np.flatnonzero(np.diff(np.concatenate([stays, [False]]).astype(int)) < 0) + 1
+    before = np.concatenate([[0.0], turned[ends[:-1]]]) if len(ends) else turned[:0]
+    return np.asarray(ends[np.abs(turned[ends] - before) > LEAST_PIVOT])
 
 
 def _gears(advance: np.ndarray) -> np.ndarray:
@@ -139,14 +169,13 @@ def _gears(advance: np.ndarray) -> np.ndarray:
     return gear
 
 
-def _spread(path: Path, way: np.ndarray, keys: np.ndarray) -> Path:
-    """Return a path with evenly spaced nodes.
+def respaced(path: Path, spacing_m: float = SPACINGS_M[-1]) -> Path:
+    """Return the path with evenly spaced nodes; stops and stretches' ends stay nodes.
 
-    Args:
-        path: the path; its gears may be those of any chain of points.
-        way: way to each of its nodes, shape (n,).
-        keys: nodes that remain: both ends, changes of gear and stops.
+    Places that must be nodes become one where they nearly coincide.
     """
+    way = path.way
+    keys = np.unique([*path.edges, *path.stop])
     ways: list[np.ndarray] = []
     gear: list[int] = []
     number = {int(keys[0]): 0}
@@ -154,7 +183,7 @@ def _spread(path: Path, way: np.ndarray, keys: np.ndarray) -> Path:
     for key in keys[1:].tolist():
         length = way[key] - way[kept]
         if length >= MERGED_M:
-            pieces = max(1, round(length / SPACING_M))
+            pieces = max(1, round(length / spacing_m))
             ways.append(np.linspace(way[kept], way[key], pieces, endpoint=False))
             gear += [int(path.gear[key - 1])] * pieces
             kept = key
@@ -165,30 +194,47 @@ def _spread(path: Path, way: np.ndarray, keys: np.ndarray) -> Path:
         node=np.stack([np.interp(at, way, path.node[:, j]) for j in range(2)], axis=1),
         gear=np.array(gear, np.int64),
         stop=np.array([number[int(v)] for v in path.stop], np.int64),
+        pivot=np.unique([number[int(v)] for v in path.pivot]).astype(np.int64),
     )
 
 
-def respaced(path: Path) -> Path:
-    """Return the path with evenly spaced nodes; stops and gear changes stay nodes."""
-    way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path.node, axis=0).T))])
-    changes = np.flatnonzero(np.diff(path.gear)) + 1
-    keys = np.unique([0, *changes.tolist(), *path.stop.tolist(), len(path.node) - 1])
-    return _spread(path, way, keys)
+def tightened(
+    targets: Targets,
+    surface: Surface,
+    path: Path,
+    spacings_m: Sequence[float] = SPACINGS_M,
+) -> tuple[Path, float]:
+    """Return a path drawn tight, and its cost [m of plain ground].
+
+    Args:
+        targets: the targets.
+        surface: what the path is priced on.
+        path: the path to begin with.
+        spacings_m: distances of nodes, one after the other.
+    """
+    cost = 0.0
+    for spacing_m in spacings_m:
+        path, cost = _relaxed(targets, surface, path, spacing_m)
+    return path, cost
 
 
-def tightened(targets: Targets, surface: Surface, path: Path) -> tuple[Path, float]:
-    """Return a path drawn tight, and its cost [m of plain ground]."""
+def _relaxed(
+    targets: Targets, surface: Surface, path: Path, spacing_m: float
+) -> tuple[Path, float]:
     cost = np.inf
     for _ in range(MOST_SERIES):
-        path = respaced(path)
+        path = respaced(path, spacing_m)
         if len(path.node) < 2:
             return path, 0.0
         node, before = path.node.copy(), cost
+        pivot = np.zeros(len(path.gear), np.bool_)
+        pivot[path.pivot[path.pivot < len(pivot)]] = True
         cost = _relax_kernels.relax(
             surface,
             stops_of(targets, path),
             node,
             path.gear,
+            pivot,
             cos(path.heading),
             sin(path.heading),
             SERIES,
@@ -196,7 +242,7 @@ def tightened(targets: Targets, surface: Surface, path: Path) -> tuple[Path, flo
         path = replace(path, node=node)
         if cost > (1.0 - LEAST_GAIN) * before:
             break
-    return respaced(path), float(cost)
+    return respaced(path, spacing_m), float(cost)
 
 
 def stops_of(targets: Targets, path: Path) -> Stops:

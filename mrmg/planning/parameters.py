@@ -29,6 +29,7 @@ class PlannerParams:
         trees: trees grown at most; a tree that fails is followed by one with new draws.
         improvements: further trees grown after the first plan; the cheapest plan
             counts.
+        drafts: after the first tree, drive along tours without one where that succeeds.
         refinements: times that the plan of each tree is drawn tight and driven again,
             as long as that saves energy.
         group_alpha, group_beta, group_lambda: alpha, beta, lambda of eq. (5).
@@ -59,6 +60,7 @@ class PlannerParams:
     max_vertices: int = 6000
     trees: int = 12
     improvements: int = 1
+    drafts: bool = True
     refinements: int = 2
     group_alpha: float = 1.0
     group_beta: float = 4.0
@@ -140,6 +142,7 @@ def _profile(profile: str, budget_s: float | None) -> PlannerParams:
             max_vertices=60_000,
             trees=2,
             improvements=0,
+            drafts=False,
             refinements=0,
             steer_decay=0.9999,
             steer_least=0.5,

@@ -1,23 +1,30 @@
-"""Refinement: a plan's robots drive again, along paths drawn tight.
+"""Refinement: robots drive along paths drawn tight.
 
 Each robot's way is drawn tight (`band`) and driven in closed loop under committed
-braking, as the motion tree does it, so that margins to obstacles and robots, dynamics
-and limits hold by construction. The result is taken only if it visits the same targets
-in the same order as deep, keeps every battery above its reserve, and costs less.
+braking, as the motion tree does it (`tracking`), so that margins to obstacles and
+robots, dynamics and limits hold by construction. What goes wrong is put right, and the
+fleet drives again: where a robot does not get along its path (it is stuck in a tight
+place, or in the way of another), its path is led farther from obstacles; where it
+misses a target, deeper into it; where it has to brake, it arrives more slowly.
+
+A refined plan counts only if it visits the same targets in the same order as deep,
+keeps every battery above its reserve, and costs less.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from mrmg.mission import Plan, Trajectory
 from mrmg.motion._kernels import USER
+from mrmg.planning._band_kernels import Surface
 from mrmg.planning._mission_kernels import in_target
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.band import (
+    SPACINGS_M,
     Path,
     path_of,
     smooth_terrain,
@@ -30,10 +37,13 @@ from mrmg.planning.motion_tree import Problem
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.roadmap import planned_regions
 from mrmg.planning.targets import TARGET_MARGIN_M
-from mrmg.planning.tracking import redriven
+from mrmg.planning.tracking import Drive, SlowPlace, braking_places, redriven
 
-TRIES = 12
+TRIES = 14
 """Times that driving is repeated with what went wrong put right."""
+
+SLOWER = 3
+"""Times that it is repeated only to spare braking."""
 
 DEEPER_M = 0.02
 """How much deeper than it was missed by a target is entered the next time."""
@@ -48,15 +58,47 @@ REPEATED_S = 4.0
 """How long after the place where a robot got stuck it still drives as before."""
 
 
+@dataclass
+class Errand:
+    """One robot's way, and what was learnt about it.
+
+    Attributes:
+        tour: numbers of its targets.
+        path: its way.
+        surface: what the way is priced on.
+        before: how the robot drove before, and the steps of its visits; None if it did
+            not.
+        repeated: number of steps that it drives as before.
+        swerves: places that it was led round.
+        slow: places that it passes slowly.
+    """
+
+    tour: list[int]
+    path: Path
+    surface: Surface
+    before: tuple[Trajectory, list[int]] | None = None
+    repeated: int = 0
+    swerves: list[np.ndarray] = field(default_factory=list)
+    slow: list[SlowPlace] = field(default_factory=list)
+
+    def tighten(self, problem: Problem, spacings_m: Sequence[float]) -> None:
+        """Draw the path tight."""
+        targets = problem.mission.targets
+        self.path, _ = tightened(targets, self.surface, self.path, spacings_m)
+
+    def controls(self) -> np.ndarray:
+        """Return the controls that it repeats, shape (n, 2)."""
+        if self.before is None:
+            return np.zeros((0, 2))
+        return self.before[0].control[: self.repeated]
+
+
 def refine(
     problem: Problem, params: PlannerParams, plan: Plan, halt: np.ndarray
 ) -> Plan:
     """Return a plan that is cheaper than `plan`, or `plan` itself.
 
-    Where a robot does not get along its path (it is stuck in a tight place, or in the
-    way of another), its path is led farther from obstacles there, and if that does not
-    help it drives as before up to behind that place; where it misses a target, its path
-    is led deeper into it.
+    A robot that cannot be helped otherwise drives as before up to behind the place.
 
     Args:
         problem: the mission.
@@ -65,54 +107,82 @@ def refine(
         halt: shape (1,); refinement ends soon after it has turned true.
     """
     targets = problem.mission.targets
-    if _stays_somewhere(problem):
+    if stays_somewhere(problem):
         return plan
-    smooth = smooth_terrain(problem.mission.terrain.multiplier)
-    surfaces = [surface_of(problem, r, smooth) for r in range(len(plan.trajectories))]
-    tours = tour_numbers(problem, plan)
-    visits = [
-        visit_steps(targets, tour, trajectory)
-        for tour, trajectory in zip(tours, plan.trajectories, strict=True)
-    ]
-    if any(len(v) < len(tour) for v, tour in zip(visits, tours, strict=True)):
-        return plan
-    given = np.where(_drives_as_before(problem), len(plan.trajectories[0].control), 0)
-    swerves: list[list[np.ndarray]] = [[] for _ in tours]
-    paths: list[Path | None] = [None] * len(tours)
-    for _ in range(TRIES):
-        for r, path in enumerate(paths):
-            if path is None:
-                raw = path_of(tours[r], visits[r], plan.trajectories[r], given[r])
-                paths[r] = tightened(targets, surfaces[r], raw)[0]
-        drawn = [path for path in paths if path is not None]
-        outcome = redriven(problem, params, plan.trajectories, drawn, given, halt)
-        if halt[0]:
+    kept = _drives_as_before(problem)
+    surfaces = surfaces_of(problem)
+    errands = []
+    for r, tour in enumerate(tour_numbers(problem, plan)):
+        trajectory = plan.trajectories[r]
+        visits = visit_steps(targets, tour, trajectory)
+        if len(visits) < len(tour):
             return plan
+        repeated = len(trajectory.control) if kept[r] else 0
+        path = path_of(tour, visits, trajectory, repeated)
+        errands.append(Errand(tour, path, surfaces[r], (trajectory, visits), repeated))
+    trajectories = run_errands(problem, params, errands, halt)
+    if not trajectories:
+        return plan
+    found = make_plan(problem, plan.seed, params, trajectories, plan.tours)
+    if found is None or found.cost_J >= plan.cost_J:
+        return plan
+    return found
+
+
+def run_errands(
+    problem: Problem,
+    params: PlannerParams,
+    errands: Sequence[Errand],
+    halt: np.ndarray,
+) -> tuple[Trajectory, ...]:
+    """Draw paths tight and drive along them until nothing goes wrong any more.
+
+    Returns:
+        The trajectories of all robots, which visit all targets; empty if it came to
+        nothing or was halted.
+    """
+    for errand in errands:
+        errand.tighten(problem, SPACINGS_M)
+    found: tuple[Trajectory, ...] = ()
+    slower = 0
+    for _ in range(TRIES):
+        outcome = redriven(
+            problem,
+            params,
+            [errand.path for errand in errands],
+            [errand.slow for errand in errands],
+            [errand.controls() for errand in errands],
+            halt,
+        )
+        if halt[0]:
+            return ()
         if outcome.stuck >= 0:
-            r = outcome.stuck
-            before = [p for p in swerves[r] if np.hypot(*(p - outcome.place)) < NEAR_M]
-            if len(before) < SWERVES:
-                swerves[r].append(outcome.place)
-                surfaces[r] = wary(surfaces[r], outcome.place)
-                paths[r] = tightened(targets, surfaces[r], drawn[r])[0]
-                continue
-            more = _behind(plan.trajectories[r], outcome.place, given[r])
-            if more is None:
-                return plan
-            given[r], paths[r] = more, None
+            if not _put_right(problem, errands[outcome.stuck], outcome.place):
+                break
             continue
-        missed = False
-        for r, trajectory in enumerate(outcome.trajectories):
-            found = _deeper(problem, tours[r], trajectory, drawn[r])
-            if found is not drawn[r]:
-                paths[r] = tightened(targets, surfaces[r], found)[0]
-                missed = True
-        if not missed:
-            return _cheaper(problem, params, plan, outcome.trajectories)
-    return plan
+        missed = [
+            _led_deeper(problem, errand, trajectory)
+            for errand, trajectory in zip(errands, outcome.trajectories, strict=True)
+        ]
+        slowed = slower < SLOWER and _slowed_down(problem, errands, outcome)
+        slower += slowed
+        if any(missed):
+            continue
+        if not _ends_well(problem, outcome):
+            break
+        found = outcome.trajectories
+        if not slowed:
+            break
+    return found
 
 
-def _stays_somewhere(problem: Problem) -> bool:
+def surfaces_of(problem: Problem) -> list[Surface]:
+    """Return what each robot's paths are priced on."""
+    smooth = smooth_terrain(problem.mission.terrain.multiplier)
+    return [surface_of(problem, r, smooth) for r in range(len(problem.start))]
+
+
+def stays_somewhere(problem: Problem) -> bool:
     """Tell whether robots stay at targets: driving along paths knows no pauses."""
     battery = [robot.battery for robot in problem.scene.robots]
     return bool(
@@ -138,6 +208,26 @@ def _drives_as_before(problem: Problem) -> np.ndarray:
     return np.asarray(turned | (problem.mission.fleet["model"] == USER))
 
 
+def _put_right(problem: Problem, errand: Errand, place: np.ndarray) -> bool:
+    """Help a robot that got stuck at a place; False if there is no help."""
+    near = [p for p in errand.swerves if np.hypot(*(p - place)) < NEAR_M]
+    if len(near) < SWERVES:
+        errand.swerves.append(place)
+        errand.surface = wary(errand.surface, place)
+        errand.tighten(problem, SPACINGS_M[-1:])
+        return True
+    if errand.before is None:
+        return False
+    trajectory, visits = errand.before
+    behind = _behind(trajectory, place, errand.repeated)
+    if behind is None:
+        return False
+    errand.repeated = behind
+    errand.path = path_of(errand.tour, visits, trajectory, behind)
+    errand.tighten(problem, SPACINGS_M)
+    return True
+
+
 def _behind(trajectory: Trajectory, place: np.ndarray, given: int) -> int | None:
     """Return the step up to which a robot that got stuck at a place drives as before.
 
@@ -151,36 +241,42 @@ def _behind(trajectory: Trajectory, place: np.ndarray, given: int) -> int | None
     return min(n, given + 1 + nearest + int(REPEATED_S / trajectory.dt_s))
 
 
-def _deeper(
-    problem: Problem, tour: Sequence[int], trajectory: Trajectory, path: Path
-) -> Path:
-    """Return the path led deeper into the first target that was missed, if any was."""
-    visits = visit_steps(problem.mission.targets, tour, trajectory)
-    if len(visits) == len(tour):
-        return path
-    t = tour[len(visits)]
-    region = planned_regions(problem.scene)[t]
-    first = visits[-1] if visits else 0
-    reached = float(region.depth(trajectory.state[first:, :2]).max())
-    i = len(visits) - (len(tour) - len(path.target))
-    needed = TARGET_MARGIN_M - reached
-    deeper = path.deeper.copy()
-    deeper[i] += max(needed, 0.0) + DEEPER_M
-    return replace(path, deeper=deeper)
-
-
-def _cheaper(
-    problem: Problem,
-    params: PlannerParams,
-    plan: Plan,
-    trajectories: Sequence[Trajectory],
-) -> Plan:
-    """Return the plan of new trajectories if it is valid and cheaper, else `plan`."""
+def _led_deeper(problem: Problem, errand: Errand, trajectory: Trajectory) -> bool:
+    """Lead a path deeper into the targets that were missed; tell if there were any."""
     targets = problem.mission.targets
-    for trajectory, finish in zip(trajectories, targets.finish, strict=True):
-        if finish >= 0 and not in_target(targets, finish, *trajectory.state[-1, :2]):
-            return plan
-    found = make_plan(problem, plan.seed, params, trajectories, plan.tours)
-    if found is None or found.cost_J >= plan.cost_J:
-        return plan
-    return found
+    tour, path = errand.tour, errand.path
+    if len(visit_steps(targets, tour, trajectory)) == len(tour):
+        return False
+    regions = planned_regions(problem.scene)
+    state = trajectory.state[errand.repeated :, :2]
+    deeper = path.deeper.copy()
+    passed = 0
+    for i, (node, t) in enumerate(zip(path.stop, path.target, strict=True)):
+        step = passed + int(np.hypot(*(state[passed:] - path.node[node]).T).argmin())
+        reached = float(regions[t].depth(state[step : step + 1])[0])
+        if reached < TARGET_MARGIN_M:
+            deeper[i] += TARGET_MARGIN_M - reached + DEEPER_M
+        passed = step
+    errand.path = replace(path, deeper=deeper)
+    errand.tighten(problem, SPACINGS_M[-1:])
+    return True
+
+
+def _ends_well(problem: Problem, outcome: Drive) -> bool:
+    """Tell whether every robot stands where it must end."""
+    targets = problem.mission.targets
+    return all(
+        finish < 0 or in_target(targets, finish, *trajectory.state[-1, :2])
+        for trajectory, finish in zip(outcome.trajectories, targets.finish, strict=True)
+    )
+
+
+def _slowed_down(problem: Problem, errands: Sequence[Errand], outcome: Drive) -> bool:
+    """Slow robots down before places where they had to brake; tell if any had to."""
+    places = [
+        braking_places(problem, r, trajectory)
+        for r, trajectory in enumerate(outcome.trajectories)
+    ]
+    for errand, found in zip(errands, places, strict=True):
+        errand.slow += found
+    return any(places)

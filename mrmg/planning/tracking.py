@@ -15,11 +15,39 @@ from mrmg.planning.band import Path
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.parameters import PlannerParams
 
-SLOWEST = 3
-"""A mission may take so many times as long as before."""
+SLOWEST = 4
+"""Driving may take so many times as long as the longest path does at full speed."""
+
+LEAST_STEPS = 400
+"""Steps that driving may take in any case."""
 
 COASTING_SHARE = 0.95
 """Share of rolling resistance's deceleration that robots slow down with."""
+
+BRAKING = 1.5
+"""Multiple of that deceleration from which on it is braking."""
+
+LEAST_BRAKING_M_S = 0.1
+"""Change of speed by braking that is worth to be avoided [m/s]."""
+
+CRAWL_M_S = 0.3
+"""Speed to which places slow down at least."""
+
+PLACE_M = 0.6
+"""Distance within which nodes belong to a place."""
+
+
+@dataclass(frozen=True, slots=True)
+class SlowPlace:
+    """A place that a robot passes slowly.
+
+    Attributes:
+        place: shape (2,).
+        speed_m_s: at most.
+    """
+
+    place: np.ndarray
+    speed_m_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +68,9 @@ class Drive:
 def redriven(
     problem: Problem,
     params: PlannerParams,
-    before: Sequence[Trajectory],
     paths: Sequence[Path],
-    given: np.ndarray,
+    slow: Sequence[Sequence[SlowPlace]],
+    repeated: Sequence[np.ndarray],
     halt: np.ndarray,
 ) -> Drive:
     """Drive the fleet along paths.
@@ -50,21 +78,21 @@ def redriven(
     Args:
         problem: the mission.
         params: gives the step.
-        before: trajectories whose controls are repeated at first.
         paths: one for each robot, from where repeating ends.
-        given: number of steps that are repeated, shape (R,).
+        slow: places that each robot passes slowly.
+        repeated: controls with which each robot begins, shape (n, 2).
         halt: shape (1,); driving ends soon after it has turned true.
     """
     mission = problem.mission
-    most = SLOWEST * max(len(t.control) for t in before) + 200
-    control = np.zeros((most, len(paths), 2))
-    for r, trajectory in enumerate(before):
-        control[: given[r], r] = trajectory.control[: given[r]]
+    given = np.array([len(controls) for controls in repeated])
+    control = np.zeros((_most_steps(problem, params, paths, given), len(paths), 2))
+    for r, controls in enumerate(repeated):
+        control[: len(controls), r] = controls
     steps, stuck = _tracking_kernels.drive(
         mission.fleet,
         mission.spaces,
         mission.gates,
-        courses_of(problem, paths),
+        courses_of(problem, paths, slow),
         given,
         problem.start,
         np.arange(len(paths)),
@@ -89,13 +117,34 @@ def redriven(
     return Drive(trajectories, -1, np.zeros(2))
 
 
-def courses_of(problem: Problem, paths: Sequence[Path]) -> Courses:
+def braking_places(problem: Problem, r: int, trajectory: Trajectory) -> list[SlowPlace]:
+    """Return the places before which robot r had to brake, with the speeds there.
+
+    Whoever arrives there slowly has lost nothing: rolling resistance slows it down.
+    """
+    ease = _free_decelerations(problem)[r]
+    speed = np.abs(trajectory.state[:, 3])
+    brakes = np.diff(speed) < -BRAKING * ease * trajectory.dt_s
+    change = np.diff(np.concatenate([[False], brakes, [False]]).astype(int))
+    begins, ends = np.flatnonzero(change > 0), np.flatnonzero(change < 0)
+    return [
+        SlowPlace(trajectory.state[end, :2], max(float(speed[end]), CRAWL_M_S))
+        for begin, end in zip(begins, ends, strict=True)
+        if speed[begin] - max(speed[end], CRAWL_M_S) > LEAST_BRAKING_M_S
+    ]
+
+
+def courses_of(
+    problem: Problem, paths: Sequence[Path], slow: Sequence[Sequence[SlowPlace]]
+) -> Courses:
     """Return paths in the form that driving needs."""
     robots, most = len(paths), max([2, *(len(path.node) for path in paths)])
     node = np.zeros((robots, most, 2))
     gear = np.ones((robots, most), np.int64)
     bend, way = np.zeros((robots, most)), np.zeros((robots, most))
     end = np.zeros((robots, most), np.int64)
+    fastest = np.full((robots, most), np.inf)
+    ease = _free_decelerations(problem)
     for r, path in enumerate(paths):
         n = len(path.node)
         if n < 2:
@@ -104,20 +153,52 @@ def courses_of(problem: Problem, paths: Sequence[Path]) -> Courses:
         size = np.hypot(*chord.T)
         node[r, :n] = path.node
         gear[r, : n - 1] = path.gear
-        way[r, 1:n] = np.cumsum(size)
-        edges = [0, *(np.flatnonzero(np.diff(path.gear)) + 1).tolist(), n - 1]
+        way[r, :n] = path.way
+        edges = path.edges.tolist()
         for a, b in zip(edges, edges[1:], strict=False):
             end[r, a:b] = b
             bend[r, a : b + 1] = _bends(chord[a:b], size[a:b])
+        fastest[r, :n] = _speed_limits(path, slow[r], float(ease[r]))
     return Courses(
         node=node,
         gear=gear,
         bend=bend,
         way=way,
         end=end,
+        fastest=fastest,
         nodes=np.array([len(path.node) for path in paths]),
-        ease=_free_decelerations(problem),
+        ease=ease,
     )
+
+
+def _most_steps(
+    problem: Problem,
+    params: PlannerParams,
+    paths: Sequence[Path],
+    given: np.ndarray,
+) -> int:
+    top = np.minimum(*np.abs(problem.mission.fleet["limit"][:, :2].T))
+    lengths = np.array([path.way[-1] for path in paths])
+    return int(
+        given.max() + SLOWEST * (lengths / top).max() / params.dt_s + LEAST_STEPS
+    )
+
+
+def _speed_limits(path: Path, slow: Sequence[SlowPlace], ease: float) -> np.ndarray:
+    """Return the speed at which each node is passed at most, shape (n,).
+
+    Before slow places it falls no faster than a robot slows down for free.
+    """
+    fastest = np.full(len(path.node), np.inf)
+    for one in slow:
+        far = np.hypot(*(path.node - one.place).T)
+        near = far < max(PLACE_M, far.min() + 1e-6)
+        fastest[near] = np.minimum(fastest[near], one.speed_m_s)
+    size = np.diff(path.way)
+    for i in range(len(size) - 1, -1, -1):
+        before = np.sqrt(fastest[i + 1] ** 2 + 2.0 * ease * size[i])
+        fastest[i] = min(fastest[i], before)
+    return fastest
 
 
 def _bends(chord: np.ndarray, size: np.ndarray) -> np.ndarray:

@@ -42,11 +42,17 @@ def stops(*circles: tuple[int, float, float, float], deeper: float = 0.0) -> Sto
     )
 
 
+NO_PIVOT = np.zeros(40, np.bool_)
+"""Of paths that never turn on the spot."""
+
+
 def cost(ground: Surface, marks: Stops, p: np.ndarray, gear: np.ndarray) -> Any:
     """Return (cost, gradient) of a path that starts heading east."""
     gradient = np.zeros_like(p)
     shape = _band_kernels.new_shape(len(p) - 1)
-    value = _band_kernels.band_cost(ground, marks, p, gear, 1.0, 0.0, shape, gradient)
+    value = _band_kernels.band_cost(
+        ground, marks, p, gear, NO_PIVOT[: len(gear)], 1.0, 0.0, shape, gradient
+    )
     return value, gradient
 
 
@@ -119,7 +125,9 @@ def test_a_change_of_gear_turns_the_heading_not_the_way() -> None:
 
 def relaxed(ground: Surface, marks: Stops, p: np.ndarray, gear: np.ndarray) -> Any:
     node = p.copy()
-    value = _relax_kernels.relax(ground, marks, node, gear, 1.0, 0.0, 400)
+    value = _relax_kernels.relax(
+        ground, marks, node, gear, NO_PIVOT[: len(gear)], 1.0, 0.0, 400
+    )
     return value, node
 
 
@@ -157,12 +165,14 @@ def test_relaxing_never_costs_more_and_keeps_the_start(seed: int) -> None:
     ground = surface(distance=np.cumsum(rng.normal(0.0, 0.1, (80, 80)), axis=1) + 1.5)
     shape, gradient = _band_kernels.new_shape(14), np.zeros_like(p)
     ux, uy = cos(angle), sin(angle)
-    before = _band_kernels.band_cost(ground, stops(), p, gear, ux, uy, shape, gradient)
+    before = _band_kernels.band_cost(
+        ground, stops(), p, gear, NO_PIVOT[:14], ux, uy, shape, gradient
+    )
     node = p.copy()
-    after = _relax_kernels.relax(ground, stops(), node, gear, ux, uy, 50)
+    after = _relax_kernels.relax(ground, stops(), node, gear, NO_PIVOT[:14], ux, uy, 50)
     assert after <= before
     assert node[0].tolist() == p[0].tolist()
     again = _band_kernels.band_cost(
-        ground, stops(), node, gear, ux, uy, shape, gradient
+        ground, stops(), node, gear, NO_PIVOT[:14], ux, uy, shape, gradient
     )
     assert again == after

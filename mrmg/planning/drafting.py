@@ -1,0 +1,143 @@
+"""Drafts: plans driven straight along tours, without a motion tree.
+
+The ways of the roadmap along tours are drawn tight and driven in closed loop
+(`refine.run_errands`). Where that succeeds, which is nearly always where there is room,
+it gives what a tree along the same tours and its refinement would give, sooner. Where
+it does not, a tree has to find the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import cos, radians, sin
+
+import numpy as np
+
+from mrmg.mission import Plan
+from mrmg.motion._kernels import CAR, UNICYCLE
+from mrmg.planning.assembly import make_plan
+from mrmg.planning.band import TRACKING_M, Path
+from mrmg.planning.motion_tree import Problem
+from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.refine import Errand, run_errands, stays_somewhere, surfaces_of
+from mrmg.planning.routing import Routing
+
+SHARP = radians(110.0)
+"""Turn at a target from which on a car goes on in its other gear [rad]."""
+
+PIVOT = radians(60.0)
+"""Turn from which on a robot that can turns on the spot [rad]."""
+
+DIRECTION_M = 4.0
+"""How far before and after a target a way's direction is read."""
+
+
+def draftable(problem: Problem) -> bool:
+    """Tell whether drafts know all that a mission asks for.
+
+    They do not know stays, ends with a heading, nor how a user's models drive.
+    """
+    targets = problem.mission.targets
+    turned = (targets.finish >= 0) & (targets.tolerance < np.pi)
+    models = problem.mission.fleet["model"]
+    known = (models == CAR) | (models == UNICYCLE)
+    return bool(known.all() and not turned.any()) and not stays_somewhere(problem)
+
+
+def draft(
+    problem: Problem,
+    params: PlannerParams,
+    routing: Routing,
+    seed: int,
+    halt: np.ndarray,
+) -> Plan | None:
+    """Return a plan along tours, or None if driving them straight away fails.
+
+    Args:
+        problem: the mission.
+        params: parameters.
+        routing: the tours.
+        seed: of the search that the plan belongs to.
+        halt: shape (1,); drafting ends soon after it has turned true.
+    """
+    finish = problem.mission.targets.finish
+    errands = []
+    for r, surface in enumerate(surfaces_of(problem)):
+        tour = [*routing.tours[r], *([int(finish[r])] if finish[r] >= 0 else [])]
+        errands.append(Errand(tour, tour_path(problem, r, tour), surface))
+    trajectories = run_errands(problem, params, errands, halt)
+    if not trajectories:
+        return None
+    names = [target.id for target in problem.scene.targets()]
+    tours = {
+        robot.id: tuple(names[t] for t in tour)
+        for robot, tour in zip(problem.scene.robots, routing.tours, strict=True)
+    }
+    return make_plan(problem, seed, params, trajectories, tours)
+
+
+def tour_path(problem: Problem, r: int, tour: Sequence[int]) -> Path:
+    """Return the way of the roadmap along robot r's tour.
+
+    A car changes gear at a target where its way turns sharply; a robot that can turns
+    on the spot there.
+    """
+    vertices, ends = tour_vertices(problem, r, tour)
+    node = problem.roadmap.arrays.vertex[vertices]
+    moves = np.hypot(*np.diff(node, axis=0).T) > 0.0
+    node = node[np.concatenate([[True], moves])]
+    stops = np.concatenate([[0], np.cumsum(moves)])[ends].astype(np.int64)
+    heading = float(problem.start[r, 2])
+    path = Path(
+        node=node,
+        gear=np.ones(len(node) - 1, np.int64),
+        stop=stops,
+        target=np.array(tour, np.int64),
+        deeper=np.full(len(tour), TRACKING_M),
+        pivot=np.zeros(0, np.int64),
+        heading=heading,
+    )
+    turns = _turns(path)
+    if problem.mission.fleet[r]["model"] == UNICYCLE:
+        pivots = [at for at, turn in turns if turn > PIVOT]
+        return replace(path, pivot=np.array(pivots, np.int64))
+    for at, turn in turns:
+        if turn > SHARP:
+            path.gear[at:] *= -1
+    return path
+
+
+def tour_vertices(
+    problem: Problem, r: int, tour: Sequence[int]
+) -> tuple[list[int], list[int]]:
+    """Return the roadmap's vertices along robot r's tour, and where each leg ends."""
+    roadmap = problem.roadmap
+    field = problem.mission.fleet[r]["field"]
+    vertices, ends = [len(roadmap.targets) + r], []
+    for target in tour:
+        successor = roadmap.arrays.successor[field, target]
+        while successor[vertices[-1]] >= 0:
+            vertices.append(int(successor[vertices[-1]]))
+        ends.append(len(vertices) - 1)
+    return vertices, ends
+
+
+def _turns(path: Path) -> list[tuple[int, float]]:
+    """Return how much a path turns at its start and at its stops, in order [rad]."""
+    way = path.way
+
+    def at(along: float) -> np.ndarray:
+        return np.array([np.interp(along, way, path.node[:, j]) for j in range(2)])
+
+    turns = []
+    for node in dict.fromkeys([0, *path.stop.tolist()]):
+        if node == len(way) - 1:
+            break
+        ahead = at(way[node] + DIRECTION_M) - path.node[node]
+        before = np.array([cos(path.heading), sin(path.heading)])
+        if node > 0:
+            before = path.node[node] - at(way[node] - DIRECTION_M)
+        turn = np.arctan2(before[0] * ahead[1] - before[1] * ahead[0], before @ ahead)
+        turns.append((node, abs(float(turn))))
+    return turns
