@@ -29,9 +29,11 @@ class AckermannChassis:
             FileError: if an MJCF lacks one.
         """
         self._model, self._data = model, data
+        self._step_s = model.opt.timestep
         models = [robot.model for robot in robots]
-        self._wheelbase_m = np.array([item.wheelbase_m for item in models])
-        self._half_track_m = np.array([item.track_m for item in models]) / 2
+        # What tan psi loses, by tan psi itself, to the left wheel's and to the right's.
+        half_track = np.array([item.track_m / item.wheelbase_m / 2 for item in models])
+        self._swing = half_track[:, None] * np.array([1.0, -1.0])
         self._wheels = DrivenWheels(model, data, robots, ("spin_rl", "spin_rr"))
         joint, actuator = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_ACTUATOR
         steer = part_ids(model, joint, robots, ("steer_fl", "steer_fr"))
@@ -46,7 +48,8 @@ class AckermannChassis:
 
     def fifth_state(self) -> np.ndarray:
         """Return the true psi, shape (K,)."""
-        tan_steer = self._tan_steer(np.tan(self._data.qpos[self._steer_q]))
+        tan_wheel = np.tan(self._data.qpos[self._steer_q])
+        tan_steer = 0.5 * (tan_wheel / (1.0 + self._swing * tan_wheel)).sum(axis=1)
         return np.asarray(np.arctan(tan_steer))
 
     def axle_speed_m_s(self) -> np.ndarray:
@@ -67,11 +70,10 @@ class AckermannChassis:
         self, force_N: np.ndarray, w_from: np.ndarray, w_to: np.ndarray, steps: int
     ) -> None:
         """Hold the traction force; ramp psi so that the servos are on it in time."""
-        step_s = self._model.opt.timestep
-        rate = (w_to - w_from) / (steps * step_s)
-        share = (np.arange(steps) / steps)[:, None]
-        psi = w_from + share * (w_to - w_from) + rate * self._servo_lag_s
-        self._angles = self._wheel_angles(psi)
+        lag = self._servo_lag_s / (steps * self._step_s)
+        share = (np.arange(steps) / steps)[:, None] + lag
+        tan_steer = np.tan(w_from + share * (w_to - w_from))[:, :, None]
+        self._angles = np.arctan(tan_steer / (1.0 - self._swing * tan_steer))
         self._force_N = force_N
         self._speed_m_s, self._rolled_m = self.axle_speed_m_s(), self._axle_way_m()
         self._data.ctrl[self._drive_ctrl] = force_N
@@ -86,7 +88,7 @@ class AckermannChassis:
             self._force_N,
             self._axle_way_m() - self._rolled_m,
             self.axle_speed_m_s() - self._speed_m_s,
-            self._model.opt.timestep,
+            self._step_s,
         )
 
     def _axle_way_m(self) -> np.ndarray:
@@ -97,18 +99,3 @@ class AckermannChassis:
         """Return the axle's motion from that of its wheels, shape (K, 2) -> (K,)."""
         radius_m = self._wheels.radius_m
         return np.asarray(0.5 * radius_m * (wheels[:, 0] + wheels[:, 1]))
-
-    def _wheel_angles(self, steer: np.ndarray) -> np.ndarray:
-        """Return left and right Ackermann angles, shape (n, K) -> (n, K, 2)."""
-        way = self._wheelbase_m * np.tan(steer)
-        swing = self._half_track_m / self._wheelbase_m * way
-        left = np.arctan(way / (self._wheelbase_m - swing))
-        right = np.arctan(way / (self._wheelbase_m + swing))
-        return np.stack([left, right], axis=-1)
-
-    def _tan_steer(self, tan_wheel: np.ndarray) -> np.ndarray:
-        """Return tan psi from the tangents of both wheels' angles, (K, 2) -> (K,)."""
-        ratio = self._half_track_m / self._wheelbase_m
-        left = tan_wheel[:, 0] / (1.0 + ratio * tan_wheel[:, 0])
-        right = tan_wheel[:, 1] / (1.0 - ratio * tan_wheel[:, 1])
-        return np.asarray(0.5 * (left + right))

@@ -7,6 +7,8 @@ that impulse and angle are exact at every tick.
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
 from mrmg.execution.disturbance import Disturbance
@@ -14,7 +16,39 @@ from mrmg.execution.disturbance import Disturbance
 _SHORTEST_S = 1e-9
 
 
-class Actuation:
+class Actuation(Protocol):
+    """Turns what is commanded into what the robots' actuators do."""
+
+    def force_N(self, commanded_N: np.ndarray, period_s: float) -> np.ndarray:
+        """Return the mean force over a tick in which one force is commanded, (R,)."""
+
+    def steer(
+        self, start: np.ndarray, end: np.ndarray, period_s: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the steering at both ends of a tick in which a ramp is commanded.
+
+        Args:
+            start: commanded at the start of the tick, shape (R,).
+            end: commanded at its end.
+            period_s: length of the tick.
+        """
+
+
+class PerfectActuation:
+    """Does at once what it is told."""
+
+    def force_N(self, commanded_N: np.ndarray, period_s: float) -> np.ndarray:
+        """Return the force commanded."""
+        return commanded_N
+
+    def steer(
+        self, start: np.ndarray, end: np.ndarray, period_s: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the ramp commanded."""
+        return start, end
+
+
+class LaggingActuation:
     """Lag and gain of all robots' actuators."""
 
     def __init__(self, disturbance: Disturbance, steer: np.ndarray) -> None:
@@ -32,7 +66,7 @@ class Actuation:
         self._steer = self._steer_gain * steer
 
     def force_N(self, commanded_N: np.ndarray, period_s: float) -> np.ndarray:
-        """Return the mean force over a tick in which one force is commanded, (R,)."""
+        """Return the mean force over the tick."""
         wanted = self._drive_gain * commanded_N
         gone, mean_gone = self._decay(period_s)
         mean = wanted + (self._force_N - wanted) * mean_gone
@@ -42,13 +76,7 @@ class Actuation:
     def steer(
         self, start: np.ndarray, end: np.ndarray, period_s: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the steering at both ends of a tick in which a ramp is commanded.
-
-        Args:
-            start: commanded at the start of the tick, shape (R,).
-            end: commanded at its end.
-            period_s: length of the tick.
-        """
+        """Return the steering at both ends of the tick."""
         gone, _ = self._decay(period_s)
         before = self._steer
         behind = self._steer_gain * (end - start) / period_s * self._lag_s
@@ -63,3 +91,12 @@ class Actuation:
         """Return exp(-T / tau) and its mean over the tick; 0 where there is no lag."""
         gone = np.exp(-period_s / np.maximum(self._lag_s, _SHORTEST_S))
         return gone, (1.0 - gone) * self._lag_s / period_s
+
+
+def actuation_of(disturbance: Disturbance, steer: np.ndarray) -> Actuation:
+    """Return the actuators of a mission, at rest with the wheels at `steer`, (R,)."""
+    differs = any(
+        item.lag_s or item.drive_gain or item.steering_gain
+        for item in disturbance.robots
+    )
+    return LaggingActuation(disturbance, steer) if differs else PerfectActuation()

@@ -26,8 +26,12 @@ class ContactWatch:
         """Record which touches of the present state are new."""
         geoms = data.contact.geom
         owners = self._owner[geoms]
+        # Most often there are but tyres on the floor.
+        if owners.max(initial=-1) < 0:
+            self._touching.clear()
+            return
         touching: dict[tuple[str, str], int] = {}
-        for index in (owners.max(axis=1, initial=-1) >= 0).nonzero()[0]:
+        for index in (owners.max(axis=1) >= 0).nonzero()[0]:
             hull, other = geoms[index]
             if owners[index][0] < 0:
                 hull, other = other, hull

@@ -99,12 +99,12 @@ class DifferentialChassis:
         other does not get.
         """
         work = held_force_work_J(
-            self._force_N.ravel(),
-            (self._wheel_way_m() - self._rolled_m).ravel(),
-            (self._wheel_speed_m_s() - self._speed_m_s).ravel(),
+            self._force_N,
+            self._wheel_way_m() - self._rolled_m,
+            self._wheel_speed_m_s() - self._speed_m_s,
             self._model.opt.timestep,
         )
-        return np.asarray(work.reshape(-1, 2, 2).sum(axis=1))
+        return np.asarray(work.sum(axis=1))
 
     def _wheel_speed_m_s(self) -> np.ndarray:
         """Return the speed each wheel rolls at, left and right, shape (K, 2)."""

@@ -50,7 +50,7 @@ class DriveControl:
         next_m_s: np.ndarray,
         resistance_N: np.ndarray,
         period_s: float,
-        slope: np.ndarray | float = 0.0,
+        slope: np.ndarray | None = None,
     ) -> np.ndarray:
         """Return the force to hold for `period_s`, shape (R,).
 
@@ -62,16 +62,12 @@ class DriveControl:
             next_m_s: speed asked for at the end of the period.
             resistance_N: force the ground is believed to take.
             period_s: how long the force will be held.
-            slope: sine of the slope along the heading.
+            slope: sine of the slope along each heading; None on level ground.
         """
-        force_N = self._loop.force(
-            speed_m_s,
-            wanted_m_s,
-            next_m_s,
-            resistance_N,
-            period_s,
-            brakes=np.not_equal(slope, 0.0),
-        )
+        asked = (speed_m_s, wanted_m_s, next_m_s, resistance_N)
+        if slope is None:
+            return self._loop.force(*asked, period_s)
+        force_N = self._loop.force(*asked, period_s, brakes=slope != 0.0)
         return np.asarray(force_N + self._weight_N * slope)
 
 

@@ -7,6 +7,7 @@ body `chassis` and the geom `hull`, besides the parts its chassis needs.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import mujoco
@@ -40,24 +41,26 @@ class Fleet:
         self._groups = _grouped(model, data, world.scene)
         root = part_ids(model, mujoco.mjtObj.mjOBJ_JOINT, robots, ("root",))
         root_q, root_v = model.jnt_qposadr[root], model.jnt_dofadr[root]
-        self._xy = root_q + np.arange(2)
-        self._quaternion = root_q + np.arange(3, 7)
+        self._pose = root_q + np.arange(7)
         self._velocity = root_v + np.arange(2)
-        self._yaw = np.array([robot.pose[2] for robot in robots])
+        self._yaw = [robot.pose[2] for robot in robots]
 
     def state(self) -> np.ndarray:
         """Return the true (x, y, theta, v, psi or omega), shape (R, 5).
 
         theta is unwrapped.
         """
-        qpos, qvel = self._data.qpos, self._data.qvel
-        w, x, y, z = qpos[self._quaternion].T
-        yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-        self._yaw = self._yaw + (yaw - self._yaw + np.pi) % (2.0 * np.pi) - np.pi
-        velocity = qvel[self._velocity]
-        speed = velocity[:, 0] * np.cos(yaw) + velocity[:, 1] * np.sin(yaw)
         fifth = self._gather([group.chassis.fifth_state() for group in self._groups])
-        return np.column_stack([qpos[self._xy], self._yaw, speed, fifth])
+        pose = self._data.qpos[self._pose].tolist()
+        velocity = self._data.qvel[self._velocity].tolist()
+        states = []
+        for index, (x, y, _, qw, qx, qy, qz) in enumerate(pose):
+            yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+            v_x, v_y = velocity[index]
+            speed = v_x * math.cos(yaw) + v_y * math.sin(yaw)
+            self._yaw[index] += math.remainder(yaw - self._yaw[index], math.tau)
+            states.append((x, y, self._yaw[index], speed, fifth[index]))
+        return np.array(states)
 
     def axle_speed_m_s(self) -> np.ndarray:
         """Return the speed the driven axle rolls at, shape (R,)."""

@@ -5,6 +5,8 @@ Robots that each kept their own time would lose the separation the planner gave 
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,18 +55,17 @@ class FleetClock:
         """
         self.time_s = 0.0
         self.rate = 1.0
-        self._turns = np.zeros(0, dtype=int) if turns is None else np.flatnonzero(turns)
+        self._turns = [] if turns is None else np.flatnonzero(turns).tolist()
         self._params = params or ClockParams()
 
     def pace(self, state: np.ndarray, reference: np.ndarray, period_s: float) -> None:
         """Set the rate from where the robots are and should be, both (R, 5)."""
         params = self._params
-        worst_s = float(lag_s(state, reference, params.least_speed_m_s).max())
-        if len(self._turns):
-            turning_s = turning_lag_s(
-                state[self._turns], reference[self._turns], params.least_yaw_rate_rad_s
-            )
-            worst_s = max(worst_s, float(turning_s.max()))
+        pairs = list(zip(state.tolist(), reference.tolist(), strict=True))
+        worst_s = max(lag_s(*pair, params.least_speed_m_s) for pair in pairs)
+        for robot in self._turns:
+            turning_s = turning_lag_s(*pairs[robot], params.least_yaw_rate_rad_s)
+            worst_s = max(worst_s, turning_s)
         target = 1.0 - params.gain_per_s * max(worst_s - params.tolerated_lag_s, 0.0)
         lowest = self.rate - params.slowing_per_s * period_s
         highest = self.rate + params.recovery_per_s * period_s
@@ -76,26 +77,40 @@ class FleetClock:
 
 
 def lag_s(
-    state: np.ndarray, reference: np.ndarray, least_speed_m_s: float
-) -> np.ndarray:
-    """Return how late each robot is along its planned way [s], shape (R,)."""
-    heading = np.stack([np.cos(reference[:, 2]), np.sin(reference[:, 2])], axis=1)
-    ahead_m = ((reference[:, :2] - state[:, :2]) * heading).sum(axis=1)
-    speed = reference[:, 3]
+    state: Sequence[float], reference: Sequence[float], least_speed_m_s: float
+) -> float:
+    """Return how late a robot is along its planned way [s].
+
+    Args:
+        state: true (x, y, theta, v, w).
+        reference: planned (x, y, theta, v, w).
+        least_speed_m_s: speed below which lag is measured as if at this speed.
+    """
+    x, y, heading, speed, _ = reference
     # One that waits is not late; where it stands short of its place, it stays there.
-    direction = np.sign(speed) * (np.abs(speed) > STANDSTILL_M_S)
-    return np.asarray(direction * ahead_m / np.maximum(np.abs(speed), least_speed_m_s))
+    if abs(speed) <= STANDSTILL_M_S:
+        return 0.0
+    ahead_m = (x - state[0]) * math.cos(heading) + (y - state[1]) * math.sin(heading)
+    late_m = math.copysign(1.0, speed) * ahead_m
+    return late_m / max(abs(speed), least_speed_m_s)
 
 
 def turning_lag_s(
-    state: np.ndarray, reference: np.ndarray, least_yaw_rate_rad_s: float
-) -> np.ndarray:
-    """Return how late each robot is in its planned turn [s], shape (R,).
+    state: Sequence[float], reference: Sequence[float], least_yaw_rate_rad_s: float
+) -> float:
+    """Return how late a robot is in its planned turn [s].
 
     One that drove on before it has turned would leave its way.
+
+    Args:
+        state: true (x, y, theta, v, omega).
+        reference: planned (x, y, theta, v, omega).
+        least_yaw_rate_rad_s: as the least speed of `lag_s`.
     """
-    yaw_rate = reference[:, 4]
+    yaw_rate = reference[4]
     # The standstill of turning is that of driving, in radians.
-    direction = np.sign(yaw_rate) * (np.abs(yaw_rate) > STANDSTILL_M_S)
-    ahead_rad = direction * (reference[:, 2] - state[:, 2])
-    return np.asarray(ahead_rad / np.maximum(np.abs(yaw_rate), least_yaw_rate_rad_s))
+    if abs(yaw_rate) <= STANDSTILL_M_S:
+        return 0.0
+    ahead_rad = reference[2] - state[2]
+    late_rad = math.copysign(1.0, yaw_rate) * ahead_rad
+    return late_rad / max(abs(yaw_rate), least_yaw_rate_rad_s)

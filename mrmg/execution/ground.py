@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+import shapely
 
 from mrmg.energy import GRAVITY_M_S2
 from mrmg.errors import Fault, FileError
@@ -57,6 +58,31 @@ class GroundResistance:
         """
         turning = self.turning_N * np.abs(np.tan(steer))
         return np.asarray(self.rolling_N * multiplier + turning)
+
+
+class TerrainUnderfoot:
+    """The terrain under a few robots, asked for at every tick."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Prepare the terrain of `scene`."""
+        self._areas = [
+            (area.shape, area.shape.bounds, area.multiplier)
+            for area in reversed(scene.terrain)
+        ]
+        for shape, _, _ in self._areas:
+            shapely.prepare(shape)
+
+    def under(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
+        """Return the multipliers at some places, equal to `multiplier_at`'s, (n,)."""
+        places = zip(x_m.tolist(), y_m.tolist(), strict=True)
+        return np.array([self._at(x, y) for x, y in places])
+
+    def _at(self, x: float, y: float) -> float:
+        for shape, (x_min, y_min, x_max, y_max), multiplier in self._areas:
+            near = x_min <= x <= x_max and y_min <= y <= y_max
+            if near and shapely.contains_xy(shape, x, y):
+                return multiplier
+        return 1.0
 
 
 def believed_resistance(scene: Scene) -> GroundResistance:

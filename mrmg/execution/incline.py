@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import mujoco
 import numpy as np
 
@@ -14,10 +16,8 @@ class Incline:
 
     def __init__(self, scene: Scene) -> None:
         """Look at the relief of `scene`."""
-        self._scene = scene
-        self._lead_m = np.array(
-            [[robot.model.center_of_mass_m] for robot in scene.robots]
-        )
+        self._relief = scene.elevation
+        self._lead_m = [robot.model.center_of_mass_m for robot in scene.robots]
 
     def under(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return cosine and sine of the slope along each heading, each (R,).
@@ -27,13 +27,18 @@ class Incline:
         Args:
             state: of the robots, shape (R, 5).
         """
-        if self._scene.elevation is None:
+        if self._relief is None:
             return np.ones(len(state)), np.zeros(len(state))
-        heading = np.stack([np.cos(state[:, 2]), np.sin(state[:, 2])], axis=1)
-        gradient = gradient_at(self._scene, state[:, :2] + self._lead_m * heading)
-        rise = (gradient * heading).sum(axis=1)
-        level = 1.0 / np.hypot(1.0, rise)
-        return level, level * rise
+        level, slope = [], []
+        for (x, y, heading, _, _), lead_m in zip(
+            state.tolist(), self._lead_m, strict=True
+        ):
+            cos, sin = math.cos(heading), math.sin(heading)
+            slope_x, slope_y = self._relief.slope_at(x + lead_m * cos, y + lead_m * sin)
+            rise = slope_x * cos + slope_y * sin
+            level.append(1.0 / math.hypot(1.0, rise))
+            slope.append(rise * level[-1])
+        return np.array(level), np.array(slope)
 
 
 def standing_pose(

@@ -70,7 +70,7 @@ class TrackingMpc:
         """Return the first control of the optimum less the reference's."""
         stages = self._target[:-NX].reshape(HORIZON, _STAGE)
         stages[:, :NX] = reference[:-1]
-        stages[:, NX:] = np.diff(reference[:, 3:], axis=0) / HORIZON_STEP_S
+        stages[:, NX:] = (reference[1:, 3:] - reference[:-1, 3:]) / HORIZON_STEP_S
         self._target[-NX:] = reference[-1]
         np.add(self._target, self._deviation, out=self._guess)
         self._fix_first_state(state)

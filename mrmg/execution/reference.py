@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from scipy.interpolate import PPoly
 
 from mrmg.mission import Plan, Trajectory
 from mrmg.motion.dynamics import DERIVATIVES, NX, SPEED_STATES
@@ -31,18 +32,23 @@ class FleetReference:
             _pieces(robot.model, plan.trajectory(robot.id)) for robot in scene.robots
         ]
         self._is_speed = speed_states(scene)
-        steps = pieces[0].shape[1]
+        self._steps = pieces[0].shape[1]
+        self._dt_s = plan.dt_s
         self.duration_s = plan.makespan_s
-        self._plan = PPoly(
-            np.stack(pieces, axis=2).reshape(4, steps, -1),
-            np.arange(steps + 1) * plan.dt_s,
-            extrapolate=False,
-        )
+        self._cubics = np.stack(pieces, axis=2).reshape(4, self._steps, -1)
 
     def at(self, plan_time_s: np.ndarray) -> np.ndarray:
         """Return the states at the given plan times, shape (n,) -> (n, R, 5)."""
-        states = self._plan(np.minimum(plan_time_s, self.duration_s))
-        return np.asarray(states.reshape(len(plan_time_s), -1, NX))
+        time_s = np.minimum(plan_time_s, self.duration_s)
+        piece = np.minimum((time_s / self._dt_s).astype(int), self._steps - 1)
+        since_s = (time_s - self._dt_s * piece)[:, None]
+        return self._states(piece, since_s).reshape(len(time_s), -1, NX)
+
+    def at_once(self, plan_time_s: float) -> np.ndarray:
+        """Return the states at one plan time, shape (R, 5)."""
+        time_s = min(plan_time_s, self.duration_s)
+        piece = min(int(time_s / self._dt_s), self._steps - 1)
+        return self._states(piece, time_s - self._dt_s * piece).reshape(-1, NX)
 
     def paced(
         self, clock_s: float, rate: float, period_s: float, count: int
@@ -53,7 +59,16 @@ class FleetReference:
         multiplied by it.
         """
         states = self.at(clock_s + rate * period_s * np.arange(count))
+        if rate == 1.0:
+            return states
         return np.where(self._is_speed, rate * states, states)
+
+    def _states(self, piece: Any, since_s: Any) -> np.ndarray:
+        """Return the cubics of pieces of the plan some time after their starts."""
+        third, second, first, start = self._cubics[:, piece]
+        return np.asarray(
+            ((third * since_s + second) * since_s + first) * since_s + start
+        )
 
 
 def speed_states(scene: Scene) -> np.ndarray:

@@ -90,10 +90,10 @@ def _floor_image(scene: Scene, center: np.ndarray, half: np.ndarray) -> np.ndarr
     classes = np.unique([1.0, *(area.multiplier for area in scene.terrain)])
     colours = np.array([palette.terrain_colour(multiplier) for multiplier in classes])
     of_pixel = np.searchsorted(classes, multiplier_at(scene, points))
-    image = _bytes(colours)[of_pixel].reshape(rows, columns, 3)
-    shade = _bytes(_GRID_SHADE * colours)[of_pixel].reshape(rows, columns, 3)
     on_grid = _on_grid(y, pixel_m)[:, None] | _on_grid(x, pixel_m)[None]
-    return np.where(on_grid[..., None], shade, image)
+    tints = _bytes(np.concatenate([colours, _GRID_SHADE * colours]))
+    tint = of_pixel.reshape(rows, columns) + len(classes) * on_grid
+    return np.asarray(tints[tint])
 
 
 def _on_grid(at_m: np.ndarray, width_m: float) -> np.ndarray:

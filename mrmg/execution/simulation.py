@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,7 +11,7 @@ import mujoco
 import numpy as np
 
 from mrmg.errors import UsageError
-from mrmg.execution.actuation import Actuation
+from mrmg.execution.actuation import actuation_of
 from mrmg.execution.chassis import chassis_maker
 from mrmg.execution.contacts import ContactWatch
 from mrmg.execution.controller import Controller, controller_maker
@@ -19,7 +20,11 @@ from mrmg.execution.disturbed_world import disturb_world, move_starts
 from mrmg.execution.drive import DriveControl
 from mrmg.execution.fleet import Fleet
 from mrmg.execution.fleet_clock import FleetClock
-from mrmg.execution.ground import believed_resistance, true_resistance
+from mrmg.execution.ground import (
+    TerrainUnderfoot,
+    believed_resistance,
+    true_resistance,
+)
 from mrmg.execution.incline import Incline
 from mrmg.execution.log import ExecutionLog, package_versions
 from mrmg.execution.recording import Recording
@@ -46,12 +51,12 @@ _AT_REST = 0.005
 _STALLED_RATE = 0.1
 _LONGEST_STALL_S = 5.0
 _PROGRESS_TICKS = 50
-_DIVERGED = (
-    mujoco.mjtWarning.mjWARN_BADQPOS,
-    mujoco.mjtWarning.mjWARN_BADQVEL,
-    mujoco.mjtWarning.mjWARN_BADQACC,
-    mujoco.mjtWarning.mjWARN_BADCTRL,
-)
+_DIVERGED = [
+    int(mujoco.mjtWarning.mjWARN_BADQPOS),
+    int(mujoco.mjtWarning.mjWARN_BADQVEL),
+    int(mujoco.mjtWarning.mjWARN_BADQACC),
+    int(mujoco.mjtWarning.mjWARN_BADCTRL),
+]
 
 Progress = Callable[[float, str], None]
 
@@ -157,8 +162,10 @@ class _Run:
         self._got_on_s, self._finished_s = 0.0, np.inf
         self._fleet = Fleet(world, self.data)
         self._incline = Incline(world.scene)
+        self._terrain = TerrainUnderfoot(world.scene)
         self._sensing = sensing_of(world.scene, disturbance, self._period_s)
-        self._actuation = Actuation(disturbance, self._set_points.following[:, 1])
+        self._actuation = actuation_of(disturbance, self._set_points.following[:, 1])
+        self._coming = self._reference.at_once(0.0)
         self._settle()
         self._observe()
         self._record()
@@ -169,7 +176,9 @@ class _Run:
         now, following = self._set_points.now, self._set_points.following
         steer, period_s = following[:, 1], self._period_s
         seen, true = self._sensing.state, self._state
-        level, slope = self._incline.under(seen)
+        level, slope = self._slopes
+        if seen is not true:
+            level, slope = self._incline.under(seen)
         ground = self._ground(seen, steer)
         believed = self._believed.force_N(*ground)
         wanted = self._drive.force_N(
@@ -184,7 +193,7 @@ class _Run:
         steer_from, steer_to = self._actuation.steer(now[:, 1], steer, period_s)
         if self._disturbance is not None:
             ground = self._ground(true, steer_to)
-            level, _ = self._incline.under(true)
+            level, _ = self._slopes
         # The slope carries a part of the weight that the tyres then need not.
         resistance = level * self._true.force_N(*ground)
         self._fleet.set_resistance(resistance, self._true.swing_N)
@@ -222,7 +231,7 @@ class _Run:
         self._set_points.follow(self._reference)
         self._clock.time_s = orders.clock_s
         self._got_on_s, self._finished_s = float(self.data.time), np.inf
-        self._planned = self._reference.at(np.array([orders.clock_s]))[0]
+        self._planned = self._reference.at_once(orders.clock_s)
 
     def fraction(self) -> float:
         """Return the share of the plan's time that is done."""
@@ -294,8 +303,15 @@ class _Run:
             )
             if calls:
                 self._call_s.append((time.thread_time() - started) / calls)
+        self._coming = self._reference.at_once(
+            clock.time_s + clock.rate * self._period_s
+        )
         self._set_points.advance(
-            self._sensing.axle_speed_m_s, clock.time_s, clock.rate, self._period_s
+            self._sensing.axle_speed_m_s,
+            self._planned,
+            self._coming,
+            clock.rate,
+            self._period_s,
         )
 
     def _ground(
@@ -307,20 +323,17 @@ class _Run:
             state: true or seen, shape (R, 5).
             steer: at the end of the tick, shape (R,).
         """
-        _, _, heading, speed, steer_now = state.T
-        way = 0.5 * self._period_s * speed
-        middle = state[:, :2] + np.stack(
-            [way * np.cos(heading), way * np.sin(heading)], axis=1
-        )
-        multiplier = multiplier_at(self._world.scene, middle)
-        return multiplier, 0.5 * (steer_now + steer)
+        x, y, heading, speed, steer_now = state.T
+        way_m = 0.5 * self._period_s * speed
+        x_m, y_m = x + way_m * np.cos(heading), y + way_m * np.sin(heading)
+        return self._terrain.under(x_m, y_m), 0.5 * (steer_now + steer)
 
     def _observe(self) -> None:
         self._state = self._fleet.state()
-        level, _ = self._incline.under(self._state)
-        over_map = level * self._fleet.axle_speed_m_s()
+        self._slopes = self._incline.under(self._state)
+        over_map = self._slopes[0] * self._fleet.axle_speed_m_s()
         self._sensing.look(self._state, over_map, self._set_points.following[:, 0])
-        self._planned = self._reference.at(np.array([self._clock.time_s]))[0]
+        self._planned = self._coming
         self._sound = bool(np.isfinite(self._state.sum() + self._planned.sum()))
         finished = self._clock.time_s >= self._reference.duration_s - 1e-9
         if finished:
@@ -342,17 +355,16 @@ class _Run:
         return min(self._clock.time_s, self._reference.duration_s)
 
     def _completed(self) -> bool:
-        rested_s = self.data.time - self._finished_s
-        at_rest = np.abs(self._state[self._is_speed]).max() < _AT_REST
-        return bool(rested_s >= _REST_S and at_rest)
+        if self.data.time - self._finished_s < _REST_S:
+            return False
+        return bool(np.abs(self._state[self._is_speed]).max() < _AT_REST)
 
     def _trouble(self) -> str:
         """Return why the fleet is past helping, in the log's words; "" if it is not."""
-        off_m = np.hypot(*(self._state - self._planned)[:, :2].T)
-        warned = any(self.data.warning[kind].number for kind in _DIVERGED)
-        if warned or not self._sound:
+        if not self._sound or self.data.warning.number[_DIVERGED].any():
             return "diverged"
-        if (off_m > _LOST_M).any():
+        pairs = zip(self._state.tolist(), self._planned.tolist(), strict=True)
+        if any(math.dist(now[:2], meant[:2]) > _LOST_M for now, meant in pairs):
             return "lost"
         if self.data.time - self._got_on_s > _LONGEST_STALL_S:
             return "stalled"

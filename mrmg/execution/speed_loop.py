@@ -8,6 +8,7 @@ turning, with moments, yaw inertias and yaw rates.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,8 +44,9 @@ class SpeedLoop:
             limit: bound of the part that accelerates [N or N m], shape (n,).
             params: the gains.
         """
-        self._inertia, self._limit, self._params = inertia, limit, params
-        self._integral_m_s2 = np.zeros(len(inertia))
+        self._params = params
+        self._inertia, self._limit = inertia.tolist(), limit.tolist()
+        self._integral_m_s2 = [0.0] * len(inertia)
 
     def force(
         self,
@@ -54,7 +56,7 @@ class SpeedLoop:
         resistance: np.ndarray,
         period_s: float,
         *,
-        brakes: np.ndarray | bool = False,
+        brakes: np.ndarray | None = None,
     ) -> np.ndarray:
         """Return the force [N] or moment [N m] to hold for `period_s`, shape (n,).
 
@@ -64,22 +66,27 @@ class SpeedLoop:
             following: speed asked for at the end of the period.
             resistance: what the ground takes [N or N m].
             period_s: how long the force will be held.
-            brakes: where standing takes more than friction, as on a slope.
+            brakes: where standing takes more than friction, as on a slope; None for
+                nowhere.
         """
-        params = self._params
-        error = wanted - speed
-        middle = 0.5 * (wanted + following)
-        direction = np.sign(middle) * (np.abs(middle) > params.standstill_m_s)
-        # A robot that shall stand is held by friction; what was learnt is forgotten.
-        keeps = np.maximum(np.abs(direction), brakes)
-        self._integral_m_s2 = keeps * np.clip(
-            self._integral_m_s2 + period_s * params.integral_per_s2 * error,
-            -params.integral_limit_m_s2,
-            params.integral_limit_m_s2,
-        )
-        acceleration = (following - wanted) / period_s
-        feedback = params.proportional_per_s * error + self._integral_m_s2
-        inertial = self._inertia * (acceleration + feedback)
-        return np.asarray(
-            direction * resistance + np.clip(inertial, -self._limit, self._limit)
-        )
+        params, forces = self._params, []
+        bound = params.integral_limit_m_s2
+        held = [False] * len(speed) if brakes is None else brakes.tolist()
+        values = (speed, wanted, following, resistance)
+        each = zip(*(value.tolist() for value in values), held, strict=True)
+        for index, (now, asked, coming, ground, brake) in enumerate(each):
+            error, middle = asked - now, 0.5 * (asked + coming)
+            moves = abs(middle) > params.standstill_m_s
+            # One that shall stand is held by friction; what was learnt is forgotten.
+            learnt = 0.0
+            if moves or brake:
+                learnt = period_s * params.integral_per_s2 * error
+                learnt = min(max(self._integral_m_s2[index] + learnt, -bound), bound)
+            self._integral_m_s2[index] = learnt
+            acceleration = (coming - asked) / period_s
+            feedback = params.proportional_per_s * error + learnt
+            inertial = self._inertia[index] * (acceleration + feedback)
+            limit = self._limit[index]
+            direction = math.copysign(1.0, middle) if moves else 0.0
+            forces.append(direction * ground + min(max(inertial, -limit), limit))
+        return np.array(forces)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -20,7 +21,7 @@ class Elevation:
     bounds: tuple[float, float, float, float]
     height_m: np.ndarray
 
-    @property
+    @cached_property
     def cell_m(self) -> tuple[float, float]:
         """Extent (x, y) of a cell between nodes [m]."""
         x_min, y_min, x_max, y_max = self.bounds
@@ -44,6 +45,20 @@ class Elevation:
         dx, dy = self.cell_m
         rise = (1.0 - v) * south + v * north
         return np.stack([rise / dx, (high - low) / dy], axis=-1)
+
+    def slope_at(self, x_m: float, y_m: float) -> tuple[float, float]:
+        """Return the slope (dh/dx, dh/dy) at one point; sooner than `gradient_at`."""
+        height = self._rows_m
+        x_min, y_min, _, _ = self.bounds
+        dx, dy = self.cell_m
+        fx = max(0.0, min(len(height[0]) - 1.0, (x_m - x_min) / dx))
+        fy = max(0.0, min(len(height) - 1.0, (y_m - y_min) / dy))
+        column, row = min(int(fx), len(height[0]) - 2), min(int(fy), len(height) - 2)
+        u, v = fx - column, fy - row
+        a, b = height[row][column : column + 2]
+        c, d = height[row + 1][column : column + 2]
+        rise = (1.0 - v) * (b - a) + v * (d - c)
+        return rise / dx, (c * (1.0 - u) + d * u - a * (1.0 - u) - b * u) / dy
 
     def span_within(
         self, box: tuple[float, float, float, float]
@@ -81,6 +96,12 @@ class Elevation:
         x = x_min + (np.arange(columns - 1) + 0.5) * dx
         y = y_min + (np.arange(rows - 1) + 0.5) * dy
         return np.stack(np.meshgrid(x, y), axis=-1)
+
+    @cached_property
+    def _rows_m(self) -> list[list[float]]:
+        """The heights as plain numbers, which are sooner at hand one by one."""
+        rows: list[list[float]] = self.height_m.tolist()
+        return rows
 
     def _about(
         self, points: np.ndarray

@@ -16,6 +16,10 @@ def multiplier_at(scene: Scene, points: np.ndarray) -> np.ndarray:
     points = np.atleast_2d(points)
     multiplier = np.ones(len(points))
     for area in scene.terrain:
-        inside = shapely.contains_xy(area.shape, points[:, 0], points[:, 1])
-        multiplier[inside] = area.multiplier
+        x_min, y_min, x_max, y_max = area.shape.bounds
+        x, y = points.T
+        near = (x >= x_min) & (x <= x_max) & (y >= y_min) & (y <= y_max)
+        (near,) = near.nonzero()
+        inside = shapely.contains_xy(area.shape, x[near], y[near])
+        multiplier[near[inside]] = area.multiplier
     return multiplier

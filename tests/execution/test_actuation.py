@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrmg.execution.actuation import Actuation
+from mrmg.execution.actuation import LaggingActuation, PerfectActuation, actuation_of
 from mrmg.execution.disturbance import Disturbance, RobotDisturbance
 
 T_S = 0.02
 
 
-def actuation(steer: float = 0.0, **changes: float) -> Actuation:
+def actuation(steer: float = 0.0, **changes: float) -> LaggingActuation:
     robot = RobotDisturbance(robot="r1", **changes)
-    return Actuation(Disturbance(seed=0, robots=(robot,)), np.array([steer]))
+    return LaggingActuation(Disturbance(seed=0, robots=(robot,)), np.array([steer]))
 
 
 def integrated(
@@ -72,7 +72,24 @@ def test_gains_scale_what_arrives() -> None:
 
 def test_robots_have_their_own_lags() -> None:
     robots = (RobotDisturbance(robot="r1", lag_s=0.1), RobotDisturbance(robot="r2"))
-    both = Actuation(Disturbance(seed=0, robots=robots), np.zeros(2))
+    both = LaggingActuation(Disturbance(seed=0, robots=robots), np.zeros(2))
     late, prompt = both.force_N(np.array([50.0, 50.0]), T_S)
     assert 0.0 < late < 6.0
     assert prompt == 50.0
+
+
+def test_without_lag_and_gain_everything_is_done_at_once() -> None:
+    """The perfect actuators do what lagging ones without lag do."""
+    undisturbed = Disturbance(seed=0, robots=(RobotDisturbance(robot="r1"),))
+    prompt = actuation_of(undisturbed, np.array([0.1]))
+    assert isinstance(prompt, PerfectActuation)
+    general = LaggingActuation(undisturbed, np.array([0.1]))
+    angles = 0.1 + 0.05 * np.sin(np.arange(6))
+    angles[0] = 0.1
+    for force, start, end in zip(angles * 900, angles, angles[1:], strict=False):
+        asked = np.array([force])
+        assert prompt.force_N(asked, T_S) == general.force_N(asked, T_S)
+        ramp = np.array([start]), np.array([end])
+        np.testing.assert_allclose(
+            prompt.steer(*ramp, T_S), general.steer(*ramp, T_S), atol=1e-15
+        )

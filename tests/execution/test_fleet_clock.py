@@ -33,13 +33,13 @@ def test_lag_is_measured_along_the_way(
 ) -> None:
     state = np.array([moving(0.0, v, heading)])
     reference = np.array([moving(behind_m, v, heading)])
-    assert lag_s(state, reference, 0.5)[0] == pytest.approx(late_s)
+    assert lag_s(state[0], reference[0], 0.5) == pytest.approx(late_s)
 
 
 def test_sideways_error_is_no_lag() -> None:
     state, reference = np.array([moving(0.0, 1.0)]), np.array([moving(0.0, 1.0)])
     state[0, 1] = 0.5
-    assert lag_s(state, reference, 0.5)[0] == pytest.approx(0.0)
+    assert lag_s(state[0], reference[0], 0.5) == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize(
@@ -55,7 +55,7 @@ def test_sideways_error_is_no_lag() -> None:
 def test_lag_of_a_turn(omega: float, behind_rad: float, late_s: float) -> None:
     state = np.array([[0.0, 0.0, 2.0, 0.0, omega]])
     reference = state + [0.0, 0.0, behind_rad, 0.0, 0.0]
-    assert turning_lag_s(state, reference, 0.5)[0] == pytest.approx(late_s)
+    assert turning_lag_s(state[0], reference[0], 0.5) == pytest.approx(late_s)
 
 
 def test_waits_for_robots_that_turn_and_not_for_wheels_that_are_turned() -> None:

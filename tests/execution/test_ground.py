@@ -11,10 +11,16 @@ import numpy as np
 import pytest
 
 from mrmg.errors import FileError
-from mrmg.execution.ground import believed_resistance, true_resistance
+from mrmg.execution.ground import (
+    TerrainUnderfoot,
+    believed_resistance,
+    true_resistance,
+)
 from mrmg.execution.simulation import simulate
 from mrmg.execution.world_model import build_world
+from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
+from mrmg.world.terrain import multiplier_at
 
 
 @pytest.fixture(scope="module")
@@ -67,3 +73,19 @@ def test_an_mjcf_that_does_not_state_its_losses_is_refused(
     )
     with pytest.raises(FileError, match=f"{mjcf}.*\n.*states no {name}; add"):
         true_resistance(build_world(believing(scene, mjcf=mjcf)))
+
+
+@pytest.mark.parametrize("name", ["scene2", "hills", "quickstart"])
+def test_terrain_underfoot_is_the_scenes(name: str) -> None:
+    """Inside, outside and on the borders of areas."""
+    scene = load_scene(name)
+    x_min, y_min, x_max, y_max = scene.bounds
+    rng = np.random.default_rng(3)
+    places = rng.uniform((x_min - 5, y_min - 5), (x_max + 5, y_max + 5), (2000, 2))
+    borders = [np.array(area.shape.exterior.coords) for area in scene.terrain]
+    points = np.concatenate([places, *borders])
+    expected = multiplier_at(scene, points)
+    np.testing.assert_array_equal(
+        TerrainUnderfoot(scene).under(*points.T), expected, strict=True
+    )
+    assert len(np.unique(expected)) > 1

@@ -72,6 +72,13 @@ def test_at_half_the_pace_speeds_are_halved(scene: Scene, plan: Plan) -> None:
     np.testing.assert_allclose(reference.paced(4.0, 0.0, 0.1, 3)[..., 3], 0.0)
 
 
+def test_one_time_is_as_good_as_many(scene: Scene, plan: Plan) -> None:
+    reference = FleetReference(scene, plan)
+    times = np.concatenate([np.linspace(0.0, 31.0, 200), plan.trajectories[0].time_s])
+    for time_s, states in zip(times.tolist(), reference.at(times), strict=True):
+        np.testing.assert_array_equal(reference.at_once(time_s), states)
+
+
 def test_order_is_that_of_the_scene(scene: Scene, plan: Plan) -> None:
     turned = replace(plan, trajectories=plan.trajectories[::-1])
     at = np.array([3.3])

@@ -86,3 +86,17 @@ def test_cell_centres_lie_amid_their_nodes(rough: Elevation) -> None:
     h = rough.height_m
     means = (h[:-1, :-1] + h[:-1, 1:] + h[1:, :-1] + h[1:, 1:]) / 4.0
     np.testing.assert_allclose(heights, means)
+
+
+def test_the_slope_at_one_point_is_that_of_many(rough: Elevation) -> None:
+    """Nodes, edges and places beyond the bounds included."""
+    nodes = np.array([[-3.0, 2.0], [9.0, 10.0], [1.0, 4.0], [9.0, 3.3]])
+    beyond = np.array([[-9.0, 5.0], [4.0, 99.0], [20.0, -4.0]])
+    points = np.concatenate([inside(300, 5), nodes, beyond])
+    slopes = [rough.slope_at(x, y) for x, y in points.tolist()]
+    np.testing.assert_allclose(slopes, rough.gradient_at(points), atol=1e-12)
+
+
+def test_a_place_that_is_no_number_has_some_slope(rough: Elevation) -> None:
+    """A simulation that diverged is ended by whoever looks at its state."""
+    assert np.shape(rough.slope_at(np.nan, np.nan)) == (2,)
