@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from concurrent.futures import Future, ThreadPoolExecutor
-from functools import cache, partial
+from functools import cache
 
 import numpy as np
 
 from mrmg import seeding
 from mrmg.errors import Fault, SceneError, UsageError
 from mrmg.mission import PlanResult, PlanStatus
-from mrmg.planning.attempt import attempt_plan
+from mrmg.planning.attempt import Attempt, attempt_plan
 from mrmg.planning.bound import lower_bound_J
 from mrmg.planning.feasibility import proof_of_infeasibility
+from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.motion_tree import Problem, state_problem
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.roadmap import Roadmap, build_roadmap
@@ -66,18 +67,23 @@ def plan_mission(
         raise UsageError(f"workers = {workers}; planning needs at least 1")
     compile_kernels()
     statistics = Statistics()
-    problem = state_mission(scene, seed, params)
+    own = Frame.of(scene).scene(scene)
+    problem = state_mission(own, seed, params)
     statistics.time_s["init"] = statistics.elapsed()
     tell(0.1, "roadmap built")
 
     bounding: list[Future[None]] = []
 
     def state_bound() -> None:
-        statistics.bound_J = lower_bound_J(scene, step_s=params.dt_s)
+        statistics.bound_J = lower_bound_J(own, step_s=params.dt_s)
 
     def begin_bound() -> None:
         if with_bound:
             bounding.append(beside.submit(state_bound))
+
+    def attempt(number: int, halt: np.ndarray) -> Attempt:
+        found = attempt_plan(problem, seed, params, number, halt)
+        return on_the_map(found, problem, scene, params)
 
     @cache
     def proof() -> str | None:
@@ -85,7 +91,7 @@ def plan_mission(
 
     with ThreadPoolExecutor(1) as beside:
         best = Search(
-            attempt=partial(attempt_plan, problem, seed, params),
+            attempt=attempt,
             params=params,
             statistics=statistics,
             workers=workers,

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from math import pi
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -14,7 +12,6 @@ import mrmg
 from mrmg.errors import SceneError
 from mrmg.mission import PlanResult, PlanStatus
 from mrmg.planning import PlannerParams, plan_mission, profile_params
-from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 
 SCENES = Path(__file__).parents[1] / "scenes"
@@ -148,63 +145,6 @@ def test_the_papers_profile_is_reproducible() -> None:
     params = profile_params("paper")
     results = [plan_mission(scene, seed=5, params=params) for _ in range(2)]
     assert digest(results[0]) == digest(results[1])
-
-
-# --- symmetry ----------------------------------------------------------------------
-
-
-def turned(document: Any, shift: tuple[float, float]) -> Any:
-    """Return a scene file's content turned by 90 degrees to the left and moved."""
-
-    def point(p: list[float]) -> list[float]:
-        return [shift[0] - p[1], shift[1] + p[0]]
-
-    def shape(entry: dict[str, Any]) -> dict[str, Any]:
-        new = dict(entry)
-        if entry.get("polygon"):
-            new["polygon"] = [point(p) for p in entry["polygon"]]
-        if entry.get("holes"):
-            new["holes"] = [[point(p) for p in ring] for ring in entry["holes"]]
-        for kind in ("box", "circle"):
-            if entry.get(kind):
-                new[kind] = {**entry[kind], "center": point(entry[kind]["center"])}
-        if entry.get("box"):
-            new["box"]["yaw"] = new["box"].get("yaw", 0.0) + 0.5 * pi
-        return new
-
-    x_min, y_min, x_max, y_max = document["bounds"]
-    low, high = point([x_min, y_max]), point([x_max, y_min])
-    lists = ("obstacles", "terrain", "goals", "stations")
-    robots = [
-        {**robot, "pose": [*point(robot["pose"][:2]), robot["pose"][2] + 0.5 * pi]}
-        for robot in document["robots"]
-    ]
-    return {
-        **document,
-        "bounds": [*low, *high],
-        "robots": robots,
-        **{key: [shape(entry) for entry in document.get(key) or []] for key in lists},
-    }
-
-
-@pytest.mark.parametrize(
-    "name",
-    ["two_swap", "station_needed", "obstacle_with_hole", "overlapping_terrain"],
-)
-def test_turning_and_moving_the_world_changes_little(name: str) -> None:
-    """Over four seeds: as solvable, and as dear within a few percent."""
-    scene = edge_scene(name)
-    document = turned(scene.document, (-137.5, 61.25))
-    moved = scene_from_document(document, source=name)
-    cheapest = []
-    for one in (scene, moved):
-        plans = [plan_mission(one, seed=seed).plan for seed in range(4)]
-        assert None not in plans
-        cheapest.append(min(plan.cost_J for plan in plans if plan is not None))
-        for plan in plans:
-            assert plan is not None
-            assert mrmg.verify(one, plan).violations == ()
-    assert cheapest[1] == pytest.approx(cheapest[0], rel=0.1)
 
 
 def test_very_short_steps_leave_room_for_long_braking() -> None:

@@ -1,0 +1,166 @@
+"""The map's own frame: what a mission costs does not depend on where its map lies.
+
+Maps lie along the axes, so that turns by quarters are all there are.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from math import pi
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mrmg
+from mrmg.mission import Plan
+from mrmg.planning import PlannerParams, plan_mission
+from mrmg.planning.frame import Frame
+from mrmg.planning.planner import state_mission
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.types import Scene
+
+SCENES = Path(__file__).parents[1] / "scenes"
+PARAMS = PlannerParams(samples=400, improvements=0)
+NAMES = ("two_swap", "station_needed", "obstacle_with_hole", "polygon_regions")
+
+SLOPE = {"hills": [{"center": [14, 6], "radius": 8, "height": 1.0}]}
+
+
+def turned_left(point: list[float]) -> list[float]:
+    return [-point[1], point[0]]
+
+
+def placed(document: Any, quarters: int, shift: tuple[float, float]) -> Any:
+    """Return a scene file's content turned to the left and then moved."""
+    for _ in range(quarters):
+        document = _mapped(document, turned_left, 0.5 * pi)
+    return _mapped(document, lambda p: [p[0] + shift[0], p[1] + shift[1]], 0.0)
+
+
+def _mapped(document: Any, point: Any, turn: float) -> Any:
+    def shape(entry: dict[str, Any]) -> dict[str, Any]:
+        new = dict(entry)
+        if entry.get("polygon"):
+            new["polygon"] = [point(p) for p in entry["polygon"]]
+        if entry.get("holes"):
+            new["holes"] = [[point(p) for p in ring] for ring in entry["holes"]]
+        for kind in ("box", "circle"):
+            if entry.get(kind):
+                new[kind] = {**entry[kind], "center": point(entry[kind]["center"])}
+        if entry.get("box"):
+            new["box"]["yaw"] = new["box"].get("yaw", 0.0) + turn
+        return new
+
+    x_min, y_min, x_max, y_max = document["bounds"]
+    corners = np.array([point([x_min, y_min]), point([x_max, y_max])])
+    robots = [
+        {**robot, "pose": [*point(robot["pose"][:2]), robot["pose"][2] + turn]}
+        for robot in document["robots"]
+    ]
+    lists = ("obstacles", "terrain", "goals", "stations")
+    return {
+        **document,
+        "bounds": [*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist()],
+        "robots": robots,
+        **{key: [shape(entry) for entry in document.get(key) or []] for key in lists},
+    }
+
+
+def plan_of(scene: Scene) -> Plan:
+    result = plan_mission(scene, seed=3, params=PARAMS)
+    assert result.plan is not None, result.reason
+    return result.plan
+
+
+@cache
+def as_it_lies(name: str) -> tuple[Scene, Plan]:
+    scene = mrmg.load_scene(SCENES / f"{name}.yaml")
+    return scene, plan_of(scene)
+
+
+@pytest.mark.parametrize("quarters", range(4))
+@pytest.mark.parametrize("name", NAMES)
+def test_moving_and_turning_a_scene_changes_nothing(name: str, quarters: int) -> None:
+    """Moved, the controls are the same bit for bit; turned, but for their rounding."""
+    scene, plan = as_it_lies(name)
+    document = placed(scene.document, quarters, (-137.53, 61.25))
+    moved = scene_from_document(document, source=name)
+    other = plan_of(moved)
+    assert other.cost_J == pytest.approx(plan.cost_J, rel=1e-6)
+    assert other.tours == plan.tours
+    for one, two in zip(plan.trajectories, other.trajectories, strict=True):
+        assert two.control == pytest.approx(one.control, abs=1e-5)
+        assert quarters or two.control.tobytes() == one.control.tobytes()
+    assert mrmg.verify(moved, other).violations == ()
+    assert other.scene_digest == moved.digest
+
+
+def test_states_are_those_that_the_controls_lead_to_on_the_map() -> None:
+    """Bit for bit, in plain Python, as the verifier repeats them."""
+    scene, _ = as_it_lies("two_swap")
+    moved = scene_from_document(placed(scene.document, 1, (0.1, 9.7)), source="moved")
+    plan = plan_of(moved)
+    rules = {item.rule for item in mrmg.verify(moved, plan).violations}
+    assert rules == set()
+    for robot, trajectory in zip(moved.robots, plan.trajectories, strict=True):
+        assert tuple(trajectory.state[0, :3]) == robot.pose
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("quarters", range(4))
+def test_the_mission_in_the_frame_is_one(name: str, quarters: int) -> None:
+    """Wherever the map lies, the frame holds the same numbers."""
+    scene, _ = as_it_lies(name)
+    moved = scene_from_document(
+        placed(scene.document, quarters, (412.7, -0.3)), source=name
+    )
+    first, second = (Frame.of(one).scene(one) for one in (scene, moved))
+    assert first.bounds == second.bounds
+    for one, two in zip(first.targets(), second.targets(), strict=True):
+        assert one.region.center.tolist() == two.region.center.tolist()
+        assert one.region.corners.tolist() == two.region.corners.tolist()
+    for one, two in zip(first.obstacles, second.obstacles, strict=True):
+        assert one.shape.equals_exact(two.shape, 0.0)
+    for one, two in zip(first.robots, second.robots, strict=True):
+        assert one.pose == pytest.approx(two.pose, abs=2e-9)
+    one, two = (state_mission(item, 0, PARAMS) for item in (first, second))
+    assert one.roadmap.distance.tolist() == two.roadmap.distance.tolist()
+
+
+@pytest.mark.parametrize("quarters", range(4))
+def test_heights_turn_with_the_map(quarters: int) -> None:
+    document = {
+        "format": 1,
+        "name": "slope",
+        "bounds": [0, 0, 30, 20],
+        "elevation": SLOPE,
+        "goals": [{"id": "g", "circle": {"center": [26, 10], "radius": 1.5}}],
+        "robots": [{"id": "r", "model": "car", "pose": [4, 9, 0]}],
+    }
+    scene = scene_from_document(document, source="slope")
+    frame = Frame(scene.bounds, quarters)
+    turned = frame.scene(scene)
+    assert scene.elevation is not None and turned.elevation is not None
+    points = np.random.default_rng(0).uniform((0, 0), (30, 20), (200, 2))
+    assert turned.elevation.height_at(frame.points(points)) == pytest.approx(
+        scene.elevation.height_at(points), abs=1e-6
+    )
+    assert np.ptp(scene.elevation.height_m) > 0.5
+
+
+def test_shipped_maps_lie_in_their_frame_or_are_turned() -> None:
+    scene = mrmg.load_scene("scene1")
+    assert Frame.of(scene).scene(scene) is scene
+    assert Frame.of(mrmg.load_scene("scene2")).quarters == 1
+
+
+def test_a_fleet_around_the_middle_is_turned_by_its_first_robot() -> None:
+    scene, _ = as_it_lies("two_swap")
+    for quarters in range(4):
+        document = placed(scene.document, quarters, (0.0, 0.0))
+        moved = scene_from_document(document, source="turned")
+        starts = [robot.pose[:2] for robot in Frame.of(moved).scene(moved).robots]
+        reference = [robot.pose[:2] for robot in Frame.of(scene).scene(scene).robots]
+        assert starts == reference

@@ -1,0 +1,70 @@
+"""The bench of foreign maps, on a map and a mission of a few places."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+TOOLS = Path(__file__).parents[2] / "tools"
+
+MAP = """\
+[SCALE]
+1
+[BORDER]
+0 0
+60 0
+60 40
+0 40
+[OBSTACLE]
+25 10
+35 10
+35 30
+25 30
+"""
+
+
+@pytest.fixture
+def bench(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
+    monkeypatch.syspath_prepend(str(TOOLS))
+    spec = importlib.util.spec_from_file_location("bench_maps", TOOLS / "bench_maps.py")
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_bench_plans_on_a_map_and_writes_rows(
+    bench: ModuleType,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path, output = tmp_path / "hall.txt", tmp_path / "rows.jsonl"
+    path.write_text(MAP)
+    options = ["--robots", "2", "--goals", "3", "--seeds", "0-1"]
+    monkeypatch.setattr(
+        sys, "argv", ["bench", str(path), *options, "--output", str(output)]
+    )
+    assert bench.main() == 0
+    assert "\nhall | 2/2 | " in capsys.readouterr().out
+    rows = [json.loads(line) for line in output.read_text().splitlines()]
+    assert [row["seed"] for row in rows] == [0, 1]
+    for row in rows:
+        assert row["problem"]["source"] == str(path)
+        assert (row["problem"]["robots"], row["problem"]["goals"]) == (2, 3)
+        assert row["violations"] == 0
+
+
+def test_a_map_that_is_not_there_is_named(
+    bench: ModuleType,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["bench", "nowhere.txt"])
+    assert bench.main() == 2
+    assert "nowhere.txt" in capsys.readouterr().err
