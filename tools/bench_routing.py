@@ -13,7 +13,7 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -128,6 +128,33 @@ def generate(seed: int) -> RoutingArrays:
     """Return a mission of 6-10 goals, 1-3 robots and 2-4 stations."""
     rng = np.random.default_rng(seed)
     goals, robots, stations = (int(rng.integers(*n)) for n in ((6, 11), (1, 4), (2, 5)))
+    return uneven_mission(
+        rng, goals=goals, stations=stations, robots=robots, range_m=(90.0, 200.0)
+    )
+
+
+def uneven_mission(
+    rng: np.random.Generator,
+    *,
+    goals: int,
+    stations: int,
+    robots: int,
+    range_m: tuple[float, float],
+    open_goal: Sequence[bool] | None = None,
+) -> RoutingArrays:
+    """Return a mission over 100 x 100 m of uneven ground.
+
+    Ways cost up to 1.6 times their length, and are shortened through each other, so
+    that they are a metric, as shortest paths are.
+
+    Args:
+        rng: draws everything.
+        goals: how many.
+        stations: how many.
+        robots: how many.
+        range_m: between these lies the way a full battery lasts for.
+        open_goal: which goals are still to be visited; all if None.
+    """
     targets = goals + stations
     point = rng.uniform(0.0, 100.0, (targets + robots, 2))
     way = np.hypot(*(point[:, None] - point[None]).transpose(2, 0, 1))
@@ -136,7 +163,7 @@ def generate(seed: int) -> RoutingArrays:
     for k in range(len(way)):
         way = np.minimum(way, way[:, k : k + 1] + way[k : k + 1])
     plain = rng.uniform(80.0, 120.0, robots)
-    capacity = plain * rng.uniform(90.0, 200.0, robots)
+    capacity = plain * rng.uniform(*range_m, robots)
     return routing_arrays(
         goals=goals,
         distance=np.repeat(way[None, :targets, :targets], robots, axis=0),
@@ -145,6 +172,7 @@ def generate(seed: int) -> RoutingArrays:
         energy=capacity * rng.uniform(0.5, 1.0, robots),
         capacity=capacity,
         reserve=0.05 * capacity,
+        open_goal=None if open_goal is None else np.array(open_goal),
     )
 
 

@@ -273,7 +273,8 @@ def surface_of(problem: Problem, r: int, smooth: np.ndarray) -> Surface:
         arm, curvature = float(robot["track"]), 2.0 * limit[2] / limit[1]
         rate = 4.0 * limit[4] / limit[1] ** 2
     else:
-        arm, curvature = float(robot["wheelbase"]), 1.0 / robot["turning_radius"]
+        arm, radius = float(robot["wheelbase"]), float(robot["turning_radius"])
+        curvature = 1.0 / radius if radius > 0.0 else np.inf  # a user's motion
         rate = limit[4] / (arm * limit[1])
     energy = model.energy_model
     return Surface(

@@ -22,30 +22,8 @@ from mrmg.planning._fleet_kernels import FLEET
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 
-SLIDER = '''\
+SLIDER = (Path(__file__).parents[2] / "tools" / "first_order.py").read_text()
 """A robot whose control is its speed and yaw rate."""
-
-from math import atan2, cos, hypot, pi, sin
-
-
-def step(state, control, length, dt):
-    x, y, theta, _, _ = state
-    v, w = control
-    middle = theta + 0.5 * w * dt
-    return x + v * dt * cos(middle), y + v * dt * sin(middle), theta + w * dt, v, w
-
-
-def steer(state, waypoint, share, limits, length, dt):
-    if share == 0.0:
-        return 0.0, 0.0
-    x, y, theta, _, _ = state
-    dx, dy = waypoint[0] - x, waypoint[1] - y
-    off = atan2(dy, dx) - theta
-    off -= 2.0 * pi * round(off / (2.0 * pi))
-    speed = share * limits[1] * max(0.0, cos(off)) ** 3
-    rate = max(-limits[2], min(limits[2], off / dt))
-    return min(speed, hypot(dx, dy) / dt), rate
-'''
 
 STEERED = '''\
 """The shipped car's equations, as a user would write them."""

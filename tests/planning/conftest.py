@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from bench_routing import uneven_mission
 
 from mrmg import seeding
 from mrmg.planning._nrpa_kernels import RoutingArrays
 from mrmg.planning.motion_tree import Problem, state_problem
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.roadmap import build_roadmap
-from mrmg.planning.routing import routing_arrays
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
@@ -31,36 +31,14 @@ def random_mission(
     range_m: tuple[float, float] = (60.0, 160.0),
     open_goal: Sequence[bool] | None = None,
 ) -> RoutingArrays:
-    """Return a mission over 100 x 100 m of uneven ground.
-
-    Ways cost up to 1.6 times their length, and are shortened through each other, so
-    that they are a metric, as shortest paths are.
-
-    Args:
-        seed: draws everything.
-        goals, stations, robots: their numbers.
-        range_m: between these lies the way a full battery lasts for.
-        open_goal: which goals are still to be visited.
-    """
-    rng = np.random.default_rng(seed)
-    targets = goals + stations
-    point = rng.uniform(0.0, 100.0, (targets + robots, 2))
-    way = np.hypot(*(point[:, None] - point[None]).transpose(2, 0, 1))
-    rough = rng.uniform(1.0, 1.6, way.shape)
-    way *= np.maximum(rough, rough.T)
-    for k in range(len(way)):
-        way = np.minimum(way, way[:, k : k + 1] + way[k : k + 1])
-    plain = rng.uniform(80.0, 120.0, robots)
-    capacity = plain * rng.uniform(*range_m, robots)
-    return routing_arrays(
+    """Return a mission of the routers' bench, drawn by a seed."""
+    return uneven_mission(
+        np.random.default_rng(seed),
         goals=goals,
-        distance=np.repeat(way[None, :targets, :targets], robots, axis=0),
-        start_distance=way[targets:, :targets],
-        plain=plain,
-        energy=capacity * rng.uniform(0.5, 1.0, robots),
-        capacity=capacity,
-        reserve=0.05 * capacity,
-        open_goal=None if open_goal is None else np.array(open_goal),
+        stations=stations,
+        robots=robots,
+        range_m=range_m,
+        open_goal=open_goal,
     )
 
 

@@ -101,13 +101,17 @@ def test_facing_the_way_out_it_drives_on(dead_end: Problem) -> None:
 
 
 def test_repeated_maneuvers_lead_out_of_the_dead_end(dead_end: Problem) -> None:
-    state = np.array([17.5, 10.0, 0.0, 0.0, 0.0])
-    for turn in range(30):
-        found, motion = choose(dead_end, state, seed=turn)
+    assert_it_gets_there(dead_end, np.array([17.5, 10.0, 0.0, 0.0, 0.0]), turns=30)
+
+
+def assert_it_gets_there(problem: Problem, state: np.ndarray, turns: int) -> None:
+    """Motion by motion it comes to the goal in the west, clear of everything."""
+    for turn in range(turns):
+        found, motion = choose(problem, state, seed=turn)
         assert found
         end = np.empty(5)
-        hold_motion(dead_end.mission, 0, state, motion[0], motion[1], end)
-        assert clearance(dead_end, end) >= PLANNING_MARGIN_M - 1e-9
+        hold_motion(problem.mission, 0, state, motion[0], motion[1], end)
+        assert clearance(problem, end) >= PLANNING_MARGIN_M - 1e-9
         state = end
         if hypot(state[0] - 3.0, state[1] - 10.0) < 1.5:
             return
@@ -224,14 +228,4 @@ def test_in_the_open_turning_round_ends_at_the_goal_behind(
     yard: MakeScene, state: MakeProblem
 ) -> None:
     problem = state(yard(goals=WESTERN_GOAL))
-    state_now = np.array([20.0, 10.0, 0.0, 0.0, 0.0])
-    for turn in range(25):
-        found, motion = choose(problem, state_now, seed=turn)
-        assert found
-        end = np.empty(5)
-        hold_motion(problem.mission, 0, state_now, motion[0], motion[1], end)
-        assert clearance(problem, end) >= PLANNING_MARGIN_M - 1e-9
-        state_now = end
-        if hypot(end[0] - 3.0, end[1] - 10.0) < 1.5:
-            return
-    pytest.fail(f"still at {state_now[:3]}")
+    assert_it_gets_there(problem, np.array([20.0, 10.0, 0.0, 0.0, 0.0]), turns=25)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import sys
 from pathlib import Path
-from types import ModuleType
 
+import bench_maps
 import pytest
-
-TOOLS = Path(__file__).parents[2] / "tools"
 
 MAP = """\
 [SCALE]
@@ -28,18 +25,7 @@ MAP = """\
 """
 
 
-@pytest.fixture
-def bench(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
-    monkeypatch.syspath_prepend(str(TOOLS))
-    spec = importlib.util.spec_from_file_location("bench_maps", TOOLS / "bench_maps.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def test_the_bench_plans_on_a_map_and_writes_rows(
-    bench: ModuleType,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -50,7 +36,7 @@ def test_the_bench_plans_on_a_map_and_writes_rows(
     monkeypatch.setattr(
         sys, "argv", ["bench", str(path), *options, "--output", str(output)]
     )
-    assert bench.main() == 0
+    assert bench_maps.main() == 0
     assert "\nhall | 2/2 | " in capsys.readouterr().out
     rows = [json.loads(line) for line in output.read_text().splitlines()]
     assert [row["seed"] for row in rows] == [0, 1]
@@ -61,10 +47,9 @@ def test_the_bench_plans_on_a_map_and_writes_rows(
 
 
 def test_a_map_that_is_not_there_is_named(
-    bench: ModuleType,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(sys, "argv", ["bench", "nowhere.txt"])
-    assert bench.main() == 2
+    assert bench_maps.main() == 2
     assert "nowhere.txt" in capsys.readouterr().err

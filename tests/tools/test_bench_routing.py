@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import sys
 from pathlib import Path
-from types import ModuleType
 
+import bench_routing
 import numpy as np
 import pytest
 
@@ -31,21 +30,10 @@ DEGREE = np.radians(1.0) * 4182.44949
 """Length of a degree of longitude or latitude at the equator [miles]."""
 
 
-@pytest.fixture(scope="module")
-def bench() -> ModuleType:
-    spec = importlib.util.spec_from_file_location(
-        "bench_routing", ROOT / "tools" / "bench_routing.py"
-    )
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_instances_are_read(bench: ModuleType, tmp_path: Path) -> None:
+def test_instances_are_read(tmp_path: Path) -> None:
     path = tmp_path / "instance.txt"
     path.write_text(INSTANCE)
-    problem = bench.read_green_vrp(path, vehicles=2)
+    problem = bench_routing.read_green_vrp(path, vehicles=2)
     assert problem.goals == 2
     assert problem.cost.shape == (2, 4, 3)
     assert problem.cost[0, 3] == pytest.approx([2 * DEGREE, DEGREE, DEGREE])
@@ -58,17 +46,16 @@ def test_instances_are_read(bench: ModuleType, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["S1_2i6s", "S1_4i2s", "S1_4i4s", "S1_4i6s"])
-def test_proven_optima_are_found(bench: ModuleType, name: str) -> None:
+def test_proven_optima_are_found(name: str) -> None:
     path = ROOT / ".." / "shared" / "routing" / f"{name}.txt"
     if not path.exists():
         pytest.skip(f"needs {path.name} in ../shared/routing")
-    problem = bench.read_green_vrp(path)
+    problem = bench_routing.read_green_vrp(path)
     routing = route(problem, RouterParams(rounds=5000), 0)
-    assert round(routing.cost_J, 2) == bench.PROVEN[name]
+    assert round(routing.cost_J, 2) == bench_routing.PROVEN[name]
 
 
 def test_the_bench_prints_tables_and_writes_rows(
-    bench: ModuleType,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -76,7 +63,7 @@ def test_the_bench_prints_tables_and_writes_rows(
     output = tmp_path / "rows.jsonl"
     options = ["--instances", "5", "--folder", str(tmp_path / "none")]
     monkeypatch.setattr(sys, "argv", ["bench", *options, "--output", str(output)])
-    assert bench.main() == 0
+    assert bench_routing.main() == 0
     printed = capsys.readouterr().out
     assert all(f"\n{name} | " in printed for name in ("nrpa", "search", "exact"))
     assert "no Green VRP instances" in printed
