@@ -48,7 +48,8 @@ def populate(
     """Place a mission on a map; an earlier one in the document is replaced.
 
     Args:
-        document: a scene document; bounds, obstacles and terrain are used.
+        document: a scene document; bounds, obstacles, terrain, objective and time limit
+            are used.
         robots: how many, at least one.
         goals: how many, at least one.
         stations: how many, at least one.
@@ -68,7 +69,8 @@ def populate(
     if model not in shipped.model_names():
         allowed = ", ".join(shipped.model_names())
         raise UsageError(f"unknown model '{model}'; shipped models: {allowed}")
-    kept = ("format", "name", "bounds", "obstacles", "terrain")
+    wishes = ("objective", "time_limit")
+    kept = ("format", "name", "bounds", "obstacles", "terrain", *wishes)
     bare = {key: document[key] for key in kept if key in document}
     for obstacle in bare.get("obstacles", []):
         if isinstance(obstacle, dict) and "blocks" in obstacle:

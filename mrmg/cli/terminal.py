@@ -89,10 +89,20 @@ def improvement_teller(
 
 
 def quality(found: Mapping[str, Any]) -> str:
-    """Return cost, bound and gap of a plan in words."""
-    text = f"cost {found['cost_J'] / 1000:.2f} kJ"
-    if found["bound_J"] is not None:
-        text += f", proven bound {found['bound_J'] / 1000:.2f} kJ"
+    """Return what plans are compared by, its bound and the gap in words."""
+    objective = found["objective"]
+
+    def told(value: float) -> str:
+        if objective["unit"] == "J":
+            return f"{value / 1000:.2f} kJ"
+        return f"{value:.1f} s" if objective["unit"] == "s" else f"{value:.1f}"
+
+    name = "cost" if objective["name"] == "energy" else objective["name"]
+    text = f"{name} {told(objective['value'])}"
+    if objective["name"] != "energy":
+        text += f" ({found['cost_J'] / 1000:.2f} kJ, {found['makespan_s']:.1f} s)"
+    if objective["bound"] is not None:
+        text += f", proven bound {told(objective['bound'])}"
     if found["gap"] is not None:
         text += f", gap {found['gap']:.1%}"
     return text

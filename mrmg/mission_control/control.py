@@ -253,6 +253,7 @@ class MissionControl:
                 name: meter.rolling.factor for name, meter in self._meters.items()
             },
             out_of_service=frozenset(self._out_of_service),
+            time_s=now.time_s,
             visited=frozenset(
                 goal.id for goal in self._scene.goals if self._is_visited(goal)
             ),

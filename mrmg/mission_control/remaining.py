@@ -30,6 +30,7 @@ class FleetCondition:
             model's.
         out_of_service: ids of robots that will not move any more.
         visited: ids of goals that need no more visit.
+        time_s: how much of the mission's time is over.
     """
 
     pose: Mapping[str, tuple[float, float, float]]
@@ -37,10 +38,15 @@ class FleetCondition:
     rolling_factor: Mapping[str, float]
     out_of_service: frozenset[str] = frozenset()
     visited: frozenset[str] = frozenset()
+    time_s: float = 0.0
 
 
 def remaining_scene(
-    scene: Scene, condition: FleetCondition, *, reserve_share: float = 1.0
+    scene: Scene,
+    condition: FleetCondition,
+    *,
+    reserve_share: float = 1.0,
+    timely: bool = True,
 ) -> Scene:
     """Return what is left of a mission: same ids, same map, from where the fleet is.
 
@@ -52,6 +58,8 @@ def remaining_scene(
         condition: of the fleet, at rest.
         reserve_share: share of the batteries' reserves that is still kept, or more of
             them; a battery that is down to its reserve has none left to keep.
+        timely: whether what is left of a time limit is still kept; it is not where
+            nothing is left.
 
     Raises:
         SceneError: if robots touch each other or an obstacle.
@@ -74,6 +82,9 @@ def remaining_scene(
         for entry in document["robots"]
         if entry["id"] not in gone
     ]
+    left_s = document.pop("time_limit", 0.0) - condition.time_s
+    if timely and left_s > 0.0:
+        document["time_limit"] = left_s
     return scene_from_document(document, source=f"rest of {scene.name}")
 
 

@@ -91,7 +91,8 @@ class Replanner:
     def replan(self, condition: FleetCondition, number: int) -> Replan:
         """Return the outcome of the `number`th new planning.
 
-        If no plan keeps the reserves they may be used: that is what they are for. Goals
+        If no plan keeps the reserves they may be used: that is what they are for. If
+        none keeps the time limit, goals are better visited late than not at all. Goals
         for which there is no plan even then are given up: those proven impossible, else
         some that are farthest from all robots.
         """
@@ -118,15 +119,22 @@ class Replanner:
     def _tried(self, left: FleetCondition, number: int, draws: int) -> Replan:
         """Return a plan for all goals that are left, or those proven impossible."""
         shares = self.control.reserves
-        last = remaining_scene(self.scene, left, reserve_share=shares[-1])
+        last = remaining_scene(self.scene, left, reserve_share=shares[-1], timely=False)
         if is_over(last):
             return Replan()
-        for share in shares:
-            rest = remaining_scene(self.scene, left, reserve_share=share)
+        limited = math.isfinite(self.scene.time_limit_s)
+        tries = [
+            (share, timely)
+            for timely in ((True, False) if limited else (True,))
+            for share in shares
+        ]
+        for share, timely in tries:
+            rest = remaining_scene(self.scene, left, reserve_share=share, timely=timely)
             plan = self._plan(rest, number, draws)
             if plan is not None:
                 return Replan(scene=rest, plan=plan, reserve_share=share)
-            impossible = impossible_goals(last) if share == shares[0] else {}
+            first = (share, timely) == tries[0]
+            impossible = impossible_goals(last) if first else {}
             if impossible:
                 return Replan(scene=last, given_up=impossible)
         return Replan(scene=last)

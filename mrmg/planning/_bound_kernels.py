@@ -317,6 +317,20 @@ def join_robot(fleet, own):
 
 
 @kernel
+def join_longest(fleet, own):
+    """Return each subset's least longest share, shared with one more robot."""
+    joined = np.full(len(fleet), np.inf)
+    for mask in range(len(fleet)):
+        part = mask
+        while True:
+            joined[mask] = min(joined[mask], max(fleet[mask ^ part], own[part]))
+            if part == 0:
+                break
+            part = (part - 1) & mask
+    return joined
+
+
+@kernel
 def spanning_bound(between, start, rounds):
     """Return a lower bound of the cost of paths from the starts through all goals.
 

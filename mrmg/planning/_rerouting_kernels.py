@@ -4,10 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, leaf_kernel
 from mrmg.planning._mission_kernels import leg_energy, look_ahead
 from mrmg.planning._nrpa_kernels import RoutingArrays
 from mrmg.planning._routing_kernels import solve_routing
+
+
+@leaf_kernel
+def elapsed(tree, v, dt):
+    """Return the time from the root of the tree to a vertex [s]."""
+    steps = 0
+    while tree.parent[v] >= 0:
+        steps += tree.steps[v]
+        v = tree.parent[v]
+    return steps * dt
 
 
 @kernel
@@ -17,17 +27,27 @@ def route_from(mission, tree, v, random, tour, length):
     robots, _, n_targets = problem.cost.shape
     cost = problem.cost.copy()
     ending = problem.finish.copy()
+    time = problem.time.copy()
+    ending_time = problem.finish_time.copy()
     waypoint = np.empty(2)
+    timed = problem.makespan_weight > 0.0
     for r in range(robots):
+        timed |= problem.limit[r] < np.inf
+    for r in range(robots):
+        pace = (1.0 + params.route_margin) / mission.fleet[r].limit[1]
         for t in range(n_targets):
             way = look_ahead(mission, r, t, tree.state[v, r], 0.0, waypoint)
             leg = leg_energy(mission, r, t, tree.state[v, r], way)
             cost[r, n_targets, t] = leg * (1.0 + params.route_margin)
+            if timed:
+                time[r, n_targets, t] = way * pace + mission.targets.dwell[t]
         finish = mission.targets.finish[r]
         if finish >= 0:
             way = look_ahead(mission, r, finish, tree.state[v, r], 0.0, waypoint)
             leg = leg_energy(mission, r, finish, tree.state[v, r], way)
             ending[r, n_targets] = leg * (1.0 + params.route_margin)
+            if timed:
+                ending_time[r, n_targets] = way * pace
     now = RoutingArrays(
         problem.goals,
         cost,
@@ -37,9 +57,9 @@ def route_from(mission, tree, v, random, tour, length):
         problem.escape,
         ~tree.visited[v],
         ending,
-        problem.time,
-        problem.finish_time,
-        problem.limit,
+        time,
+        ending_time,
+        problem.limit - elapsed(tree, v, params.dt),
         problem.charge_power,
         problem.energy_weight,
         problem.makespan_weight,

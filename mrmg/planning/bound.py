@@ -85,7 +85,7 @@ def exact_routing(problem: RoutingArrays) -> Routing | None:
     fleet[0] = 0.0
     ways, shares = [], []
     for r in range(len(problem.energy)):
-        way = _RobotWays(problem, r, goal_list)
+        way = RobotWays(problem, r, goal_list)
         if not way.complete:
             return None
         fleet, share = _bound_kernels.join_robot(fleet, way.cost)
@@ -101,7 +101,7 @@ def exact_routing(problem: RoutingArrays) -> Routing | None:
     return Routing(tuple(reversed(tours)), float(fleet[-1]))
 
 
-class _RobotWays:
+class RobotWays:
     """The undominated ways of one robot to visit each subset of the goals."""
 
     def __init__(self, problem: RoutingArrays, r: int, goal_list: np.ndarray) -> None:
@@ -262,7 +262,7 @@ def _starts(scene: Scene) -> np.ndarray:
 
 
 def _ground(scene: Scene, robot: Robot, cell_m: float, step_s: float) -> Ground:
-    step_m = _top_speed_m_s(robot) * step_s
+    step_m = top_speed_m_s(robot) * step_s
     return Ground.of(scene, robot, cell_m=cell_m, step_m=step_m)
 
 
@@ -293,16 +293,17 @@ def _descents_J(scene: Scene, robot: Robot) -> tuple[float, float]:
 def _travel_key(scene: Scene, robot: Robot) -> TravelKey:
     """Return what the ways of a robot depend on."""
     obstacles = tuple(o.id for o in scene.obstacles if o.stops(robot.id))
-    return obstacles, robot.model.inscribed_radius_m, _top_speed_m_s(robot)
+    return obstacles, robot.model.inscribed_radius_m, top_speed_m_s(robot)
 
 
-def _top_speed_m_s(robot: Robot) -> float:
+def top_speed_m_s(robot: Robot) -> float:
+    """Return the speed that a robot exceeds in neither direction."""
     return max(robot.model.limits.v_max_m_s, -robot.model.limits.v_min_m_s)
 
 
 def _most_kinetic_J(robot: Robot) -> float:
     """Return the battery energy that stands behind a robot's top speed."""
-    kinetic_J = 0.5 * robot.model.effective_mass_kg * _top_speed_m_s(robot) ** 2
+    kinetic_J = 0.5 * robot.model.effective_mass_kg * top_speed_m_s(robot) ** 2
     return kinetic_J / robot.model.drive_efficiency
 
 

@@ -30,6 +30,7 @@ from mrmg.planning.targets import (
     has_options,
     target_arrays,
 )
+from mrmg.planning.timing import routing_times
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
 
@@ -66,6 +67,8 @@ class Problem:
                     cost=routing.cost * share,
                     escape=routing.escape * share,
                     finish=routing.finish * share,
+                    time=routing.time * share,
+                    finish_time=routing.finish_time * share,
                 ),
                 params=self.mission.params._replace(route_margin=margin),
             ),
@@ -89,6 +92,7 @@ def state_problem(
     stay_m = idle_m[:, None] * targets.dwell[:places]
     last_leg = _last_legs(scene, roadmap, fleet)
     energy = np.array([robot.battery.start_J for robot in scene.robots])
+    times = routing_times(scene, roadmap, fleet, targets.dwell, params.route_margin)
     start = np.zeros((len(scene.robots), 5))
     start[:, :3] = [robot.pose for robot in scene.robots]
     mission = Mission(
@@ -107,6 +111,7 @@ def state_problem(
             capacity=fleet["capacity"],
             reserve=fleet["reserve"],
             finish_distance=last_leg / fleet["plain"][:, None],
+            **({} if times is None else times._asdict()),
         ),
         last_leg=last_leg,
         params=tree_params(params)._replace(optioned=has_options(scene)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
 
@@ -14,12 +15,15 @@ from mrmg.planning.attempt import Attempt, attempt_plan
 from mrmg.planning.bound import lower_bound_J
 from mrmg.planning.feasibility import proof_of_infeasibility
 from mrmg.planning.frame import Frame, on_the_map
+from mrmg.planning.makespan_bound import makespan_bound_s
 from mrmg.planning.motion_tree import Problem, state_problem
 from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.preference import TIME_MARGIN_S, Preference
 from mrmg.planning.roadmap import Roadmap, build_roadmap
 from mrmg.planning.search import OnImprovement, Progress, Search
-from mrmg.planning.statistics import Statistics
+from mrmg.planning.statistics import Bounds, Statistics
 from mrmg.scene.loading import scene_from_document
+from mrmg.scene.objective import overtime_s
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
 
@@ -41,7 +45,7 @@ def plan_mission(
 
     Grows motion trees along routed tours until one visits all goals, then
     `params.improvements` more, each along tours of its own draw, or as many as a time
-    limit allows, and returns the cheapest plan.
+    limit allows, and returns the best plan by the scene's objective.
 
     Args:
         scene: the mission.
@@ -49,10 +53,11 @@ def plan_mission(
             whatever the number of workers, unless `params.budget_s` ends the search.
         params: parameters; the default profile's if None.
         workers: threads that grow trees.
-        with_bound: bound the energy of all plans, too, beside the search once there is
-            a plan; statistics then hold `bound_J` and `gap`.
+        with_bound: bound what the objective asks of all plans, too, beside the search
+            once there is a plan; statistics then hold `bound_J` or `bound_s`, and
+            `gap`.
         on_progress: told how far planning has got.
-        on_improvement: told of every plan that is cheaper than all before it.
+        on_improvement: told of every plan that is better than all before it.
 
     Raises:
         SceneError: if the scene has no robots.
@@ -72,10 +77,11 @@ def plan_mission(
     statistics.time_s["init"] = statistics.elapsed()
     tell(0.1, "roadmap built")
 
+    preference = Preference.of(scene)
     bounding: list[Future[None]] = []
 
     def state_bound() -> None:
-        statistics.bound_J = lower_bound_J(own, step_s=params.dt_s)
+        statistics.bounds = bounds_of(own, params.dt_s)
 
     def begin_bound() -> None:
         if with_bound:
@@ -87,10 +93,10 @@ def plan_mission(
 
     @cache
     def proof() -> str | None:
-        return proof_of_infeasibility(scene)
+        return proof_of_infeasibility(scene) or proof_of_lateness(own, params.dt_s)
 
     with ThreadPoolExecutor(1) as beside:
-        best = Search(
+        search = Search(
             attempt=attempt,
             params=params,
             statistics=statistics,
@@ -99,7 +105,9 @@ def plan_mission(
             on_improvement=on_improvement or (lambda improvement: None),
             on_first=begin_bound,
             proof=proof,
-        ).run()
+            preference=preference,
+        )
+        best = search.run()
         for future in bounding:
             future.result()
     if best is not None:
@@ -112,7 +120,7 @@ def plan_mission(
     return PlanResult(
         status=PlanStatus.INFEASIBLE if proof() else PlanStatus.TIMEOUT,
         plan=None,
-        reason=proof() or _why_not(problem, statistics),
+        reason=proof() or _why_not(problem, statistics, search.earliest_s),
         statistics=statistics.as_dict(),
     )
 
@@ -138,6 +146,7 @@ def compile_kernels() -> None:
     )
     assert attempt.plans, "the smallest mission has a plan, or not all is compiled"
     lower_bound_J(scene)
+    makespan_bound_s(scene)
 
 
 def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
@@ -167,7 +176,30 @@ def unjoined_goals(scene: Scene, roadmap: Roadmap) -> list[str]:
     ]
 
 
-def _why_not(problem: Problem, statistics: Statistics) -> str:
+def bounds_of(scene: Scene, step_s: float) -> Bounds:
+    """Return what no plan of a mission undercuts, as far as its objective needs it."""
+    energy_J = makespan_s = None
+    if scene.objective.energy_weight:
+        energy_J = lower_bound_J(scene, step_s=step_s)
+    if scene.objective.makespan_weight:
+        makespan_s = makespan_bound_s(scene, step_s=step_s)
+    return Bounds(energy_J=energy_J, makespan_s=makespan_s)
+
+
+def proof_of_lateness(scene: Scene, step_s: float) -> str | None:
+    """Return why no plan can keep the time limit, or None if no proof is known."""
+    if math.isinf(scene.time_limit_s):
+        return None
+    least_s = makespan_bound_s(scene, step_s=step_s)
+    if not overtime_s(scene.time_limit_s, least_s):
+        return None
+    return (
+        f"the time limit of {scene.time_limit_s:g} s is too short: even at top speed "
+        f"on the shortest ways no plan is over before {least_s:.1f} s"
+    )
+
+
+def _why_not(problem: Problem, statistics: Statistics, earliest_s: float) -> str:
     unjoined = unjoined_goals(problem.scene, problem.roadmap)
     if unjoined:
         return (
@@ -176,6 +208,17 @@ def _why_not(problem: Problem, statistics: Statistics) -> str:
         )
     if "routing" not in statistics.time_s:
         return "the time limit was over before the first tours were drawn"
+    limit_s = problem.scene.time_limit_s
+    timely = f" and the time limit of {limit_s:g} s" if math.isfinite(limit_s) else ""
+    if math.isfinite(earliest_s):
+        return (
+            f"plans were found, but none in time: the earliest is over at "
+            f"{earliest_s:.1f} s, the time limit is {limit_s:g} s, and "
+            f"{TIME_MARGIN_S:g} s of it are kept for execution"
+        )
     if not statistics.counts:
-        return "the router found no tours that keep every battery above its reserve"
+        return (
+            "the router found no tours that keep every battery above its reserve"
+            f"{timely}"
+        )
     return "no motion tree reached all goals within its size and the time limit"

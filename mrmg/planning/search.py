@@ -7,6 +7,7 @@ does not depend on the number of workers. With a time limit they count as they c
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -18,13 +19,14 @@ import numpy as np
 from mrmg.mission import Plan
 from mrmg.planning.attempt import Attempt
 from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.preference import Preference
 from mrmg.planning.statistics import Improvement, Statistics
 
 Progress = Callable[[float, str], None]
 """Receives the fraction done, in [0, 1], and a short text."""
 
 OnImprovement = Callable[[Improvement], None]
-"""Receives each plan that is cheaper than all before it, as soon as it counts."""
+"""Receives each plan that is better than all before it, as soon as it counts."""
 
 HOPELESS = 10
 """With a time limit, times the number of trees after which finding none ends it."""
@@ -32,7 +34,7 @@ HOPELESS = 10
 
 @dataclass
 class Search:
-    """The search for a cheap plan.
+    """The search for a good plan.
 
     Attributes:
         attempt: makes attempt number n; ends soon after `halt[0]` has turned true.
@@ -43,7 +45,9 @@ class Search:
         on_first: called when the first plan has been found.
         proof: asked, once an attempt has failed, why the mission has no solution; None
             if that is not known.
-        best: the cheapest plan so far.
+        preference: what plans are compared by.
+        best: the best plan so far that is in time.
+        earliest_s: when the earliest of all plans is over.
     """
 
     attempt: Callable[[int, np.ndarray], Attempt]
@@ -54,11 +58,13 @@ class Search:
     on_improvement: OnImprovement
     on_first: Callable[[], object]
     proof: Callable[[], str | None]
+    preference: Preference = field(default_factory=Preference)
     best: Plan | None = None
+    earliest_s: float = math.inf
     halt: np.ndarray = field(default_factory=lambda: np.zeros(1, np.bool_))
 
     def run(self) -> Plan | None:
-        """Return the cheapest plan found.
+        """Return the best plan found.
 
         An interrupt during a time limit ends the search as if the limit were reached,
         provided there is a plan to keep.
@@ -71,9 +77,7 @@ class Search:
                 for attempt in self._attempts(pool):
                     number += 1
                     self.statistics.add(dict(attempt.counts), attempt.routing_s)
-                    found += bool(attempt.plans)
-                    for found_at, plan in attempt.plans:
-                        self._take(plan, found_at)
+                    found += any([self._take(*each) for each in attempt.plans])
                     self.on_progress(self._fraction(number, found), f"{found} plans")
                     if self._enough(number, found):
                         break
@@ -115,18 +119,28 @@ class Search:
         finally:
             alarm.cancel()
 
-    def _take(self, plan: Plan, found_at: float) -> None:
-        """Keep a plan if it is the cheapest so far."""
+    def _take(self, found_at: float, plan: Plan) -> bool:
+        """Keep a plan if it is the best so far; return whether it is in time."""
         time_s = found_at - self.statistics.started
+        self.earliest_s = min(self.earliest_s, plan.makespan_s)
+        if self.preference.late_s(plan):
+            return False
         if self.best is None:
             self.statistics.time_s["first_solution"] = time_s
             self.on_first()
-        elif plan.cost_J >= self.best.cost_J:
-            return
+        elif self.preference.rank(plan) >= self.preference.rank(self.best):
+            return True
         self.best = plan
-        improvement = Improvement.of(time_s, plan.cost_J, self.statistics.bound_J)
+        improvement = Improvement(
+            time_s=time_s,
+            cost_J=plan.cost_J,
+            makespan_s=plan.makespan_s,
+            objective=self.preference.objective,
+            bounds=self.statistics.bounds,
+        )
         self.statistics.improvements.append(improvement)
         self.on_improvement(improvement)
+        return True
 
     def _enough(self, number: int, found: int) -> bool:
         params = self.params

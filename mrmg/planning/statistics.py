@@ -3,45 +3,85 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from mrmg.scene.objective import ENERGY, Objective
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """What no plan of a mission undercuts.
+
+    Attributes:
+        energy_J: of the fleet; None while it is not known, or not wanted.
+        makespan_s: as `energy_J`.
+    """
+
+    energy_J: float | None = None
+    makespan_s: float | None = None
+
+    def of(self, objective: Objective) -> float | None:
+        """Return what the objective's value cannot undercut; None if unknown."""
+        if objective.energy_weight and self.energy_J is None:
+            return None
+        if objective.makespan_weight and self.makespan_s is None:
+            return None
+        return objective.value(self.energy_J or 0.0, self.makespan_s or 0.0)
+
+
+UNKNOWN = Bounds()
+"""Nothing is known."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Improvement:
-    """A plan that is cheaper than all before it.
+    """A plan that is better than all before it.
 
     Attributes:
         time_s: since planning began.
         cost_J: the plan's energy.
-        bound_J: energy that no plan undercuts; None while it is not known.
-        gap: cost / bound - 1; None without a bound above 0.
+        makespan_s: its duration.
+        objective: what it is better by.
+        bounds: what is known that no plan undercuts.
     """
 
     time_s: float
     cost_J: float
-    bound_J: float | None = None
-    gap: float | None = None
+    makespan_s: float
+    objective: Objective = ENERGY
+    bounds: Bounds = UNKNOWN
 
-    @staticmethod
-    def of(time_s: float, cost_J: float, bound_J: float | None) -> Improvement:
-        """Return the improvement, judged by a bound if there is one."""
-        return Improvement(
-            time_s=time_s, cost_J=cost_J, bound_J=bound_J, gap=gap_of(cost_J, bound_J)
-        )
+    @property
+    def value(self) -> float:
+        """The objective's value."""
+        return self.objective.value(self.cost_J, self.makespan_s)
 
-    def to_json(self) -> dict[str, float | None]:
+    @property
+    def gap(self) -> float | None:
+        """The objective's value / its bound - 1; None without a bound above 0."""
+        return gap_of(self.value, self.bounds.of(self.objective))
+
+    def to_json(self) -> dict[str, Any]:
         """Return the improvement as JSON data."""
         return {
             "time_s": self.time_s,
             "cost_J": self.cost_J,
-            "bound_J": self.bound_J,
+            "makespan_s": self.makespan_s,
+            "bound_J": self.bounds.energy_J,
             "gap": self.gap,
+            "objective": {
+                "name": self.objective.name,
+                "unit": self.objective.unit,
+                "value": self.value,
+                "bound": self.bounds.of(self.objective),
+            },
         }
 
 
-def gap_of(cost_J: float, bound_J: float | None) -> float | None:
-    """Return cost / bound - 1; None without a bound above 0."""
-    return cost_J / bound_J - 1.0 if bound_J else None
+def gap_of(value: float, bound: float | None) -> float | None:
+    """Return value / bound - 1; None without a bound above 0."""
+    return value / bound - 1.0 if bound else None
 
 
 @dataclass
@@ -51,7 +91,7 @@ class Statistics:
     time_s: dict[str, float] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
     improvements: list[Improvement] = field(default_factory=list)
-    bound_J: float | None = None
+    bounds: Bounds = UNKNOWN
     started: float = field(default_factory=time.perf_counter)
 
     def elapsed(self) -> float:
@@ -69,15 +109,14 @@ class Statistics:
         first = self.time_s.get("first_solution", 0.0)
         times = {"init": 0.0, "routing": 0.0, **self.time_s, "first_solution": first}
         counts = {"vertices": 0, "groups": 0, "router_calls": 0, "expansions": 0}
-        judged = [
-            Improvement.of(found.time_s, found.cost_J, self.bound_J)
-            for found in self.improvements
-        ]
+        judged = [replace(found, bounds=self.bounds) for found in self.improvements]
         return {
             **counts,
             **self.counts,
             "improvements": [found.to_json() for found in judged],
-            "bound_J": self.bound_J,
+            "bound_J": self.bounds.energy_J,
+            "bound_s": self.bounds.makespan_s,
+            "bound": self.bounds.of(judged[-1].objective) if judged else None,
             "gap": judged[-1].gap if judged else None,
             "time_s": {**times, "total": self.elapsed()},
         }

@@ -10,7 +10,8 @@ model misses of the physics.
 
 No battery may fall below its reserve, by what was measured: the rule the verifier holds
 plans to, whether or not the robots are as modelled. Under disturbances a battery is as
-the disturbance has it.
+the disturbance has it. Where there is a time limit, all robots must be at rest by then,
+and every visit over.
 """
 
 from __future__ import annotations
@@ -33,8 +34,12 @@ from mrmg.execution.log import ExecutionLog
 from mrmg.ledger import EnergyLedger, LedgerEntry
 from mrmg.mission import Plan, Visit
 from mrmg.results.energy_audit import EnergyAudit, RobotAudit, SimulatedVisit
+from mrmg.scene.objective import overtime_s
 from mrmg.scene.types import Robot, Scene
 from mrmg.visiting import crowded_stations, first_stay
+
+AT_REST = 0.02
+"""Speed below which a simulated robot is at rest [m/s], and rate of turning [rad/s]."""
 
 _TROUBLE = {
     "lost": "a robot was too far from its plan",
@@ -99,6 +104,7 @@ def audit(scene: Scene, plan: Plan, log: ExecutionLog) -> EnergyAudit:
         "goal missed": _goals_missed(scene, goals_visited),
         "contact": _contacts(log),
         "station shared": _crowded(scene, log),
+        "late": _late(scene, log),
         "below reserve": _below_reserve(scene, measured),
         "battery empty": _ran_empty(measured),
     }
@@ -258,6 +264,34 @@ def _crowded(scene: Scene, log: ExecutionLog) -> list[str]:
         f"{' and '.join(found.robots)} were both at {found.station} at "
         f"{log.time_s[found.first]:.1f} s, which is for one robot at a time"
         for found in crowded_stations(scene, ways)
+    ]
+
+
+def over_s(scene: Scene, log: ExecutionLog) -> float:
+    """Return when a simulated mission was over: all at rest, no stay too short [s].
+
+    Goals that were not visited do not count.
+    """
+    turning = [robot.model.motion_model != "car" for robot in scene.robots]
+    rates = np.concatenate([log.state[:, :, 3], log.state[turning, :, 4]])
+    moving = np.flatnonzero((np.abs(rates) > AT_REST).any(axis=0))
+    last = min(int(moving.max(initial=-1)) + 1, len(log.time_s) - 1)
+    stays = [
+        [first_stay(goal, log.time_s, state[:, :2], 0) for state in log.state]
+        for goal in scene.goals
+    ]
+    ends = [[stay.over for stay in found if stay] for found in stays]
+    return float(log.time_s[max([last, *(min(found) for found in ends if found)])])
+
+
+def _late(scene: Scene, log: ExecutionLog) -> list[str]:
+    done_s = over_s(scene, log)
+    late_s = overtime_s(scene.time_limit_s, done_s)
+    if not late_s:
+        return []
+    return [
+        f"the mission was over at {done_s:.2f} s, {late_s:.2f} s after its time limit "
+        f"of {scene.time_limit_s:g} s"
     ]
 
 

@@ -124,8 +124,10 @@ def _names(folders: Sequence[Path]) -> tuple[str, ...]:
 _FIGURES: tuple[tuple[str, str, int, float, tuple[str, ...]], ...] = (
     ("planned energy", "kJ", 2, 1e-3, ("plan", "cost_J")),
     ("proven bound", "kJ", 2, 1e-3, ("plan", "bound_J")),
-    ("above the bound", "%", 1, 100.0, ("plan", "gap")),
     ("planned duration", "s", 1, 1.0, ("plan", "makespan_s")),
+    ("proven bound of the duration", "s", 1, 1.0, ("plan", "bound_s")),
+    ("time limit", "s", 1, 1.0, ("plan", "time_limit_s")),
+    ("above the bound", "%", 1, 100.0, ("plan", "gap")),
     ("planning time", "s", 2, 1.0, ("plan", "time_s", "total")),
     ("first plan after", "s", 2, 1.0, ("plan", "time_s", "first_solution")),
     ("tree vertices", "", 0, 1.0, ("plan", "vertices")),
@@ -159,6 +161,7 @@ def _rows(records: Sequence[RunRecord]) -> list[Row]:
         texts("scene", lambda record: _scene_name(record, records)),
         texts("seed", lambda record: str(record.summary["seed"])),
         texts("profile", lambda record: str(record.arguments.get("profile", MISSING))),
+        texts("objective", _objective),
         texts("outcome", _outcome),
     ]
     for name, unit, digits, factor, place in _FIGURES:
@@ -184,6 +187,16 @@ def _scene_name(record: RunRecord, records: Sequence[RunRecord]) -> str:
     scene = record.scene
     named = {item.scene.digest for item in records if item.scene.name == scene.name}
     return scene.name if len(named) == 1 else f"{scene.name} ({scene.digest[:6]})"
+
+
+def _objective(record: RunRecord) -> str:
+    objective = record.scene.objective
+    if objective.name != "blend":
+        return objective.name
+    return (
+        f"{objective.energy_weight:g} / J energy, "
+        f"{objective.makespan_weight:g} / s makespan"
+    )
 
 
 def _outcome(record: RunRecord) -> str:

@@ -1,4 +1,4 @@
-"""Rules of the mission: goals, tours, visits, recharges, energy and the ledger."""
+"""Rules of the mission: goals, tours, visits, recharges, energy, time and ledger."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from mrmg.ledger import EnergyLedger
 from mrmg.mission import Plan, Trajectory, Visit
 from mrmg.results.motion_rules import violation_at, worst_of_runs
 from mrmg.results.verdict import Violation, ViolationKind
+from mrmg.scene.objective import overtime_s
 from mrmg.scene.types import Goal, Scene
 from mrmg.visiting import ROUNDING_S, crowded_stations, longest_stay_s
 
@@ -25,6 +26,7 @@ def check_mission(scene: Scene, plan: Plan) -> list[Violation]:
         *_check_goals(scene, plan),
         *_check_recharges(scene, plan),
         *_check_stations(scene, plan),
+        *_check_time(scene, plan),
     ]
     known = {target.id for target in scene.targets()}
     visits: list[Visit] = []
@@ -214,6 +216,25 @@ def _check_stations(scene: Scene, plan: Plan) -> list[Violation]:
             )
         )
     return violations
+
+
+def _check_time(scene: Scene, plan: Plan) -> list[Violation]:
+    """Check that all robots are at rest when the time limit is over."""
+    late_s = overtime_s(scene.time_limit_s, plan.makespan_s)
+    if not late_s:
+        return []
+    message = (
+        f"the plan takes {plan.makespan_s:g} s, {late_s:.3g} s more than the limit of "
+        f"{scene.time_limit_s:g} s"
+    )
+    return [
+        Violation(
+            kind=ViolationKind.LATE,
+            time_s=plan.makespan_s,
+            amount=late_s,
+            message=message,
+        )
+    ]
 
 
 def _check_energy(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
@@ -154,7 +155,7 @@ def _main_figures(record: RunRecord) -> list[tuple[str, str, str]]:
     figures = [
         ("Goals visited", f"{done}{len(scene.goals)}", kinds),
         ("Planned energy", sections.kJ(record.plan.cost_J), _above_bound(record)),
-        ("Planned duration", f"{record.plan.makespan_s:.0f} s", "last robot at rest"),
+        ("Planned duration", f"{record.plan.makespan_s:.0f} s", _how_soon(record)),
     ]
     if execution and energy:
         figures += [
@@ -184,12 +185,23 @@ def _main_figures(record: RunRecord) -> list[tuple[str, str, str]]:
 
 def _above_bound(record: RunRecord) -> str:
     figures = record.summary["plan"]
-    gap = figures.get("gap")
+    gap = figures.get("gap") if record.scene.objective.name == "energy" else None
     # Where the fleet was planned for anew, the bound is not one of what was driven.
     planned_anew = record.plan is None or record.plan.cost_J != figures["cost_J"]
     if gap is None or planned_anew:
         return "whole fleet"
     return f"whole fleet; at most {100 * gap:.0f} % above the least"
+
+
+def _how_soon(record: RunRecord) -> str:
+    """Return what is known or asked of the makespan."""
+    figures = record.summary["plan"]
+    words = ["last robot at rest"]
+    if math.isfinite(record.scene.time_limit_s):
+        words.append(f"limit {record.scene.time_limit_s:g} s")
+    if record.scene.objective.name == "makespan" and figures["gap"] is not None:
+        words.append(f"at most {100 * figures['gap']:.0f} % above the least")
+    return "; ".join(words)
 
 
 def _reproduce(record: RunRecord) -> list[str]:

@@ -26,7 +26,15 @@ _NAMES = {
     "groups": "Groups of vertices",
     "dead_ends": "Expansions that led nowhere",
 }
-_TOLD_IN_WORDS = ("bound_J", "gap")
+_TOLD_IN_WORDS = ("bound", "bound_J", "bound_s", "gap")
+_SHOWN = {"J": ("kJ", 1e-3), "s": ("s", 1.0), "1": ("", 1.0)}
+"""Unit and factor in which the chart shows each unit of an objective."""
+
+_TITLES = {
+    "energy": "Energy",
+    "makespan": "Makespan",
+    "blend": "Weighted sum of energy and makespan",
+}
 _ROOM = (0.9, 1.05)
 """Room below and above the courses, as factors."""
 
@@ -51,7 +59,7 @@ def planner(record: RunRecord) -> list[str]:
     ]
 
 
-def found_plans(record: RunRecord) -> Sequence[Mapping[str, float]]:
+def found_plans(record: RunRecord) -> Sequence[Mapping[str, Any]]:
     """Return the plans found over time, each cheaper than the one before."""
     return list(record.planning["statistics"].get("improvements", []))
 
@@ -67,20 +75,24 @@ def cost_chart(record: RunRecord) -> dict[str, Any] | None:
     total_s = record.planning["statistics"]["time_s"]["total"]
     found_s = [float(item["time_s"]) for item in found]
     time_s = np.array([0.0, *found_s, max(total_s, found_s[-1])])
-    cost_kJ = np.array([np.nan, *_kJ(found, "cost_J"), found[-1]["cost_J"] / 1000.0])
-    last = record.summary["plan"].get("bound_J")
-    bound_kJ = np.array([np.nan, *_kJ(found, "bound_J"), _in_kJ(last)])
-    if np.isnan(bound_kJ[:-1]).all():
-        bound_kJ[:] = _in_kJ(last)  # when it became known was not kept
-    bound_kJ = np.fmax.accumulate(bound_kJ)
-    lines = [chart_spec.line("cost of the plan", "course", (0, COST), cost_kJ)]
-    if not np.isnan(bound_kJ).all():
-        lines.append(chart_spec.line("proven bound", "limit", (0, COST), bound_kJ))
-    shown = np.concatenate([cost_kJ, bound_kJ])
+    wanted = judged(record.summary["plan"])
+    unit, size = _SHOWN[wanted["unit"]]
+    values = [size * judged(item)["value"] for item in found]
+    bounds = [_scaled(judged(item)["bound"], size) for item in found]
+    last = _scaled(wanted["bound"], size)
+    value = np.array([np.nan, *values, values[-1]])
+    bound = np.array([np.nan, *bounds, last])
+    if np.isnan(bound[:-1]).all():
+        bound[:] = last  # when it became known was not kept
+    bound = np.fmax.accumulate(bound)
+    lines = [chart_spec.line("cost of the plan", "course", (0, COST), value)]
+    if not np.isnan(bound).all():
+        lines.append(chart_spec.line("proven bound", "limit", (0, COST), bound))
+    shown = np.concatenate([value, bound])
     return chart_spec.chart(
         COST,
-        "Energy of the best plan over the time of planning",
-        "kJ",
+        f"{_TITLES[wanted['name']]} of the best plan over the time of planning",
+        unit,
         lines,
         group=COST,
         limits=(_ROOM[0] * np.nanmin(shown), _ROOM[1] * np.nanmax(shown)),
@@ -88,22 +100,49 @@ def cost_chart(record: RunRecord) -> dict[str, Any] | None:
     )
 
 
-def _kJ(found: Sequence[Mapping[str, float]], name: str) -> list[float]:
-    return [_in_kJ(item.get(name)) for item in found]
+def judged(figures: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return name, unit, value and bound of what a plan is judged by.
+
+    Before objectives could be chosen it was the energy.
+    """
+    energy = {
+        "name": "energy",
+        "unit": "J",
+        "value": figures["cost_J"],
+        "bound": figures.get("bound_J"),
+    }
+    return dict(figures.get("objective", energy))
 
 
-def _in_kJ(value_J: float | None) -> float:
-    return np.nan if value_J is None else value_J / 1000.0
+def _scaled(value: float | None, size: float) -> float:
+    return np.nan if value is None else size * value
+
+
+def _said_value(value: float, unit: str) -> str:
+    """Return a value of the objective as text."""
+    if unit == "J":
+        return kJ(value)
+    return f"{value:.1f} s" if unit == "s" else f"{value:.4g}"
 
 
 def _quality(figures: Mapping[str, Any] | None) -> str:
     """Return how far the plan can be from the cheapest there is, if it is known."""
     if figures is None or figures.get("gap") is None:
         return ""
+    objective = judged(figures)
+    least = _said_value(objective["bound"], objective["unit"])
+    value = _said_value(objective["value"], objective["unit"])
+    share = f"{100.0 * figures['gap']:.1f} %"
     return html.paragraph(
-        f"No plan for this mission needs less than {kJ(figures['bound_J'])}: this one "
-        f"({kJ(figures['cost_J'])}) is at most {100.0 * figures['gap']:.1f} % dearer "
-        "than the cheapest there is."
+        {
+            "energy": f"No plan for this mission needs less than {least}: this one "
+            f"({value}) is at most {share} dearer than the cheapest there is.",
+            "makespan": f"No plan for this mission is over before {least}: this one "
+            f"({value}) takes at most {share} longer than the shortest there is.",
+            "blend": "No plan for this mission has a weighted sum of energy and "
+            f"makespan below {least}: this one ({value}) is at most {share} above the "
+            "least there is.",
+        }[objective["name"]]
     )
 
 
@@ -112,12 +151,20 @@ def _improvements(found: Sequence[Mapping[str, Any]]) -> str:
         [
             f"{item['time_s']:.2f} s",
             kJ(item["cost_J"]),
-            "" if item.get("bound_J") is None else kJ(item["bound_J"]),
+            f"{item['makespan_s']:.1f} s" if "makespan_s" in item else "",
+            _bound_of(judged(item)),
             "" if item.get("gap") is None else f"{100.0 * item['gap']:.1f} %",
         ]
         for item in found
     ]
-    return html.table(["After", "Cost of the plan", "Bound", "Above the bound"], rows)
+    columns = ["After", "Energy", "Makespan", "Proven bound", "Above the bound"]
+    return html.table(columns, rows)
+
+
+def _bound_of(objective: Mapping[str, Any]) -> str:
+    if objective["bound"] is None:
+        return ""
+    return _said_value(objective["bound"], objective["unit"])
 
 
 def _said(place: str, value: float | str, times: Mapping[str, float]) -> str:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
@@ -84,7 +85,7 @@ def summary_of(
         "robots": len(scene.robots),
         "goals": len(scene.goals),
         "stations": len(scene.stations),
-        "plan": _plan_figures(plan, planning["statistics"]) if plan else None,
+        "plan": _plan_figures(scene, plan, planning["statistics"]) if plan else None,
         "verdict": _verdict_figures(verdict) if verdict else None,
         "execution": _execution_figures(log, audit) if log and audit else None,
         "energy": _energy_figures(audit) if audit else None,
@@ -96,13 +97,26 @@ def summary_of(
     }
 
 
-def _plan_figures(plan: Plan, statistics: Mapping[str, Any]) -> dict[str, Any]:
+def _plan_figures(
+    scene: Scene, plan: Plan, statistics: Mapping[str, Any]
+) -> dict[str, Any]:
+    limit_s = scene.time_limit_s
     times = ("init", "routing", "first_solution", "total")
     return {
         "cost_J": plan.cost_J,
         "bound_J": statistics.get("bound_J"),
         "gap": statistics.get("gap"),
         "makespan_s": plan.makespan_s,
+        "bound_s": statistics.get("bound_s"),
+        "time_limit_s": limit_s if math.isfinite(limit_s) else None,
+        "objective": {
+            "name": scene.objective.name,
+            "unit": scene.objective.unit,
+            "energy_weight": scene.objective.energy_weight,
+            "makespan_weight": scene.objective.makespan_weight,
+            "value": scene.objective.value(plan.cost_J, plan.makespan_s),
+            "bound": statistics.get("bound"),
+        },
         "improvements": list(statistics.get("improvements", [])),
         "vertices": statistics["vertices"],
         "groups": statistics["groups"],

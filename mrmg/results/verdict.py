@@ -35,6 +35,7 @@ class ViolationKind(Enum):
     VISIT = "visit"
     RECHARGE = "recharge"
     ENERGY = "energy"
+    LATE = "late"
     LEDGER = "ledger"
 
     @property
@@ -59,6 +60,7 @@ class ViolationKind(Enum):
             ViolationKind.VISIT: "s",
             ViolationKind.RECHARGE: "m",
             ViolationKind.ENERGY: "J",
+            ViolationKind.LATE: "s",
             ViolationKind.LEDGER: "J",
         }[self]
 

@@ -11,6 +11,7 @@ import numpy as np
 from shapely.geometry import Polygon
 
 from mrmg.scene.elevation import Elevation
+from mrmg.scene.objective import ENERGY, Objective
 from mrmg.scene.robot_model import RobotModel
 
 
@@ -191,6 +192,9 @@ class Scene:
             `scene.loading.scene_from_document` turns back into an equal scene.
         digest: fingerprint of the content, models included.
         elevation: the relief; None is flat ground at height 0.
+        objective: what its plans are judged by.
+        time_limit_s: by when all robots must be at rest, everything done; inf for any
+            time.
     """
 
     name: str
@@ -203,6 +207,8 @@ class Scene:
     document: dict[str, Any]
     digest: str
     elevation: Elevation | None = None
+    objective: Objective = ENERGY
+    time_limit_s: float = math.inf
 
     def robot(self, robot_id: str) -> Robot:
         """Return the robot of that id."""

@@ -23,11 +23,12 @@ COSTS = (90.0, None, 70.0, 80.0, 60.0, 65.0, 50.0, None, 55.0, 40.0)
 
 
 class Priced:
-    """Stands for a plan: the search asks for nothing but the cost."""
+    """Stands for a plan: the search asks for nothing but cost and duration."""
 
-    def __init__(self, number: int, cost_J: float) -> None:
+    def __init__(self, number: int, cost_J: float, makespan_s: float = 9.0) -> None:
         self.number = number
         self.cost_J = cost_J
+        self.makespan_s = makespan_s
 
 
 def search(

@@ -171,7 +171,8 @@ def test_the_bound_is_set_against_the_plan_it_was_computed_for(
 ) -> None:
     fill(tmp_path, *mission)
     record = read_record(tmp_path)
-    figures = {**record.summary["plan"], "bound_J": 1.0, "gap": 0.204}
+    objective = {**record.summary["plan"]["objective"], "bound": 1.0}
+    figures = {**record.summary["plan"], "objective": objective, "gap": 0.204}
 
     def page_with(**changes) -> Page:
         plan = {**figures, **changes.pop("plan", {})}

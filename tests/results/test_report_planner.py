@@ -92,3 +92,14 @@ def test_time_goes_on_to_the_end_of_planning(total: float) -> None:
     own = record(FOUND)
     own.planning["statistics"]["time_s"]["total"] = total
     assert cost_chart(own)["along_s"][-1] == max(total, 2.0)
+
+
+def test_plans_are_judged_by_the_objective_they_were_made_for() -> None:
+    makespan = {"name": "makespan", "unit": "s", "value": 80.0, "bound": 64.0}
+    found = [{"time_s": 0.5, "cost_J": 6e4, "makespan_s": 80.0, "objective": makespan}]
+    own = record(found, objective=makespan, gap=0.25)
+    chart = cost_chart(own)
+    assert lines(chart)["cost of the plan"][-1] == 80.0
+    assert lines(chart)["proven bound"][-1] == 64.0
+    said = "".join(planner(own))
+    assert "over before 64.0 s: this one (80.0 s) takes at most 25.0 % longer" in said

@@ -13,6 +13,7 @@ from mrmg import storage
 from mrmg.errors import RunFolderError
 from mrmg.execution.disturbance import DEFAULT_RANGES
 from mrmg.mission import PlanStatus
+from mrmg.planning.statistics import Bounds, Improvement
 from mrmg.results.audit import audit
 from mrmg.results.summary import summarize, summary_of, summary_schema
 from mrmg.results.verify import verify
@@ -23,6 +24,9 @@ SECTIONS = {
         "bound_J",
         "gap",
         "makespan_s",
+        "bound_s",
+        "time_limit_s",
+        "objective",
         "improvements",
         "vertices",
         "groups",
@@ -62,10 +66,14 @@ STATISTICS = {
     "groups": 7,
     "router_calls": 3,
     "improvements": [
-        {"time_s": 0.5, "cost_J": 3.0, "bound_J": 2.0, "gap": 0.5},
-        {"time_s": 0.7, "cost_J": 2.5, "bound_J": 2.0, "gap": 0.25},
+        Improvement(
+            time_s=time_s, cost_J=cost_J, makespan_s=9.0, bounds=Bounds(energy_J=2.0)
+        ).to_json()
+        for time_s, cost_J in ((0.5, 3.0), (0.7, 2.5))
     ],
     "bound_J": 2.0,
+    "bound_s": None,
+    "bound": 2.0,
     "gap": 0.25,
     "time_s": {"init": 0.1, "routing": 0.2, "first_solution": 0.5, "total": 0.5},
 }

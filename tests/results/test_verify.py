@@ -163,6 +163,11 @@ def broken_energy(case: Any, drive: Any) -> Case:
     return replace(scene, robots=(robot,)), plan
 
 
+def broken_late(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    return replace(scene, time_limit_s=plan.makespan_s - 0.5), plan
+
+
 def broken_ledger(case: Any, drive: Any) -> Case:
     scene, plan = case()
     first, *rest = plan.ledger.entries
@@ -253,6 +258,14 @@ def test_energy_violation_tells_the_lack(case: Any, drive: Any) -> None:
     scene, plan = broken_energy(case, drive)
     violation = only(verify(scene, plan), Kind.ENERGY)
     assert violation.amount == pytest.approx(1000.0 - (2000.0 - plan.cost_J))
+
+
+def test_lateness_is_measured_from_the_limit(case: Any, drive: Any) -> None:
+    scene, plan = broken_late(case, drive)
+    violation = only(verify(scene, plan), Kind.LATE)
+    assert violation.amount == pytest.approx(0.5)
+    assert violation.time_s == plan.makespan_s
+    assert verify(replace(scene, time_limit_s=plan.makespan_s), plan).ok
 
 
 def test_recharge_keeps_the_battery_above_the_reserve(case: Any) -> None:

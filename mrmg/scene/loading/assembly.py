@@ -6,6 +6,7 @@ well-formed entries, also when others are malformed: a user sees everything at o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
@@ -29,11 +30,13 @@ from mrmg.scene.loading.models import load_model, model_folder
 from mrmg.scene.loading.schema import (
     SECTIONS,
     BatteryEntry,
+    BlendEntry,
     CircleEntry,
     ElevationEntry,
     FinishEntry,
     SceneDocument,
 )
+from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import (
     Finish,
@@ -83,6 +86,7 @@ class Assembly:
             )
             for entry, region in self._regions("stations")
         ]
+        self.objective = self._objective()
         self._check_starts()
 
     def scene(self) -> Scene:
@@ -109,6 +113,8 @@ class Assembly:
             stations=tuple(self.stations),
             robots=tuple(self.robots),
             elevation=self.elevation,
+            objective=self.objective,
+            time_limit_s=document.get("time_limit", math.inf),
             document=document,
             digest=storage.digest(storage.canonical_json(content)),
         )
@@ -262,6 +268,16 @@ class Assembly:
             elevation, self.robots, self.obstacles, self.terrain
         )
         return elevation
+
+    def _objective(self) -> Objective:
+        wanted = self._document.get("objective")
+        blend = _parsed(BlendEntry, wanted)
+        if blend is None:
+            return MAKESPAN if wanted == "makespan" else ENERGY
+        if not blend.energy and not blend.makespan:
+            message = "both weights are 0; give at least one that is positive"
+            self._fault("objective", message)
+        return Objective(energy_weight=blend.energy, makespan_weight=blend.makespan)
 
     def _shape(self, entry: Any, path: str) -> Polygon | None:
         shape = shape_of(entry, path)

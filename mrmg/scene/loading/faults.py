@@ -28,11 +28,30 @@ _KINDS = {
 
 def faults_of(error: ValidationError, model: type[BaseModel]) -> list[Fault]:
     """Return one fault per error: its path, the value, and what is allowed there."""
-    return [_fault(dict(detail), model) for detail in error.errors()]
+    details = [dict(detail) for detail in error.errors()]
+    return [_fault(detail, model) for detail in details if _is_meant(detail)]
+
+
+def _is_meant(detail: dict[str, Any]) -> bool:
+    """Tell whether an error is about what the user meant of a word or a mapping."""
+    end = detail["loc"][-1] if detail["loc"] else ""
+    if _is_word(end):
+        return not isinstance(detail["input"], dict)
+    return not (detail["type"] == "model_type" and _is_model(end))
+
+
+def _is_word(part: str | int) -> bool:
+    return isinstance(part, str) and part.startswith("literal[")
+
+
+def _is_model(part: str | int) -> bool:
+    return isinstance(part, str) and part.endswith("Entry")
 
 
 def _fault(detail: dict[str, Any], model: type[BaseModel]) -> Fault:
-    loc: tuple[str | int, ...] = detail["loc"]
+    *inner, end = detail["loc"] or ("",)
+    loc: tuple[str | int, ...] = tuple(part for part in inner if not _is_model(part))
+    loc += () if _is_word(end) else (end,)
     kind: str = detail["type"]
     value = detail["input"]
     # A start energy is mostly spelt as a bare number, which means a fraction.

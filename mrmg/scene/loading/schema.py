@@ -18,6 +18,8 @@ A scene is one YAML file (scalars as in YAML 1.2; metres, radians, joules):
     stations:                         # convex; entering one fills the battery
       - {id: s1, polygon: [[40, 40], [43, 40], [43, 43], [40, 43]]}
     battery: {capacity_m: 240, reserve: 0.05}
+    objective: energy                 # or makespan, or {energy: w, makespan: w}
+    time_limit: 300                   # s; default: none
     robots:
       - {id: r1, model: car, pose: [5, 5, 0]}
       - {id: r2, model: ../my_robot, pose: [5, 9, 0], start_energy: 0.8,
@@ -64,6 +66,13 @@ Details:
 - `energy: paper` (of a robot here, or in its `robot.yaml`) charges only distance times
   terrain and turning, the cost of the published method; the default `full` also counts
   inertia, slopes, and idle and device power.
+- `objective` says which plan is better: that with less `energy` of the whole fleet (J,
+  the default), that with the smaller `makespan`, the time at which the last robot has
+  come to rest (s), or that with the smaller sum of both, each times its weight:
+  `{energy: 1, makespan: 50}` has a second count as much as 50 J. Batteries must keep
+  their reserves in any case.
+- `time_limit` (s) is the largest makespan allowed: by then everything is done, and all
+  robots are at rest.
 - A map without robots, goals or stations is a valid scene; nothing can be planned on it
   until it is populated.
 """
@@ -224,6 +233,13 @@ class StartEnergyEntry(Strict):
     m: Positive | None = Field(default=None, description="metres of plain ground")
 
 
+class BlendEntry(Strict):
+    """Weights of energy and makespan; one of them at least is positive."""
+
+    energy: NotNegative = Field(description="weight of each J")
+    makespan: NotNegative = Field(description="weight of each s")
+
+
 def _share_to_mapping(value: Any) -> Any:
     is_number = isinstance(value, int | float) and not isinstance(value, bool)
     return {"fraction": value} if is_number else value
@@ -305,6 +321,12 @@ class SceneDocument(Strict):
     goals: list[RegionEntry] = []
     stations: list[StationEntry] = []
     battery: BatteryEntry = BatteryEntry()
+    objective: Literal["energy", "makespan"] | BlendEntry | None = Field(
+        default=None, description="energy, makespan, or {energy: w, makespan: w}"
+    )
+    time_limit: Positive | None = Field(
+        default=None, description="largest makespan in s"
+    )
     robots: list[RobotEntry] = []
 
 
