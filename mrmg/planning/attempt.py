@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -25,7 +25,7 @@ SPREADS = (0.0, 0.03, 0.08, 0.05)
 """Spread of the random factors on the roadmap's energies for successive drafts."""
 
 LEAST_GAIN = 0.001
-"""Share of the cost that a refinement must save to be followed by another."""
+"""Share of the objective that a refinement must save to be followed by another."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +33,8 @@ class Attempt:
     """What one attempt gave.
 
     Attributes:
-        plans: those found, each cheaper than the one before, with the time of
-            `time.perf_counter()` when it was found.
+        plans: those found, each better than the one before, with the time of
+            `time.perf_counter()` when it was found; some may be late.
         routing_s: time the tours took.
         counts: of the tree; empty if there were no tours to grow it along.
     """
@@ -86,8 +86,9 @@ def attempt_plan(
     left = params.refinements
     while plan is not None:
         plans.append((time.perf_counter(), plan))
-        better = refine(problem, params, plan, halt) if left > 0 else plan
-        enough = better.cost_J >= (1.0 - LEAST_GAIN) * plan.cost_J
+        hurried = replace(problem, hurried=problem.preference.late_s(plan) > 0.0)
+        better = refine(hurried, params, plan, halt) if left > 0 else plan
+        enough = not problem.preference.gains(better, plan, LEAST_GAIN)
         plan = better if better is not plan else None
         left = 0 if enough else left - 1
     return Attempt(plans, routing_s, growth.counts)
@@ -104,9 +105,17 @@ def _drafted(
     shape = problem.mission.routing.cost.shape[1:]
     noise = seeding.stream(seed, "costs", number).standard_normal(shape)
     routing = problem.mission.routing
-    routing = routing._replace(cost=routing.cost * np.exp(spread * noise))
+    factor = np.exp(spread * noise)
+    routing = routing._replace(cost=routing.cost * factor, time=routing.time * factor)
     tours = route(routing, params.router, draw)
     routing_s = time.perf_counter() - began
     if not tours.feasible or halt[0]:
         return None, routing_s
-    return draft(problem, params, tours, seed, halt), routing_s
+    plan = draft(problem, params, tours, seed, halt)
+    if plan is not None and problem.preference.late_s(plan):
+        hurried = replace(problem, hurried=True)
+        sooner = draft(hurried, params, tours, seed, halt)
+        plan = (
+            plan if sooner is None else min(plan, sooner, key=problem.preference.rank)
+        )
+    return plan, routing_s

@@ -22,6 +22,7 @@ from mrmg.planning._staying_kernels import has_visited_station
 from mrmg.planning._tree_kernels import Tours
 from mrmg.planning.fleet import fleet_array, stack_spaces
 from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.preference import Preference
 from mrmg.planning.roadmap import Roadmap
 from mrmg.planning.routing import Routing, routing_arrays, tour_room
 from mrmg.planning.targets import (
@@ -48,6 +49,7 @@ class Problem:
         mission: what the kernels work on.
         start: composite state at the start, shape (R, 5).
         start_energy: battery contents at the start [J], shape (R,).
+        hurried: whether plans must be sooner over at any cost.
     """
 
     scene: Scene
@@ -55,6 +57,12 @@ class Problem:
     mission: Mission
     start: np.ndarray
     start_energy: np.ndarray
+    hurried: bool = False
+
+    @property
+    def preference(self) -> Preference:
+        """What plans are compared by."""
+        return Preference.of(self.scene)
 
     def with_margin(self, margin: float) -> Problem:
         """Return the problem with another surcharge on the roadmap's energies."""

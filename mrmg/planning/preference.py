@@ -48,6 +48,12 @@ class Preference:
         """
         return self.late_s(plan), self.value(plan), plan.cost_J
 
+    def gains(self, better: Plan, plan: Plan, share: float) -> bool:
+        """Tell whether one plan betters another one by a share of the objective."""
+        if self.late_s(plan) > 0.0:
+            return self.late_s(better) < self.late_s(plan)
+        return self.value(better) < (1.0 - share) * self.value(plan)
+
     def value(self, plan: Plan) -> float:
         """Return the value of the objective."""
         return self.objective.value(plan.cost_J, plan.makespan_s)

@@ -8,7 +8,7 @@ place, or in the way of another), its path is led farther from obstacles; where 
 misses a target, deeper into it; where it has to brake, it arrives more slowly.
 
 A refined plan counts only if it visits the same targets in the same order as deep,
-keeps every battery above its reserve, and costs less.
+keeps every battery above its reserve, and is better by the scene's objective.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from mrmg.planning.band import (
     visit_steps,
     wary,
 )
+from mrmg.planning.haste import energy_shares
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.roadmap import planned_regions
@@ -96,7 +97,7 @@ class Errand:
 def refine(
     problem: Problem, params: PlannerParams, plan: Plan, halt: np.ndarray
 ) -> Plan:
-    """Return a plan that is cheaper than `plan`, or `plan` itself.
+    """Return a plan that is better than `plan`, or `plan` itself.
 
     A robot that cannot be helped otherwise drives as before up to behind the place.
 
@@ -124,7 +125,8 @@ def refine(
     if not trajectories:
         return plan
     found = make_plan(problem, plan.seed, params, trajectories, plan.tours)
-    if found is None or found.cost_J >= plan.cost_J:
+    rank = problem.preference.rank
+    if found is None or rank(found) >= rank(plan):
         return plan
     return found
 
@@ -179,7 +181,15 @@ def run_errands(
 def surfaces_of(problem: Problem) -> list[Surface]:
     """Return what each robot's paths are priced on."""
     smooth = smooth_terrain(problem.mission.terrain.multiplier)
-    return [surface_of(problem, r, smooth) for r in range(len(problem.start))]
+    surfaces = []
+    for r, share in enumerate(energy_shares(problem)):
+        surface = surface_of(problem, r, smooth)
+        if share < 1.0:
+            worth = share * surface.multiplier + (1.0 - share)
+            scrub = float(share * surface.scrub)
+            surface = surface._replace(multiplier=worth, scrub=scrub)
+        surfaces.append(surface)
+    return surfaces
 
 
 def stays_somewhere(problem: Problem) -> bool:

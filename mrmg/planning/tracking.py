@@ -12,6 +12,7 @@ from mrmg.mission import Trajectory
 from mrmg.planning import _tracking_kernels
 from mrmg.planning._tracking_kernels import Courses
 from mrmg.planning.band import Path
+from mrmg.planning.haste import brakes_hard
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.parameters import PlannerParams
 
@@ -23,6 +24,9 @@ LEAST_STEPS = 400
 
 COASTING_SHARE = 0.95
 """Share of rolling resistance's deceleration that robots slow down with."""
+
+HARD_SHARE = 0.9
+"""Share of the largest deceleration that robots in a hurry brake with."""
 
 BRAKING = 1.5
 """Multiple of that deceleration from which on it is braking."""
@@ -122,7 +126,7 @@ def braking_places(problem: Problem, r: int, trajectory: Trajectory) -> list[Slo
 
     Whoever arrives there slowly has lost nothing: rolling resistance slows it down.
     """
-    ease = _free_decelerations(problem)[r]
+    ease = _decelerations(problem)[r]
     speed = np.abs(trajectory.state[:, 3])
     brakes = np.diff(speed) < -BRAKING * ease * trajectory.dt_s
     change = np.diff(np.concatenate([[False], brakes, [False]]).astype(int))
@@ -144,7 +148,7 @@ def courses_of(
     bend, way = np.zeros((robots, most)), np.zeros((robots, most))
     end = np.zeros((robots, most), np.int64)
     fastest = np.full((robots, most), np.inf)
-    ease = _free_decelerations(problem)
+    ease = _decelerations(problem)
     for r, path in enumerate(paths):
         n = len(path.node)
         if n < 2:
@@ -211,14 +215,17 @@ def _bends(chord: np.ndarray, size: np.ndarray) -> np.ndarray:
     return np.concatenate([inner[:1], inner, inner[-1:]])
 
 
-def _free_decelerations(problem: Problem) -> np.ndarray:
-    """Return what each robot slows down with [m/s^2] so that no energy is braked away.
+def _decelerations(problem: Problem) -> np.ndarray:
+    """Return what each robot slows down with [m/s^2].
 
-    That is rolling resistance on the easiest ground; at least a tenth of the limit.
+    Where that is worth the time, no energy is braked away: it is rolling resistance on
+    the easiest ground, at least a tenth of the limit.
     """
     ground = float(problem.mission.terrain.multiplier.min())
     fleet = problem.mission.fleet
     mass = np.maximum(fleet["energy"][:, EFFECTIVE_MASS_KG], 1e-9)
     rolling = COASTING_SHARE * ground * fleet["energy"][:, ROLLING_N] / mass
     hardest = fleet["limit"][:, 3]
-    return np.asarray(np.clip(rolling, 0.1 * hardest, 0.9 * hardest))
+    braking = HARD_SHARE * hardest
+    eased = np.clip(rolling, 0.1 * hardest, braking)
+    return np.where(brakes_hard(problem), braking, eased)
