@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
 import json
 import sys
+from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -15,17 +16,19 @@ from mrmg import shipped
 from mrmg.results.robustness import Study, Trial
 from mrmg.scene.loading.models import load_model
 
-TOOL = Path(__file__).parents[2] / "tools" / "bench_physics.py"
+TOOLS = Path(__file__).parents[2] / "tools"
 
 
 @pytest.fixture(scope="module")
-def bench() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("bench_physics", TOOL)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def bench() -> Iterator[SimpleNamespace]:
+    """The bench's modules by name, as its script finds them beside itself."""
+    names = ("figures", "missions", "trials", "yaw", "protocol")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(TOOLS))
+        yield SimpleNamespace(
+            script=importlib.import_module("bench_physics"),
+            **{name: importlib.import_module(f"physics.{name}") for name in names},
+        )
 
 
 def row(seed: int = 0, **changes: Any) -> dict[str, Any]:
@@ -44,9 +47,9 @@ def row(seed: int = 0, **changes: Any) -> dict[str, Any]:
     return mission | changes
 
 
-def test_a_mission_within_all_figures_holds(bench: ModuleType) -> None:
-    assert bench.faults_of([row(seed) for seed in range(3)]) == []
-    assert bench.verdict([]) == "holds"
+def test_a_mission_within_all_figures_holds(bench: SimpleNamespace) -> None:
+    assert bench.missions.faults_of([row(seed) for seed in range(3)]) == []
+    assert bench.figures.verdict([]) == "holds"
 
 
 @pytest.mark.parametrize(
@@ -60,11 +63,11 @@ def test_a_mission_within_all_figures_holds(bench: ModuleType) -> None:
     ],
 )
 def test_one_bad_mission_makes_the_row_miss(
-    bench: ModuleType, changes: dict[str, Any], told: str
+    bench: SimpleNamespace, changes: dict[str, Any], told: str
 ) -> None:
-    faults = bench.faults_of([row(0), row(1, **changes), row(2)])
+    faults = bench.missions.faults_of([row(0), row(1, **changes), row(2)])
     assert faults == [told]
-    assert bench.verdict(faults) == f"MISSES: {told}"
+    assert bench.figures.verdict(faults) == f"MISSES: {told}"
 
 
 @pytest.mark.parametrize(
@@ -82,16 +85,16 @@ def test_one_bad_mission_makes_the_row_miss(
     ],
 )
 def test_medians_count_where_figures_are_of_the_median(
-    bench: ModuleType, changes: dict[str, Any], told: str
+    bench: SimpleNamespace, changes: dict[str, Any], told: str
 ) -> None:
-    assert bench.faults_of([row(0, **changes)] * 3) == [told]
+    assert bench.missions.faults_of([row(0, **changes)] * 3) == [told]
     if "fleet" not in changes:
-        assert bench.faults_of([row(0), row(1, **changes), row(2)]) == []
+        assert bench.missions.faults_of([row(0), row(1, **changes), row(2)]) == []
 
 
-def test_larger_fleets_may_be_slower(bench: ModuleType) -> None:
-    assert bench.faults_of([row(fleet=8, realtime=13.0)]) == []
-    assert bench.faults_of([row(fleet=3, realtime=13.0)]) == []
+def test_larger_fleets_may_be_slower(bench: SimpleNamespace) -> None:
+    assert bench.missions.faults_of([row(fleet=8, realtime=13.0)]) == []
+    assert bench.missions.faults_of([row(fleet=3, realtime=13.0)]) == []
 
 
 def study(feasible: int, trials: int) -> Study:
@@ -106,50 +109,99 @@ def study(feasible: int, trials: int) -> Study:
     )
 
 
-def test_the_gain_by_replanning_is_that_over_all_scenes(bench: ModuleType) -> None:
+def test_the_gain_by_replanning_is_that_over_all_scenes(bench: SimpleNamespace) -> None:
     carried, failing, saved = study(10, 10), study(5, 10), study(9, 10)
-    assert bench.share([carried, failing]) == 0.75
-    assert bench.gain_faults([carried, failing], [carried, saved]) == []
-    assert bench.gain_faults([carried, carried], [carried, saved]) == [
-        "-5% by replanning"
+    assert bench.trials.share([carried, failing]) == 0.75
+    gained = bench.trials.gain_figure([carried, failing], [carried, saved])
+    assert gained.holds
+    assert gained.found == "+20.0%"
+    lost = bench.trials.gain_figure([carried, carried], [carried, saved])
+    assert not lost.holds
+    assert lost.found == "-5.0%"
+
+
+@pytest.mark.parametrize(
+    ("feasible", "trials", "holds", "asked"),
+    [(95, 100, True, ">= 95/100"), (94, 100, False, ">= 95/100"), (2, 2, True, "all")],
+)
+def test_a_share_of_the_trials_must_be_feasible(
+    bench: SimpleNamespace, feasible: int, trials: int, holds: bool, asked: str
+) -> None:
+    own = study(feasible, trials)
+    figure = bench.trials.figure_of("scene1", "", False, own, 0.95)
+    assert (figure.holds, figure.asked) == (holds, asked)
+    assert figure.found == f"{feasible}/{trials}"
+
+
+def test_every_figure_is_told_and_judged(
+    bench: SimpleNamespace, capsys: pytest.CaptureFixture[str]
+) -> None:
+    slow = row(0, scene="b", realtime=39.0)
+    rows = [row(seed, scene="a") for seed in range(3)] + [slow]
+    figures = bench.missions.figures_of(rows)
+    assert [item.what for item in figures if not item.holds] == [
+        "x real time with 2 robots, slowest scene"
     ]
+    bench.figures.print_figures(figures)
+    told = capsys.readouterr().out
+    assert "feasible missions | 4/4 | all | PASS" in told
+    assert "slowest scene | 39 | >= 40 | FAIL" in told
+    assert told.endswith("1 figures FAIL\n")
 
 
-def test_seeds_are_read(bench: ModuleType) -> None:
-    assert bench.seeds_of("2-4") == range(2, 5)
-    assert bench.seeds_of("7") == range(7, 8)
+def test_rows_are_kept_for_the_same_state_only(
+    bench: SimpleNamespace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "rows.jsonl"
+    first = bench.missions.Kept.of(path)
+    assert first.rows == {}
+    mine = first.add(row(3, scene="a"))
+    path.write_text(path.read_text() + '{"broken')
+    again = bench.missions.Kept.of(path)
+    assert again.rows == {("a", 3): mine}
+    assert "broken" not in path.read_text()
+    monkeypatch.setattr(bench.missions, "state", lambda: "another")
+    assert bench.missions.Kept.of(path).rows == {}
 
 
-def test_a_mission_without_plan_is_told_and_breaks_nothing(bench: ModuleType) -> None:
+def test_seeds_are_read(bench: SimpleNamespace) -> None:
+    assert bench.script.seeds_of("2-4") == range(2, 5)
+    assert bench.script.seeds_of("7") == range(7, 8)
+
+
+def test_a_mission_without_plan_is_told_and_breaks_nothing(
+    bench: SimpleNamespace,
+) -> None:
     lost = {"seed": 4, "fleet": 2, "feasible": False, "reasons": ["x"], "robots": []}
-    assert bench.faults_of([lost]) == ["seed 4 infeasible"]
-    assert bench.cells("somewhere", [lost]) == ["somewhere", "2", "0/1"]
-    assert bench.faults_of([row(0), lost]) == ["seed 4 infeasible"]
+    assert bench.missions.faults_of([lost]) == ["seed 4 infeasible"]
+    assert bench.missions.cells("somewhere", [lost]) == ["somewhere", "2", "0/1"]
+    assert bench.missions.faults_of([row(0), lost]) == ["seed 4 infeasible"]
 
 
 @pytest.mark.parametrize("name", shipped.model_names())
-def test_robots_turn_as_their_wheels_say(bench: ModuleType, name: str) -> None:
+def test_robots_turn_as_their_wheels_say(bench: SimpleNamespace, name: str) -> None:
     model, _ = load_model(shipped.models_folder() / name)
-    error_pct = bench.yaw_error_pct(model, 1.0, 0.3)
-    assert abs(error_pct) < bench.YAW_ERROR_PCT
+    error_pct = bench.yaw.yaw_error_pct(model, 1.0, 0.3)
+    assert abs(error_pct) < bench.yaw.YAW_ERROR_PCT
     assert error_pct != 0.0
 
 
 @pytest.mark.slow
-def test_the_quickstart_is_driven_and_written(
-    bench: ModuleType,
+def test_the_quickstart_is_driven_kept_and_not_driven_again(
+    bench: SimpleNamespace,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     output = tmp_path / "rows.jsonl"
-    arguments = "--scenes quickstart --seeds 0-1 --no-yaw --output"
-    monkeypatch.setattr(sys, "argv", ["bench", *arguments.split(), str(output)])
-    code = bench.main()
+    arguments = ["--scenes", "quickstart", "--no-yaw", "--output", str(output)]
+    monkeypatch.setattr(sys, "argv", ["bench", *arguments, "--seeds", "0-1"])
+    code = bench.script.main()
     told = capsys.readouterr().out
     line = next(item for item in told.splitlines() if item.startswith("quickstart"))
     assert " | 2/2 | " in line
-    assert code == ("MISSES" in line)
+    assert code == ("| FAIL" in told)
+    assert "a mission driven again | same log | same log | PASS" in told
     rows = [json.loads(item) for item in output.read_text().splitlines()]
     assert [item["seed"] for item in rows] == [0, 1]
     for item in rows:
@@ -157,3 +209,11 @@ def test_the_quickstart_is_driven_and_written(
         for robot in item["robots"]:
             assert abs(robot["measured_pct"]) < 4.0
             assert robot["parts_J"]["rolling"] > robot["parts_J"]["turning"] > 0.0
+    monkeypatch.setattr(
+        sys, "argv", ["bench", *arguments, "--seeds", "0-2", "--workers", "2"]
+    )
+    bench.script.main()
+    assert f"2 of 3 missions are in {output}" in capsys.readouterr().out
+    more = [json.loads(item) for item in output.read_text().splitlines()]
+    assert more[:2] == rows
+    assert [item["seed"] for item in more] == [0, 1, 2]

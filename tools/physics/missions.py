@@ -1,0 +1,279 @@
+"""Missions of scenes and seeds: planned, verified, driven, audited, and judged.
+
+A row is what one mission came to. Rows are kept in a file, if one is given, and are not
+made twice in the same state of the project.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import statistics
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import mrmg
+from mrmg.execution.controller import controller_maker
+from mrmg.planning import plan_mission
+from physics.figures import Figure, verdict
+from physics.protocol import state
+
+Row = dict[str, Any]
+Job = tuple[str, int]
+"""Scene and seed."""
+
+MEDIAN_PCT = {"metered_pct": 1.0, "measured_pct": 2.0}
+WORST_PCT = {"metered_pct": 2.0, "measured_pct": 4.0}
+TRACKING_M = {"rms_m": 0.03, "max_m": 0.15}
+CONTROLLER_MS = {"median": 1.0, "p99": 5.0}
+REALTIME = {2: 40.0, 8: 12.0}
+"""Least speed of the simulation by the largest fleet it is asked of."""
+
+HEAD = (
+    "scene", "robots", "feasible", "metered % median", "worst", "measured % median",
+    "worst", "rms m worst", "max m worst", "x real (processor)", "(clock)",
+    "control ms median", "p99 worst", "",
+)  # fmt: skip
+
+
+def mission(job: Job) -> Row:
+    """Return what came of one mission."""
+    source, seed = job
+    scene = mrmg.load_scene(source)
+    _warm(source)
+    row: Row = {"scene": source, "seed": seed, "fleet": len(scene.robots)}
+    result = plan_mission(scene, seed=seed)
+    if result.plan is None:
+        return row | {"feasible": False, "reasons": [result.reason], "robots": []}
+    verified = mrmg.verify(scene, result.plan).ok
+    began = time.process_time()
+    log = mrmg.execute(scene, result.plan)
+    processor_s = time.process_time() - began
+    account = mrmg.audit(scene, result.plan, log)
+    return row | {
+        "feasible": verified and account.mission_ok,
+        "reasons": list(account.reasons),
+        "robots": [
+            {
+                "robot": robot.robot,
+                "planned_J": robot.planned_J,
+                "metered_pct": robot.metered_error_pct,
+                "measured_pct": robot.measured_error_pct,
+                "rms_m": robot.tracking_rms_m,
+                "max_m": robot.tracking_max_m,
+                "parts_J": {
+                    part: account.planned.total_J(robot=robot.robot, part=part)
+                    for part in ("rolling", "turning")
+                },
+            }
+            for robot in account.robots
+        ],
+        "realtime": float(log.time_s[-1]) / processor_s,
+        "realtime_clock": log.timing["realtime_factor"],
+        "controller_ms": log.timing["controller_ms"],
+        "log_digest": log.digest,
+    }
+
+
+@cache
+def _warm(source: str) -> None:
+    """Set the controllers of a scene's robots up, once a process."""
+    for robot in mrmg.load_scene(source).robots:
+        controller_maker("mpc")(robot.model)
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """Rows that were made before, in a file of JSON lines.
+
+    Attributes:
+        rows: of the present state of the project.
+        path: where new ones go; None to keep none.
+    """
+
+    rows: dict[Job, Row]
+    path: Path | None
+
+    @staticmethod
+    def of(path: Path | None) -> Kept:
+        """Read a file, and drop from it what is of another state or broken."""
+        rows: dict[Job, Row] = {}
+        if path is not None and path.exists():
+            for line in path.read_text().splitlines():
+                try:
+                    row = json.loads(line)
+                    if row.pop("state") == state():
+                        rows[row["scene"], row["seed"]] = row
+                except (ValueError, KeyError):
+                    continue
+        kept = Kept(rows, path)
+        if path is not None:
+            path.write_text("".join(map(_line, rows.values())))
+        return kept
+
+    def add(self, row: Row) -> Row:
+        """Keep and return a new row."""
+        if self.path is not None:
+            with self.path.open("a") as file:
+                file.write(_line(row))
+        return row
+
+
+def _line(row: Row) -> str:
+    return json.dumps({**row, "state": state()}, sort_keys=True) + "\n"
+
+
+def mission_figures(
+    scenes: Sequence[str], seeds: range, output: Path | None, workers: int
+) -> list[Figure]:
+    """Drive what is missing, print a row per scene, and return what all came to."""
+    kept = Kept.of(output)
+    jobs = [(scene, seed) for scene in scenes for seed in seeds]
+    missing = [job for job in jobs if job not in kept.rows]
+    if len(missing) < len(jobs):
+        print(f"\n{len(jobs) - len(missing)} of {len(jobs)} missions are in {output}")
+    print("\n" + " | ".join(HEAD))
+    made = _made(missing, workers)
+    rows: list[Row] = []
+    for scene in scenes:
+        own = [
+            kept.rows[scene, seed]
+            if (scene, seed) in kept.rows
+            else kept.add(next(made))
+            for seed in seeds
+        ]
+        rows += own
+        print(" | ".join([*cells(scene, own), verdict(faults_of(own))]), flush=True)
+    return [*figures_of(rows), _repeated(rows)]
+
+
+def _made(jobs: Sequence[Job], workers: int) -> Iterator[Row]:
+    """Yield the rows of jobs in their order."""
+    if workers == 1:
+        yield from map(mission, jobs)
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+        yield from pool.map(mission, jobs)
+
+
+def _repeated(rows: Sequence[Row]) -> Figure:
+    """Drive the first mission that was driven once more, here."""
+    first = next((row for row in rows if row["robots"]), None)
+    same = first is not None and (
+        mission((first["scene"], first["seed"]))["log_digest"] == first["log_digest"]
+    )
+    told = "same log" if same else "another log"
+    return Figure("a mission driven again", told, "same log", same)
+
+
+def figures_of(rows: Sequence[Row]) -> list[Figure]:
+    """Return the figures that all missions together came to."""
+    driven = [row for row in rows if row["robots"]]
+    feasible = sum(row["feasible"] for row in rows)
+    figures = [Figure.count("feasible missions", feasible, len(rows), len(rows))]
+    if not driven:
+        return figures
+    names = sorted({row["scene"] for row in driven})
+    by_scene = [[row for row in driven if row["scene"] == name] for name in names]
+    for key, bound in MEDIAN_PCT.items():
+        found = max(statistics.median(of_robots(own, key)) for own in by_scene)
+        worst = max(of_robots(driven, key))
+        what = f"{key.removesuffix('_pct')} against planned energy"
+        figures += [
+            Figure.at_most(f"{what}, median of the worst scene", found, bound, " %"),
+            Figure.at_most(f"{what}, worst robot", worst, WORST_PCT[key], " %"),
+        ]
+    for key, bound in TRACKING_M.items():
+        what = f"tracking {key.removesuffix('_m')}, worst robot"
+        figures.append(Figure.at_most(what, max(of_robots(driven, key)), bound, " m"))
+    for fleet, least in REALTIME.items():
+        speeds = [
+            typical(own, lambda row: row["realtime"])
+            for own in by_scene
+            if own[0]["fleet"] == fleet
+        ]
+        if speeds:
+            what = f"x real time with {fleet} robots, slowest scene"
+            figures.append(Figure.at_least(what, min(speeds), least))
+    for key, bound in CONTROLLER_MS.items():
+        slowest = max(_controller_ms(own, key) for own in by_scene)
+        what = f"controller {key} a step and robot, slowest scene"
+        figures.append(Figure.at_most(what, slowest, bound, " ms"))
+    return figures
+
+
+def _controller_ms(rows: Sequence[Row], key: str) -> float:
+    return statistics.median(row["controller_ms"][key] for row in rows)
+
+
+def faults_of(rows: Sequence[Row]) -> list[str]:
+    """Return the figures that the missions of one scene miss, each in a few words."""
+    faults = [f"seed {row['seed']} infeasible" for row in rows if not row["feasible"]]
+    driven = [row for row in rows if row["robots"]]
+    if not driven:
+        return faults
+    checks: list[tuple[str, float, float]] = [
+        (f"median {key}", statistics.median(of_robots(driven, key)), bound)
+        for key, bound in MEDIAN_PCT.items()
+    ]
+    checks += [
+        (f"worst {key}", max(of_robots(driven, key)), bound)
+        for key, bound in (WORST_PCT | TRACKING_M).items()
+    ]
+    checks += [
+        (f"controller {key} ms", _controller_ms(driven, key), bound)
+        for key, bound in CONTROLLER_MS.items()
+    ]
+    faults += [
+        f"{name} {value:.3g} > {bound:g}"
+        for name, value, bound in checks
+        if value > bound
+    ]
+    realtime = typical(driven, lambda row: row["realtime"])
+    least = slowest_allowed(rows)
+    if realtime < least:
+        faults.append(f"{realtime:.0f} x real time < {least:g}")
+    return faults
+
+
+def slowest_allowed(rows: Sequence[Row]) -> float:
+    """Return the least speed of simulation asked of a fleet of this size."""
+    return next(
+        (least for size, least in REALTIME.items() if rows[0]["fleet"] <= size), 0.0
+    )
+
+
+def of_robots(rows: Iterable[Row], key: str) -> list[float]:
+    """Return the sizes of one figure of all robots of all missions."""
+    return [abs(robot[key]) for row in rows for robot in row["robots"]]
+
+
+def typical(rows: Sequence[Row], figure: Callable[[Row], float]) -> float:
+    """Return the median over missions."""
+    return statistics.median(figure(row) for row in rows)
+
+
+def cells(scene: str, rows: Sequence[Row]) -> list[str]:
+    """Return a scene's row of the table."""
+    feasible = f"{sum(row['feasible'] for row in rows)}/{len(rows)}"
+    start = [scene, str(rows[0]["fleet"]), feasible]
+    driven = [row for row in rows if row["robots"]]
+    if not driven:
+        return start
+    for key in MEDIAN_PCT:
+        sizes = of_robots(driven, key)
+        start += [f"{statistics.median(sizes):.2f}", f"{max(sizes):.2f}"]
+    start += [f"{max(of_robots(driven, key)):.4f}" for key in TRACKING_M]
+    return [
+        *start,
+        f"{typical(driven, lambda row: row['realtime']):.0f}",
+        f"{typical(driven, lambda row: row['realtime_clock']):.0f}",
+        f"{typical(driven, lambda row: row['controller_ms']['median']):.2f}",
+        f"{max(row['controller_ms']['p99'] for row in driven):.2f}",
+    ]
