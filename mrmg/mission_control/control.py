@@ -10,7 +10,7 @@ beyond a fixed pause, so that a run is a function of its arguments.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -29,11 +29,13 @@ from mrmg.mission_control.meter import RobotMeter
 from mrmg.mission_control.parameters import ControlParams
 from mrmg.mission_control.remaining import FleetCondition, is_over, remaining_scene
 from mrmg.mission_control.replanning import Replan, Replanner
+from mrmg.mission_control.stays import (
+    VISITED_DEPTH_M,
+    StayUnderWay,
+    stays_under_way,
+)
 from mrmg.scene.types import Goal, Scene
 from mrmg.visiting import first_stay
-
-_VISITED_DEPTH_M = 0.05
-"""How deep in a goal a robot must have been seen, as places are seen with noise."""
 
 _STUCK_M = 1.0
 """Way between two hold-ups below which a robot counts as stuck."""
@@ -246,6 +248,9 @@ class MissionControl:
             true = off_m > self._params.tracked_m or gone
             x, y, yaw = (now.state[index] if true else item.state[-1])[:3]
             poses[item.robot] = (float(x), float(y), float(yaw))
+        visited = frozenset(
+            goal.id for goal in self._scene.goals if self._is_visited(goal)
+        )
         return FleetCondition(
             pose=poses,
             energy_J={name: meter.charge_J for name, meter in self._meters.items()},
@@ -254,18 +259,34 @@ class MissionControl:
             },
             out_of_service=frozenset(self._out_of_service),
             time_s=now.time_s,
-            visited=frozenset(
-                goal.id for goal in self._scene.goals if self._is_visited(goal)
-            ),
+            visited=visited,
+            stays=self._stays(visited),
         )
+
+    def _stays(self, visited: Set[str]) -> dict[str, StayUnderWay]:
+        """Return the stays of robots in service at goals that miss their visit."""
+        goals = [
+            goal
+            for goal in self._scene.goals
+            if goal.dwell_s > 0.0 and goal.id not in visited
+        ]
+        ways = self._ways()
+        for name in self._out_of_service:
+            del ways[name]
+        return stays_under_way(goals, np.array(self._seen.time_s), ways)
+
+    def _ways(self) -> dict[str, np.ndarray]:
+        """Return where each robot was seen so far, shape (n, 2) each."""
+        ways = np.stack(self._seen.state, axis=1)[..., :2]
+        return dict(zip(self._robots, ways, strict=True))
 
     def _is_visited(self, goal: Goal) -> bool:
         """Tell whether some robot has been deep inside a goal, for long enough."""
-        time_s, ways = np.array(self._seen.time_s), np.stack(self._seen.state, axis=1)
+        time_s = np.array(self._seen.time_s)
         return any(
-            (goal.region.depth(way[:, :2]) >= _VISITED_DEPTH_M).any()
-            and first_stay(goal, time_s, way[:, :2], 0) is not None
-            for way in ways
+            (goal.region.depth(way) >= VISITED_DEPTH_M).any()
+            and first_stay(goal, time_s, way, 0) is not None
+            for way in self._ways().values()
         )
 
     def _entered(self) -> dict[str, tuple[str, ...]]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from mrmg.mission_control.stays import StayUnderWay
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Battery, Finish, Robot, Scene
 
@@ -30,6 +31,7 @@ class FleetCondition:
             model's.
         out_of_service: ids of robots that will not move any more.
         visited: ids of goals that need no more visit.
+        stays: stays under way at goals without one, by their ids.
         time_s: how much of the mission's time is over.
     """
 
@@ -38,6 +40,7 @@ class FleetCondition:
     rolling_factor: Mapping[str, float]
     out_of_service: frozenset[str] = frozenset()
     visited: frozenset[str] = frozenset()
+    stays: Mapping[str, StayUnderWay] = field(default_factory=dict)
     time_s: float = 0.0
 
 
@@ -67,7 +70,9 @@ def remaining_scene(
     document = copy.deepcopy(scene.document)
     gone = condition.out_of_service
     document["goals"] = [
-        goal for goal in document["goals"] if goal["id"] not in condition.visited
+        _still_to_stay(goal, condition.stays.get(goal["id"]))
+        for goal in document["goals"]
+        if goal["id"] not in condition.visited
     ]
     document["obstacles"] = [
         *_obstacles_for_others(document["obstacles"], gone),
@@ -86,6 +91,13 @@ def remaining_scene(
     if timely and left_s > 0.0:
         document["time_limit"] = left_s
     return scene_from_document(document, source=f"rest of {scene.name}")
+
+
+def _still_to_stay(goal: dict[str, Any], stay: StayUnderWay | None) -> dict[str, Any]:
+    """Return a goal's entry with what is left of its dwell time."""
+    if stay is None or not goal.get("dwell"):
+        return goal
+    return {**goal, "dwell": max(goal["dwell"] - stay.stayed_s, 0.0)}
 
 
 def _obstacles_for_others(

@@ -18,6 +18,7 @@ from mrmg.mission_control.remaining import (
     is_over,
     remaining_scene,
 )
+from mrmg.mission_control.stays import StayUnderWay, keeps_stays
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.feasibility import impossible_goals
 from mrmg.results.verify import verify
@@ -123,28 +124,35 @@ class Replanner:
         if is_over(last):
             return Replan()
         limited = math.isfinite(self.scene.time_limit_s)
+        # Stays under way are brought to their end, or else begun anew.
         tries = [
-            (share, timely)
+            (share, timely, stays)
             for timely in ((True, False) if limited else (True,))
             for share in shares
+            for stays in ((left.stays, {}) if left.stays else ({},))
         ]
-        for share, timely in tries:
-            rest = remaining_scene(self.scene, left, reserve_share=share, timely=timely)
-            plan = self._plan(rest, number, draws)
+        for share, timely, stays in tries:
+            held = replace(left, stays=stays)
+            rest = remaining_scene(self.scene, held, reserve_share=share, timely=timely)
+            plan = self._plan(rest, number, draws, stays)
             if plan is not None:
                 return Replan(scene=rest, plan=plan, reserve_share=share)
-            first = (share, timely) == tries[0]
+            first = (share, timely, stays) == tries[0]
             impossible = impossible_goals(last) if first else {}
             if impossible:
                 return Replan(scene=last, given_up=impossible)
         return Replan(scene=last)
 
-    def _plan(self, rest: Scene, number: int, draws: int) -> Plan | None:
-        """Return a plan that the verifier accepts, or None."""
+    def _plan(
+        self, rest: Scene, number: int, draws: int, stays: Mapping[str, StayUnderWay]
+    ) -> Plan | None:
+        """Return a plan that the verifier accepts and that keeps stays, or None."""
         for draw in range(draws):
             seed = seeding.stream_seed(self.seed, "replan", number, draw)
             plan = plan_mission(rest, seed=seed, params=self.planner).plan
-            if plan is not None and verify(rest, plan).ok:
+            if plan is None or not keeps_stays(plan, stays):
+                continue
+            if verify(rest, plan).ok:
                 return plan
         return None
 
