@@ -15,6 +15,7 @@ from mrmg.planning.attempt import Attempt, attempt_plan
 from mrmg.planning.bound import lower_bound_J
 from mrmg.planning.feasibility import proof_of_infeasibility
 from mrmg.planning.frame import Frame, on_the_map
+from mrmg.planning.haste import priced_world, with_energies
 from mrmg.planning.makespan_bound import makespan_bound_s
 from mrmg.planning.motion_tree import Problem, state_problem
 from mrmg.planning.parameters import PlannerParams
@@ -152,11 +153,12 @@ def compile_kernels() -> None:
 def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
     """Build the roadmap, denser while it does not join all goals, and the problem."""
     world = World.from_scene(scene)
+    priced = priced_world(scene, world)
     samples = params.samples
     for attempt in range(ROADMAPS):
         roadmap = build_roadmap(
             scene,
-            world,
+            priced,
             samples=samples,
             neighbours=params.neighbours,
             margin_m=params.obstacle_margin_m,
@@ -165,6 +167,8 @@ def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
         if not unjoined_goals(scene, roadmap):
             break
         samples *= 3
+    if priced is not world:
+        roadmap = with_energies(roadmap, scene, world, params.obstacle_margin_m)
     return state_problem(scene, world, roadmap, params)
 
 

@@ -33,7 +33,7 @@ from mrmg.planning.band import (
     visit_steps,
     wary,
 )
-from mrmg.planning.haste import energy_shares
+from mrmg.planning.haste import energy_share
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.roadmap import planned_regions
@@ -182,7 +182,8 @@ def surfaces_of(problem: Problem) -> list[Surface]:
     """Return what each robot's paths are priced on."""
     smooth = smooth_terrain(problem.mission.terrain.multiplier)
     surfaces = []
-    for r, share in enumerate(energy_shares(problem)):
+    for r, robot in enumerate(problem.scene.robots):
+        share = energy_share(problem.scene.objective, robot)
         surface = surface_of(problem, r, smooth)
         if share < 1.0:
             worth = share * surface.multiplier + (1.0 - share)

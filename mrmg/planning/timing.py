@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.energy import CONSUMERS_W
+from mrmg.planning.haste import way_lengths_m
 from mrmg.planning.preference import Preference
 from mrmg.planning.roadmap import Roadmap
 from mrmg.planning.targets import finish_of
@@ -77,24 +78,3 @@ def routing_times(
         energy_weight=objective.energy_weight / size,
         makespan_weight=objective.makespan_weight / size,
     )
-
-
-def way_lengths_m(roadmap: Roadmap) -> np.ndarray:
-    """Return the length of the roadmap's way from each vertex to each target [m].
-
-    Ways are those of least energy, so that their costs are not their lengths. From a
-    vertex that has no way of its own the length is inf. Shape (F, T, V).
-    """
-    vertex = roadmap.arrays.vertex
-    after = roadmap.arrays.successor
-    here = np.broadcast_to(np.arange(len(vertex)), after.shape)
-    jump = np.where(after < 0, here, after).astype(np.int64)
-    length = np.hypot(*(vertex[jump] - vertex[here]).transpose(3, 0, 1, 2))
-    # Each round joins every piece of way to the equally long one that follows it.
-    while True:
-        further = np.take_along_axis(jump, jump, axis=2)
-        if (further == jump).all():
-            break
-        length = length + np.take_along_axis(length, jump, axis=2)
-        jump = further
-    return np.where(np.isfinite(roadmap.arrays.cost_to_go), length, np.inf)

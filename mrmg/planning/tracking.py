@@ -228,4 +228,4 @@ def _decelerations(problem: Problem) -> np.ndarray:
     hardest = fleet["limit"][:, 3]
     braking = HARD_SHARE * hardest
     eased = np.clip(rolling, 0.1 * hardest, braking)
-    return np.where(brakes_hard(problem), braking, eased)
+    return np.where(brakes_hard(problem.scene, problem.hurried), braking, eased)
