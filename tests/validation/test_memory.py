@@ -1,0 +1,25 @@
+"""The memory that planning takes, as a whole process with all it imports."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+MOST_MB = 500.0
+
+PEAK = """
+import resource
+
+import mrmg
+from mrmg.planning import plan_mission
+
+assert plan_mission(mrmg.load_scene("scene6_r8"), with_bound=True).plan
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
+"""
+
+
+def test_planning_for_eight_robots_and_bounding_keeps_to_half_a_gigabyte() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", PEAK], capture_output=True, text=True, check=True
+    )
+    assert 50.0 < float(done.stdout) < MOST_MB
