@@ -126,13 +126,13 @@ class Ground:
 
     def distances(self, sources: Sequence[int]) -> np.ndarray:
         """Return costs from `sources` to all points [m], shape (n, rows * columns)."""
-        return np.asarray(dijkstra(self.roads, directed=False, indices=list(sources)))
+        return np.asarray(dijkstra(self.roads, indices=list(sources)))
 
     def road_to_nearest(self, targets: np.ndarray) -> np.ndarray:
         """Return the cost from every point to the nearest of `targets` [m]."""
         if not len(targets):
             return np.full(len(self.points_m), np.inf)
-        cost = dijkstra(self.roads, directed=False, indices=targets, min_only=True)
+        cost = dijkstra(self.roads, indices=targets, min_only=True)
         return np.asarray(cost)
 
     def clearance_at(self, points: np.ndarray) -> np.ndarray:
