@@ -215,6 +215,8 @@ def drive(fleet, spaces, gates, courses, given, start, order, dt, control, halt)
                     return n, r
                 if left < ARRIVED_M:
                     v = 0.0
+                    if fleet[r].model == UNICYCLE:
+                        w = 0.0
                     if stands(fleet, r, state):
                         still[r] = 0
                         done[r] = courses.end[r, i] + 1 >= courses.nodes[r]

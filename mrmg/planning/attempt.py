@@ -11,7 +11,7 @@ import numpy as np
 from mrmg import seeding
 from mrmg.mission import Plan
 from mrmg.planning.assembly import make_plan
-from mrmg.planning.drafting import draft, draftable
+from mrmg.planning.drafting import draftable, drafts
 from mrmg.planning.motion_tree import Problem, grow_tree
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.refine import refine
@@ -47,28 +47,36 @@ class Attempt:
 def attempt_plan(
     problem: Problem, seed: int, params: PlannerParams, number: int, halt: np.ndarray
 ) -> Attempt:
-    """Draw tours and grow a tree along them; a function of seed and number alone.
+    """Draw tours and find a plan along them; a function of seed and number alone.
 
-    All attempts but the first try to do without a tree (`drafting`), along tours for
-    energies that differ by chance: those of the roadmap are not quite what driving
-    takes.
-
-    The surcharge on the roadmap's energies changes from draw to draw: batteries may
-    leave no room for it, or driving may take more than it allows for.
+    Tours are drafted first (`drafting`); where that is not possible or fails, a tree
+    grows along tours of its own.
 
     Args:
         problem: the mission.
         seed: of the whole search.
         params: parameters.
         number: of the attempt; each has its own random streams.
-        halt: shape (1,); growing ends soon after it has turned true.
+        halt: shape (1,); the attempt ends soon after it has turned true.
+    """
+    drafted = Attempt()
+    if params.drafts and draftable(problem):
+        drafted = draft_plans(problem, seed, params, number, halt)
+        if drafted.plans or halt[0]:
+            return drafted
+    tree = tree_plans(problem, seed, params, number, halt)
+    return replace(tree, routing_s=drafted.routing_s + tree.routing_s)
+
+
+def tree_plans(
+    problem: Problem, seed: int, params: PlannerParams, number: int, halt: np.ndarray
+) -> Attempt:
+    """Grow a tree along tours, and refine its plan.
+
+    The surcharge on the roadmap's energies changes from draw to draw: batteries may
+    leave no room for it, or driving may take more than it allows for.
     """
     began = time.perf_counter()
-    if params.drafts and number > 0 and draftable(problem):
-        plan, routing_s = _drafted(problem, seed, params, number, halt)
-        if plan is not None or halt[0]:
-            plans = [] if plan is None else [(time.perf_counter(), plan)]
-            return Attempt(plans, routing_s)
     margin = MARGINS[number % len(MARGINS)] * params.route_margin
     problem = problem.with_margin(margin)
     draw = seeding.stream_seed(seed, "tours", number)
@@ -94,10 +102,14 @@ def attempt_plan(
     return Attempt(plans, routing_s, growth.counts)
 
 
-def _drafted(
+def draft_plans(
     problem: Problem, seed: int, params: PlannerParams, number: int, halt: np.ndarray
-) -> tuple[Plan | None, float]:
-    """Return the plan driven straight along tours, if any, and the time they took."""
+) -> Attempt:
+    """Drive straight along tours for energies that differ by chance.
+
+    Those of the roadmap are not quite what driving takes, so that other tours may turn
+    out to be cheaper.
+    """
     began = time.perf_counter()
     problem = problem.with_margin(0.0)
     draw = seeding.stream_seed(seed, "draft", number)
@@ -110,12 +122,14 @@ def _drafted(
     tours = route(routing, params.router, draw)
     routing_s = time.perf_counter() - began
     if not tours.feasible or halt[0]:
-        return None, routing_s
-    plan = draft(problem, params, tours, seed, halt)
-    if plan is not None and problem.preference.late_s(plan):
-        hurried = replace(problem, hurried=True)
-        sooner = draft(hurried, params, tours, seed, halt)
-        plan = (
-            plan if sooner is None else min(plan, sooner, key=problem.preference.rank)
-        )
-    return plan, routing_s
+        return Attempt(routing_s=routing_s)
+    plans: list[tuple[float, Plan]] = []
+    preference = problem.preference
+    for hurried in (False, True):
+        if hurried and not (plans and preference.late_s(plans[-1][1])):
+            break
+        pressed = replace(problem, hurried=hurried)
+        for plan in drafts(pressed, params, tours, seed, halt):
+            if not plans or preference.rank(plan) < preference.rank(plans[-1][1]):
+                plans.append((time.perf_counter(), plan))
+    return Attempt(plans, routing_s)

@@ -49,6 +49,10 @@ WARY_M = 4.0
 WARINESS_M = 0.06
 """... and how much farther, at the place."""
 
+SPARE_M = 0.06
+"""Room beyond the margin that a path leaves for what tracking may be off: it costs next
+to nothing, and robots seldom get stuck."""
+
 CURVATURE_SHARE = 0.92
 """Share of the steering that a path uses."""
 
@@ -284,7 +288,7 @@ def surface_of(problem: Problem, r: int, smooth: np.ndarray) -> Surface:
         distance=spaces.distance[robot["space"]],
         multiplier=smooth,
         disc=low[0] + length * (np.arange(pieces) + 0.5),
-        room=float(np.hypot(0.5 * length, half) + robot["margin"]),
+        room=float(np.hypot(0.5 * length, half) + robot["margin"] + SPARE_M),
         curvature=float(CURVATURE_SHARE * curvature),
         curvature_rate=float(CURVATURE_SHARE * rate),
         scrub=arm * energy.turning_force_N / max(energy.rolling_force_N, 1e-9),

@@ -8,7 +8,7 @@ it does not, a tree has to find the way.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from math import cos, radians, sin
 
@@ -45,14 +45,16 @@ def draftable(problem: Problem) -> bool:
     return bool(known.all() and not turned.any()) and not stays_somewhere(problem)
 
 
-def draft(
+def drafts(
     problem: Problem,
     params: PlannerParams,
     routing: Routing,
     seed: int,
     halt: np.ndarray,
-) -> Plan | None:
-    """Return a plan along tours, or None if driving them straight away fails.
+) -> Iterator[Plan]:
+    """Yield plans along tours, in the order found; none if driving them fails.
+
+    The first one is driven without regard to braking.
 
     Args:
         problem: the mission.
@@ -66,15 +68,15 @@ def draft(
     for r, surface in enumerate(surfaces_of(problem)):
         tour = [*routing.tours[r], *([int(finish[r])] if finish[r] >= 0 else [])]
         errands.append(Errand(tour, tour_path(problem, r, tour), surface))
-    trajectories = run_errands(problem, params, errands, halt)
-    if not trajectories:
-        return None
     names = [target.id for target in problem.scene.targets()]
     tours = {
         robot.id: tuple(names[t] for t in tour)
         for robot, tour in zip(problem.scene.robots, routing.tours, strict=True)
     }
-    return make_plan(problem, seed, params, trajectories, tours)
+    for trajectories in run_errands(problem, params, errands, halt):
+        plan = make_plan(problem, seed, params, trajectories, tours)
+        if plan is not None:
+            yield plan
 
 
 def tour_path(problem: Problem, r: int, tour: Sequence[int]) -> Path:

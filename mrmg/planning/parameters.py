@@ -29,7 +29,7 @@ class PlannerParams:
         trees: trees grown at most; a tree that fails is followed by one with new draws.
         improvements: further trees grown after the first plan; the cheapest plan
             counts.
-        drafts: after the first tree, drive along tours without one where that succeeds.
+        drafts: drive along tours without a tree where that succeeds.
         refinements: times that the plan of each tree is drawn tight and driven again,
             as long as that saves energy.
         group_alpha, group_beta, group_lambda: alpha, beta, lambda of eq. (5).

@@ -11,7 +11,7 @@ import numpy as np
 from mrmg import seeding
 from mrmg.errors import Fault, SceneError, UsageError
 from mrmg.mission import PlanResult, PlanStatus
-from mrmg.planning.attempt import Attempt, attempt_plan
+from mrmg.planning.attempt import Attempt, attempt_plan, draft_plans, tree_plans
 from mrmg.planning.bound import lower_bound_J
 from mrmg.planning.feasibility import proof_of_infeasibility
 from mrmg.planning.frame import Frame, on_the_map
@@ -142,10 +142,10 @@ def compile_kernels() -> None:
         "robots": [{"id": "r", "model": "car", "pose": [5, 5, 0]}],
     }
     scene = scene_from_document(document, source="smallest mission")
-    attempt = attempt_plan(
-        state_mission(scene, 0, params), 0, params, 0, np.zeros(1, np.bool_)
-    )
-    assert attempt.plans, "the smallest mission has a plan, or not all is compiled"
+    problem = state_mission(scene, 0, params)
+    for find in (tree_plans, draft_plans):
+        found = find(problem, 0, params, 0, np.zeros(1, np.bool_))
+        assert found.plans, "the smallest mission has a plan, or not all is compiled"
     lower_bound_J(scene)
     makespan_bound_s(scene)
 

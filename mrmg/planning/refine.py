@@ -13,7 +13,7 @@ keeps every battery above its reserve, and is better by the scene's objective.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -121,14 +121,13 @@ def refine(
         repeated = len(trajectory.control) if kept[r] else 0
         path = path_of(tour, visits, trajectory, repeated)
         errands.append(Errand(tour, path, surfaces[r], (trajectory, visits), repeated))
-    trajectories = run_errands(problem, params, errands, halt)
-    if not trajectories:
-        return plan
-    found = make_plan(problem, plan.seed, params, trajectories, plan.tours)
+    best = plan
     rank = problem.preference.rank
-    if found is None or rank(found) >= rank(plan):
-        return plan
-    return found
+    for trajectories in run_errands(problem, params, errands, halt):
+        found = make_plan(problem, plan.seed, params, trajectories, plan.tours)
+        if found is not None and rank(found) < rank(best):
+            best = found
+    return best
 
 
 def run_errands(
@@ -136,16 +135,15 @@ def run_errands(
     params: PlannerParams,
     errands: Sequence[Errand],
     halt: np.ndarray,
-) -> tuple[Trajectory, ...]:
+) -> Iterator[tuple[Trajectory, ...]]:
     """Draw paths tight and drive along them until nothing goes wrong any more.
 
-    Returns:
-        The trajectories of all robots, which visit all targets; empty if it came to
-        nothing or was halted.
+    Yields:
+        The trajectories of all robots whenever they visit all targets: the first time,
+        and after robots have been slowed down.
     """
     for errand in errands:
         errand.tighten(problem, SPACINGS_M)
-    found: tuple[Trajectory, ...] = ()
     slower = 0
     for _ in range(TRIES):
         outcome = redriven(
@@ -157,10 +155,10 @@ def run_errands(
             halt,
         )
         if halt[0]:
-            return ()
+            return
         if outcome.stuck >= 0:
             if not _put_right(problem, errands[outcome.stuck], outcome.place):
-                break
+                return
             continue
         missed = [
             _led_deeper(problem, errand, trajectory)
@@ -171,11 +169,10 @@ def run_errands(
         if any(missed):
             continue
         if not _ends_well(problem, outcome):
-            break
-        found = outcome.trajectories
+            return
+        yield outcome.trajectories
         if not slowed:
-            break
-    return found
+            return
 
 
 def surfaces_of(problem: Problem) -> list[Surface]:

@@ -11,8 +11,7 @@ import pytest
 import mrmg
 from mrmg.mission import Plan
 from mrmg.planning import PlannerParams
-from mrmg.planning.drafting import draft, draftable, tour_path
-from mrmg.planning.motion_tree import Problem
+from mrmg.planning.drafting import draftable, drafts, tour_path
 from mrmg.planning.planner import state_mission
 from mrmg.planning.routers import route
 from mrmg.scene.types import Scene
@@ -20,21 +19,20 @@ from mrmg.scene.types import Scene
 PARAMS = PlannerParams(samples=600)
 
 
-def drafted(scene: Scene) -> tuple[Problem, Plan | None]:
+def drafted(scene: Scene) -> list[Plan]:
     problem = state_mission(scene, 0, PARAMS)
     tours = route(problem.mission.routing, PARAMS.router, 0)
-    return problem, draft(problem, PARAMS, tours, 0, np.zeros(1, np.bool_))
+    return list(drafts(problem, PARAMS, tours, 0, np.zeros(1, np.bool_)))
 
 
-@pytest.mark.parametrize("name", ["quickstart", "scene2"])
-def test_a_draft_is_a_valid_plan_and_the_same_again(name: str) -> None:
+@pytest.mark.parametrize("name", ["quickstart", "scene2", "diffdrive"])
+def test_drafts_are_valid_plans_and_the_same_again(name: str) -> None:
     scene = mrmg.load_scene(name)
-    _, plan = drafted(scene)
-    assert plan is not None
-    assert mrmg.verify(scene, plan).violations == ()
-    _, again = drafted(scene)
-    assert again is not None
-    assert again.digest == plan.digest
+    plans = drafted(scene)
+    assert plans
+    for plan in plans:
+        assert mrmg.verify(scene, plan).violations == ()
+    assert [plan.digest for plan in drafted(scene)] == [plan.digest for plan in plans]
 
 
 def test_a_car_backs_out_of_a_target_that_lies_at_a_sharp_turn(
@@ -54,7 +52,8 @@ def test_a_car_backs_out_of_a_target_that_lies_at_a_sharp_turn(
 def test_halted_it_gives_nothing(yard: Callable[..., Scene]) -> None:
     problem = state_mission(yard(), 0, PARAMS)
     tours = route(problem.mission.routing, PARAMS.router, 0)
-    assert draft(problem, PARAMS, tours, 0, np.ones(1, np.bool_)) is None
+    halted = np.ones(1, np.bool_)
+    assert not list(drafts(problem, PARAMS, tours, 0, halted))
 
 
 def test_ends_with_a_heading_are_not_drafted(yard: Callable[..., Scene]) -> None:

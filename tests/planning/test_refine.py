@@ -21,7 +21,7 @@ from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 
 SCENES = Path(__file__).parents[1] / "scenes"
-RAW = PlannerParams(improvements=0, refinements=0, samples=600)
+RAW = PlannerParams(improvements=0, refinements=0, samples=600, drafts=False)
 NEVER = np.zeros(1, np.bool_)
 
 MISSIONS = (
