@@ -5,7 +5,8 @@ timed, so that kernels are compiled and caches warm. Times are wall-clock, of pl
 in process. The runs of one call are comparable with each other; figures of different
 machines are not.
 
-With --bound, costs are compared with a proven lower bound: that of the first plan, and
+With --bound, costs (the scene's objective: energy, unless it says else) are compared
+with a proven lower bound: that of the first plan, and
 with --budget S those of the best plans after each of 5 s and 30 s that S reaches. The
 quality protocol is `tools/bench --bound --budget 30 --seeds 0-9`.
 
@@ -29,7 +30,8 @@ from typing import Any
 
 import mrmg
 from mrmg.planning import plan_mission, profile_params
-from mrmg.planning.bound import lower_bound_J
+from mrmg.planning.planner import bounds_of
+from mrmg.planning.statistics import UNKNOWN
 
 MOMENTS_S = (5.0, 30.0)
 """Times after which a budget's plans are compared with the bound."""
@@ -121,10 +123,11 @@ def missions(source: str, options: argparse.Namespace) -> Iterator[dict[str, Any
     # All profiles run the same kernels, and the default one is the quickest to warm.
     plan_mission(scene, seed=options.seeds.start)
     step_s = profile_params(options.profile[0]).dt_s
-    bound_J = lower_bound_J(scene, step_s=step_s) if options.bound else None
+    bounds = bounds_of(scene, step_s) if options.bound else UNKNOWN
+    bound = bounds.of(scene.objective)
     for seed in options.seeds:
         for profile in options.profile:
-            row = planned(source, scene, seed, profile, bound_J, options)
+            row = planned(source, scene, seed, profile, bound, options)
             if not row["ok"]:
                 print(f"FAILED {scene.name} seed {seed}: {row}", file=sys.stderr)
             yield row
@@ -135,7 +138,7 @@ def planned(
     scene: Any,
     seed: int,
     profile: str,
-    bound_J: float | None,
+    bound: float | None,
     options: argparse.Namespace,
 ) -> dict[str, Any]:
     """Plan, verify and, if asked to, drive a mission; return its row."""
@@ -162,13 +165,15 @@ def planned(
         "cost_J": result.plan.cost_J,
         "cost_m": result.plan.cost_J / metre,
         "makespan_s": result.plan.makespan_s,
+        "objective": scene.objective.name,
+        "value": scene.objective.value(result.plan.cost_J, result.plan.makespan_s),
         "violations": len(verdict.violations),
         "ok": verdict.ok,
     }
-    if bound_J is not None:
-        row |= {"bound_J": bound_J, "cost_to_bound": row["cost_J"] / bound_J}
+    if bound is not None:
+        row |= {"bound": bound, "cost_to_bound": row["value"] / bound}
         row["cost_to_bound_after"] = {
-            name: cost_after(result.statistics, time_s) / bound_J
+            name: value_after(result.statistics, time_s) / bound
             for name, time_s in moments(options).items()
         }
     if options.execute:
@@ -182,13 +187,15 @@ def moments(options: argparse.Namespace) -> dict[str, float | None]:
     return {"first": None, **{f"{time_s:g} s": time_s for time_s in reached}}
 
 
-def cost_after(statistics: Mapping[str, Any], time_s: float | None) -> float:
-    """Return the cost of the best plan by a time, or of the first one [J]."""
+def value_after(statistics: Mapping[str, Any], time_s: float | None) -> float:
+    """Return the objective of the best plan by a time, or of the first one."""
     found = statistics["improvements"]
-    costs = [
-        row["cost_J"] for row in found if time_s is not None and row["time_s"] <= time_s
+    values = [
+        row["objective"]["value"]
+        for row in found
+        if time_s is not None and row["time_s"] <= time_s
     ]
-    return float(min(costs, default=found[0]["cost_J"]))
+    return float(min(values, default=found[0]["objective"]["value"]))
 
 
 def driven(scene: Any, plan: Any, plan_ok: bool) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from mrmg.cli import terminal
 from mrmg.errors import ExitCode
 
 if TYPE_CHECKING:
+    from mrmg.scene.types import Scene
     from mrmg.steps import Run
 
 
@@ -22,7 +23,7 @@ def run(options: argparse.Namespace) -> int:
     terminal.announce_compilation()
     with terminal.progress() as told:
         result = pipeline.run(
-            options.scene,
+            _scene(options),
             seed=options.seed,
             out=options.out,
             budget_s=options.budget,
@@ -45,16 +46,27 @@ def run(options: argparse.Namespace) -> int:
     return result.exit_code
 
 
+def _scene(options: argparse.Namespace) -> Scene:
+    """Return the scene, with the wishes of the command line in place of its own."""
+    from mrmg.scene.loading import load_scene, scene_from_document
+
+    scene = load_scene(options.scene)
+    wishes = {"objective": options.objective, "time_limit": options.time_limit}
+    changes = {key: value for key, value in wishes.items() if value is not None}
+    if not changes:
+        return scene
+    return scene_from_document({**scene.document, **changes}, source=options.scene)
+
+
 def plan(options: argparse.Namespace) -> int:
     """Plan, and start a run folder."""
     from mrmg.pipeline import default_folder
     from mrmg.run_arguments import RunArguments
     from mrmg.run_folder import RunFolder, Step
-    from mrmg.scene.loading import load_scene
     from mrmg.steps import Run
 
     terminal.announce_compilation()
-    scene = load_scene(options.scene)
+    scene = _scene(options)
     folder = RunFolder(options.out or default_folder(scene, options.seed))
     arguments = RunArguments(
         seed=options.seed,

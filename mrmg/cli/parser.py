@@ -81,6 +81,19 @@ def _add_planning(verb: argparse.ArgumentParser) -> None:
     verb.add_argument(
         "--out", type=Path, metavar="DIR", help="run folder; default runs/SCENE-sN"
     )
+    verb.add_argument(
+        "--objective",
+        type=values.objective,
+        metavar="energy|makespan|E:M",
+        help="what is to be small, instead of what the scene says; E and M are the "
+        "weights of each J and each s",
+    )
+    verb.add_argument(
+        "--time-limit",
+        type=values.positive,
+        metavar="SECONDS",
+        help="by when all is done, instead of what the scene says",
+    )
     limit = verb.add_mutually_exclusive_group()
     limit.add_argument(
         "--budget",

@@ -49,6 +49,21 @@ def time(text: str) -> float:
     return 0.0 if text.strip() in {"0", "0.0"} else positive(text)
 
 
+def objective(text: str) -> str | dict[str, float]:
+    """Read an objective: a name, or weights of energy and makespan such as 1:50."""
+    if text in ("energy", "makespan"):
+        return text
+    try:
+        energy, makespan = (time(part) for part in text.split(":"))
+    except (ValueError, argparse.ArgumentTypeError):
+        energy = makespan = 0.0
+    if energy + makespan == 0.0:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is neither energy nor makespan nor two weights such as 1:50"
+        )
+    return {"energy": energy, "makespan": makespan}
+
+
 def size(text: str) -> tuple[int, int]:
     """Read a size in pixels such as 1280x720."""
     try:

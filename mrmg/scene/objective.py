@@ -35,11 +35,9 @@ class Objective:
 
     def value(self, energy_J: float, makespan_s: float) -> float:
         """Return the value of a plan, or of bounds of both, which bounds it."""
+        weighed = ((self.energy_weight, energy_J), (self.makespan_weight, makespan_s))
         # A product of zero and an infinite bound would be no number.
-        value = self.energy_weight * energy_J if self.energy_weight else 0.0
-        return value + (
-            self.makespan_weight * makespan_s if self.makespan_weight else 0.0
-        )
+        return sum(weight * figure for weight, figure in weighed if weight)
 
 
 ENERGY = Objective()

@@ -15,6 +15,8 @@ from mrmg import storage
 from mrmg.cli import main
 from mrmg.errors import ExitCode
 from mrmg.results.summary import summary_schema
+from mrmg.scene.loading import load_scene
+from mrmg.scene.objective import Objective
 
 
 def test_json_stands_alone_on_stdout(own_run: Path) -> None:
@@ -28,6 +30,28 @@ def test_json_stands_alone_on_stdout(own_run: Path) -> None:
     assert (ended.returncode, ended.stderr) == (ExitCode.OK, "")
     assert ended.stdout == (own_run / "summary.json").read_text()
     jsonschema.validate(json.loads(ended.stdout), summary_schema())
+
+
+def test_wishes_of_the_command_line_stand_in_the_run_s_scene(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = ["--out", str(tmp_path / "run")]
+    wishes = ["--objective", "1:50", "--time-limit", "300"]
+    assert main(["plan", "quickstart", *wishes, *out]) == ExitCode.OK
+    assert "blend" in capsys.readouterr().out
+    scene = load_scene(tmp_path / "run" / "scene.yaml")
+    assert scene.objective == Objective(energy_weight=1.0, makespan_weight=50.0)
+    assert scene.time_limit_s == 300.0
+    assert main(["report", str(tmp_path / "run")]) == ExitCode.OK
+    summary = storage.read_json(tmp_path / "run" / "summary.json")
+    jsonschema.validate(summary, summary_schema())
+    plan = summary["plan"]
+    assert plan["objective"]["name"] == "blend"
+    value = plan["cost_J"] + 50.0 * plan["makespan_s"]
+    assert plan["objective"]["value"] == pytest.approx(value)
+    bound = plan["bound_J"] + 50.0 * plan["bound_s"]
+    assert plan["objective"]["bound"] == pytest.approx(bound)
+    assert plan["gap"] == pytest.approx(value / bound - 1.0)
 
 
 def test_a_run_tells_its_outcome_and_where_the_report_is(

@@ -187,3 +187,16 @@ def test_a_mission_is_over_when_all_is_visited_and_all_are_home(
     assert not is_over(remaining_scene(scene, done))
     assert is_over(remaining_scene(scene, home))
     assert is_over(remaining_scene(scene, away))
+
+
+def test_what_is_left_of_the_time_limit_still_holds(
+    make_yard: Callable[..., Scene], condition: FleetCondition
+) -> None:
+    yard = make_yard(time_limit=100, objective="makespan")
+    later = replace(condition, time_s=40.0)
+    rest = remaining_scene(yard, later)
+    assert rest.time_limit_s == 60.0
+    assert rest.objective == yard.objective
+    assert remaining_scene(yard, later, timely=False).time_limit_s == np.inf
+    over = replace(condition, time_s=100.0)
+    assert remaining_scene(yard, over).time_limit_s == np.inf

@@ -13,7 +13,7 @@ import pytest
 from mrmg.errors import RunFolderError
 from mrmg.execution.log import Contact, ExecutionLog
 from mrmg.mission import Plan
-from mrmg.results.audit import audit
+from mrmg.results.audit import AT_REST, audit, over_s
 from mrmg.results.energy_audit import EnergyAudit
 from mrmg.scene.types import Scene
 
@@ -246,3 +246,36 @@ def test_unreadable_audit_names_the_cure(content: str, tmp_path: Path) -> None:
     (tmp_path / "audit.json").write_text(content)
     with pytest.raises(RunFolderError, match="mrmg audit"):
         EnergyAudit.load(tmp_path)
+
+
+def test_a_mission_is_late_from_when_the_last_robot_rests(mission: Any) -> None:
+    scene, plan, log = mission()
+    (moving,) = np.flatnonzero(np.diff(np.abs(log.state[0, :, 3]) > AT_REST) & True)[
+        -1:
+    ]
+    assert over_s(scene, log) == pytest.approx(log.time_s[moving + 1])
+    assert over_s(scene, log) < plan.makespan_s + 0.1
+    account = audit(replace(scene, time_limit_s=over_s(scene, log) - 0.5), plan, log)
+    assert account.causes == ("late",)
+    assert "0.50 s after its time limit" in account.reasons[0]
+    in_time = replace(scene, time_limit_s=over_s(scene, log))
+    assert audit(in_time, plan, log).mission_ok
+
+
+def test_a_mission_is_not_over_while_a_robot_has_to_stay(mission: Any) -> None:
+    scene, plan, log = mission()
+    region = replace(scene.goals[0].region, center=log.state[0, -1, :2])
+    inside = region.depth(log.state[0, :, :2]) >= 0.0
+    arrival_s = float(log.time_s[inside.argmax()])
+    later_s = log.time_s[-1] + np.arange(1, 101) * log.control_period_s
+    standing = np.repeat(log.state[:, -1:], 100, axis=1)
+    longer = replace(
+        log,
+        time_s=np.concatenate([log.time_s, later_s]),
+        state=np.concatenate([log.state, standing], axis=1),
+    )
+    assert over_s(scene, longer) == over_s(scene, log)
+    dwell_s = 0.5 + over_s(scene, log) - arrival_s
+    goal = replace(scene.goals[0], region=region, dwell_s=dwell_s)
+    found_s = over_s(replace(scene, goals=(goal,)), longer)
+    assert found_s == pytest.approx(arrival_s + dwell_s, abs=0.05)
