@@ -16,9 +16,9 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from mrmg.mission import Plan, Trajectory
+from mrmg.mission import Plan
 from mrmg.motion._kernels import MODEL_ID
-from mrmg.motion._kernels import step as motion_step
+from mrmg.planning import _tracking_kernels
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.attempt import Attempt
 from mrmg.planning.motion_tree import Problem
@@ -179,19 +179,13 @@ def _moved(
     None if accounting refuses what it accepted a nanometre away.
     """
     trajectories = []
+    fleet = problem.mission.fleet
     for r, (robot, given) in enumerate(
         zip(scene.robots, plan.trajectories, strict=True)
     ):
-        state = np.zeros_like(given.state)
+        control, state = given.control.copy(), np.zeros(given.state.shape)
         state[0, :3] = robot.pose
-        for k, (u1, u2) in enumerate(given.control):
-            motion_step(
-                problem.mission.fleet[r], state[k], u1, u2, given.dt_s, state[k + 1]
-            )
-        trajectories.append(
-            Trajectory(
-                robot=robot.id, dt_s=given.dt_s, state=state, control=given.control
-            )
-        )
+        _tracking_kernels.write_states(fleet, r, given.dt_s, control, state)
+        trajectories.append(replace(given, control=control, state=state))
     problem = replace(problem, scene=scene)
     return make_plan(problem, plan.seed, params, trajectories, plan.tours)

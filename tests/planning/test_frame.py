@@ -5,6 +5,7 @@ Maps lie along the axes, so that turns by quarters are all there are.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from math import pi
 from pathlib import Path
@@ -164,3 +165,14 @@ def test_a_fleet_around_the_middle_is_turned_by_its_first_robot() -> None:
         starts = [robot.pose[:2] for robot in Frame.of(moved).scene(moved).robots]
         reference = [robot.pose[:2] for robot in Frame.of(scene).scene(scene).robots]
         assert starts == reference
+
+
+def test_maps_of_robots_with_their_own_motion_stay() -> None:
+    """Their motion may depend on the place."""
+    scene, _ = as_it_lies("two_swap")
+    moved = scene_from_document(placed(scene.document, 2, (5.0, 5.0)), source="own")
+    first, second = moved.robots
+    own = replace(first, model=replace(first.model, motion_model="motion.py"))
+    users = replace(moved, robots=(own, second))
+    assert not Frame.of(moved).is_the_maps
+    assert Frame.of(users).scene(users) is users
