@@ -10,8 +10,9 @@ differences of kinetic energy and grade to those of potential energy.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Protocol
 
 import numpy as np
@@ -60,6 +61,8 @@ class LoggedMotion:
     state: np.ndarray
 
 
+_AS_MODELLED: Mapping[str, np.ndarray] = MappingProxyType({})
+
 SHORTEST_ON_SLOPES_S = 0.1
 """Shortest time charged on its own where there are slopes, a step of the planner.
 
@@ -69,10 +72,22 @@ moment would count, but not what it gained by the braking after that.
 """
 
 
-def step_power_parts(scene: Scene, motion: Motion) -> np.ndarray:
-    """Return the battery power of each interval by part [W], shape (n, len(PARTS))."""
+def step_power_parts(
+    scene: Scene, motion: Motion, rolling_factor: np.ndarray | None = None
+) -> np.ndarray:
+    """Return the battery power of each interval by part [W], shape (n, len(PARTS)).
+
+    Args:
+        scene: gives energy models and terrain.
+        motion: planned or logged.
+        rolling_factor: by which the rolling resistance differs from the model's over
+            each interval, shape (n,); None if it does not.
+    """
+    factor = (
+        np.ones(len(motion.state) - 1) if rolling_factor is None else rolling_factor
+    )
     if scene.elevation is None:
-        return _power_parts(scene, motion)
+        return _power_parts(scene, motion, factor)
     time_s = motion.time_s
     marks_s = np.arange(time_s[0], time_s[-1], SHORTEST_ON_SLOPES_S)
     ends = np.append(np.searchsorted(time_s, marks_s - 1e-6), len(time_s) - 1)
@@ -80,10 +95,13 @@ def step_power_parts(scene: Scene, motion: Motion) -> np.ndarray:
     coarse = LoggedMotion(
         robot=motion.robot, time_s=time_s[ends], state=motion.state[ends]
     )
-    return np.repeat(_power_parts(scene, coarse), np.diff(ends), axis=0)
+    parts_W = _power_parts(scene, coarse, factor[ends[:-1]])
+    return np.repeat(parts_W, np.diff(ends), axis=0)
 
 
-def _power_parts(scene: Scene, motion: Motion) -> np.ndarray:
+def _power_parts(
+    scene: Scene, motion: Motion, rolling_factor: np.ndarray
+) -> np.ndarray:
     robot = scene.robot(motion.robot)
     before, after = motion.state[:-1], motion.state[1:]
     middle = 0.5 * (before + after)
@@ -101,15 +119,20 @@ def _power_parts(scene: Scene, motion: Motion) -> np.ndarray:
         speed_m_s=middle[:, 3],
         acceleration_m_s2=acceleration_m_s2,
         turn_speed_m_s=turn_speed_m_s,
-        multiplier=multiplier_at(scene, middle[:, :2]),
+        multiplier=rolling_factor * multiplier_at(scene, middle[:, :2]),
         climb_m_s=np.diff(height_m) / duration_s,
     )
 
 
-def step_energy_parts(scene: Scene, motion: Motion) -> np.ndarray:
-    """Return the battery energy of each interval by part [J], shape (n, len(PARTS))."""
+def step_energy_parts(
+    scene: Scene, motion: Motion, rolling_factor: np.ndarray | None = None
+) -> np.ndarray:
+    """Return the battery energy of each interval by part [J], shape (n, len(PARTS)).
+
+    The arguments are those of `step_power_parts`.
+    """
     duration_s = np.diff(motion.time_s)
-    return step_power_parts(scene, motion) * duration_s[:, None]
+    return step_power_parts(scene, motion, rolling_factor) * duration_s[:, None]
 
 
 def measured_energy_parts(
@@ -230,7 +253,10 @@ def own_visits(motion: Motion, visits: Iterable[Visit]) -> list[Visit]:
 
 
 def plan_ledger(
-    scene: Scene, motions: Iterable[Motion], visits: Iterable[Visit]
+    scene: Scene,
+    motions: Iterable[Motion],
+    visits: Iterable[Visit],
+    rolling_factor: Mapping[str, np.ndarray] = _AS_MODELLED,
 ) -> EnergyLedger:
     """Return the account of motions under the energy model, by robot, leg and part.
 
@@ -238,11 +264,14 @@ def plan_ledger(
         scene: gives energy models and terrain.
         motions: one per robot, planned or logged.
         visits: of all robots; each ends a leg of its robot.
+        rolling_factor: by which the rolling resistance of robots differs from their
+            models' over each interval, shape (n,) each.
     """
     visits = tuple(visits)
     entries: list[LedgerEntry] = []
     for motion in motions:
-        energy_J = step_energy_parts(scene, motion)
+        factor = rolling_factor.get(motion.robot)
+        energy_J = step_energy_parts(scene, motion, factor)
         entries += leg_entries(
             motion.robot, energy_J, PARTS, own_visits(motion, visits)
         )

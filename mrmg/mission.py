@@ -20,6 +20,7 @@ DRIVEN_PLAN = "driven_plan"
 """Name of the files of a plan that was joined on the way."""
 
 _CONTENT = ".content"
+_FACTOR = ".rolling_factor"
 
 
 class PlanStatus(Enum):
@@ -110,6 +111,8 @@ class Plan:
         content_J: planned battery content at each state by robot, shape (n + 1,), where
             it is not what the scene's energy models say: in plans that were joined on
             the way, after more was known.
+        rolling_factor: by which the rolling resistance was believed to differ from the
+            model's over each step, by robot, shape (n,), in such plans.
     """
 
     scene_name: str
@@ -124,6 +127,7 @@ class Plan:
     visits: tuple[Visit, ...]
     ledger: EnergyLedger
     content_J: Mapping[str, np.ndarray] = field(default_factory=dict)
+    rolling_factor: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def cost_J(self) -> float:
@@ -155,6 +159,8 @@ class Plan:
         arrays = {
             f"{robot}{_CONTENT}": value for robot, value in self.content_J.items()
         }
+        for robot, value in self.rolling_factor.items():
+            arrays[f"{robot}{_FACTOR}"] = value
         for trajectory in self.trajectories:
             arrays[f"{trajectory.robot}.state"] = trajectory.state
             arrays[f"{trajectory.robot}.control"] = trajectory.control
@@ -233,12 +239,17 @@ def _plan_from(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Plan:
         tours={robot: tuple(tour) for robot, tour in header["tours"].items()},
         visits=tuple(Visit(**visit) for visit in header["visits"]),
         ledger=EnergyLedger.from_rows(header["ledger"]),
-        content_J={
-            name.removesuffix(_CONTENT): value
-            for name, value in arrays.items()
-            if name.endswith(_CONTENT)
-        },
+        content_J=_by_robot(arrays, _CONTENT),
+        rolling_factor=_by_robot(arrays, _FACTOR),
     )
+
+
+def _by_robot(arrays: Mapping[str, np.ndarray], suffix: str) -> dict[str, np.ndarray]:
+    return {
+        name.removesuffix(suffix): value
+        for name, value in arrays.items()
+        if name.endswith(suffix)
+    }
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -323,3 +323,18 @@ def test_legs_share_out_all_intervals(steps: list[int], seed: int) -> None:
     entries = leg_entries("r", energy_J, ("drive", "idle"), visits)
     assert len(entries) == 2 * (len(steps) + 1)
     assert sum(entry.energy_J for entry in entries) == energy_J.sum()
+
+
+def test_more_rolling_resistance_is_that_of_another_model(scene: Scene) -> None:
+    """A factor over half of the way is the model with it over that half."""
+    motion = cruise(5, 95)
+    half = (len(motion.time_s) - 1) // 2
+    factor = np.where(np.arange(len(motion.time_s) - 1) < half, 1.0, 1.3)
+    entry = {"id": "r", "model": "car", "pose": [5, 0, 0], "rolling_factor": 1.3}
+    worn = step_energy_parts(make_scene(robots=[entry]), motion)
+    plain = step_energy_parts(scene, motion)
+    mixed = step_energy_parts(scene, motion, factor)
+    np.testing.assert_array_equal(mixed[:half], plain[:half])
+    np.testing.assert_allclose(mixed[half:], worn[half:], rtol=1e-12, atol=1e-9)
+    ledger = plan_ledger(scene, [motion], [], {"r": factor})
+    assert ledger.total_J() == pytest.approx(mixed.sum())

@@ -31,6 +31,8 @@ class Course:
         plan: the joined plan, of all robots of the scene.
         parts_J: planned energy of each step by robot, shape (n, len(PARTS)) each; under
             the energy model that was believed when the step was planned.
+        rolling_factor: the believed rolling resistance over that of the scene's models,
+            by robot and step, shape (n,) each.
         charge_J: (step, battery contents by robot) from which the batteries were
             reckoned on, in order.
     """
@@ -38,6 +40,7 @@ class Course:
     scene: Scene
     plan: Plan
     parts_J: Mapping[str, np.ndarray]
+    rolling_factor: Mapping[str, np.ndarray]
     charge_J: tuple[tuple[int, Mapping[str, float]], ...]
 
     @staticmethod
@@ -48,6 +51,9 @@ class Course:
             plan=plan,
             parts_J={
                 item.robot: step_energy_parts(scene, item) for item in plan.trajectories
+            },
+            rolling_factor={
+                item.robot: np.ones(len(item.control)) for item in plan.trajectories
             },
             charge_J=(
                 (0, {robot.id: robot.battery.start_J for robot in scene.robots}),
@@ -137,6 +143,7 @@ class Course:
             visits=tuple(visits),
             ledger=EnergyLedger(tuple(entries)),
             content_J=content_J,
+            rolling_factor=self.rolling_factor,
         )
         return replace(self, plan=plan)
 
@@ -171,13 +178,19 @@ class Course:
             believed: whose energy models the new steps are reckoned with.
         """
         known = {robot.id for robot in believed.robots}
-        trajectories, parts_J = [], {}
+        trajectories, parts_J, factors = [], {}, {}
         for item in self.plan.trajectories:
             state, control = ways[item.robot]
             new = replace(item, state=state.copy(), control=control.copy())
             scene = believed if item.robot in known else self.scene
             parts_J[item.robot] = np.concatenate(
                 [self.parts_J[item.robot][:step], step_energy_parts(scene, new)]
+            )
+            factor = np.full(
+                len(control), _rolling_factor(self.scene, scene, item.robot)
+            )
+            factors[item.robot] = np.concatenate(
+                [self.rolling_factor[item.robot][:step], factor]
             )
             trajectories.append(
                 replace(
@@ -187,7 +200,15 @@ class Course:
                 )
             )
         plan = replace(self.plan, trajectories=tuple(trajectories))
-        return replace(self, plan=plan, parts_J=parts_J)
+        return replace(self, plan=plan, parts_J=parts_J, rolling_factor=factors)
+
+
+def _rolling_factor(scene: Scene, believed: Scene, robot: str) -> float:
+    """Return a robot's rolling resistance as it is believed over that of its model."""
+    modelled, known = (
+        of.robot(robot).model.energy_model.rolling_force_N for of in (scene, believed)
+    )
+    return known / modelled
 
 
 def _held(

@@ -1,7 +1,8 @@
 """Compare what a mission was planned to cost with what its simulation cost.
 
 Three meters: *planned* is the energy model over the plan, *metered* the same model over
-the simulated motion, *measured* the work done at the simulated wheels,
+the simulated motion, both with the parameters believed at the time, *measured* the work
+done at the simulated wheels,
 
     E = W_driving / eta + regeneration * W_braking + (P_idle + P_device) t.
 
@@ -93,6 +94,7 @@ def audit(scene: Scene, plan: Plan, log: ExecutionLog) -> EnergyAudit:
         scene,
         [item.motion for item in measured],
         [visit for item in measured for visit in item.visits],
+        believed_rolling(plan, log),
     )
     measured_ledger = EnergyLedger(
         tuple(entry for item in measured for entry in _measured_entries(item))
@@ -174,6 +176,21 @@ def measured_step_energy(robot: Robot, log: ExecutionLog, index: int) -> np.ndar
         By tick and part of `MEASURED_PARTS`, shape (n - 1, 3).
     """
     return measured_energy_parts(robot, log.work_J[index], log.time_s)
+
+
+def believed_rolling(plan: Plan, log: ExecutionLog) -> dict[str, np.ndarray]:
+    """Return by what rolling resistance differed from its model's, as was believed.
+
+    Returns:
+        Factors of each tick by robot, shape (n - 1,) each; without any where the models
+        were believed throughout.
+    """
+    middle_s = 0.5 * (log.clock_s[1:] + log.clock_s[:-1])
+    step = (middle_s / plan.dt_s).astype(int)
+    return {
+        robot: factor[np.minimum(step, len(factor) - 1)]
+        for robot, factor in plan.rolling_factor.items()
+    }
 
 
 def _measured_entries(item: _Measured) -> list[LedgerEntry]:

@@ -12,9 +12,8 @@ from mrmg import storage
 from mrmg.results import chart_spec, style
 from mrmg.results import report_page as html
 from mrmg.results.compare import Comparison
-from mrmg.results.energy_plot import BatteryCurve, planned_curves
+from mrmg.results.energy_plot import BatteryCurve, measured_curves, planned_curves
 from mrmg.results.mission_series import shown_motions, shown_visits
-from mrmg.results.report_charts import measured_curves
 from mrmg.results.report_map import mission_map
 from mrmg.results.report_record import RunRecord
 

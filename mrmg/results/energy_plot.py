@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +11,16 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from mrmg.accounting import LoggedMotion, battery_profile, find_visits
+from mrmg.accounting import (
+    LoggedMotion,
+    battery_content,
+    battery_profile,
+    find_visits,
+)
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan, Visit
 from mrmg.results import scene_drawing, style
+from mrmg.results.audit import measured_step_energy
 from mrmg.scene.types import Robot, Scene
 
 _PANEL_INCHES = (9.5, 2.5)
@@ -52,20 +58,27 @@ def planned_curves(scene: Scene, plan: Plan) -> tuple[BatteryCurve, ...]:
     )
 
 
-def simulated_curves(
+def measured_curves(
     scene: Scene, plan: Plan, log: ExecutionLog
 ) -> tuple[BatteryCurve, ...]:
-    """Return the battery content of the simulated motion, one curve per robot."""
+    """Return the battery content by the work at the simulated wheels."""
+    if log.disturbance is not None:
+        scene = log.disturbance.actual_scene(scene)
     curves = []
-    for robot, state in zip(log.robots, log.state, strict=True):
+    for index, (robot, state) in enumerate(zip(log.robots, log.state, strict=True)):
         motion = LoggedMotion(robot=robot, time_s=log.time_s, state=state)
         visits = find_visits(scene, motion, plan.tours.get(robot, ()))
+        draw_J = measured_step_energy(scene.robot(robot), log, index).sum(axis=1)
+        content_J, arrival_J = battery_content(scene, motion, draw_J, visits)
         curves.append(
             BatteryCurve(
                 robot=robot,
                 time_s=log.time_s,
-                energy_J=battery_profile(scene, motion, visits),
-                visits=visits,
+                energy_J=content_J,
+                visits=tuple(
+                    replace(visit, energy_J=energy_J)
+                    for visit, energy_J in zip(visits, arrival_J, strict=True)
+                ),
             )
         )
     return tuple(curves)
@@ -79,13 +92,13 @@ def draw_energy(
     Args:
         scene: gives capacity and reserve.
         plan: what was predicted.
-        log: adds the content under the simulated motion.
+        log: adds the content by the work at the simulated wheels.
         path: picture to write (PNG, SVG or PDF by its suffix).
     """
     planned = {curve.robot: curve for curve in planned_curves(scene, plan)}
     simulated = {
         curve.robot: curve
-        for curve in (simulated_curves(scene, plan, log) if log is not None else ())
+        for curve in (measured_curves(scene, plan, log) if log is not None else ())
     }
     width_in, panel_in = _PANEL_INCHES
     figure = Figure(

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from mrmg.accounting import LoggedMotion, step_energy_parts
 from mrmg.execution.log import ExecutionLog
 from mrmg.execution.world_model import build_world
 from mrmg.mission import Plan
 from mrmg.results import style
-from mrmg.results.energy_plot import BatteryCurve, simulated_curves
+from mrmg.results.audit import measured_step_energy
+from mrmg.results.energy_plot import BatteryCurve, measured_curves
 from mrmg.results.ground_image import TrailPainter
 from mrmg.results.overlay import Panel, Reading, RobotReading
 from mrmg.results.tags import Label, Tag
@@ -45,7 +45,7 @@ class Film:
         self.world = build_world(scene)
         self.frame = floor_frame(self.world)
         self.colors = style.scene_robot_colors(scene)
-        self.curves = simulated_curves(scene, plan, log)
+        self.curves = measured_curves(scene, plan, log)
         self.capacity_J = [robot.battery.capacity_J for robot in scene.robots]
         self.used_J = _used_J(scene, log)
         self.followed = self._followed()
@@ -109,9 +109,9 @@ class Film:
 def _used_J(scene: Scene, log: ExecutionLog) -> np.ndarray:
     """Return the energy the fleet has drawn at each tick, shape (n,)."""
     used_J = np.zeros(len(log.time_s))
-    for robot, state in zip(log.robots, log.state, strict=True):
-        motion = LoggedMotion(robot=robot, time_s=log.time_s, state=state)
-        used_J[1:] += np.cumsum(step_energy_parts(scene, motion).sum(axis=1))
+    for index, robot in enumerate(log.robots):
+        draw_J = measured_step_energy(scene.robot(robot), log, index)
+        used_J[1:] += np.cumsum(draw_J.sum(axis=1))
     return used_J
 
 

@@ -5,7 +5,7 @@ Everything is computed from the plan and the log alone, for charts and figures.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ import shapely
 from mrmg.accounting import LoggedMotion, Motion, find_visits, step_energy_parts
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan, Visit
-from mrmg.results.audit import measured_step_energy
+from mrmg.results.audit import believed_rolling, measured_step_energy
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Robot, Scene
 from mrmg.visiting import runs
@@ -189,15 +189,17 @@ def energy_by_terrain(
     Each interval belongs to the ground under its middle, as in the energy model.
     """
     planned = _by_class(
-        scene, plan.trajectories, _model_energy(scene, plan.trajectories)
+        scene,
+        plan.trajectories,
+        _model_energy(scene, plan.trajectories, plan.rolling_factor),
     )
     if log is None:
         return tuple(
             TerrainEnergy(multiplier=key, planned_m=way_m, planned_J=energy_J)
             for key, (way_m, energy_J) in sorted(planned.items())
         )
-    driven = logged_motions(log)
-    metered = _by_class(scene, driven, _model_energy(scene, driven))
+    driven, rolling = logged_motions(log), believed_rolling(plan, log)
+    metered = _by_class(scene, driven, _model_energy(scene, driven, rolling))
     work_J = [
         measured_step_energy(scene.robot(robot), log, index).sum(axis=1)
         for index, robot in enumerate(log.robots)
@@ -217,8 +219,13 @@ def energy_by_terrain(
     )
 
 
-def _model_energy(scene: Scene, motions: Iterable[Motion]) -> list[np.ndarray]:
-    return [step_energy_parts(scene, motion).sum(axis=1) for motion in motions]
+def _model_energy(
+    scene: Scene, motions: Iterable[Motion], rolling: Mapping[str, np.ndarray]
+) -> list[np.ndarray]:
+    return [
+        step_energy_parts(scene, motion, rolling.get(motion.robot)).sum(axis=1)
+        for motion in motions
+    ]
 
 
 def _by_class(

@@ -6,18 +6,21 @@ All series share one grid of times, so that one cursor reads them all.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from mrmg.accounting import Motion, battery_content
+from mrmg.accounting import Motion
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan
 from mrmg.results import mission_series as series
-from mrmg.results.audit import measured_step_energy
 from mrmg.results.chart_spec import chart, line, rounded
-from mrmg.results.energy_plot import BatteryCurve, planned_curves, with_recharge_jumps
+from mrmg.results.energy_plot import (
+    BatteryCurve,
+    measured_curves,
+    planned_curves,
+    with_recharge_jumps,
+)
 from mrmg.scene.types import Battery, Scene
 
 _MOST_SAMPLES = 1200
@@ -62,31 +65,6 @@ def chart_data(scene: Scene, plan: Plan, log: ExecutionLog | None) -> dict[str, 
             *_distance_charts(scene, poses),
         ],
     }
-
-
-def measured_curves(
-    scene: Scene, plan: Plan, log: ExecutionLog
-) -> tuple[BatteryCurve, ...]:
-    """Return the battery content by the work at the simulated wheels."""
-    curves = []
-    for index, motion in enumerate(series.logged_motions(log)):
-        visits = series.shown_visits(scene, plan, motion)
-        draw_J = measured_step_energy(scene.robot(motion.robot), log, index)
-        content_J, arrival_J = battery_content(
-            scene, motion, draw_J.sum(axis=1), visits
-        )
-        curves.append(
-            BatteryCurve(
-                robot=motion.robot,
-                time_s=log.time_s,
-                energy_J=content_J,
-                visits=tuple(
-                    replace(visit, energy_J=energy_J)
-                    for visit, energy_J in zip(visits, arrival_J, strict=True)
-                ),
-            )
-        )
-    return tuple(curves)
 
 
 def _grid(plan: Plan, log: ExecutionLog | None) -> np.ndarray:

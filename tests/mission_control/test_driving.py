@@ -18,6 +18,8 @@ from mrmg.mission import Plan
 from mrmg.mission_control import Drive, drive_mission
 from mrmg.planning import plan_mission
 from mrmg.results.audit import audit
+from mrmg.results.energy_plot import measured_curves
+from mrmg.results.mission_series import energy_by_terrain
 from mrmg.results.verify import verify
 from mrmg.scene.types import Scene
 
@@ -184,6 +186,19 @@ def test_replanning_saves_a_mission_that_runs_out_of_energy(
         / scene.robots[0].model.rolling_coefficient
     )
     assert factor == pytest.approx(1.4, rel=0.04)
+    believed = drive.plan.rolling_factor["r1"]
+    assert believed[0] == 1.0
+    assert believed[-1] == pytest.approx(factor)
+    # Planned and metered energy are those of what was believed at each time.
+    robot = account.robots[0]
+    assert robot.metered_J == pytest.approx(robot.planned_J, rel=0.02)
+    (by_ground,) = energy_by_terrain(scene, drive.plan, drive.log)
+    assert by_ground.planned_J == pytest.approx(robot.planned_J, rel=1e-6)
+    assert by_ground.metered_J == pytest.approx(robot.metered_J, rel=1e-6)
+    (curve,) = measured_curves(scene, drive.plan, drive.log)
+    capacity_J = scene.robots[0].battery.capacity_J
+    least_J = min(curve.energy_J.min(), *(v.energy_J for v in curve.visits))
+    assert least_J == pytest.approx(robot.min_charge_fraction * capacity_J)
 
 
 def test_what_cannot_be_reached_any_more_is_given_up(

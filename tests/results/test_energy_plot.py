@@ -32,7 +32,7 @@ def test_planned_curve_is_the_plan_s_battery_profile(mission) -> None:
 def test_a_perfect_drive_gives_the_planned_curve(mission) -> None:
     scene, plan, log = mission
     (planned,) = energy_plot.planned_curves(scene, plan)
-    (simulated,) = energy_plot.simulated_curves(scene, plan, log)
+    (simulated,) = energy_plot.measured_curves(scene, plan, log)
     assert [visit.target for visit in simulated.visits] == ["s", "g"]
     at_plan_times = np.interp(planned.time_s, simulated.time_s, simulated.energy_J)
     recharge = planned.visits[0].step

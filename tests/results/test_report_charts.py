@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from mrmg.results.audit import audit
-from mrmg.results.report_charts import chart_data, measured_curves
+from mrmg.results.energy_plot import measured_curves
+from mrmg.results.report_charts import chart_data
 from mrmg.results.report_map import mission_map
 
 
