@@ -1,4 +1,4 @@
-"""The one way this package compiles kernels with numba.
+"""Where compiled kernels are kept, and when they are good.
 
 numba's cache does not notice edits in other files: a cached caller keeps the old
 callee. The cache folder is therefore named after a digest of all sources that feed
@@ -13,21 +13,17 @@ import os
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from mrmg import storage
 
-F = TypeVar("F", bound=Callable[..., Any])
-
-_PACKAGE = Path(__file__).resolve().parent
-_SOURCES = ("compilation.py", "energy.py", "motion/dynamics.py")
+_PACKAGE = Path(__file__).resolve().parents[1]
+_SOURCES = ("compilation/*.py", "energy.py", "motion/dynamics.py", "**/*_kernels.py")
 
 
 def kernel_sources() -> list[Path]:
     """Return every source file whose code is compiled into a kernel."""
-    return sorted(
-        {*_PACKAGE.rglob("*_kernels.py"), *(_PACKAGE / name for name in _SOURCES)}
-    )
+    return sorted({path for name in _SOURCES for path in _PACKAGE.glob(name)})
 
 
 @cache
@@ -86,33 +82,6 @@ class KernelLocator(caching.UserProvidedCacheLocator):  # type: ignore[misc]
     def get_source_stamp(self) -> str:
         """Return what must not have changed for compiled kernels to be good."""
         return sources_digest()
-
-
-def kernel(function: F) -> F:
-    """Compile `function` ahead of use: cached, releasing the GIL, without fast-math.
-
-    Fast-math and parallel reductions would let a branch of the search depend on the
-    order of additions, which would end reproducibility.
-    """
-    return numba.njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]
-
-
-def leaf_kernel(function: F) -> F:
-    """Compile a function that neither makes nor returns arrays: no reference counting.
-
-    Counting the references of every array handed on is a good part of the time of a
-    short function, and of the time it takes to compile. What it calls is compiled the
-    same way, so that must be leaf kernels and views.
-    """
-    return numba.njit(cache=True, nogil=True, error_model="numpy", _nrt=False)(function)  # type: ignore[no-any-return]
-
-
-def view(function: F) -> F:
-    """Compile a function that returns parts of its arguments: into its callers.
-
-    An array handed back by a function would have to be counted.
-    """
-    return numba.njit(inline="always", error_model="numpy")(function)  # type: ignore[no-any-return]
 
 
 def kernels_are_compiled() -> bool:
