@@ -6,9 +6,13 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 
+import pytest
+
 import mrmg
+from mrmg.compilation import compile_in_processes
 
 PACKAGE = Path(mrmg.__file__).parent
 
@@ -32,7 +36,24 @@ event.register("numba:compile", Listener())
 from mrmg.motion import _kernels
 
 value = _kernels.turn_speed(0, 1.0, 0.1, 2.0)
-print(_kernels.__file__, value, len(compiled) == 0)
+print(_kernels.__file__, value, len(compiled))
+"""
+
+TRACES = """
+import os
+from pathlib import Path
+
+
+def first():
+    Path(__file__).with_name("first.trace").write_text(str(os.getpid()))
+
+
+def fail():
+    raise RuntimeError
+
+
+def second():
+    Path(__file__).with_name("second.trace").write_text(str(os.getpid()))
 """
 
 
@@ -48,6 +69,8 @@ def copy_of_package(folder: Path) -> Path:
         "compilation/cache.py",
         "compilation/calls.py",
         "compilation/decorators.py",
+        "compilation/parallel.py",
+        "compilation/sharing.py",
         "storage.py",
         "errors.py",
         "motion/_kernels.py",
@@ -59,36 +82,46 @@ def copy_of_package(folder: Path) -> Path:
     return folder
 
 
-def call_kernel(package: Path, cache: Path) -> tuple[str, float, bool]:
-    """Return (file, value, whether the kernel was found compiled) in a new process."""
+def start_call(package: Path, cache: Path) -> subprocess.Popen[str]:
+    """Call a kernel in a new process."""
     environment = {
         **os.environ,
         "PYTHONPATH": str(package),
         "XDG_CACHE_HOME": str(cache),
     }
     environment.pop("NUMBA_CACHE_DIR", None)
-    done = subprocess.run(
+    return subprocess.Popen(
         [sys.executable, "-c", CALL],
-        capture_output=True,
+        stdout=subprocess.PIPE,
         text=True,
-        check=True,
         env=environment,
         cwd=package,
     )
-    file, value, found = done.stdout.split()
-    return file, float(value), found == "True"
+
+
+def answer(process: subprocess.Popen[str]) -> tuple[str, float, int]:
+    """Return (file, value, number of functions compiled for it)."""
+    printed, _ = process.communicate()
+    assert process.returncode == 0
+    file, value, compiled = printed.split()
+    return file, float(value), int(compiled)
+
+
+def call_kernel(package: Path, cache: Path) -> tuple[str, float, int]:
+    """Call a kernel in a new process, and wait."""
+    return answer(start_call(package, cache))
 
 
 def test_a_copy_of_the_package_finds_the_kernels_of_another(tmp_path: Path) -> None:
     first = copy_of_package(tmp_path / "first")
     second = copy_of_package(tmp_path / "second")
     cache = tmp_path / "cache"
-    file, value, found = call_kernel(first, cache)
+    file, value, compiled = call_kernel(first, cache)
     assert file.startswith(str(first))
-    assert not found
-    file, again, found = call_kernel(second, cache)
+    assert compiled > 0
+    file, again, compiled = call_kernel(second, cache)
     assert file.startswith(str(second))
-    assert found
+    assert compiled == 0
     assert again == value
 
 
@@ -101,6 +134,53 @@ def test_an_edit_of_any_kernel_source_compiles_anew(tmp_path: Path) -> None:
     edited = source.replace("abs(v * tan", "2.0 * abs(v * tan")
     assert edited != source
     dynamics.write_text(edited)
-    _, doubled, found = call_kernel(package, cache)
-    assert not found
+    _, doubled, compiled = call_kernel(package, cache)
+    assert compiled > 0
     assert doubled == 2.0 * value
+
+
+def test_processes_that_compile_at_once_share_the_work(tmp_path: Path) -> None:
+    package = copy_of_package(tmp_path / "package")
+    alone = call_kernel(package, tmp_path / "cache of one")
+    together = [start_call(package, tmp_path / "cache of two") for _ in range(2)]
+    answers = [answer(process) for process in together]
+    assert [value for _, value, _ in answers] == [alone[1]] * 2
+    ours = len(list((tmp_path / "cache of one").rglob("*.nbc")))
+    assert len(list((tmp_path / "cache of two").rglob("*.nbc"))) == ours
+    compiled = sum(number for _, _, number in answers)
+    assert compiled < 2 * alone[2]
+
+
+def test_a_compilation_that_is_killed_leaves_a_cache_that_can_be_used(
+    tmp_path: Path,
+) -> None:
+    package = copy_of_package(tmp_path / "package")
+    expected = call_kernel(package, tmp_path / "another cache")[1]
+    cache = tmp_path / "cache"
+    killed = start_call(package, cache)
+    while not list(cache.rglob("*.lock")):
+        assert killed.poll() is None
+        time.sleep(0.001)
+    killed.kill()
+    killed.communicate()
+    _, value, compiled = call_kernel(package, cache)
+    assert value == expected
+    assert compiled > 0
+    assert call_kernel(package, cache)[1:] == (expected, 0)
+
+
+def test_calls_run_in_processes_of_their_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "leaving_traces.py").write_text(TRACES)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    import leaving_traces
+
+    told: list[int] = []
+    calls = (leaving_traces.first, leaving_traces.fail, leaving_traces.second)
+    compile_in_processes(calls, told.append)
+    traces = {path.read_text() for path in tmp_path.glob("*.trace")}
+    assert len(traces) == 2
+    assert str(os.getpid()) not in traces
+    assert told

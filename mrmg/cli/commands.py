@@ -20,10 +20,11 @@ def run(options: argparse.Namespace) -> int:
     from mrmg import pipeline
     from mrmg.run_arguments import DEFAULT_VIDEO
 
-    terminal.announce_compilation()
+    scene = _scene(options)
+    terminal.compile_kernels()
     with terminal.progress() as told:
         result = pipeline.run(
-            _scene(options),
+            scene,
             seed=options.seed,
             out=options.out,
             budget_s=options.budget,
@@ -65,8 +66,8 @@ def plan(options: argparse.Namespace) -> int:
     from mrmg.run_folder import RunFolder, Step
     from mrmg.steps import Run
 
-    terminal.announce_compilation()
     scene = _scene(options)
+    terminal.compile_kernels()
     folder = RunFolder(options.out or default_folder(scene, options.seed))
     arguments = RunArguments(
         seed=options.seed,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -108,14 +109,24 @@ def quality(found: Mapping[str, Any]) -> str:
     return text
 
 
-def announce_compilation() -> None:
-    """Tell a person who waits for it that kernels are being compiled."""
-    if not sys.stderr.isatty():
-        return
-    from mrmg.compilation import kernels_are_compiled
+def compile_kernels() -> None:
+    """Compile kernels where that is to be done, and tell a person who waits for it."""
+    from mrmg.compilation import compiled_kernels, kernels_are_compiled
 
-    if not kernels_are_compiled():
-        print("compiling kernels (once per machine) ...", file=sys.stderr)
+    if kernels_are_compiled():
+        return
+    with _bars() as bars:
+        if bars is None:
+            return  # planning does it
+        from mrmg.planning.planner import compile_kernels
+
+        task = bars.add_task("compiling", total=None, note="")
+        note = "{} kernels, once for this version"
+        began = time.perf_counter()
+        compile_kernels(lambda n: bars.update(task, note=note.format(n)))
+        took_s = time.perf_counter() - began
+    text = f"compiled {compiled_kernels()} kernels in {took_s:.0f} s"
+    print(f"{text}, once for this version", file=sys.stderr)
 
 
 def print_json(value: Any) -> None:

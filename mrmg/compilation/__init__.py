@@ -3,19 +3,25 @@
 from mrmg.compilation.cache import (
     KernelLocator,
     cache_folder,
+    compiled_kernels,
     kernel_sources,
     kernels_are_compiled,
+    note_kernels_are_compiled,
     sources_digest,
 )
 from mrmg.compilation.decorators import kernel, leaf_kernel, view
+from mrmg.compilation.parallel import compile_in_processes
 
 __all__ = [
     "KernelLocator",
     "cache_folder",
+    "compile_in_processes",
+    "compiled_kernels",
     "kernel",
     "kernel_sources",
     "kernels_are_compiled",
     "leaf_kernel",
+    "note_kernels_are_compiled",
     "sources_digest",
     "view",
 ]

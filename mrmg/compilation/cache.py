@@ -17,13 +17,15 @@ from typing import Any
 
 from mrmg import storage
 
-_PACKAGE = Path(__file__).resolve().parents[1]
+PACKAGE = Path(__file__).resolve().parents[1]
+"""Folder of the package."""
+
 _SOURCES = ("compilation/*.py", "energy.py", "motion/dynamics.py", "**/*_kernels.py")
 
 
 def kernel_sources() -> list[Path]:
     """Return every source file whose code is compiled into a kernel."""
-    return sorted({path for name in _SOURCES for path in _PACKAGE.glob(name)})
+    return sorted({path for name in _SOURCES for path in PACKAGE.glob(name)})
 
 
 @cache
@@ -31,7 +33,7 @@ def sources_digest() -> str:
     """Return a fingerprint of the sources, wherever they lie and whenever written."""
     state = hashlib.sha256()
     for path in kernel_sources():
-        state.update(str(path.relative_to(_PACKAGE)).encode())
+        state.update(str(path.relative_to(PACKAGE)).encode())
         state.update(path.read_bytes())
     return state.hexdigest()[:16]
 
@@ -69,14 +71,14 @@ class KernelLocator(caching.UserProvidedCacheLocator):  # type: ignore[misc]
     @classmethod
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> Any:
         """Return a locator for a function of this package, None for any other."""
-        if not Path(py_file).resolve().is_relative_to(_PACKAGE):
+        if not Path(py_file).resolve().is_relative_to(PACKAGE):
             return None
         return super().from_function(py_func, py_file)
 
     @classmethod
     def get_suitable_cache_subpath(cls, py_file: str) -> str:
         """Return the folder of a file's kernels below the cache folder."""
-        place = Path(py_file).resolve().relative_to(_PACKAGE)
+        place = Path(py_file).resolve().relative_to(PACKAGE)
         return ".".join(place.with_suffix("").parts)
 
     def get_source_stamp(self) -> str:
@@ -84,7 +86,24 @@ class KernelLocator(caching.UserProvidedCacheLocator):  # type: ignore[misc]
         return sources_digest()
 
 
+def compiled_kernels() -> int:
+    """Return how many kernels of these sources this machine holds compiled."""
+    return sum(1 for _ in _folder().rglob("*.nbc"))
+
+
 def kernels_are_compiled() -> bool:
-    """Tell whether this machine already holds compiled kernels of these sources."""
-    folder = Path(os.environ["NUMBA_CACHE_DIR"])
-    return folder.is_dir() and any(folder.rglob("*.nbc"))
+    """Tell whether this machine holds all the kernels that missions need, if any."""
+    return bool(numba.config.DISABLE_JIT) or (_folder() / _COMPLETE).exists()
+
+
+def note_kernels_are_compiled() -> None:
+    """Have the next process know that this machine holds all kernels."""
+    if not kernels_are_compiled():
+        storage.write_text(_folder() / _COMPLETE, f"{compiled_kernels()} kernels\n")
+
+
+def _folder() -> Path:
+    return Path(os.environ["NUMBA_CACHE_DIR"])
+
+
+_COMPLETE = "complete"

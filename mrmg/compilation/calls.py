@@ -29,6 +29,8 @@ from numba.core.registry import cpu_target
 from numba.core.typing import signature
 from numba.extending import intrinsic, typeof_impl
 
+from mrmg.compilation.sharing import KernelCache
+
 
 class Kernel:
     """A compiled function, compiled once for Python and once for kernels, at need.
@@ -44,14 +46,31 @@ class Kernel:
     ) -> None:
         functools.update_wrapper(self, function)
         self.name = function.__qualname__
-        always = {"cache": True, "error_model": "numpy", **options}
-        self._for_python = numba.njit(nogil=True, **always)(function)
-        self._for_kernels = numba.njit(
-            no_cpython_wrapper=True, no_cfunc_wrapper=True, **always
-        )(_renamed(function, "for_kernels"))
+        self._function = function
+        self._options = {"error_model": "numpy", **options}
         self._linked = linked
         self._symbols: dict[tuple[Any, ...], str] = {}
         self.intrinsic = intrinsic(self._typed_call(function))
+
+    @functools.cached_property
+    def _for_python(self) -> Any:
+        return self._cached(self._function, linked=False, nogil=True)
+
+    @functools.cached_property
+    def _for_kernels(self) -> Any:
+        return self._cached(
+            _renamed(self._function, "for_kernels"),
+            linked=self._linked,
+            no_cpython_wrapper=True,
+            no_cfunc_wrapper=True,
+        )
+
+    def _cached(
+        self, function: Callable[..., Any], *, linked: bool, **options: bool
+    ) -> Any:
+        dispatcher = numba.njit(**self._options, **options)(function)
+        dispatcher._cache = KernelCache(function, linked=linked)
+        return dispatcher
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the function from Python."""

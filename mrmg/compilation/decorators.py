@@ -11,7 +11,7 @@ from mrmg.compilation.calls import Kernel
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-SHORT = 400
+SHORT = 1000
 """Bytes of bytecode up to which a function is linked into its callers."""
 
 

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import cache
 
 import numpy as np
 
 from mrmg import seeding
+from mrmg.compilation import (
+    compile_in_processes,
+    kernels_are_compiled,
+    note_kernels_are_compiled,
+)
 from mrmg.errors import Fault, SceneError, UsageError
 from mrmg.mission import PlanResult, PlanStatus
 from mrmg.planning.attempt import Attempt, attempt_plan, draft_plans, tree_plans
@@ -17,10 +23,11 @@ from mrmg.planning.feasibility import proof_of_infeasibility
 from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.haste import priced_world, with_energies
 from mrmg.planning.makespan_bound import makespan_bound_s
-from mrmg.planning.motion_tree import Problem, state_problem
+from mrmg.planning.motion_tree import Problem, grow_tree, state_problem
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import TIME_MARGIN_S, Preference
 from mrmg.planning.roadmap import Roadmap, build_roadmap
+from mrmg.planning.routing import Routing
 from mrmg.planning.search import OnImprovement, Progress, Search
 from mrmg.planning.statistics import Bounds, Statistics
 from mrmg.scene.loading import scene_from_document
@@ -126,28 +133,71 @@ def plan_mission(
     )
 
 
-@cache
-def compile_kernels() -> None:
+def compile_kernels(on_progress: Callable[[int], None] | None = None) -> None:
     """Compile or load every kernel, so that no time limit or figure includes it.
 
-    Plans the smallest mission there is: types do not depend on a scene's size.
+    Args:
+        on_progress: told the number of kernels compiled so far, while there are any to
+            compile, which happens once for these sources.
     """
-    params = PlannerParams(samples=20, max_vertices=20, trees=1)
+    if not kernels_are_compiled():
+        calls = (grow_smallest, draft_smallest, bound_smallest)
+        compile_in_processes(calls, on_progress or (lambda number: None))
+    _load_kernels()
+
+
+@cache
+def _load_kernels() -> None:
+    _find_in_smallest(tree_plans)
+    draft_smallest()
+    bound_smallest()
+    note_kernels_are_compiled()
+
+
+def grow_smallest() -> None:
+    """Grow a tree in the smallest mission."""
+    _, problem = _smallest_mission()
+    routing = Routing(tours=((0,),), cost_J=0.0)
+    growth = grow_tree(problem, SMALL_PARAMS, routing, 0, np.zeros(1, np.bool_))
+    assert growth.solved, "the smallest mission has a plan, or not all is compiled"
+
+
+def draft_smallest() -> None:
+    """Plan the smallest mission without a tree."""
+    _find_in_smallest(draft_plans)
+
+
+def bound_smallest() -> None:
+    """Bound the energy and the makespan of the smallest mission."""
+    scene, _ = _smallest_mission()
+    lower_bound_J(scene, cells=50)
+    makespan_bound_s(scene, cells=50)
+
+
+SMALL_PARAMS = PlannerParams(samples=20, max_vertices=20, trees=1)
+"""What suffices to plan the smallest mission."""
+
+
+def _find_in_smallest(find: Callable[..., Attempt]) -> None:
+    scene, problem = _smallest_mission()
+    found = find(problem, 0, SMALL_PARAMS, 0, np.zeros(1, np.bool_))
+    found = on_the_map(found, problem, scene, SMALL_PARAMS)
+    assert found.plans, "the smallest mission has a plan, or not all is compiled"
+
+
+@cache
+def _smallest_mission() -> tuple[Scene, Problem]:
+    """Return the smallest mission there is: types do not depend on a scene's size."""
     document = {
         "format": 1,
         "name": "smallest",
-        "bounds": [0, 0, 20, 10],
-        "goals": [{"id": "g", "circle": {"center": [12, 5], "radius": 2}}],
+        "bounds": [1, 0, 21, 10],
+        "goals": [{"id": "g", "circle": {"center": [13, 5], "radius": 2}}],
         "battery": {"capacity_m": 100},
-        "robots": [{"id": "r", "model": "car", "pose": [5, 5, 0]}],
+        "robots": [{"id": "r", "model": "car", "pose": [6, 5, 0]}],
     }
     scene = scene_from_document(document, source="smallest mission")
-    problem = state_mission(scene, 0, params)
-    for find in (tree_plans, draft_plans):
-        found = find(problem, 0, params, 0, np.zeros(1, np.bool_))
-        assert found.plans, "the smallest mission has a plan, or not all is compiled"
-    lower_bound_J(scene)
-    makespan_bound_s(scene)
+    return scene, state_mission(Frame.of(scene).scene(scene), 0, SMALL_PARAMS)
 
 
 def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import networkx as nx
 import numpy as np
 import shapely
 from scipy.sparse import csr_array
@@ -28,6 +28,9 @@ from mrmg.scene.types import Region, Scene
 from mrmg.world._kernels import FreeSpace
 from mrmg.world.relief import height_at
 from mrmg.world.world import World
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 BUCKET_M = 4.0
 
@@ -71,6 +74,9 @@ class Roadmap:
         of plain ground. On slopes the graph is directed and nodes have `z_m`; a weight
         is negative where regeneration feeds back more than driving takes.
         """
+        import networkx as nx
+
+        graph: nx.Graph
         graph = nx.Graph() if self.height_m is None else nx.DiGraph()
         for i, (x, y) in enumerate(self.arrays.vertex):
             graph.add_node(i, x_m=float(x), y_m=float(y))

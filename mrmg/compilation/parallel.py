@@ -1,0 +1,55 @@
+"""Kernels compiled by several processes at once, and not by the one that waits.
+
+What compiling takes of memory is given back as those processes end.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+
+from mrmg.compilation.cache import PACKAGE, compiled_kernels
+
+_CALL = "import importlib; getattr(importlib.import_module({!r}), {!r})()"
+
+_LOOK_S = 0.2
+"""How often the processes are looked at."""
+
+
+def compile_in_processes(
+    calls: Sequence[Callable[[], None]],
+    on_progress: Callable[[int], None],
+) -> None:
+    """Call functions for the kernels they compile, each in a process of its own.
+
+    As many run at once as there are processors. What keeps one of them from compiling
+    is not told: whoever needs the kernel compiles it then, and learns of it.
+
+    Args:
+        calls: functions of modules, without arguments.
+        on_progress: told the number of kernels compiled so far, now and then.
+    """
+    path = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
+    waiting = [_CALL.format(call.__module__, call.__name__) for call in calls]
+    running: list[subprocess.Popen[bytes]] = []
+    try:
+        while waiting or running:
+            while waiting and len(running) < len(os.sched_getaffinity(0)):
+                process = subprocess.Popen(
+                    [sys.executable, "-c", waiting.pop(0)],
+                    env={**os.environ, "PYTHONPATH": path.rstrip(os.pathsep)},
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                )
+                running.append(process)
+            time.sleep(_LOOK_S)
+            on_progress(compiled_kernels())
+            running = [process for process in running if process.poll() is None]
+    finally:
+        for process in running:
+            process.terminate()
+            process.wait()

@@ -1,0 +1,81 @@
+"""The cache of compiled kernels as processes that compile at once share it.
+
+numba's own lets two processes compile the same function, and when both add a kind of
+arguments to it, one may overwrite what the other has just written. Here whoever
+compiles a function locks it, and whoever needs it meanwhile waits and then loads it. A
+process that ends, however it ends, leaves no lock behind, and waiting in a circle is
+impossible, as a function is locked only while what it calls is compiled.
+"""
+
+from __future__ import annotations
+
+import fcntl
+from collections.abc import Callable
+from pathlib import Path
+from typing import IO, Any
+
+from llvmlite import binding
+from numba.core import caching
+
+
+class KernelCache(caching.FunctionCache):  # type: ignore[misc]
+    """Keeps the compiled forms of one function.
+
+    Args:
+        function: it.
+        linked: whether callers are compiled together with it; if not, its object code
+            is all that is kept, which is loaded in half the time.
+    """
+
+    def __init__(self, function: Callable[..., Any], *, linked: bool) -> None:
+        super().__init__(function)
+        self._linked = linked
+        self._lock: IO[bytes] | None = None
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Return what is compiled for a signature; None if it is ours to compile."""
+        found = super().load_overload(sig, target_context)
+        if found is None and self._lock is None:
+            self._acquire()
+            found = super().load_overload(sig, target_context)
+            if found is not None:
+                self._release()
+        return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep what has been compiled for a signature."""
+        if not self._linked:
+            data.library._shared_module = _names_of(data)
+        try:
+            super().save_overload(sig, data._replace(type_annotation=""))
+        finally:
+            self._release()
+        # A listing of every variable's type, which nobody will read.
+        vars(data.type_annotation).clear()
+
+    def _acquire(self) -> None:
+        self._impl.locator.ensure_cache_path()
+        lock = Path(self.cache_path) / f"{self._impl.filename_base}.lock"
+        self._lock = lock.open("wb")
+        fcntl.flock(self._lock, fcntl.LOCK_EX)
+
+    def _release(self) -> None:
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+
+def _names_of(compiled: Any) -> Any:
+    """Return a module that has of a compiled function no more than its names.
+
+    numba takes from it what the object code defines.
+    """
+    description = compiled.fndesc
+    sought = {description.llvm_func_name, description.llvm_cpython_wrapper_name}
+    defined = {function.name for function in compiled.library.get_defined_functions()}
+    return binding.parse_assembly(
+        "".join(
+            f'define void @"{name}"() {{ ret void }}\n'
+            for name in sorted(sought & defined)
+        )
+    )
