@@ -9,6 +9,7 @@ cell is; a finer one brings them nearer to the truth.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -243,7 +244,8 @@ class Ways:
     @staticmethod
     def of(ground: Ground, regions: Sequence[Region], starts: np.ndarray) -> Ways:
         """Bound all ways between regions, and from starts (R, 2) to regions."""
-        fields = [ground.field_from(region) for region in regions]
+        with ThreadPoolExecutor() as threads:
+            fields = list(threads.map(ground.field_from, regions))
         looks = [ground.look_at(border(one), 0.5 * SPACING_M) for one in regions]
         highest = np.array(
             [highest_of(*pair) for pair in zip(fields, looks, strict=True)]

@@ -9,6 +9,7 @@ are looked at, so the result is the least cost of all tours or the limit.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -48,12 +49,7 @@ def touring_bound_J(
     after, before = _touring_kernels.least_completions(way, start)
     best = float(before[0, 0])
     for _ in range(rounds):
-        fresh = [
-            ways[r].tighten(*pair)
-            for r, tour in enumerate(tours)
-            for pair in _pairs(r, tour)
-        ]
-        if not any(fresh):
+        if not _tighten(ways, tours):
             break
         leg = _leg_table(ways, price)
         most = (1.0 + SLACK) * _cost_along(leg, tours)
@@ -67,6 +63,15 @@ def touring_bound_J(
             break
         tours = _tours_of(trace, last, len(ways), len(leg[0, 0, 0]))
     return best
+
+
+def _tighten(ways: Sequence[ArcWays], tours: Sequence[Sequence[int]]) -> bool:
+    """Tighten the ways that tours take; tell whether any had not been tightened yet."""
+    legs = [
+        (ways[r], *pair) for r, tour in enumerate(tours) for pair in _pairs(r, tour)
+    ]
+    with ThreadPoolExecutor() as threads:
+        return any(list(threads.map(lambda leg: leg[0].tighten(*leg[1:]), legs)))
 
 
 def _pairs(r: int, tour: Sequence[int]) -> Iterator[tuple[int, int]]:
