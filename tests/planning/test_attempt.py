@@ -1,0 +1,85 @@
+"""What every way to find plans promises, be it drafting or growing a tree.
+
+Both refine what they find: plans of one attempt are each better than the one before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mrmg
+from mrmg.planning import PlannerParams
+from mrmg.planning.attempt import Attempt, attempt_plan, draft_plans, tree_plans
+from mrmg.planning.motion_tree import Problem
+from mrmg.planning.planner import state_mission
+
+SCENES = Path(__file__).parents[1] / "scenes"
+PARAMS = PlannerParams(samples=500)
+WAYS: tuple[Callable[..., Attempt], ...] = (draft_plans, tree_plans, attempt_plan)
+MISSIONS = ("quickstart", "station_needed", "polygon_regions", "blocks_only_r1")
+
+
+@cache
+def problem_of(name: str) -> Problem:
+    own = SCENES / f"{name}.yaml"
+    scene = mrmg.load_scene(own if own.exists() else name)
+    return state_mission(scene, 0, PARAMS)
+
+
+def attempted(way: Callable[..., Attempt], name: str, number: int = 0) -> Attempt:
+    return way(problem_of(name), 7, PARAMS, number, np.zeros(1, np.bool_))
+
+
+@pytest.fixture(params=WAYS, ids=lambda way: way.__name__)
+def way(request: pytest.FixtureRequest) -> Callable[..., Attempt]:
+    return request.param
+
+
+@pytest.mark.parametrize("name", MISSIONS)
+def test_plans_are_valid_and_each_better_than_the_last(
+    way: Callable[..., Attempt], name: str
+) -> None:
+    problem = problem_of(name)
+    plans = [plan for _, plan in attempted(way, name).plans]
+    assert plans
+    for plan in plans:
+        assert mrmg.verify(problem.scene, plan).violations == ()
+    for before, after in pairwise(plans):
+        assert problem.preference.rank(after) < problem.preference.rank(before)
+
+
+def digests(way: Callable[..., Attempt], number: int) -> list[str]:
+    found = attempted(way, "quickstart", number)
+    return [plan.digest for _, plan in found.plans]
+
+
+def test_an_attempt_is_a_function_of_its_number(way: Callable[..., Attempt]) -> None:
+    """Whatever was attempted in between."""
+    numbers = (0, 3, 1)
+    first = [digests(way, number) for number in numbers]
+    assert [digests(way, number) for number in reversed(numbers)] == first[::-1]
+
+
+def test_other_numbers_grow_other_trees() -> None:
+    assert digests(tree_plans, 0) != digests(tree_plans, 1)
+
+
+def test_halted_it_gives_nothing(way: Callable[..., Attempt]) -> None:
+    halt = np.ones(1, np.bool_)
+    found = way(problem_of("quickstart"), 7, PARAMS, 0, halt)
+    assert list(found.plans) == []
+
+
+def test_trees_are_grown_only_where_drafting_fails() -> None:
+    drafted = attempted(attempt_plan, "quickstart")
+    assert drafted.counts == {}
+    without = PlannerParams(samples=500, drafts=False)
+    halt = np.zeros(1, np.bool_)
+    grown = attempt_plan(problem_of("quickstart"), 7, without, 0, halt)
+    assert grown.counts["vertices"] > 1
