@@ -18,10 +18,20 @@ def make_plan(
     params: PlannerParams,
     trajectories: Sequence[Trajectory],
     tours: Mapping[str, tuple[str, ...]],
+    spare_share: float = 0.0,
 ) -> Plan | None:
     """Return the plan of trajectories, or None if exact accounting refuses it.
 
     Kernels meter terrain on a grid; the ledger uses the exact areas.
+
+    Args:
+        problem: the mission.
+        seed: of the search that the plan belongs to.
+        params: of that search.
+        trajectories: of all robots.
+        tours: targets each robot visits, in order.
+        spare_share: what batteries must keep above their reserves, as a share of their
+            capacities.
     """
     scene = problem.scene
     visits: list[Visit] = []
@@ -30,7 +40,8 @@ def make_plan(
         if len(own) < len(tours[trajectory.robot]):
             return None
         battery = scene.robot(trajectory.robot).battery
-        if battery_profile(scene, trajectory, own).min() < battery.reserve_J:
+        least_J = battery.reserve_J + spare_share * battery.capacity_J
+        if battery_profile(scene, trajectory, own).min() < least_J:
             return None
         visits += own
     ways = {item.robot: item.state[:, :2] for item in trajectories}

@@ -5,24 +5,33 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import product
 
 import numpy as np
 
 from mrmg import seeding
 from mrmg.mission import Plan
 from mrmg.planning.assembly import make_plan
-from mrmg.planning.drafting import draftable, drafts
+from mrmg.planning.drafting import draftable, drafts, path_cost_J
 from mrmg.planning.motion_tree import Problem, grow_tree
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.refine import refine
 from mrmg.planning.routers import route
+from mrmg.planning.routing import Routing
 
 MARGINS = (1.0, 0.0, 2.0)
 """Multiples of the route margin that successive trees are grown with."""
 
 
-SPREADS = (0.0, 0.03, 0.08, 0.05)
-"""Spread of the random factors on the roadmap's energies for successive drafts."""
+DRAWS = 4
+"""Tours drawn by each attempt after the first one."""
+
+SPREADS = (0.0, 0.04, 0.08, 0.12, 0.06)
+"""Spread of the random factors on the roadmap's energies for successive draws."""
+
+SURCHARGES = (0.0, 0.0, -0.06)
+"""Surcharge on the roadmap's energies for successive draws."""
 
 LEAST_GAIN = 0.001
 """Share of the objective that a refinement must save to be followed by another."""
@@ -105,31 +114,55 @@ def tree_plans(
 def draft_plans(
     problem: Problem, seed: int, params: PlannerParams, number: int, halt: np.ndarray
 ) -> Attempt:
-    """Drive straight along tours for energies that differ by chance.
+    """Drive straight along tours.
 
-    Those of the roadmap are not quite what driving takes, so that other tours may turn
-    out to be cheaper.
+    The first attempt takes the router's tours as they are; others the best of several
+    draws.
     """
     began = time.perf_counter()
-    problem = problem.with_margin(0.0)
-    draw = seeding.stream_seed(seed, "draft", number)
-    spread = SPREADS[number % len(SPREADS)]
-    shape = problem.mission.routing.cost.shape[1:]
-    noise = seeding.stream(seed, "costs", number).standard_normal(shape)
-    routing = problem.mission.routing
-    factor = np.exp(spread * noise)
-    routing = routing._replace(cost=routing.cost * factor, time=routing.time * factor)
-    tours = route(routing, params.router, draw)
+    choice = _drawn_tours(problem, seed, params, number)
     routing_s = time.perf_counter() - began
-    if not tours.feasible or halt[0]:
-        return Attempt(routing_s=routing_s)
-    plans: list[tuple[float, Plan]] = []
+    problem = problem.with_margin(0.0)
     preference = problem.preference
-    for hurried in (False, True):
-        if hurried and not (plans and preference.late_s(plans[-1][1])):
+    plans: list[tuple[float, Plan]] = []
+    for tours, hurried in product(choice, (False, True)):
+        if halt[0] or (plans and not preference.late_s(plans[-1][1])):
             break
+        if hurried and not plans:
+            continue
         pressed = replace(problem, hurried=hurried)
         for plan in drafts(pressed, params, tours, seed, halt):
             if not plans or preference.rank(plan) < preference.rank(plans[-1][1]):
                 plans.append((time.perf_counter(), plan))
     return Attempt(plans, routing_s)
+
+
+def _drawn_tours(
+    problem: Problem, seed: int, params: PlannerParams, number: int
+) -> list[Routing]:
+    """Return tours for energies that differ by chance, those that look best first.
+
+    The roadmap's energies are not quite what driving takes: it leads through the middle
+    of targets.
+    """
+    draws = range(number * DRAWS, (number + 1) * DRAWS)
+    if number == 0 or problem.preference.timed:
+        draws = draws[:1]
+    found: dict[tuple[tuple[int, ...], ...], Routing] = {}
+    for draw in draws:
+        surcharged = problem.with_margin(SURCHARGES[draw % len(SURCHARGES)])
+        routing = surcharged.mission.routing
+        noise = seeding.stream(seed, "costs", draw).standard_normal(
+            routing.cost.shape[1:]
+        )
+        factor = np.exp(SPREADS[draw % len(SPREADS)] * noise)
+        tours = route(
+            routing._replace(cost=routing.cost * factor, time=routing.time * factor),
+            params.router,
+            seeding.stream_seed(seed, "draft", draw),
+        )
+        if tours.feasible:
+            found.setdefault(tours.tours, tours)
+    if len(found) < 2:
+        return list(found.values())
+    return sorted(found.values(), key=partial(path_cost_J, problem))

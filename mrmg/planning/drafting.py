@@ -17,7 +17,7 @@ import numpy as np
 from mrmg.mission import Plan
 from mrmg.motion._kernels import CAR, UNICYCLE
 from mrmg.planning.assembly import make_plan
-from mrmg.planning.band import TRACKING_M, Path
+from mrmg.planning.band import TRACKING_M, Path, tightened
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.refine import Errand, run_errands, stays_somewhere, surfaces_of
@@ -28,6 +28,13 @@ SHARP = radians(110.0)
 
 PIVOT = radians(60.0)
 """Turn from which on a robot that can turns on the spot [rad]."""
+
+SPARE_SHARE = 0.02
+"""Share of a battery's capacity that drafts leave above its reserve: a robot may take a
+percent or two more than planned on slopes and in turns on the spot."""
+
+JUDGED_M = 4.0
+"""Distance of the nodes of paths that only tours are judged by."""
 
 DIRECTION_M = 4.0
 """How far before and after a target a way's direction is read."""
@@ -63,10 +70,9 @@ def drafts(
         seed: of the search that the plan belongs to.
         halt: shape (1,); drafting ends soon after it has turned true.
     """
-    finish = problem.mission.targets.finish
     errands = []
     for r, surface in enumerate(surfaces_of(problem)):
-        tour = [*routing.tours[r], *([int(finish[r])] if finish[r] >= 0 else [])]
+        tour = whole_tour(problem, routing, r)
         errands.append(Errand(tour, tour_path(problem, r, tour), surface))
     names = [target.id for target in problem.scene.targets()]
     tours = {
@@ -74,9 +80,26 @@ def drafts(
         for robot, tour in zip(problem.scene.robots, routing.tours, strict=True)
     }
     for trajectories in run_errands(problem, params, errands, halt):
-        plan = make_plan(problem, seed, params, trajectories, tours)
+        plan = make_plan(problem, seed, params, trajectories, tours, SPARE_SHARE)
         if plan is not None:
             yield plan
+
+
+def path_cost_J(problem: Problem, routing: Routing) -> float:
+    """Return what driving along tours takes by paths drawn tight, of few nodes [J]."""
+    plain = problem.mission.fleet["plain"]
+    total = 0.0
+    for r, surface in enumerate(surfaces_of(problem)):
+        path = tour_path(problem, r, whole_tour(problem, routing, r))
+        _, cost_m = tightened(problem.mission.targets, surface, path, (JUDGED_M,))
+        total += cost_m * float(plain[r])
+    return total
+
+
+def whole_tour(problem: Problem, routing: Routing, r: int) -> list[int]:
+    """Return robot r's targets; where it must end comes last."""
+    finish = int(problem.mission.targets.finish[r])
+    return [*routing.tours[r], *([finish] if finish >= 0 else [])]
 
 
 def tour_path(problem: Problem, r: int, tour: Sequence[int]) -> Path:
