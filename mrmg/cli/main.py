@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -13,6 +14,9 @@ from mrmg.errors import ExitCode, MrmgError
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it."""
 
+MOST_NEW_OBJECTS = 50_000
+"""New objects after which there is a search for garbage."""
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line `arguments` (those of the process if None).
@@ -21,6 +25,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code; errors are told on stderr, by their message alone.
     """
     options = make_parser().parse_args(arguments)
+    # What imports make stays: to search it for garbage again and again takes a tenth of
+    # the time of a short command.
+    gc.set_threshold(MOST_NEW_OBJECTS)
     try:
         code = options.command(options)
         sys.stdout.flush()

@@ -21,6 +21,8 @@ turns round, the way back is not charged; that is worth less than 0.01 mm.
 from __future__ import annotations
 
 import math
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,13 +86,19 @@ def exact_routing(problem: RoutingArrays) -> Routing | None:
     fleet = np.full(1 << len(goal_list), np.inf)
     fleet[0] = 0.0
     ways, shares = [], []
-    for r in range(len(problem.energy)):
-        way = RobotWays(problem, r, goal_list)
-        if not way.complete:
-            return None
-        fleet, share = _bound_kernels.join_robot(fleet, way.cost)
-        ways.append(way)
-        shares.append(share)
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as threads:
+        found = [
+            threads.submit(RobotWays, problem, r, goal_list)
+            for r in range(len(problem.energy))
+        ]
+        for future in found:
+            way = future.result()
+            if not way.complete:
+                threads.shutdown(cancel_futures=True)
+                return None
+            fleet, share = _bound_kernels.join_robot(fleet, way.cost)
+            ways.append(way)
+            shares.append(share)
     mask = len(fleet) - 1
     if not np.isfinite(fleet[mask]):
         return Routing(tuple(() for _ in ways), math.inf)
