@@ -83,6 +83,11 @@ class Film:
     def reading(self, tick: int) -> Reading:
         """Return what the panel says at a tick."""
         goals = {goal.id for goal in self.scene.goals}
+        broken_down = {
+            event.robot
+            for event in self.log.events
+            if event.cause == "fault" and event.time_s <= self.log.time_s[tick]
+        }
         return Reading(
             time_s=float(self.log.time_s[tick]),
             used_J=float(self.used_J[tick]),
@@ -98,6 +103,7 @@ class Film:
                     charge=float(curve.energy_J[tick]) / capacity_J,
                     speed_m_s=round(float(state[tick, 3]), 1) + 0.0,
                     heading_for=_next_target(self.plan, curve, tick),
+                    broken_down=curve.robot in broken_down,
                 )
                 for curve, state, capacity_J in zip(
                     self.curves, self.log.state, self.capacity_J, strict=True

@@ -26,12 +26,20 @@ class RobotReading:
         charge: battery content over capacity.
         speed_m_s: signed speed.
         heading_for: label of the next target; "" after the last.
+        broken_down: whether it will not move any more.
     """
 
     robot: str
     charge: float
     speed_m_s: float
     heading_for: str
+    broken_down: bool = False
+
+    def way(self, towards: str) -> str:
+        """Return where the robot is going, after the word for towards."""
+        if self.broken_down:
+            return "broken down"
+        return f"{towards} {self.heading_for}" if self.heading_for else "tour done"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -180,7 +188,7 @@ class Panel:
         pen.text(
             (left + self._px(20), middle), robot.id, font=text, fill=_TEXT, anchor="lm"
         )
-        way = f"→ {reading.heading_for}" if reading.heading_for else "tour done"
+        way = reading.way("→")
         pen.text((left + self._px(84), middle), way, font=text, fill=_TEXT, anchor="lm")
         pen.text(
             (right - self._px(14), middle),

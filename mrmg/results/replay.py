@@ -86,8 +86,8 @@ def spoken(scene: Scene, reading: Reading) -> tuple[str, list[tuple[str, str]]]:
     )
     lines = []
     for robot in reading.robots:
-        way = f"to {robot.heading_for}" if robot.heading_for else "tour done"
-        words = f"{100.0 * robot.charge:.0f} %, {robot.speed_m_s:.1f} m/s, {way}"
+        going = f"{robot.speed_m_s:.1f} m/s, {robot.way('to')}"
+        words = f"{100.0 * robot.charge:.0f} %, {going}"
         lines.append((robot.robot, words))
     return mission, lines
 

@@ -72,3 +72,18 @@ def test_the_legend_names_obstacles_for_some_robots_where_there_are_any(
         scene = make_scene(obstacles=[{**box, **blocks}])
         drawn = Panel(scene, (330, 720), 8.0, 720).draw(reading())
         assert (count(drawn, color) > 100) is shown
+
+
+@pytest.mark.parametrize(
+    ("heading_for", "broken_down", "told"),
+    [("g1", False, "to g1"), ("", False, "tour done"), ("g1", True, "broken down")],
+)
+def test_a_robot_s_way_is_told(heading_for: str, broken_down: bool, told: str) -> None:
+    robot = RobotReading(
+        robot="r1",
+        charge=0.5,
+        speed_m_s=0.0,
+        heading_for=heading_for,
+        broken_down=broken_down,
+    )
+    assert robot.way("to") == told
