@@ -136,7 +136,9 @@ def _kernel_cache() -> Finding:
             ok=False,
             cure="set NUMBA_CACHE_DIR to a folder that can be written",
         )
-    state = "filled" if kernels_are_compiled() else "empty; the first run compiles"
+    state = (
+        "filled" if kernels_are_compiled() else "incomplete; the next planning compiles"
+    )
     return Finding(name="kernel cache", found=f"{folder} ({state})")
 
 
