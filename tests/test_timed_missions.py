@@ -98,6 +98,20 @@ def test_a_time_limit_is_kept_by_dearer_plans() -> None:
     assert verify(errands(time_limit=LONGEST_S), timely).ok
 
 
+def test_attempts_that_were_late_are_followed_by_hastier_tours() -> None:
+    """The roadmap does not see how long turns on the spot take."""
+    document = load_scene("diffdrive").document
+    free = scene_from_document(document, source="diffdrive")
+    cheap = plan_mission(free, seed=0, params=QUICK).plan
+    assert cheap is not None
+    limit_s = round(0.93 * cheap.makespan_s, 1)
+    scene = scene_from_document({**document, "time_limit": limit_s}, source="limited")
+    plan = plan_mission(scene, seed=0, params=QUICK).plan
+    assert plan is not None
+    assert verify(scene, plan).ok
+    assert plan.makespan_s <= limit_s
+
+
 def test_a_limit_below_the_bound_is_proven_impossible() -> None:
     bound_s = planned(0, objective="makespan").statistics["bound_s"]
     result = planned(0, time_limit=bound_s - 0.1)

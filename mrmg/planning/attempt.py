@@ -33,6 +33,10 @@ SPREADS = (0.0, 0.04, 0.08, 0.12, 0.06)
 SURCHARGES = (0.0, 0.0, -0.06)
 """Surcharge on the roadmap's energies for successive draws."""
 
+LIMITS = (1.0, 0.95, 0.85, 0.7)
+"""Shares of the time limit that successive tours may take: driving takes longer than
+the roadmap says where robots turn much or get in each other's way."""
+
 LEAST_GAIN = 0.001
 """Share of the objective that a refinement must save to be followed by another."""
 
@@ -68,6 +72,7 @@ def attempt_plan(
         number: of the attempt; each has its own random streams.
         halt: shape (1,); the attempt ends soon after it has turned true.
     """
+    problem = problem.with_limit(LIMITS[number % len(LIMITS)])
     drafted = Attempt()
     if params.drafts and draftable(problem):
         drafted = draft_plans(problem, seed, params, number, halt)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from math import cos, radians, sin
+from math import cos, pi, radians, sin
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from mrmg.planning.routing import Routing
 
 SHARP = radians(110.0)
 """Turn at a target from which on a car goes on in its other gear [rad]."""
+
+ROOMY = (pi, radians(150.0))
+"""The same where time counts, as far as there is room to turn round."""
 
 PIVOT = radians(60.0)
 """Turn from which on a robot that can turns on the spot [rad]."""
@@ -61,7 +64,8 @@ def drafts(
 ) -> Iterator[Plan]:
     """Yield plans along tours, in the order found; none if driving them fails.
 
-    The first one is driven without regard to braking.
+    The first one is driven without regard to braking. Where time counts, cars turn
+    round rather than change gear, as they are slower backwards, if there is room.
 
     Args:
         problem: the mission.
@@ -70,19 +74,27 @@ def drafts(
         seed: of the search that the plan belongs to.
         halt: shape (1,); drafting ends soon after it has turned true.
     """
-    errands = []
-    for r, surface in enumerate(surfaces_of(problem)):
-        tour = whole_tour(problem, routing, r)
-        errands.append(Errand(tour, tour_path(problem, r, tour), surface))
+    surfaces = surfaces_of(problem)
+    stops = [whole_tour(problem, routing, r) for r in range(len(surfaces))]
     names = [target.id for target in problem.scene.targets()]
     tours = {
         robot.id: tuple(names[t] for t in tour)
         for robot, tour in zip(problem.scene.robots, routing.tours, strict=True)
     }
-    for trajectories in run_errands(problem, params, errands, halt):
-        plan = make_plan(problem, seed, params, trajectories, tours, SPARE_SHARE)
-        if plan is not None:
-            yield plan
+    timed = problem.hurried or problem.preference.objective.makespan_weight > 0.0
+    for sharp in (*ROOMY, SHARP) if timed else (SHARP,):
+        errands = [
+            Errand(tour, tour_path(problem, r, tour, sharp), surfaces[r])
+            for r, tour in enumerate(stops)
+        ]
+        found = False
+        for trajectories in run_errands(problem, params, errands, halt):
+            plan = make_plan(problem, seed, params, trajectories, tours, SPARE_SHARE)
+            if plan is not None:
+                found = True
+                yield plan
+        if found or halt[0]:
+            return
 
 
 def path_cost_J(problem: Problem, routing: Routing) -> float:
@@ -102,11 +114,19 @@ def whole_tour(problem: Problem, routing: Routing, r: int) -> list[int]:
     return [*routing.tours[r], *([finish] if finish >= 0 else [])]
 
 
-def tour_path(problem: Problem, r: int, tour: Sequence[int]) -> Path:
+def tour_path(
+    problem: Problem, r: int, tour: Sequence[int], sharp: float = SHARP
+) -> Path:
     """Return the way of the roadmap along robot r's tour.
 
     A car changes gear at a target where its way turns sharply; a robot that can turns
     on the spot there.
+
+    Args:
+        problem: the mission.
+        r: robot.
+        tour: numbers of its targets.
+        sharp: turn from which on a car changes gear [rad].
     """
     vertices, ends = tour_vertices(problem, r, tour)
     node = problem.roadmap.arrays.vertex[vertices]
@@ -128,7 +148,7 @@ def tour_path(problem: Problem, r: int, tour: Sequence[int]) -> Path:
         pivots = [at for at, turn in turns if turn > PIVOT]
         return replace(path, pivot=np.array(pivots, np.int64))
     for at, turn in turns:
-        if turn > SHARP:
+        if turn > sharp:
             path.gear[at:] *= -1
     return path
 

@@ -82,6 +82,12 @@ class Problem:
             ),
         )
 
+    def with_limit(self, share: float) -> Problem:
+        """Return the problem with routes that take a share of the time limit."""
+        routing = self.mission.routing
+        shorter = routing._replace(limit=share * routing.limit)
+        return replace(self, mission=self.mission._replace(routing=shorter))
+
 
 def state_problem(
     scene: Scene, world: World, roadmap: Roadmap, params: PlannerParams

@@ -13,6 +13,10 @@ from mrmg.planning.roadmap import Roadmap
 from mrmg.planning.targets import finish_of
 from mrmg.scene.types import Scene
 
+TIE_SHARE = 0.01
+"""Worth of a second of driving, in seconds of makespan: among tours that are over as
+soon, those of less energy are better."""
+
 
 class Times(NamedTuple):
     """The part of a routing problem that is about time; see `RoutingArrays`.
@@ -67,14 +71,18 @@ def routing_times(
         time[r] = pace[r] * to[:places, here].T + dwell[:places]
         if finish >= 0:
             finish_time[r] = pace[r] * to[finish, here]
-    # Weights in the proportion wanted, of the size that energy alone would have.
     objective = preference.objective
-    size = objective.energy_weight + objective.makespan_weight
+    power_W = float((fleet["plain"] * fleet["limit"][:, 1]).mean())
+    energy_weight = max(
+        objective.energy_weight, TIE_SHARE * objective.makespan_weight / power_W
+    )
+    # Of the size that the weights have where energy alone counts.
+    size = energy_weight + objective.makespan_weight
     return Times(
         time=time,
         finish_time=finish_time,
         limit=np.full(robots, preference.limit_s),
         charge_power=fleet["charge"] - fleet["energy"][:, CONSUMERS_W],
-        energy_weight=objective.energy_weight / size,
+        energy_weight=energy_weight / size,
         makespan_weight=objective.makespan_weight / size,
     )

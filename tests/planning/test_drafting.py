@@ -49,6 +49,44 @@ def test_a_car_backs_out_of_a_target_that_lies_at_a_sharp_turn(
     assert len(path.pivot) == 0
 
 
+OUT_AND_BACK = {
+    "goals": [
+        {"id": "g1", "circle": {"center": [24, 10], "radius": 1.5}},
+        {"id": "g2", "circle": {"center": [4, 10], "radius": 1.5}},
+    ],
+    "robots": [{"id": "r1", "model": "car", "pose": [19, 10, 0]}],
+}
+
+
+def reversing_s(plan: Plan) -> float:
+    return sum(float((t.state[:, 3] < -0.1).sum()) * t.dt_s for t in plan.trajectories)
+
+
+def test_where_time_counts_cars_turn_round_if_there_is_room(
+    yard: Callable[..., Scene],
+) -> None:
+    cheap = drafted(yard(**OUT_AND_BACK))[-1]
+    scene = yard(**OUT_AND_BACK, objective="makespan")
+    soon = drafted(scene)[-1]
+    assert mrmg.verify(scene, soon).ok
+    assert reversing_s(cheap) > 5.0
+    assert reversing_s(soon) < 1.0
+    assert soon.makespan_s < cheap.makespan_s
+
+
+def test_where_time_counts_cars_back_out_of_what_is_too_narrow(
+    yard: Callable[..., Scene],
+) -> None:
+    walls = [
+        {"box": {"center": [18, y], "size": [22, 1]}, "id": f"w{y}"} for y in (7, 13)
+    ]
+    scene = yard(**OUT_AND_BACK, obstacles=walls, objective="makespan")
+    plans = drafted(scene)
+    assert plans
+    assert mrmg.verify(scene, plans[-1]).ok
+    assert reversing_s(plans[-1]) > 3.0
+
+
 def test_halted_it_gives_nothing(yard: Callable[..., Scene]) -> None:
     problem = state_mission(yard(), 0, PARAMS)
     tours = route(problem.mission.routing, PARAMS.router, 0)
