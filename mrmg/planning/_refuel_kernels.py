@@ -115,29 +115,40 @@ def add_label(label, row, n, cost, time, origin, station, draw, rate):
 
 @leaf_kernel
 def recharge(legs, labels, r, end, place, row):
-    """Lead the ways of a row, to a place, on to each station by the cheapest hops."""
+    """Lead the ways of a row, to a place, on to each station by the cheapest hops.
+
+    Where time does not count, only the cheapest way to each station is kept.
+    """
     stations = legs.hop.shape[1]
+    timed = labels.full.shape[1] > 1
     for e in range(stations):
         labels.fulls[row * stations + e] = 0
     for f in range(stations):
         s = legs.goals + f
         leg = legs.cost[r, place, s] if end == 0 else legs.cost[r, s, place]
         time = legs.time[r, place, s] if end == 0 else legs.time[r, s, place]
+        cheapest = np.inf
         for k in range(labels.ways[row]):
             drawn = labels.way[row, k, DRAW] + leg
             if drawn > legs.robot[r, USABLE] * (1.0 + ROUNDING):
                 continue
             cost = labels.way[row, k, COST] + leg
+            if cost >= cheapest and not timed:
+                continue
+            cheapest = cost
             begun = labels.way[row, k, TIME] + time + labels.way[row, k, RATE] * drawn
             for e in range(stations):
                 hop = legs.hop[r, f, e] if end == 0 else legs.hop[r, e, f]
+                at = row * stations + e
+                n = labels.fulls[at]
+                if hop == np.inf:
+                    continue
+                if not timed and n > 0 and labels.full[at, 0, COST] <= cost + hop:
+                    continue
                 late = legs.hop_time[r, f, e] if end == 0 else legs.hop_time[r, e, f]
-                if hop < np.inf:
-                    at = row * stations + e
-                    n = labels.fulls[at]
-                    labels.fulls[at] = add_label(
-                        labels.full, at, n, cost + hop, begun + late, k, f, leg, leg
-                    )
+                labels.fulls[at] = add_label(
+                    labels.full, at, n, cost + hop, begun + late, k, f, leg, leg
+                )
 
 
 @leaf_kernel
@@ -235,7 +246,24 @@ def route_value(legs, cost, time, longest):
 
 
 @leaf_kernel
-def value_with(legs, labels, r, front, a, goal, b, back, longest):
+def least_rest(legs, labels, r, goal, b, back):
+    """Return the least energy from a goal to the end of a route, by the place behind.
+
+    What the way to the goal has drawn is left out.
+    """
+    stations = legs.hop.shape[1]
+    least = np.inf
+    for s in range(-1, stations):
+        leg = legs.cost[r, goal, b if s < 0 else legs.goals + s]
+        at = back * stations + s
+        for j in range(labels.ways[back] if s < 0 else labels.fulls[at]):
+            rest = labels.way[back, j, COST] if s < 0 else labels.full[at, j, COST]
+            least = min(least, leg + rest)
+    return least
+
+
+@leaf_kernel
+def value_with(legs, labels, r, front, a, goal, b, back, longest, ceiling):
     """Return the value of a route with one more goal; inf if it cannot be driven.
 
     Args:
@@ -244,10 +272,13 @@ def value_with(legs, labels, r, front, a, goal, b, back, longest):
         goal: the goal.
         b, back: the place behind it, and its row.
         longest: as of `route_value`.
+        ceiling: values that are not below it count as inf.
     """
     stations = legs.hop.shape[1]
     usable, limit = legs.robot[r, USABLE], legs.robot[r, LIMIT]
-    best = np.inf
+    weight = legs.energy_weight
+    least = least_rest(legs, labels, r, goal, b, back)
+    best, worth = np.inf, ceiling
     for f in range(-1, stations):
         place = a if f < 0 else legs.goals + f
         leg, time = legs.cost[r, place, goal], legs.time[r, place, goal]
@@ -263,7 +294,7 @@ def value_with(legs, labels, r, front, a, goal, b, back, longest):
                 cost = labels.full[at, k, COST] + leg
                 begun = labels.full[at, k, TIME] + time
                 draw = leg
-            if draw > usable:
+            if draw > usable or weight * (cost + least) >= worth:
                 continue
             for s in range(-1, stations):
                 place = b if s < 0 else legs.goals + s
@@ -280,10 +311,12 @@ def value_with(legs, labels, r, front, a, goal, b, back, longest):
                         rate = legs.robot[r, CHARGE_TIME]
                         rest = labels.full[on, j, COST]
                         late = labels.full[on, j, TIME]
+                    if weight * (cost + leg_on + rest) >= worth:
+                        continue
                     late += begun + time_on + rate * drawn
                     value = route_value(legs, cost + leg_on + rest, late, longest)
-                    if value < best and drawn <= usable and late <= limit:
-                        best = value
+                    if value < worth and drawn <= usable and late <= limit:
+                        best = worth = value
     return best
 
 

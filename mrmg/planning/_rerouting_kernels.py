@@ -7,7 +7,11 @@ import numpy as np
 from mrmg.compilation import kernel, leaf_kernel
 from mrmg.planning._mission_kernels import leg_energy, look_ahead
 from mrmg.planning._nrpa_kernels import RoutingArrays
-from mrmg.planning._routing_kernels import solve_routing
+from mrmg.planning._routes_kernels import add_absent, new_routes
+from mrmg.planning._routing_kernels import improve_routes, solve_routing
+
+AGAIN_SHARE = 0.2
+"""Share of the rounds that searching on from the tours so far takes."""
 
 
 @leaf_kernel
@@ -21,8 +25,27 @@ def elapsed(tree, v, dt):
 
 
 @kernel
-def route_from(mission, tree, v, random, tour, length):
-    """Solve the routing problem from a vertex; return the cost [J]."""
+def read_rest(tree, tours, v, routes):
+    """Write what is left of a vertex's tours into empty routes, without stations."""
+    row = tree.tour[v]
+    seen = tree.visited[v].copy()
+    for r in range(tree.position.shape[1]):
+        for p in range(tree.position[v, r], tours.length[row, r]):
+            goal = tours.target[row, r, p]
+            if goal < len(seen) and not seen[goal]:
+                routes.goal[r, routes.length[r]] = goal
+                routes.length[r] += 1
+                seen[goal] = True
+    add_absent(~tree.visited[v], seen, routes)
+
+
+@kernel
+def route_from(mission, tree, tours, v, random, tour, length):
+    """Solve the routing problem from a vertex; return the cost [J].
+
+    The search goes on from the rest of the vertex's tours. Without rounds of search, as
+    the paper has it, NRPA draws new ones.
+    """
     problem, params = mission.routing, mission.params
     robots, _, n_targets = problem.cost.shape
     cost = problem.cost.copy()
@@ -64,6 +87,11 @@ def route_from(mission, tree, v, random, tour, length):
         problem.energy_weight,
         problem.makespan_weight,
     )
+    if params.rounds > 0:
+        routes = new_routes(robots, problem.goals)
+        read_rest(tree, tours, v, routes)
+        rounds = int(AGAIN_SHARE * params.rounds)
+        return improve_routes(now, routes, rounds, random, tour, length)
     return solve_routing(
         now,
         params.levels,

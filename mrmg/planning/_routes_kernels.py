@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel, leaf_kernel
+from mrmg.planning._pool_kernels import pool_route
 from mrmg.planning._random_kernels import random_unit
 from mrmg.planning._refuel_kernels import label_route, route_value, row_of, value_with
 
@@ -52,6 +53,16 @@ def new_routes(robots, goals):
 
 
 @leaf_kernel
+def add_absent(open_goal, seen, routes):
+    """Write goals that are to be visited but were not seen on any route as absent."""
+    absent = len(routes.length) - 1
+    for g in range(len(open_goal)):
+        if open_goal[g] and not seen[g]:
+            routes.goal[absent, routes.length[absent]] = g
+            routes.length[absent] += 1
+
+
+@leaf_kernel
 def copy_routes(source, copy, changed):
     """Copy those routes that have changed, and the absent goals."""
     robots = len(changed) - 1
@@ -67,8 +78,8 @@ def copy_routes(source, copy, changed):
 
 
 @leaf_kernel
-def update(legs, routes, labels):
-    """Bring labels and costs of changed routes up to date."""
+def update(legs, routes, labels, pool):
+    """Bring labels and costs of changed routes up to date, and pool those routes."""
     end = legs.cost.shape[1] - 1
     for r in range(len(routes.length) - 1):
         n = routes.length[r]
@@ -81,6 +92,7 @@ def update(legs, routes, labels):
         routes.known[r, COST] = cost
         routes.known[r, TIME] = time
         routes.known[r, LABEL] = label
+        pool_route(pool, r, goal, n, cost)
         place = end
         direct = 0.0
         for i in range(n):
@@ -144,7 +156,9 @@ def put_goal(legs, routes, labels, goal, random, blink):
             if random_unit(random) < blink:
                 continue
             front, back = row_of(legs, r, 0, i), row_of(legs, r, 1, n - i)
-            value = value_with(legs, labels, r, front, a, goal, b, back, longest)
+            value = value_with(
+                legs, labels, r, front, a, goal, b, back, longest, best + before
+            )
             if value - before < best:
                 best = value - before
                 robot, place = r, i

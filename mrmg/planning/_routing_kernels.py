@@ -13,13 +13,15 @@ import numpy as np
 
 from mrmg.compilation import kernel, leaf_kernel
 from mrmg.planning._legs_kernels import new_legs
-from mrmg.planning._nrpa_kernels import nrpa
+from mrmg.planning._nrpa_kernels import goals_to_visit, nrpa
+from mrmg.planning._pool_kernels import combine, new_pool
 from mrmg.planning._random_kernels import random_unit
 from mrmg.planning._refuel_kernels import new_labels, write_tour
 from mrmg.planning._routes_kernels import (
     COST,
     IMPOSSIBLE,
     LABEL,
+    add_absent,
     copy_routes,
     new_routes,
     objective,
@@ -43,21 +45,29 @@ SWAPS = 0.15
 HOT, COLD = 0.3, 0.003
 """First and last temperature of the search, as shares of a goal's mean cost."""
 
+POOLED_HOT, POOLED_COLD = 5.0, 0.5
+"""The same where routes are pooled: to meet many of them is what counts there."""
+
+ROUNDS_PER_GOAL = 50
+"""Rounds are at most so many for each goal there is to visit."""
+
 
 @kernel
-def search(legs, routes, labels, near, rounds, random):
+def search(legs, routes, labels, near, pool, rounds, random):
     """Improve routes by ruin and recreate with simulated annealing; keep the best.
 
     Before the first round, routes that cannot be driven are emptied, and absent goals
-    put where they fit.
+    put where they fit. At the end routes the search has met are combined anew.
     """
     robots, goals = len(routes.length) - 1, routes.goal.shape[1]
+    pooled = pool.cost.shape[1] > 1
+    first, last = (POOLED_HOT, POOLED_COLD) if pooled else (HOT, COLD)
     present, best = new_routes(robots, goals), new_routes(robots, goals)
     gone, home = np.zeros(goals, np.int64), np.zeros(goals, np.int64)
     key = np.zeros(goals)
     value = best_value = np.inf
     hot = 0.0
-    update(legs, routes, labels)
+    update(legs, routes, labels, pool)
     for k in range(rounds + 1):
         if k > 0 and robots > 1 and random_unit(random) < SWAPS:
             gone[:] = 0
@@ -69,21 +79,21 @@ def search(legs, routes, labels, near, rounds, random):
                 for i in range(routes.length[r]):
                     gone[routes.goal[r, i]] = routes.known[r, COST] == np.inf
         remove_goals(routes, gone)
-        update(legs, routes, labels)
+        update(legs, routes, labels, pool)
         order_absent(legs, routes, random, key)
         n = routes.length[robots]
         routes.length[robots] = 0
         for i in range(n):
             goal = routes.goal[robots, i]
             if put_goal(legs, routes, labels, goal, random, BLINK if k > 0 else 0.0):
-                update(legs, routes, labels)
+                update(legs, routes, labels, pool)
             else:
                 routes.goal[robots, routes.length[robots]] = goal
                 routes.length[robots] += 1
         found = objective(legs, routes)
         if k == 0:
-            hot = HOT * (found - IMPOSSIBLE * routes.length[robots]) / max(1, goals)
-        warmth = hot * (COLD / HOT) ** (k / (rounds + 1))
+            hot = first * (found - IMPOSSIBLE * routes.length[robots]) / max(1, goals)
+        warmth = hot * (last / first) ** (k / (rounds + 1))
         if k == 0 or found < value - warmth * log(1.0 - random_unit(random)):
             value = found
             copy_routes(routes, present, routes.changed)
@@ -93,17 +103,18 @@ def search(legs, routes, labels, near, rounds, random):
                 copy_routes(routes, best, routes.changed)
         else:
             copy_routes(present, routes, routes.changed)
-            update(legs, routes, labels)
+            update(legs, routes, labels, pool)
         routes.changed[:] = 0
     routes.changed[:] = 1
     copy_routes(best, routes, routes.changed)
-    update(legs, routes, labels)
+    combine(pool, routes)
+    update(legs, routes, labels, pool)
 
 
 @leaf_kernel
 def read_playout(problem, sequence, moves, routes, seen):
     """Turn the moves of a playout into routes; what it has not `seen` is absent."""
-    robots, _, targets = problem.cost.shape
+    targets = problem.cost.shape[2]
     for k in range(moves):
         r = sequence[k] // targets
         t = sequence[k] % targets
@@ -111,10 +122,7 @@ def read_playout(problem, sequence, moves, routes, seen):
             routes.goal[r, routes.length[r]] = t
             routes.length[r] += 1
             seen[t] = True
-    for g in range(problem.goals):
-        if problem.open_goal[g] and not seen[g]:
-            routes.goal[robots, routes.length[robots]] = g
-            routes.length[robots] += 1
+    add_absent(problem.open_goal, seen, routes)
 
 
 @kernel
@@ -140,11 +148,23 @@ def solve_routing(
     sequence = np.zeros(3 * goals + 4 * robots, np.int64)
     _, moves = nrpa(problem, levels, iterations, alpha, random, sequence)
     read_playout(problem, sequence, moves, routes, np.zeros(goals, np.int64))
+    return improve_routes(problem, routes, rounds, random, tour, tour_length)
+
+
+@kernel
+def improve_routes(problem, routes, rounds, random, tour, tour_length):
+    """Search from given routes on and write the best tours found; return their energy.
+
+    Args:
+        problem, rounds, random, tour, tour_length: as of `solve_routing`.
+        routes: to begin with; those that cannot be driven are mended.
+    """
     legs = new_legs(problem)
     labels = new_labels(legs)
-    near = np.zeros((goals, goals))
+    near = np.zeros((problem.goals, problem.goals))
     round_trips(problem, near)
-    search(legs, routes, labels, near, rounds, random)
+    rounds = min(rounds, ROUNDS_PER_GOAL * goals_to_visit(problem))
+    search(legs, routes, labels, near, new_pool(problem), rounds, random)
     return write_tours(legs, routes, labels, tour, tour_length)
 
 

@@ -291,7 +291,13 @@ def insert(mission, tree, tours, n, n_tours, target, event, random, counts):
     if n_tours == len(tours.target) or goals_left(tree, n) == 0:
         return enough, n_tours
     cost = route_from(
-        mission, tree, n, random, tours.target[n_tours], tours.length[n_tours]
+        mission,
+        tree,
+        tours,
+        n,
+        random,
+        tours.target[n_tours],
+        tours.length[n_tours],
     )
     counts[ROUTER_CALLS] += 1
     if cost >= IMPOSSIBLE:

@@ -30,7 +30,8 @@ class RouterParams:
         levels: nesting levels of NRPA.
         iterations: iterations of each level.
         alpha: step of the policy adaptation.
-        rounds: rounds of ruin and recreate; 0 leaves the order NRPA found.
+        rounds: most rounds of ruin and recreate, fewer if there are few goals; 0 leaves
+            the order NRPA found.
     """
 
     method: str = "search"

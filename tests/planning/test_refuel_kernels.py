@@ -13,6 +13,8 @@ from mrmg.planning._nrpa_kernels import RoutingArrays
 from mrmg.planning._refuel_kernels import (
     label_route,
     new_labels,
+    row_of,
+    value_with,
     write_tour,
 )
 from mrmg.planning.routing import routing_arrays
@@ -102,3 +104,29 @@ def test_without_stations_a_route_is_drivable_or_not() -> None:
             assert cost == np.inf
         else:
             assert (cost, tour) == (expected, [0, 1])
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_one_more_goal_is_worth_what_the_longer_route_costs(
+    mission: Callable, seed: int
+) -> None:
+    problem = mission(seed, goals=5, stations=3, range_m=(50.0, 120.0))
+    legs = new_legs(problem)
+    labels = new_labels(legs)
+    end = legs.cost.shape[1] - 1
+    route = (0, 1, 2, 3)
+    label_route(legs, labels, 0, np.array(route), len(route), 0, 0)
+    for place in range(len(route) + 1):
+        a = route[place - 1] if place > 0 else end
+        b = route[place] if place < len(route) else end
+        front = row_of(legs, 0, 0, place)
+        back = row_of(legs, 0, 1, len(route) - place)
+        cost, _ = refuelled(problem, (*route[:place], 4, *route[place:]))
+
+        def with_goal(ceiling: float, where: tuple = (front, a, 4, b, back)) -> float:
+            return value_with(legs, labels, 0, *where, 0.0, ceiling)
+
+        assert with_goal(np.inf) == pytest.approx(cost)
+        if cost < np.inf:
+            assert with_goal(cost + 1.0) == pytest.approx(cost)
+            assert with_goal(cost - 1.0) == np.inf
