@@ -316,20 +316,6 @@ def test_a_goal_beyond_the_battery_has_an_infinite_bound(yard: Yard) -> None:
     assert lower_bound_J(yard(battery={"capacity_m": 30})) < math.inf
 
 
-def test_more_obstacles_do_not_lower_the_bound() -> None:
-    scene = load_scene(str(SCENES / "quickstart.yaml"))
-    bounds = []
-    for count in range(len(scene.document["obstacles"]) + 1):
-        obstacles = scene.document["obstacles"][:count]
-        fewer = scene_from_document(
-            {**scene.document, "obstacles": obstacles}, source="fewer"
-        )
-        bounds.append(lower_bound_J(fewer))
-    for before, after in zip(bounds, bounds[1:], strict=False):
-        assert after >= before * (1.0 - DISCRETISATION)
-    assert bounds[-1] > bounds[0]
-
-
 @pytest.mark.parametrize("turned", [False, True])
 def test_moving_a_scene_changes_little(yard: Yard, turned: bool) -> None:
     """Moved by a fraction of a cell, or turned by a quarter."""

@@ -27,7 +27,7 @@ SCENES = Path(__file__).parents[1] / "scenes"
 PARAMS = PlannerParams(samples=300, improvements=0)
 
 FEW = settings(
-    max_examples=6,
+    max_examples=4,
     deadline=None,
     derandomize=True,
     phases=(Phase.explicit, Phase.generate),
