@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from functools import cache
 
 import numpy as np
@@ -151,7 +152,8 @@ def _load_kernels() -> None:
     _find_in_smallest(tree_plans)
     draft_smallest()
     bound_smallest()
-    note_kernels_are_compiled()
+    with suppress(OSError):  # without a cache that can be written, plan all the same
+        note_kernels_are_compiled()
 
 
 def grow_smallest() -> None:
