@@ -10,7 +10,6 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import shapely
-import trimesh
 from shapely.geometry import Polygon
 
 from mrmg.execution import palette
@@ -232,12 +231,36 @@ def _add_drawn_mesh(
         ]
     )
     vertices, faces = np.unique(corners, axis=0, return_inverse=True)
-    solid = trimesh.creation.extrude_triangulation(
-        vertices, faces.reshape(-1, 3), height_m
-    )
+    sides = _extruded(vertices, faces.reshape(-1, 3), height_m)
     # Shared corners would make MuJoCo smooth the edges away.
-    solid.unmerge_vertices()
-    _add_mesh(spec, name, solid.vertices, solid.faces)
+    _add_mesh(spec, name, sides.reshape(-1, 3), np.arange(3 * len(sides)))
+
+
+def _extruded(points: np.ndarray, faces: np.ndarray, height_m: float) -> np.ndarray:
+    """Return the corners of the outward triangles round an upright solid, (n, 3, 3).
+
+    Args:
+        points: on the ground [m], shape (k, 2).
+        faces: triangles of its base, counter-clockwise, whole side to whole side,
+            shape (m, 3).
+        height_m: of the solid.
+    """
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    _, place, uses = np.unique(
+        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    # An edge of a single triangle is one of the outline.
+    start, end = edges[place[uses == 1]].T
+    low = np.insert(points, 2, 0.0, axis=1)
+    high = np.insert(points, 2, height_m, axis=1)
+    return np.concatenate(
+        [
+            low[faces[:, ::-1]],
+            high[faces],
+            np.stack([low[start], low[end], high[end]], axis=1),
+            np.stack([low[start], high[end], high[start]], axis=1),
+        ]
+    )
 
 
 def _add_mesh(

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -82,7 +83,8 @@ def mission(job: Job) -> Row:
 
 @cache
 def _warm(source: str) -> None:
-    """Set the controllers of a scene's robots up, once a process."""
+    """Import what drives, and set the controllers of a scene up, once a process."""
+    import_module("mrmg.execution.simulation")
     for robot in mrmg.load_scene(source).robots:
         controller_maker("mpc")(robot.model)
 
