@@ -161,7 +161,12 @@ def _station_closure(problem: RoutingArrays, r: int) -> tuple[np.ndarray, np.nda
 
 
 def lower_bound_J(
-    scene: Scene, *, step_s: float = 0.1, cells: int = CELLS, rounds: int = ROUNDS
+    scene: Scene,
+    *,
+    step_s: float = 0.1,
+    cells: int = CELLS,
+    rounds: int = ROUNDS,
+    finer: int = FINER,
 ) -> float:
     """Return an energy [J] that no plan of a mission undercuts.
 
@@ -171,6 +176,7 @@ def lower_bound_J(
         cells: cells of the grid on which ways are bounded; more bring the bound nearer
             to the truth.
         rounds: how often the ways of the cheapest tours are tightened; as `cells`.
+        finer: parts into which cells are cut for that; as `cells`.
 
     Returns:
         The bound, at least 0; inf if the mission is proven to have no solution.
@@ -182,7 +188,7 @@ def lower_bound_J(
     if routing is None:
         bound = relaxed_routing_J(relaxed.problem)
     elif routing.feasible and rounds:
-        ways = relaxed.arc_ways()
+        ways = relaxed.arc_ways(finer)
         bound = touring_bound_J(
             relaxed.problem, routing.tours, ways, relaxed.price, rounds=rounds
         )
@@ -253,13 +259,16 @@ class Relaxation:
         )
         return Relaxation(scene, step_s, problem, keys, ways, np.array(price))
 
-    def arc_ways(self) -> list[ArcWays]:
-        """Return the ways of each robot between arcs; robots share what is equal."""
+    def arc_ways(self, finer: int = FINER) -> list[ArcWays]:
+        """Return the ways of each robot between arcs; robots share what is equal.
+
+        Cells are cut into `finer` parts along each side.
+        """
         found = {}
         for key, robot in zip(self.keys, self.scene.robots, strict=True):
             if key not in found:
                 ways = self.ways[key]
-                cell_m = ways.ground.cell_m / FINER
+                cell_m = ways.ground.cell_m / finer
                 fine = _ground(self.scene, robot, cell_m, self.step_s)
                 found[key] = ArcWays.of(ways, fine, _starts(self.scene))
         return [found[key] for key in self.keys]

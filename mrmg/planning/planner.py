@@ -19,7 +19,7 @@ from mrmg.compilation import (
 from mrmg.errors import Fault, SceneError, UsageError
 from mrmg.mission import PlanResult, PlanStatus
 from mrmg.planning.attempt import Attempt, attempt_plan, draft_plans, tree_plans
-from mrmg.planning.bound import lower_bound_J
+from mrmg.planning.bound import FINER, lower_bound_J
 from mrmg.planning.feasibility import proof_of_infeasibility
 from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.haste import priced_world, with_energies
@@ -232,11 +232,18 @@ def unjoined_goals(scene: Scene, roadmap: Roadmap) -> list[str]:
     ]
 
 
-def bounds_of(scene: Scene, step_s: float) -> Bounds:
-    """Return what no plan of a mission undercuts, as far as its objective needs it."""
+def bounds_of(scene: Scene, step_s: float, *, finer: int = FINER) -> Bounds:
+    """Return what no plan of a mission undercuts, as far as its objective needs it.
+
+    Args:
+        scene: the mission.
+        step_s: time step of the plans.
+        finer: parts into which cells are cut; more take longer and bring the bound
+            nearer to the truth.
+    """
     energy_J = makespan_s = None
     if scene.objective.energy_weight:
-        energy_J = lower_bound_J(scene, step_s=step_s)
+        energy_J = lower_bound_J(scene, step_s=step_s, finer=finer)
     if scene.objective.makespan_weight:
         makespan_s = makespan_bound_s(scene, step_s=step_s)
     return Bounds(energy_J=energy_J, makespan_s=makespan_s)

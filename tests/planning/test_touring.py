@@ -207,5 +207,6 @@ def test_touching_a_goal_beside_the_way_is_paid_for() -> None:
             leg = np.hypot(*(points[:, None] - to[None]).transpose(2, 0, 1))
             cost, points = (cost[:, None] + leg).min(axis=0), to
         exact_m = min(exact_m, float(cost.min()))
-    assert coarse_m < touring_m <= exact_m + 1e-3
+    finer_m = lower_bound_J(scene, finer=7) / joules
+    assert coarse_m < touring_m <= finer_m <= exact_m + 1e-3
     assert touring_m >= 0.97 * exact_m
