@@ -33,6 +33,9 @@ SPREADS = (0.0, 0.04, 0.08, 0.12, 0.06)
 SURCHARGES = (0.0, 0.0, -0.06)
 """Surcharge on the roadmap's energies for successive draws."""
 
+TIMED_SURCHARGES = (0.06, 0.0, 0.12)
+"""The same where the makespan counts: who brakes hard and turns round needs more."""
+
 LIMITS = (1.0, 0.95, 0.85, 0.7)
 """Shares of the time limit that successive tours may take: driving takes longer than
 the roadmap says where robots turn much or get in each other's way."""
@@ -153,9 +156,11 @@ def _drawn_tours(
     draws = range(number * DRAWS, (number + 1) * DRAWS)
     if number == 0 or problem.preference.timed:
         draws = draws[:1]
+    timed = problem.preference.objective.makespan_weight > 0.0
+    surcharges = TIMED_SURCHARGES if timed else SURCHARGES
     found: dict[tuple[tuple[int, ...], ...], Routing] = {}
     for draw in draws:
-        surcharged = problem.with_margin(SURCHARGES[draw % len(SURCHARGES)])
+        surcharged = problem.with_margin(surcharges[draw % len(surcharges)])
         routing = surcharged.mission.routing
         noise = seeding.stream(seed, "costs", draw).standard_normal(
             routing.cost.shape[1:]
