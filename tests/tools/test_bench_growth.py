@@ -1,0 +1,51 @@
+"""The bench of growth, on a tiny series."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import bench_growth
+import pytest
+import shapely
+from bench_growth import Case
+
+from mrmg.scene.loading import scene_from_document
+
+TINY = [Case(series="robots", size=n, robots=n, goals=3, stations=3) for n in (1, 2)]
+
+
+@pytest.mark.parametrize("boxes", [12, 200])
+def test_maps_cover_the_same_share(boxes: int) -> None:
+    scene = scene_from_document(bench_growth.drawn_map(boxes, 0), source="test")
+    shapes = [shapely.Polygon(wall.shape.exterior) for wall in scene.obstacles]
+    assert len(shapes) == boxes
+    share = sum(shape.area for shape in shapes) / bench_growth.SIDE_M**2
+    assert share == pytest.approx(bench_growth.COVERED, rel=0.01)
+    assert shapely.unary_union(shapes).area == pytest.approx(share * 1e4)
+    assert bench_growth.drawn_map(boxes, 0) != bench_growth.drawn_map(boxes, 1)
+
+
+def test_every_case_has_its_numbers() -> None:
+    for case in TINY:
+        document = bench_growth.document_of(case, 0)
+        placed = [len(document[part]) for part in ("robots", "goals", "stations")]
+        assert placed == [case.robots, case.goals, case.stations]
+
+
+@pytest.mark.slow
+def test_rows_and_figure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output, figure = tmp_path / "rows.jsonl", tmp_path / "growth.svg"
+    arguments = ["bench_growth", "--series", "robots", "--seeds", "1"]
+    arguments += ["--output", str(output), "--figure", str(figure)]
+    monkeypatch.setattr(sys, "argv", arguments)
+    monkeypatch.setattr(bench_growth, "SERIES", {"robots": TINY})
+    assert bench_growth.main() == 0
+    rows = [json.loads(line) for line in output.read_text().splitlines()]
+    assert [row["size"] for row in rows] == [1, 2]
+    assert all(row["ok"] and row["time_s"]["first_solution"] > 0.0 for row in rows)
+    assert "time to the first plan" in figure.read_text()
+    assert "robots | 2 | 0 | yes" in capsys.readouterr().out

@@ -1,0 +1,250 @@
+"""Measure how the time of planning grows with a mission; draw it, write JSONL.
+
+Protocol: one process, one thread, kernels compiled and loaded before anything is timed.
+A map is a square with boxes at drawn places and headings; `mrmg scene populate` places
+robots, goals and stations on it, and the mission is planned until there is a first
+plan, with one seed for map, places and planner. One number grows at a time, the others
+stay: 4 robots, 20 goals, 6 stations and 50 boxes on 100 x 100 m. The boxes of a map
+cover 12 % of it, however many there are, and stations grow with the goals, one for each
+4. Large fleets (16 robots with 64 goals and 20 stations, 32 with 128 and 40) are placed
+on the map of scene6, 100 x 100 m as well. Times are wall-clock, of planning in process;
+a plan counts if the verifier finds nothing wrong with it. Memory is the process's peak
+so far.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+from bench import conditions
+from shapely import affinity
+
+import mrmg
+from mrmg import seeding
+from mrmg.authoring import populate
+from mrmg.errors import UsageError
+from mrmg.planning import PlannerParams, plan_mission
+from mrmg.planning.planner import compile_kernels
+from mrmg.results.growth_figure import GrowthPoint, draw_growth
+from mrmg.scene.loading import scene_from_document
+
+SIDE_M = 100.0
+COVERED = 0.12
+"""Share of a drawn map that its boxes cover."""
+
+APART_M = 3.6
+"""Least distance of boxes from each other and from the edge: a road's width."""
+
+GOALS_PER_STATION = 4
+"""Where goals grow; the others' missions have 20 goals and 6 stations."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """A mission to be generated.
+
+    Attributes:
+        series: what grows.
+        size: of it.
+        robots, goals, stations: how many.
+        boxes: of a drawn map; None for the map of scene6.
+    """
+
+    series: str
+    size: int
+    robots: int = 4
+    goals: int = 20
+    stations: int = 6
+    boxes: int | None = 50
+
+
+SERIES = {
+    "robots": [Case(series="robots", size=n, robots=n) for n in (1, 2, 4, 8, 16)],
+    "goals": [
+        Case(series="goals", size=n, goals=n, stations=max(4, n // GOALS_PER_STATION))
+        for n in (5, 10, 20, 40, 80)
+    ],
+    "obstacles": [
+        Case(series="obstacles", size=n, boxes=n) for n in (12, 25, 50, 100, 200)
+    ],
+    "large": [
+        Case(series="large", size=r, robots=r, goals=g, stations=s, boxes=None)
+        for r, g, s in ((16, 64, 20), (32, 128, 40))
+    ],
+}
+
+
+def main() -> int:
+    """Measure all chosen series; return 1 if a mission has no verified plan."""
+    options = parse_options()
+    chosen = [case for name in options.series for case in SERIES[name]]
+    rows = measure(chosen, range(options.seeds), options.most)
+    if options.output:
+        text = "".join(json.dumps(row, sort_keys=True) + "\n" for row in rows)
+        options.output.write_text(text)
+    if options.figure:
+        draw(rows, options.figure)
+    return 0 if all(row["ok"] for row in rows) else 1
+
+
+def parse_options() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, prog="tools/bench_growth")
+    parser.add_argument("--series", nargs="+", default=list(SERIES), choices=SERIES)
+    parser.add_argument("--seeds", type=int, default=3, help="default 3: 0, 1 and 2")
+    parser.add_argument("--most", type=int, help="leave out larger sizes")
+    parser.add_argument("--output", type=Path, help="JSONL file, one line a mission")
+    parser.add_argument("--figure", type=Path, help="PDF, SVG or PNG")
+    return parser.parse_args()
+
+
+def measure(
+    cases: Sequence[Case], seeds: Sequence[int], most: int | None = None
+) -> list[dict[str, Any]]:
+    """Plan all cases with all seeds; print a table and return its rows."""
+    print(f"{__doc__}\n{conditions(argparse.Namespace(budget=None))}\n")
+    compile_kernels()
+    plan_mission(mrmg.load_scene("quickstart"))  # the first mission loads much
+    print("grows | size | seed | ok | init s | router s | first plan s | cost J | MB")
+    rows = []
+    for case in cases:
+        for seed in seeds if most is None or case.size <= most else ():
+            rows.append(planned(case, seed))
+            print(table_row(rows[-1]), flush=True)
+    return rows
+
+
+def planned(case: Case, seed: int) -> dict[str, Any]:
+    """Generate, plan and verify one mission; return its row."""
+    scene = scene_from_document(document_of(case, seed), source=f"{case}")
+    params = replace(PlannerParams(), improvements=0)
+    began = time.perf_counter()
+    result = plan_mission(scene, seed=seed, params=params)
+    row = {
+        "series": case.series,
+        "size": case.size,
+        "seed": seed,
+        "robots": case.robots,
+        "goals": case.goals,
+        "stations": case.stations,
+        "obstacles": len(scene.obstacles),
+        "status": result.status.value,
+        "reason": result.reason,
+        "plan_s": time.perf_counter() - began,
+        "time_s": dict(result.statistics["time_s"]),
+        "conditions": conditions(argparse.Namespace(budget=None)),
+        "ok": False,
+    }
+    if result.plan is not None:
+        row["ok"] = mrmg.verify(scene, result.plan).ok
+        row["cost_J"] = result.plan.cost_J
+    row["memory_MB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    return row
+
+
+def table_row(row: dict[str, Any]) -> str:
+    """Return one line of the table."""
+    first_s = row["time_s"].get("first_solution", np.nan)
+    return (
+        f"{row['series']} | {row['size']} | {row['seed']} | "
+        f"{'yes' if row['ok'] else row['status']} | {row['time_s']['init']:.3f} | "
+        f"{row['time_s'].get('routing', np.nan):.3f} | {first_s:.3f} | "
+        f"{row.get('cost_J', np.nan):.0f} | {row['memory_MB']:.0f}"
+    )
+
+
+def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
+    """Draw the series that grow."""
+    series: dict[str, list[GrowthPoint]] = {}
+    for row in rows:
+        if row["series"] != "large":
+            first_s = row["time_s"]["first_solution"] if row["ok"] else None
+            points = series.setdefault(row["series"], [])
+            points.append(GrowthPoint(row["size"], first_s))
+    if series:
+        draw_growth(series, path)
+        print(path)
+
+
+def document_of(case: Case, seed: int) -> dict[str, Any]:
+    """Return the scene of a case: a map, populated.
+
+    Places are drawn anew, with other seeds, while a mission cannot do with them.
+    """
+    if case.boxes is None:
+        bare = mrmg.load_scene("scene6").document
+    else:
+        bare = drawn_map(case.boxes, seed)
+    for again in range(20):
+        try:
+            return populate(
+                bare,
+                robots=case.robots,
+                goals=case.goals,
+                stations=case.stations,
+                seed=seed + 1000 * again,
+            )
+        except UsageError as error:
+            refused = error
+    raise refused
+
+
+def drawn_map(boxes: int, seed: int) -> dict[str, Any]:
+    """Return a square map with boxes at drawn places."""
+    rng = seeding.stream(seed, "growth", boxes)
+    side_m = SIDE_M * sqrt(COVERED / boxes)
+    placed: list[Any] = []
+    found = list(_free_boxes(rng, boxes, side_m, placed))
+    return {
+        "format": 1,
+        "name": f"{boxes} boxes, seed {seed}",
+        "bounds": [0, 0, SIDE_M, SIDE_M],
+        "obstacles": found,
+    }
+
+
+def _free_boxes(
+    rng: np.random.Generator, boxes: int, side_m: float, placed: list[Any]
+) -> Iterator[dict[str, Any]]:
+    """Yield boxes that leave roads between each other, narrower if there is no room."""
+    apart_m, tries = APART_M, 0
+    while len(placed) < boxes:
+        ratio = float(rng.uniform(0.6, 1.6))
+        size = (side_m * sqrt(ratio), side_m / sqrt(ratio))
+        yaw = float(rng.uniform(0.0, np.pi / 2.0))
+        centre = rng.uniform(0.0, SIDE_M, 2)
+        box = affinity.rotate(
+            shapely.box(-size[0] / 2.0, -size[1] / 2.0, size[0] / 2.0, size[1] / 2.0),
+            yaw,
+            use_radians=True,
+        )
+        box = affinity.translate(box, *centre)
+        inside = shapely.box(0.0, 0.0, SIDE_M, SIDE_M).buffer(-apart_m).contains(box)
+        tries += 1
+        if tries % 2000 == 0:
+            apart_m *= 0.8
+        if inside and all(box.distance(other) >= apart_m for other in placed):
+            placed.append(box)
+            yield {
+                "id": f"box{len(placed)}",
+                "box": {
+                    "center": [round(float(x), 3) for x in centre],
+                    "size": [round(x, 3) for x in size],
+                    "yaw": round(yaw, 4),
+                },
+            }
+
+
+if __name__ == "__main__":
+    sys.exit(main())
