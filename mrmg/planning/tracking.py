@@ -9,6 +9,7 @@ import numpy as np
 
 from mrmg.energy import EFFECTIVE_MASS_KG, ROLLING_N
 from mrmg.mission import Trajectory
+from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning import _tracking_kernels
 from mrmg.planning._tracking_kernels import Courses
 from mrmg.planning.band import Path
@@ -24,6 +25,11 @@ LEAST_STEPS = 400
 
 COASTING_SHARE = 0.95
 """Share of rolling resistance's deceleration that robots slow down with."""
+
+TURNING_SHARE = 0.3
+"""The same for robots that turn by their wheels' speeds: nearly without traction one
+wheel would push in a turn and the other one brake, which takes up to a tenth more than
+planned."""
 
 HARD_SHARE = 0.9
 """Share of the largest deceleration that robots in a hurry brake with."""
@@ -224,7 +230,8 @@ def _decelerations(problem: Problem) -> np.ndarray:
     ground = float(problem.mission.terrain.multiplier.min())
     fleet = problem.mission.fleet
     mass = np.maximum(fleet["energy"][:, EFFECTIVE_MASS_KG], 1e-9)
-    rolling = COASTING_SHARE * ground * fleet["energy"][:, ROLLING_N] / mass
+    share = np.where(fleet["model"] == UNICYCLE, TURNING_SHARE, COASTING_SHARE)
+    rolling = share * ground * fleet["energy"][:, ROLLING_N] / mass
     hardest = fleet["limit"][:, 3]
     braking = HARD_SHARE * hardest
     eased = np.clip(rolling, 0.1 * hardest, braking)
