@@ -9,9 +9,16 @@ import numpy as np
 import pytest
 
 import mrmg
+from mrmg.accounting import battery_profile
 from mrmg.mission import Plan
 from mrmg.planning import PlannerParams
-from mrmg.planning.drafting import draftable, drafts, tour_path
+from mrmg.planning.drafting import (
+    SPARE_SHARE,
+    draftable,
+    drafts,
+    path_cost_J,
+    tour_path,
+)
 from mrmg.planning.planner import state_mission
 from mrmg.planning.routers import route
 from mrmg.scene.types import Scene
@@ -33,6 +40,25 @@ def test_drafts_are_valid_plans_and_the_same_again(name: str) -> None:
     for plan in plans:
         assert mrmg.verify(scene, plan).violations == ()
     assert [plan.digest for plan in drafted(scene)] == [plan.digest for plan in plans]
+
+
+@pytest.mark.parametrize("name", ["quickstart", "hills"])
+def test_drafts_leave_something_of_every_battery(name: str) -> None:
+    scene = mrmg.load_scene(name)
+    for plan in drafted(scene):
+        for trajectory in plan.trajectories:
+            battery = scene.robot(trajectory.robot).battery
+            visits = [one for one in plan.visits if one.robot == trajectory.robot]
+            least_J = battery_profile(scene, trajectory, visits).min()
+            assert least_J >= battery.reserve_J + SPARE_SHARE * battery.capacity_J
+
+
+def test_tours_are_judged_nearly_by_what_driving_takes() -> None:
+    scene = mrmg.load_scene("quickstart")
+    problem = state_mission(scene, 0, PARAMS)
+    tours = route(problem.mission.routing, PARAMS.router, 0)
+    best_J = min(plan.cost_J for plan in drafted(scene))
+    assert 0.9 * best_J < path_cost_J(problem, tours) < 1.02 * best_J
 
 
 def test_a_car_backs_out_of_a_target_that_lies_at_a_sharp_turn(
