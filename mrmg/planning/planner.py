@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
+import threading
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import cache
 
@@ -30,7 +32,7 @@ from mrmg.planning.preference import TIME_MARGIN_S, Preference
 from mrmg.planning.roadmap import Roadmap, build_roadmap
 from mrmg.planning.routing import Routing
 from mrmg.planning.search import OnImprovement, Progress, Search
-from mrmg.planning.statistics import Bounds, Statistics
+from mrmg.planning.statistics import UNKNOWN, Bounds, Statistics
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.objective import overtime_s
 from mrmg.scene.types import Scene
@@ -62,9 +64,8 @@ def plan_mission(
             whatever the number of workers, unless `params.budget_s` ends the search.
         params: parameters; the default profile's if None.
         workers: threads that grow trees.
-        with_bound: bound what the objective asks of all plans, too, beside the search
-            once there is a plan; statistics then hold `bound_J` or `bound_s`, and
-            `gap`.
+        with_bound: bound what the objective asks of all plans, too, beside the search;
+            statistics of a plan then hold `bound_J` or `bound_s`, and `gap`.
         on_progress: told how far planning has got.
         on_improvement: told of every plan that is better than all before it.
 
@@ -82,19 +83,10 @@ def plan_mission(
     compile_kernels()
     statistics = Statistics()
     own = Frame.of(scene).scene(scene)
-    problem = state_mission(own, seed, params)
-    statistics.time_s["init"] = statistics.elapsed()
-    tell(0.1, "roadmap built")
-
     preference = Preference.of(scene)
-    bounding: list[Future[None]] = []
 
     def state_bound() -> None:
         statistics.bounds = bounds_of(own, params.dt_s)
-
-    def begin_bound() -> None:
-        if with_bound:
-            bounding.append(beside.submit(state_bound))
 
     def attempt(number: int, halt: np.ndarray) -> Attempt:
         found = attempt_plan(problem, seed, params, number, halt)
@@ -104,7 +96,13 @@ def plan_mission(
     def proof() -> str | None:
         return proof_of_infeasibility(scene) or proof_of_lateness(own, params.dt_s)
 
-    with ThreadPoolExecutor(1) as beside:
+    with ThreadPoolExecutor(1, initializer=_give_way) as beside:
+        bounding = beside.submit(state_bound) if with_bound else None
+        _load_kernels(trees=not params.drafts)
+        statistics.begin()
+        problem = state_mission(own, seed, params)
+        statistics.time_s["init"] = statistics.elapsed()
+        tell(0.1, "roadmap built")
         search = Search(
             attempt=attempt,
             params=params,
@@ -112,13 +110,12 @@ def plan_mission(
             workers=workers,
             on_progress=tell,
             on_improvement=on_improvement or (lambda improvement: None),
-            on_first=begin_bound,
             proof=proof,
             preference=preference,
         )
         best = search.run()
-        for future in bounding:
-            future.result()
+        if best is not None and bounding is not None:
+            bounding.result()
     if best is not None:
         return PlanResult(
             status=PlanStatus.SOLVED,
@@ -126,6 +123,7 @@ def plan_mission(
             reason="",
             statistics=statistics.as_dict(),
         )
+    statistics.bounds = UNKNOWN  # they are bounds of plans
     return PlanResult(
         status=PlanStatus.INFEASIBLE if proof() else PlanStatus.TIMEOUT,
         plan=None,
@@ -135,25 +133,41 @@ def plan_mission(
 
 
 def compile_kernels(on_progress: Callable[[int], None] | None = None) -> None:
-    """Compile or load every kernel, so that no time limit or figure includes it.
+    """Compile every kernel that this machine does not hold compiled.
 
     Args:
         on_progress: told the number of kernels compiled so far, while there are any to
             compile, which happens once for these sources.
     """
-    if not kernels_are_compiled():
-        calls = (grow_smallest, draft_smallest, bound_smallest)
-        compile_in_processes(calls, on_progress or (lambda number: None))
-    _load_kernels()
-
-
-@cache
-def _load_kernels() -> None:
-    _find_in_smallest(tree_plans)
-    draft_smallest()
+    if kernels_are_compiled():
+        return
+    calls = (grow_smallest, draft_smallest, bound_smallest)
+    compile_in_processes(calls, on_progress or (lambda number: None))
+    _load_kernels(trees=True)
     bound_smallest()
     with suppress(OSError):  # without a cache that can be written, plan all the same
         note_kernels_are_compiled()
+
+
+@cache
+def _load_kernels(*, trees: bool) -> None:
+    """Load the kernels of planning, so that no time limit or figure includes it.
+
+    Those of trees take as long as all others; few missions need them where there are
+    drafts, and load them then.
+    """
+    draft_smallest()
+    if trees:
+        _find_in_smallest(tree_plans)
+
+
+def _give_way() -> None:
+    """Leave the processors to other threads; so do all threads that this one starts."""
+    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
+
+
+_NICENESS = 5
+"""Of the bound, on the system's scale: planning goes on three times as fast."""
 
 
 def grow_smallest() -> None:

@@ -16,9 +16,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components, dijkstra
-from scipy.spatial import cKDTree
 
 from mrmg.planning import _roadmap_kernels
 from mrmg.planning._roadmap_kernels import RoadmapArrays
@@ -31,6 +28,7 @@ from mrmg.world.world import World
 
 if TYPE_CHECKING:
     import networkx as nx
+    from scipy.sparse import csr_array
 
 BUCKET_M = 4.0
 
@@ -119,6 +117,8 @@ def build_roadmap(
         margin_m: distance robots keep from obstacles.
         rng: source of the samples.
     """
+    from scipy.sparse import csr_array  # takes its time, which the bound can use
+
     classes, class_of_robot = travel_classes(scene, world, margin_m)
     vertex = _vertices(scene, world, classes, samples, rng)
     first, second = _candidate_edges(vertex, neighbours)
@@ -192,6 +192,8 @@ def _entries(scene: Scene, graph: csr_array, vertex: np.ndarray) -> list[np.ndar
     That is the target's own vertex, and where a region reaches across a wall, those of
     its vertices that are cut off from it.
     """
+    from scipy.sparse.csgraph import connected_components
+
     _, part = connected_components(graph, directed=False)
     entries = []
     for t, region in enumerate(planned_regions(scene)):
@@ -214,6 +216,9 @@ def _cost_to_go(
     graph: csr_array, entries: list[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return each target's cost and successor for all vertices, (T, V)."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import dijkstra
+
     against = csr_array(graph.T)
     shape = (len(entries), graph.shape[0])
     cost, successor = np.empty(shape), np.empty(shape, np.int32)
@@ -327,6 +332,8 @@ def _field_at(space: FreeSpace, points: np.ndarray) -> np.ndarray:
 def _candidate_edges(
     vertex: np.ndarray, neighbours: int
 ) -> tuple[np.ndarray, np.ndarray]:
+    from scipy.spatial import cKDTree
+
     k = min(neighbours + 1, len(vertex))
     _, index = cKDTree(vertex).query(vertex, k=k)
     first = np.repeat(np.arange(len(vertex)), k)

@@ -42,7 +42,6 @@ class Search:
         statistics: receives counts, times and improvements.
         workers: threads.
         on_progress, on_improvement: told how it goes.
-        on_first: called when the first plan has been found.
         proof: asked, once an attempt has failed, why the mission has no solution; None
             if that is not known.
         preference: what plans are compared by.
@@ -56,7 +55,6 @@ class Search:
     workers: int
     on_progress: Progress
     on_improvement: OnImprovement
-    on_first: Callable[[], object]
     proof: Callable[[], str | None]
     preference: Preference = field(default_factory=Preference)
     best: Plan | None = None
@@ -127,7 +125,6 @@ class Search:
             return False
         if self.best is None:
             self.statistics.time_s["first_solution"] = time_s
-            self.on_first()
         elif self.preference.rank(plan) >= self.preference.rank(self.best):
             return True
         self.best = plan

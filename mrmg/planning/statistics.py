@@ -94,6 +94,10 @@ class Statistics:
     bounds: Bounds = UNKNOWN
     started: float = field(default_factory=time.perf_counter)
 
+    def begin(self) -> None:
+        """Have planning begin now, and not when this was made."""
+        self.started = time.perf_counter()
+
     def elapsed(self) -> float:
         """Return the time since planning began [s]."""
         return time.perf_counter() - self.started

@@ -41,7 +41,6 @@ def search(
         workers=workers,
         on_progress=lambda fraction, text: None,
         on_improvement=more.get("on_improvement", lambda improvement: None),
-        on_first=more.get("on_first", lambda: None),
         proof=lambda: None,
     )
 
