@@ -97,7 +97,10 @@ def plan_mission(
         return proof_of_infeasibility(scene) or proof_of_lateness(own, params.dt_s)
 
     with ThreadPoolExecutor(1, initializer=_give_way) as beside:
-        bounding = beside.submit(state_bound) if with_bound else None
+        bounding = None
+        if with_bound:
+            bound_smallest()  # what holds the interpreter's lock first
+            bounding = beside.submit(state_bound)
         _load_kernels(trees=not params.drafts)
         statistics.begin()
         problem = state_mission(own, seed, params)
@@ -183,9 +186,10 @@ def draft_smallest() -> None:
     _find_in_smallest(draft_plans)
 
 
+@cache
 def bound_smallest() -> None:
     """Bound the energy and the makespan of the smallest mission."""
-    scene, _ = _smallest_mission()
+    scene = _smallest_scene()
     lower_bound_J(scene, cells=50)
     makespan_bound_s(scene, cells=50)
 
@@ -203,6 +207,12 @@ def _find_in_smallest(find: Callable[..., Attempt]) -> None:
 
 @cache
 def _smallest_mission() -> tuple[Scene, Problem]:
+    scene = _smallest_scene()
+    return scene, state_mission(Frame.of(scene).scene(scene), 0, SMALL_PARAMS)
+
+
+@cache
+def _smallest_scene() -> Scene:
     """Return the smallest mission there is: types do not depend on a scene's size."""
     document = {
         "format": 1,
@@ -212,8 +222,7 @@ def _smallest_mission() -> tuple[Scene, Problem]:
         "battery": {"capacity_m": 100},
         "robots": [{"id": "r", "model": "car", "pose": [6, 5, 0]}],
     }
-    scene = scene_from_document(document, source="smallest mission")
-    return scene, state_mission(Frame.of(scene).scene(scene), 0, SMALL_PARAMS)
+    return scene_from_document(document, source="smallest mission")
 
 
 def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
