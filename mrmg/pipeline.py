@@ -46,6 +46,7 @@ def run(
     out: Path | None = None,
     budget_s: float | None = None,
     trees: int | None = None,
+    spare: float | None = None,
     workers: int = 1,
     profile: str = "default",
     controller: str = "mpc",
@@ -65,6 +66,9 @@ def run(
         out: the run folder; `default_folder` if None.
         budget_s: wall-clock limit of planning; None for none.
         trees: number of motion trees to grow; None for the profile's.
+        spare: share of every battery's capacity that plans leave above the reserve
+            where they can, for robots that take more than modelled; None for the
+            profile's.
         workers: threads that grow them.
         profile: "default" or "paper".
         controller: name of the tracking controller.
@@ -89,6 +93,7 @@ def run(
         profile=profile,
         budget_s=budget_s,
         trees=trees,
+        spare=spare,
         workers=workers,
         controller=controller,
         disturb=None if disturb is None else written_out(disturb),

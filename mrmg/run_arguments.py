@@ -43,6 +43,8 @@ class RunArguments:
         profile: "default" or "paper".
         budget_s: wall-clock limit of planning; None for none.
         trees: number of motion trees to grow; None for the profile's.
+        spare: share of every battery's capacity that plans leave above the reserve
+            where they can; None for the profile's.
         workers: threads that grow them; without a time limit they decide nothing.
         controller: name of the tracking controller.
         disturb: specification of the disturbances driven under; None for none.
@@ -56,6 +58,7 @@ class RunArguments:
     profile: str = "default"
     budget_s: float | None = None
     trees: int | None = None
+    spare: float | None = None
     workers: int = 1
     controller: str = "mpc"
     disturb: str | None = None

@@ -81,6 +81,7 @@ class Run:
                 self.arguments.profile,
                 self.arguments.budget_s,
                 self.arguments.trees,
+                self.arguments.spare,
             ],
             Step.EXECUTE: [
                 self.arguments.controller,
@@ -162,7 +163,10 @@ def _plan(run: Run) -> Write:
         run.scene,
         seed=arguments.seed,
         params=profile_params(
-            arguments.profile, budget_s=arguments.budget_s, trees=arguments.trees
+            arguments.profile,
+            budget_s=arguments.budget_s,
+            trees=arguments.trees,
+            spare=arguments.spare,
         ),
         workers=arguments.workers,
         with_bound=True,

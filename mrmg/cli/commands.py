@@ -29,6 +29,7 @@ def run(options: argparse.Namespace) -> int:
             out=options.out,
             budget_s=options.budget,
             trees=options.trees,
+            spare=options.spare,
             workers=options.workers,
             profile=options.profile,
             disturb=options.disturb,
@@ -74,6 +75,7 @@ def plan(options: argparse.Namespace) -> int:
         profile=options.profile,
         budget_s=options.budget,
         trees=options.trees,
+        spare=options.spare,
         workers=options.workers,
     )
     with folder.opened_for_writing(), terminal.progress() as told:

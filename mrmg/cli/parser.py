@@ -108,6 +108,13 @@ def _add_planning(verb: argparse.ArgumentParser) -> None:
         help="go on improving for so many motion trees: the same plan every time",
     )
     verb.add_argument(
+        "--spare",
+        type=values.share,
+        metavar="SHARE",
+        help="of every battery's capacity, left above the reserve where that can be; "
+        "default 0.1",
+    )
+    verb.add_argument(
         "--workers",
         type=values.count,
         default=1,

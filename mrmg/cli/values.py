@@ -49,6 +49,19 @@ def time(text: str) -> float:
     return 0.0 if text.strip() in {"0", "0.0"} else positive(text)
 
 
+def share(text: str) -> float:
+    """Read a share: a number of at least 0 and less than 1."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value < 1.0:
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a share: a number of at least 0 and less than 1"
+        )
+    return value
+
+
 def objective(text: str) -> str | dict[str, float]:
     """Read an objective: a name, or weights of energy and makespan such as 1:50."""
     if text in ("energy", "makespan"):

@@ -18,7 +18,6 @@ def make_plan(
     params: PlannerParams,
     trajectories: Sequence[Trajectory],
     tours: Mapping[str, tuple[str, ...]],
-    spare_share: float = 0.0,
 ) -> Plan | None:
     """Return the plan of trajectories, or None if exact accounting refuses it.
 
@@ -30,8 +29,6 @@ def make_plan(
         params: of that search.
         trajectories: of all robots.
         tours: targets each robot visits, in order.
-        spare_share: what batteries must keep above their reserves, as a share of their
-            capacities.
     """
     scene = problem.scene
     visits: list[Visit] = []
@@ -40,7 +37,7 @@ def make_plan(
         if len(own) < len(tours[trajectory.robot]):
             return None
         battery = scene.robot(trajectory.robot).battery
-        least_J = battery.reserve_J + spare_share * battery.capacity_J
+        least_J = battery.reserve_J + problem.spare * battery.capacity_J
         if battery_profile(scene, trajectory, own).min() < least_J:
             return None
         visits += own

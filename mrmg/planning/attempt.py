@@ -13,7 +13,7 @@ import numpy as np
 from mrmg import seeding
 from mrmg.mission import Plan
 from mrmg.planning.assembly import make_plan
-from mrmg.planning.drafting import draftable, drafts, path_cost_J
+from mrmg.planning.drafting import LEAST_SPARE, draftable, drafts, path_cost_J
 from mrmg.planning.motion_tree import Problem, grow_tree
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.refine import refine
@@ -23,6 +23,10 @@ from mrmg.planning.routing import Routing
 MARGINS = (1.0, 0.0, 2.0)
 """Multiples of the route margin that successive trees are grown with."""
 
+
+SPARES = ((1.0, 0.0), (1.0, 0.0), (0.0,))
+"""Multiples of the spare charge that successive trees are grown with: the next one
+where there are no tours that leave so much."""
 
 DRAWS = 4
 """Tours drawn by each attempt after the first one."""
@@ -66,7 +70,7 @@ def attempt_plan(
     """Draw tours and find a plan along them; a function of seed and number alone.
 
     Tours are drafted first (`drafting`); where that is not possible or fails, a tree
-    grows along tours of its own.
+    grows along tours of its own. Batteries keep `params.spare` if that can be.
 
     Args:
         problem: the mission.
@@ -76,13 +80,21 @@ def attempt_plan(
         halt: shape (1,); the attempt ends soon after it has turned true.
     """
     problem = problem.with_limit(LIMITS[number % len(LIMITS)])
-    drafted = Attempt()
-    if params.drafts and draftable(problem):
-        drafted = draft_plans(problem, seed, params, number, halt)
+    routing_s = 0.0
+    for spare in sorted({max(params.spare, LEAST_SPARE), LEAST_SPARE}, reverse=True):
+        if not params.drafts or not draftable(problem):
+            break
+        drafted = draft_plans(problem.with_spare(spare), seed, params, number, halt)
         if drafted.plans or halt[0]:
             return drafted
-    tree = tree_plans(problem, seed, params, number, halt)
-    return replace(tree, routing_s=drafted.routing_s + tree.routing_s)
+        routing_s += drafted.routing_s
+    for spare in SPARES[number % len(SPARES)]:
+        spared = problem.with_spare(spare * params.spare)
+        tree = tree_plans(spared, seed, params, number, halt)
+        routing_s += tree.routing_s
+        if tree.counts:
+            break
+    return replace(tree, routing_s=routing_s)
 
 
 def tree_plans(

@@ -32,9 +32,9 @@ ROOMY = (pi, radians(150.0))
 PIVOT = radians(60.0)
 """Turn from which on a robot that can turns on the spot [rad]."""
 
-SPARE_SHARE = 0.02
-"""Share of a battery's capacity that drafts leave above its reserve: a robot may take a
-percent or two more than planned on slopes and in turns on the spot."""
+LEAST_SPARE = 0.02
+"""Share of a battery's capacity that drafts always leave above its reserve: a robot may
+take a percent or two more than planned on slopes and in turns on the spot."""
 
 JUDGED_M = 4.0
 """Distance of the nodes of paths that only tours are judged by."""
@@ -89,7 +89,7 @@ def drafts(
         ]
         found = False
         for trajectories in run_errands(problem, params, errands, halt):
-            plan = make_plan(problem, seed, params, trajectories, tours, SPARE_SHARE)
+            plan = make_plan(problem, seed, params, trajectories, tours)
             if plan is not None:
                 found = True
                 yield plan

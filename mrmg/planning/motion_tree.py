@@ -50,6 +50,7 @@ class Problem:
         start: composite state at the start, shape (R, 5).
         start_energy: battery contents at the start [J], shape (R,).
         hurried: whether plans must be sooner over at any cost.
+        spare: share of every battery's capacity that plans leave above the reserve.
     """
 
     scene: Scene
@@ -58,6 +59,7 @@ class Problem:
     start: np.ndarray
     start_energy: np.ndarray
     hurried: bool = False
+    spare: float = 0.0
 
     @property
     def preference(self) -> Preference:
@@ -81,6 +83,18 @@ class Problem:
                 params=self.mission.params._replace(route_margin=margin),
             ),
         )
+
+    def with_spare(self, share: float) -> Problem:
+        """Return the problem whose plans leave more in batteries than the reserve.
+
+        Args:
+            share: of their capacities, for all of them.
+        """
+        fleet = self.mission.fleet.copy()
+        fleet["reserve"] += (share - self.spare) * fleet["capacity"]
+        routing = self.mission.routing._replace(reserve=fleet["reserve"])
+        mission = self.mission._replace(fleet=fleet, routing=routing)
+        return replace(self, mission=mission, spare=share)
 
     def with_limit(self, share: float) -> Problem:
         """Return the problem with routes that take a share of the time limit."""

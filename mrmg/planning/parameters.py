@@ -30,6 +30,9 @@ class PlannerParams:
         improvements: further trees grown after the first plan; the cheapest plan
             counts.
         drafts: drive along tours without a tree where that succeeds.
+        spare: share of every battery's capacity that plans leave above the reserve
+            where they can, for robots that take more than their models say. With a
+            tenth, a robot that uses all it may on one charge can take 12 % more.
         refinements: times that the plan of each tree is drawn tight and driven again,
             as long as that saves energy.
         group_alpha, group_beta, group_lambda: alpha, beta, lambda of eq. (5).
@@ -61,6 +64,7 @@ class PlannerParams:
     trees: int = 12
     improvements: int = 1
     drafts: bool = True
+    spare: float = 0.1
     refinements: int = 2
     group_alpha: float = 1.0
     group_beta: float = 4.0
@@ -86,6 +90,7 @@ class PlannerParams:
             "trees": self.trees >= 1,
             "improvements": self.improvements >= 0,
             "refinements": self.refinements >= 0,
+            "spare": 0.0 <= self.spare < 1.0,
             "group_lambda": 0.0 < self.group_lambda <= 1.0,
             "group_bias": 0.0 <= self.group_bias <= 1.0,
             "steer_start": 0.0 <= self.steer_start <= 1.0,
@@ -111,7 +116,11 @@ class PlannerParams:
 
 
 def profile_params(
-    profile: str, *, budget_s: float | None = None, trees: int | None = None
+    profile: str,
+    *,
+    budget_s: float | None = None,
+    trees: int | None = None,
+    spare: float | None = None,
 ) -> PlannerParams:
     """Return the parameters of a profile.
 
@@ -119,6 +128,8 @@ def profile_params(
         profile: "default" or "paper".
         budget_s: time limit [s]; None for none.
         trees: number of trees to grow, all of them; None for the profile's.
+        spare: share of every battery's capacity that plans leave above the reserve
+            where they can; None for the profile's.
 
     Raises:
         UsageError: if the profile is unknown, or a number is out of range.
@@ -126,6 +137,8 @@ def profile_params(
     params = _profile(profile, budget_s)
     if params.refinements and (budget_s is not None or trees is not None):
         params = replace(params, refinements=THOROUGH)
+    if spare is not None:
+        params = replace(params, spare=spare)
     if trees is not None:
         return replace(params, trees=trees, improvements=trees)
     return params
@@ -143,6 +156,7 @@ def _profile(profile: str, budget_s: float | None) -> PlannerParams:
             trees=2,
             improvements=0,
             drafts=False,
+            spare=0.0,
             refinements=0,
             steer_decay=0.9999,
             steer_least=0.5,

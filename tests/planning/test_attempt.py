@@ -6,6 +6,7 @@ Both refine what they find: plans of one attempt are each better than the one be
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
@@ -14,10 +15,13 @@ import numpy as np
 import pytest
 
 import mrmg
+from mrmg.accounting import battery_profile
+from mrmg.mission import Plan
 from mrmg.planning import PlannerParams
 from mrmg.planning.attempt import Attempt, attempt_plan, draft_plans, tree_plans
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.planner import state_mission
+from mrmg.scene.types import Scene
 
 SCENES = Path(__file__).parents[1] / "scenes"
 PARAMS = PlannerParams(samples=500)
@@ -83,3 +87,33 @@ def test_trees_are_grown_only_where_drafting_fails() -> None:
     halt = np.zeros(1, np.bool_)
     grown = attempt_plan(problem_of("quickstart"), 7, without, 0, halt)
     assert grown.counts["vertices"] > 1
+
+
+@pytest.mark.parametrize("spare", [0.0, 0.1, 0.2])
+def test_plans_leave_charge_to_spare(spare: float) -> None:
+    problem = problem_of("station_needed")
+    params = replace(PARAMS, spare=spare)
+    found = attempt_plan(problem, 7, params, 0, np.zeros(1, np.bool_))
+    for _, plan in found.plans:
+        assert least_share(problem.scene, plan) >= spare
+    assert found.plans
+
+
+def test_who_cannot_spare_charge_is_planned_for_all_the_same() -> None:
+    problem = problem_of("station_needed")
+    params = replace(PARAMS, spare=0.9)
+    assert attempt_plan(problem, 7, params, 0, np.zeros(1, np.bool_)).plans
+    for way in (draft_plans, tree_plans):
+        spared = problem.with_spare(0.9)
+        assert not way(spared, 7, params, 0, np.zeros(1, np.bool_)).plans
+
+
+def least_share(scene: Scene, plan: Plan) -> float:
+    """Least charge above the reserve, as a share of the capacity."""
+    shares = []
+    for trajectory in plan.trajectories:
+        battery = scene.robot(trajectory.robot).battery
+        visits = [visit for visit in plan.visits if visit.robot == trajectory.robot]
+        least_J = battery_profile(scene, trajectory, visits).min()
+        shares.append((least_J - battery.reserve_J) / battery.capacity_J)
+    return min(shares)

@@ -13,7 +13,7 @@ from mrmg.accounting import battery_profile
 from mrmg.mission import Plan
 from mrmg.planning import PlannerParams
 from mrmg.planning.drafting import (
-    SPARE_SHARE,
+    LEAST_SPARE,
     draftable,
     drafts,
     path_cost_J,
@@ -27,7 +27,7 @@ PARAMS = PlannerParams(samples=600)
 
 
 def drafted(scene: Scene) -> list[Plan]:
-    problem = state_mission(scene, 0, PARAMS)
+    problem = state_mission(scene, 0, PARAMS).with_spare(LEAST_SPARE)
     tours = route(problem.mission.routing, PARAMS.router, 0)
     return list(drafts(problem, PARAMS, tours, 0, np.zeros(1, np.bool_)))
 
@@ -50,7 +50,7 @@ def test_drafts_leave_something_of_every_battery(name: str) -> None:
             battery = scene.robot(trajectory.robot).battery
             visits = [one for one in plan.visits if one.robot == trajectory.robot]
             least_J = battery_profile(scene, trajectory, visits).min()
-            assert least_J >= battery.reserve_J + SPARE_SHARE * battery.capacity_J
+            assert least_J >= battery.reserve_J + LEAST_SPARE * battery.capacity_J
 
 
 def test_tours_are_judged_nearly_by_what_driving_takes() -> None:

@@ -128,7 +128,7 @@ def test_a_share_of_the_trials_must_be_feasible(
     bench: SimpleNamespace, feasible: int, trials: int, holds: bool, asked: str
 ) -> None:
     own = study(feasible, trials)
-    figure = bench.trials.figure_of("scene1", "", False, own, 0.95)
+    figure = bench.trials.figure_of("scene1", bench.trials.DEFAULT, own)
     assert (figure.holds, figure.asked) == (holds, asked)
     assert figure.found == f"{feasible}/{trials}"
 

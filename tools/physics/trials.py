@@ -20,13 +20,42 @@ from physics.figures import Figure, verdict
 from physics.protocol import state
 
 SCENES = ("scene1", "scene4")
-KINDS = (("", False, 0.95), ("rolling=+30%", False, 0.0), ("rolling=+30%", True, 0.9))
-"""Disturbances over the default ones, replanning, least share of feasible trials."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Kind:
+    """A row of trials.
+
+    Attributes:
+        disturb: disturbances over the default ones.
+        spare: spare charge of the plans; None for the default.
+        replan: whether the rest is planned anew where a mission leaves its plan.
+        least: share of the trials that must be feasible.
+    """
+
+    disturb: str = ""
+    spare: float | None = None
+    replan: bool = False
+    least: float = 0.0
+
+    @property
+    def plans(self) -> str:
+        """What kind of plans are driven."""
+        return "default" if self.spare is None else f"spare {self.spare:g}"
+
+
+DEFAULT = Kind(least=0.95)
+ROLLING = Kind(disturb="rolling=+30%", replan=True, least=0.9)
+TIGHT = Kind(disturb="rolling=+30%", spare=0.0)
+"""Plans that use all they may show what replanning gains: those with the default spare
+carry more resistance by themselves."""
+SAVED = replace(TIGHT, replan=True, least=0.9)
+KINDS = (DEFAULT, ROLLING, TIGHT, SAVED)
 VISIBLE_GAIN = 0.05
 """By how much replanning must raise that share."""
 
 HEAD = (
-    "scene", "disturbance", "replanning", "feasible", "95 % interval",
+    "scene", "plans", "disturbance", "replanning", "feasible", "95 % interval",
     "least charge: worst, median", "failures", "",
 )  # fmt: skip
 
@@ -52,33 +81,34 @@ def disturbance_figures(options: TrialOptions) -> list[Figure]:
     """Print a row per scene and kind of disturbance; return what they came to."""
     print("\n" + " | ".join(HEAD))
     figures: list[Figure] = []
-    stressed: dict[bool, list[Study]] = {False: [], True: []}
+    studies: dict[Kind, list[Study]] = {kind: [] for kind in KINDS}
     for source in SCENES:
-        for disturb, replan, least in KINDS:
-            study = study_of(source, disturb, replan, options)
-            if disturb:
-                stressed[replan].append(study)
-            figure = figure_of(source, disturb, replan, study, least)
+        for kind in KINDS:
+            study = study_of(source, kind, options)
+            studies[kind].append(study)
+            figure = figure_of(source, kind, study)
             faults = [] if figure.holds else [f"{figure.found} not {figure.asked}"]
-            print(" | ".join([*cells(source, disturb, replan, study), verdict(faults)]))
-            if least:
+            print(
+                " | ".join([*cells(source, kind, study), verdict(faults)]), flush=True
+            )
+            if kind.least:
                 figures.append(figure)
     return [
         *figures,
-        gain_figure(stressed[False], stressed[True]),
+        gain_figure(studies[TIGHT], studies[SAVED]),
         repeated_figure(options),
     ]
 
 
-def figure_of(
-    source: str, disturb: str, replan: bool, study: Study, least: float
-) -> Figure:
+def figure_of(source: str, kind: Kind, study: Study) -> Figure:
     """Return how many trials of one row are feasible, and how many must be."""
-    under = f"default and {disturb}" if disturb else "default disturbances"
-    how = ", replanning" if replan else ""
+    under = f"default and {kind.disturb}" if kind.disturb else "default disturbances"
+    plans = "" if kind.spare is None else f", plans with {kind.plans}"
+    how = ", replanning" if kind.replan else ""
     total = len(study.trials)
-    needed = math.ceil(least * total - 1e-9)
-    return Figure.count(f"{source}, {under}{how}", study.feasible, total, needed)
+    needed = math.ceil(kind.least * total - 1e-9)
+    what = f"{source}, {under}{plans}{how}"
+    return Figure.count(what, study.feasible, total, needed)
 
 
 def gain_figure(alone: Sequence[Study], replanned: Sequence[Study]) -> Figure:
@@ -98,14 +128,15 @@ def share(studies: Sequence[Study]) -> float:
     return sum(study.feasible for study in studies) / trials
 
 
-def cells(source: str, disturb: str, replan: bool, study: Study) -> list[str]:
+def cells(source: str, kind: Kind, study: Study) -> list[str]:
     """Return the table's row of one study."""
     low, high = wilson_interval(study.feasible, len(study.trials))
     charges = [trial.charge_fraction for trial in study.trials]
     return [
         source,
-        f"default, {disturb}" if disturb else "default",
-        "yes" if replan else "no",
+        kind.plans,
+        f"default, {kind.disturb}" if kind.disturb else "default",
+        "yes" if kind.replan else "no",
         f"{study.feasible}/{len(study.trials)}",
         f"{low:.3f}-{high:.3f}",
         f"{min(charges):.2f}, {statistics.median(charges):.2f}",
@@ -118,7 +149,7 @@ def causes(study: Study) -> dict[str, int]:
     return Counter(cause for trial in study.trials for cause in trial.causes)
 
 
-def study_of(source: str, disturb: str, replan: bool, options: TrialOptions) -> Study:
+def study_of(source: str, kind: Kind, options: TrialOptions) -> Study:
     """Return all trials of one row, making those that are missing.
 
     They are spread evenly over the plans; no two have the same disturbance.
@@ -126,13 +157,14 @@ def study_of(source: str, disturb: str, replan: bool, options: TrialOptions) -> 
     per_plan = options.trials // len(options.plan_seeds)
     trials: list[Trial] = []
     for number, seed in enumerate(options.plan_seeds):
-        with planned_run(source, seed, options) as run:
-            driven = replace(run, arguments=replace(run.arguments, replan=replan))
+        with planned_run(source, seed, kind.spare, options) as run:
+            arguments = replace(run.arguments, replan=kind.replan)
+            driven = replace(run, arguments=arguments)
             study = study_robustness(
                 driven,
                 trials=per_plan,
                 seed=number * per_plan,
-                disturb=disturb,
+                disturb=kind.disturb,
                 workers=options.workers,
             )
         trials += study.trials
@@ -140,20 +172,24 @@ def study_of(source: str, disturb: str, replan: bool, options: TrialOptions) -> 
 
 
 @contextmanager
-def planned_run(source: str, seed: int, options: TrialOptions) -> Iterator[Run]:
+def planned_run(
+    source: str, seed: int, spare: float | None, options: TrialOptions
+) -> Iterator[Run]:
     """Open the run folder of one plan, made if it is missing."""
     scene = mrmg.load_scene(source)
-    folder = RunFolder(options.runs / state() / f"{source}-s{seed}")
+    arguments = RunArguments(seed=seed, spare=spare)
+    plans = "" if spare is None else f"-spare{spare:g}"
+    folder = RunFolder(options.runs / state() / f"{source}-s{seed}{plans}")
     with folder.opened_for_writing():
-        run = Run(scene=scene, arguments=RunArguments(seed=seed), folder=folder)
+        run = Run(scene=scene, arguments=arguments, folder=folder)
         run.ensure(Step.PLAN)
         yield run
 
 
 def repeated_figure(options: TrialOptions) -> Figure:
     """Drive a worker's first trial in this process, to the last bit."""
-    trial = study_of(SCENES[0], "", False, options).trials[0]
-    with planned_run(SCENES[0], options.plan_seeds[0], options) as run:
+    trial = study_of(SCENES[0], DEFAULT, options).trials[0]
+    with planned_run(SCENES[0], options.plan_seeds[0], None, options) as run:
         arguments = replace(run.arguments, disturb="", disturb_seed=trial.seed)
         again = drive_as(run.scene, run.plan(), arguments)
     same = again.log.digest == trial.log_digest
