@@ -57,6 +57,35 @@ def second():
 """
 
 
+CHAIN = """
+from mrmg.compilation import kernel
+
+
+@kernel
+def far(x):
+{steps}
+    return x
+
+
+@kernel
+def near(x):
+    return far(x) + 1.0
+
+
+@kernel
+def caller(x):
+{steps}
+    return near(x)
+
+
+@kernel
+def other_caller(x):
+{steps}
+    return near(x) - 1.0
+""".format(steps="\n".join(["    x = (x * 3.0 + 1.0) / 3.0 - 1.0 / 3.0"] * 60))
+"""`far` is called by symbol, `near` is linked into what calls it."""
+
+
 def copy_of_package(folder: Path) -> Path:
     """Copy what the kernels of motion need; dates are those of the copying."""
     target = folder / "mrmg"
@@ -82,19 +111,24 @@ def copy_of_package(folder: Path) -> Path:
     return folder
 
 
-def start_call(package: Path, cache: Path) -> subprocess.Popen[str]:
-    """Call a kernel in a new process."""
+def environment_of(package: Path, cache: Path) -> dict[str, str]:
+    """Return the environment of a process that has a package and a cache of its own."""
     environment = {
         **os.environ,
         "PYTHONPATH": str(package),
         "XDG_CACHE_HOME": str(cache),
     }
     environment.pop("NUMBA_CACHE_DIR", None)
+    return environment
+
+
+def start_call(package: Path, cache: Path) -> subprocess.Popen[str]:
+    """Call a kernel in a new process."""
     return subprocess.Popen(
         [sys.executable, "-c", CALL],
         stdout=subprocess.PIPE,
         text=True,
-        env=environment,
+        env=environment_of(package, cache),
         cwd=package,
     )
 
@@ -167,6 +201,31 @@ def test_a_compilation_that_is_killed_leaves_a_cache_that_can_be_used(
     assert value == expected
     assert compiled > 0
     assert call_kernel(package, cache)[1:] == (expected, 0)
+
+
+def test_what_linked_functions_call_by_symbol_is_loaded_before_their_callers(
+    tmp_path: Path,
+) -> None:
+    package = copy_of_package(tmp_path / "package")
+    (package / "mrmg" / "motion" / "chain.py").write_text(CHAIN)
+    cache = tmp_path / "cache"
+    call = "from mrmg.motion import chain; print(chain.{}(1.0))"
+    # The second process compiles what links a function that the first has compiled;
+    # the third finds all compiled.
+    for name, expected in (
+        ("other_caller", 1.0),
+        ("caller", 2.0),
+        ("caller", 2.0),
+    ):
+        done = subprocess.run(
+            [sys.executable, "-c", call.format(name)],
+            capture_output=True,
+            text=True,
+            env=environment_of(package, cache),
+            cwd=package,
+            check=True,
+        )
+        assert float(done.stdout) == pytest.approx(expected)
 
 
 def test_calls_run_in_processes_of_their_own(

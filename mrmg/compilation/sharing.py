@@ -40,6 +40,10 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
             found = super().load_overload(sig, target_context)
             if found is not None:
                 self._release()
+        if found is not None:
+            # Callers that it is linked into load these before themselves; numba forgets
+            # that of what it loads.
+            found.library._reload_init.update(found.reload_init)
         return found
 
     def save_overload(self, sig: Any, data: Any) -> None:

@@ -28,7 +28,9 @@ def changed(scene: Scene, **changes: object) -> Scene:
 
 
 def planned(scene: Scene, seed: int = 0, profile: str = "default") -> Plan:
-    plan = plan_mission(scene, seed=seed, params=PlannerParams(profile=profile)).plan
+    # Without spare charge, so that robots recharge no more often than they must.
+    params = PlannerParams(profile=profile, spare=0.0)
+    plan = plan_mission(scene, seed=seed, params=params).plan
     assert plan is not None
     assert verify(scene, plan).violations == ()
     return plan
