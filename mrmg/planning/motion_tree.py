@@ -92,7 +92,7 @@ class Problem:
         """
         fleet = self.mission.fleet.copy()
         fleet["reserve"] += (share - self.spare) * fleet["capacity"]
-        routing = self.mission.routing._replace(reserve=fleet["reserve"])
+        routing = self.mission.routing._replace(reserve=fleet["reserve"].copy())
         mission = self.mission._replace(fleet=fleet, routing=routing)
         return replace(self, mission=mission, spare=share)
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numba
 import numpy as np
 import pytest
 import shapely
@@ -322,6 +323,19 @@ def test_the_margin_scales_the_roadmaps_energies_alone(
     )
     back = problem.with_margin(0.5).with_margin(problem.mission.params.route_margin)
     assert back.mission.routing.cost == pytest.approx(problem.mission.routing.cost)
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="about compiled kernels")
+def test_variants_of_a_problem_need_no_other_kernels(
+    yard: MakeScene, state: MakeProblem
+) -> None:
+    problem = state(yard())
+    for variant in (
+        problem.with_spare(0.1),
+        problem.with_limit(0.5),
+        problem.with_margin(0.2),
+    ):
+        assert numba.typeof(variant.mission) == numba.typeof(problem.mission)
 
 
 def test_a_halted_tree_ends_without_a_solution(
