@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
@@ -19,7 +20,9 @@ from shapely.geometry import Point, Polygon, box
 import mrmg
 from mrmg.mission import Plan
 from mrmg.planning import PlannerParams, plan_mission
-from mrmg.planning.bound import lower_bound_J
+from mrmg.planning.bound import exact_routing, lower_bound_J
+from mrmg.planning.geodesic import Ground
+from mrmg.planning.routing import routing_arrays
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 
@@ -36,8 +39,9 @@ FEW = settings(
 
 CELLS_SHARE = 5e-3
 """By how much less than it might a bound certifies on its cells, as a share. Each bound
-holds for certain; but what a cell at an obstacle takes away may be a little more than
-the obstacle adds."""
+holds for certain; but a field is certified by division where it is too steep, and what
+an obstacle takes away in this manner may be a little more than it adds to the way. That
+neither cells nor tours get cheaper, on either side of it, holds exactly."""
 
 YARD: dict[str, Any] = {
     "format": 1,
@@ -56,6 +60,9 @@ YARD: dict[str, Any] = {
     ],
 }
 """Room for obstacles between all that must stay free."""
+
+
+MUD = {"polygon": [[10, 2], [30, 2], [26, 20], [14, 12]], "multiplier": 2.5}
 
 
 def scene_of(document: dict[str, Any]) -> Scene:
@@ -151,6 +158,49 @@ def test_more_obstacles_never_lower_the_bound(
     assert fewer >= bound_of() * (1.0 - CELLS_SHARE)
     both = bound_of(obstacles=[*before, *more])
     assert both >= fewer * (1.0 - CELLS_SHARE)
+
+
+@settings(FEW, max_examples=20)
+@given(before=obstacles(), more=obstacles())
+def test_more_obstacles_never_lower_a_price(
+    before: list[dict[str, Any]], more: list[dict[str, Any]]
+) -> None:
+    """Exactly: a cell is blocked if the obstacles together cover it."""
+    fewer, both = (
+        Ground.of(scene, scene.robots[0], cell_m=0.5, step_m=0.2).price
+        for scene in (
+            scene_of({**YARD, "terrain": [MUD], "obstacles": entries})
+            for entries in (before, [*before, *more])
+        )
+    )
+    assert (both >= fewer).all()
+
+
+@settings(FEW, max_examples=50)
+@given(seed=st.integers(0, 1000), dearer=st.lists(st.integers(0, 83), max_size=20))
+def test_dearer_legs_never_make_tours_cheaper(seed: int, dearer: list[int]) -> None:
+    """Exactly, as tours are the least of all and not sought by chance."""
+    rng = np.random.default_rng(seed)
+    distance = rng.uniform(1.0, 30.0, (2, 6, 6))
+    start_distance = rng.uniform(1.0, 30.0, (2, 6))
+    raised = np.concatenate([distance.ravel(), start_distance.ravel()])
+    raised[np.array(dearer, int)] *= rng.uniform(1.0, 1.5, len(dearer))
+    problems = [
+        routing_arrays(
+            goals=4,
+            distance=legs[:72].reshape(2, 6, 6),
+            start_distance=legs[72:].reshape(2, 6),
+            plain=np.ones(2),
+            energy=np.array([20.0, 30.0]),
+            capacity=np.array([25.0, 30.0]),
+            reserve=np.ones(2),
+        )
+        for legs in (np.append(distance, start_distance), raised)
+    ]
+    before, after = (exact_routing(problem) for problem in problems)
+    assert before is not None
+    assert after is not None
+    assert after.cost_J >= before.cost_J
 
 
 def test_an_obstacle_in_the_way_raises_the_bound() -> None:
