@@ -99,6 +99,7 @@ def copy_of_package(folder: Path) -> Path:
         "compilation/calls.py",
         "compilation/decorators.py",
         "compilation/parallel.py",
+        "compilation/pointers.py",
         "compilation/sharing.py",
         "storage.py",
         "errors.py",

@@ -11,9 +11,11 @@ from mrmg.compilation.cache import (
 )
 from mrmg.compilation.decorators import kernel, leaf_kernel, view
 from mrmg.compilation.parallel import compile_in_processes
+from mrmg.compilation.pointers import by_pointer
 
 __all__ = [
     "KernelLocator",
+    "by_pointer",
     "cache_folder",
     "compile_in_processes",
     "compiled_kernels",

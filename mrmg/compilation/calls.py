@@ -7,7 +7,7 @@ holds no more of them than their name. Short ones are linked, as they may be inl
 
 numba also compiles, for every function, what takes its arguments out of Python's
 objects, which is long for a function of many arrays. Here only what Python calls has
-it.
+it. Named tuples go from kernel to kernel by pointer (`pointers`).
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from numba.core.registry import cpu_target
 from numba.core.typing import signature
 from numba.extending import intrinsic, typeof_impl
 
+from mrmg.compilation.pointers import lend, lent
 from mrmg.compilation.sharing import KernelCache
 
 
@@ -97,7 +98,8 @@ class Kernel:
         """Return numba's definition of a call: its type and what generates it."""
 
         def call(typing_context: Any, *arguments: Any) -> Any:
-            compiled = self.load(arguments)
+            handed_on = tuple(map(lent, arguments))
+            compiled = self.load(handed_on)
             kind = compiled.signature
 
             def generate(context: Any, builder: Any, _: Any, values: Any) -> Any:
@@ -105,10 +107,10 @@ class Kernel:
                     symbol = compiled.fndesc.llvm_func_name
                     context.add_linking_libs([compiled.library])
                 else:
-                    symbol = self._symbols[arguments]
+                    symbol = self._symbols[handed_on]
                     # Run before the caller is loaded from the cache.
                     context.active_code_library._reload_init.add(
-                        _Needed(self.__module__, self.name, arguments)
+                        _Needed(self.__module__, self.name, handed_on)
                     )
                 called = cgutils.get_or_insert_function(
                     builder.module,
@@ -116,7 +118,14 @@ class Kernel:
                     symbol,
                 )
                 status, value = context.call_conv.call_function(
-                    builder, called, kind.return_type, kind.args, values
+                    builder,
+                    called,
+                    kind.return_type,
+                    kind.args,
+                    [
+                        lend(builder, *given)
+                        for given in zip(arguments, values, strict=True)
+                    ],
                 )
                 with cgutils.if_unlikely(builder, status.is_error):
                     context.call_conv.return_status_propagate(builder, status)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import by_pointer, kernel, leaf_kernel
 
 SOFT_TURN = 0.05
 """Angle below which the scrub of turning is rounded off [rad]."""
@@ -33,6 +33,7 @@ EVENNESS_WEIGHT = 0.3
 """Cost of neighbouring segments of unequal length [m/m^2]."""
 
 
+@by_pointer
 class Surface(NamedTuple):
     """What a path is priced on: grids of one robot's clearance and of the terrain.
 
@@ -60,6 +61,7 @@ class Surface(NamedTuple):
     scrub: float
 
 
+@by_pointer
 class Stops(NamedTuple):
     """The targets at a path's nodes.
 
@@ -79,6 +81,7 @@ class Stops(NamedTuple):
     deeper: np.ndarray
 
 
+@by_pointer
 class Shape(NamedTuple):
     """The form of a path, by segment and its first node, with the cost's derivatives.
 

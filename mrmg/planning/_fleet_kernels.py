@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import view
+from mrmg.compilation import by_pointer, view
 from mrmg.energy import N_COEFFICIENTS
 from mrmg.world._kernels import FreeSpace
 
@@ -42,6 +42,7 @@ FLEET = np.dtype(
 """One robot as a record; a fleet is an array of them, shape (R,)."""
 
 
+@by_pointer
 class Spaces(NamedTuple):
     """The free spaces of a world stacked: their number is not part of a type."""
 

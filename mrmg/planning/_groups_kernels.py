@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import by_pointer, kernel, leaf_kernel
 from mrmg.planning._random_kernels import random_below, random_unit
 
 AGAIN = 0.005
@@ -20,6 +20,7 @@ NEAREST_SHARE = 0.7
 """How often the vertex nearest to its targets is taken from a group, not any."""
 
 
+@by_pointer
 class Tree(NamedTuple):
     """The motion tree; N vertices at most, R robots.
 
@@ -60,6 +61,7 @@ class Tree(NamedTuple):
     sibling: np.ndarray
 
 
+@by_pointer
 class Groups(NamedTuple):
     """Vertex groups: same regions of the robots, same visited goals (Algorithm 2)."""
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import by_pointer, kernel, leaf_kernel
 from mrmg.energy import CONSUMERS_W
 from mrmg.planning._fleet_kernels import Spaces, space_of
 from mrmg.planning._nrpa_kernels import RoutingArrays
@@ -16,6 +16,7 @@ from mrmg.planning._safety_kernels import Gates
 from mrmg.world._kernels import TerrainGrid, height_in, point_in_convex
 
 
+@by_pointer
 class Targets(NamedTuple):
     """Goals, stations and finishes: convex regions; T targets, in that order.
 
@@ -46,6 +47,7 @@ class Targets(NamedTuple):
     gate: np.ndarray
 
 
+@by_pointer
 class TreeParams(NamedTuple):
     """Numbers the tree is grown by; see `parameters.PlannerParams`."""
 
@@ -70,6 +72,7 @@ class TreeParams(NamedTuple):
     rounds: int
 
 
+@by_pointer
 class Mission(NamedTuple):
     """A planning problem.
 

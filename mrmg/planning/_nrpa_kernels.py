@@ -11,13 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import by_pointer, kernel, leaf_kernel
 from mrmg.planning._random_kernels import random_unit
 
 UNVISITED = 1e13
 """Cost of each goal that a playout left unvisited."""
 
 
+@by_pointer
 class RoutingArrays(NamedTuple):
     """An energy-constrained multi-robot route problem with recharging.
 
@@ -55,6 +56,7 @@ class RoutingArrays(NamedTuple):
     makespan_weight: float
 
 
+@by_pointer
 class Fleet(NamedTuple):
     """Where the robots of a playout have got to.
 

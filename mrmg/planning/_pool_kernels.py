@@ -11,13 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import by_pointer, kernel, leaf_kernel
 from mrmg.planning._nrpa_kernels import goals_to_visit
 
 MOST_POOLED = 10
 """Open goals up to which routes are pooled; subsets of subsets are 3 to that power."""
 
 
+@by_pointer
 class Pool(NamedTuple):
     """The cheapest route met for each robot and set of goals, numbered by its bits.
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import by_pointer, kernel, leaf_kernel
 from mrmg.planning._legs_kernels import CHARGE_TIME, LIMIT, MISSING, USABLE
 
 COST, TIME, ORIGIN, STATION, DRAW, RATE = range(6)
@@ -33,6 +33,7 @@ TIMED_WAYS = 6
 """Recharged ways kept at a station if time counts; else the cheapest is enough."""
 
 
+@by_pointer
 class Labels(NamedTuple):
     """The undominated ways along every route, from both ends; one row for each step.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import by_pointer, kernel
 from mrmg.world._kernels import (
     clearance_estimate,
     height_in,
@@ -18,6 +18,7 @@ from mrmg.world._kernels import (
 )
 
 
+@by_pointer
 class RoadmapArrays(NamedTuple):
     """The roadmap as the kernels see it; V vertices, T targets, F travel classes.
 

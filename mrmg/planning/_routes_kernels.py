@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import by_pointer, kernel, leaf_kernel
 from mrmg.planning._pool_kernels import pool_route
 from mrmg.planning._random_kernels import random_unit
 from mrmg.planning._refuel_kernels import label_route, route_value, row_of, value_with
@@ -19,6 +19,7 @@ COST, TIME, DIRECT, LABEL = range(4)
 [J], and label of its best way."""
 
 
+@by_pointer
 class Routes(NamedTuple):
     """Goals of each robot in order, without stations.
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel, view
+from mrmg.compilation import by_pointer, kernel, leaf_kernel, view
 from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, step
 from mrmg.planning._fleet_kernels import MOST_CORNERS, space_of
 from mrmg.world._kernels import (
@@ -30,6 +30,7 @@ REST = 1e-9
 """Speed below which a robot counts as standing [m/s]."""
 
 
+@by_pointer
 class Gates(NamedTuple):
     """Convex regions that one robot at a time may be in, or committed to enter.
 
@@ -46,6 +47,7 @@ class Gates(NamedTuple):
     corners: np.ndarray
 
 
+@by_pointer
 class Commitment(NamedTuple):
     """Committed motions; two slots a robot, one active and one for a proposal.
 

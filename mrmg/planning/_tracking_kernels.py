@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import by_pointer, kernel, leaf_kernel
 from mrmg.motion._kernels import UNICYCLE, step
 from mrmg.planning._mission_kernels import in_target
 from mrmg.planning._safety_kernels import (
@@ -52,6 +52,7 @@ ATTEMPTS = 3
 """Controls tried before a robot brakes as committed."""
 
 
+@by_pointer
 class Courses(NamedTuple):
     """The fleet's paths, padded to one length.
 

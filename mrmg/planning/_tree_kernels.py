@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import by_pointer, kernel, leaf_kernel
 from mrmg.motion._kernels import copy_numbers
 from mrmg.planning._expansion_kernels import choose_modes, expand
 from mrmg.planning._finish_kernels import all_finished, at_finish
@@ -48,6 +48,7 @@ VERTICES, GROUPS, ROUTER_CALLS, EXPANSIONS, ROUTER_FAILURES = range(5)
 """Places in the array of counts."""
 
 
+@by_pointer
 class Tours(NamedTuple):
     """The tours the vertices of a tree follow.
 

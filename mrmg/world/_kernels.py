@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import leaf_kernel
+from mrmg.compilation import by_pointer, leaf_kernel
 
 
+@by_pointer
 class FreeSpace(NamedTuple):
     """Free space of one set of obstacles as flat arrays.
 
@@ -49,6 +50,7 @@ NO_RELIEF = np.zeros((0, 0))
 """The heights of flat ground."""
 
 
+@by_pointer
 class TerrainGrid(NamedTuple):
     """What the ground costs.
 
