@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -56,7 +57,8 @@ class Attempt:
         plans: those found, each better than the one before, with the time of
             `time.perf_counter()` when it was found; some may be late.
         routing_s: time the tours took.
-        counts: of the tree; empty if there were no tours to grow it along.
+        counts: drafts (fleets driven along tours), router calls, and those of the tree;
+            empty if no tours were found for a tree.
     """
 
     plans: Sequence[tuple[float, Plan]] = ()
@@ -81,20 +83,23 @@ def attempt_plan(
     """
     problem = problem.with_limit(LIMITS[number % len(LIMITS)])
     routing_s = 0.0
+    counts: Counter[str] = Counter()
     for spare in sorted({max(params.spare, LEAST_SPARE), LEAST_SPARE}, reverse=True):
         if not params.drafts or not draftable(problem):
             break
         drafted = draft_plans(problem.with_spare(spare), seed, params, number, halt)
-        if drafted.plans or halt[0]:
-            return drafted
         routing_s += drafted.routing_s
+        counts.update(drafted.counts)
+        if drafted.plans or halt[0]:
+            return replace(drafted, routing_s=routing_s, counts=counts)
     for spare in SPARES[number % len(SPARES)]:
         spared = problem.with_spare(spare * params.spare)
         tree = tree_plans(spared, seed, params, number, halt)
         routing_s += tree.routing_s
+        counts.update(tree.counts)
         if tree.counts:
             break
-    return replace(tree, routing_s=routing_s)
+    return replace(tree, routing_s=routing_s, counts=counts)
 
 
 def tree_plans(
@@ -140,34 +145,40 @@ def draft_plans(
     draws.
     """
     began = time.perf_counter()
-    choice = _drawn_tours(problem, seed, params, number)
+    draws = _draws(problem, number)
+    choice = _drawn_tours(problem, seed, params, draws)
     routing_s = time.perf_counter() - began
     problem = problem.with_margin(0.0)
     preference = problem.preference
     plans: list[tuple[float, Plan]] = []
+    driven = 0
     for tours, hurried in product(choice, (False, True)):
         if halt[0] or (plans and not preference.late_s(plans[-1][1])):
             break
         if hurried and not plans:
             continue
+        driven += 1
         pressed = replace(problem, hurried=hurried)
         for plan in drafts(pressed, params, tours, seed, halt):
             if not plans or preference.rank(plan) < preference.rank(plans[-1][1]):
                 plans.append((time.perf_counter(), plan))
-    return Attempt(plans, routing_s)
+    return Attempt(plans, routing_s, {"drafts": driven, "router_calls": len(draws)})
+
+
+def _draws(problem: Problem, number: int) -> range:
+    """Return the numbers of an attempt's draws of tours."""
+    draws = range(number * DRAWS, (number + 1) * DRAWS)
+    return draws[:1] if number == 0 or problem.preference.timed else draws
 
 
 def _drawn_tours(
-    problem: Problem, seed: int, params: PlannerParams, number: int
+    problem: Problem, seed: int, params: PlannerParams, draws: range
 ) -> list[Routing]:
     """Return tours for energies that differ by chance, those that look best first.
 
     The roadmap's energies are not quite what driving takes: it leads through the middle
     of targets.
     """
-    draws = range(number * DRAWS, (number + 1) * DRAWS)
-    if number == 0 or problem.preference.timed:
-        draws = draws[:1]
     timed = problem.preference.objective.makespan_weight > 0.0
     surcharges = TIMED_SURCHARGES if timed else SURCHARGES
     found: dict[tuple[tuple[int, ...], ...], Routing] = {}

@@ -112,7 +112,8 @@ class Statistics:
         """Return counts, times and improvements; the total time is the time so far."""
         first = self.time_s.get("first_solution", 0.0)
         times = {"init": 0.0, "routing": 0.0, **self.time_s, "first_solution": first}
-        counts = {"vertices": 0, "groups": 0, "router_calls": 0, "expansions": 0}
+        names = ("drafts", "vertices", "groups", "router_calls", "expansions")
+        counts = dict.fromkeys(names, 0)
         judged = [replace(found, bounds=self.bounds) for found in self.improvements]
         return {
             **counts,

@@ -40,6 +40,7 @@ HEAD = (
     "first plan [s]",
     "total [s]",
     "solver [%]",
+    "drafts",
     "iterations",
     "timeouts",
 )
@@ -105,9 +106,17 @@ def _line(rows: Sequence[BenchRow]) -> tuple[str, ...]:
         _median(solved, lambda row: row.first_s or 0.0),
         _median(rows, lambda row: row.total_s),
         _median(rows, lambda row: 100.0 * row.routing_s / row.total_s, 0),
-        _median(rows, lambda row: float(row.iterations), 0),
+        _count(rows, lambda row: row.drafts),
+        _count(rows, lambda row: row.iterations),
         str(len(rows) - len(solved)),
     )
+
+
+def _count(rows: Sequence[BenchRow], of: Callable[[BenchRow], int]) -> str:
+    """Return the median of the runs that did such a thing at all, and how many did."""
+    doing = [row for row in rows if of(row)]
+    text = _median(doing, lambda row: float(of(row)), 0)
+    return text if len(doing) in (0, len(rows)) else f"{text} in {len(doing)}"
 
 
 def _median(

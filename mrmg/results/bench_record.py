@@ -26,6 +26,8 @@ class BenchRow:
         capacity_m: of the first robot's battery, as metres of plain ground.
         init_s, routing_s, first_s, total_s: times of planning; `first_s` is None
             without a plan.
+        drafts: how often the fleet was driven along tours without a motion tree;
+            files of earlier versions do not say it.
         iterations: expansions of motion trees.
         conditions: machine, versions, budget.
     """
@@ -45,6 +47,7 @@ class BenchRow:
     routing_s: float
     first_s: float | None
     total_s: float
+    drafts: int
     iterations: int
     conditions: str
 
@@ -105,6 +108,7 @@ def _row(data: dict[str, Any]) -> BenchRow:
         routing_s=times["routing"],
         first_s=times["first_solution"] if solved else None,
         total_s=times["total"],
+        drafts=statistics.get("drafts", 0),
         iterations=statistics["expansions"],
         conditions=data["conditions"],
     )

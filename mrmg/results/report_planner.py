@@ -21,6 +21,7 @@ _NAMES = {
     "time_s.first_solution": "First plan after",
     "time_s.total": "Time of planning in all",
     "router_calls": "Calls of the discrete solver",
+    "drafts": "Times the fleet was driven along tours without a tree",
     "expansions": "Expansions of motion trees",
     "vertices": "Vertices of motion trees",
     "groups": "Groups of vertices",

@@ -118,6 +118,7 @@ def _plan_figures(
             "bound": statistics.get("bound"),
         },
         "improvements": list(statistics.get("improvements", [])),
+        "drafts": statistics.get("drafts", 0),
         "vertices": statistics["vertices"],
         "groups": statistics["groups"],
         "router_calls": statistics["router_calls"],

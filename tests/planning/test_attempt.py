@@ -17,7 +17,7 @@ import pytest
 import mrmg
 from mrmg.accounting import battery_profile
 from mrmg.mission import Plan
-from mrmg.planning import PlannerParams
+from mrmg.planning import PlannerParams, attempt
 from mrmg.planning.attempt import Attempt, attempt_plan, draft_plans, tree_plans
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.planner import state_mission
@@ -82,11 +82,23 @@ def test_halted_it_gives_nothing(way: Callable[..., Attempt]) -> None:
 
 def test_trees_are_grown_only_where_drafting_fails() -> None:
     drafted = attempted(attempt_plan, "quickstart")
-    assert drafted.counts == {}
+    assert drafted.counts == {"drafts": 1, "router_calls": 1}
     without = PlannerParams(samples=500, drafts=False)
     halt = np.zeros(1, np.bool_)
     grown = attempt_plan(problem_of("quickstart"), 7, without, 0, halt)
     assert grown.counts["vertices"] > 1
+    assert "drafts" not in grown.counts
+
+
+def test_drafts_that_failed_are_counted_with_the_tree(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """With and without charge to spare, then the tree."""
+    monkeypatch.setattr(attempt, "drafts", lambda *_: iter(()))
+    found = attempted(attempt_plan, "quickstart")
+    assert found.counts["drafts"] == 2
+    assert found.counts["router_calls"] >= 3
+    assert found.counts["vertices"] > 1
 
 
 @pytest.mark.parametrize("spare", [0.0, 0.1, 0.2])

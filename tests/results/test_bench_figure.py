@@ -18,7 +18,7 @@ from mrmg.results.bench_record import read_rows
 def row(scene: str = "scene1", **changes: Any) -> dict[str, Any]:
     """Return a row as the bench writes it; `changes` are of its own or its times."""
     times = {"init": 0.1, "routing": 0.2, "first_solution": 0.4, "total": 0.8}
-    data = {
+    data: dict[str, Any] = {
         "scene": scene,
         "seed": 0,
         "profile": "default",
@@ -33,11 +33,11 @@ def row(scene: str = "scene1", **changes: Any) -> dict[str, Any]:
             "terrain_areas": 4,
             "capacity_m": 240.0,
         },
-        "statistics": {"expansions": 300, "time_s": times},
+        "statistics": {"drafts": 0, "expansions": 300, "time_s": times},
     }
     for name, value in changes.items():
-        place = times if name in times else data
-        (data["problem"] if name in data["problem"] else place)[name] = value
+        parts = (times, data["problem"], data["statistics"], data)
+        next(part for part in parts if name in part)[name] = value
     return data
 
 
@@ -65,6 +65,28 @@ def test_the_table_has_medians_shares_and_timeouts(tmp_path: Path) -> None:
     assert first["total [s]"] == "0.900"
     assert first["solver [%]"] == "25"
     assert table[1]["capacity [m]"] == "200"
+
+
+@pytest.mark.parametrize(
+    ("drafts", "expansions", "cells"),
+    [
+        ((3, 1, 2), (0, 0, 0), ("2", "–")),
+        ((3, 1, 2), (0, 0, 80), ("2", "80 in 1")),
+        ((0, 0, 0), (50, 70, 80), ("–", "70")),
+    ],
+)
+def test_counts_are_of_the_runs_that_did_such_a_thing(
+    tmp_path: Path,
+    drafts: tuple[int, ...],
+    expansions: tuple[int, ...],
+    cells: tuple[str, str],
+) -> None:
+    rows = [
+        row(seed=seed, drafts=drafts[seed], expansions=expansions[seed])
+        for seed in range(3)
+    ]
+    (line,) = table_rows(read_rows([written(tmp_path / "b.jsonl", rows)]))
+    assert (line[HEAD.index("drafts")], line[HEAD.index("iterations")]) == cells
 
 
 def test_profiles_have_lines_of_their_own(tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ SECTIONS = {
         "time_limit_s",
         "objective",
         "improvements",
+        "drafts",
         "vertices",
         "groups",
         "router_calls",
@@ -62,6 +63,7 @@ SECTIONS = {
 }
 TOP = {"status", "mission_ok", "scene", "seed", "robots", "goals", "stations"}
 STATISTICS = {
+    "drafts": 2,
     "vertices": 100,
     "groups": 7,
     "router_calls": 3,
