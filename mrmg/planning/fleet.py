@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numba
 import numpy as np
 
 from mrmg.errors import Fault, SceneError
@@ -137,4 +138,5 @@ def fleet_array(
         one["capacity"] = battery.capacity_J
         one["charge"] = battery.charging_power_W
         one["reserve"] = battery.reserve_J + RESERVE_MARGIN * battery.capacity_J
-    return fleet
+    # Uncompiled kernels find the fields of records as attributes only in such a view.
+    return fleet.view(np.recarray) if numba.config.DISABLE_JIT else fleet
