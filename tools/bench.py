@@ -19,14 +19,14 @@ from __future__ import annotations
 
 import argparse
 import json
-import platform
 import statistics
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+
+from protocol import seed_range, versions
 
 import mrmg
 from mrmg.planning import plan_mission, profile_params
@@ -68,7 +68,9 @@ def parse_options() -> argparse.Namespace:
     """Read the command line."""
     parser = argparse.ArgumentParser(description=__doc__, prog="tools/bench")
     parser.add_argument("--scenes", nargs="+", default=list(TABLE), metavar="SCENE")
-    parser.add_argument("--seeds", default="0-9", help="first-last, default 0-9")
+    parser.add_argument(
+        "--seeds", type=seed_range, default="0-9", help="first-last, default 0-9"
+    )
     parser.add_argument(
         "--profile", nargs="+", default=["default"], choices=("default", "paper")
     )
@@ -76,10 +78,7 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument("--execute", action="store_true", help="drive in MuJoCo too")
     parser.add_argument("--bound", action="store_true", help="compare with a bound")
     parser.add_argument("--output", type=Path, help="JSONL file, one line a mission")
-    options = parser.parse_args()
-    first, _, last = options.seeds.partition("-")
-    options.seeds = range(int(first), int(last or first) + 1)
-    return options
+    return parser.parse_args()
 
 
 def protocol(options: argparse.Namespace) -> str:
@@ -91,10 +90,8 @@ def protocol(options: argparse.Namespace) -> str:
 
 def conditions(options: argparse.Namespace) -> str:
     """Return what times depend on: budget, versions, machine."""
-    names = ("mrmg", "mujoco", "numba", "numpy", "casadi")
-    versions = ", ".join(f"{name} {version(name)}" for name in names)
     budget = f"budget {options.budget:g} s" if options.budget else "no time limit"
-    return f"{budget}; {versions}, Python {platform.python_version()}; {cpu()}"
+    return f"{budget}; {versions()}"
 
 
 def problem_of(scene: Any, source: str) -> dict[str, Any]:
@@ -109,16 +106,6 @@ def problem_of(scene: Any, source: str) -> dict[str, Any]:
         "terrain_areas": len(scene.terrain),
         "capacity_m": robot.battery.capacity_J / metre_J,
     }
-
-
-def cpu() -> str:
-    """Return the processor's name."""
-    info = Path("/proc/cpuinfo")
-    if not info.exists():
-        return platform.processor()
-    lines = info.read_text().splitlines()
-    names = [line.partition(":")[2].strip() for line in lines if "model name" in line]
-    return f"{names[0]} x {len(names)}" if names else platform.machine()
 
 
 def missions(source: str, options: argparse.Namespace) -> Iterator[dict[str, Any]]:

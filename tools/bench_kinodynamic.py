@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import yaml
+from protocol import seed_range
 
 import mrmg
 from mrmg.mission import PlanStatus
@@ -59,18 +60,19 @@ def main() -> int:
     )
     parser.add_argument("--folder", type=Path, default=FOLDER)
     parser.add_argument("--only", default="", help="part of the file's name")
-    parser.add_argument("--seeds", default="0-9", help="first-last, default 0-9")
+    parser.add_argument(
+        "--seeds", type=seed_range, default="0-9", help="first-last, default 0-9"
+    )
     options = parser.parse_args()
     files = sorted(p for p in options.folder.glob("*.yaml") if options.only in p.name)
     if not files:
         print(f"no benchmark files in {options.folder}", file=sys.stderr)
         return 1
-    first, _, last = options.seeds.partition("-")
-    seeds = range(int(first), int(last or first) + 1)
     print(__doc__)
     print("file | solved | plan_s median | p95 | makespan_s median | / straight line")
     with tempfile.TemporaryDirectory() as folder:
-        return 0 if all([bench(path, seeds, Path(folder)) for path in files]) else 1
+        solved = [bench(path, options.seeds, Path(folder)) for path in files]
+    return 0 if all(solved) else 1
 
 
 def bench(path: Path, seeds: range, folder: Path) -> bool:

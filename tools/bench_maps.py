@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import bench
+from protocol import seed_range
 
 from mrmg import storage
 from mrmg.authoring import import_map, populate
@@ -58,14 +59,14 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument("--robots", type=int, default=4, help="default 4")
     parser.add_argument("--goals", type=int, default=20, help="default 20")
     parser.add_argument("--placement", type=int, default=3, help="its seed, default 3")
-    parser.add_argument("--seeds", default="0-19", help="first-last, default 0-19")
+    parser.add_argument(
+        "--seeds", type=seed_range, default="0-19", help="first-last, default 0-19"
+    )
     parser.add_argument("--budget", type=float, help="seconds of planning")
     parser.add_argument("--execute", action="store_true", help="drive in MuJoCo too")
     parser.add_argument("--bound", action="store_true", help="compare with a bound")
     parser.add_argument("--output", type=Path, help="JSONL file, one line a mission")
     options = parser.parse_args()
-    first, _, last = options.seeds.partition("-")
-    options.seeds = range(int(first), int(last or first) + 1)
     options.profile = ["default"]
     return options
 

@@ -31,9 +31,9 @@ from pathlib import Path
 
 from physics.figures import print_figures
 from physics.missions import mission_figures
-from physics.protocol import state, versions
 from physics.trials import TrialOptions, disturbance_figures
 from physics.yaw import yaw_figures
+from protocol import seed_range, state, versions
 
 from mrmg import shipped
 
@@ -72,12 +72,16 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument(
         "--scenes", nargs="*", default=shipped.scene_names(), metavar="SCENE"
     )
-    parser.add_argument("--seeds", default="0-9", help="first-last, default 0-9")
+    parser.add_argument(
+        "--seeds", type=seed_range, default="0-9", help="first-last, default 0-9"
+    )
     parser.add_argument("--output", type=Path, help="JSONL file, one line a mission")
     parser.add_argument("--no-yaw", action="store_true", help="leave out yaw rates")
     parser.add_argument("--disturb", action="store_true", help="robustness, too")
     parser.add_argument("--trials", type=int, default=100, help="of each row of it")
-    parser.add_argument("--plan-seeds", default="0-9", help="of the plans in it")
+    parser.add_argument(
+        "--plan-seeds", type=seed_range, default="0-9", help="of the plans in it"
+    )
     parser.add_argument(
         "--runs",
         type=Path,
@@ -91,18 +95,9 @@ def parse_options() -> argparse.Namespace:
         help="processes that make missions and trials, default 1",
     )
     options = parser.parse_args()
-    options.seeds, options.plan_seeds = map(
-        seeds_of, (options.seeds, options.plan_seeds)
-    )
     if options.trials < len(options.plan_seeds):
         parser.error("--trials must not be fewer than the plans of --plan-seeds")
     return options
-
-
-def seeds_of(text: str) -> range:
-    """Return the seeds `first-last`, or the single one."""
-    first, _, last = text.partition("-")
-    return range(int(first), int(last or first) + 1)
 
 
 if __name__ == "__main__":

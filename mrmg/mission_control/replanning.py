@@ -150,7 +150,7 @@ class Replanner:
         for draw in range(draws):
             seed = seeding.stream_seed(self.seed, "replan", number, draw)
             plan = plan_mission(rest, seed=seed, params=self.planner).plan
-            if plan is None or not keeps_stays(plan, stays):
+            if plan is None or not keeps_stays(plan.visits, stays):
                 continue
             if verify(rest, plan).ok:
                 return plan

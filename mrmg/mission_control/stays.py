@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrmg.mission import Plan
+from mrmg.mission import Visit
 from mrmg.scene.types import Goal
 from mrmg.visiting import runs
 
@@ -55,7 +55,12 @@ def stays_under_way(
     return found
 
 
-def keeps_stays(plan: Plan, stays: Mapping[str, StayUnderWay]) -> bool:
-    """Tell whether a plan has all stays end where, and by whom, they were begun."""
-    begun = {(item.robot, item.target) for item in plan.visits if item.step == 0}
+def keeps_stays(visits: Iterable[Visit], stays: Mapping[str, StayUnderWay]) -> bool:
+    """Tell whether all stays end where, and by whom, they were begun.
+
+    Args:
+        visits: of a plan that begins with the stays under way.
+        stays: by goal.
+    """
+    begun = {(item.robot, item.target) for item in visits if item.step == 0}
     return all((stay.robot, goal) in begun for goal, stay in stays.items())

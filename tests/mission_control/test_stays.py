@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from mrmg.mission import Visit
 from mrmg.mission_control import drive_mission, remaining_scene
 from mrmg.mission_control.remaining import FleetCondition
 from mrmg.mission_control.stays import StayUnderWay, keeps_stays, stays_under_way
@@ -61,17 +62,15 @@ def test_the_rest_of_the_stay_is_left(scene: Scene) -> None:
 
 
 def test_only_who_is_there_from_the_start_keeps_a_stay() -> None:
-    visit = SimpleNamespace(robot="r1", target="g1", step=0)
+    visit = Visit(
+        robot="r1", target="g1", kind="goal", step=0, time_s=0.0, energy_J=1.0
+    )
     stays = {"g1": StayUnderWay("r1", 2.0)}
 
-    def kept(**changes: object) -> bool:
-        changed = SimpleNamespace(**{**vars(visit), **changes})
-        return keeps_stays(SimpleNamespace(visits=(changed,)), stays)  # type: ignore
-
-    assert kept()
-    assert not kept(robot="r2")
-    assert not kept(step=30)
-    assert not kept(target="g2")
+    assert keeps_stays([visit], stays)
+    assert not keeps_stays([replace(visit, robot="r2")], stays)
+    assert not keeps_stays([replace(visit, step=30)], stays)
+    assert not keeps_stays([replace(visit, target="g2")], stays)
 
 
 @pytest.mark.slow

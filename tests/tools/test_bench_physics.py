@@ -22,7 +22,7 @@ TOOLS = Path(__file__).parents[2] / "tools"
 @pytest.fixture(scope="module")
 def bench() -> Iterator[SimpleNamespace]:
     """The bench's modules by name, as its script finds them beside itself."""
-    names = ("figures", "missions", "trials", "yaw", "protocol")
+    names = ("figures", "missions", "trials", "yaw")
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(TOOLS))
         yield SimpleNamespace(
@@ -99,7 +99,7 @@ def test_larger_fleets_may_be_slower(bench: SimpleNamespace) -> None:
 
 def study(feasible: int, trials: int) -> Study:
     """Trials of which the first so many are feasible."""
-    blank = dict.fromkeys(Trial.__dataclass_fields__, 0)
+    blank = dict.fromkeys(Trial.__dataclass_fields__, 0) | {"causes": ()}
     return Study(
         options={},
         trials=tuple(
@@ -164,9 +164,27 @@ def test_rows_are_kept_for_the_same_state_only(
     assert bench.missions.Kept.of(path).rows == {}
 
 
-def test_seeds_are_read(bench: SimpleNamespace) -> None:
-    assert bench.script.seeds_of("2-4") == range(2, 5)
-    assert bench.script.seeds_of("7") == range(7, 8)
+def test_rows_that_nothing_is_asked_of_are_told_but_not_judged(
+    bench: SimpleNamespace,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """However few of their trials are feasible; the others decide."""
+    trials = bench.trials
+    same = bench.figures.Figure("a trial by a worker and here", "same", "same", True)
+    monkeypatch.setattr(trials, "repeated_figure", lambda _: same)
+    monkeypatch.setattr(
+        trials, "study_of", lambda _, kind, __: study(10 if kind.least else 1, 10)
+    )
+    figures = trials.disturbance_figures(None)
+    told = capsys.readouterr().out.splitlines()
+    rows = [line.split(" | ") for line in told if line.startswith("scene")][1:]
+    assert {row[4]: row[-1] for row in rows} == {"10/10": "holds", "1/10": "not judged"}
+    names = [figure.what for figure in figures]
+    assert len(names) == 2 * 3 + 2
+    assert all(figure.holds for figure in figures)
+    assert "scene1, default and rolling=+30%" not in names
+    assert "scene1, default and rolling=+30%, replanning" in names
 
 
 def test_a_mission_without_plan_is_told_and_breaks_nothing(

@@ -18,11 +18,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from protocol import state
+
 import mrmg
 from mrmg.execution.controller import controller_maker
 from mrmg.planning import plan_mission
 from physics.figures import Figure, verdict
-from physics.protocol import state
 
 Row = dict[str, Any]
 Job = tuple[str, int]

@@ -1,4 +1,4 @@
-"""On what, and with what, figures were measured: what makes them comparable."""
+"""On what, with what and with which seeds figures were measured."""
 
 from __future__ import annotations
 
@@ -12,6 +12,12 @@ import mrmg
 from mrmg import shipped
 
 _PACKAGES = ("mrmg", "mujoco", "casadi", "numpy", "scipy", "shapely", "numba")
+
+
+def seed_range(text: str) -> range:
+    """Return the seeds `first-last`, or the single one."""
+    first, _, last = text.partition("-")
+    return range(int(first), int(last or first) + 1)
 
 
 def versions() -> str:
