@@ -346,7 +346,7 @@ def grow(mission, start, energy, random, tree, tours, counts, halt):
         not halt[0]
         and n < params.max_vertices
         and counts[EXPANSIONS] < most
-        and counts[ROUTER_FAILURES] < FAILED_ROUTES
+        and (params.literal or counts[ROUTER_FAILURES] < FAILED_ROUTES)
     ):
         counts[EXPANSIONS] += 1
         v = select_vertex(groups, tree, n_groups, params, initial, random)

@@ -36,7 +36,7 @@ from mrmg.scene.types import Scene
 from mrmg.world.world import World
 
 TOUR_ROWS = 2000
-"""Most tours one tree may hold."""
+"""Most tours one tree may hold; in the paper's profile as many as vertices."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,9 +233,10 @@ def grow_tree(
     tree = _groups_kernels.new_tree(
         params.max_vertices, robots, mission.targets.goals, params.steps
     )
+    rows = params.max_vertices if mission.params.reroute_always else TOUR_ROWS
     tours = Tours(
-        target=np.zeros((TOUR_ROWS, robots, width), np.int64),
-        length=np.zeros((TOUR_ROWS, robots), np.int64),
+        target=np.zeros((rows, robots, width), np.int64),
+        length=np.zeros((rows, robots), np.int64),
     )
     for r, tour in enumerate(routing.tours):
         tours.target[0, r, : len(tour)] = tour
