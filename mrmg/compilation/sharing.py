@@ -16,6 +16,7 @@ from typing import IO, Any
 
 from llvmlite import binding
 from numba.core import caching
+from numba.core.runtime.nrt import rtsys
 
 
 class KernelCache(caching.FunctionCache):  # type: ignore[misc]
@@ -34,7 +35,9 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return what is compiled for a signature; None if it is ours to compile."""
-        found = super().load_overload(sig, target_context)
+        found = self._kept(sig, target_context)
+        if found is None:
+            found = super().load_overload(sig, target_context)
         if found is None and self._lock is None:
             self._acquire()
             found = super().load_overload(sig, target_context)
@@ -56,6 +59,17 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
             self._release()
         # A listing of every variable's type, which nobody will read.
         vars(data.type_annotation).clear()
+
+    def _kept(self, sig: Any, target_context: Any) -> Any:
+        """Return what is compiled for a signature, None if nothing is.
+
+        All that code needs in order to run is the counting of references. numba also
+        imports everything that it could compile, before it looks for what is compiled,
+        which takes longer than to load the kernels of a mission.
+        """
+        rtsys.initialize(target_context)
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
     def _acquire(self) -> None:
         self._impl.locator.ensure_cache_path()

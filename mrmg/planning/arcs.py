@@ -18,7 +18,7 @@ import numpy as np
 import shapely
 from shapely.ops import substring
 
-from mrmg.planning._bound_kernels import UNREACHED
+from mrmg.planning._eikonal_kernels import UNREACHED
 from mrmg.planning.geodesic import (
     ARCS,
     SPACING_M,

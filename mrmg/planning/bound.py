@@ -43,7 +43,7 @@ from mrmg.planning.arcs import ArcWays
 from mrmg.planning.geodesic import Ground, Ways
 from mrmg.planning.routing import Routing, routing_arrays
 from mrmg.planning.slopes import climb_J, height_span_m
-from mrmg.planning.touring import touring_bound_J
+from mrmg.planning.touring import Completions, near_routing, touring_bound_J
 from mrmg.scene.types import Robot, Scene
 
 MOST_GOALS = 14
@@ -192,17 +192,22 @@ def lower_bound_J(
     if not scene.goals:
         return 0.0
     relaxed = Relaxation.of(scene, step_s=step_s, cells=cells)
-    routing = exact_routing(relaxed.problem)
-    if routing is None:
-        bound = relaxed_routing_J(relaxed.problem)
-    elif routing.feasible and rounds:
-        ways = relaxed.arc_ways(finer)
-        bound = touring_bound_J(
-            relaxed.problem, routing.tours, ways, relaxed.price, rounds=rounds
-        )
-        bound = max(bound, routing.cost_J)
+    problem = relaxed.problem
+    if len(scene.goals) > MOST_GOALS:
+        bound = relaxed_routing_J(problem)
     else:
-        bound = routing.cost_J
+        completions = Completions.of(problem)
+        routing = near_routing(problem, completions) or exact_routing(problem)
+        if routing is None:
+            bound = relaxed_routing_J(problem)
+        elif routing.feasible and rounds:
+            ways = relaxed.arc_ways(finer)
+            bound = touring_bound_J(
+                problem, completions, routing.tours, ways, relaxed.price, rounds=rounds
+            )
+            bound = max(bound, routing.cost_J)
+        else:
+            bound = routing.cost_J
     bound -= sum(_most_descent_J(scene, robot) for robot in scene.robots)
     return max(0.0, bound) * (1.0 - ROUNDING_SHARE)
 

@@ -2,8 +2,8 @@
 
 A way is that of the reference point. It keeps as far from obstacles as the largest disc
 about that point inside the footprint reaches, and nothing else about the robot counts.
-The bounds come from certified fields (see `_bound_kernels`), so they hold whatever the
-cell is; a finer one brings them nearer to the truth.
+The bounds come from certified fields (see `_eikonal_kernels`), so they hold whatever
+the cell is; a finer one brings them nearer to the truth.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ import numpy as np
 import shapely
 from shapely.geometry import Point
 
-from mrmg.planning import _bound_kernels
-from mrmg.planning._bound_kernels import UNREACHED
+from mrmg.planning import _eikonal_kernels
+from mrmg.planning._eikonal_kernels import UNREACHED
 from mrmg.planning.prices import least_prices
 from mrmg.scene.types import Region, Robot, Scene
 
-ROUNDS = 4
+ROUNDS = 3
 """Solutions of the eikonal equation at most per field."""
 
 BAND_SHARE = 0.25
@@ -210,7 +210,7 @@ class Ground:
 
     def field(self, seed: np.ndarray) -> Field:
         """Return the certified field that spreads from seeds."""
-        values, level, certified = _bound_kernels.certified_field(
+        values, level, certified = _eikonal_kernels.certified_field(
             self.price, self.cell_m, seed, ROUNDS, BAND_SHARE * self.cell_m
         )
         return Field(values.reshape(-1), level, certified)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from mrmg.planning import _touring_kernels
 from mrmg.planning._nrpa_kernels import RoutingArrays
 from mrmg.planning.arcs import ArcWays
 from mrmg.planning.geodesic import ARCS
+from mrmg.planning.routing import Routing
 
 MOST_LABELS = 4_000_000
 """Labels up to which tours are told apart by arcs."""
@@ -24,9 +26,94 @@ MOST_LABELS = 4_000_000
 SLACK = 1e-6
 """Share by which tours may cost more than the best known; rounding loses none."""
 
+SHARES = (0.02, 0.08)
+"""What the cheapest tours may cost more than if batteries lasted for ever, as a share
+of that: they are first sought within the first share, then within the next."""
+
+
+@dataclass(frozen=True)
+class Completions:
+    """What the rest of a mission costs at least, were batteries to last for ever.
+
+    Attributes:
+        goal_list: the open goals, shape (G,).
+        from_station: least cost from station to goal, over any stations, (R, S, G).
+        after: with a robot at a goal and goals visited, shape (R, 2^G, G).
+        before: with a robot that has not set out, shape (R + 1, 2^G).
+    """
+
+    goal_list: np.ndarray
+    from_station: np.ndarray
+    after: np.ndarray
+    before: np.ndarray
+
+    @staticmethod
+    def of(problem: RoutingArrays) -> Completions:
+        """Work out all completions of a mission."""
+        goal_list = np.flatnonzero(problem.open_goal)
+        from_station, way, start = _coarse(problem, goal_list)
+        after, before = _touring_kernels.least_completions(way, start)
+        return Completions(goal_list, from_station, after, before)
+
+    @property
+    def cost_J(self) -> float:
+        """What the whole mission costs at least."""
+        return float(self.before[0, 0])
+
+    def cheapest(
+        self, problem: RoutingArrays, leg: np.ndarray, most: float
+    ) -> tuple[float, list[list[int]]] | None:
+        """Return the cost of the cheapest tours and these, if it is `most` or less.
+
+        Args:
+            problem: the mission, whose least legs drain batteries.
+            leg: what legs cost from arc to arc, shape (R, T + 1, K, T, K).
+            most: cost of tours of interest.
+
+        Returns:
+            Infinite cost and empty tours if all cost more; None if that takes too many
+            labels to tell.
+        """
+        robots, start = leg.shape[:2]
+        cost, last, trace = _touring_kernels.touring_labels(
+            problem,
+            self.goal_list,
+            leg,
+            self.from_station,
+            self.after,
+            self.before,
+            most,
+            MOST_LABELS,
+        )
+        if not len(trace):
+            return None
+        return float(cost), _tours_of(trace, last, robots, start - 1)
+
+
+def near_routing(problem: RoutingArrays, completions: Completions) -> Routing | None:
+    """Return the cheapest tours if they cost little more than without batteries.
+
+    Returns:
+        The tours, with infinite cost if no robot can reach some goal; None if they are
+        not within reach.
+    """
+    least_J = completions.cost_J
+    if not np.isfinite(least_J):
+        return Routing(tuple(() for _ in problem.energy), least_J)
+    leg = np.ascontiguousarray(problem.cost[:, :, None, :, None])
+    for share in SHARES:
+        found = completions.cheapest(problem, leg, (1.0 + share) * least_J)
+        if found is None:
+            break
+        cost_J, tours = found
+        if np.isfinite(cost_J):
+            return Routing(tuple(tuple(tour) for tour in tours), cost_J)
+    return None
+
 
 def touring_bound_J(
     problem: RoutingArrays,
+    completions: Completions,
     tours: Sequence[Sequence[int]],
     ways: Sequence[ArcWays],
     price: np.ndarray,
@@ -39,29 +126,25 @@ def touring_bound_J(
 
     Args:
         problem: the relaxed routing problem, whose batteries limit tours.
+        completions: of that problem.
         tours: cheapest tours of that problem, whose ways are tightened first.
         ways: of each robot.
         price: cost of a metre of plain ground of each robot, shape (R,).
         rounds: how often at most.
     """
-    goal_list = np.flatnonzero(problem.open_goal)
-    to_goal, way, start = _coarse(problem, goal_list)
-    after, before = _touring_kernels.least_completions(way, start)
-    best = float(before[0, 0])
+    best = completions.cost_J
     for _ in range(rounds):
         if not _tighten(ways, tours):
             break
         leg = _leg_table(ways, price)
         most = (1.0 + SLACK) * _cost_along(leg, tours)
-        cost, last, trace = _touring_kernels.touring_labels(
-            problem, goal_list, leg, to_goal, after, before, most, MOST_LABELS
-        )
-        if not len(trace):
+        found = completions.cheapest(problem, leg, most)
+        if found is None:
             break
+        cost, tours = found
         best = max(best, min(cost, most))
         if not np.isfinite(cost):
             break
-        tours = _tours_of(trace, last, len(ways), len(leg[0, 0, 0]))
     return best
 
 

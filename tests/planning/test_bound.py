@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from mrmg.planning import plan_mission
-from mrmg.planning._bound_kernels import UNREACHED, certified_field
+from mrmg.planning._eikonal_kernels import UNREACHED, certified_field
 from mrmg.planning._nrpa_kernels import RoutingArrays
 from mrmg.planning.bound import (
     MOST_GOALS,
