@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import combinations, permutations, product
 
 import numpy as np
 import pytest
 
+from mrmg.planning._nrpa_kernels import RoutingArrays
 from mrmg.planning._touring_kernels import least_completions, touring_labels
 from mrmg.planning.arcs import ArcWays
-from mrmg.planning.bound import lower_bound_J
+from mrmg.planning.bound import exact_routing, lower_bound_J
 from mrmg.planning.geodesic import Ground, Ways
 from mrmg.planning.routing import routing_arrays
+from mrmg.planning.touring import Completions, near_routing
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
+
+Mission = Callable[..., RoutingArrays]
 
 FIRST_GOAL = np.array([8.0, 10.0])
 SECOND_GOAL = np.array([24.0, 10.0])
@@ -122,6 +127,49 @@ def test_tours_by_arcs_are_the_cheapest(
             problem, goal_list, leg, to_goal, after, before, 0.99 * exact, 1_000_000
         )
         assert below == math.inf, "nothing is cheaper than the cheapest"
+
+
+@pytest.mark.parametrize(
+    ("goals", "stations", "robots", "range_m"),
+    [(7, 2, 1, (150.0, 300.0)), (7, 2, 2, (120.0, 300.0)), (6, 0, 3, (300.0, 600.0))],
+)
+def test_tours_sought_among_near_ones_are_the_cheapest_of_all(
+    mission: Mission,
+    goals: int,
+    stations: int,
+    robots: int,
+    range_m: tuple[float, float],
+) -> None:
+    found = 0
+    for seed in range(25):
+        problem = mission(
+            seed, goals=goals, stations=stations, robots=robots, range_m=range_m
+        )
+        near = near_routing(problem, Completions.of(problem))
+        if near is None:
+            continue  # not near: `exact_routing` is asked
+        exact = exact_routing(problem)
+        assert exact is not None
+        assert near.cost_J == pytest.approx(exact.cost_J, rel=1e-12)
+        visited = [t for tour in near.tours for t in tour if t < goals]
+        assert sorted(visited) == list(range(goals))
+        found += 1
+    assert found >= 10, "too few tours are near to say anything"
+
+
+def test_a_goal_that_no_robot_reaches_makes_the_near_tours_infinite() -> None:
+    problem = routing_arrays(
+        goals=1,
+        distance=np.zeros((1, 1, 1)),
+        start_distance=np.array([[np.inf]]),
+        plain=np.ones(1),
+        energy=np.ones(1),
+        capacity=np.ones(1),
+        reserve=np.zeros(1),
+    )
+    near = near_routing(problem, Completions.of(problem))
+    assert near is not None
+    assert not near.feasible
 
 
 def field(**parts: object) -> Scene:
