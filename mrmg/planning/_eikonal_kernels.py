@@ -2,7 +2,8 @@
 
 A field u over a grid is certified if it is nowhere steeper than the ground is dear:
 then u(b) - u(a) is at most the cost of any way from a to b through free cells, however
-u was found. Between the nodes of the grid fields are bilinear.
+u was found. Fields are linear on triangles: every cell of the grid is cut in two along
+the diagonal that leaves it the flatter.
 
 Nodes are numbered row by row. Cells have a rim of blocked ones about them, so that the
 four cells about node n of row i are n + i, n + i + 1 and as many in the next row, and
@@ -78,16 +79,18 @@ def certified_field(price, cell, seed, rounds, band):
 
 @leaf_kernel
 def steepness(field, cell, row, column):
-    """Return the largest gradient of the bilinear field in a cell.
+    """Return the largest gradient in a cell, cut along the better diagonal.
 
-    Each partial derivative lies between its values on two opposite sides, so the
-    gradient is largest at a corner.
+    Where fronts meet, the other cut, or a bilinear field, would be the steeper by up to
+    a factor of sqrt(2).
     """
     a, b = field[row, column], field[row, column + 1]
     c, d = field[row + 1, column], field[row + 1, column + 1]
-    across = max(abs(b - a), abs(d - c))
-    along = max(abs(c - a), abs(d - b))
-    return sqrt(across * across + along * along) / cell
+    low, high = (b - a) * (b - a), (d - c) * (d - c)
+    left, right = (c - a) * (c - a), (d - b) * (d - b)
+    from_a = max(low + right, high + left)
+    from_b = max(low + left, high + right)
+    return sqrt(min(from_a, from_b)) / cell
 
 
 @leaf_kernel

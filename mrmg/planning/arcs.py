@@ -5,14 +5,16 @@ into arcs of equal length; between arcs holds
 
 - the straight distance at the least price there is,
 - the bound of all ways from one region to the other arc (`geodesic.Ways`),
-- for pairs of interest, what a plane wave that leaves one region certifies. It is
-  computed on finer cells, in a window that ways of interest do not leave: a way that
-  does costs at least what it costs to the window's border and on from there.
+- for pairs of interest, what a wave from a start certifies, or a plane wave that leaves
+  a region in the direction that ways between given arcs take. It is computed on finer
+  cells, in a window that ways of interest do not leave: a way that does costs at least
+  what it costs to the window's border and on from there.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -34,8 +36,25 @@ from mrmg.scene.types import Region
 CHORDS = 4
 """Chords that stand for an arc of a circle in straight distances."""
 
-WINDOW_M = 4.0
+SECTORS = 64
+"""Directions that waves leave regions in."""
+
+WINDOW_M = 8.0
 """By how much ways that leave a window are longer than the least way, if they can."""
+
+
+class Wave(NamedTuple):
+    """A wave that spreads from a region or a start, and certifies ways from there.
+
+    Attributes:
+        source: a region, or a start (-1 - r).
+        sink: the region that the ways lead to.
+        sector: of the direction in which it leaves a region.
+    """
+
+    source: int
+    sink: int
+    sector: int
 
 
 @dataclass(slots=True)
@@ -48,7 +67,7 @@ class ArcWays:
         between: from arc to arc, shape (T, K, T, K), symmetric.
         from_start: from start to arc, shape (R, T, K).
         starts: shape (R, 2).
-        done: pairs that are as tight as can be; a start r is -1 - r.
+        known: waves that were taken.
     """
 
     ways: Ways
@@ -56,7 +75,7 @@ class ArcWays:
     between: np.ndarray
     from_start: np.ndarray
     starts: np.ndarray
-    done: set[tuple[int, int]] = field(default_factory=set)
+    known: set[Wave] = field(default_factory=set)
 
     @staticmethod
     def of(ways: Ways, fine: Ground, starts: np.ndarray) -> ArcWays:
@@ -90,38 +109,103 @@ class ArcWays:
             table[table > 0.5 * UNREACHED] = np.inf
         return ArcWays(ways, fine, between, from_start, starts)
 
-    def tighten(self, origin: int, target: int) -> bool:
-        """Tighten the ways between two regions, or from a start (-1 - r) to a region.
+    def waves(self, origin: int, from_arc: int, target: int, to_arc: int) -> list[Wave]:
+        """Return the waves that tell most of ways between arcs, but for those known.
 
-        Returns:
-            Whether it had not been done before.
+        Args:
+            origin: a region, or a start (-1 - r).
+            from_arc: of the origin's border; 0 for a start.
+            target: a region.
+            to_arc: of its border.
         """
-        pair = (min(origin, target), max(origin, target))
-        if pair in self.done or origin == target:
-            return False
-        self.done.add(pair)
+        if origin == target or not 0.0 < self._least(origin, target) < np.inf:
+            return []
         if origin < 0:
-            least = self.ways.from_start[-1 - origin, target]
+            found = [Wave(origin, target, 0)]
         else:
-            least = self.ways.between[origin, target]
-        if least == 0.0 or least == np.inf:
-            return True
-        window, outside_m = self._window(origin, target, least)
-        for source, sink in ((target, origin), (origin, target)):
-            if source < 0:
-                continue
-            wave = self._wave(window, source, sink)
-            if wave is None:
-                continue
-            apart = np.minimum(wave, outside_m)
-            if sink < 0:
-                old = self.from_start[-1 - sink, source]
-                np.maximum(old, apart[:, 0], out=old)
-            else:
-                old = self.between[source, :, sink]
-                np.maximum(old, apart, out=old)
-                self.between[sink, :, source] = old.T
-        return True
+            found = [
+                Wave(origin, target, self._sector(origin, from_arc, target, to_arc)),
+                Wave(target, origin, self._sector(target, to_arc, origin, from_arc)),
+            ]
+        return [wave for wave in found if wave not in self.known]
+
+    def certificate(self, wave: Wave) -> np.ndarray:
+        """Return what a wave certifies of ways from arc to arc, shape (K, K).
+
+        From a start the first axis has length 1.
+        """
+        source, sink, sector = wave
+        window, outside_m = self._window(source, sink, self._least(source, sink))
+        away = window.look_at(border(self.ways.regions[sink]), 0.5 * SPACING_M)
+        field: Field | None
+        if source < 0:
+            point = self.starts[-1 - source]
+            region = Region(center=point, radius_m=0.0, corners=np.zeros((0, 2)))
+            field, here = window.field_from(region), window.look_at(point[None], 0.0)
+        else:
+            region = self.ways.regions[source]
+            angle = 2.0 * np.pi * sector / SECTORS
+            heading = np.array([np.cos(angle), np.sin(angle)])
+            field = window.wave_from(region, heading)
+            here = window.look_at(border(region), 0.5 * SPACING_M)
+        if field is None or not _all_reached(field, here, away):
+            return np.zeros((1, 1))
+        highest = _highest_by_arc(field, here)[: ARCS if source >= 0 else 1]
+        low = _lowest_by_arc(field, away)
+        return np.asarray(np.minimum(low - highest[:, None], outside_m))
+
+    def take(self, wave: Wave, apart: np.ndarray) -> None:
+        """Tighten ways by a wave's certificate."""
+        self.known.add(wave)
+        if wave.source < 0:
+            old = self.from_start[-1 - wave.source, wave.sink]
+            np.maximum(old, apart[0], out=old)
+        else:
+            old = self.between[wave.source, :, wave.sink]
+            np.maximum(old, apart, out=old)
+            self.between[wave.sink, :, wave.source] = old.T
+
+    def _least(self, origin: int, target: int) -> float:
+        """Return the bound of all ways to a region from another one or a start."""
+        ways = self.ways
+        if origin < 0:
+            return float(ways.from_start[-1 - origin, target])
+        return float(ways.between[origin, target])
+
+    def _sector(self, source: int, arc: int, sink: int, sink_arc: int) -> int:
+        """Return the sector in which the way from arc to arc sets out, or nearly so.
+
+        That is straight to the other arc, unless something is in the way, or else
+        where the way to the region leads.
+        """
+        here, there = self._middle(source, arc), self._middle(sink, sink_arc)
+        straight = there - here
+        down = -self._slope(sink, here)
+        swing = np.arctan2(
+            down[0] * straight[1] - down[1] * straight[0], down @ straight
+        )
+        reach_m = np.hypot(*(there - self.ways.regions[sink].center))
+        wide = np.arctan2(2.0 * reach_m, np.hypot(*straight))
+        heading = straight if abs(swing) <= wide else down
+        angle = np.arctan2(heading[1], heading[0])
+        return round(SECTORS * float(angle) / (2.0 * np.pi)) % SECTORS
+
+    def _middle(self, region: int, arc: int) -> np.ndarray:
+        """Return the middle of an arc, shape (2,)."""
+        points = border(self.ways.regions[region])
+        return np.asarray(points[(2 * arc + 1) * len(points) // (2 * ARCS)])
+
+    def _slope(self, source: int, point: np.ndarray) -> np.ndarray:
+        """Return the gradient of a region's field about a point, shape (2,)."""
+        ground = self.ways.ground
+        rows, columns = ground.price.shape
+        field = self.ways.fields[source].at_nodes().reshape(rows + 1, columns + 1)
+        column, row = ((point - (ground.x_min, ground.y_min)) / ground.cell_m).astype(
+            int
+        )
+        row, column = min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)
+        a, b, c, d = field[row : row + 2, column : column + 2].ravel()
+        return np.array([b - a + d - c, c - a + d - b])
 
     def _window(self, origin: int, target: int, least: float) -> tuple[Ground, float]:
         """Return a part of the fine ground, and the least cost of ways out of it."""
@@ -163,28 +247,12 @@ class ArcWays:
         rows, columns = ground.price.shape
         return np.asarray(values.reshape(rows + 1, columns + 1))
 
-    def _wave(self, window: Ground, source: int, sink: int) -> np.ndarray | None:
-        """Return what a wave from a region to a place certifies between their arcs."""
-        region = self.ways.regions[source]
-        if sink >= 0:
-            look = self.ways.looks[source]
-            toward = self.ways.fields[sink].at(look)
-            leave = border(region)[look.point[int(toward.argmin())]]
-            there = border(self.ways.regions[sink])
-        else:
-            leave = self.starts[-1 - sink]
-            there = self.starts[-1 - sink][None]
-        heading = leave - region.center
-        wave = window.wave_from(region, heading / np.hypot(*heading))
-        if wave is None:
-            return None
-        here = window.look_at(border(region), 0.5 * SPACING_M)
-        away = window.look_at(there, 0.5 * SPACING_M if sink >= 0 else 0.0)
-        for look in (here, away):
-            if wave.at(look).max(initial=-UNREACHED) > 0.5 * UNREACHED:
-                return None
-        low = _lowest_by_arc(wave, away)
-        return np.asarray(low[None] - _highest_by_arc(wave, here)[:, None])
+
+def _all_reached(wave: Field, *looks: Look) -> bool:
+    """Tell whether a field knows all points of looks."""
+    return all(
+        wave.at(look).max(initial=-UNREACHED) <= 0.5 * UNREACHED for look in looks
+    )
 
 
 def _lowest_by_arc(wave: Field, look: Look) -> np.ndarray:

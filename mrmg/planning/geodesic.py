@@ -49,14 +49,16 @@ class Look(NamedTuple):
 
     Attributes:
         point: which of them, as each is looked at from several cells, shape (n,).
-        nodes, weights: flat indices and bilinear weights, shape (n, 4).
+        nodes: flat indices of its cell's corners, row by row, shape (n, 4).
+        across, along: where in the cell it is, from 0 to 1, shape (n,).
         slack: how much a certified field can differ within reach, shape (n,).
         arc: which of ARCS equal runs of points each belongs to, shape (n,).
     """
 
     point: np.ndarray
     nodes: np.ndarray
-    weights: np.ndarray
+    across: np.ndarray
+    along: np.ndarray
     slack: np.ndarray
     arc: np.ndarray
 
@@ -77,7 +79,7 @@ class Field:
 
     def at(self, look: Look) -> np.ndarray:
         """Return f(u) at points, shape (n,)."""
-        return self._certified((self.values[look.nodes] * look.weights).sum(axis=1))
+        return self._certified(_on_triangles(self.values[look.nodes], look))
 
     def at_nodes(self) -> np.ndarray:
         """Return f(u) at all nodes, flat."""
@@ -159,12 +161,9 @@ class Ground:
         nodes = np.stack(
             [corner, corner + 1, corner + columns + 1, corner + columns + 2], axis=1
         )
-        weights = np.stack(
-            [(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy], axis=1
-        )
         arc = index * ARCS // max(ARCS, len(points))
         slack = self.price[row, column] * reach_m
-        return Look(index, nodes, weights, slack, arc)
+        return Look(index, nodes, fx, fy, slack, arc)
 
     def field_from(self, region: Region) -> Field:
         """Return a certified field that grows away from a region."""
@@ -270,6 +269,24 @@ class Ways:
         for table in (way, start_way):
             table[table > 0.5 * UNREACHED] = np.inf
         return Ways(ground, regions, fields, looks, highest, way, start_way)
+
+
+def _on_triangles(corner: np.ndarray, look: Look) -> np.ndarray:
+    """Return a field's values, shape (n, 4) -> (n,), as it is certified.
+
+    Cells are cut along the diagonal that leaves their two triangles the flatter
+    (`_eikonal_kernels.steepness`).
+    """
+    a, b, c, d = corner.T
+    x, y = look.across, look.along
+    low, high = (b - a) ** 2, (d - c) ** 2
+    left, right = (c - a) ** 2, (d - b) ** 2
+    cut_from_a = np.maximum(low + right, high + left)
+    cut_from_b = np.maximum(low + left, high + right)
+    of_a = a + np.where(x >= y, x * (b - a) + y * (d - b), x * (d - c) + y * (c - a))
+    near = a + x * (b - a) + y * (c - a)
+    of_b = np.where(x + y <= 1.0, near, d + (1 - x) * (c - d) + (1 - y) * (b - d))
+    return np.asarray(np.where(cut_from_a < cut_from_b, of_a, of_b))
 
 
 def lowest_of(field: Field, look: Look) -> float:

@@ -8,7 +8,7 @@ are looked at, so the result is the least cost of all tours or the limit.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -16,12 +16,16 @@ import numpy as np
 
 from mrmg.planning import _touring_kernels
 from mrmg.planning._nrpa_kernels import RoutingArrays
-from mrmg.planning.arcs import ArcWays
+from mrmg.planning.arcs import ArcWays, Wave
 from mrmg.planning.geodesic import ARCS
 from mrmg.planning.routing import Routing
 
 MOST_LABELS = 4_000_000
 """Labels up to which tours are told apart by arcs."""
+
+AGAIN = 3
+"""Times that the ways of the same tours are tightened again: tight ones lead elsewhere.
+"""
 
 SLACK = 1e-6
 """Share by which tours may cost more than the best known; rounding loses none."""
@@ -133,10 +137,15 @@ def touring_bound_J(
         rounds: how often at most.
     """
     best = completions.cost_J
+    leg = _leg_table(ways, price)
     for _ in range(rounds):
-        if not _tighten(ways, tours):
+        if not _tighten(ways, leg, tours):
             break
         leg = _leg_table(ways, price)
+        for _ in range(AGAIN):
+            if not _tighten(ways, leg, tours):
+                break
+            leg = _leg_table(ways, price)
         most = (1.0 + SLACK) * _cost_along(leg, tours)
         found = completions.cheapest(problem, leg, most)
         if found is None:
@@ -148,18 +157,39 @@ def touring_bound_J(
     return best
 
 
-def _tighten(ways: Sequence[ArcWays], tours: Sequence[Sequence[int]]) -> bool:
+def _tighten(
+    ways: Sequence[ArcWays], leg: np.ndarray, tours: Sequence[Sequence[int]]
+) -> bool:
     """Tighten the ways that tours take; tell whether any had not been tightened yet."""
-    legs = [
-        (ways[r], *pair) for r, tour in enumerate(tours) for pair in _pairs(r, tour)
-    ]
+    new: dict[tuple[int, Wave], ArcWays] = {}
+    for r, tour in enumerate(tours):
+        arcs = _arcs_along(leg[r], tour)
+        for one in zip((-1 - r, *tour), (0, *arcs), tour, arcs, strict=False):
+            new |= {(id(ways[r]), wave): ways[r] for wave in ways[r].waves(*one)}
     with ThreadPoolExecutor() as threads:
-        return any(list(threads.map(lambda leg: leg[0].tighten(*leg[1:]), legs)))
+        found = threads.map(lambda at: new[at].certificate(at[1]), new)
+        for (key, wave), apart in zip(new, found, strict=True):
+            new[key, wave].take(wave, apart)
+    return bool(new)
 
 
-def _pairs(r: int, tour: Sequence[int]) -> Iterator[tuple[int, int]]:
-    """Return the legs of a tour; the start is -1 - r."""
-    yield from zip((-1 - r, *tour), tour, strict=False)
+def _arcs_along(leg: np.ndarray, tour: Sequence[int]) -> list[int]:
+    """Return the arcs that a robot touches its targets at for the least cost.
+
+    Args:
+        leg: what its legs cost, shape (T + 1, K, T, K).
+        tour: its targets.
+    """
+    cost, place = np.where(np.arange(ARCS) == 0, 0.0, np.inf), len(leg) - 1
+    origins: list[np.ndarray] = []
+    for target in tour:
+        over = cost[:, None] + leg[place, :, target]
+        origins.append(over.argmin(axis=0))
+        cost, place = over.min(axis=0), target
+    arcs = [int(cost.argmin())]
+    for origin in reversed(origins):
+        arcs.append(int(origin[arcs[-1]]))
+    return arcs[-2::-1]  # the last one found is that of the start
 
 
 def _leg_table(ways: Sequence[ArcWays], price: np.ndarray) -> np.ndarray:

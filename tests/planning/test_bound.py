@@ -21,6 +21,7 @@ from mrmg.planning.bound import (
     lower_bound_J,
     relaxed_routing_J,
 )
+from mrmg.planning.geodesic import Field, Look
 from mrmg.planning.routing import RouterParams, Routing, routing_arrays, solve_routing
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.types import Scene
@@ -183,17 +184,23 @@ def test_a_field_is_never_steeper_than_the_price(seed: int) -> None:
     price[rng.random(price.shape) < 0.15] = np.inf
     seeds = np.full((31, 31), UNREACHED)
     seeds[12, 17] = 0.0
-    field, level, certified = certified_field(price, 0.5, seeds, 4, 0.1)
-    assert np.count_nonzero(field < UNREACHED) > 500
+    u, level, certified = certified_field(price, 0.5, seeds, 4, 0.1)
+    field = Field(u.ravel(), level, certified)
+    assert np.count_nonzero(u < UNREACHED) > 500
     t = np.linspace(0.0, 1.0, 6)
     y, x = (axis.ravel() for axis in np.meshgrid(t, t, indexing="ij"))
     way = 0.5 * np.hypot(x[:, None] - x, y[:, None] - y)
-    for i, j in np.argwhere(np.isfinite(price) & (field[:-1, :-1] < UNREACHED)):
-        (a, b), (c, d) = field[i : i + 2, j : j + 2]
-        u = (1 - y) * ((1 - x) * a + x * b) + y * ((1 - x) * c + x * d)
-        value = np.interp(u, level, certified)
+    for i, j in np.argwhere(np.isfinite(price) & (u[:-1, :-1] < UNREACHED)):
+        nodes = np.ravel_multi_index(
+            ([i, i, i + 1, i + 1], [j, j + 1, j, j + 1]), u.shape
+        )
+        here = np.zeros(len(x), int)
+        look = Look(here, np.tile(nodes, (len(x), 1)), x, y, 0.0 * x, here)
+        value = field.at(look)
         rise = np.abs(value[:, None] - value)
         assert (rise <= price[i, j] * way + 1e-9).all()
+        corners = np.isin(x, (0, 1)) & np.isin(y, (0, 1))
+        assert value[corners] == pytest.approx(field.at_nodes()[nodes])
 
 
 def way_m(scene: Scene, **options: Any) -> float:

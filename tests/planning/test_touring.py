@@ -211,7 +211,12 @@ def test_no_way_between_arcs_is_shorter_than_its_bound(walls: int) -> None:
     """Straight, or round a wall; the robot's disc reaches 0.3 m."""
     ways = arc_ways(field(obstacles=[WALL] * walls))
     before = ways.between.copy()
-    assert ways.tighten(0, 1) and not ways.tighten(1, 0)
+    middle = ways.between.shape[1] // 2
+    waves = ways.waves(0, 0, 1, middle)
+    assert {(wave.source, wave.sink) for wave in waves} == {(0, 1), (1, 0)}
+    for wave in waves:
+        ways.take(wave, ways.certificate(wave))
+    assert not ways.waves(1, middle, 0, 0)
     assert (ways.between >= before).all()
     gained = 0.0
     arcs = ways.between.shape[1]
@@ -229,6 +234,22 @@ def test_no_way_between_arcs_is_shorter_than_its_bound(walls: int) -> None:
         assert ways.between[0, a, 1, b] <= exact + 1e-9
         gained += float((ways.between - before)[0, a, 1, b])
     assert gained > 0.0 or not walls
+
+
+def test_no_way_from_a_start_is_shorter_than_its_bound() -> None:
+    """The wall hides the second goal; what a wave from the start tells is nearly so."""
+    ways = arc_ways(field(obstacles=[WALL]))
+    (wave,) = ways.waves(-1, 0, 1, 0)
+    ways.take(wave, ways.certificate(wave))
+    assert not ways.waves(-1, 0, 1, 5)
+    arcs = ways.between.shape[1]
+    start, here, there = np.array([[2.0, 4.0], [14.7, 5.7], [17.3, 5.7]])
+    for arc in range(arcs):
+        last = border_points(SECOND_GOAL, arc, arcs) - there
+        exact = np.hypot(*(here - start)) + 2.6 + np.hypot(*last.T).min()
+        assert ways.from_start[0, 1, arc] <= exact + 1e-9
+        if last[:, 1].min() > 0.0 and last[:, 0].min() > 0.0:
+            assert ways.from_start[0, 1, arc] >= 0.97 * exact
 
 
 def test_touching_a_goal_beside_the_way_is_paid_for() -> None:
