@@ -33,8 +33,17 @@ def pytest_configure() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Run the slow tests last, so that a broken build is told early."""
+    """Run the slow tests last, so that a broken build is told early.
+
+    Where a test is marked quick for some of its parameters, the others are slow.
+    """
+    for item in items:
+        quick = item.get_closest_marker("quick")
+        called = getattr(item, "callspec", None)
+        if quick and called and called.id not in quick.args:
+            item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: item.get_closest_marker("slow") is not None)
 
 

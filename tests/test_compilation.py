@@ -174,6 +174,7 @@ def test_an_edit_of_any_kernel_source_compiles_anew(tmp_path: Path) -> None:
     assert doubled == 2.0 * value
 
 
+@pytest.mark.slow
 def test_processes_that_compile_at_once_share_the_work(tmp_path: Path) -> None:
     package = copy_of_package(tmp_path / "package")
     alone = call_kernel(package, tmp_path / "cache of one")
@@ -186,6 +187,7 @@ def test_processes_that_compile_at_once_share_the_work(tmp_path: Path) -> None:
     assert compiled < 2 * alone[2]
 
 
+@pytest.mark.slow
 def test_a_compilation_that_is_killed_leaves_a_cache_that_can_be_used(
     tmp_path: Path,
 ) -> None:
@@ -204,6 +206,7 @@ def test_a_compilation_that_is_killed_leaves_a_cache_that_can_be_used(
     assert call_kernel(package, cache)[1:] == (expected, 0)
 
 
+@pytest.mark.slow
 def test_what_linked_functions_call_by_symbol_is_loaded_before_their_callers(
     tmp_path: Path,
 ) -> None:

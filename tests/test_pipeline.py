@@ -50,6 +50,7 @@ def test_a_finished_run_is_not_made_again(own_run: Path) -> None:
     assert made_again <= {"run.json", *OUTPUTS[Step.REPORT]}
 
 
+@pytest.mark.quick("log.json")
 @pytest.mark.parametrize("lost", ["log.json", "audit.json", "energy.png"])
 def test_only_what_is_missing_is_made(own_run: Path, lost: str) -> None:
     before = written(own_run)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy.special import stdtrit
 
 CONFIDENCE = 0.95
 """Probability that an interval holds the true value, if the residuals are noise."""
@@ -56,7 +56,7 @@ def fit_linear(matrix: np.ndarray, measured: np.ndarray) -> LinearFit:
     freedom = rows - parameters
     normal = (matrix / scale).T @ (matrix / scale)
     variance = residual @ residual / freedom * np.diag(np.linalg.inv(normal))
-    quantile = stats.t.ppf(0.5 + 0.5 * CONFIDENCE, freedom)
+    quantile = stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE)
     return LinearFit(
         value=value,
         half_width=quantile * np.sqrt(variance) / scale,

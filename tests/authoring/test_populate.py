@@ -88,6 +88,7 @@ def _forest_m(road: np.ndarray, robots: int, goals: int) -> float:
     return total
 
 
+@pytest.mark.quick("potholes.txt")
 @pytest.mark.parametrize("name", PAIR_MAPS)
 def test_two_robots_on_shared_map(name: str) -> None:
     path = MAPS / name
@@ -96,6 +97,7 @@ def test_two_robots_on_shared_map(name: str) -> None:
     check_mission(populate(import_map(path)), 2, 14)
 
 
+@pytest.mark.quick("gaps.txt")
 @pytest.mark.parametrize("name", FLEET_MAPS)
 def test_fleet_on_shared_map(name: str) -> None:
     path = MAPS / name
@@ -104,6 +106,7 @@ def test_fleet_on_shared_map(name: str) -> None:
     check_mission(populate(import_map(path), robots=4, goals=20), 4, 20)
 
 
+@pytest.mark.slow
 def test_map_too_narrow_for_the_robot() -> None:
     path = MAPS / "jf-pb2.txt"
     if not path.exists():
@@ -113,6 +116,7 @@ def test_map_too_narrow_for_the_robot() -> None:
     check_mission(populate(import_map(path, 300.0)), 2, 14)
 
 
+@pytest.mark.quick("0", "1")
 @pytest.mark.parametrize("seed", range(4))
 def test_seeds(seed: int) -> None:
     document = populate(FIELD, goals=6, stations=3, seed=seed)

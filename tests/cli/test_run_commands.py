@@ -109,6 +109,7 @@ def test_an_infeasible_mission_ends_with_its_code(
     assert "g1" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_budget_too_small_ends_with_its_code_and_is_tried_again(
     tmp_path: Path,
 ) -> None:

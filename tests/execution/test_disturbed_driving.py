@@ -133,6 +133,7 @@ def test_the_control_does_not_see_the_truth(mission: tuple[Scene, Plan]) -> None
     assert step_m.max() < 0.005
 
 
+@pytest.mark.quick("mpc")
 @pytest.mark.parametrize("controller", ["mpc", "pure_pursuit", "tvlqr"])
 def test_every_controller_survives_everything_at_once(
     driving: SimpleNamespace, controller: str

@@ -19,6 +19,8 @@ from mrmg.mission import Plan
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
 
+pytestmark = pytest.mark.quick("car-mpc", "diffdrive-tvlqr", "hauler-pure_pursuit")
+
 DRAG = 0.43
 """Rolling resistance over weight of which the drive can overcome hardly more."""
 

@@ -151,6 +151,7 @@ def test_timing_is_reported(wild_log: ExecutionLog) -> None:
     assert 0 < timing["controller_ms"]["median"] <= timing["controller_ms"]["p99"]
 
 
+@pytest.mark.quick("plain-mpc", "two-pure_pursuit", "four-tvlqr")
 @pytest.mark.parametrize("controller", controller_names())
 @pytest.mark.parametrize(
     ("start_m", "multiplier"),
@@ -235,6 +236,7 @@ def test_a_standing_robot_does_no_work(driving: SimpleNamespace, model: str) -> 
     assert off_m(log).max() < 1e-3
 
 
+@pytest.mark.quick("car-1e-16", "diffdrive-0.0")
 @pytest.mark.parametrize(
     ("model", "rounding"),
     [("car", 0.0), ("car", 1e-16), ("car", -1e-9), ("diffdrive", 0.0)],

@@ -343,6 +343,7 @@ def grid_way_m(
     return np.inf
 
 
+@pytest.mark.quick("0", "1")
 @pytest.mark.parametrize("seed", range(8))
 def test_it_is_never_longer_than_a_way_on_a_fine_grid(
     seed: int,

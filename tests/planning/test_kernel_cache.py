@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 COUNT = """
 import mrmg.compilation
 from numba.core import event
@@ -35,6 +37,7 @@ def names_compiled() -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.slow
 def test_no_kernel_is_compiled_in_a_second_process() -> None:
     names_compiled()
     assert names_compiled() == []

@@ -13,6 +13,7 @@ from mrmg.results.figure import KINDS, draw_figure
 STARTS = {".pdf": b"%PDF", ".svg": b"<?xml", ".png": b"\x89PNG"}
 
 
+@pytest.mark.quick(".pdf-map", ".svg-energy", ".png-timeline")
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("suffix", STARTS)
 def test_every_kind_in_every_format_twice_the_same(

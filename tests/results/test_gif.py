@@ -69,6 +69,7 @@ def test_too_long_a_gif_is_refused_before_anything_is_drawn(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_command_shows_a_part_from_a_robot_s_place(
     own_run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -244,6 +244,7 @@ def test_without_viser_the_cure_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
         browser_view.BrowserView(scene, None, host="127.0.0.1", port=18081)
 
 
+@pytest.mark.quick("run")
 @pytest.mark.parametrize("what", ["run", "scene"])
 def test_the_command_serves_until_it_is_stopped(
     what: str, quickstart_run: Path

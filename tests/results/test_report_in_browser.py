@@ -324,6 +324,7 @@ def test_a_comparison_draws_and_its_toggles_work(
     assert tab.errors == []
 
 
+@pytest.mark.slow
 def test_an_infeasible_mission_has_a_page_too(
     tab: Tab, walled_scene: Path, tmp_path: Path
 ) -> None:

@@ -52,6 +52,7 @@ def decoded(path: Path) -> list[av.VideoFrame]:
         return list(container.decode(stream))
 
 
+@pytest.mark.quick("split")
 @pytest.mark.parametrize("view", VIEWS)
 def test_file_plays_with_all_frames_and_is_not_blank(mission, view, tmp_path) -> None:
     scene, plan, log = mission

@@ -33,6 +33,7 @@ TABLE = {
     "diffdrive": (2, 6, 2, 1, 45),
     "hills": (2, 8, 2, 3, 95),
 }
+QUICK = pytest.mark.quick("scene1", "scene4", "quickstart", "mixed", "hills")
 MARGIN_M = 0.1
 """Beside half the robot's width: what a road must at least leave."""
 
@@ -46,8 +47,10 @@ def kinds_of(scene: Scene) -> list[list[int]]:
     return list(kinds.values())
 
 
-def ground_of(scene: Scene, number: int = 0) -> Ground:
+@cache
+def ground_of(name: str, number: int = 0) -> Ground:
     """Where the robot of that number can drive."""
+    scene = load_scene(name)
     robot = scene.robots[number]
     return Ground.over(
         scene.bounds,
@@ -57,13 +60,14 @@ def ground_of(scene: Scene, number: int = 0) -> Ground:
     )
 
 
-def road_m(scene: Scene, number: int = 0) -> np.ndarray:
+@cache
+def road_m(name: str, number: int = 0) -> np.ndarray:
     """Distances between robots, goals and stations [m of plain ground], in this order.
 
     They are those of one robot: places it cannot reach are infinitely far. The grid
     makes a road up to 2.8 % longer than it must be.
     """
-    ground = ground_of(scene, number)
+    scene, ground = load_scene(name), ground_of(name, number)
     places = [robot.pose[:2] for robot in scene.robots]
     places += [tuple(target.region.center) for target in scene.targets()]
     cells = [ground.nearest(place) for place in places]
@@ -100,6 +104,7 @@ def test_table(name: str) -> None:
         assert robot.battery.start_J == robot.battery.capacity_J
 
 
+@QUICK
 @pytest.mark.parametrize("name", TABLE)
 def test_every_target_can_be_reached_and_left(name: str) -> None:
     """Goals have room about them and a station well within half a battery."""
@@ -107,7 +112,7 @@ def test_every_target_can_be_reached_and_left(name: str) -> None:
     robots, goals = len(scene.robots), len(scene.goals)
     reached = np.zeros(goals, dtype=bool)
     for kind in kinds_of(scene):
-        ground, road = ground_of(scene, kind[0]), road_m(scene, kind[0])
+        ground, road = ground_of(name, kind[0]), road_m(name, kind[0])
         for target in scene.targets():
             at = ground.nearest(target.region.center)
             assert ground.clearance_m[at] >= 1.0, target.id
@@ -150,7 +155,7 @@ def cheapest_mission(name: str) -> tuple[list[list[int]], list[float]]:
     """Routes of the cheapest assignment that ignores energy, and their lengths [m]."""
     scene = load_scene(name)
     kinds = kinds_of(scene)
-    roads = np.stack([road_m(scene, kind[0]) for kind in kinds])
+    roads = np.stack([road_m(name, kind[0]) for kind in kinds])
     prices_J = np.array([per_metre_J(scene, kind[0]) for kind in kinds])
     costs_J = roads * prices_J[:, None, None]
     cost_J, routes = cheapest_routes(costs_J, kinds, len(scene.goals))
@@ -164,6 +169,7 @@ def cheapest_mission(name: str) -> tuple[list[list[int]], list[float]]:
     return routes, lengths_m
 
 
+@QUICK
 @pytest.mark.parametrize("name", TABLE)
 def test_the_energy_limit_binds(name: str) -> None:
     """The cheapest assignment that ignores energy overdraws some battery."""
@@ -172,6 +178,7 @@ def test_the_energy_limit_binds(name: str) -> None:
     assert max(lengths_m) > 1.03 * usable_m(load_scene(name))
 
 
+@QUICK
 @pytest.mark.parametrize("name", TABLE)
 def test_every_robot_is_worth_using(name: str) -> None:
     """It starts where it is the cheapest for some goal."""
@@ -289,7 +296,7 @@ def test_scene4_makes_both_robots_use_narrow_passages() -> None:
     robots, goals = len(scene.robots), len(scene.goals)
     reach = np.stack(
         [
-            np.isfinite(road_m(scene, number)[number, robots : robots + goals])
+            np.isfinite(road_m("scene4", number)[number, robots : robots + goals])
             for number in range(robots)
         ]
     )

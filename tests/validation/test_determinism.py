@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import mrmg
 
 FILES = ("plan.json", "plan.npz")
@@ -22,17 +24,19 @@ def test_two_plans_of_one_process_are_equal_bytes(
         assert (tmp_path / name).read_bytes() == (quickstart_run / name).read_bytes()
 
 
-def test_two_processes_plan_equal_bytes(quickstart_run: Path, tmp_path: Path) -> None:
-    for hash_seed in ("1", "4711"):
-        out = tmp_path / hash_seed
-        subprocess.run(
-            [sys.executable, "-m", "mrmg", "plan", "quickstart", "--out", str(out)],
-            env={**os.environ, "PYTHONHASHSEED": hash_seed},
-            check=True,
-            capture_output=True,
-        )
-        for name in FILES:
-            assert (out / name).read_bytes() == (quickstart_run / name).read_bytes()
+@pytest.mark.quick("1")
+@pytest.mark.parametrize("hash_seed", ["1", "4711"])
+def test_another_process_plans_equal_bytes(
+    hash_seed: str, quickstart_run: Path, tmp_path: Path
+) -> None:
+    subprocess.run(
+        [sys.executable, "-m", "mrmg", "plan", "quickstart", "--out", str(tmp_path)],
+        env={**os.environ, "PYTHONHASHSEED": hash_seed},
+        check=True,
+        capture_output=True,
+    )
+    for name in FILES:
+        assert (tmp_path / name).read_bytes() == (quickstart_run / name).read_bytes()
 
 
 def test_another_seed_gives_another_plan(quickstart_run: Path, tmp_path: Path) -> None:

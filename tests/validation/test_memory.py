@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pytest
+
 MOST_MB = 500.0
 
 PEAK = """
@@ -20,6 +22,7 @@ print(float(status["VmHWM"].split()[0]) / 1024.0)
 """
 
 
+@pytest.mark.slow
 def test_planning_for_eight_robots_and_bounding_keeps_to_half_a_gigabyte() -> None:
     done = subprocess.run(
         [sys.executable, "-c", PEAK], capture_output=True, text=True, check=True
