@@ -1,6 +1,7 @@
 """Plan the kinodynamic multi-robot benchmarks of a folder; print a table.
 
 Protocol: one process, one thread; every file is planned once before anything is timed.
+The objective is the makespan, and the first plan counts.
 Every robot must be at rest within its own goal at the end (0.5 m; unicycles within
 0.2 m and 0.2 rad of the pose), and nothing may overlap at any time, in between steps
 and with robots that have arrived included: `mrmg.verify` judges that, with true
@@ -137,6 +138,7 @@ def benchmark_scene(path: Path, folder: Path) -> Scene:
             for box in world["obstacles"]
         ],
         "robots": robots,
+        "objective": "makespan",
     }  # fmt: skip
     return scene_from_document(document, source=str(path))
 

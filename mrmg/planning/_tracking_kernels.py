@@ -21,9 +21,6 @@ from mrmg.planning._safety_kernels import (
 )
 from mrmg.planning._steering_kernels import control_towards, wrap
 
-STIFFNESS = 0.8
-"""How fast a robot returns to its path: errors decay over about 1 / STIFFNESS [1/m]."""
-
 PREVIEW_S = 0.2
 """How far ahead the path's curvature is read."""
 
@@ -48,6 +45,12 @@ STUCK_STEPS = 150
 TURNING_SHARE = 0.5
 """Share of the acceleration of turning with which a turn on the spot is slowed down."""
 
+WAITING_M = 0.3
+"""How near to the place where it waits a standing robot counts as waiting ..."""
+
+PASSED_M = 1.0
+"""... and how far behind that place it no longer waits."""
+
 ATTEMPTS = 3
 """Controls tried before a robot brakes as committed."""
 
@@ -66,6 +69,10 @@ class Courses(NamedTuple):
         fastest: speed at which each node is passed at most [m/s], shape (R, N).
         nodes: number of nodes of each path, shape (R,).
         ease: deceleration that costs nothing [m/s^2], shape (R,).
+        stiffness: how fast each robot returns to its path: errors decay over about
+            its inverse [1/m], shape (R,).
+        heading: in which robots that turn on the spot end [rad], shape (R,).
+        tolerance: allowed deviation from that [rad]; inf for any, shape (R,).
     """
 
     node: np.ndarray
@@ -76,6 +83,25 @@ class Courses(NamedTuple):
     fastest: np.ndarray
     nodes: np.ndarray
     ease: np.ndarray
+    stiffness: np.ndarray
+    heading: np.ndarray
+    tolerance: np.ndarray
+
+
+class Waits(NamedTuple):
+    """Who waits for whom; W waits.
+
+    Attributes:
+        robot: that waits, shape (W,).
+        at: way along its path at which it waits [m], shape (W,).
+        other: for which it waits, shape (W,).
+        until: way along the other's path that the other must have driven [m], (W,).
+    """
+
+    robot: np.ndarray
+    at: np.ndarray
+    other: np.ndarray
+    until: np.ndarray
 
 
 @leaf_kernel
@@ -103,8 +129,41 @@ def bend_at(courses, r, i, s):
 
 
 @leaf_kernel
-def follow(fleet, courses, r, i, state):
-    """Return (segment, way left in this gear, off the path, wanted v, wanted w)."""
+def waiting_at(waits, driven, r):
+    """Return the way along its path at which robot r has to wait now, inf for none.
+
+    Args:
+        waits: who waits for whom.
+        driven: way that each robot has driven along its path [m], shape (R,).
+        r: robot.
+    """
+    nearest = np.inf
+    for k in range(len(waits.robot)):
+        unmet = waits.robot[k] == r and driven[waits.other[k]] < waits.until[k]
+        if unmet and driven[r] < waits.at[k] + PASSED_M:
+            nearest = min(nearest, waits.at[k])
+    return nearest
+
+
+@leaf_kernel
+def turned(courses, r, state):
+    """Tell whether a robot has the heading that it must end with."""
+    return abs(wrap(courses.heading[r] - state[2])) < 0.5 * courses.tolerance[r]
+
+
+@leaf_kernel
+def turning_rate(fleet, r, lacking):
+    """Return the rate at which a robot turns on the spot by an angle [rad/s]."""
+    w = sqrt(2.0 * TURNING_SHARE * fleet[r].limit[4] * abs(lacking))
+    return w if lacking > 0.0 else -w
+
+
+@leaf_kernel
+def follow(fleet, courses, r, i, state, barrier):
+    """Return (segment, way, way left in this gear, off the path, wanted v, wanted w).
+
+    The robot stops before `barrier`, a way along its path.
+    """
     i, s = advance(courses, r, i, state[0], state[1])
     ax, ay = courses.node[r, i, 0], courses.node[r, i, 1]
     bx, by = courses.node[r, i + 1, 0] - ax, courses.node[r, i + 1, 1] - ay
@@ -123,26 +182,28 @@ def follow(fleet, courses, r, i, state):
     top = fleet[r].limit[1] if gear > 0 else -fleet[r].limit[0]
     ease = courses.ease[r]
     v = min(top, sqrt(2.0 * ease * max(left - 0.5 * ARRIVED_M, 0.0)) + 0.02)
+    if barrier < np.inf:
+        v = min(v, sqrt(2.0 * ease * max(barrier - s, 0.0)))
     near = max(courses.way[r, i + 1] - s, 0.0)
     v = min(v, sqrt(courses.fastest[r, i + 1] ** 2 + 2.0 * ease * near))
     ahead = s + max(abs(state[3]), 0.2) * PREVIEW_S
     bend = bend_at(courses, r, i, ahead)
     standing = abs(state[3]) < 0.05
-    bend -= STIFFNESS * STIFFNESS * off + 2.0 * STIFFNESS * sin(askew)
+    stiffness = courses.stiffness[r]
+    bend -= stiffness * stiffness * off + 2.0 * stiffness * sin(askew)
     if fleet[r].model == UNICYCLE:
         v = min(v, fleet[r].limit[2] / max(abs(bend), 1e-9))
         # w is the rate of turning, which grows with v and not with the gear.
         w = bend * v
         if abs(askew) > (ASKEW if standing else FAR_ASKEW):
             v = 0.0
-            w = sqrt(2.0 * TURNING_SHARE * fleet[r].limit[4] * abs(askew))
-            w = -w if askew > 0.0 else w
+            w = turning_rate(fleet, r, -askew)
     else:
         w = atan(gear * fleet[r].wheelbase * bend)
     w = max(-fleet[r].limit[2], min(fleet[r].limit[2], w))
     if standing and fleet[r].model != UNICYCLE and abs(w - state[4]) > ALIGNED:
         v = 0.0
-    return i, left, off, gear * v, w
+    return i, s, left, off, gear * v, w
 
 
 @kernel
@@ -160,19 +221,24 @@ def track_step(fleet, spaces, commitment, decided, r, v, w, dt):
 
 
 @kernel
-def drive(fleet, spaces, gates, courses, given, start, order, dt, control, halt):
+def drive(
+    fleet, spaces, gates, courses, waits, given, start, order, dt, control, driven, halt
+):
     """Drive the fleet to the ends of its paths.
 
     Args:
         fleet, spaces: robots and their free spaces.
         gates: where one robot at a time may be.
         courses: their paths.
+        waits: who waits for whom.
         given: number of steps for which each robot follows the controls that it finds
             in `control`, before it takes to its path, shape (R,).
         start: state of each robot, shape (R, 5).
         order: robots in order of right of way, shape (R,).
         dt: step [s].
         control: receives the controls, shape (K, R, 2).
+        driven: receives the way that each robot has driven along its path [m]: -inf
+            before it takes to it, inf behind its end, shape (R,).
         halt: shape (1,); driving ends once it has turned true.
 
     Returns:
@@ -185,33 +251,56 @@ def drive(fleet, spaces, gates, courses, given, start, order, dt, control, halt)
     segment = np.zeros(robots, np.int64)
     still = np.zeros(robots, np.int64)
     done = courses.nodes < 2
+    driven[:] = -np.inf
+    steps, idle = len(control), 0
     for r in range(robots):
         write_braking(fleet, r, start[r], dt, commitment, 0)
     for n in range(len(control)):
         rest = True
         for r in range(robots):
+            state = present_state(commitment, r)
             rest &= done[r] and n >= given[r]
-            rest &= stands(fleet, r, present_state(commitment, r))
+            rest &= stands(fleet, r, state) and turned(courses, r, state)
         if rest:
             return n, -1
-        if halt[0]:
+        if halt[0] or idle > STUCK_STEPS:
+            steps = n
             break
+        idle += 1
         decided[:] = False
         for k in range(robots):
             r = order[k]
             state = present_state(commitment, r).copy()
-            still[r] = 0 if abs(state[3]) > 1e-3 or done[r] else still[r] + 1
+            moves = abs(state[3]) > 1e-3
+            if done[r]:
+                moves = not stands(fleet, r, state) or turned(courses, r, state)
+            still[r] = 0 if moves else still[r] + 1
+            if not stands(fleet, r, state):
+                idle = 0
             if n < given[r]:
-                still[r] = 0
+                still[r] = idle = 0
                 u1, u2 = control[n, r, 0], control[n, r, 1]
                 if not try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):
                     return n, r
-            elif done[r]:
+            elif done[r] and turned(courses, r, state):
+                driven[r] = np.inf
                 u1, u2 = braking_control(fleet, r, state, dt)
                 follow_braking(commitment, r)
+            elif done[r]:
+                driven[r] = np.inf
+                if still[r] > STUCK_STEPS:
+                    return n, r
+                w = turning_rate(fleet, r, wrap(courses.heading[r] - state[2]))
+                u1, u2 = track_step(fleet, spaces, commitment, decided, r, 0.0, w, dt)
             else:
-                i, left, off, v, w = follow(fleet, courses, r, segment[r], state)
+                barrier = waiting_at(waits, driven, r)
+                i, s, left, off, v, w = follow(
+                    fleet, courses, r, segment[r], state, barrier
+                )
                 segment[r] = i
+                driven[r] = s
+                if barrier - s < WAITING_M:
+                    still[r] = 0
                 if abs(off) > STRAYED_M or still[r] > STUCK_STEPS:
                     return n, r
                 if left < ARRIVED_M:
@@ -225,7 +314,10 @@ def drive(fleet, spaces, gates, courses, given, start, order, dt, control, halt)
                 u1, u2 = track_step(fleet, spaces, commitment, decided, r, v, w, dt)
             control[n, r, 0], control[n, r, 1] = u1, u2
             decided[r] = True
-    return len(control), order[robots - 1]
+    for k in range(robots - 1):
+        if not done[order[k]]:
+            return steps, order[k]
+    return steps, order[robots - 1]
 
 
 @leaf_kernel

@@ -25,6 +25,12 @@ SPACINGS_M = (2.4, 0.8)
 Few nodes find the way sooner, and a shorter one: many stick where they lie.
 """
 
+NODE_TURN = 1.2
+"""Largest turn between two nodes [rad]; nimble robots' nodes are nearer together ..."""
+
+LEAST_SHARE = 0.25
+"""... but no nearer than this share of others'."""
+
 MERGED_M = 0.1
 """Distance within which places that must be nodes become one."""
 
@@ -93,6 +99,11 @@ class Path:
         """Way to each node [m], shape (n,)."""
         size = np.hypot(*np.diff(self.node, axis=0).T)
         return np.concatenate([[0.0], np.cumsum(size)])
+
+    def points(self, at_m: np.ndarray) -> np.ndarray:
+        """Return the points at ways along the path [m], shape (n,) -> (n, 2)."""
+        own = self.way
+        return np.stack([np.interp(at_m, own, one) for one in self.node.T], axis=1)
 
     @property
     def edges(self) -> np.ndarray:
@@ -218,8 +229,18 @@ def tightened(
     """
     cost = 0.0
     for spacing_m in spacings_m:
+        spacing_m *= nimble_share(surface.curvature)
         path, cost = _relaxed(targets, surface, path, spacing_m)
     return path, cost
+
+
+def nimble_share(curvature: float) -> float:
+    """Return how much shorter lengths are for a robot that turns in little room.
+
+    Args:
+        curvature: of the sharpest turn that its paths may have [1/m].
+    """
+    return min(1.0, max(LEAST_SHARE, NODE_TURN / (SPACINGS_M[-1] * curvature)))
 
 
 def _relaxed(
@@ -273,12 +294,10 @@ def surface_of(problem: Problem, r: int, smooth: np.ndarray) -> Surface:
     length = (high[0] - low[0]) / pieces
     limit = robot["limit"]
     if robot["model"] == UNICYCLE:
-        # Sharper than it can turn at full speed: it slows down there.
-        arm, curvature = float(robot["track"]), 2.0 * limit[2] / limit[1]
+        arm = float(robot["track"])
         rate = 4.0 * limit[4] / limit[1] ** 2
     else:
-        arm, radius = float(robot["wheelbase"]), float(robot["turning_radius"])
-        curvature = 1.0 / radius if radius > 0.0 else np.inf  # a user's motion
+        arm = float(robot["wheelbase"])
         rate = limit[4] / (arm * limit[1])
     energy = model.energy_model
     return Surface(
@@ -289,10 +308,23 @@ def surface_of(problem: Problem, r: int, smooth: np.ndarray) -> Surface:
         multiplier=smooth,
         disc=low[0] + length * (np.arange(pieces) + 0.5),
         room=float(np.hypot(0.5 * length, half) + robot["margin"] + SPARE_M),
-        curvature=float(CURVATURE_SHARE * curvature),
+        curvature=path_curvature(robot),
         curvature_rate=float(CURVATURE_SHARE * rate),
         scrub=arm * energy.turning_force_N / max(energy.rolling_force_N, 1e-9),
     )
+
+
+def path_curvature(robot: np.ndarray) -> float:
+    """Return the curvature of the sharpest turn of a robot's paths [1/m].
+
+    Args:
+        robot: a record of FLEET.
+    """
+    limit, radius = robot["limit"], float(robot["turning_radius"])
+    if robot["model"] == UNICYCLE:
+        # Sharper than it can turn at full speed: it slows down there.
+        return float(CURVATURE_SHARE * 2.0 * limit[2] / limit[1])
+    return CURVATURE_SHARE / radius if radius > 0.0 else np.inf  # a user's motion
 
 
 def wary(surface: Surface, place: np.ndarray) -> Surface:

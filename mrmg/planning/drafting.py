@@ -18,9 +18,10 @@ from mrmg.mission import Plan
 from mrmg.motion._kernels import CAR, UNICYCLE
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.band import TRACKING_M, Path, tightened
+from mrmg.planning.errand import Errand
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.refine import Errand, run_errands, stays_somewhere, surfaces_of
+from mrmg.planning.refine import run_errands, stays_somewhere, surfaces_of
 from mrmg.planning.routing import Routing
 
 SHARP = radians(110.0)
@@ -46,13 +47,11 @@ DIRECTION_M = 4.0
 def draftable(problem: Problem) -> bool:
     """Tell whether drafts know all that a mission asks for.
 
-    They do not know stays, ends with a heading, nor how a user's models drive.
+    They do not know stays, nor how a user's models drive.
     """
-    targets = problem.mission.targets
-    turned = (targets.finish >= 0) & (targets.tolerance < np.pi)
     models = problem.mission.fleet["model"]
     known = (models == CAR) | (models == UNICYCLE)
-    return bool(known.all() and not turned.any()) and not stays_somewhere(problem)
+    return bool(known.all()) and not stays_somewhere(problem)
 
 
 def drafts(

@@ -14,7 +14,7 @@ keeps every battery above its reserve, and is better by the scene's objective.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,23 +22,24 @@ from mrmg.mission import Plan, Trajectory
 from mrmg.motion._kernels import USER
 from mrmg.planning._band_kernels import Surface
 from mrmg.planning._mission_kernels import in_target
+from mrmg.planning._steering_kernels import wrap
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.band import (
     SPACINGS_M,
-    Path,
     path_of,
     smooth_terrain,
     surface_of,
-    tightened,
     visit_steps,
     wary,
 )
+from mrmg.planning.encounters import Encounters
+from mrmg.planning.errand import Errand
 from mrmg.planning.haste import energy_share
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.roadmap import planned_regions
 from mrmg.planning.targets import TARGET_MARGIN_M
-from mrmg.planning.tracking import Drive, SlowPlace, braking_places, redriven
+from mrmg.planning.tracking import Drive, braking_places, redriven
 
 TRIES = 14
 """Times that driving is repeated with what went wrong put right."""
@@ -59,41 +60,6 @@ REPEATED_S = 4.0
 """How long after the place where a robot got stuck it still drives as before."""
 
 
-@dataclass
-class Errand:
-    """One robot's way, and what was learnt about it.
-
-    Attributes:
-        tour: numbers of its targets.
-        path: its way.
-        surface: what the way is priced on.
-        before: how the robot drove before, and the steps of its visits; None if it did
-            not.
-        repeated: number of steps that it drives as before.
-        swerves: places that it was led round.
-        slow: places that it passes slowly.
-    """
-
-    tour: list[int]
-    path: Path
-    surface: Surface
-    before: tuple[Trajectory, list[int]] | None = None
-    repeated: int = 0
-    swerves: list[np.ndarray] = field(default_factory=list)
-    slow: list[SlowPlace] = field(default_factory=list)
-
-    def tighten(self, problem: Problem, spacings_m: Sequence[float]) -> None:
-        """Draw the path tight."""
-        targets = problem.mission.targets
-        self.path, _ = tightened(targets, self.surface, self.path, spacings_m)
-
-    def controls(self) -> np.ndarray:
-        """Return the controls that it repeats, shape (n, 2)."""
-        if self.before is None:
-            return np.zeros((0, 2))
-        return self.before[0].control[: self.repeated]
-
-
 def refine(
     problem: Problem, params: PlannerParams, plan: Plan, halt: np.ndarray
 ) -> Plan:
@@ -110,7 +76,7 @@ def refine(
     targets = problem.mission.targets
     if stays_somewhere(problem):
         return plan
-    kept = _drives_as_before(problem)
+    kept = problem.mission.fleet["model"] == USER
     surfaces = surfaces_of(problem)
     errands = []
     for r, tour in enumerate(tour_numbers(problem, plan)):
@@ -144,18 +110,23 @@ def run_errands(
     """
     for errand in errands:
         errand.tighten(problem, SPACINGS_M)
-    slower = 0
-    for _ in range(TRIES):
+    encounters = Encounters()
+    slower = tries = 0
+    while tries < TRIES:
         outcome = redriven(
             problem,
             params,
             [errand.path for errand in errands],
             [errand.slow for errand in errands],
             [errand.controls() for errand in errands],
+            encounters.waits,
             halt,
         )
         if halt[0]:
             return
+        if outcome.stuck >= 0 and encounters.resolve(problem, errands, outcome):
+            continue
+        tries += 1
         if outcome.stuck >= 0:
             if not _put_right(problem, errands[outcome.stuck], outcome.place):
                 return
@@ -207,13 +178,6 @@ def tour_numbers(problem: Problem, plan: Plan) -> list[list[int]]:
         [number[name] for name in plan.tours[trajectory.robot]] + [int(f)] * int(f >= 0)
         for trajectory, f in zip(plan.trajectories, finish, strict=True)
     ]
-
-
-def _drives_as_before(problem: Problem) -> np.ndarray:
-    """Tell which robots' ways are kept: a user's models, and ends with a heading."""
-    targets = problem.mission.targets
-    turned = (targets.finish >= 0) & (targets.tolerance < np.pi)
-    return np.asarray(turned | (problem.mission.fleet["model"] == USER))
 
 
 def _put_right(problem: Problem, errand: Errand, place: np.ndarray) -> bool:
@@ -271,12 +235,17 @@ def _led_deeper(problem: Problem, errand: Errand, trajectory: Trajectory) -> boo
 
 
 def _ends_well(problem: Problem, outcome: Drive) -> bool:
-    """Tell whether every robot stands where it must end."""
+    """Tell whether every robot stands where, and as, it must end."""
     targets = problem.mission.targets
-    return all(
-        finish < 0 or in_target(targets, finish, *trajectory.state[-1, :2])
-        for trajectory, finish in zip(outcome.trajectories, targets.finish, strict=True)
-    )
+    for state, finish, heading, tolerance in zip(
+        outcome.state, targets.finish, targets.heading, targets.tolerance, strict=True
+    ):
+        if finish >= 0 and not (
+            in_target(targets, finish, state[0], state[1])
+            and abs(wrap(heading - state[2])) <= tolerance
+        ):
+            return False
+    return True
 
 
 def _slowed_down(problem: Problem, errands: Sequence[Errand], outcome: Drive) -> bool:

@@ -11,8 +11,8 @@ from mrmg.energy import EFFECTIVE_MASS_KG, ROLLING_N
 from mrmg.mission import Trajectory
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning import _tracking_kernels
-from mrmg.planning._tracking_kernels import Courses
-from mrmg.planning.band import Path
+from mrmg.planning._tracking_kernels import Courses, Waits
+from mrmg.planning.band import Path, nimble_share, path_curvature
 from mrmg.planning.haste import brakes_hard
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.parameters import PlannerParams
@@ -43,8 +43,17 @@ LEAST_BRAKING_M_S = 0.1
 CRAWL_M_S = 0.3
 """Speed to which places slow down at least."""
 
+STIFFNESS = 0.8
+"""How fast robots return to their paths [1/m]; nimbler ones faster."""
+
 PLACE_M = 0.6
 """Distance within which nodes belong to a place."""
+
+MOVED_M = 8.0
+"""How far along its path a place may move when a path is drawn anew ..."""
+
+RESOLUTION_M = 0.1
+"""... and how exactly it is found again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,18 +70,62 @@ class SlowPlace:
 
 
 @dataclass(frozen=True, slots=True)
+class PathPlace:
+    """A place on a robot's path.
+
+    Attributes:
+        robot: number of the robot.
+        way_m: way along the path to it.
+        point: it, shape (2,).
+    """
+
+    robot: int
+    way_m: float
+    point: np.ndarray
+
+    def way_along(self, path: Path) -> float:
+        """Return the way to the place, or to what is nearest to it on a new path."""
+        first = max(0.0, self.way_m - MOVED_M)
+        last = min(path.way[-1], self.way_m + MOVED_M)
+        at = np.linspace(first, last, max(2, int((last - first) / RESOLUTION_M)))
+        far = np.hypot(*(path.points(at) - self.point).T)
+        return float(at[far.argmin()])
+
+
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """One robot waits for another one.
+
+    Attributes:
+        at: where.
+        until: where on its own path the other one must have got.
+    """
+
+    at: PathPlace
+    until: PathPlace
+
+
+@dataclass(frozen=True, slots=True)
 class Drive:
     """What driving along paths gave.
 
     Attributes:
         trajectories: of all robots; empty if somebody got stuck.
         stuck: the robot that got stuck, or -1.
-        place: where, shape (2,).
+        state: of all robots in the end, shape (R, 5).
+        driven: way that each robot has driven along its path [m], shape (R,); -inf
+            before it takes to it, inf behind its end.
     """
 
     trajectories: tuple[Trajectory, ...]
     stuck: int
-    place: np.ndarray
+    state: np.ndarray
+    driven: np.ndarray
+
+    @property
+    def place(self) -> np.ndarray:
+        """Where a robot got stuck, shape (2,)."""
+        return np.asarray(self.state[self.stuck, :2])
 
 
 def redriven(
@@ -81,6 +134,7 @@ def redriven(
     paths: Sequence[Path],
     slow: Sequence[Sequence[SlowPlace]],
     repeated: Sequence[np.ndarray],
+    waits: Sequence[Wait],
     halt: np.ndarray,
 ) -> Drive:
     """Drive the fleet along paths.
@@ -91,6 +145,7 @@ def redriven(
         paths: one for each robot, from where repeating ends.
         slow: places that each robot passes slowly.
         repeated: controls with which each robot begins, shape (n, 2).
+        waits: who waits for whom.
         halt: shape (1,); driving ends soon after it has turned true.
     """
     mission = problem.mission
@@ -98,16 +153,19 @@ def redriven(
     control = np.zeros((_most_steps(problem, params, paths, given), len(paths), 2))
     for r, controls in enumerate(repeated):
         control[: len(controls), r] = controls
+    driven = np.empty(len(paths))
     steps, stuck = _tracking_kernels.drive(
         mission.fleet,
         mission.spaces,
         mission.gates,
         courses_of(problem, paths, slow),
+        waits_of(paths, waits),
         given,
         problem.start,
         np.arange(len(paths)),
         params.dt_s,
         control,
+        driven,
         halt,
     )
     steps = max(steps, 1)
@@ -118,13 +176,14 @@ def redriven(
         own = np.ascontiguousarray(control[:steps, r])
         _tracking_kernels.write_states(mission.fleet, r, params.dt_s, own, state)
         states.append((own, state))
+    last = np.array([state[-1] for _, state in states])
     if stuck >= 0:
-        return Drive((), int(stuck), states[stuck][1][-1, :2])
+        return Drive((), int(stuck), last, driven)
     trajectories = tuple(
         Trajectory(robot=robot.id, dt_s=params.dt_s, state=state, control=own)
         for robot, (own, state) in zip(problem.scene.robots, states, strict=True)
     )
-    return Drive(trajectories, -1, np.zeros(2))
+    return Drive(trajectories, -1, last, driven)
 
 
 def braking_places(problem: Problem, r: int, trajectory: Trajectory) -> list[SlowPlace]:
@@ -155,6 +214,8 @@ def courses_of(
     end = np.zeros((robots, most), np.int64)
     fastest = np.full((robots, most), np.inf)
     ease = _decelerations(problem)
+    targets, fleet = problem.mission.targets, problem.mission.fleet
+    turned = (targets.finish >= 0) & (targets.tolerance < np.pi)
     for r, path in enumerate(paths):
         n = len(path.node)
         if n < 2:
@@ -168,7 +229,8 @@ def courses_of(
         for a, b in zip(edges, edges[1:], strict=False):
             end[r, a:b] = b
             bend[r, a : b + 1] = _bends(chord[a:b], size[a:b])
-        fastest[r, :n] = _speed_limits(path, slow[r], float(ease[r]))
+        tight = steerable_speeds(problem, r, bend[r, :n], way[r, :n], end[r, : n - 1])
+        fastest[r, :n] = _speed_limits(path, slow[r], tight, float(ease[r]))
     return Courses(
         node=node,
         gear=gear,
@@ -178,6 +240,23 @@ def courses_of(
         fastest=fastest,
         nodes=np.array([len(path.node) for path in paths]),
         ease=ease,
+        stiffness=np.array(
+            [STIFFNESS / nimble_share(path_curvature(robot)) for robot in fleet]
+        ),
+        heading=targets.heading,
+        tolerance=np.where(turned, targets.tolerance, np.inf),
+    )
+
+
+def waits_of(paths: Sequence[Path], waits: Sequence[Wait]) -> Waits:
+    """Return who waits for whom in the form that driving needs."""
+    return Waits(
+        robot=np.array([wait.at.robot for wait in waits], np.int64),
+        at=np.array([wait.at.way_along(paths[wait.at.robot]) for wait in waits]),
+        other=np.array([wait.until.robot for wait in waits], np.int64),
+        until=np.array(
+            [wait.until.way_along(paths[wait.until.robot]) for wait in waits]
+        ),
     )
 
 
@@ -194,12 +273,41 @@ def _most_steps(
     )
 
 
-def _speed_limits(path: Path, slow: Sequence[SlowPlace], ease: float) -> np.ndarray:
+def steerable_speeds(
+    problem: Problem, r: int, bend: np.ndarray, way: np.ndarray, end: np.ndarray
+) -> np.ndarray:
+    """Return the speed up to which a robot can steer along its path, shape (n,).
+
+    Args:
+        problem: the mission.
+        r: robot.
+        bend: curvature at the nodes [1/m], shape (n,).
+        way: way to the nodes [m], shape (n,).
+        end: number of the node at which each segment's stretch ends, shape (n - 1,).
+    """
+    robot = problem.mission.fleet[r]
+    limit = robot["limit"]
+    change = np.abs(np.diff(bend)) / np.maximum(np.diff(way), 1e-6)
+    change[1:][np.diff(end) != 0] = 0.0  # the robot stands there
+    change = np.maximum(change, 1e-9)
+    if robot["model"] == UNICYCLE:
+        speed = np.sqrt(limit[4] / change)
+    else:
+        sharp = np.minimum(np.abs(bend[1:]), np.abs(bend[:-1]))
+        arm = float(robot["wheelbase"])
+        speed = limit[4] * (1.0 + (arm * sharp) ** 2) / (arm * change)
+    speed = np.maximum(speed, CRAWL_M_S)
+    return np.asarray(np.minimum(np.append(speed, np.inf), np.insert(speed, 0, np.inf)))
+
+
+def _speed_limits(
+    path: Path, slow: Sequence[SlowPlace], tight: np.ndarray, ease: float
+) -> np.ndarray:
     """Return the speed at which each node is passed at most, shape (n,).
 
     Before slow places it falls no faster than a robot slows down for free.
     """
-    fastest = np.full(len(path.node), np.inf)
+    fastest = tight.copy()
     for one in slow:
         far = np.hypot(*(path.node - one.place).T)
         near = far < max(PLACE_M, far.min() + 1e-6)

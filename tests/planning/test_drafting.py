@@ -11,6 +11,7 @@ import pytest
 import mrmg
 from mrmg.accounting import battery_profile
 from mrmg.mission import Plan
+from mrmg.motion._kernels import USER
 from mrmg.planning import PlannerParams
 from mrmg.planning.drafting import (
     LEAST_SPARE,
@@ -120,13 +121,36 @@ def test_halted_it_gives_nothing(yard: Callable[..., Scene]) -> None:
     assert not list(drafts(problem, PARAMS, tours, 0, halted))
 
 
-def test_ends_with_a_heading_are_not_drafted(yard: Callable[..., Scene]) -> None:
+SWAP = [
+    {
+        "id": name,
+        "model": "diffdrive",
+        "pose": [x, 10, yaw],
+        "finish": {
+            "circle": {"center": [30 - x, 10], "radius": 0.8},
+            "heading": heading,
+        },
+    }
+    for name, x, yaw, heading in (("a", 8, 0.0, 1.5), ("b", 22, np.pi, 3.1))
+]
+
+
+def test_robots_that_turn_on_the_spot_end_as_they_must(
+    yard: Callable[..., Scene],
+) -> None:
+    scene = yard(goals=[], robots=SWAP)
+    plans = drafted(scene)
+    assert plans
+    assert mrmg.verify(scene, plans[-1]).violations == ()
+    for trajectory, heading in zip(plans[-1].trajectories, (1.5, 3.1), strict=True):
+        lacking = np.angle(np.exp(1j * (trajectory.state[-1, 2] - heading)))
+        assert abs(lacking) < 0.15
+
+
+def test_models_of_users_are_not_drafted(yard: Callable[..., Scene]) -> None:
     problem = state_mission(yard(), 0, PARAMS)
     assert draftable(problem)
-    targets = problem.mission.targets
-    turned = targets._replace(
-        finish=np.zeros_like(targets.finish),
-        tolerance=np.full_like(targets.tolerance, 0.2),
-    )
-    mission = problem.mission._replace(targets=turned)
+    fleet = problem.mission.fleet.copy()
+    fleet["model"] = USER
+    mission = problem.mission._replace(fleet=fleet)
     assert not draftable(replace(problem, mission=mission))
