@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import re
+import shlex
 from pathlib import Path
 
 import pytest
@@ -17,7 +19,14 @@ from mrmg.scene.loading import scene_from_document
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
-VERBS = re.findall(r"^\| `mrmg ([a-z ]+)", README, re.MULTILINE)
+VERBS = re.findall(r"^\| `mrmg ([a-z ]+)([^`]*)`", README, re.MULTILINE)
+"""Verbs with their arguments."""
+LINES = re.findall(r"^    \$ mrmg (.*)", README, re.MULTILINE)
+TOOLS = re.findall(
+    r"(?:^    |`)tools/(\w+)(?![\w./])((?: [^\s`]+)*)", README, re.MULTILINE
+)
+"""Tools with their arguments."""
+OPTION = re.compile(r"(?<![\w-])--[a-z-]+")
 
 
 def block(language: str) -> str:
@@ -26,12 +35,29 @@ def block(language: str) -> str:
     return found[1]
 
 
-@pytest.mark.parametrize("verb", VERBS)
-def test_every_verb_exists(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(("verb", "arguments"), VERBS)
+def test_every_verb_exists_with_its_options(
+    verb: str, arguments: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(SystemExit) as ended:
         make_parser().parse_args([*verb.split(), "--help"])
     assert ended.value.code == 0
-    assert "usage: mrmg" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "usage: mrmg" in told
+    assert set(OPTION.findall(arguments)) <= set(OPTION.findall(told))
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_every_command_line_is_understood(line: str) -> None:
+    assert make_parser().parse_args(shlex.split(line)).command
+
+
+@pytest.mark.parametrize(("tool", "arguments"), TOOLS)
+def test_every_tool_exists_with_its_options(tool: str, arguments: str) -> None:
+    assert os.access(ROOT / "tools" / tool, os.X_OK)
+    script = ROOT / "tools" / f"{tool}.py"
+    known = OPTION.findall(script.read_text() if script.exists() else "")
+    assert set(OPTION.findall(arguments)) <= set(known)
 
 
 def test_every_exit_code_is_told() -> None:
