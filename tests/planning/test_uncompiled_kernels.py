@@ -1,0 +1,33 @@
+"""Kernels mean the same without numba: their tests pass uncompiled, too.
+
+What only a compiler lets pass (fields of records, types that change, indices out of
+range) shows there.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+QUICK = ("band", "expansion", "pool", "random", "refuel", "roadmap", "safety")
+"""Kernels whose tests take seconds uncompiled."""
+
+
+@pytest.mark.slow
+def test_tests_of_kernels_pass_uncompiled() -> None:
+    files = [str(HERE / f"test_{name}_kernels.py") for name in QUICK]
+    options = ["-q", "-p", "no:cacheprovider", "-k", "not keeps_the_margins"]
+    ended = subprocess.run(
+        [sys.executable, "-m", "pytest", *options, *files],
+        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
+        cwd=HERE.parents[1],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == 0, ended.stdout
