@@ -29,8 +29,13 @@ from numba.core.registry import cpu_target
 from numba.core.typing import signature
 from numba.extending import intrinsic, typeof_impl
 
+from mrmg.compilation.libraries import emit_late
 from mrmg.compilation.pointers import lend, lent
 from mrmg.compilation.sharing import KernelCache
+from mrmg.compilation.shortcuts import take_shortcuts
+
+emit_late()
+take_shortcuts()
 
 
 class Kernel:

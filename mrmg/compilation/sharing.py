@@ -51,6 +51,7 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep what has been compiled for a signature."""
+        data.library.is_part = self._linked
         if not self._linked:
             data.library._shared_module = _names_of(data)
         try:
