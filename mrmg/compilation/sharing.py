@@ -10,13 +10,67 @@ impossible, as a function is locked only while what it calls is compiled.
 from __future__ import annotations
 
 import fcntl
+import sys
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
 from llvmlite import binding
-from numba.core import caching
+from numba.core import caching, environment
 from numba.core.runtime.nrt import rtsys
+
+
+@dataclass(frozen=True)
+class _Surroundings:
+    """What numba keeps beside a compiled function, without the module it is of.
+
+    numba imports that module, be it one of its own of which only code is needed here.
+
+    Attributes:
+        module, name: of the function.
+        constants: that it uses.
+    """
+
+    module: str
+    name: str
+    constants: list[Any]
+
+    @staticmethod
+    def of(known: Any) -> _Surroundings:
+        """Return what is kept of an environment."""
+        return _Surroundings(known.globals["__name__"], known.env_name, known.consts)
+
+    def restored(self) -> Any:
+        """Return the environment, the one that this process has if there is one."""
+        known = environment.lookup_environment(self.name)
+        if known is None:
+            module = sys.modules.get(self.module)
+            known = environment.Environment(
+                {"__name__": self.module} if module is None else vars(module)
+            )
+            known.consts[:] = self.constants
+            known.env_name = self.name
+            environment.Environment._memo[self.name] = known
+        return known
+
+
+class _Form(caching.CompileResultCacheImpl):  # type: ignore[misc]
+    """How a compiled function is kept: as numba does, but for its surroundings."""
+
+    def reduce(self, compiled: Any) -> Any:
+        """Return what is written."""
+        library, description, own, *more, others = super().reduce(compiled)
+        kept = tuple(map(_Surroundings.of, others))
+        return library, description, _Surroundings.of(own), *more, kept
+
+    def rebuild(self, target_context: Any, written: Any) -> Any:
+        """Return the function."""
+        library, description, own, *more, kept = written
+        others = tuple(one.restored() for one in kept)
+        return super().rebuild(
+            target_context, (library, description, own.restored(), *more, others)
+        )
 
 
 class KernelCache(caching.FunctionCache):  # type: ignore[misc]
@@ -27,6 +81,8 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
         linked: whether callers are compiled together with it; if not, its object code
             is all that is kept, which is loaded in half the time.
     """
+
+    _impl_class = _Form
 
     def __init__(self, function: Callable[..., Any], *, linked: bool) -> None:
         super().__init__(function)

@@ -17,6 +17,7 @@ from math import sqrt
 import numpy as np
 
 from mrmg.compilation import kernel, leaf_kernel
+from mrmg.planning._heap_kernels import pop, push
 
 UNREACHED = 1e18
 """Field value of nodes that no free cell joins to the source."""
@@ -127,11 +128,11 @@ def _march(step, field):
     size = 0
     for node in range(len(flat)):
         if flat[node] < UNREACHED:
-            size = _push(key, entry, size, flat[node], node)
+            size = push(key, entry, size, flat[node], node)
     count = 0
     while size > 0:
         node = entry[0]
-        size = _pop(key, entry, size)
+        size = pop(key, entry, size)
         if done[node]:
             continue
         done[node] = True
@@ -157,7 +158,7 @@ def _march(step, field):
                 )
             if value < UNREACHED and value < flat[to]:
                 flat[to] = value
-                size = _push(key, entry, size, value, to)
+                size = push(key, entry, size, value, to)
     return order[:count]
 
 
@@ -215,32 +216,3 @@ def _corner_value(a, b, step):
     if abs(a - b) < step:
         return 0.5 * (a + b + sqrt(2.0 * step * step - (a - b) * (a - b)))
     return min(a, b) + step
-
-
-@leaf_kernel
-def _push(key, entry, size, value, node):
-    """Add an entry to a heap, least key first; return its size."""
-    at = size
-    while at > 0 and key[(at - 1) // 2] > value:
-        key[at], entry[at] = key[(at - 1) // 2], entry[(at - 1) // 2]
-        at = (at - 1) // 2
-    key[at], entry[at] = value, node
-    return size + 1
-
-
-@leaf_kernel
-def _pop(key, entry, size):
-    """Take the first entry off a heap; return its size."""
-    size -= 1
-    value, node = key[size], entry[size]
-    at = 0
-    while 2 * at + 1 < size:
-        child = 2 * at + 1
-        if child + 1 < size and key[child + 1] < key[child]:
-            child += 1
-        if key[child] >= value:
-            break
-        key[at], entry[at] = key[child], entry[child]
-        at = child
-    key[at], entry[at] = value, node
-    return size

@@ -8,6 +8,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -21,7 +22,13 @@ from mrmg.compilation import (
 from mrmg.errors import Fault, SceneError, UsageError
 from mrmg.mission import PlanResult, PlanStatus
 from mrmg.planning.attempt import Attempt, attempt_plan, draft_plans, tree_plans
-from mrmg.planning.bound import FINER, lower_bound_J
+from mrmg.planning.bound import (
+    CELLS,
+    FINER,
+    Relaxation,
+    exact_routing,
+    lower_bound_J,
+)
 from mrmg.planning.feasibility import proof_of_infeasibility
 from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.haste import priced_world, with_energies
@@ -34,7 +41,7 @@ from mrmg.planning.routing import Routing
 from mrmg.planning.search import OnImprovement, Progress, Search
 from mrmg.planning.statistics import UNKNOWN, Bounds, Statistics
 from mrmg.scene.loading import scene_from_document
-from mrmg.scene.objective import overtime_s
+from mrmg.scene.objective import Objective, overtime_s
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
 
@@ -99,7 +106,7 @@ def plan_mission(
     with ThreadPoolExecutor(1, initializer=_give_way) as beside:
         bounding = None
         if with_bound:
-            bound_smallest()  # what holds the interpreter's lock first
+            _load_bounds(scene.objective)  # what holds the interpreter's lock first
             bounding = beside.submit(state_bound)
         _load_kernels(trees=not params.drafts)
         statistics.begin()
@@ -188,11 +195,17 @@ def draft_smallest() -> None:
 
 
 @cache
+def _load_bounds(objective: Objective) -> None:
+    """Load the kernels of the bounds of an objective."""
+    bounds_of(replace(_smallest_scene(), objective=objective), 0.1, cells=50)
+
+
 def bound_smallest() -> None:
-    """Bound the energy and the makespan of the smallest mission."""
+    """Bound the energy and the makespan of the smallest mission, in all ways."""
     scene = _smallest_scene()
     lower_bound_J(scene, cells=50)
     makespan_bound_s(scene, cells=50)
+    exact_routing(Relaxation.of(scene, cells=50).problem)
 
 
 SMALL_PARAMS = PlannerParams(samples=20, max_vertices=20, trees=1)
@@ -256,20 +269,22 @@ def unjoined_goals(scene: Scene, roadmap: Roadmap) -> list[str]:
     ]
 
 
-def bounds_of(scene: Scene, step_s: float, *, finer: int = FINER) -> Bounds:
+def bounds_of(
+    scene: Scene, step_s: float, *, cells: int = CELLS, finer: int = FINER
+) -> Bounds:
     """Return what no plan of a mission undercuts, as far as its objective needs it.
 
     Args:
         scene: the mission.
         step_s: time step of the plans.
-        finer: parts into which cells are cut; more take longer and bring the bound
-            nearer to the truth.
+        cells: of the grid; more take longer and bring the bound nearer to the truth.
+        finer: parts into which cells are cut in the end; as `cells`.
     """
     energy_J = makespan_s = None
     if scene.objective.energy_weight:
-        energy_J = lower_bound_J(scene, step_s=step_s, finer=finer)
+        energy_J = lower_bound_J(scene, step_s=step_s, cells=cells, finer=finer)
     if scene.objective.makespan_weight:
-        makespan_s = makespan_bound_s(scene, step_s=step_s)
+        makespan_s = makespan_bound_s(scene, step_s=step_s, cells=cells)
     return Bounds(energy_J=energy_J, makespan_s=makespan_s)
 
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from mrmg.planning import _roadmap_kernels
+from mrmg.planning import _graph_kernels, _roadmap_kernels
 from mrmg.planning._roadmap_kernels import RoadmapArrays
 from mrmg.planning.fleet import TravelClass, travel_classes
 from mrmg.planning.slopes import SlopeCost
@@ -28,7 +28,6 @@ from mrmg.world.world import World
 
 if TYPE_CHECKING:
     import networkx as nx
-    from scipy.sparse import csr_array
 
 BUCKET_M = 4.0
 
@@ -117,8 +116,6 @@ def build_roadmap(
         margin_m: distance robots keep from obstacles.
         rng: source of the samples.
     """
-    from scipy.sparse import csr_array  # takes its time, which the bound can use
-
     classes, class_of_robot = travel_classes(scene, world, margin_m)
     vertex = _vertices(scene, world, classes, samples, rng)
     first, second = _candidate_edges(vertex, neighbours)
@@ -139,10 +136,15 @@ def build_roadmap(
         usable = np.isfinite(weight[:, 0])
         low, high, weight = first[usable], second[usable], weight[usable]
         edges.append((low, high, weight))
-        ways = np.concatenate([low, high]), np.concatenate([high, low])
-        graph = csr_array((weight.T.ravel(), ways), shape=(len(vertex),) * 2)
-        entries = _entries(scene, graph, vertex)
-        cost, successor = _cost_to_go(graph, entries)
+        entries = _entries(scene, vertex, _graph_kernels.parts(len(vertex), low, high))
+        cost, successor = _graph_kernels.cheapest_ways(
+            len(vertex),
+            low,
+            high,
+            weight,
+            np.concatenate([np.zeros(0, np.int64), *entries]),
+            np.cumsum([0, *map(len, entries)]),
+        )
         fields.append(cost)
         successors.append(successor)
         energies = _with_potential(cost, height_m, slope.refund)
@@ -186,15 +188,12 @@ def planned_regions(scene: Scene) -> list[Region]:
     return [*(target.region for target in scene.targets()), *finishes]
 
 
-def _entries(scene: Scene, graph: csr_array, vertex: np.ndarray) -> list[np.ndarray]:
+def _entries(scene: Scene, vertex: np.ndarray, part: np.ndarray) -> list[np.ndarray]:
     """Return the vertices at which each target may be entered.
 
     That is the target's own vertex, and where a region reaches across a wall, those of
-    its vertices that are cut off from it.
+    its vertices that are cut off from it, which is to say in another part.
     """
-    from scipy.sparse.csgraph import connected_components
-
-    _, part = connected_components(graph, directed=False)
     entries = []
     for t, region in enumerate(planned_regions(scene)):
         near = np.hypot(*(vertex - region.center).T)
@@ -210,27 +209,6 @@ def _reach(region: Region) -> float:
     if len(region.corners):
         return float(np.hypot(*(region.corners - region.center).T).max())
     return region.radius_m
-
-
-def _cost_to_go(
-    graph: csr_array, entries: list[np.ndarray]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return each target's cost and successor for all vertices, (T, V)."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import dijkstra
-
-    against = csr_array(graph.T)
-    shape = (len(entries), graph.shape[0])
-    cost, successor = np.empty(shape), np.empty(shape, np.int32)
-    for t, sources in enumerate(entries):
-        cost[t], previous, _ = dijkstra(
-            against,
-            indices=sources,
-            min_only=True,
-            return_predecessors=True,
-        )
-        successor[t] = np.maximum(previous, -1)
-    return cost, successor
 
 
 def _vertices(
@@ -332,14 +310,11 @@ def _field_at(space: FreeSpace, points: np.ndarray) -> np.ndarray:
 def _candidate_edges(
     vertex: np.ndarray, neighbours: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    from scipy.spatial import cKDTree
-
-    k = min(neighbours + 1, len(vertex))
-    _, index = cKDTree(vertex).query(vertex, k=k)
-    first = np.repeat(np.arange(len(vertex)), k)
-    second = index.reshape(-1)
+    count = min(neighbours, len(vertex) - 1)
+    second = _graph_kernels.nearest_vertices(vertex, count).reshape(-1)
+    first = np.repeat(np.arange(len(vertex)), count)
     low, high = np.minimum(first, second), np.maximum(first, second)
-    pair = np.unique((low * len(vertex) + high)[low < high])
+    pair = np.unique(low * len(vertex) + high)
     return pair // len(vertex), pair % len(vertex)
 
 
