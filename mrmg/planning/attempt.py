@@ -159,7 +159,7 @@ def draft_plans(
             continue
         driven += 1
         pressed = replace(problem, hurried=hurried)
-        for plan in drafts(pressed, params, tours, seed, halt):
+        for plan in drafts(pressed, params, tours, seed, halt, hasty=number == 0):
             if not plans or preference.rank(plan) < preference.rank(plans[-1][1]):
                 plans.append((time.perf_counter(), plan))
     return Attempt(plans, routing_s, {"drafts": driven, "router_calls": len(draws)})

@@ -16,9 +16,11 @@ import numpy as np
 
 from mrmg.mission import Plan
 from mrmg.motion._kernels import CAR, UNICYCLE
+from mrmg.planning._band_kernels import Surface
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.band import TRACKING_M, Path, tightened
 from mrmg.planning.errand import Errand
+from mrmg.planning.gears import with_best_gears
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.refine import run_errands, stays_somewhere, surfaces_of
@@ -36,6 +38,10 @@ PIVOT = radians(60.0)
 LEAST_SPARE = 0.02
 """Share of a battery's capacity that drafts always leave above its reserve: a robot may
 take a percent or two more than planned on slopes and in turns on the spot."""
+
+SURELY_M = 0.08
+"""How much deeper than needed hasty drafts enter targets: they seldom miss one, which
+spares driving again."""
 
 JUDGED_M = 4.0
 """Distance of the nodes of paths that only tours are judged by."""
@@ -60,6 +66,8 @@ def drafts(
     routing: Routing,
     seed: int,
     halt: np.ndarray,
+    *,
+    hasty: bool = False,
 ) -> Iterator[Plan]:
     """Yield plans along tours, in the order found; none if driving them fails.
 
@@ -72,6 +80,7 @@ def drafts(
         routing: the tours.
         seed: of the search that the plan belongs to.
         halt: shape (1,); drafting ends soon after it has turned true.
+        hasty: find the first plan soon rather than a cheap one.
     """
     surfaces = surfaces_of(problem)
     stops = [whole_tour(problem, routing, r) for r in range(len(surfaces))]
@@ -82,10 +91,15 @@ def drafts(
     }
     timed = problem.hurried or problem.preference.objective.makespan_weight > 0.0
     for sharp in (*ROOMY, SHARP) if timed else (SHARP,):
-        errands = [
-            Errand(tour, tour_path(problem, r, tour, sharp), surfaces[r])
-            for r, tour in enumerate(stops)
+        deeper_m = SURELY_M if hasty else TRACKING_M
+        paths = [
+            tour_path(problem, r, tour, sharp, deeper_m) for r, tour in enumerate(stops)
         ]
+        if not hasty and not timed:
+            paths = [
+                _geared(problem, r, surfaces[r], path) for r, path in enumerate(paths)
+            ]
+        errands = [Errand(*one) for one in zip(stops, paths, surfaces, strict=True)]
         found = False
         for trajectories in run_errands(problem, params, errands, halt):
             plan = make_plan(problem, seed, params, trajectories, tours)
@@ -114,7 +128,11 @@ def whole_tour(problem: Problem, routing: Routing, r: int) -> list[int]:
 
 
 def tour_path(
-    problem: Problem, r: int, tour: Sequence[int], sharp: float = SHARP
+    problem: Problem,
+    r: int,
+    tour: Sequence[int],
+    sharp: float = SHARP,
+    deeper_m: float = TRACKING_M,
 ) -> Path:
     """Return the way of the roadmap along robot r's tour.
 
@@ -126,6 +144,7 @@ def tour_path(
         r: robot.
         tour: numbers of its targets.
         sharp: turn from which on a car changes gear [rad].
+        deeper_m: how much deeper than needed it enters its targets.
     """
     vertices, ends = tour_vertices(problem, r, tour)
     node = problem.roadmap.arrays.vertex[vertices]
@@ -138,7 +157,7 @@ def tour_path(
         gear=np.ones(len(node) - 1, np.int64),
         stop=stops,
         target=np.array(tour, np.int64),
-        deeper=np.full(len(tour), TRACKING_M),
+        deeper=np.full(len(tour), deeper_m),
         pivot=np.zeros(0, np.int64),
         heading=heading,
     )
@@ -150,6 +169,12 @@ def tour_path(
         if turn > sharp:
             path.gear[at:] *= -1
     return path
+
+
+def _geared(problem: Problem, r: int, surface: Surface, path: Path) -> Path:
+    if problem.mission.fleet[r]["model"] == UNICYCLE:
+        return path
+    return with_best_gears(problem, r, surface, path, _turns(path))
 
 
 def tour_vertices(

@@ -94,7 +94,7 @@ def test_drafts_that_failed_are_counted_with_the_tree(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """With and without charge to spare, then the tree."""
-    monkeypatch.setattr(attempt, "drafts", lambda *_: iter(()))
+    monkeypatch.setattr(attempt, "drafts", lambda *_, **__: iter(()))
     found = attempted(attempt_plan, "quickstart")
     assert found.counts["drafts"] == 2
     assert found.counts["router_calls"] >= 3
