@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -23,8 +23,17 @@ from mrmg.planning.lanes import (
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.tracking import Drive
 
-LACK_M = 0.1
-"""Clearance that a detour may lack: discs cover more than footprints."""
+LACK_M = 0.25
+"""Clearance that a detour may lack: discs cover more than footprints ..."""
+
+LACK_WORTH = 30.0
+"""... and how much longer one that lacks less may be, by what it lacks less."""
+
+WIDER = 0.6
+"""How much farther to both sides, in their sizes, the first to give way does so."""
+
+ROUNDS = 2
+"""Times that each of two robots that both give way is led round the other one."""
 
 ASIDE_M = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0)
 """How far a robot that has nothing to do moves out of the way, at least and at most."""
@@ -48,23 +57,22 @@ class Detour:
     cost_m: float
     lack_m: float
 
-    def lead(self, errand: Errand) -> None:
-        """Have the robot's errand lead along it."""
-        errand.surface, errand.path = self.surface, self.path
-        errand.cost_m = self.cost_m
+    def lead(self, errand: Errand) -> Errand:
+        """Return the robot's errand along it."""
+        return replace(errand, surface=self.surface, path=self.path, cost_m=self.cost_m)
 
 
-def cheapest_detours(
+def passing_detours(
     problem: Problem,
     errands: Sequence[Errand],
     outcome: Drive,
     r: int,
     other: int,
     way: float,
-) -> list[Detour]:
-    """Return detours that lead two robots past each other, none if there are none.
+) -> list[list[Detour]]:
+    """Return all detours that lead two robots past each other, the cheapest first.
 
-    One of them is led round the other one if that can be, otherwise both give way.
+    One of them is led round the other one, or both give way.
 
     Args:
         problem: the mission.
@@ -75,32 +83,36 @@ def cheapest_detours(
         way: to both sides of the meeting that is avoided, in sizes of both robots.
     """
     plain = problem.mission.fleet["plain"]
+    found: list[tuple[float, list[Detour]]] = []
     for both in (False, True):
-        found: list[tuple[float, list[Detour]]] = []
         for (robot, by), side in product(((r, other), (other, r)), (-1.0, 1.0)):
-            turns = [(robot, by, 1.0)]
-            if both:  # the first one gives way by half, then each as far as it must
-                turns = [(by, robot, 0.5), *turns, (by, robot, 1.0)]
+            turns = [(robot, by, way, 1.0)]
+            if both:  # one gives way by half, for longer, then each as far as it must
+                turns = [(by, robot, way + WIDER, 0.5)]
+                turns += ROUNDS * [(robot, by, way, 1.0), (by, robot, way, 1.0)]
             led: dict[int, Detour] = {}
             changed = list(errands)
-            for one, past, share in turns:
-                given = detour(problem, changed, outcome, one, past, way, side, share)
+            for one, past, along, share in turns:
+                given = detour(problem, changed, outcome, one, past, along, side, share)
                 if given is not None:
                     led[one] = given
-                    changed[one] = replace(changed[one], path=given.path)
+                    surface = given.surface if share < 1.0 else changed[one].surface
+                    changed[one] = replace(given.lead(changed[one]), surface=surface)
             # Who went first is judged by the other one, which came to terms with it.
             lacks_m = [
                 lack_m(errands[one].surface, its.path) for one, its in led.items()
             ]
-            if given is not None and max(*lacks_m, given.lack_m) < SPARE_M + LACK_M:
+            if given is None:
+                continue
+            lacks_m.append(given.lack_m)
+            if max(lacks_m) < SPARE_M + LACK_M:
                 more_J = [
                     (one.cost_m - errands[one.robot].cost_m) * float(plain[one.robot])
                     for one in led.values()
                 ]
-                found.append((sum(more_J), list(led.values())))
-        if found:
-            return min(found, key=lambda each: each[0])[1]
-    return []
+                worse_J = LACK_WORTH * max(lacks_m) * float(plain[[r, other]].mean())
+                found.append((sum(more_J) + worse_J, list(led.values())))
+    return [led for _, led in sorted(found, key=lambda each: each[0])]
 
 
 def detour(
@@ -148,8 +160,8 @@ def detour(
 
 def room_made(
     problem: Problem, errands: Sequence[Errand], outcome: Drive, r: int, other: int
-) -> list[Detour]:
-    """Return how a robot without targets moves off another one's path, if it can.
+) -> Iterator[list[Detour]]:
+    """Yield how a robot without targets moves off another one's path, if it can.
 
     It drives straight ahead or back, as far as it must.
 
@@ -175,9 +187,9 @@ def room_made(
         )
         own = lane_of(problem, replace(errand, path=path), r, far_m, far_m)
         apart = apart_m(own.disc[0], passing.disc.reshape(-1, 2)).min() - own.radius_m
-        if apart > least_m and lack_m(errand.surface, path) < LACK_M:
-            return [Detour(r, errand.surface, path, far_m, 0.0)]
-    return []
+        if apart > least_m and lack_m(errand.surface, path) < SPARE_M:
+            yield [Detour(r, errand.surface, path, far_m, 0.0)]
+            return
 
 
 def avoiding(surface: Surface, lane: Lane, needed_m: float) -> Surface:

@@ -32,6 +32,9 @@ SHARP = radians(110.0)
 ROOMY = (pi, radians(150.0))
 """The same where time counts, as far as there is room to turn round."""
 
+NEARLY = 0.9
+"""Share of its speed forwards from which on a car is as fast backwards."""
+
 PIVOT = radians(60.0)
 """Turn from which on a robot that can turns on the spot [rad]."""
 
@@ -71,8 +74,9 @@ def drafts(
 ) -> Iterator[Plan]:
     """Yield plans along tours, in the order found; none if driving them fails.
 
-    The first one is driven without regard to braking. Where time counts, cars turn
-    round rather than change gear, as they are slower backwards, if there is room.
+    The first one is driven without regard to braking. Where time counts, cars that are
+    slower backwards turn round rather than change gear, if there is room. What fails
+    with one way of turning is tried with the others.
 
     Args:
         problem: the mission.
@@ -89,12 +93,18 @@ def drafts(
         robot.id: tuple(names[t] for t in tour)
         for robot, tour in zip(problem.scene.robots, routing.tours, strict=True)
     }
+    limit = problem.mission.fleet["limit"]
+    slower = -limit[:, 0] < NEARLY * limit[:, 1]  # backwards than forwards
     timed = problem.hurried or problem.preference.objective.makespan_weight > 0.0
-    for sharp in (*ROOMY, SHARP) if timed else (SHARP,):
-        deeper_m = SURELY_M if hasty else TRACKING_M
+    deeper_m = SURELY_M if hasty else TRACKING_M
+    tried: list[list[Path]] = []
+    for sharp in (*ROOMY, SHARP) if timed and slower.any() else (SHARP, *ROOMY):
         paths = [
             tour_path(problem, r, tour, sharp, deeper_m) for r, tour in enumerate(stops)
         ]
+        if any(_same_gears(paths, before) for before in tried):
+            continue
+        tried.append(paths)
         if not hasty and not timed:
             paths = [
                 _geared(problem, r, surfaces[r], path) for r, path in enumerate(paths)
@@ -108,6 +118,11 @@ def drafts(
                 yield plan
         if found or halt[0]:
             return
+
+
+def _same_gears(paths: Sequence[Path], others: Sequence[Path]) -> bool:
+    pairs = zip(paths, others, strict=True)
+    return all(np.array_equal(one.gear, other.gear) for one, other in pairs)
 
 
 def path_cost_J(problem: Problem, routing: Routing) -> float:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mrmg.planning.detours import Detour, cheapest_detours, room_made
+from mrmg.planning.detours import Detour, passing_detours, room_made
 from mrmg.planning.errand import Errand
 from mrmg.planning.lanes import (
     apart_m,
@@ -39,32 +39,54 @@ SAME_M = 4.0
 BACK_M = 0.6
 """How far before a shared stretch a robot waits."""
 
-PASSING = (1.0, 0.6, 2.0)
+PASSING = (0.6, 1.0, 2.0)
 """Way to both sides of a meeting that is avoided, in sizes of both robots; those that
-are tried one after the other."""
+are tried one after the other ..."""
+
+MOST_TRIED = 3
+"""... and how many of the detours that avoid so much."""
 
 
 @dataclass
 class Meeting:
-    """Two robots that got in each other's way at a place.
+    """Two robots that got in each other's way, and what has been done about it.
 
     Attributes:
         pair: their numbers.
         place: where, shape (2,).
-        tried: what has been done about it.
+        options: what else may be done.
         wait: the wait that is in force, if any.
+        before: errands of the robots that make detours now, as they were without them.
+        detours: that are driven now.
     """
 
     pair: frozenset[int]
     place: np.ndarray
-    tried: set[tuple[str, float]] = field(default_factory=set)
+    options: Iterator[Wait | list[Detour]]
     wait: Wait | None = None
+    before: list[Errand] = field(default_factory=list)
+    detours: list[Detour] = field(default_factory=list)
 
-    def tries(self, what: tuple[str, float]) -> bool:
-        """Note that something is tried; tell whether it had not been tried before."""
-        new = what not in self.tried
-        self.tried.add(what)
-        return new
+    def undo(self, errands: list[Errand]) -> None:
+        """Take back what has been done, unless more has been done since."""
+        self.wait = None
+        if all(errands[one.robot].path is one.path for one in self.detours):
+            for one, errand in zip(self.detours, self.before, strict=True):
+                errands[one.robot] = errand
+        self.detours, self.before = [], []
+
+    def proceed(self, errands: list[Errand]) -> bool:
+        """Do what is to be done next; tell whether there was anything."""
+        for option in self.options:
+            if isinstance(option, Wait):
+                self.wait = option
+            else:
+                self.detours = option
+                self.before = [errands[one.robot] for one in option]
+                for one in option:
+                    errands[one.robot] = one.lead(errands[one.robot])
+            return True
+        return False
 
 
 @dataclass
@@ -79,49 +101,65 @@ class Encounters:
         """Who waits for whom."""
         return [one.wait for one in self.meetings if one.wait is not None]
 
-    def resolve(
-        self, problem: Problem, errands: Sequence[Errand], outcome: Drive
-    ) -> bool:
+    def resolve(self, problem: Problem, errands: list[Errand], outcome: Drive) -> bool:
         """Have one robot wait or make a detour; tell whether there was a way to.
 
         Args:
             problem: the mission.
-            errands: of all robots; one of them is given another path, maybe.
+            errands: of all robots; some of them may be replaced.
             outcome: of the drive in which a robot got stuck.
         """
-        r = outcome.stuck
         other = in_the_way(problem, errands, outcome)
-        if other < 0 or self.resolved >= MOST * len(errands):
+        meeting = self._meeting(outcome.stuck, other, outcome.place)
+        if self.resolved >= MOST * len(errands):
             return False
-        meeting = self._meeting(frozenset((r, other)), outcome.place)
-        meeting.wait = None
-        for robot, wait in waits_at(problem, errands, outcome, r, other):
-            if meeting.tries(("wait", robot)):
-                meeting.wait = wait
-                self.resolved += 1
-                return True
-        for way in PASSING:
-            if meeting.tries(("detour", way)):
-                detours = cheapest_detours(problem, errands, outcome, r, other, way)
-                if self._lead(errands, detours):
-                    return True
-        if not errands[other].tour and meeting.tries(("room", other)):
-            room = room_made(problem, errands, outcome, other, r)
-            return self._lead(errands, room)
-        return False
+        if meeting is None and other < 0:
+            return False
+        if meeting is None:
+            pair = frozenset((outcome.stuck, other))
+            options = ways_out(problem, list(errands), outcome, other)
+            meeting = Meeting(pair, outcome.place, options)
+            self.meetings.append(meeting)
+        self.resolved += 1
+        meeting.undo(errands)
+        return meeting.proceed(errands)
 
-    def _lead(self, errands: Sequence[Errand], detours: Sequence[Detour]) -> bool:
-        for detour in detours:
-            detour.lead(errands[detour.robot])
-        self.resolved += bool(detours)
-        return bool(detours)
+    def _meeting(self, r: int, other: int, place: np.ndarray) -> Meeting | None:
+        """Return the meeting that a robot is stuck by, known from before.
 
-    def _meeting(self, pair: frozenset[int], place: np.ndarray) -> Meeting:
-        for meeting in self.meetings:
-            if meeting.pair == pair and np.hypot(*(meeting.place - place)) < SAME_M:
+        Who is stuck with nobody near, but on a detour, is so by what it was led round.
+        """
+        for meeting in reversed(self.meetings):
+            same = meeting.pair == {r, other}
+            led = other < 0 and r in [one.robot for one in meeting.detours]
+            if (same or led) and np.hypot(*(meeting.place - place)) < SAME_M:
                 return meeting
-        self.meetings.append(Meeting(pair, place))
-        return self.meetings[-1]
+        return None
+
+
+def ways_out(
+    problem: Problem, errands: Sequence[Errand], outcome: Drive, other: int
+) -> Iterator[Wait | list[Detour]]:
+    """Yield what may help two robots past each other, what costs least first.
+
+    Args:
+        problem: the mission.
+        errands: of all robots.
+        outcome: of the drive in which they met, and one got stuck.
+        other: the other one.
+    """
+    r = outcome.stuck
+    for _, wait in waits_at(problem, errands, outcome, r, other):
+        yield wait
+    # Round a robot that stands it is the same way, however much of a path is avoided.
+    first, *more = PASSING if np.isfinite(outcome.driven[other]) else PASSING[:1]
+    yield from passing_detours(problem, errands, outcome, r, other, first)[:MOST_TRIED]
+    if not errands[other].tour:
+        yield from room_made(problem, errands, outcome, other, r)
+    for way in more:
+        yield from passing_detours(problem, errands, outcome, r, other, way)[
+            :MOST_TRIED
+        ]
 
 
 def in_the_way(problem: Problem, errands: Sequence[Errand], outcome: Drive) -> int:

@@ -19,7 +19,7 @@ from dataclasses import replace
 import numpy as np
 
 from mrmg.mission import Plan, Trajectory
-from mrmg.motion._kernels import USER
+from mrmg.motion._kernels import UNICYCLE, USER
 from mrmg.planning._band_kernels import Surface
 from mrmg.planning._mission_kernels import in_target
 from mrmg.planning._steering_kernels import wrap
@@ -99,7 +99,7 @@ def refine(
 def run_errands(
     problem: Problem,
     params: PlannerParams,
-    errands: Sequence[Errand],
+    errands: list[Errand],
     halt: np.ndarray,
 ) -> Iterator[tuple[Trajectory, ...]]:
     """Draw paths tight and drive along them until nothing goes wrong any more.
@@ -149,13 +149,17 @@ def run_errands(
 def surfaces_of(problem: Problem) -> list[Surface]:
     """Return what each robot's paths are priced on."""
     smooth = smooth_terrain(problem.mission.terrain.multiplier)
+    fleet = problem.mission.fleet
+    # A radian of robots that slow down for it takes as long as so much way.
+    top, rate = fleet["limit"][:, 1], fleet["limit"][:, 2]
+    turning_m = np.where(fleet["model"] == UNICYCLE, top / rate, 0.0)
     surfaces = []
     for r, robot in enumerate(problem.scene.robots):
         share = energy_share(problem.scene.objective, robot)
         surface = surface_of(problem, r, smooth)
         if share < 1.0:
             worth = share * surface.multiplier + (1.0 - share)
-            scrub = float(share * surface.scrub)
+            scrub = float(share * surface.scrub + (1.0 - share) * turning_m[r])
             surface = surface._replace(multiplier=worth, scrub=scrub)
         surfaces.append(surface)
     return surfaces

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import mrmg
 from mrmg.mission import Plan
 from mrmg.planning import PlannerParams
 from mrmg.planning.drafting import draftable, drafts, tour_path, whole_tour
-from mrmg.planning.encounters import Encounters, in_the_way, waits_at
+from mrmg.planning.encounters import MOST, Encounters, in_the_way, waits_at
 from mrmg.planning.errand import Errand
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.planner import state_mission
@@ -141,11 +142,51 @@ def test_nobody_waits_on_the_other_ones_way(yard: Callable[..., Scene]) -> None:
 def test_what_did_not_help_is_not_tried_again(yard: Callable[..., Scene]) -> None:
     problem = state_mission(yard(goals=[], robots=CROSSING), 0, PARAMS)
     errands = errands_of(problem)
+    straight = [errand.path for errand in errands]
     outcome = stuck(problem, (12.8, 10, 0), (15, 8, np.pi / 2), driven=(8.8, 5))
     encounters = Encounters()
-    waiting = []
+    seen: list[Any] = []
     while encounters.resolve(problem, errands, outcome):
-        waiting.append([wait.at.robot for wait in encounters.waits])
-    assert sorted(waiting[:2]) == [[0], [1]]
-    assert all(not one for one in waiting[2:])
-    assert 3 <= len(waiting) <= 5
+        waiting = [wait.at.robot for wait in encounters.waits]
+        led = [
+            errand.path is not path
+            for errand, path in zip(errands, straight, strict=True)
+        ]
+        assert bool(waiting) != any(led)
+        seen.append((waiting, [errand.path for errand in errands]))
+    assert sorted(waiting for waiting, _ in seen[:2]) == [[0], [1]]
+    assert len(seen) == MOST * len(errands)
+    paths = [tuple(id(path) for path in paths) for _, paths in seen[2:]]
+    assert len(set(paths)) == len(paths)
+
+
+def test_a_detour_on_which_a_robot_gets_stuck_is_given_up(
+    yard: Callable[..., Scene],
+) -> None:
+    """Also where nobody is near: it may lack the room there."""
+    problem = state_mission(yard(goals=[], robots=SWAP), 0, PARAMS)
+    errands = errands_of(problem)
+    straight = [errand.path for errand in errands]
+    outcome = stuck(problem, (13.5, 10, 0), (16.8, 10, np.pi), driven=(9.5, 9.2))
+    encounters = Encounters()
+    assert encounters.resolve(problem, errands, outcome)
+    led = [r for r in range(2) if errands[r].path is not straight[r]]
+    first = [errand.path for errand in errands]
+    alone = [(14.0, 10.5, 0.0), (25.0, 10.0, np.pi)]
+    if led[0] == 1:
+        alone = [(4.0, 10.0, 0.0), (15.0, 10.5, np.pi)]
+    again = replace(stuck(problem, *alone, driven=(9.5, 9.2)), stuck=led[0])
+    assert in_the_way(problem, errands, again) == -1
+    assert encounters.resolve(problem, errands, again)
+    assert any(
+        errand.path is not path for errand, path in zip(errands, first, strict=True)
+    )
+
+
+def test_a_robot_stuck_alone_is_not_in_anybodys_way(
+    yard: Callable[..., Scene],
+) -> None:
+    problem = state_mission(yard(goals=[], robots=SWAP), 0, PARAMS)
+    errands = errands_of(problem)
+    outcome = stuck(problem, (8, 10, 0), (20, 10, np.pi), driven=(4, 6))
+    assert not Encounters().resolve(problem, errands, outcome)
