@@ -97,6 +97,7 @@ def copy_of_package(folder: Path) -> Path:
         "compilation/__init__.py",
         "compilation/cache.py",
         "compilation/calls.py",
+        "compilation/clock.py",
         "compilation/decorators.py",
         "compilation/libraries.py",
         "compilation/parallel.py",

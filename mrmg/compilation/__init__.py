@@ -9,6 +9,7 @@ from mrmg.compilation.cache import (
     note_kernels_are_compiled,
     sources_digest,
 )
+from mrmg.compilation.clock import now_ns
 from mrmg.compilation.decorators import kernel, leaf_kernel, view
 from mrmg.compilation.parallel import compile_in_processes
 from mrmg.compilation.pointers import by_pointer
@@ -24,6 +25,7 @@ __all__ = [
     "kernels_are_compiled",
     "leaf_kernel",
     "note_kernels_are_compiled",
+    "now_ns",
     "sources_digest",
     "view",
 ]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, kernel, leaf_kernel
+from mrmg.compilation import by_pointer, kernel, leaf_kernel, now_ns
 from mrmg.motion._kernels import copy_numbers
 from mrmg.planning._expansion_kernels import choose_modes, expand
 from mrmg.planning._finish_kernels import all_finished, at_finish
@@ -44,8 +44,8 @@ STALLED_M = 0.3
 FAILED_ROUTES = 60
 """A tree is given up after this many vertices from which no tours are feasible."""
 
-VERTICES, GROUPS, ROUTER_CALLS, EXPANSIONS, ROUTER_FAILURES = range(5)
-"""Places in the array of counts."""
+VERTICES, GROUPS, ROUTER_CALLS, EXPANSIONS, ROUTER_FAILURES, ROUTING_NS = range(6)
+"""Places in the array of counts; the last is the time that router calls took."""
 
 
 @by_pointer
@@ -291,15 +291,12 @@ def insert(mission, tree, tours, n, n_tours, target, event, random, counts):
         return True, n_tours
     if n_tours == len(tours.target) or goals_left(tree, n) == 0:
         return enough, n_tours
+    began = now_ns()
     cost = route_from(
-        mission,
-        tree,
-        tours,
-        n,
-        random,
-        tours.target[n_tours],
-        tours.length[n_tours],
-    )
+        mission, tree, tours, n, random,
+        tours.target[n_tours], tours.length[n_tours],
+    )  # fmt: skip
+    counts[ROUTING_NS] += now_ns() - began
     counts[ROUTER_CALLS] += 1
     if cost >= IMPOSSIBLE:
         counts[ROUTER_FAILURES] += not enough

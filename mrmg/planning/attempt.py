@@ -133,7 +133,7 @@ def tree_plans(
         enough = not problem.preference.gains(better, plan, LEAST_GAIN)
         plan = better if better is not plan else None
         left = 0 if enough else left - 1
-    return Attempt(plans, routing_s, growth.counts)
+    return Attempt(plans, routing_s + growth.routing_s, growth.counts)
 
 
 def draft_plans(

@@ -195,6 +195,7 @@ class Growth:
         trajectories: of all robots, or empty if the tree found no solution.
         tours: targets each robot visited, in order.
         counts: vertices, groups, router_calls, expansions.
+        routing_s: time the router calls took.
         place: where the robots are at each vertex of the tree [m], shape (V, R, 2).
         parent: of each vertex; -1 for the root, shape (V,).
     """
@@ -202,6 +203,7 @@ class Growth:
     trajectories: tuple[Trajectory, ...]
     tours: Mapping[str, tuple[str, ...]]
     counts: Mapping[str, int]
+    routing_s: float
     place: np.ndarray
     parent: np.ndarray
 
@@ -241,7 +243,7 @@ def grow_tree(
     for r, tour in enumerate(routing.tours):
         tours.target[0, r, : len(tour)] = tour
         tours.length[0, r] = len(tour)
-    counts = np.zeros(5, np.int64)
+    counts = np.zeros(6, np.int64)
     leaf = _tree_kernels.grow(
         mission,
         problem.start,
@@ -253,17 +255,19 @@ def grow_tree(
         halt,
     )
     names = ("vertices", "groups", "router_calls", "expansions", "dead_ends")
-    statistics = {name: int(n) for name, n in zip(names, counts, strict=True)}
+    statistics = {name: int(n) for name, n in zip(names, counts, strict=False)}
+    routing_s = 1e-9 * int(counts[_tree_kernels.ROUTING_NS])
     size = statistics["vertices"]
     place, parent = tree.state[:size, :, :2].copy(), tree.parent[:size].copy()
     if leaf < 0:
-        return Growth((), {}, statistics, place, parent)
+        return Growth((), {}, statistics, routing_s, place, parent)
     branch = _branch(tree, leaf)
     control = _controls(problem, params, tree, branch)
     return Growth(
         _replay(problem, params, control),
         _visited_tours(problem, tree, tours, branch),
         statistics,
+        routing_s,
         place,
         parent,
     )
