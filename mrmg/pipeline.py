@@ -8,9 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mrmg.errors import ExitCode
-from mrmg.execution.disturbance_spec import written_out
 from mrmg.mission import PlanStatus
-from mrmg.results.gl_backend import choose_backend
 from mrmg.run_arguments import DEFAULT_VIDEO, RunArguments, VideoArguments
 from mrmg.run_folder import RunFolder, Step
 from mrmg.scene.loading import load_scene
@@ -85,7 +83,9 @@ def run(
         MrmgError: for everything that keeps the run from starting. A mission that
             cannot be planned, or fails, is a result and not an error.
     """
+    from mrmg.execution.disturbance_spec import written_out
     from mrmg.mission_control.faults import checked_faults
+    from mrmg.results.gl_backend import choose_backend
 
     scene = source if isinstance(source, Scene) else load_scene(source)
     arguments = RunArguments(

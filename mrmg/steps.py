@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import mrmg
 from mrmg import storage
 from mrmg.errors import ExitCode, MrmgError
-from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan, PlanStatus, plan_in_force
 from mrmg.run_arguments import RunArguments
 from mrmg.run_folder import NEEDS, RunFolder, Step
@@ -26,6 +25,7 @@ from mrmg.shipped import models_folder
 
 if TYPE_CHECKING:
     from mrmg.capsule import Failure
+    from mrmg.execution.log import ExecutionLog
     from mrmg.mission_control import Drive
     from mrmg.planning import Improvement
 
@@ -114,6 +114,8 @@ class Run:
 
     def log(self) -> ExecutionLog:
         """Return the log of the simulation."""
+        from mrmg.execution.log import ExecutionLog
+
         return ExecutionLog.load(self.folder.path)
 
     def summary(self) -> dict[str, Any]:

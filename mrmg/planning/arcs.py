@@ -68,6 +68,7 @@ class ArcWays:
         from_start: from start to arc, shape (R, T, K).
         starts: shape (R, 2).
         known: waves that were taken.
+        cost: least cost from regions and starts to each node, as far as asked for.
     """
 
     ways: Ways
@@ -76,6 +77,7 @@ class ArcWays:
     from_start: np.ndarray
     starts: np.ndarray
     known: set[Wave] = field(default_factory=set)
+    cost: dict[int, np.ndarray] = field(default_factory=dict)
 
     @staticmethod
     def of(ways: Ways, fine: Ground, starts: np.ndarray) -> ArcWays:
@@ -88,13 +90,19 @@ class ArcWays:
         lines = np.array([line for region in regions for line in _arc_lines(region)])
         sagitta_m = max((_sagitta_m(region) for region in regions), default=0.0)
         floor = float(np.min(ways.ground.price, initial=1.0))
-        flat = np.zeros((len(lines), len(lines)))
-        first, second = np.triu_indices(len(lines), 1)
-        flat[first, second] = shapely.distance(lines[first], lines[second])
-        flat = floor * np.maximum(0.0, flat + flat.T - 2.0 * sagitta_m)
-        between = flat.reshape(count, ARCS, count, ARCS)
-        between = np.maximum(between, reach[:, None])
+        between = np.maximum(0.0, reach[:, None])
         between = np.maximum(between, reach.transpose(1, 2, 0)[..., None])
+        between = between.reshape(len(lines), len(lines))
+        # How far arcs are apart takes its time: it is asked where it may tell more.
+        middle = shapely.get_coordinates(
+            shapely.line_interpolate_point(lines, 0.5, normalized=True)
+        )
+        most = floor * np.hypot(*(middle[:, None] - middle).T)
+        first, second = np.nonzero(np.triu(most > between, 1))
+        apart = shapely.distance(lines[first], lines[second]) - 2.0 * sagitta_m
+        apart = np.maximum(between[first, second], floor * apart)
+        between[first, second] = between[second, first] = apart
+        between = between.reshape(count, ARCS, count, ARCS)
         points = shapely.points(starts)[:, None]
         away = floor * (shapely.distance(points, lines[None]) - sagitta_m)
         from_start = np.maximum(
@@ -238,6 +246,12 @@ class ArcWays:
 
     def _cost_to(self, place: int) -> np.ndarray:
         """Return the least cost from a region or start to each node."""
+        if place not in self.cost:
+            self.cost[place] = self._spread(place)
+        return self.cost[place]
+
+    def _spread(self, place: int) -> np.ndarray:
+        """Work out the least cost from a region or start to each node."""
         ground = self.ways.ground
         if place < 0:
             offset = ground.nodes() - self.starts[-1 - place]

@@ -144,17 +144,14 @@ class Ground:
         rows, columns = self.price.shape
         place = (points - (self.x_min, self.y_min)) / self.cell_m
         reach = reach_m / self.cell_m + 1e-9
-        found = []
-        for shift_y in (-reach, 0.0, reach):
-            for shift_x in (-reach, 0.0, reach):
-                column = np.floor(place[:, 0] + shift_x).astype(int)
-                row = np.floor(place[:, 1] + shift_y).astype(int)
-                found.append(np.stack([np.arange(len(points)), row, column], axis=1))
-        index, row, column = np.unique(np.concatenate(found), axis=0).T
-        fine = (row >= 0) & (column >= 0) & (row < rows) & (column < columns)
-        index, row, column = index[fine], row[fine], column[fine]
-        free = np.isfinite(self.price[row, column])
-        index, row, column = index[free], row[free], column[free]
+        shift = np.array([-reach, 0.0, reach])
+        row = np.floor(place[:, 1] + shift[:, None, None]).astype(int)
+        column = np.floor(place[:, 0] + shift[:, None]).astype(int)
+        fine = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+        index = np.arange(len(points))
+        cell = np.unique(((index * rows + row) * columns + column)[fine])
+        cell = cell[np.isfinite(self.price.reshape(-1)[cell % (rows * columns)])]
+        index, row, column = np.unravel_index(cell, (len(points), rows, columns))
         fx = np.clip(place[index, 0] - column, 0.0, 1.0)
         fy = np.clip(place[index, 1] - row, 0.0, 1.0)
         corner = row * (columns + 1) + column
