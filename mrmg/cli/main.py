@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import errno
 import gc
 import os
@@ -28,6 +29,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # What imports make stays: to search it for garbage again and again takes a tenth of
     # the time of a short command.
     gc.set_threshold(MOST_NEW_OBJECTS)
+    atexit.register(gc.freeze)  # nor need it be searched when the process ends
     try:
         code = options.command(options)
         sys.stdout.flush()
