@@ -31,6 +31,9 @@ NODE_TURN = 1.2
 LEAST_SHARE = 0.25
 """... but no nearer than this share of others'."""
 
+ROOMY_M = 0.65
+"""Room that paths need from which on nodes need not be nearer to each other, either."""
+
 MERGED_M = 0.1
 """Distance within which places that must be nodes become one."""
 
@@ -229,7 +232,7 @@ def tightened(
     """
     cost = 0.0
     for spacing_m in spacings_m:
-        spacing_m *= nimble_share(surface.curvature)
+        spacing_m *= min(nimble_share(surface.curvature), surface.room / ROOMY_M)
         path, cost = _relaxed(targets, surface, path, spacing_m)
     return path, cost
 
