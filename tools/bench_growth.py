@@ -9,7 +9,7 @@ cover 12 % of it, however many there are, and stations grow with the goals, one 
 4. Large fleets (16 robots with 64 goals and 20 stations, 32 with 128 and 40) are placed
 on the map of scene6, 100 x 100 m as well. Times are wall-clock, of planning in process;
 a plan counts if the verifier finds nothing wrong with it. Memory is the process's peak
-so far.
+so far. The last table has one line for the missions of one size.
 """
 
 from __future__ import annotations
@@ -90,6 +90,7 @@ def main() -> int:
     options = parse_options()
     chosen = [case for name in options.series for case in SERIES[name]]
     rows = measure(chosen, range(options.seeds), options.most)
+    print(f"\n{summary(rows)}\n")
     if options.output:
         text = "".join(json.dumps(row, sort_keys=True) + "\n" for row in rows)
         options.output.write_text(text)
@@ -162,6 +163,30 @@ def table_row(row: dict[str, Any]) -> str:
         f"{row['time_s'].get('routing', np.nan):.3f} | {first_s:.3f} | "
         f"{row.get('cost_J', np.nan):.0f} | {row['memory_MB']:.0f}"
     )
+
+
+def summary(rows: Sequence[dict[str, Any]]) -> str:
+    """Return a table for documents: the missions of one size in a line."""
+    lines = [
+        "| grows | robots | goals | obstacles | ok | first plan: median, worst [s] "
+        "| routing [s] | memory [MB] |",
+        "|---" * 8 + "|",
+    ]
+    sizes: dict[tuple[str, int], list[dict[str, Any]]] = {}
+    for row in rows:
+        sizes.setdefault((row["series"], row["size"]), []).append(row)
+    for (series, _), same in sizes.items():
+        times = [row["time_s"] for row in same]
+        first_s = [each.get("first_solution", np.nan) for each in times]
+        routing_s = [each.get("routing", np.nan) for each in times]
+        lines.append(
+            f"| {series} | {same[0]['robots']} | {same[0]['goals']} "
+            f"| {same[0]['obstacles']} | {sum(row['ok'] for row in same)} of {len(same)} "
+            f"| {np.median(first_s):.2f}, {np.max(first_s):.2f} "
+            f"| {np.median(routing_s):.2f} "
+            f"| {max(row['memory_MB'] for row in same):.0f} |"
+        )
+    return "\n".join(lines)
 
 
 def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import bench_growth
 import pytest
@@ -49,3 +50,18 @@ def test_rows_and_figure(
     assert all(row["ok"] and row["time_s"]["first_solution"] > 0.0 for row in rows)
     assert "time to the first plan" in figure.read_text()
     assert "robots | 2 | 0 | yes" in capsys.readouterr().out
+
+
+def test_the_summary_has_a_line_for_the_missions_of_one_size() -> None:
+    def row(size: int, first_s: float, ok: bool = True) -> dict[str, Any]:
+        return {
+            "series": "robots", "size": size, "robots": size, "goals": 20,
+            "obstacles": 50, "ok": ok, "memory_MB": 250.4,
+            "time_s": {"first_solution": first_s, "routing": 0.25},
+        }  # fmt: skip
+
+    rows = [row(2, 0.5), row(2, 0.7), row(2, 1.5, ok=False), row(4, 2.0)]
+    lines = bench_growth.summary(rows).splitlines()
+    assert lines[2] == "| robots | 2 | 20 | 50 | 2 of 3 | 0.70, 1.50 | 0.25 | 250 |"
+    assert lines[3] == "| robots | 4 | 20 | 50 | 1 of 1 | 2.00, 2.00 | 0.25 | 250 |"
+    assert {line.count("|") for line in lines} == {9}
