@@ -181,7 +181,8 @@ def summary(rows: Sequence[dict[str, Any]]) -> str:
         routing_s = [each.get("routing", np.nan) for each in times]
         lines.append(
             f"| {series} | {same[0]['robots']} | {same[0]['goals']} "
-            f"| {same[0]['obstacles']} | {sum(row['ok'] for row in same)} of {len(same)} "
+            f"| {same[0]['obstacles']} "
+            f"| {sum(row['ok'] for row in same)} of {len(same)} "
             f"| {np.median(first_s):.2f}, {np.max(first_s):.2f} "
             f"| {np.median(routing_s):.2f} "
             f"| {max(row['memory_MB'] for row in same):.0f} |"

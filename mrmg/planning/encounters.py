@@ -142,6 +142,8 @@ def ways_out(
 ) -> Iterator[Wait | list[Detour]]:
     """Yield what may help two robots past each other, what costs least first.
 
+    That is to wait, which takes no energy, or where time counts what is over soonest.
+
     Args:
         problem: the mission.
         errands: of all robots.
@@ -149,17 +151,28 @@ def ways_out(
         other: the other one.
     """
     r = outcome.stuck
-    for _, wait in waits_at(problem, errands, outcome, r, other):
-        yield wait
+    waits = waits_at(problem, errands, outcome, r, other)
     # Round a robot that stands it is the same way, however much of a path is avoided.
     first, *more = PASSING if np.isfinite(outcome.driven[other]) else PASSING[:1]
-    yield from passing_detours(problem, errands, outcome, r, other, first)[:MOST_TRIED]
+    if problem.hurried or problem.preference.objective.makespan_weight > 0.0:
+        detours = passing_detours(problem, errands, outcome, r, other, first)
+        options: list[tuple[float, Wait | list[Detour]]] = [*waits]
+        options += [(_longer_m(errands, led), led) for led in detours[:MOST_TRIED]]
+        yield from (option for _, option in sorted(options, key=lambda each: each[0]))
+    else:  # to wait takes no energy
+        yield from (wait for _, wait in waits)
+        detours = passing_detours(problem, errands, outcome, r, other, first)
+        yield from detours[:MOST_TRIED]
     if not errands[other].tour:
         yield from room_made(problem, errands, outcome, other, r)
     for way in more:
         yield from passing_detours(problem, errands, outcome, r, other, way)[
             :MOST_TRIED
         ]
+
+
+def _longer_m(errands: Sequence[Errand], led: Sequence[Detour]) -> float:
+    return max(one.cost_m - errands[one.robot].cost_m for one in led)
 
 
 def in_the_way(problem: Problem, errands: Sequence[Errand], outcome: Drive) -> int:
@@ -184,11 +197,14 @@ def waits_at(
     outcome: Drive,
     r: int,
     other: int,
-) -> Iterator[tuple[int, Wait]]:
-    """Yield who of two robots may wait for the other one, the shorter wait first."""
+) -> list[tuple[float, Wait]]:
+    """Return how either of two robots may wait for the other one, shorter waits first.
+
+    Each with the way that the other one drives in the meantime [m].
+    """
     shared = shared_stretches(problem, errands, outcome, r, other)
     if shared is None:
-        return
+        return []
     stretch = dict(zip((r, other), shared, strict=True))
     found = []
     for waiting, passing in ((r, other), (other, r)):
@@ -203,6 +219,5 @@ def waits_at(
                 (passing, leave_m),
             )
         ]
-        found.append((leave_m - here_m, waiting, Wait(*places)))
-    for _, waiting, wait in sorted(found, key=lambda each: each[0]):
-        yield waiting, wait
+        found.append((leave_m - here_m, Wait(*places)))
+    return sorted(found, key=lambda each: each[0])

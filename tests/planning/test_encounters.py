@@ -110,10 +110,12 @@ def test_who_waits_stands_before_the_shared_stretch_until_it_is_left(
     problem = state_mission(yard(goals=[], robots=CROSSING), 0, PARAMS)
     errands = errands_of(problem)
     outcome = stuck(problem, (12, 10, 0), (15, 7, np.pi / 2), driven=(8, 4))
-    waits = dict(waits_at(problem, errands, outcome, 0, 1))
-    assert set(waits) == {0, 1}
-    for waiting, wait in waits.items():
-        assert wait.at.robot == waiting
+    waits = waits_at(problem, errands, outcome, 0, 1)
+    assert {wait.at.robot for _, wait in waits} == {0, 1}
+    assert waits[0][0] <= waits[1][0]
+    for other_m, wait in waits:
+        waiting = wait.at.robot
+        assert other_m == pytest.approx(wait.until.way_m - (4 if waiting == 0 else 8))
         assert wait.until.robot == 1 - waiting
         # The one stands short of the crossing at (15, 10), the other has left it.
         assert np.hypot(*(wait.at.point - (15, 10))) > 2.0
@@ -127,7 +129,7 @@ def test_nobody_waits_on_the_other_ones_way(yard: Callable[..., Scene]) -> None:
     problem = state_mission(yard(goals=[], robots=SWAP), 0, PARAMS)
     errands = errands_of(problem)
     outcome = stuck(problem, (13.5, 10, 0), (16.8, 10, np.pi), driven=(9.5, 9.2))
-    assert not list(waits_at(problem, errands, outcome, 0, 1))
+    assert waits_at(problem, errands, outcome, 0, 1) == []
     encounters = Encounters()
     before = [errand.path.node.copy() for errand in errands]
     assert encounters.resolve(problem, errands, outcome)
@@ -190,3 +192,24 @@ def test_a_robot_stuck_alone_is_not_in_anybodys_way(
     errands = errands_of(problem)
     outcome = stuck(problem, (8, 10, 0), (20, 10, np.pi), driven=(4, 6))
     assert not Encounters().resolve(problem, errands, outcome)
+
+
+@pytest.mark.parametrize("objective", ["energy", "makespan"])
+def test_robots_wait_for_nothing_but_energy_if_a_detour_is_sooner(
+    yard: Callable[..., Scene], objective: str
+) -> None:
+    """Ways that share a long stretch aslant: who waits there waits long."""
+    robots = [
+        finishing("a", 4, 4, 0.0, (26, 12)),
+        finishing("b", 26, 4, np.pi, (4, 12)),
+    ]
+    scene = yard(goals=[], robots=robots, objective=objective)
+    problem = state_mission(scene, 0, PARAMS)
+    errands = errands_of(problem)
+    outcome = stuck(problem, (13.4, 7.5, 0.3), (16.6, 7.5, 2.8), driven=(10, 10))
+    waits = waits_at(problem, errands, outcome, 0, 1)
+    assert waits
+    assert waits[0][0] > 3.0
+    encounters = Encounters()
+    assert encounters.resolve(problem, errands, outcome)
+    assert bool(encounters.waits) == (objective == "energy")
