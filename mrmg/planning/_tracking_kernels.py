@@ -67,6 +67,7 @@ class Courses(NamedTuple):
         end: number of the node at which the segment's stretch ends, where the gear
             changes or the robot turns on the spot, shape (R, N).
         fastest: speed at which each node is passed at most [m/s], shape (R, N).
+        pause: steps that a robot stands at each node where a stretch ends (R, N).
         nodes: number of nodes of each path, shape (R,).
         ease: deceleration that costs nothing [m/s^2], shape (R,).
         stiffness: how fast each robot returns to its path: errors decay over about
@@ -81,6 +82,7 @@ class Courses(NamedTuple):
     way: np.ndarray
     end: np.ndarray
     fastest: np.ndarray
+    pause: np.ndarray
     nodes: np.ndarray
     ease: np.ndarray
     stiffness: np.ndarray
@@ -250,6 +252,7 @@ def drive(
     decided = np.zeros(robots, np.bool_)
     segment = np.zeros(robots, np.int64)
     still = np.zeros(robots, np.int64)
+    stood = np.zeros(robots, np.int64)
     done = courses.nodes < 2
     driven[:] = -np.inf
     steps, idle = len(control), 0
@@ -309,8 +312,14 @@ def drive(
                         w = 0.0
                     if stands(fleet, r, state):
                         still[r] = 0
-                        done[r] = courses.end[r, i] + 1 >= courses.nodes[r]
-                        segment[r] = i if done[r] else courses.end[r, i]
+                        last = courses.end[r, i]
+                        if stood[r] < courses.pause[r, last]:
+                            stood[r] += 1
+                            idle = 0
+                        else:
+                            stood[r] = 0
+                            done[r] = last + 1 >= courses.nodes[r]
+                            segment[r] = i if done[r] else last
                 u1, u2 = track_step(fleet, spaces, commitment, decided, r, v, w, dt)
             control[n, r, 0], control[n, r, 1] = u1, u2
             decided[r] = True

@@ -87,6 +87,7 @@ class Path:
         deeper: how much deeper than needed the path enters them [m], shape (S,).
         pivot: numbers of the nodes at which the robot turns on the spot, shape (P,).
         heading: of the robot at the start [rad].
+        pause_s: how long it stands at each stop, shape (S,).
     """
 
     node: np.ndarray
@@ -96,6 +97,7 @@ class Path:
     deeper: np.ndarray
     pivot: np.ndarray
     heading: float
+    pause_s: np.ndarray
 
     @property
     def way(self) -> np.ndarray:
@@ -112,7 +114,10 @@ class Path:
     def edges(self) -> np.ndarray:
         """Numbers of the nodes between which it is driven without a stop."""
         changes = np.flatnonzero(np.diff(self.gear)) + 1
-        return np.unique([0, *changes.tolist(), *self.pivot, len(self.node) - 1])
+        pauses = self.stop[self.pause_s > 0.0]
+        return np.unique(
+            [0, *changes.tolist(), *self.pivot, *pauses, len(self.node) - 1]
+        )
 
 
 def visit_steps(
@@ -157,6 +162,7 @@ def path_of(
         deeper=np.full(len(left), TRACKING_M),
         pivot=_pivots(state),
         heading=float(state[0, 2]),
+        pause_s=np.zeros(len(left)),
     )
     return respaced(path)
 

@@ -23,7 +23,7 @@ from mrmg.planning.errand import Errand
 from mrmg.planning.gears import with_best_gears
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.refine import run_errands, stays_somewhere, surfaces_of
+from mrmg.planning.refine import run_errands, surfaces_of
 from mrmg.planning.routing import Routing
 
 SHARP = radians(110.0)
@@ -56,11 +56,11 @@ DIRECTION_M = 4.0
 def draftable(problem: Problem) -> bool:
     """Tell whether drafts know all that a mission asks for.
 
-    They do not know stays, nor how a user's models drive.
+    They do not know how a user's models drive.
     """
     models = problem.mission.fleet["model"]
     known = (models == CAR) | (models == UNICYCLE)
-    return bool(known.all()) and not stays_somewhere(problem)
+    return bool(known.all())
 
 
 def drafts(
@@ -175,6 +175,7 @@ def tour_path(
         deeper=np.full(len(tour), deeper_m),
         pivot=np.zeros(0, np.int64),
         heading=heading,
+        pause_s=np.zeros(len(tour)),
     )
     turns = _turns(path)
     if problem.mission.fleet[r]["model"] == UNICYCLE:

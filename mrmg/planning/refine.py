@@ -37,6 +37,7 @@ from mrmg.planning.errand import Errand
 from mrmg.planning.haste import energy_share
 from mrmg.planning.motion_tree import Problem
 from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.pauses import with_pauses
 from mrmg.planning.roadmap import planned_regions
 from mrmg.planning.targets import TARGET_MARGIN_M
 from mrmg.planning.tracking import Drive, braking_places, redriven
@@ -74,8 +75,6 @@ def refine(
         halt: shape (1,); refinement ends soon after it has turned true.
     """
     targets = problem.mission.targets
-    if stays_somewhere(problem):
-        return plan
     kept = problem.mission.fleet["model"] == USER
     surfaces = surfaces_of(problem)
     errands = []
@@ -116,7 +115,7 @@ def run_errands(
         outcome = redriven(
             problem,
             params,
-            [errand.path for errand in errands],
+            [with_pauses(problem, r, one.path) for r, one in enumerate(errands)],
             [errand.slow for errand in errands],
             [errand.controls() for errand in errands],
             encounters.waits,
@@ -163,15 +162,6 @@ def surfaces_of(problem: Problem) -> list[Surface]:
             surface = surface._replace(multiplier=worth, scrub=scrub)
         surfaces.append(surface)
     return surfaces
-
-
-def stays_somewhere(problem: Problem) -> bool:
-    """Tell whether robots stay at targets: driving along paths knows no pauses."""
-    battery = [robot.battery for robot in problem.scene.robots]
-    return bool(
-        (problem.mission.targets.dwell > 0.0).any()
-        or any(item.takes_time_to_fill for item in battery)
-    )
 
 
 def tour_numbers(problem: Problem, plan: Plan) -> list[list[int]]:

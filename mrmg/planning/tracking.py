@@ -213,6 +213,7 @@ def courses_of(
     bend, way = np.zeros((robots, most)), np.zeros((robots, most))
     end = np.zeros((robots, most), np.int64)
     fastest = np.full((robots, most), np.inf)
+    pause = np.zeros((robots, most), np.int64)
     ease = _decelerations(problem)
     targets, fleet = problem.mission.targets, problem.mission.fleet
     turned = (targets.finish >= 0) & (targets.tolerance < np.pi)
@@ -230,6 +231,8 @@ def courses_of(
             end[r, a:b] = b
             bend[r, a : b + 1] = _bends(chord[a:b], size[a:b])
         tight = steerable_speeds(problem, r, bend[r, :n], way[r, :n], end[r, : n - 1])
+        steps = np.ceil(path.pause_s / problem.mission.params.dt).astype(int)
+        np.add.at(pause[r], path.stop, steps)
         fastest[r, :n] = _speed_limits(path, slow[r], tight, float(ease[r]))
     return Courses(
         node=node,
@@ -238,6 +241,7 @@ def courses_of(
         way=way,
         end=end,
         fastest=fastest,
+        pause=pause,
         nodes=np.array([len(path.node) for path in paths]),
         ease=ease,
         stiffness=np.array(
@@ -268,8 +272,11 @@ def _most_steps(
 ) -> int:
     top = np.minimum(*np.abs(problem.mission.fleet["limit"][:, :2].T))
     lengths = np.array([path.way[-1] for path in paths])
+    pauses_s = sum(float(path.pause_s.sum()) for path in paths)
     return int(
-        given.max() + SLOWEST * (lengths / top).max() / params.dt_s + LEAST_STEPS
+        given.max()
+        + (SLOWEST * (lengths / top).max() + pauses_s) / params.dt_s
+        + LEAST_STEPS
     )
 
 
