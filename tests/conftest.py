@@ -7,6 +7,11 @@ import signal
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
+
+# Equal examples whenever the tests run, and none judged by its time.
+settings.register_profile("mrmg", derandomize=True, deadline=None)
+settings.load_profile("mrmg")
 
 WALLED = """\
 format: 1

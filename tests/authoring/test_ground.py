@@ -29,7 +29,7 @@ def ground(
         max_size=5,
     )
 )
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_clearance_is_the_exact_distance(boxes: list[tuple[float, ...]]) -> None:
     obstacles = [shapely.box(x, y, x + a, y + b) for x, y, a, b in boxes]
     grid = ground(obstacles)

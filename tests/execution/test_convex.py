@@ -54,7 +54,7 @@ def test_known_shapes_need_few_pieces(polygon: Polygon, most: int) -> None:
     assert len(assert_tiles(polygon)) <= most
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 10_000), st.integers(5, 40), st.integers(0, 3))
 def test_random_shapes_are_tiled(seed: int, corners: int, holes: int) -> None:
     polygon = star(seed, corners, holes)

@@ -36,7 +36,7 @@ def mission(station: dict[str, float], battery: dict[str, float]) -> Scene:
 
 @pytest.mark.parametrize("battery", [{}, {"charging_power": 7.0}])
 @pytest.mark.parametrize("station", [{}, {"dwell": 1.5}])
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     st.lists(st.sampled_from([-9.0, 0.0, 9.0]), min_size=40, max_size=40),
     st.integers(1, 39),

@@ -31,8 +31,6 @@ PARAMS = PlannerParams(samples=300, improvements=0)
 
 FEW = settings(
     max_examples=4,
-    deadline=None,
-    derandomize=True,
     phases=(Phase.explicit, Phase.generate),
 )
 """A bound takes a good part of a second."""

@@ -38,7 +38,6 @@ random_driving = st.lists(
 )
 quiet = settings(
     max_examples=60,
-    deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 

@@ -344,7 +344,6 @@ def test_stated_battery_content_must_be_the_recomputed_one(case: Any) -> None:
 
 @settings(
     max_examples=150,
-    deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(

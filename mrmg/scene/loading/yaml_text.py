@@ -64,6 +64,9 @@ _CORE_SCALARS = (
         list("-+.0123456789"),
     ),
 )
+_CORE_SCALAR = re.compile("|".join(pattern for _, pattern, _ in _CORE_SCALARS))
+"""Anything but text."""
+
 for _tag, _pattern, _first in _CORE_SCALARS:
     _CoreLoader.add_implicit_resolver(_tag, re.compile(f"^(?:{_pattern})$"), _first)
 _CoreLoader.add_constructor("tag:yaml.org,2002:int", _construct_core_int)
@@ -128,7 +131,15 @@ def _represent_float(dumper: _Dumper, data: float) -> yaml.ScalarNode:
     return dumper.represent_scalar("tag:yaml.org,2002:float", text)
 
 
+def _represent_text(dumper: _Dumper, data: str) -> yaml.ScalarNode:
+    # PyYAML quotes what YAML 1.1 takes for something else than text, as "no"; but "1e3"
+    # is a number in YAML 1.2 only.
+    style = "'" if _CORE_SCALAR.fullmatch(data) else None
+    return dumper.represent_scalar("tag:yaml.org,2002:str", data, style=style)
+
+
 _Dumper.add_representer(list, _represent_list)
+_Dumper.add_representer(str, _represent_text)
 _Dumper.add_representer(float, _represent_float)
 
 

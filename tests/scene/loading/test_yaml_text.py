@@ -68,6 +68,14 @@ PLAIN = st.recursive(
 )
 
 
+@pytest.mark.parametrize("text", ["1e3", "0E0", "0o10", "no", "~", "", "1.", "=", "a"])
+def test_text_is_written_as_text(text: str) -> None:
+    """Whatever YAML 1.1 or 1.2 would take it for."""
+    document = {text or "key": text}
+    assert parse_yaml(dump_yaml(document), source="test") == document
+    assert yaml.safe_load(dump_yaml(document)) == document
+
+
 @given(PLAIN)
 def test_what_is_written_reads_back_equal(value: object) -> None:
     assert parse_yaml(dump_yaml(value), source="test") == value
