@@ -29,7 +29,6 @@ from mrmg.planning.geodesic import (
     Look,
     Ways,
     border,
-    distance_m,
 )
 from mrmg.scene.types import Region
 
@@ -83,10 +82,7 @@ class ArcWays:
     def of(ways: Ways, fine: Ground, starts: np.ndarray) -> ArcWays:
         """Bound all ways between arcs, and from starts to arcs."""
         regions, count = ways.regions, len(ways.regions)
-        reach = np.zeros((count, count, ARCS))
-        for i, source in enumerate(ways.fields):
-            for j, look in enumerate(ways.looks):
-                reach[i, j] = _lowest_by_arc(source, look) - ways.highest[i]
+        reach = ways.lowest - ways.highest[:, None, None]
         lines = np.array([line for region in regions for line in _arc_lines(region)])
         sagitta_m = max((_sagitta_m(region) for region in regions), default=0.0)
         floor = float(np.min(ways.ground.price, initial=1.0))
@@ -108,10 +104,7 @@ class ArcWays:
         from_start = np.maximum(
             away.reshape(len(starts), count, ARCS), ways.from_start[..., None]
         )
-        for i in range(count):
-            for j in range(count):
-                if distance_m(regions[i], regions[j]) <= 0.0:
-                    between[i, :, j] = 0.0
+        between.transpose(0, 2, 1, 3)[ways.overlap] = 0.0
         from_start[ways.from_start == 0.0] = 0.0
         for table in (between, from_start):
             table[table > 0.5 * UNREACHED] = np.inf

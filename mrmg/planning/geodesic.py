@@ -225,6 +225,8 @@ class Ways:
         fields: one from each region.
         looks: at each region's border, `border` points of it.
         highest: bound of each region's own field on its border, shape (T,).
+        lowest: bounds of each region's field on the arcs of borders, shape (T, T, K).
+        overlap: which regions do, shape (T, T).
         between: from region to region, shape (T, T).
         from_start: from start to region, shape (R, T); inf where there is no way.
     """
@@ -234,6 +236,8 @@ class Ways:
     fields: list[Field]
     looks: list[Look]
     highest: np.ndarray
+    lowest: np.ndarray
+    overlap: np.ndarray
     between: np.ndarray
     from_start: np.ndarray
 
@@ -246,15 +250,12 @@ class Ways:
         highest = np.array(
             [highest_of(*pair) for pair in zip(fields, looks, strict=True)]
         )
+        lowest = _lowest_by_arc(fields, looks)
         floor = float(np.min(ground.price, initial=1.0))
-        way = np.zeros((len(regions), len(regions)))
-        for i, field in enumerate(fields):
-            for j in range(len(regions)):
-                apart = distance_m(regions[i], regions[j])
-                if apart > 0.0:
-                    certified = lowest_of(field, looks[j]) - highest[i]
-                    way[i, j] = max(certified, floor * apart, 0.0)
-        way = np.maximum(way, way.T)
+        apart_m = _distances_m(regions)
+        certified = lowest.min(axis=2, initial=UNREACHED) - highest[:, None]
+        way = np.maximum(np.maximum(certified, floor * apart_m), 0.0)
+        way = np.where(apart_m > 0.0, np.maximum(way, way.T), 0.0)
         start_way = np.zeros((len(starts), len(regions)))
         for r, start in enumerate(starts):
             look = ground.look_at(start[None], 0.0)
@@ -265,7 +266,17 @@ class Ways:
                     start_way[r, i] = max(certified, floor * apart, 0.0)
         for table in (way, start_way):
             table[table > 0.5 * UNREACHED] = np.inf
-        return Ways(ground, regions, fields, looks, highest, way, start_way)
+        return Ways(
+            ground=ground,
+            regions=regions,
+            fields=fields,
+            looks=looks,
+            highest=highest,
+            lowest=lowest,
+            overlap=apart_m <= 0.0,
+            between=way,
+            from_start=start_way,
+        )
 
 
 def _on_triangles(corner: np.ndarray, look: Look) -> np.ndarray:
@@ -284,6 +295,17 @@ def _on_triangles(corner: np.ndarray, look: Look) -> np.ndarray:
     near = a + x * (b - a) + y * (c - a)
     of_b = np.where(x + y <= 1.0, near, d + (1 - x) * (c - d) + (1 - y) * (b - d))
     return np.asarray(np.where(cut_from_a < cut_from_b, of_a, of_b))
+
+
+def _lowest_by_arc(fields: Sequence[Field], looks: Sequence[Look]) -> np.ndarray:
+    """Return bounds of the least values of fields on the arcs of borders, (T, T, K)."""
+    together = Look(*(np.concatenate(parts) for parts in zip(*looks, strict=True)))
+    place = np.repeat(np.arange(len(looks)), [len(look.arc) for look in looks])
+    arc, first = np.unique(place * ARCS + together.arc, return_index=True)
+    lowest = np.full((len(fields), len(looks) * ARCS), UNREACHED)
+    for own, field in zip(lowest, fields, strict=True):
+        own[arc] = np.minimum.reduceat(field.at(together) - together.slack, first)
+    return lowest.reshape(len(fields), len(looks), ARCS)
 
 
 def lowest_of(field: Field, look: Look) -> float:
@@ -324,10 +346,14 @@ def _middles(length_m: float) -> np.ndarray:
     return (np.arange(count) + 0.5) / count
 
 
-def distance_m(first: Region, second: Region) -> float:
-    """Return the distance of two regions; not positive if they overlap."""
-    cores = [
-        region.shape if len(region.corners) else Point(*region.center)
-        for region in (first, second)
-    ]
-    return float(cores[0].distance(cores[1])) - first.radius_m - second.radius_m
+def _distances_m(regions: Sequence[Region]) -> np.ndarray:
+    """Return the distances of regions, (T, T); not positive where they overlap."""
+    cores = np.array(
+        [
+            region.shape if len(region.corners) else Point(*region.center)
+            for region in regions
+        ]
+    )
+    radius_m = np.array([region.radius_m for region in regions])
+    apart_m = shapely.distance(cores[:, None], cores)
+    return np.asarray(apart_m - radius_m[:, None] - radius_m)
