@@ -19,6 +19,9 @@ from numba.core.registry import cpu_target
 _ENVIRONMENT = "_ZN08NumbaEnv"
 """How the names of variables begin that point to what a function has of Python."""
 
+_COUNTING = "NRT_incref"
+"""What code calls that counts references."""
+
 
 class LateLibrary(codegen.JITCodeLibrary):  # type: ignore[misc]
     """The code of one function and of all that is linked into it.
@@ -52,13 +55,21 @@ class LateLibrary(codegen.JITCodeLibrary):  # type: ignore[misc]
         if self._emitted:
             return
         self._emitted = True
-        super()._optimize_final_module()
+        self._optimize()
         super()._finalize_final_module()
         for variable in self._final_module.global_variables:
             if variable.name.startswith(_ENVIRONMENT):
                 environment = lookup_environment(variable.name)
                 if environment is not None:
                     self._codegen.set_env(variable.name, environment)
+
+    def _optimize(self) -> None:
+        if _COUNTING in map(_name_of, self._final_module.functions):
+            super()._optimize_final_module()
+            return
+        # Without numba's first round, which is there to find counts that cancel out.
+        manager, builder = self._codegen._module_pass_manager()
+        manager.run(self._final_module, builder)
 
     def _optimize_functions(self, module: Any) -> None:
         module.data_layout = self._codegen._data_layout

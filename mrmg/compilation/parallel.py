@@ -30,7 +30,8 @@ def compile_in_processes(
 ) -> None:
     """Call functions for the kernels they compile, each in a process of its own.
 
-    As many run at once as there are processors. What keeps one of them from compiling
+    One more runs at once than there are processors, as every now and then one waits for
+    a kernel that another is compiling. What keeps one of them from compiling
     is not told: whoever needs the kernel compiles it then, and learns of it.
 
     Args:
@@ -42,7 +43,7 @@ def compile_in_processes(
     running: list[subprocess.Popen[bytes]] = []
     try:
         while waiting or running:
-            while waiting and len(running) < len(os.sched_getaffinity(0)):
+            while waiting and len(running) <= len(os.sched_getaffinity(0)):
                 process = subprocess.Popen(
                     [sys.executable, "-c", waiting.pop(0)],
                     env={**os.environ, "PYTHONPATH": path.rstrip(os.pathsep)},

@@ -3,8 +3,9 @@
 To find the type of `a + b`, numba tries each of dozens of definitions of `+`, and words
 an explanation for each that does not fit, at every place where two such types are added
 and in every round of its inference. Here the definition that fitted the same types
-before is tried first. Its settings are compared at every such try, option by option,
-and every call into LLVM is reported twice to whoever listens: nobody. Together that is
+before is tried first. Its settings are compared at every such try, option by option;
+every call into LLVM is reported twice to whoever listens: nobody; and variables are
+listed time and again by looking at what else instructions consist of. Together that is
 a quarter of the time to compile; what is compiled is the same.
 """
 
@@ -15,7 +16,7 @@ from collections.abc import Callable
 from typing import Any
 
 from llvmlite import binding
-from numba.core import errors
+from numba.core import errors, ir
 from numba.core.target_extension import get_local_target
 from numba.core.targetconfig import TargetConfig
 from numba.core.types import Poison
@@ -30,6 +31,8 @@ def take_shortcuts() -> None:
     settings.__hash__, settings.__eq__ = _hash, _equal
     function: Any = BaseFunction
     function.get_call_type = _call_type(function.get_call_type)
+    instruction: Any = ir.Inst
+    instruction._rec_list_vars = _variables
     for callbacks in list(binding.ffi.lib._lock._cblist):
         binding.ffi.unregister_lock_callback(*callbacks)
 
@@ -42,6 +45,24 @@ def _equal(settings: Any, others: Any) -> Any:
     if not isinstance(others, TargetConfig):
         return NotImplemented
     return settings._values == others._values or settings.values() == others.values()
+
+
+def _variables(instruction: Any, part: Any) -> list[Any]:
+    """Return the variables in a part of an instruction, in their order."""
+    if isinstance(part, ir.Var):
+        return [part]
+    if isinstance(part, ir.Inst):
+        return list(part.list_vars())
+    found: list[Any] = []
+    if isinstance(part, _HOLDERS):
+        for item in part.values() if isinstance(part, dict) else part:
+            if isinstance(item, _HOLDERS):
+                found += _variables(instruction, item)
+    return found
+
+
+_HOLDERS = (ir.Var, ir.Inst, list, tuple, dict)
+"""All that variables are, or are found in."""
 
 
 def _call_type(slow: Callable[..., Any]) -> Callable[..., Any]:

@@ -8,6 +8,7 @@ import numba
 import pytest
 from llvmlite import binding
 from numba import types
+from numba.core import ir
 from numba.core.compiler import Flags
 from numba.core.registry import cpu_target
 from numba.core.types.functions import BaseFunction
@@ -77,6 +78,16 @@ def test_settings_are_equal_where_all_options_are() -> None:
     assert hash(plain) == hash(explicit)
     assert plain != other
     assert plain != "settings"
+
+
+def test_variables_of_an_instruction_are_listed_in_their_order() -> None:
+    scope = ir.Scope(None, ir.unknown_loc)
+    a, b, c = (scope.define(name, ir.unknown_loc) for name in "abc")
+    inner = ir.Expr.build_tuple([a, b], ir.unknown_loc)
+    call = ir.Expr.call(c, (a, inner, 3), (("flag", b), ("level", 2)), ir.unknown_loc)
+    assert call.list_vars() == [c, a, a, b, b]
+    assert ir.Assign(call, a, ir.unknown_loc).list_vars() == [*call.list_vars(), a]
+    assert ir.Jump(7, ir.unknown_loc).list_vars() == []
 
 
 def test_nobody_is_told_of_calls_into_llvm() -> None:
