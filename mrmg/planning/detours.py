@@ -29,6 +29,9 @@ LACK_M = 0.25
 LACK_WORTH = 30.0
 """... and how much longer one that lacks less may be, by what it lacks less."""
 
+ROOMY_M = 0.1
+"""Lack of clearance below which one robot alone gives way."""
+
 WIDER = 0.6
 """How much farther to both sides, in their sizes, the first to give way does so."""
 
@@ -83,9 +86,13 @@ def passing_detours(
         way: to both sides of the meeting that is avoided, in sizes of both robots.
     """
     plain = problem.mission.fleet["plain"]
+    driving = [one for one in (r, other) if len(errands[one].path.node) > 1]
+    under_way = bool((outcome.driven[[r, other]] < np.inf).all())
     found: list[tuple[float, list[Detour]]] = []
-    for both in (False, True):
-        for (robot, by), side in product(((r, other), (other, r)), (-1.0, 1.0)):
+    least_m = np.inf
+    for both in (False, True) if under_way else (False,):
+        for robot, side in product(driving, (-1.0, 1.0)):
+            by = r + other - robot
             turns = [(robot, by, way, 1.0)]
             if both:  # one gives way by half, for longer, then each as far as it must
                 turns = [(by, robot, way + WIDER, 0.5)]
@@ -94,16 +101,13 @@ def passing_detours(
             changed = list(errands)
             for one, past, along, share in turns:
                 given = detour(problem, changed, outcome, one, past, along, side, share)
-                if given is not None:
-                    led[one] = given
-                    surface = given.surface if share < 1.0 else changed[one].surface
-                    changed[one] = replace(given.lead(changed[one]), surface=surface)
+                led[one] = given
+                surface = given.surface if share < 1.0 else changed[one].surface
+                changed[one] = replace(given.lead(changed[one]), surface=surface)
             # Who went first is judged by the other one, which came to terms with it.
             lacks_m = [
                 lack_m(errands[one].surface, its.path) for one, its in led.items()
             ]
-            if given is None:
-                continue
             lacks_m.append(given.lack_m)
             if max(lacks_m) < SPARE_M + LACK_M:
                 more_J = [
@@ -112,6 +116,9 @@ def passing_detours(
                 ]
                 worse_J = LACK_WORTH * max(lacks_m) * float(plain[[r, other]].mean())
                 found.append((sum(more_J) + worse_J, list(led.values())))
+                least_m = min(least_m, max(lacks_m))
+        if least_m < ROOMY_M:  # one alone will do
+            break
     return [led for _, led in sorted(found, key=lambda each: each[0])]
 
 
@@ -124,8 +131,8 @@ def detour(
     way: float,
     side: float,
     share: float,
-) -> Detour | None:
-    """Return robot r's way round another one's path, None for a robot that stays.
+) -> Detour:
+    """Return robot r's way round another one's path.
 
     Args:
         problem: the mission.
@@ -138,8 +145,6 @@ def detour(
         share: of the distance that robots keep.
     """
     errand = errands[r]
-    if len(errand.path.node) < 2:
-        return None
     fleet = problem.mission.fleet
     apart_m = spacing_m(problem, r, other)
     at_m = driven_m(errands[other], outcome, other)
