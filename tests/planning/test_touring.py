@@ -236,6 +236,26 @@ def test_no_way_between_arcs_is_shorter_than_its_bound(walls: int) -> None:
     assert gained > 0.0 or not walls
 
 
+def test_no_way_through_dear_ground_costs_less_than_its_bound() -> None:
+    """Ways through a strip are refracted: the cheapest one is found point by point."""
+    strip = {"id": "mud", "polygon": [[14, 0], [18, 0], [18, 20], [14, 20]]}
+    ways = arc_ways(field(terrain=[{**strip, "multiplier": 2.0}]))
+    arcs = ways.between.shape[1]
+    pairs = [(a, b) for a in (0, 4, 9) for b in (14, 16, 20)]
+    for a, b in pairs:
+        for wave in ways.waves(0, a, 1, b):
+            ways.take(wave, ways.certificate(wave))
+    y = np.linspace(6.0, 14.0, 801)
+    for a, b in pairs:
+        first = border_points(FIRST_GOAL, a, arcs)
+        second = border_points(SECOND_GOAL, b, arcs)
+        into = np.hypot(14.0 - first[:, :1], y - first[:, 1:]).min(axis=0)
+        out = np.hypot(second[:, :1] - 18.0, y - second[:, 1:]).min(axis=0)
+        across = into[:, None] + 2.0 * np.hypot(4.0, y[:, None] - y)
+        exact = float((across.min(axis=0) + out).min())
+        assert 0.95 * exact < ways.between[0, a, 1, b] <= exact + 1e-4
+
+
 def test_no_way_from_a_start_is_shorter_than_its_bound() -> None:
     """The wall hides the second goal; what a wave from the start tells is nearly so."""
     ways = arc_ways(field(obstacles=[WALL]))
