@@ -32,6 +32,9 @@ where there are no tours that leave so much."""
 DRAWS = 4
 """Tours drawn by each attempt after the first one."""
 
+UNLIKE = (1, 3)
+"""Draws that the first attempt goes on with where its first one fails."""
+
 SPREADS = (0.0, 0.04, 0.08, 0.12, 0.06)
 """Spread of the random factors on the roadmap's energies for successive draws."""
 
@@ -84,10 +87,13 @@ def attempt_plan(
     problem = problem.with_limit(LIMITS[number % len(LIMITS)])
     routing_s = 0.0
     counts: Counter[str] = Counter()
-    for spare in sorted({max(params.spare, LEAST_SPARE), LEAST_SPARE}, reverse=True):
-        if not params.drafts or not draftable(problem):
-            break
-        drafted = draft_plans(problem.with_spare(spare), seed, params, number, halt)
+    spares = sorted({max(params.spare, LEAST_SPARE), LEAST_SPARE}, reverse=True)
+    drafting = params.drafts and draftable(problem)
+    # The first attempt draws but once: where that fails, other tours may not.
+    again = product((LEAST_SPARE,), UNLIKE if number == 0 else ())
+    for spare, drawn in [*product(spares, (0,)), *again] if drafting else []:
+        spared = problem.with_spare(spare)
+        drafted = draft_plans(spared, seed, params, number, halt, drawn=drawn)
         routing_s += drafted.routing_s
         counts.update(drafted.counts)
         if drafted.plans or halt[0]:
@@ -137,15 +143,29 @@ def tree_plans(
 
 
 def draft_plans(
-    problem: Problem, seed: int, params: PlannerParams, number: int, halt: np.ndarray
+    problem: Problem,
+    seed: int,
+    params: PlannerParams,
+    number: int,
+    halt: np.ndarray,
+    *,
+    drawn: int = 0,
 ) -> Attempt:
     """Drive straight along tours.
 
     The first attempt takes the router's tours as they are; others the best of several
     draws.
+
+    Args:
+        problem: the mission.
+        seed: of the whole search.
+        params: parameters.
+        number: of the attempt.
+        halt: shape (1,); drafting ends soon after it has turned true.
+        drawn: draws of this attempt that are left out.
     """
     began = time.perf_counter()
-    draws = _draws(problem, number)
+    draws = _draws(problem, number, drawn)
     choice = _drawn_tours(problem, seed, params, draws)
     routing_s = time.perf_counter() - began
     problem = problem.with_margin(0.0)
@@ -165,9 +185,9 @@ def draft_plans(
     return Attempt(plans, routing_s, {"drafts": driven, "router_calls": len(draws)})
 
 
-def _draws(problem: Problem, number: int) -> range:
-    """Return the numbers of an attempt's draws of tours."""
-    draws = range(number * DRAWS, (number + 1) * DRAWS)
+def _draws(problem: Problem, number: int, drawn: int) -> range:
+    """Return the numbers of an attempt's draws of tours, without those left out."""
+    draws = range(number * DRAWS + drawn, (number + 1) * DRAWS)
     return draws[:1] if number == 0 or problem.preference.timed else draws
 
 

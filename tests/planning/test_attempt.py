@@ -5,11 +5,12 @@ Both refine what they find: plans of one attempt are each better than the one be
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -90,14 +91,32 @@ def test_trees_are_grown_only_where_drafting_fails() -> None:
     assert "drafts" not in grown.counts
 
 
+def test_other_tours_are_drafted_before_a_tree_grows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where robots get stuck along the router's tours, they may not along others."""
+    driven: list[tuple[tuple[int, ...], ...]] = []
+    drive = attempt.drafts
+
+    def failing_at_first(*given: Any, **options: Any) -> Iterator[Plan]:
+        driven.append(given[2].tours)
+        return drive(*given, **options) if len(driven) > 3 else iter(())
+
+    monkeypatch.setattr(attempt, "drafts", failing_at_first)
+    found = attempted(attempt_plan, "scene1")
+    assert found.plans
+    assert "vertices" not in found.counts
+    assert driven[3] not in driven[:2]
+
+
 def test_drafts_that_failed_are_counted_with_the_tree(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With and without charge to spare, then the tree."""
+    """With and without charge to spare, along other tours, then the tree."""
     monkeypatch.setattr(attempt, "drafts", lambda *_, **__: iter(()))
     found = attempted(attempt_plan, "quickstart")
-    assert found.counts["drafts"] == 2
-    assert found.counts["router_calls"] >= 3
+    assert found.counts["drafts"] == 4
+    assert found.counts["router_calls"] >= 5
     assert found.counts["vertices"] > 1
 
 
