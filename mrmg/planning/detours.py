@@ -229,6 +229,8 @@ def avoiding(surface: Surface, lane: Lane, needed_m: float) -> Surface:
 
 def _aside(path: Path, lane: Lane, side: float, needed_m: float) -> Path:
     """Return a path moved aside of a lane; to the left if `side` is 1, right if -1."""
+    if len(path.node) < 2:
+        return path  # it ends where it begins
     middle = lane.disc.mean(axis=1)
     apart = path.node[:, None] - middle[None]
     nearest = np.hypot(*apart.transpose(2, 0, 1)).argmin(axis=1)

@@ -184,3 +184,15 @@ def test_a_detour_costs_more_than_the_path_drawn_tight(
     lacks_m = [max(one.lack_m for one in way) for way in ways]
     for k in range(len(ways) - 1):  # what is dearer lacks less, if anything
         assert costs_m[k] <= costs_m[k + 1] or lacks_m[k] < lacks_m[k + 1]
+
+
+def test_a_robot_that_ends_where_it_begins_makes_no_detour(
+    yard: Callable[..., Scene],
+) -> None:
+    """Also if it has not been found at its end yet."""
+    problem, errands = meeting(yard)
+    path = errands[1].path
+    one_node = replace(path, node=np.array([[16.8, 10.0]]), gear=path.gear[:0])
+    errands[1].path = replace(one_node, stop=np.zeros(1, np.int64))
+    ways = passing_detours(problem, errands, STUCK, 0, 1, 0.6)
+    assert {one.robot for one in ways[0]} == {0}
