@@ -95,6 +95,7 @@ def copy_of_package(folder: Path) -> Path:
     (target / "motion" / "__init__.py").write_text("")
     for name in (
         "compilation/__init__.py",
+        "compilation/arrays.py",
         "compilation/cache.py",
         "compilation/calls.py",
         "compilation/clock.py",

@@ -20,6 +20,8 @@ from llvmlite import binding
 from numba.core import caching, environment
 from numba.core.runtime.nrt import rtsys
 
+from mrmg.compilation.arrays import say_less_of_shapes
+
 
 @dataclass(frozen=True)
 class _Surroundings:
@@ -95,6 +97,7 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
         if found is None:
             found = super().load_overload(sig, target_context)
         if found is None and self._lock is None:
+            say_less_of_shapes()
             self._acquire()
             found = super().load_overload(sig, target_context)
             if found is not None:

@@ -55,10 +55,12 @@ def certified_field(price, cell, seed, rounds, band):
         _lower_where_steep(field, price, cell, step)
         field[:] = seed
         _follow(step.ravel(), cell, field.ravel(), field.shape[1], order)
-    low, high = field.min(), field.min()
+    low, high = np.inf, -np.inf
     for value in field.ravel():
+        low = min(low, value)
         if value < UNREACHED:
             high = max(high, value)
+    high = max(high, low)
     excess = np.ones(int((high - low) / band) + 2)
     for row in range(price.shape[0]):
         for column in range(price.shape[1]):
@@ -67,14 +69,16 @@ def certified_field(price, cell, seed, rounds, band):
             ratio = steepness(field, cell, row, column) / price[row, column]
             if ratio <= 1.0:
                 continue
-            corners = field[row : row + 2, column : column + 2]
-            first = int((corners.min() - low) / band)
-            last = int((corners.max() - low) / band)
+            a, b = field[row, column], field[row, column + 1]
+            c, d = field[row + 1, column], field[row + 1, column + 1]
+            first = int((min(min(a, b), min(c, d)) - low) / band)
+            last = int((max(max(a, b), max(c, d)) - low) / band)
             for k in range(first, last + 1):
                 excess[k] = max(excess[k], ratio)
     level = low + band * np.arange(len(excess) + 1)
     certified = np.zeros(len(level))
-    certified[1:] = np.cumsum(band / excess)
+    for k in range(len(excess)):
+        certified[k + 1] = certified[k] + band / excess[k]
     return field, level, certified
 
 

@@ -28,18 +28,19 @@ def nearest_vertices(vertex, count):
     nearest = np.empty((n, count), np.int64)
     if count == 0:
         return nearest
-    x_min, y_min = vertex[:, 0].min(), vertex[:, 1].min()
-    extent = max(vertex[:, 0].max() - x_min, vertex[:, 1].max() - y_min)
+    x_min, x_max = _extremes(vertex[:, 0])
+    y_min, y_max = _extremes(vertex[:, 1])
+    extent = max(x_max - x_min, y_max - y_min)
     side = extent / ceil(sqrt(n / CROWD)) if extent > 0.0 else 1.0
-    columns = int((vertex[:, 0].max() - x_min) / side) + 1
-    rows = int((vertex[:, 1].max() - y_min) / side) + 1
+    columns = int((x_max - x_min) / side) + 1
+    rows = int((y_max - y_min) / side) + 1
     bucket = np.empty(n, np.int64)
     start = np.zeros(rows * columns + 1, np.int64)
     for v in range(n):
         column = int((vertex[v, 0] - x_min) / side)
         bucket[v] = int((vertex[v, 1] - y_min) / side) * columns + column
         start[bucket[v] + 1] += 1
-    start = np.cumsum(start)
+    _add_up(start)
     member = np.empty(n, np.int64)
     filled = start[:-1].copy()
     for v in range(n):
@@ -138,6 +139,22 @@ def cheapest_ways(vertices, low, high, cost, entry, entry_start):
     return total, successor
 
 
+@leaf_kernel
+def _extremes(values):
+    """Return the least and the greatest of values."""
+    low = high = values[0]
+    for value in values:
+        low, high = min(low, value), max(high, value)
+    return low, high
+
+
+@leaf_kernel
+def _add_up(values):
+    """Add to each of values all before it."""
+    for i in range(1, len(values)):
+        values[i] += values[i - 1]
+
+
 @kernel
 def _edges_by_vertex(vertices, low, high):
     """Return the first of each vertex's edges in a list, shape (V + 1,), and that."""
@@ -145,7 +162,7 @@ def _edges_by_vertex(vertices, low, high):
     for e in range(len(low)):
         start[low[e] + 1] += 1
         start[high[e] + 1] += 1
-    start = np.cumsum(start)
+    _add_up(start)
     edge = np.empty(2 * len(low), np.int64)
     filled = start[:-1].copy()
     for e in range(len(low)):

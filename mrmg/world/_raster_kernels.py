@@ -69,13 +69,25 @@ def fill_rings(ring_start, point, x_min, y_min, cell, rows, columns):
                     t = (y - y0) / (y1 - y0)
                     crossing[n] = point[i, 0] + t * (point[j, 0] - point[i, 0])
                     n += 1
-        crossing[:n].sort()
+        _sort(crossing[:n])
         for pair in range(0, n - 1, 2):
             low = int(ceil((crossing[pair] - x_min) / cell - 0.5))
             high = int(floor((crossing[pair + 1] - x_min) / cell - 0.5))
             for column in range(max(low, 0), min(high, columns - 1) + 1):
                 inside[row, column] = True
     return inside
+
+
+@leaf_kernel
+def _sort(values):
+    """Put a few values in order."""
+    for i in range(1, len(values)):
+        value = values[i]
+        place = i
+        while place > 0 and values[place - 1] > value:
+            values[place] = values[place - 1]
+            place -= 1
+        values[place] = value
 
 
 @kernel
