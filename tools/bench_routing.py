@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from mrmg.planning._nrpa_kernels import RoutingArrays
-from mrmg.planning.bound import exact_routing
+from mrmg.planning.bound.bound import exact_routing
 from mrmg.planning.routers import route
-from mrmg.planning.routing import RouterParams, routing_arrays
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.planning.routing.routing import RouterParams, routing_arrays
 
 PROVEN = {
     "S1_2i6s": 1578.12,

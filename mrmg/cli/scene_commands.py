@@ -42,7 +42,7 @@ def roadmap(options: argparse.Namespace) -> int:
 
     from mrmg import seeding
     from mrmg.planning import PlannerParams
-    from mrmg.planning.roadmap import build_roadmap
+    from mrmg.planning.roadmap.roadmap import build_roadmap
     from mrmg.scene.loading import load_scene
     from mrmg.world.world import World
 

@@ -7,8 +7,8 @@ from importlib.metadata import version
 
 from mrmg.accounting import battery_profile, find_visits, plan_ledger
 from mrmg.mission import Plan, Trajectory, Visit
-from mrmg.planning.motion_tree import Problem
 from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.tree.motion_tree import Problem
 from mrmg.visiting import crowded_stations
 
 

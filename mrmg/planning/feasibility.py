@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 from shapely.geometry import Point, Polygon, box
 
-from mrmg.planning.slopes import climb_J, height_span_m
+from mrmg.planning.roadmap.slopes import climb_J, height_span_m
 from mrmg.scene.types import Goal, Region, Robot, Scene
 
 

@@ -18,11 +18,11 @@ from shapely.geometry import Polygon
 
 from mrmg.mission import Plan
 from mrmg.motion._kernels import MODEL_ID
-from mrmg.planning import _tracking_kernels
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.attempt import Attempt
-from mrmg.planning.motion_tree import Problem
+from mrmg.planning.drafting import _tracking_kernels
 from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.tree.motion_tree import Problem
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.types import Finish, Region, Robot, Scene
 

@@ -10,11 +10,11 @@ import numpy as np
 from mrmg import seeding
 from mrmg.errors import UsageError
 from mrmg.mission import Trajectory
-from mrmg.planning.motion_tree import Problem, grow_tree, state_problem
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.roadmap import Roadmap, build_roadmap
+from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
 from mrmg.planning.routers import route
-from mrmg.planning.routing import Routing
+from mrmg.planning.routing.routing import Routing
+from mrmg.planning.tree.motion_tree import Problem, grow_tree, state_problem
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
 

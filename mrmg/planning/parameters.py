@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, field, replace
 
 from mrmg import storage
 from mrmg.errors import UsageError
-from mrmg.planning.routing import RouterParams
+from mrmg.planning.routing.routing import RouterParams
 
 PROFILES = ("default", "paper")
 

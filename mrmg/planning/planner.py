@@ -22,24 +22,24 @@ from mrmg.compilation import (
 from mrmg.errors import Fault, SceneError, UsageError
 from mrmg.mission import PlanResult, PlanStatus
 from mrmg.planning.attempt import Attempt, attempt_plan, draft_plans, tree_plans
-from mrmg.planning.bound import (
+from mrmg.planning.bound.bound import (
     CELLS,
     FINER,
     Relaxation,
     exact_routing,
     lower_bound_J,
 )
+from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.feasibility import proof_of_infeasibility
 from mrmg.planning.frame import Frame, on_the_map
-from mrmg.planning.haste import priced_world, with_energies
-from mrmg.planning.makespan_bound import makespan_bound_s
-from mrmg.planning.motion_tree import Problem, grow_tree, state_problem
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import TIME_MARGIN_S, Preference
-from mrmg.planning.roadmap import Roadmap, build_roadmap
-from mrmg.planning.routing import Routing
+from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
+from mrmg.planning.routing.routing import Routing
 from mrmg.planning.search import OnImprovement, Progress, Search
 from mrmg.planning.statistics import UNKNOWN, Bounds, Statistics
+from mrmg.planning.tree.haste import priced_world, with_energies
+from mrmg.planning.tree.motion_tree import Problem, grow_tree, state_problem
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.objective import Objective, overtime_s
 from mrmg.scene.types import Scene

@@ -7,9 +7,9 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Protocol
 
-from mrmg.planning._nrpa_kernels import RoutingArrays
-from mrmg.planning.bound import exact_routing
-from mrmg.planning.routing import RouterParams, Routing, solve_routing
+from mrmg.planning.bound.bound import exact_routing
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.planning.routing.routing import RouterParams, Routing, solve_routing
 
 
 class Router(Protocol):

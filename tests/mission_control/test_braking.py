@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mrmg.mission_control.braking import brake_to_rest
-from mrmg.planning._safety_kernels import new_commitment, write_braking
-from mrmg.planning.fleet import fleet_array
-from mrmg.planning.targets import gate_arrays
+from mrmg.planning.roadmap.fleet import fleet_array
+from mrmg.planning.tree._safety_kernels import new_commitment, write_braking
+from mrmg.planning.tree.targets import gate_arrays
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.world.world import World

@@ -15,7 +15,7 @@ import pytest
 
 from mrmg.motion import _kernels
 from mrmg.motion.dynamics import DERIVATIVES, NU, NX, TURN_SPEEDS, rk4_step
-from mrmg.planning._fleet_kernels import FLEET
+from mrmg.planning.roadmap._fleet_kernels import FLEET
 
 WHEELBASE_M = 1.2
 DT_S = 0.1

@@ -18,7 +18,7 @@ from mrmg.errors import MrmgError, SceneError
 from mrmg.motion import _kernels
 from mrmg.motion.user_motion import user_motion
 from mrmg.planning import PlannerParams, plan_mission
-from mrmg.planning._fleet_kernels import FLEET
+from mrmg.planning.roadmap._fleet_kernels import FLEET
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 

@@ -9,7 +9,7 @@ import pytest
 
 from mrmg.errors import UsageError
 from mrmg.planning.parameters import PROFILES, PlannerParams, profile_params
-from mrmg.planning.routing import RouterParams
+from mrmg.planning.routing.routing import RouterParams
 
 
 @pytest.mark.parametrize(

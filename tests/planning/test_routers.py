@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from mrmg.errors import UsageError
-from mrmg.planning._nrpa_kernels import RoutingArrays
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.routers import ROUTERS, route
-from mrmg.planning.routing import METHODS, RouterParams, Routing, routing_arrays
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.planning.routing.routing import METHODS, RouterParams, Routing, routing_arrays
 
 SLACK = 1e-9
 """Share by which sums may differ."""

@@ -20,7 +20,9 @@ QUICK = ("band", "expansion", "pool", "random", "refuel", "roadmap", "safety")
 
 @pytest.mark.slow
 def test_tests_of_kernels_pass_uncompiled() -> None:
-    files = [str(HERE / f"test_{name}_kernels.py") for name in QUICK]
+    names = [f"test_{name}_kernels.py" for name in QUICK]
+    files = [str(path) for name in names for path in HERE.rglob(name)]
+    assert len(files) == len(names)
     options = ["-q", "-p", "no:cacheprovider", "-k", "not keeps_the_margins"]
     ended = subprocess.run(
         [sys.executable, "-m", "pytest", *options, *files],

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mrmg.planning.routers import route
-from mrmg.planning.routing import RouterParams
+from mrmg.planning.routing.routing import RouterParams
 
 ROOT = Path(__file__).parents[2]
 

@@ -1,0 +1,376 @@
+"""A proven lower bound of a fleet's energy, and exact tours of small missions.
+
+Whoever solves a mission visits the goals and recharges at stations in some order. The
+energy of that is at least the rolling resistance on the shortest ways (`geodesic`), as
+a robot that starts and ends at rest gets no inertia for nothing, and turning, idling
+and other robots only cost more. The least over all orders is the bound.
+
+Up to MOST_GOALS goals, orders are told apart by where each region is touched first
+(`touring`), as the way through a region is no more for nothing than any other.
+
+On slopes the battery also pays for climbing and is paid for rolling down, at most what
+that is worth without losses (`slopes.climb_J`). Along a way this adds up to the
+difference of heights between its ends, so the bound of flat ground less the descent
+from each start to the lowest ground on which a mission can end is a bound, with
+batteries that hold as much more.
+
+Charges are taken at the middle of each planning step. In a step in which the robot
+turns round, the way back is not charged; that is worth less than 0.01 mm.
+
+With more obstacles no cell is cheaper, and no tours are cheaper where no leg is. What a
+field certifies of a leg in between may be less nevertheless: fields are solved and then
+divided by how much too steep they are, which depends on where fronts meet. The greatest
+field that certifies would never fall, but it is the solution of a conic programme over
+all cells, another one for each leg. So an obstacle may lower the bound: by less than
+half a percent in all that was tried. What holds among fewer obstacles holds among more:
+of two such bounds the greater one is a bound of the mission with more.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry import Point
+
+from mrmg.planning.bound import _bound_kernels
+from mrmg.planning.bound.arcs import ArcWays
+from mrmg.planning.bound.geodesic import Ground, Ways
+from mrmg.planning.bound.touring import Completions, near_routing, touring_bound_J
+from mrmg.planning.roadmap.slopes import climb_J, height_span_m
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.planning.routing.routing import Routing, routing_arrays
+from mrmg.scene.types import Robot, Scene
+
+MOST_GOALS = 14
+"""Goals up to which tours are exact."""
+
+MOST_LABELS = 3_000_000
+"""Labels per robot up to which tours are exact."""
+
+CELLS = 30_000
+"""Cells of the grid on which ways are bounded."""
+
+SPANNING_ROUNDS = 400
+"""Changes of the prices in the bound of missions with more goals."""
+
+FINER = 3
+"""Parts into which cells are cut where ways are tightened."""
+
+ROUNDS = 20
+"""Times that the ways of the cheapest tours are tightened at most."""
+
+TravelKey = tuple[tuple[str, ...], float, float]
+"""What the ways of a robot depend on: obstacles, inscribed radius, top speed."""
+
+ROUNDING_SHARE = 1e-9
+"""What rounding may add to a bound; taken off."""
+
+
+ROUND_SHARE = 0.002
+"""What a circle reaches beyond the polygon that stands for it, over its radius."""
+
+
+def exact_routing(problem: RoutingArrays) -> Routing | None:
+    """Return the cheapest tours there are, stations in any number and order.
+
+    Label setting over (goals visited, place) per robot, where a label is (cost, energy
+    left) and one that costs no less and leaves no more energy is dropped; then the best
+    division of the goals among the robots. Costs need not be a metric.
+
+    Returns:
+        The tours, with infinite cost if there are none; None if the mission is too
+        large (more than MOST_GOALS open goals or MOST_LABELS labels), or if time
+        matters in it.
+    """
+    goal_list = np.flatnonzero(problem.open_goal)
+    timed = problem.makespan_weight > 0.0 or bool((problem.limit < np.inf).any())
+    if timed or len(goal_list) > MOST_GOALS:
+        return None
+    fleet = np.full(1 << len(goal_list), np.inf)
+    fleet[0] = 0.0
+    ways, shares = [], []
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as threads:
+        found = [
+            threads.submit(RobotWays, problem, r, goal_list)
+            for r in range(len(problem.energy))
+        ]
+        for future in found:
+            way = future.result()
+            if not way.complete:
+                threads.shutdown(cancel_futures=True)
+                return None
+            fleet, share = _bound_kernels.join_robot(fleet, way.cost)
+            ways.append(way)
+            shares.append(share)
+    mask = len(fleet) - 1
+    if not np.isfinite(fleet[mask]):
+        return Routing(tuple(() for _ in ways), math.inf)
+    tours: list[tuple[int, ...]] = []
+    for way, share in zip(reversed(ways), reversed(shares), strict=True):
+        tours.append(way.tour(int(share[mask])))
+        mask ^= int(share[mask])
+    return Routing(tuple(reversed(tours)), float(fleet[-1]))
+
+
+class RobotWays:
+    """The undominated ways of one robot to visit each subset of the goals."""
+
+    def __init__(self, problem: RoutingArrays, r: int, goal_list: np.ndarray) -> None:
+        self.goal_list = goal_list
+        self.goals = problem.goals
+        self.hop, self.next_station = _station_closure(problem, r)
+        self.label, self.parent, self.start_of, station, self.came = (
+            _bound_kernels.subset_labels(problem, r, self.hop, goal_list, MOST_LABELS)
+        )
+        self.cost, self.last = _bound_kernels.cheapest_labels(
+            problem, r, goal_list, self.label, self.start_of, station
+        )
+        self.complete = int(self.start_of[-1]) == len(self.label)
+
+    def tour(self, mask: int) -> tuple[int, ...]:
+        """Return the cheapest tour through a subset of the goals."""
+        backwards: list[int] = []
+        label = int(self.last[mask])
+        while label != -1:
+            if label <= -2:
+                station = -2 - label
+                label, first = (int(i) for i in self.came[mask, station])
+                chain = [first]
+                while chain[-1] != station:
+                    chain.append(int(self.next_station[chain[-1], station]))
+                backwards += [self.goals + s for s in reversed(chain)]
+                continue
+            state = int(np.searchsorted(self.start_of, label, side="right")) - 1
+            goal = state % len(self.goal_list)
+            mask = state // len(self.goal_list) ^ (1 << goal)
+            backwards.append(int(self.goal_list[goal]))
+            label = int(self.parent[label])
+        return tuple(reversed(backwards))
+
+
+def _station_closure(problem: RoutingArrays, r: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return (least cost, next station) from station to station over any others."""
+    goals = problem.goals
+    hop = problem.cost[r, goals:-1, goals:].copy()
+    hop[hop > problem.capacity[r] - problem.reserve[r]] = np.inf
+    np.fill_diagonal(hop, 0.0)
+    follower = np.tile(np.arange(len(hop)), (len(hop), 1))
+    for k in range(len(hop)):
+        over = hop[:, k : k + 1] + hop[k : k + 1]
+        shorter = over < hop
+        hop = np.where(shorter, over, hop)
+        follower = np.where(shorter, follower[:, k : k + 1], follower)
+    return np.ascontiguousarray(hop), follower
+
+
+def lower_bound_J(
+    scene: Scene,
+    *,
+    step_s: float = 0.1,
+    cells: int = CELLS,
+    rounds: int = ROUNDS,
+    finer: int = FINER,
+) -> float:
+    """Return an energy [J] that no plan of a mission undercuts.
+
+    Args:
+        scene: the mission.
+        step_s: time step of the plans.
+        cells: cells of the grid on which ways are bounded; more bring the bound nearer
+            to the truth.
+        rounds: how often the ways of the cheapest tours are tightened; as `cells`.
+        finer: parts into which cells are cut for that; as `cells`.
+
+    Returns:
+        The bound, at least 0; inf if the mission is proven to have no solution.
+    """
+    if not scene.goals:
+        return 0.0
+    relaxed = Relaxation.of(scene, step_s=step_s, cells=cells)
+    problem = relaxed.problem
+    if len(scene.goals) > MOST_GOALS:
+        bound = relaxed_routing_J(problem)
+    else:
+        completions = Completions.of(problem)
+        routing = near_routing(problem, completions) or exact_routing(problem)
+        if routing is None:
+            bound = relaxed_routing_J(problem)
+        elif routing.feasible and rounds:
+            ways = relaxed.arc_ways(finer)
+            bound = touring_bound_J(
+                problem, completions, routing.tours, ways, relaxed.price, rounds=rounds
+            )
+            bound = max(bound, routing.cost_J)
+        else:
+            bound = routing.cost_J
+    bound -= sum(_most_descent_J(scene, robot) for robot in scene.robots)
+    return max(0.0, bound) * (1.0 - ROUNDING_SHARE)
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """A mission in which every leg costs at most what it must.
+
+    Attributes:
+        scene, step_s: the mission and the time step of its plans.
+        problem: with the least ways from region to region.
+        keys: what the ways of each robot depend on.
+        ways: by key.
+        price: energy of a metre of plain ground of each robot [J/m], shape (R,).
+    """
+
+    scene: Scene
+    step_s: float
+    problem: RoutingArrays
+    keys: list[TravelKey]
+    ways: dict[TravelKey, Ways]
+    price: np.ndarray
+
+    @staticmethod
+    def of(scene: Scene, *, step_s: float = 0.1, cells: int = CELLS) -> Relaxation:
+        """Relax a mission.
+
+        Between recharges a robot may bring kinetic energy along and use its height,
+        which is added to its capacity and to its energy at the start.
+        """
+        x_min, y_min, x_max, y_max = scene.bounds
+        cell_m = math.sqrt((x_max - x_min) * (y_max - y_min) / cells)
+        regions = [target.region for target in scene.targets()]
+        starts = _starts(scene)
+        keys = [_travel_key(scene, robot) for robot in scene.robots]
+        ways = {}
+        for key, robot in zip(keys, scene.robots, strict=True):
+            if key not in ways:
+                ground = _ground(scene, robot, cell_m, step_s)
+                ways[key] = Ways.of(ground, regions, starts)
+        batteries = [robot.battery for robot in scene.robots]
+        descents = [_descents_J(scene, robot) for robot in scene.robots]
+        capacity_J = [
+            robot.battery.capacity_J + _most_kinetic_J(robot) + from_top_J
+            for robot, (_, from_top_J) in zip(scene.robots, descents, strict=True)
+        ]
+        energy_J = [
+            battery.start_J + from_start_J
+            for battery, (from_start_J, _) in zip(batteries, descents, strict=True)
+        ]
+        price = [r.model.energy_model.plain_ground_J_per_m() for r in scene.robots]
+        problem = routing_arrays(
+            goals=len(scene.goals),
+            distance=np.stack([ways[key].between for key in keys]),
+            start_distance=np.stack(
+                [ways[key].from_start[r] for r, key in enumerate(keys)]
+            ),
+            plain=np.array(price),
+            energy=np.array(energy_J),
+            capacity=np.array(capacity_J),
+            reserve=np.array([battery.reserve_J - 1e-3 for battery in batteries]),
+        )
+        return Relaxation(scene, step_s, problem, keys, ways, np.array(price))
+
+    def arc_ways(self, finer: int = FINER) -> list[ArcWays]:
+        """Return the ways of each robot between arcs; robots share what is equal.
+
+        Cells are cut into `finer` parts along each side.
+        """
+        found = {}
+        for key, robot in zip(self.keys, self.scene.robots, strict=True):
+            if key not in found:
+                ways = self.ways[key]
+                cell_m = ways.ground.cell_m / finer
+                fine = _ground(self.scene, robot, cell_m, self.step_s)
+                found[key] = ArcWays.of(ways, fine, _starts(self.scene))
+        return [found[key] for key in self.keys]
+
+
+def _starts(scene: Scene) -> np.ndarray:
+    return np.array([robot.pose[:2] for robot in scene.robots])
+
+
+def _ground(scene: Scene, robot: Robot, cell_m: float, step_s: float) -> Ground:
+    step_m = top_speed_m_s(robot) * step_s
+    return Ground.of(scene, robot, cell_m=cell_m, step_m=step_m)
+
+
+def _most_descent_J(scene: Scene, robot: Robot) -> float:
+    """Return the battery energy that a start above the mission's end is worth.
+
+    Without regeneration the battery never gains, so the mission counts as ended at a
+    robot's last goal; with it, the robot may roll down to the lowest place there is.
+    """
+    _, start_m = height_span_m(scene, robot, Point(*robot.pose[:2]))
+    ends = [shapely.box(*scene.bounds)]
+    if robot.model.regeneration_efficiency == 0.0:
+        ends = [
+            goal.region.shape.buffer(ROUND_SHARE * goal.region.radius_m)
+            for goal in scene.goals
+        ]
+    lowest_m = min(height_span_m(scene, robot, end)[0] for end in ends)
+    return climb_J(robot, max(0.0, start_m - lowest_m))
+
+
+def _descents_J(scene: Scene, robot: Robot) -> tuple[float, float]:
+    """Return what rolling down from the start, and from the top, is worth at most."""
+    _, start_m = height_span_m(scene, robot, Point(*robot.pose[:2]))
+    low_m, high_m = height_span_m(scene, robot, shapely.box(*scene.bounds))
+    return climb_J(robot, start_m - low_m), climb_J(robot, high_m - low_m)
+
+
+def _travel_key(scene: Scene, robot: Robot) -> TravelKey:
+    """Return what the ways of a robot depend on."""
+    obstacles = tuple(o.id for o in scene.obstacles if o.stops(robot.id))
+    return obstacles, robot.model.inscribed_radius_m, top_speed_m_s(robot)
+
+
+def top_speed_m_s(robot: Robot) -> float:
+    """Return the speed that a robot exceeds in neither direction."""
+    return max(robot.model.limits.v_max_m_s, -robot.model.limits.v_min_m_s)
+
+
+def _most_kinetic_J(robot: Robot) -> float:
+    """Return the battery energy that stands behind a robot's top speed."""
+    kinetic_J = 0.5 * robot.model.effective_mass_kg * top_speed_m_s(robot) ** 2
+    return kinetic_J / robot.model.drive_efficiency
+
+
+def relaxed_routing_J(problem: RoutingArrays) -> float:
+    """Return a lower bound of the cost of all tours of a mission of any size.
+
+    Robots are exchangeable but for their starts, and batteries only limit single legs;
+    the bound is that of spanning trees with prices (`_bound_kernels.spanning_bound`).
+    """
+    goal_list = np.flatnonzero(problem.open_goal)
+    if not len(goal_list):
+        return 0.0
+    between, start = [], []
+    for r in range(len(problem.energy)):
+        hop, _ = _station_closure(problem, r)
+        cost = problem.cost[r]
+        usable = problem.capacity[r] - problem.reserve[r]
+        first = problem.energy[r] - problem.reserve[r]
+        here = cost[-1].copy()
+        here[here > first] = np.inf
+        legs = cost[:-1].copy()
+        legs[legs > usable] = np.inf
+        goals = problem.goals
+        way, own = legs[:goals, :goals], here[:goals]
+        if len(hop):
+            to_goal = _over(hop, legs[goals:, :goals])
+            way = np.minimum(way, _over(legs[:goals, goals:], to_goal))
+            own = np.minimum(own, _over(here[None, goals:], to_goal)[0])
+        between.append(way[np.ix_(goal_list, goal_list)])
+        start.append(own[goal_list])
+    cheapest = np.min(between, axis=0)
+    symmetric = np.ascontiguousarray(np.minimum(cheapest, cheapest.T))
+    return float(
+        _bound_kernels.spanning_bound(symmetric, np.array(start), SPANNING_ROUNDS)
+    )
+
+
+def _over(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the least sums of legs over the places between, (A, S) + (S, B)."""
+    return np.asarray((first[:, :, None] + second[None]).min(axis=1))

@@ -1,0 +1,359 @@
+"""Lower bounds of the cost of ways between regions, round obstacles and over terrain.
+
+A way is that of the reference point. It keeps as far from obstacles as the largest disc
+about that point inside the footprint reaches, and nothing else about the robot counts.
+The bounds come from certified fields (see `_eikonal_kernels`), so they hold whatever
+the cell is; a finer one brings them nearer to the truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from shapely.geometry import Point
+
+from mrmg.planning.bound import _eikonal_kernels
+from mrmg.planning.bound._eikonal_kernels import UNREACHED
+from mrmg.planning.bound.prices import least_prices
+from mrmg.scene.types import Region, Robot, Scene
+
+ROUNDS = 3
+"""Solutions of the eikonal equation at most per field."""
+
+BAND_SHARE = 0.25
+"""Width of the levels of a field, as a share of a cell."""
+
+CLEARANCE_TOLERANCE_M = 0.02
+"""How much nearer to an obstacle than its disc allows a robot is taken to come."""
+
+ROUND_MARGIN = 1.02
+"""Factor on radii of terrain's surroundings, whose arcs are drawn by chords."""
+
+SPACING_M = 0.04
+"""Distance of the points that stand for a region's border."""
+
+ARCS = 32
+"""Arcs into which borders are cut."""
+
+SEED_SHARE = 0.95
+"""Steepness of a field next to its source, as a share of the price there."""
+
+
+class Look(NamedTuple):
+    """How values at points follow from those at nodes.
+
+    Attributes:
+        point: which of them, as each is looked at from several cells, shape (n,).
+        nodes: flat indices of its cell's corners, row by row, shape (n, 4).
+        across, along: where in the cell it is, from 0 to 1, shape (n,).
+        slack: how much a certified field can differ within reach, shape (n,).
+        arc: which of ARCS equal runs of points each belongs to, shape (n,).
+    """
+
+    point: np.ndarray
+    nodes: np.ndarray
+    across: np.ndarray
+    along: np.ndarray
+    slack: np.ndarray
+    arc: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """A certified field f(u).
+
+    Attributes:
+        values: u at the nodes, flat.
+        level: levels of u, rising.
+        certified: f there.
+    """
+
+    values: np.ndarray
+    level: np.ndarray
+    certified: np.ndarray
+
+    def at(self, look: Look) -> np.ndarray:
+        """Return f(u) at points, shape (n,)."""
+        return self._certified(_on_triangles(self.values[look.nodes], look))
+
+    def at_nodes(self) -> np.ndarray:
+        """Return f(u) at all nodes, flat."""
+        return self._certified(self.values)
+
+    def _certified(self, raw: np.ndarray) -> np.ndarray:
+        certified = np.interp(raw, self.level, self.certified)
+        return np.where(raw < 0.5 * UNREACHED, certified, UNREACHED)
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """Prices of driving, never above the true ones, on square cells.
+
+    Attributes:
+        x_min, y_min: corner of the first cell [m].
+        cell_m: side of a cell.
+        price: least multiplier within half a planning step of each cell, inf where the
+            reference point cannot be, shape (Y, X).
+    """
+
+    x_min: float
+    y_min: float
+    cell_m: float
+    price: np.ndarray
+
+    @staticmethod
+    def of(scene: Scene, robot: Robot, *, cell_m: float, step_m: float) -> Ground:
+        """Return the ground of a robot.
+
+        Args:
+            scene: the scene.
+            robot: gives obstacles and disc.
+            cell_m: side of a cell.
+            step_m: longest way of one planning step. A step is charged at its middle,
+                which is at most half of it away from any point of it.
+        """
+        radius = max(0.0, robot.model.inscribed_radius_m - CLEARANCE_TOLERANCE_M)
+        shapes = [o.shape for o in scene.obstacles if o.stops(robot.id)]
+        blocked = shapely.union_all(shapes).buffer(radius)
+        price = least_prices(
+            scene, blocked, cell_m=cell_m, reach_m=ROUND_MARGIN * 0.5 * step_m
+        )
+        x_min, y_min, _, _ = scene.bounds
+        return Ground(float(x_min), float(y_min), cell_m, price)
+
+    def part(self, rows: slice, columns: slice) -> Ground:
+        """Return the ground of a block of cells."""
+        return Ground(
+            x_min=self.x_min + columns.start * self.cell_m,
+            y_min=self.y_min + rows.start * self.cell_m,
+            cell_m=self.cell_m,
+            price=np.ascontiguousarray(self.price[rows, columns]),
+        )
+
+    def look_at(self, points: np.ndarray, reach_m: float) -> Look:
+        """Return how a field's values at points follow from its nodes.
+
+        A point stands for all free points within `reach_m`; it is looked at from every
+        free cell that near, at that cell's nearest point.
+        """
+        rows, columns = self.price.shape
+        place = (points - (self.x_min, self.y_min)) / self.cell_m
+        reach = reach_m / self.cell_m + 1e-9
+        shift = np.array([-reach, 0.0, reach])
+        row = np.floor(place[:, 1] + shift[:, None, None]).astype(int)
+        column = np.floor(place[:, 0] + shift[:, None]).astype(int)
+        fine = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+        index = np.arange(len(points))
+        cell = np.unique(((index * rows + row) * columns + column)[fine])
+        cell = cell[np.isfinite(self.price.reshape(-1)[cell % (rows * columns)])]
+        index, row, column = np.unravel_index(cell, (len(points), rows, columns))
+        fx = np.clip(place[index, 0] - column, 0.0, 1.0)
+        fy = np.clip(place[index, 1] - row, 0.0, 1.0)
+        corner = row * (columns + 1) + column
+        nodes = np.stack(
+            [corner, corner + 1, corner + columns + 1, corner + columns + 2], axis=1
+        )
+        arc = index * ARCS // max(ARCS, len(points))
+        slack = self.price[row, column] * reach_m
+        return Look(index, nodes, fx, fy, slack, arc)
+
+    def field_from(self, region: Region) -> Field:
+        """Return a certified field that grows away from a region."""
+        points = self.nodes()
+        away = -region.depth(points.reshape(-1, 2)).reshape(points.shape[:2])
+        band = np.sqrt(2.0) * self.cell_m
+        near = away <= band
+        share = SEED_SHARE * self.least_price(near)
+        return self.field(np.where(near, share * np.maximum(away, -band), UNREACHED))
+
+    def wave_from(self, region: Region, heading: np.ndarray) -> Field | None:
+        """Return a certified field that is a plane wave in a region and spreads on.
+
+        It is the better a bound the more nearly ways leave with that heading, and tells
+        apart what parts of the region's border they leave from.
+
+        Args:
+            region: the source.
+            heading: unit vector, shape (2,).
+
+        Returns:
+            The field; None if the region is too small for the cells.
+        """
+        points = self.nodes()
+        inside = region.depth(points.reshape(-1, 2)).reshape(points.shape[:2]) >= 0.0
+        if not inside.any():
+            return None
+        share = self.least_price(inside)
+        along = share * ((points - region.center) @ heading)
+        return self.field(np.where(inside, along, UNREACHED))
+
+    def nodes(self) -> np.ndarray:
+        """Return the corners of all cells, shape (Y + 1, X + 1, 2)."""
+        rows, columns = self.price.shape
+        y, x = np.mgrid[0 : rows + 1, 0 : columns + 1] * self.cell_m
+        return np.stack([x + self.x_min, y + self.y_min], axis=-1)
+
+    def least_price(self, near: np.ndarray) -> float:
+        """Return the least price of cells with a corner among the given nodes."""
+        touching = near[:-1, :-1] | near[1:, :-1] | near[:-1, 1:] | near[1:, 1:]
+        prices = self.price[touching & np.isfinite(self.price)]
+        return float(prices.min()) if prices.size else 1.0
+
+    def field(self, seed: np.ndarray) -> Field:
+        """Return the certified field that spreads from seeds."""
+        values, level, certified = _eikonal_kernels.certified_field(
+            self.price, self.cell_m, seed, ROUNDS, BAND_SHARE * self.cell_m
+        )
+        return Field(values.reshape(-1), level, certified)
+
+
+@dataclass(frozen=True, slots=True)
+class Ways:
+    """Lower bounds of the weighted length of ways between regions [m of plain ground].
+
+    A way between regions that do not overlap leads from the border of one to the border
+    of the other.
+
+    Attributes:
+        ground: prices of driving.
+        regions: T convex sets.
+        fields: one from each region.
+        looks: at each region's border, `border` points of it.
+        highest: bound of each region's own field on its border, shape (T,).
+        lowest: bounds of each region's field on the arcs of borders, shape (T, T, K).
+        overlap: which regions do, shape (T, T).
+        between: from region to region, shape (T, T).
+        from_start: from start to region, shape (R, T); inf where there is no way.
+    """
+
+    ground: Ground
+    regions: Sequence[Region]
+    fields: list[Field]
+    looks: list[Look]
+    highest: np.ndarray
+    lowest: np.ndarray
+    overlap: np.ndarray
+    between: np.ndarray
+    from_start: np.ndarray
+
+    @staticmethod
+    def of(ground: Ground, regions: Sequence[Region], starts: np.ndarray) -> Ways:
+        """Bound all ways between regions, and from starts (R, 2) to regions."""
+        with ThreadPoolExecutor() as threads:
+            fields = list(threads.map(ground.field_from, regions))
+        looks = [ground.look_at(border(one), 0.5 * SPACING_M) for one in regions]
+        highest = np.array(
+            [highest_of(*pair) for pair in zip(fields, looks, strict=True)]
+        )
+        lowest = _lowest_by_arc(fields, looks)
+        floor = float(np.min(ground.price, initial=1.0))
+        apart_m = _distances_m(regions)
+        certified = lowest.min(axis=2, initial=UNREACHED) - highest[:, None]
+        way = np.maximum(np.maximum(certified, floor * apart_m), 0.0)
+        way = np.where(apart_m > 0.0, np.maximum(way, way.T), 0.0)
+        start_way = np.zeros((len(starts), len(regions)))
+        for r, start in enumerate(starts):
+            look = ground.look_at(start[None], 0.0)
+            for i, field in enumerate(fields):
+                apart = float(-regions[i].depth(start)[0])
+                if apart > 0.0:
+                    certified = lowest_of(field, look) - highest[i]
+                    start_way[r, i] = max(certified, floor * apart, 0.0)
+        for table in (way, start_way):
+            table[table > 0.5 * UNREACHED] = np.inf
+        return Ways(
+            ground=ground,
+            regions=regions,
+            fields=fields,
+            looks=looks,
+            highest=highest,
+            lowest=lowest,
+            overlap=apart_m <= 0.0,
+            between=way,
+            from_start=start_way,
+        )
+
+
+def _on_triangles(corner: np.ndarray, look: Look) -> np.ndarray:
+    """Return a field's values, shape (n, 4) -> (n,), as it is certified.
+
+    Cells are cut along the diagonal that leaves their two triangles the flatter
+    (`_eikonal_kernels.steepness`).
+    """
+    a, b, c, d = corner.T
+    x, y = look.across, look.along
+    low, high = (b - a) ** 2, (d - c) ** 2
+    left, right = (c - a) ** 2, (d - b) ** 2
+    cut_from_a = np.maximum(low + right, high + left)
+    cut_from_b = np.maximum(low + left, high + right)
+    of_a = a + np.where(x >= y, x * (b - a) + y * (d - b), x * (d - c) + y * (c - a))
+    near = a + x * (b - a) + y * (c - a)
+    of_b = np.where(x + y <= 1.0, near, d + (1 - x) * (c - d) + (1 - y) * (b - d))
+    return np.asarray(np.where(cut_from_a < cut_from_b, of_a, of_b))
+
+
+def _lowest_by_arc(fields: Sequence[Field], looks: Sequence[Look]) -> np.ndarray:
+    """Return bounds of the least values of fields on the arcs of borders, (T, T, K)."""
+    together = Look(*(np.concatenate(parts) for parts in zip(*looks, strict=True)))
+    place = np.repeat(np.arange(len(looks)), [len(look.arc) for look in looks])
+    arc, first = np.unique(place * ARCS + together.arc, return_index=True)
+    lowest = np.full((len(fields), len(looks) * ARCS), UNREACHED)
+    for own, field in zip(lowest, fields, strict=True):
+        own[arc] = np.minimum.reduceat(field.at(together) - together.slack, first)
+    return lowest.reshape(len(fields), len(looks), ARCS)
+
+
+def lowest_of(field: Field, look: Look) -> float:
+    """Return a bound of the least value of a field over a border."""
+    return float((field.at(look) - look.slack).min(initial=UNREACHED))
+
+
+def highest_of(field: Field, look: Look) -> float:
+    """Return a bound of the greatest value of a field over a border, if reached."""
+    value = field.at(look)
+    reached = value < 0.5 * UNREACHED
+    if not reached.any():  # no free point: nothing gets there
+        return 0.0
+    return float((value + look.slack)[reached].max())
+
+
+def border(region: Region) -> np.ndarray:
+    """Return points on a region's border, SPACING_M apart at most.
+
+    They lie in the middles of equal parts, whose number is a multiple of ARCS.
+    """
+    if len(region.corners):
+        ring = region.shape.exterior
+        share = _middles(ring.length)
+        return np.asarray(
+            shapely.get_coordinates(
+                shapely.line_interpolate_point(ring, share, normalized=True)
+            )
+        )
+    angle = 2.0 * np.pi * _middles(2.0 * np.pi * region.radius_m)
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return np.asarray(region.center + region.radius_m * ring)
+
+
+def _middles(length_m: float) -> np.ndarray:
+    """Return the middles of equal parts of a border, as shares of its length."""
+    count = ARCS * max(1, int(np.ceil(length_m / SPACING_M / ARCS)))
+    return (np.arange(count) + 0.5) / count
+
+
+def _distances_m(regions: Sequence[Region]) -> np.ndarray:
+    """Return the distances of regions, (T, T); not positive where they overlap."""
+    cores = np.array(
+        [
+            region.shape if len(region.corners) else Point(*region.center)
+            for region in regions
+        ]
+    )
+    radius_m = np.array([region.radius_m for region in regions])
+    apart_m = shapely.distance(cores[:, None], cores)
+    return np.asarray(apart_m - radius_m[:, None] - radius_m)

@@ -1,0 +1,123 @@
+"""A proven lower bound of a mission's duration.
+
+As in the bound of energy (`bound`), whoever solves a mission visits the goals in some
+order, each robot a part of them, on ways no shorter than the shortest round obstacles.
+Here robots drive them at top speed on any ground, from rest to rest, and stay at goals
+as long as they must; the longest time of a robot is the mission's. Batteries, turning
+and other robots could only make it longer. The least over all divisions and orders is
+the bound.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+
+from mrmg.motion._kernels import MODEL_ID
+from mrmg.planning.bound import _bound_kernels
+from mrmg.planning.bound.bound import (
+    CELLS,
+    MOST_GOALS,
+    ROUNDING_SHARE,
+    Relaxation,
+    RobotWays,
+    relaxed_routing_J,
+    top_speed_m_s,
+)
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.planning.routing.routing import routing_arrays
+from mrmg.scene.types import Robot, Scene
+
+
+def makespan_bound_s(scene: Scene, *, step_s: float = 0.1, cells: int = CELLS) -> float:
+    """Return a time [s] before which no plan of a mission is over.
+
+    Args:
+        scene: the mission.
+        step_s: time step of the plans.
+        cells: cells of the grid on which ways are bounded; more bring the bound nearer
+            to the truth.
+
+    Returns:
+        The bound, at least 0; inf if some goal cannot be reached.
+    """
+    if not scene.goals:
+        return 0.0
+    flat = replace(scene, terrain=(), elevation=None)
+    ways = Relaxation.of(flat, step_s=step_s, cells=cells).problem
+    metres = _free_of_energy(ways, ways.cost / _plain_of(flat)[:, None, None])
+    if len(scene.goals) > MOST_GOALS:
+        bound_s = _relaxed_s(scene, metres)
+    else:
+        fleet = np.full(1 << len(scene.goals), inf)
+        fleet[0] = 0.0
+        for r, robot in enumerate(scene.robots):
+            way_m = RobotWays(metres, r, np.arange(len(scene.goals))).cost
+            fleet = _bound_kernels.join_longest(
+                fleet, _times_s(robot, way_m, _stays_s(scene))
+            )
+        bound_s = float(fleet[-1])
+    return max(0.0, bound_s) * (1.0 - ROUNDING_SHARE)
+
+
+def _plain_of(scene: Scene) -> np.ndarray:
+    energy = [robot.model.energy_model for robot in scene.robots]
+    return np.array([model.plain_ground_J_per_m() for model in energy])
+
+
+def _free_of_energy(problem: RoutingArrays, cost: np.ndarray) -> RoutingArrays:
+    """Return a problem of other costs in which batteries never run out."""
+    robots = len(cost)
+    return routing_arrays(
+        goals=problem.goals,
+        distance=cost[:, :-1],
+        start_distance=cost[:, -1],
+        plain=np.ones(robots),
+        energy=np.full(robots, inf),
+        capacity=np.full(robots, inf),
+        reserve=np.zeros(robots),
+    )
+
+
+def _stays_s(scene: Scene) -> np.ndarray:
+    """Return how long a robot stays that visits each subset of the goals, (2^G,)."""
+    stay_s = np.zeros(1)
+    for goal in scene.goals:
+        stay_s = np.concatenate([stay_s, stay_s + goal.dwell_s])
+    return stay_s
+
+
+def _times_s(robot: Robot, way_m: np.ndarray, stay_s: np.ndarray) -> np.ndarray:
+    """Return the least times of ways between regions and of stays in them.
+
+    A robot may speed up while it stays, but not all of its ways and stays fit into less
+    than both at top speed, nor its ways into less than they take from rest to rest.
+    """
+    top_m_s = top_speed_m_s(robot)
+    times_s: np.ndarray = way_m / top_m_s + stay_s
+    if robot.model.motion_model not in MODEL_ID:
+        return times_s  # nothing is known of how it speeds up
+    strongest = robot.model.limits.u1_max_m_s2
+    long = way_m >= top_m_s * top_m_s / strongest
+    ramped_s = np.where(
+        long,
+        way_m / top_m_s + top_m_s / strongest,
+        2.0 * np.sqrt(way_m / strongest),
+    )
+    return np.asarray(np.maximum(times_s, ramped_s))
+
+
+def _relaxed_s(scene: Scene, metres: RoutingArrays) -> float:
+    """Return a bound for any number of goals.
+
+    That is the largest of the least times to each goal, and all driving and staying
+    divided equally among all robots.
+    """
+    top_m_s = np.array([top_speed_m_s(robot) for robot in scene.robots])
+    times = _free_of_energy(metres, metres.cost / top_m_s[:, None, None])
+    stay_s = np.array([goal.dwell_s for goal in scene.goals])
+    nearest_s = times.cost[:, -1, : len(scene.goals)].min(axis=0)
+    shared_s = (relaxed_routing_J(times) + stay_s.sum()) / len(scene.robots)
+    return float(max((nearest_s + stay_s).max(), shared_s))

@@ -1,0 +1,66 @@
+"""Which way round a car drives: where on its tour it changes gear.
+
+Turning towards the next target takes a detour and scrub, changing gear only some scrub.
+Which of the two is cheaper at a target is seen when the path is drawn tight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import radians
+
+import numpy as np
+
+from mrmg.planning.drafting._band_kernels import Surface
+from mrmg.planning.drafting.band import SPACINGS_M, Path, tightened
+from mrmg.planning.tree.motion_tree import Problem
+
+DOUBTFUL = (radians(60.0), radians(165.0))
+"""Turns at targets between which either may be cheaper [rad]."""
+
+WORTH_M_S = 0.01
+"""Plain ground that a second is worth where paths cost about the same [m/s]: cars are
+slower backwards."""
+
+
+def with_best_gears(
+    problem: Problem,
+    r: int,
+    surface: Surface,
+    path: Path,
+    turns: Sequence[tuple[int, float]],
+) -> Path:
+    """Return robot r's path with the gears that look cheapest.
+
+    Each turn that leaves it open is tried with a change of gear and without; they
+    hardly depend on each other.
+
+    Args:
+        problem: the mission.
+        r: robot, a car.
+        surface: what the path is priced on.
+        path: the path.
+        turns: nodes at which it may change gear, and how much it turns there [rad].
+    """
+    least_m = _cost_m(problem, r, surface, path)
+    for at, turn in turns:
+        if not DOUBTFUL[0] < turn < DOUBTFUL[1]:
+            continue
+        gear = np.where(np.arange(len(path.gear)) < at, path.gear, -path.gear)
+        other = replace(path, gear=gear)
+        cost_m = _cost_m(problem, r, surface, other)
+        if cost_m < least_m:
+            path, least_m = other, cost_m
+    return path
+
+
+def _cost_m(problem: Problem, r: int, surface: Surface, path: Path) -> float:
+    """Return what a path costs, drawn tight of few nodes, with the time it takes."""
+    path, cost_m = tightened(problem.mission.targets, surface, path, SPACINGS_M[:1])
+    size = np.hypot(*np.diff(path.node, axis=0).T)
+    backwards, forwards = np.maximum(
+        np.abs(problem.mission.fleet[r]["limit"][:2]), 1e-3
+    )
+    time_s = size / np.where(path.gear > 0, forwards, backwards)
+    return cost_m + WORTH_M_S * float(time_s.sum())

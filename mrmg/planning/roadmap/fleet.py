@@ -1,0 +1,142 @@
+"""From a scene's robots to the arrays the kernels work on."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from mrmg.errors import Fault, SceneError
+from mrmg.motion._kernels import MODEL_ID, USER
+from mrmg.motion.user_motion import user_motion
+from mrmg.planning.roadmap._fleet_kernels import FLEET, MOST_CORNERS, Spaces
+from mrmg.planning.roadmap.slopes import SlopeCost
+from mrmg.scene.types import Robot, Scene
+from mrmg.world.world import World
+
+RESERVE_MARGIN = 0.01
+"""Share of the capacity the planner keeps above the reserve, for execution to use."""
+
+PASSAGE_SLACK_M = 0.05
+"""Clearance of roadmap edges beyond half the robot's width and its margin."""
+
+
+def stack_spaces(world: World) -> Spaces:
+    """Stack the world's free spaces; bucket starts and edges are counted through."""
+    first = world.spaces[0]
+    start, index, edges = [], [], []
+    edge_offset = index_offset = 0
+    for space in world.spaces:
+        start.append(space.bucket_start + index_offset)
+        index.append(space.bucket_edge + edge_offset)
+        edges.append(space.edge)
+        index_offset += len(space.bucket_edge)
+        edge_offset += len(space.edge)
+    return Spaces(
+        x_min=first.x_min,
+        y_min=first.y_min,
+        cell=first.cell,
+        distance=np.stack([space.distance for space in world.spaces]),
+        bucket=first.bucket,
+        bucket_columns=first.bucket_columns,
+        bucket_rows=first.bucket_rows,
+        bucket_start=np.stack(start),
+        bucket_edge=np.concatenate(index),
+        reach=first.reach,
+        edge=np.concatenate(edges),
+    )
+
+
+def passage_m(robot: Robot, margin_m: float) -> float:
+    """Return the clearance the line of a robot's reference point needs [m]."""
+    return round(robot.model.half_width_m + margin_m + PASSAGE_SLACK_M, 6)
+
+
+class TravelClass(NamedTuple):
+    """Robots that share a roadmap and its cost-to-go fields.
+
+    Attributes:
+        space: index of their free space.
+        passage: clearance of their line of travel [m].
+        slope: what slopes cost them.
+    """
+
+    space: int
+    passage: float
+    slope: SlopeCost
+
+
+def travel_classes(
+    scene: Scene, world: World, margin_m: float
+) -> tuple[list[TravelClass], list[int]]:
+    """Return the distinct travel classes and each robot's index among them.
+
+    Args:
+        scene: the scene.
+        world: its geometry.
+        margin_m: distance robots keep from obstacles.
+    """
+    keys = [
+        TravelClass(
+            space=int(world.space_of_robot[i]),
+            passage=passage_m(robot, margin_m),
+            slope=SlopeCost.of(scene, robot.model),
+        )
+        for i, robot in enumerate(scene.robots)
+    ]
+    distinct = list(dict.fromkeys(keys))
+    return distinct, [distinct.index(key) for key in keys]
+
+
+def fleet_array(
+    scene: Scene, world: World, *, obstacle_margin_m: float, robot_margin_m: float
+) -> np.ndarray:
+    """Return the scene's robots as records of FLEET, shape (R,).
+
+    Args:
+        scene: the scene.
+        world: its geometry.
+        obstacle_margin_m: distance robots keep from obstacles.
+        robot_margin_m: distance robots keep from each other.
+
+    Raises:
+        SceneError: if a footprint has more corners than the kernels hold, or a user's
+            motion model cannot be used.
+    """
+    fleet = np.zeros(len(scene.robots), FLEET)
+    _, fields = travel_classes(scene, world, obstacle_margin_m)
+    for r, robot in enumerate(scene.robots):
+        model, battery = robot.model, robot.battery
+        limits = model.limits.scaled(model.planning_share)
+        outline = model.footprint_m
+        if len(outline) > MOST_CORNERS:
+            message = f"has {len(outline)} corners, at most {MOST_CORNERS} are allowed"
+            raise SceneError(model.name, [Fault("footprint", message)])
+        middle = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
+        one = fleet[r]
+        one["model"] = MODEL_ID.get(model.motion_model, USER)
+        if model.motion_model not in MODEL_ID:
+            motion = user_motion(model.motion_model)
+            one["step_at"], one["steer_at"] = motion.compiled(limits.as_tuple())
+        one["wheelbase"] = model.wheelbase_m
+        one["track"] = model.track_m
+        one["lead"] = model.center_of_mass_m
+        one["limit"] = limits.as_tuple()
+        one["corner"][: len(outline)] = outline
+        one["corners"] = len(outline)
+        one["middle"] = middle
+        one["radius"] = np.hypot(*(outline - middle).T).max()
+        one["turning_radius"] = model.turning_radius_m
+        one["passage"] = passage_m(robot, obstacle_margin_m)
+        one["margin"] = obstacle_margin_m
+        one["spacing"] = robot_margin_m
+        one["space"] = world.space_of_robot[r]
+        one["field"] = fields[r]
+        one["energy"] = model.energy_model.coefficients()
+        one["plain"] = model.energy_model.plain_ground_J_per_m()
+        one["capacity"] = battery.capacity_J
+        one["charge"] = battery.charging_power_W
+        one["reserve"] = battery.reserve_J + RESERVE_MARGIN * battery.capacity_J
+    # Uncompiled kernels find the fields of records as attributes only in such a view.
+    return fleet.view(np.recarray) if numba.config.DISABLE_JIT else fleet

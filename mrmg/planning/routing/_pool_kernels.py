@@ -1,0 +1,110 @@
+"""Every route a search has met, and the cheapest fleet that can be made of them.
+
+A search that changes a few goals at a time seldom meets all routes of the best answer
+at once; it meets each of them much sooner. For few goals the cheapest choice of one
+route for each robot that shares out all goals is found exactly, over subsets.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.compilation import by_pointer, kernel, leaf_kernel
+from mrmg.planning.routing._nrpa_kernels import goals_to_visit
+
+MOST_POOLED = 10
+"""Open goals up to which routes are pooled; subsets of subsets are 3 to that power."""
+
+
+@by_pointer
+class Pool(NamedTuple):
+    """The cheapest route met for each robot and set of goals, numbered by its bits.
+
+    Attributes:
+        bit: of each goal in the number of a set; 0 for goals that are not open, (G,).
+        cost: of the route [J], inf if none was met, shape (R, sets).
+        goal: its goals in order, shape (R, sets, goals).
+        length: their number, shape (R, sets).
+    """
+
+    bit: np.ndarray
+    cost: np.ndarray
+    goal: np.ndarray
+    length: np.ndarray
+
+
+@kernel
+def new_pool(problem):
+    """Return an empty pool; one without room if there are too many goals."""
+    robots = len(problem.energy)
+    bit = np.zeros(problem.goals, np.int64)
+    goals = goals_to_visit(problem)
+    number = 0
+    for g in range(problem.goals if goals <= MOST_POOLED else 0):
+        if problem.open_goal[g]:
+            bit[g] = 1 << number
+            number += 1
+    if goals > MOST_POOLED or problem.makespan_weight > 0.0:
+        goals = 0
+    sets = 1 << goals
+    return Pool(
+        bit,
+        np.full((robots, sets), np.inf),
+        np.zeros((robots, sets, goals), np.int64),
+        np.zeros((robots, sets), np.int64),
+    )
+
+
+@leaf_kernel
+def pool_route(pool, r, goal, length, cost):
+    """Keep a route of robot r if it is cheaper than all others of the same goals."""
+    if pool.cost.shape[1] == 1:
+        return
+    members = 0
+    for i in range(length):
+        members += pool.bit[goal[i]]
+    if cost < pool.cost[r, members]:
+        pool.cost[r, members] = cost
+        pool.length[r, members] = length
+        for i in range(length):
+            pool.goal[r, members, i] = goal[i]
+
+
+@kernel
+def combine(pool, routes):
+    """Set the routes to the cheapest choice of pooled ones that shares out all goals.
+
+    They are left as they are if the pool has no room.
+    """
+    robots, sets = pool.cost.shape
+    if sets == 1:
+        return
+    least = np.full((robots + 1, sets), np.inf)
+    own = np.zeros((robots + 1, sets), np.int64)
+    least[0, 0] = 0.0
+    for r in range(robots):
+        for done in range(sets):
+            if r == robots - 1 and done < sets - 1:
+                continue
+            part = done
+            while True:
+                cost = pool.cost[r, part] + least[r, done ^ part]
+                if cost < least[r + 1, done]:
+                    least[r + 1, done] = cost
+                    own[r + 1, done] = part
+                if part == 0:
+                    break
+                part = (part - 1) & done
+    done = sets - 1
+    if least[robots, done] == np.inf:
+        return
+    routes.length[robots] = 0
+    for r in range(robots - 1, -1, -1):
+        part = own[r + 1, done]
+        routes.length[r] = pool.length[r, part]
+        for i in range(pool.length[r, part]):
+            routes.goal[r, i] = pool.goal[r, part, i]
+        routes.front[r] = routes.back[r] = 0
+        done ^= part

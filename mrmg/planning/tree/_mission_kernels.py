@@ -1,0 +1,169 @@
+"""The planning problem as one value for the kernels, and its simplest questions."""
+
+from __future__ import annotations
+
+from math import cos, hypot, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.compilation import by_pointer, kernel, leaf_kernel
+from mrmg.energy import CONSUMERS_W
+from mrmg.planning.roadmap._fleet_kernels import Spaces, space_of
+from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays, find_waypoint
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.planning.tree._safety_kernels import Gates
+from mrmg.world._kernels import TerrainGrid, height_in, point_in_convex
+
+
+@by_pointer
+class Targets(NamedTuple):
+    """Goals, stations and finishes: convex regions; T targets, in that order.
+
+    Attributes:
+        goals: number of goals.
+        places: number of goals and stations.
+        finish: target in which each robot must end, -1 for anywhere, shape (R,).
+        heading: heading with which it must end there [rad], shape (R,).
+        tolerance: allowed deviation from that [rad]; at least pi for any, shape (R,).
+        center: shape (T, 2).
+        reach: radius of the circle about the centre that holds the region, shape (T,).
+        corner: padded corners of polygons, shape (T, M, 2).
+        corners: number of corners; 0 for a circle, shape (T,).
+        dwell: how long a visit takes [s], shape (T,).
+        gate: number among the gates of the safety kernels, -1 for none, shape (T,).
+    """
+
+    goals: int
+    places: int
+    finish: np.ndarray
+    heading: np.ndarray
+    tolerance: np.ndarray
+    center: np.ndarray
+    reach: np.ndarray
+    corner: np.ndarray
+    corners: np.ndarray
+    dwell: np.ndarray
+    gate: np.ndarray
+
+
+@by_pointer
+class TreeParams(NamedTuple):
+    """Numbers the tree is grown by; see `parameters.PlannerParams`."""
+
+    dt: float
+    steps: int
+    max_vertices: int
+    group_alpha: float
+    group_beta: float
+    group_lambda: float
+    group_bias: float
+    steer_start: float
+    steer_decay: float
+    steer_least: float
+    region: float
+    route_margin: float
+    reroute_always: bool
+    literal: bool
+    optioned: bool
+    levels: int
+    iterations: int
+    alpha: float
+    rounds: int
+
+
+@by_pointer
+class Mission(NamedTuple):
+    """A planning problem.
+
+    Attributes:
+        fleet, spaces, terrain, roadmap, targets: robots, world and where to go.
+        gates: stations that one robot at a time may be at.
+        routing: the routing problem at the start; costs include the route margin.
+        last_leg: energy from each place (the start last) to each robot's finish [J],
+            shape (R, G + S + 1); zero where a robot may end anywhere.
+        params: numbers the tree is grown by.
+    """
+
+    fleet: np.ndarray
+    spaces: Spaces
+    terrain: TerrainGrid
+    roadmap: RoadmapArrays
+    targets: Targets
+    routing: RoutingArrays
+    last_leg: np.ndarray
+    params: TreeParams
+    gates: Gates
+
+
+@leaf_kernel
+def in_target(targets, t, x, y):
+    """Tell whether a point lies in a target's region."""
+    far = hypot(x - targets.center[t, 0], y - targets.center[t, 1])
+    if far > targets.reach[t]:
+        return False
+    n = targets.corners[t]
+    return n == 0 or point_in_convex(x, y, targets.corner[t, :n])
+
+
+@kernel
+def look_ahead(mission, r, target, state, view, waypoint):
+    """Write robot r's waypoint towards a target; return the cost of the way [m].
+
+    It is in metres of plain ground, with heights as a potential (`slopes`).
+
+    Args:
+        mission: the problem.
+        r: robot.
+        target: number of the target.
+        state: the robot's state.
+        view: how far along its way it looks [m].
+        waypoint: receives (x, y).
+    """
+    fleet = mission.fleet
+    return find_waypoint(
+        space_of(mission.spaces, fleet[r].space),
+        mission.terrain,
+        mission.roadmap,
+        fleet[r].field,
+        target,
+        state[0],
+        state[1],
+        fleet[r].passage,
+        view,
+        waypoint,
+    )
+
+
+@leaf_kernel
+def load_height(mission, r, state):
+    """Return the height of the ground below robot r's centre of mass [m]."""
+    lead = mission.fleet[r].lead
+    return height_in(
+        mission.terrain,
+        state[0] + lead * cos(state[2]),
+        state[1] + lead * sin(state[2]),
+    )
+
+
+@leaf_kernel
+def leg_energy(mission, r, target, state, way):
+    """Return the energy of the way to a target and of the stay there [J].
+
+    Args:
+        mission: the problem.
+        r: robot.
+        target: number of the target.
+        state: the robot's state.
+        way: cost of the way that `look_ahead` found [m].
+    """
+    robot = mission.fleet[r]
+    stay = robot.energy[CONSUMERS_W] * mission.targets.dwell[target]
+    refund = mission.roadmap.slope_refund[robot.field]
+    if refund > 0.0:
+        center = mission.targets.center[target]
+        rise = height_in(mission.terrain, center[0], center[1]) - height_in(
+            mission.terrain, state[0], state[1]
+        )
+        way = max(0.0, way + refund * rise)
+    return way * robot.plain + stay

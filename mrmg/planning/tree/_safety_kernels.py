@@ -1,0 +1,296 @@
+"""Committed braking: what keeps every state of the motion tree safe.
+
+Each robot carries a committed motion: the states it will go through if it brakes from
+now on, steering held, until it stands. All committed motions keep clear of obstacles
+and, step by step, of each other. A robot may replace its commitment by "one step under
+a new control, then brake" only if that keeps clear too; otherwise it follows the one it
+has. So braking is always possible, no expansion ever dies, and a mission may end at any
+time.
+"""
+
+from __future__ import annotations
+
+from math import ceil, cos, hypot, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.compilation import by_pointer, kernel, leaf_kernel, view
+from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, step
+from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS, space_of
+from mrmg.world._kernels import (
+    clearance_at_least,
+    convex_convex_distance,
+    footprint_is_clear,
+    place_footprint,
+    point_in_convex,
+)
+
+REST = 1e-9
+"""Speed below which a robot counts as standing [m/s]."""
+
+
+@by_pointer
+class Gates(NamedTuple):
+    """Convex regions that one robot at a time may be in, or committed to enter.
+
+    Attributes:
+        center: shape (S, 2).
+        reach: radius of the circle about the centre that holds the region, shape (S,).
+        corner: padded corners of polygons, shape (S, M, 2).
+        corners: number of corners; 0 for a circle, shape (S,).
+    """
+
+    center: np.ndarray
+    reach: np.ndarray
+    corner: np.ndarray
+    corners: np.ndarray
+
+
+@by_pointer
+class Commitment(NamedTuple):
+    """Committed motions; two slots a robot, one active and one for a proposal.
+
+    Attributes:
+        state: shape (R, 2, K, 5).
+        corner: placed footprints, shape (R, 2, K, M, 2); only where `placed`, as most
+            are far from everything.
+        placed: shape (R, 2, K).
+        middle: middles of the footprints, shape (R, 2, K, 2).
+        length: number of states in each slot, shape (R, 2).
+        active: slot in force, shape (R,).
+        now: index of the present state in the active slot, shape (R,).
+        braking: False commits to nothing: only present states are kept clear.
+        gates: where one robot at a time may be.
+    """
+
+    state: np.ndarray
+    corner: np.ndarray
+    placed: np.ndarray
+    middle: np.ndarray
+    length: np.ndarray
+    active: np.ndarray
+    now: np.ndarray
+    braking: bool
+    gates: Gates
+
+
+@kernel
+def new_commitment(fleet, gates, dt, braking):
+    """Return an empty commitment large enough for the fleet's longest braking."""
+    robots = len(fleet)
+    longest = 0
+    for r in range(robots):
+        slowing_s = max(fleet[r].limit[1], -fleet[r].limit[0]) / fleet[r].limit[3]
+        if fleet[r].model != CAR:
+            slowing_s = max(slowing_s, fleet[r].limit[2] / fleet[r].limit[4])
+        longest = max(longest, int(ceil(slowing_s / dt)) + 3)
+    return Commitment(
+        np.zeros((robots, 2, longest, 5)),
+        np.empty((robots, 2, longest, MOST_CORNERS, 2)),
+        np.zeros((robots, 2, longest), np.bool_),
+        np.zeros((robots, 2, longest, 2)),
+        np.zeros((robots, 2), np.int64),
+        np.zeros(robots, np.int64),
+        np.zeros(robots, np.int64),
+        braking,
+        gates,
+    )
+
+
+@leaf_kernel
+def toward_zero(value, bound, dt):
+    """Return the rate that brings `value` to 0 as fast as `bound` allows."""
+    if abs(value) < REST:
+        return 0.0
+    return max(-bound, min(bound, -value / dt))
+
+
+@leaf_kernel
+def braking_control(fleet, r, state, dt):
+    """Return the control (u1, u2) of full braking; a car holds its steering."""
+    if fleet[r].model == USER:
+        return steer_user(fleet[r], state, state[0], state[1], 0.0, dt)
+    u1 = toward_zero(state[3], fleet[r].limit[3], dt)
+    u2 = 0.0
+    if fleet[r].model != CAR:
+        u2 = toward_zero(state[4], fleet[r].limit[4], dt)
+    return u1, u2
+
+
+@leaf_kernel
+def stands(fleet, r, state):
+    """Tell whether a robot is at rest."""
+    return abs(state[3]) < REST and (fleet[r].model == CAR or abs(state[4]) < REST)
+
+
+@leaf_kernel
+def write_braking(fleet, r, first, dt, commitment, slot):
+    """Fill a slot with `first` and the braking that follows it."""
+    states = commitment.state[r, slot]
+    copy_numbers(first, states[0])
+    n = 1
+    most = len(states) if commitment.braking else 1
+    while n < most and not stands(fleet, r, states[n - 1]):
+        u1, u2 = braking_control(fleet, r, states[n - 1], dt)
+        step(fleet[r], states[n - 1], u1, u2, dt, states[n])
+        n += 1
+    mx, my = fleet[r].middle[0], fleet[r].middle[1]
+    for k in range(n):
+        x, y, theta = states[k, 0], states[k, 1], states[k, 2]
+        c, s = cos(theta), sin(theta)
+        commitment.middle[r, slot, k, 0] = x + c * mx - s * my
+        commitment.middle[r, slot, k, 1] = y + s * mx + c * my
+        commitment.placed[r, slot, k] = False
+    commitment.length[r, slot] = n
+
+
+@leaf_kernel
+def place(fleet, commitment, r, slot, k):
+    """Place a committed footprint, if it is not yet."""
+    if not commitment.placed[r, slot, k]:
+        state = commitment.state[r, slot, k]
+        outline = fleet[r].corner[: fleet[r].corners]
+        corners = commitment.corner[r, slot, k]
+        place_footprint(outline, state[0], state[1], state[2], corners)
+        commitment.placed[r, slot, k] = True
+
+
+@leaf_kernel
+def clear_of_obstacles(fleet, spaces, commitment, r, slot, first):
+    """Tell whether a slot's states from `first` on keep the margin from obstacles."""
+    space = space_of(spaces, fleet[r].space)
+    radius, margin = fleet[r].radius, fleet[r].margin
+    for k in range(first, commitment.length[r, slot]):
+        cx, cy = commitment.middle[r, slot, k, 0], commitment.middle[r, slot, k, 1]
+        if clearance_at_least(space, cx, cy) > radius + margin:
+            continue
+        place(fleet, commitment, r, slot, k)
+        corners = commitment.corner[r, slot, k, : fleet[r].corners]
+        if not footprint_is_clear(space, corners, cx, cy, radius, margin):
+            return False
+    return True
+
+
+@leaf_kernel
+def clear_of_robot(fleet, commitment, r, slot, first, other, other_first, margin):
+    """Tell whether two committed motions keep `margin`, step by step.
+
+    State `first + k` of robot r is compared with state `other_first + k` of the other;
+    a robot that stands stays.
+    """
+    other_slot = commitment.active[other]
+    last = commitment.length[r, slot] - 1
+    other_last = commitment.length[other, other_slot] - 1
+    reach = fleet[r].radius + fleet[other].radius + margin
+    span = max(last - first, other_last - other_first)
+    for k in range(max(span, 0) + 1):
+        i = min(first + k, last)
+        j = min(other_first + k, other_last)
+        apart = hypot(
+            commitment.middle[r, slot, i, 0]
+            - commitment.middle[other, other_slot, j, 0],
+            commitment.middle[r, slot, i, 1]
+            - commitment.middle[other, other_slot, j, 1],
+        )
+        if apart >= reach:
+            continue
+        place(fleet, commitment, r, slot, i)
+        place(fleet, commitment, other, other_slot, j)
+        between = convex_convex_distance(
+            commitment.corner[r, slot, i, : fleet[r].corners],
+            commitment.corner[other, other_slot, j, : fleet[other].corners],
+        )
+        if between < margin:
+            return False
+    return True
+
+
+@leaf_kernel
+def passes_gate(commitment, gate, r, slot, first):
+    """Tell whether a slot's states from `first` on are in a gate at any time."""
+    gates = commitment.gates
+    n = gates.corners[gate]
+    for k in range(first, commitment.length[r, slot]):
+        x, y = commitment.state[r, slot, k, 0], commitment.state[r, slot, k, 1]
+        far = hypot(x - gates.center[gate, 0], y - gates.center[gate, 1])
+        if far > gates.reach[gate]:
+            continue
+        if n == 0 or point_in_convex(x, y, gates.corner[gate, :n]):
+            return True
+    return False
+
+
+@leaf_kernel
+def gate_is_taken(commitment, gate, r):
+    """Tell whether a robot other than r is in a gate or committed to enter it."""
+    for other in range(len(commitment.now)):
+        if other != r and passes_gate(
+            commitment, gate, other, commitment.active[other], commitment.now[other]
+        ):
+            return True
+    return False
+
+
+@leaf_kernel
+def clear_of_gates(commitment, r, slot):
+    """Tell whether a slot's states enter no gate that another robot has taken."""
+    for gate in range(len(commitment.gates.reach)):
+        if passes_gate(commitment, gate, r, slot, 0) and gate_is_taken(
+            commitment, gate, r
+        ):
+            return False
+    return True
+
+
+@kernel
+def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):
+    """Replace robot r's commitment by one step of a control and braking, if it is safe.
+
+    Args:
+        fleet, spaces: the fleet and its free spaces.
+        commitment: changed in place on success.
+        decided: which robots have already made this step, shape (R,).
+        r: robot.
+        u1, u2: control.
+        dt: step [s].
+
+    Returns:
+        Whether it was safe.
+    """
+    active = commitment.active[r]
+    slot = 1 - active
+    state = commitment.state[r, active, commitment.now[r]]
+    after = np.empty(5)
+    step(fleet[r], state, u1, u2, dt, after)
+    write_braking(fleet, r, after, dt, commitment, slot)
+    if not clear_of_obstacles(fleet, spaces, commitment, r, slot, 0):
+        return False
+    if not clear_of_gates(commitment, r, slot):
+        return False
+    for other in range(len(fleet)):
+        if other == r:
+            continue
+        # A robot that has not moved yet is met where its braking takes it.
+        other_first = commitment.now[other] + (0 if decided[other] else 1)
+        spacing = max(fleet[r].spacing, fleet[other].spacing)
+        if not clear_of_robot(
+            fleet, commitment, r, slot, 0, other, other_first, spacing
+        ):
+            return False
+    commitment.active[r] = slot
+    commitment.now[r] = 0
+    return True
+
+
+@leaf_kernel
+def follow_braking(commitment, r):
+    """Advance robot r one step along its commitment."""
+    last = commitment.length[r, commitment.active[r]] - 1
+    commitment.now[r] = min(commitment.now[r] + 1, last)
+
+
+@view
+def present_state(commitment, r):
+    """Return robot r's present state, a view of shape (5,)."""
+    return commitment.state[r, commitment.active[r], commitment.now[r]]

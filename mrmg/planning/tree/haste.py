@@ -1,0 +1,138 @@
+"""What a second is worth to robots on their ways.
+
+Driving slower than top speed never saves energy on the way, but two things do that take
+time: rolling to a stop instead of braking, and ways round dear ground.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mrmg.planning.roadmap import _roadmap_kernels
+from mrmg.planning.roadmap.fleet import travel_classes
+from mrmg.planning.roadmap.roadmap import Roadmap
+from mrmg.scene.objective import Objective
+from mrmg.scene.types import Robot, Scene
+from mrmg.world.world import World
+
+
+def energy_share(objective: Objective, robot: Robot) -> float:
+    """Return the share of energy in what a plain metre at top speed is worth.
+
+    The rest is the time it takes. It is 1 where only energy counts, 0 where only the
+    makespan does.
+    """
+    model = robot.model
+    top_m_s = model.limits.scaled(model.planning_share).v_max_m_s
+    power_W = model.energy_model.plain_ground_J_per_m() * top_m_s
+    energy = objective.energy_weight * power_W
+    return energy / (energy + objective.makespan_weight)
+
+
+def brakes_hard(scene: Scene, hurried: bool) -> np.ndarray:
+    """Tell which robots brake instead of rolling to a stop, shape (R,).
+
+    Rolling saves the power of driving for as long as it takes longer.
+
+    Args:
+        scene: gives robots and objective.
+        hurried: whether plans must be sooner over at any cost.
+    """
+    shares = [energy_share(scene.objective, robot) for robot in scene.robots]
+    return np.asarray(hurried | (np.array(shares) < 0.5))
+
+
+def priced_world(scene: Scene, world: World) -> World:
+    """Return the world with the ground as dear as its energy and time are worth.
+
+    It is the world itself where only energy counts, and on slopes, where ways are what
+    energy makes them.
+    """
+    shares = [energy_share(scene.objective, robot) for robot in scene.robots]
+    share = float(np.mean(shares))
+    if share == 1.0 or scene.elevation is not None:
+        return world
+    multiplier = share * world.terrain.multiplier + (1.0 - share)
+    return replace(world, terrain=world.terrain._replace(multiplier=multiplier))
+
+
+def with_energies(
+    roadmap: Roadmap, scene: Scene, world: World, margin_m: float
+) -> Roadmap:
+    """Return a roadmap of a priced world with distances that are energies.
+
+    Args:
+        roadmap: of `priced_world`.
+        scene: the mission.
+        world: its geometry, not priced.
+        margin_m: distance robots keep from obstacles.
+    """
+    vertex, successors = roadmap.arrays.vertex, roadmap.arrays.successor
+    classes, class_of_robot = travel_classes(scene, world, margin_m)
+    cost = np.zeros(successors.shape)
+    for (space, passage, slope), after, own in zip(
+        classes, successors, cost, strict=True
+    ):
+        here = np.broadcast_to(np.arange(len(vertex)), after.shape)[after >= 0]
+        edge, which = np.unique(
+            here * len(vertex) + after[after >= 0], return_inverse=True
+        )
+        costs = _roadmap_kernels.edge_costs(
+            world.spaces[space],
+            world.terrain,
+            vertex,
+            edge // len(vertex),
+            edge % len(vertex),
+            passage,
+            slope.price,
+            slope.floor,
+        )
+        own[after >= 0] = costs[which, 0]
+    energies = along_ways(roadmap, cost)
+    targets = len(roadmap.targets)
+    between = energies[:, :, :targets].transpose(0, 2, 1)
+    starts = energies[class_of_robot, :, targets + np.arange(len(scene.robots))]
+    return replace(
+        roadmap,
+        # Out of a region that reaches across a wall, another vertex knows the way.
+        distance=np.where(np.isfinite(between), between, roadmap.distance),
+        start_distance=starts,
+    )
+
+
+def along_ways(roadmap: Roadmap, cost: np.ndarray) -> np.ndarray:
+    """Return the sums of costs along the roadmap's ways, inf where there is none.
+
+    Args:
+        roadmap: the roadmap.
+        cost: from each vertex to its successor on the way to each target, 0 at the end
+            of the way, shape (F, T, V).
+
+    Returns:
+        From each vertex to each target, shape (F, T, V).
+    """
+    after = roadmap.arrays.successor
+    here = np.broadcast_to(np.arange(after.shape[2]), after.shape)
+    jump = np.where(after < 0, here, after).astype(np.int64)
+    # Each round joins every piece of way to the equally long one that follows it.
+    while True:
+        further = np.take_along_axis(jump, jump, axis=2)
+        cost = cost + np.take_along_axis(cost, jump, axis=2)
+        if (further == jump).all():
+            break
+        jump = further
+    return np.where(np.isfinite(roadmap.arrays.cost_to_go), cost, np.inf)
+
+
+def way_lengths_m(roadmap: Roadmap) -> np.ndarray:
+    """Return the length of the roadmap's way from each vertex to each target [m].
+
+    From a vertex that has no way of its own it is inf. Shape (F, T, V).
+    """
+    vertex, after = roadmap.arrays.vertex, roadmap.arrays.successor
+    here = np.broadcast_to(np.arange(len(vertex)), after.shape)
+    jump = np.where(after < 0, here, after)
+    step_m = np.hypot(*(vertex[jump] - vertex[here]).transpose(3, 0, 1, 2))
+    return along_ways(roadmap, step_m)

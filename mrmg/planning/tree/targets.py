@@ -1,0 +1,126 @@
+"""Where robots must go, as arrays: goals, stations and finishes, and gates."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrmg.planning.roadmap.roadmap import planned_regions
+from mrmg.planning.tree._mission_kernels import Targets
+from mrmg.planning.tree._safety_kernels import Gates
+from mrmg.scene.types import Scene, Station
+
+TARGET_MARGIN_M = 0.12
+"""How deep inside a region the planner drives, so that a tracked path enters it too:
+robots stray by 0.02 m at most, and by 0.04 m under the default disturbances."""
+
+GATE_MARGIN_M = 0.3
+"""How far from a station for one robot others stay, so that tracked paths do, too."""
+
+FINISH_SHARE = 0.8
+"""Share of a finish's heading tolerance that planning uses."""
+
+LONGER_S = 0.5
+"""How much longer than asked for robots stay, so that one that lags stays enough."""
+
+
+def has_options(scene: Scene) -> bool:
+    """Tell whether robots must stay anywhere, or something else than energy counts."""
+    return any(target.dwell_s > 0.0 for target in scene.targets()) or any(
+        robot.battery.takes_time_to_fill for robot in scene.robots
+    )
+
+
+def finish_of(scene: Scene) -> np.ndarray:
+    """Return the target in which each robot must end, -1 for none, shape (R,)."""
+    must = np.array([robot.finish is not None for robot in scene.robots], bool)
+    return np.where(must, len(scene.targets()) + np.cumsum(must) - 1, -1)
+
+
+def target_arrays(scene: Scene) -> Targets:
+    """Return goals, stations and finishes as the planner enters them."""
+    regions = planned_regions(scene)
+    shrunk = []
+    for region in regions:
+        corners = region.corners
+        if len(corners):
+            smaller = region.shape.buffer(-TARGET_MARGIN_M, join_style="mitre")
+            if not smaller.is_empty and smaller.geom_type == "Polygon":
+                corners = np.asarray(smaller.normalize().exterior.coords)[:-1][::-1]
+        shrunk.append(corners)
+    most = max([3, *(len(corners) for corners in shrunk)])
+    corner = np.zeros((len(regions), most, 2))
+    reach = np.zeros(len(regions))
+    for i, (region, corners) in enumerate(zip(regions, shrunk, strict=True)):
+        corner[i, : len(corners)] = corners
+        if len(corners):
+            reach[i] = np.hypot(*(corners - region.center).T).max()
+        else:
+            reach[i] = max(region.radius_m - TARGET_MARGIN_M, 0.5 * region.radius_m)
+    finishes = [robot.finish for robot in scene.robots]
+    return Targets(
+        goals=len(scene.goals),
+        places=len(scene.targets()),
+        finish=finish_of(scene),
+        heading=np.array([(f and f.heading_rad) or 0.0 for f in finishes]),
+        tolerance=np.array(
+            [
+                2.0 * np.pi
+                if f is None or f.heading_rad is None
+                else FINISH_SHARE * f.heading_tolerance_rad
+                for f in finishes
+            ]
+        ),
+        center=np.array([region.center for region in regions], float).reshape(-1, 2),
+        reach=reach,
+        corner=corner,
+        corners=np.array([len(corners) for corners in shrunk], np.int64),
+        dwell=_dwell_s(scene),
+        gate=_gates_of(scene),
+    )
+
+
+def _dwell_s(scene: Scene) -> np.ndarray:
+    """Return how long robots stay at each target [s], shape (T,)."""
+    dwell_s = np.zeros(len(planned_regions(scene)))
+    for t, target in enumerate(scene.targets()):
+        if target.dwell_s > 0.0:
+            dwell_s[t] = target.dwell_s + LONGER_S
+    return dwell_s
+
+
+def _exclusive(scene: Scene) -> list[Station]:
+    return [station for station in scene.stations if station.one_at_a_time]
+
+
+def _gates_of(scene: Scene) -> np.ndarray:
+    """Return each target's number among the gates, -1 for none, shape (T,)."""
+    gate = np.full(len(planned_regions(scene)), -1, np.int64)
+    numbers = {station.id: i for i, station in enumerate(_exclusive(scene))}
+    for t, target in enumerate(scene.targets()):
+        gate[t] = numbers.get(target.id, -1)
+    return gate
+
+
+def gate_arrays(scene: Scene) -> Gates:
+    """Return the stations for one robot at a time, a margin wider than they are."""
+    regions = [station.region for station in _exclusive(scene)]
+    outlines = []
+    for region in regions:
+        corners = region.corners
+        if len(corners):
+            wider = region.shape.buffer(GATE_MARGIN_M, join_style="mitre")
+            corners = np.asarray(wider.normalize().exterior.coords)[:-1][::-1]
+        outlines.append(corners)
+    corner = np.zeros((len(regions), max([3, *map(len, outlines)]), 2))
+    reach = np.zeros(len(regions))
+    for i, (region, corners) in enumerate(zip(regions, outlines, strict=True)):
+        corner[i, : len(corners)] = corners
+        reach[i] = region.radius_m + GATE_MARGIN_M
+        if len(corners):
+            reach[i] = np.hypot(*(corners - region.center).T).max()
+    return Gates(
+        center=np.array([region.center for region in regions], float).reshape(-1, 2),
+        reach=reach,
+        corner=corner,
+        corners=np.array([len(corners) for corners in outlines], np.int64),
+    )

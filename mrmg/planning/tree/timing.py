@@ -1,0 +1,88 @@
+"""How long legs take: what the router reckons with where time matters."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.energy import CONSUMERS_W
+from mrmg.planning.preference import Preference
+from mrmg.planning.roadmap.roadmap import Roadmap
+from mrmg.planning.tree.haste import way_lengths_m
+from mrmg.planning.tree.targets import finish_of
+from mrmg.scene.types import Scene
+
+TIE_SHARE = 0.01
+"""Worth of a second of driving, in seconds of makespan: among tours that are over as
+soon, those of less energy are better."""
+
+
+class Times(NamedTuple):
+    """The part of a routing problem that is about time; see `RoutingArrays`.
+
+    Attributes:
+        time: from place to target, with the dwell there [s], shape (R, T + 1, T).
+        finish_time: from place to finish [s], shape (R, T + 1).
+        limit: longest time of a route [s], shape (R,).
+        charge_power: at which batteries are filled [W], shape (R,).
+        energy_weight: of the summed energy in the objective.
+        makespan_weight: of the longest time of a route in the objective [J/s].
+    """
+
+    time: np.ndarray
+    finish_time: np.ndarray
+    limit: np.ndarray
+    charge_power: np.ndarray
+    energy_weight: float
+    makespan_weight: float
+
+
+def routing_times(
+    scene: Scene, roadmap: Roadmap, fleet: np.ndarray, dwell: np.ndarray, margin: float
+) -> Times | None:
+    """Return the times of a mission's legs, or None if time does not matter.
+
+    Robots drive the ways of the roadmap at the top speed that they are planned with.
+
+    Args:
+        scene: the mission.
+        roadmap: its roadmap.
+        fleet: records of FLEET, shape (R,).
+        dwell: how long robots stay at each target [s].
+        margin: surcharge on times, for what the roadmap does not see.
+    """
+    preference = Preference.of(scene)
+    if not preference.timed:
+        return None
+    places, robots = len(scene.targets()), len(fleet)
+    length = way_lengths_m(roadmap)
+    pace = (1.0 + margin) / fleet["limit"][:, 1]
+    time = np.zeros((robots, places + 1, places))
+    finish_time = np.zeros((robots, places + 1))
+    for r, finish in enumerate(finish_of(scene)):
+        field = fleet[r]["field"]
+        to = length[field][:, [*range(len(roadmap.targets)), len(roadmap.targets) + r]]
+        # Out of a region that reaches across a wall, another vertex knows the way.
+        to[:, :-1] = np.where(
+            np.isfinite(to[:, :-1]), to[:, :-1], roadmap.distance[field].T
+        )
+        here = [*range(places), -1]
+        time[r] = pace[r] * to[:places, here].T + dwell[:places]
+        if finish >= 0:
+            finish_time[r] = pace[r] * to[finish, here]
+    objective = preference.objective
+    power_W = float((fleet["plain"] * fleet["limit"][:, 1]).mean())
+    energy_weight = max(
+        objective.energy_weight, TIE_SHARE * objective.makespan_weight / power_W
+    )
+    # Of the size that the weights have where energy alone counts.
+    size = energy_weight + objective.makespan_weight
+    return Times(
+        time=time,
+        finish_time=finish_time,
+        limit=np.full(robots, preference.limit_s),
+        charge_power=fleet["charge"] - fleet["energy"][:, CONSUMERS_W],
+        energy_weight=energy_weight / size,
+        makespan_weight=objective.makespan_weight / size,
+    )

@@ -1,0 +1,301 @@
+"""Tours by arcs against brute force, ways between arcs against exact distances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import combinations, permutations, product
+
+import numpy as np
+import pytest
+
+from mrmg.planning.bound._touring_kernels import least_completions, touring_labels
+from mrmg.planning.bound.arcs import ArcWays
+from mrmg.planning.bound.bound import exact_routing, lower_bound_J
+from mrmg.planning.bound.geodesic import Ground, Ways
+from mrmg.planning.bound.touring import Completions, near_routing
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.planning.routing.routing import routing_arrays
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.types import Scene
+
+Mission = Callable[..., RoutingArrays]
+
+FIRST_GOAL = np.array([8.0, 10.0])
+SECOND_GOAL = np.array([24.0, 10.0])
+RADIUS_M = 2.0
+
+
+def legs(seed: int, robots: int, goals: int, stations: int, arcs: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    targets = goals + stations
+    return rng.uniform(5.0, 30.0, (robots, targets + 1, arcs, targets, arcs))
+
+
+def least_cost(leg: np.ndarray, goals: int, range_m: float) -> float:
+    """Return the cheapest tours' cost by trying all, with at most one recharge a leg.
+
+    Batteries are drained by the least leg, whatever the arcs.
+    """
+    robots, start = leg.shape[0], leg.shape[1] - 1
+    least = leg.min(axis=(2, 4))
+    least[:, start] = leg[:, start, 0].min(axis=-1)
+    best = math.inf
+    for order in permutations(range(goals)):
+        for cuts in combinations(range(goals + robots - 1), robots - 1):
+            ends = [-1, *cuts, goals + robots - 1]
+            own = [
+                order[low + 1 - r : high - r]
+                for r, (low, high) in enumerate(zip(ends, ends[1:], strict=False))
+            ]
+            cost = sum(
+                route_cost(leg[r], least[r], route, start, goals, range_m)
+                for r, route in enumerate(own)
+            )
+            best = min(best, cost)
+    return best
+
+
+def route_cost(
+    leg: np.ndarray,
+    least: np.ndarray,
+    route: tuple[int, ...],
+    start: int,
+    goals: int,
+    range_m: float,
+) -> float:
+    stations = range(goals, start)
+    best = math.inf
+    for stops in product((None, *stations), repeat=len(route)):
+        places = [
+            place
+            for stop, goal in zip(stops, route, strict=True)
+            for place in ((goal,) if stop is None else (stop, goal))
+        ]
+        left, here = range_m, start
+        cost = np.where(np.arange(leg.shape[1]) == 0, 0.0, np.inf)
+        for place in places:
+            left -= least[here, place]
+            if left < 0.0:
+                break
+            if place >= goals:
+                left = range_m
+            cost = (cost[:, None] + leg[here, :, place]).min(axis=0)
+            here = place
+        else:
+            best = min(best, float(cost.min()))
+    return best
+
+
+@pytest.mark.parametrize(
+    ("goals", "stations", "robots", "range_m"),
+    [(4, 0, 1, 1e9), (3, 1, 1, 40.0), (4, 0, 2, 50.0), (3, 2, 2, 25.0)],
+)
+def test_tours_by_arcs_are_the_cheapest(
+    goals: int, stations: int, robots: int, range_m: float
+) -> None:
+    for seed in range(8):
+        leg = legs(seed, robots, goals, stations, arcs=3)
+        # One station between two goals at most, as the oracle tries: make two dear.
+        leg[:, goals:-1, :, goals:] = 1e6
+        least = leg.min(axis=(2, 4))
+        least[:, -1] = leg[:, -1, 0].min(axis=-1)
+        problem = routing_arrays(
+            goals=goals,
+            distance=least[:, :-1],
+            start_distance=least[:, -1],
+            plain=np.ones(robots),
+            energy=np.full(robots, range_m),
+            capacity=np.full(robots, range_m),
+            reserve=np.zeros(robots),
+        )
+        free = np.zeros((robots, goals, goals))
+        after, before = least_completions(free, np.zeros((robots, goals)))
+        to_goal = np.zeros((robots, stations, goals))
+        exact = least_cost(leg, goals, range_m)
+        goal_list = np.arange(goals)
+        most = 1e4
+        found, _, trace = touring_labels(
+            problem, goal_list, leg, to_goal, after, before, most, 1_000_000
+        )
+        assert len(trace)
+        if exact <= most:
+            assert found == pytest.approx(exact)
+        else:
+            assert found == math.inf
+        below, _, _ = touring_labels(
+            problem, goal_list, leg, to_goal, after, before, 0.99 * exact, 1_000_000
+        )
+        assert below == math.inf, "nothing is cheaper than the cheapest"
+
+
+@pytest.mark.parametrize(
+    ("goals", "stations", "robots", "range_m"),
+    [(7, 2, 1, (150.0, 300.0)), (7, 2, 2, (120.0, 300.0)), (6, 0, 3, (300.0, 600.0))],
+)
+def test_tours_sought_among_near_ones_are_the_cheapest_of_all(
+    mission: Mission,
+    goals: int,
+    stations: int,
+    robots: int,
+    range_m: tuple[float, float],
+) -> None:
+    found = 0
+    for seed in range(25):
+        problem = mission(
+            seed, goals=goals, stations=stations, robots=robots, range_m=range_m
+        )
+        near = near_routing(problem, Completions.of(problem))
+        if near is None:
+            continue  # not near: `exact_routing` is asked
+        exact = exact_routing(problem)
+        assert exact is not None
+        assert near.cost_J == pytest.approx(exact.cost_J, rel=1e-12)
+        visited = [t for tour in near.tours for t in tour if t < goals]
+        assert sorted(visited) == list(range(goals))
+        found += 1
+    assert found >= 10, "too few tours are near to say anything"
+
+
+def test_a_goal_that_no_robot_reaches_makes_the_near_tours_infinite() -> None:
+    problem = routing_arrays(
+        goals=1,
+        distance=np.zeros((1, 1, 1)),
+        start_distance=np.array([[np.inf]]),
+        plain=np.ones(1),
+        energy=np.ones(1),
+        capacity=np.ones(1),
+        reserve=np.zeros(1),
+    )
+    near = near_routing(problem, Completions.of(problem))
+    assert near is not None
+    assert not near.feasible
+
+
+def field(**parts: object) -> Scene:
+    document = {
+        "format": 1,
+        "name": "field",
+        "bounds": [0, 0, 32, 20],
+        "goals": [
+            {"id": f"g{k}", "circle": {"center": list(center), "radius": RADIUS_M}}
+            for k, center in enumerate((FIRST_GOAL, SECOND_GOAL))
+        ],
+        "battery": {"capacity_m": 500},
+        "robots": [{"id": "r1", "model": "car", "pose": [2, 4, 0]}],
+        **parts,
+    }
+    return scene_from_document(document, source="field")
+
+
+def arc_ways(scene: Scene) -> ArcWays:
+    robot = scene.robots[0]
+    regions = [goal.region for goal in scene.goals]
+    starts = np.array([robot.pose[:2]])
+    ground, fine = (
+        Ground.of(scene, robot, cell_m=cell_m, step_m=0.2) for cell_m in (0.3, 0.1)
+    )
+    return ArcWays.of(Ways.of(ground, regions, starts), fine, starts)
+
+
+def border_points(center: np.ndarray, arc: int, arcs: int) -> np.ndarray:
+    angle = 2.0 * np.pi * (arc + np.linspace(0.0, 1.0, 9)) / arcs
+    return center + RADIUS_M * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+WALL = {"id": "w", "polygon": [[15, 6], [17, 6], [17, 20], [15, 20]], "height": 1}
+
+
+@pytest.mark.parametrize("walls", [0, 1])
+def test_no_way_between_arcs_is_shorter_than_its_bound(walls: int) -> None:
+    """Straight, or round a wall; the robot's disc reaches 0.3 m."""
+    ways = arc_ways(field(obstacles=[WALL] * walls))
+    before = ways.between.copy()
+    middle = ways.between.shape[1] // 2
+    waves = ways.waves(0, 0, 1, middle)
+    assert {(wave.source, wave.sink) for wave in waves} == {(0, 1), (1, 0)}
+    for wave in waves:
+        ways.take(wave, ways.certificate(wave))
+    assert not ways.waves(1, middle, 0, 0)
+    assert (ways.between >= before).all()
+    gained = 0.0
+    arcs = ways.between.shape[1]
+    for a, b in product(range(0, arcs, 3), repeat=2):
+        first = border_points(FIRST_GOAL, a, arcs)[:, None]
+        second = border_points(SECOND_GOAL, b, arcs)[None]
+        if walls:  # a way there is, clear of both corners
+            here, there = np.array([14.7, 5.7]), np.array([17.3, 5.7])
+            first, second = first[:, 0] - here, second[0] - there
+            exact = 2.6 + sum(
+                float(np.hypot(*part.T).min()) for part in (first, second)
+            )
+        else:
+            exact = float(np.hypot(*(first - second).transpose(2, 0, 1)).min())
+        assert ways.between[0, a, 1, b] <= exact + 1e-9
+        gained += float((ways.between - before)[0, a, 1, b])
+    assert gained > 0.0 or not walls
+
+
+def test_no_way_through_dear_ground_costs_less_than_its_bound() -> None:
+    """Ways through a strip are refracted: the cheapest one is found point by point."""
+    strip = {"id": "mud", "polygon": [[14, 0], [18, 0], [18, 20], [14, 20]]}
+    ways = arc_ways(field(terrain=[{**strip, "multiplier": 2.0}]))
+    arcs = ways.between.shape[1]
+    pairs = [(a, b) for a in (0, 4, 9) for b in (14, 16, 20)]
+    for a, b in pairs:
+        for wave in ways.waves(0, a, 1, b):
+            ways.take(wave, ways.certificate(wave))
+    y = np.linspace(6.0, 14.0, 801)
+    for a, b in pairs:
+        first = border_points(FIRST_GOAL, a, arcs)
+        second = border_points(SECOND_GOAL, b, arcs)
+        into = np.hypot(14.0 - first[:, :1], y - first[:, 1:]).min(axis=0)
+        out = np.hypot(second[:, :1] - 18.0, y - second[:, 1:]).min(axis=0)
+        across = into[:, None] + 2.0 * np.hypot(4.0, y[:, None] - y)
+        exact = float((across.min(axis=0) + out).min())
+        assert 0.95 * exact < ways.between[0, a, 1, b] <= exact + 1e-4
+
+
+def test_no_way_from_a_start_is_shorter_than_its_bound() -> None:
+    """The wall hides the second goal; what a wave from the start tells is nearly so."""
+    ways = arc_ways(field(obstacles=[WALL]))
+    (wave,) = ways.waves(-1, 0, 1, 0)
+    ways.take(wave, ways.certificate(wave))
+    assert not ways.waves(-1, 0, 1, 5)
+    arcs = ways.between.shape[1]
+    start, here, there = np.array([[2.0, 4.0], [14.7, 5.7], [17.3, 5.7]])
+    for arc in range(arcs):
+        last = border_points(SECOND_GOAL, arc, arcs) - there
+        exact = np.hypot(*(here - start)) + 2.6 + np.hypot(*last.T).min()
+        assert ways.from_start[0, 1, arc] <= exact + 1e-9
+        if last[:, 1].min() > 0.0 and last[:, 0].min() > 0.0:
+            assert ways.from_start[0, 1, arc] >= 0.97 * exact
+
+
+def test_touching_a_goal_beside_the_way_is_paid_for() -> None:
+    """Three goals at the corners of a triangle; each is entered and left by one arc."""
+    centers = np.array([[4.0, 4.0], [28.0, 4.0], [16.0, 16.0]])
+    goals = [
+        {"id": f"g{k}", "circle": {"center": center.tolist(), "radius": 1.5}}
+        for k, center in enumerate(centers)
+    ]
+    scene = field(
+        goals=goals, robots=[{"id": "r1", "model": "car", "pose": [16, 4, 0]}]
+    )
+    joules = scene.robots[0].model.energy_model.plain_ground_J_per_m()
+    coarse_m, touring_m = (
+        lower_bound_J(scene, rounds=rounds) / joules for rounds in (0, 20)
+    )
+    angle = np.linspace(0.0, 2.0 * np.pi, 721)
+    ring = 1.5 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    exact_m = math.inf
+    for order in permutations(range(3)):
+        cost, points = np.zeros(1), np.array([[16.0, 4.0]])
+        for k in order:
+            to = centers[k] + ring
+            leg = np.hypot(*(points[:, None] - to[None]).transpose(2, 0, 1))
+            cost, points = (cost[:, None] + leg).min(axis=0), to
+        exact_m = min(exact_m, float(cost.min()))
+    finer_m = lower_bound_J(scene, finer=7) / joules
+    assert coarse_m < touring_m <= finer_m <= exact_m + 1e-3
+    assert touring_m >= 0.97 * exact_m

@@ -1,0 +1,132 @@
+"""Placing the stations in a route against plain enumeration."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from mrmg.planning.routing._legs_kernels import new_legs
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.planning.routing._refuel_kernels import (
+    label_route,
+    new_labels,
+    row_of,
+    value_with,
+    write_tour,
+)
+from mrmg.planning.routing.routing import routing_arrays
+
+SLACK_J = 1e-6
+
+
+def refuelled(
+    problem: RoutingArrays, route: tuple[int, ...]
+) -> tuple[float, list[int]]:
+    """Return the cost of robot 0's route and its targets, stations included."""
+    legs = new_legs(problem)
+    labels = new_labels(legs)
+    goal = np.array(route, np.int64)
+    cost, _, label = label_route(legs, labels, 0, goal, len(route), 0, 0)
+    out = np.full(10 * len(route) + 10, -1, np.int64)
+    n = write_tour(legs, labels, 0, goal, len(route), label, out)
+    return cost, out[:n].tolist()
+
+
+@pytest.mark.parametrize(
+    ("goals", "stations"), [(1, 3), (2, 3), (3, 2), (3, 3), (5, 1)]
+)
+def test_stations_are_placed_as_enumeration_would(
+    mission: Callable,
+    replay: Callable,
+    insertions: Callable,
+    goals: int,
+    stations: int,
+) -> None:
+    outcomes = []
+    for seed in range(25):
+        problem = mission(seed, goals=goals, stations=stations, range_m=(50.0, 120.0))
+        route = tuple(range(goals))
+        exact = min(
+            (
+                replay(problem, 0, tour)[0]
+                for tour in insertions(route, range(goals, goals + stations), stations)
+                if replay(problem, 0, tour)[1] >= 0.0
+            ),
+            default=np.inf,
+        )
+        cost, tour = refuelled(problem, route)
+        if exact == np.inf:
+            assert cost == np.inf
+            assert tour == []
+            outcomes.append("impossible")
+            continue
+        assert cost == pytest.approx(exact)
+        driven, least = replay(problem, 0, tour)
+        assert driven == pytest.approx(exact)
+        assert least >= -SLACK_J
+        assert [t for t in tour if t < goals] == list(route)
+        outcomes.append("recharged" if len(tour) > goals else "direct")
+    assert len(set(outcomes)) >= 2, "more than one kind must be drawn"
+
+
+def test_a_route_of_no_goals_costs_nothing(mission: Callable) -> None:
+    assert refuelled(mission(0, goals=2, stations=1), ()) == (0.0, [])
+
+
+def test_a_larger_battery_never_costs_more(mission: Callable) -> None:
+    for seed in range(20):
+        problem = mission(seed, goals=5, stations=3, range_m=(60.0, 100.0))
+        route = (0, 1, 2, 3, 4)
+        costs = [
+            refuelled(problem._replace(capacity=problem.capacity * k), route)[0]
+            for k in (1.0, 1.2, 1.5, 2.0, 4.0)
+        ]
+        assert all(later <= earlier for earlier, later in itertools.pairwise(costs))
+
+
+def test_without_stations_a_route_is_drivable_or_not() -> None:
+    """Ten, then ten more joules: 25 suffice above a reserve of 5, 24 do not."""
+    for energy, expected in ((25.0, 20.0), (24.0, None)):
+        problem = routing_arrays(
+            goals=2,
+            distance=np.array([[[0.0, 10.0], [10.0, 0.0]]]),
+            start_distance=np.array([[10.0, 20.0]]),
+            plain=np.ones(1),
+            energy=np.array([energy]),
+            capacity=np.array([100.0]),
+            reserve=np.array([5.0]),
+        )
+        cost, tour = refuelled(problem, (0, 1))
+        if expected is None:
+            assert cost == np.inf
+        else:
+            assert (cost, tour) == (expected, [0, 1])
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_one_more_goal_is_worth_what_the_longer_route_costs(
+    mission: Callable, seed: int
+) -> None:
+    problem = mission(seed, goals=5, stations=3, range_m=(50.0, 120.0))
+    legs = new_legs(problem)
+    labels = new_labels(legs)
+    end = legs.cost.shape[1] - 1
+    route = (0, 1, 2, 3)
+    label_route(legs, labels, 0, np.array(route), len(route), 0, 0)
+    for place in range(len(route) + 1):
+        a = route[place - 1] if place > 0 else end
+        b = route[place] if place < len(route) else end
+        front = row_of(legs, 0, 0, place)
+        back = row_of(legs, 0, 1, len(route) - place)
+        cost, _ = refuelled(problem, (*route[:place], 4, *route[place:]))
+
+        def with_goal(ceiling: float, where: tuple = (front, a, 4, b, back)) -> float:
+            return value_with(legs, labels, 0, *where, 0.0, ceiling)
+
+        assert with_goal(np.inf) == pytest.approx(cost)
+        if cost < np.inf:
+            assert with_goal(cost + 1.0) == pytest.approx(cost)
+            assert with_goal(cost - 1.0) == np.inf
