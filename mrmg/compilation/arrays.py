@@ -62,7 +62,7 @@ def _define(function: Callable[..., Any]) -> None:
     most, kind_of = _KINDS[function]
 
     @infer_global(function)
-    class _Definition(AbstractTemplate):  # type: ignore[misc]
+    class _Definition(AbstractTemplate):
         key = function
         metadata = {"target": "cpu"}  # noqa: RUF012  (read by numba before its own)
 
@@ -98,15 +98,15 @@ def _fill(
     return array._getvalue()
 
 
-@lower_builtin(np.empty, types.Any)  # type: ignore[untyped-decorator]
-@lower_builtin(np.empty, types.Any, types.Any)  # type: ignore[untyped-decorator]
+@lower_builtin(np.empty, types.Any)
+@lower_builtin(np.empty, types.Any, types.Any)
 def _empty(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     array = _new(context, builder, sig.return_type, sig.args[0], args[0])
     return array._getvalue()
 
 
-@lower_builtin(np.zeros, types.Any)  # type: ignore[untyped-decorator]
-@lower_builtin(np.zeros, types.Any, types.Any)  # type: ignore[untyped-decorator]
+@lower_builtin(np.zeros, types.Any)
+@lower_builtin(np.zeros, types.Any, types.Any)
 def _zeros(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     array = _new(context, builder, sig.return_type, sig.args[0], args[0])
     size = builder.mul(array.itemsize, array.nitems)
@@ -114,8 +114,8 @@ def _zeros(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return array._getvalue()
 
 
-@lower_builtin(np.ones, types.Any)  # type: ignore[untyped-decorator]
-@lower_builtin(np.ones, types.Any, types.Any)  # type: ignore[untyped-decorator]
+@lower_builtin(np.ones, types.Any)
+@lower_builtin(np.ones, types.Any, types.Any)
 def _ones(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     kind = sig.return_type
     array = _new(context, builder, kind, sig.args[0], args[0])
@@ -124,8 +124,8 @@ def _ones(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _fill(context, builder, kind, array, lambda _: value)
 
 
-@lower_builtin(np.full, types.Any, types.Any)  # type: ignore[untyped-decorator]
-@lower_builtin(np.full, types.Any, types.Any, types.Any)  # type: ignore[untyped-decorator]
+@lower_builtin(np.full, types.Any, types.Any)
+@lower_builtin(np.full, types.Any, types.Any, types.Any)
 def _full(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     kind = sig.return_type
     array = _new(context, builder, kind, sig.args[0], args[0])
@@ -133,7 +133,7 @@ def _full(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return _fill(context, builder, kind, array, lambda _: value)
 
 
-@lower_builtin(np.arange, types.Any)  # type: ignore[untyped-decorator]
+@lower_builtin(np.arange, types.Any)
 def _arange(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     kind = sig.return_type
     zero = context.get_constant(types.int64, 0)
@@ -147,7 +147,7 @@ def refuse_shapes(given: Any, expected: Any) -> None:
     raise ValueError("an array is assigned to a part of another shape")
 
 
-@overload(refuse_shapes)  # type: ignore[untyped-decorator]
+@overload(refuse_shapes)
 def _refuse_shapes(given: Any, expected: Any) -> Any:
     return refuse_shapes
 

@@ -62,7 +62,7 @@ from numba.core import caching  # noqa: E402
 numba.core.config.reload_config()  # in case somebody imported numba before
 
 
-class KernelLocator(caching.UserProvidedCacheLocator):  # type: ignore[misc]
+class KernelLocator(caching.UserProvidedCacheLocator):
     """Finds compiled kernels by their place in the package and its sources' digest.
 
     numba goes by a file's full path and its date, which differ from copy to copy.

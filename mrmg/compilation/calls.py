@@ -152,7 +152,7 @@ class Kernel:
         return call
 
 
-@typeof_impl.register(Kernel)  # type: ignore[untyped-decorator]
+@typeof_impl.register(Kernel)
 def _type_of(kernel: Kernel, _: Any) -> Any:
     return cpu_target.typing_context.resolve_value_type(kernel.intrinsic)
 

@@ -14,7 +14,7 @@ from numba.extending import intrinsic
 _WORD, _HALF = ir.IntType(64), ir.IntType(32)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def _clock_ns(typing: Any) -> Any:
     """Call clock_gettime of the C library; return nanoseconds."""
 

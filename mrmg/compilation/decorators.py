@@ -39,7 +39,7 @@ def view(function: F) -> F:
 
     An array handed back by a function would have to be counted.
     """
-    return numba.njit(inline="always", error_model="numpy")(function)  # type: ignore[no-any-return]
+    return numba.njit(inline="always", error_model="numpy")(function)
 
 
 def _compiled(function: F, **options: bool) -> F:

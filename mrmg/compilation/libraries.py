@@ -23,7 +23,7 @@ _COUNTING = "NRT_incref"
 """What code calls that counts references."""
 
 
-class LateLibrary(codegen.JITCodeLibrary):  # type: ignore[misc]
+class LateLibrary(codegen.JITCodeLibrary):
     """The code of one function and of all that is linked into it.
 
     Attributes:
@@ -49,7 +49,7 @@ class LateLibrary(codegen.JITCodeLibrary):  # type: ignore[misc]
             return self.name, "bitcode", self._get_module_for_linking().as_bitcode()
         self._ensure_finalized()
         self._emit()
-        return super().serialize_using_object_code()  # type: ignore[no-any-return]
+        return super().serialize_using_object_code()
 
     def _emit(self) -> None:
         if self._emitted:

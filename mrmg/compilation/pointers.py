@@ -36,7 +36,7 @@ _CLASSES: set[type] = set()
 """What is passed by pointer."""
 
 
-class ByPointer(types.Type):  # type: ignore[misc]
+class ByPointer(types.Type):
     """A named tuple that lies in memory and does not change.
 
     Args:
@@ -56,7 +56,7 @@ class ByPointer(types.Type):  # type: ignore[misc]
 
 
 @register_model(ByPointer)
-class _Model(models.PrimitiveModel):  # type: ignore[misc]
+class _Model(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: ByPointer) -> None:
         pointee = manager.lookup(kind.pointee).get_value_type()
         super().__init__(manager, kind, pointee.as_pointer())
@@ -70,7 +70,7 @@ def by_pointer(cls: C) -> C:
     """
     _CLASSES.add(cls)
 
-    @typeof_impl.register(cls)  # type: ignore[untyped-decorator]
+    @typeof_impl.register(cls)
     def _type_of(value: Any, context: Any) -> ByPointer | None:
         kinds = [typeof_impl(field, context) for field in value]
         return None if None in kinds else ByPointer(types.NamedTuple(kinds, cls))
@@ -91,7 +91,7 @@ def lend(builder: Any, kind: Any, value: Any) -> Any:
     return _opaque(builder, cgutils.alloca_once_value(builder, value))
 
 
-@unbox(ByPointer)  # type: ignore[untyped-decorator]
+@unbox(ByPointer)
 def _unbox(kind: ByPointer, value: Any, c: Any) -> Any:
     given = c.unbox(kind.pointee, value)
     place = cgutils.alloca_once_value(c.builder, given.value)
@@ -105,7 +105,7 @@ def _unbox(kind: ByPointer, value: Any, c: Any) -> Any:
     return NativeValue(_opaque(c.builder, place), given.is_error, cleanup)
 
 
-@box(ByPointer)  # type: ignore[untyped-decorator]
+@box(ByPointer)
 def _box(kind: ByPointer, pointer: Any, c: Any) -> Any:
     """Return to Python the arrays that came from there, by the objects they are."""
     value = _borrowed(c.context, c.builder, kind.pointee, pointer, ("parent", *_PARTS))
@@ -122,7 +122,7 @@ def _opaque(builder: Any, place: Any) -> Any:
 
 
 @infer_getattr
-class _Attributes(AttributeTemplate):  # type: ignore[misc]
+class _Attributes(AttributeTemplate):
     key = ByPointer
 
     def generic_resolve(self, kind: ByPointer, name: str) -> Any:
@@ -132,7 +132,7 @@ class _Attributes(AttributeTemplate):  # type: ignore[misc]
         return kind.pointee.types[kind.pointee.fields.index(name)]
 
 
-@lower_getattr_generic(ByPointer)  # type: ignore[untyped-decorator]
+@lower_getattr_generic(ByPointer)
 def _field(context: Any, builder: Any, kind: ByPointer, value: Any, name: str) -> Any:
     index = kind.pointee.fields.index(name)
     place = cgutils.gep_inbounds(builder, value, 0, index)

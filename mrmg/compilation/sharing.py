@@ -57,7 +57,7 @@ class _Surroundings:
         return known
 
 
-class _Form(caching.CompileResultCacheImpl):  # type: ignore[misc]
+class _Form(caching.CompileResultCacheImpl):
     """How a compiled function is kept: as numba does, but for its surroundings."""
 
     def reduce(self, compiled: Any) -> Any:
@@ -75,7 +75,7 @@ class _Form(caching.CompileResultCacheImpl):  # type: ignore[misc]
         )
 
 
-class KernelCache(caching.FunctionCache):  # type: ignore[misc]
+class KernelCache(caching.FunctionCache):
     """Keeps the compiled forms of one function.
 
     Args:
