@@ -16,6 +16,7 @@ from mrmg import seeding
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.roadmap.roadmap import build_roadmap
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.planning.routing.routing import routing_arrays
 from mrmg.planning.tree.motion_tree import Problem, state_problem
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
@@ -198,3 +199,18 @@ def yard() -> Callable[..., Scene]:
 def state() -> Callable[..., Problem]:
     """Return the maker of planning problems."""
     return state_scene
+
+
+@pytest.fixture
+def chain() -> RoutingArrays:
+    """Five stations on a line, 10 m apart, with a battery for 11 m."""
+    x = np.array([60.0, 10.0, 20.0, 30.0, 40.0, 50.0])
+    return routing_arrays(
+        goals=1,
+        distance=np.abs(x[:, None] - x)[None],
+        start_distance=x[None],
+        plain=np.ones(1),
+        energy=np.array([11.0]),
+        capacity=np.array([11.0]),
+        reserve=np.zeros(1),
+    )

@@ -312,19 +312,8 @@ def test_exact_tours_return_to_the_start() -> None:
     assert feasible >= 3
 
 
-def test_any_number_of_stations_may_stand_in_a_row() -> None:
-    """Five stations on a line, 10 m apart, with a battery for 11 m."""
-    x = np.array([60.0, 10.0, 20.0, 30.0, 40.0, 50.0])
-    problem = routing_arrays(
-        goals=1,
-        distance=np.abs(x[:, None] - x)[None],
-        start_distance=x[None],
-        plain=np.ones(1),
-        energy=np.array([11.0]),
-        capacity=np.array([11.0]),
-        reserve=np.zeros(1),
-    )
-    routing = route(problem, RouterParams(), 0)
+def test_any_number_of_stations_may_stand_in_a_row(chain: RoutingArrays) -> None:
+    routing = route(chain, RouterParams(), 0)
     assert routing == Routing(((1, 2, 3, 4, 5, 0),), 60.0)
 
 

@@ -104,21 +104,12 @@ def test_costs_need_not_be_a_metric(oracle: Oracle) -> None:
         assert routing.cost_J == pytest.approx(oracle(problem))
 
 
-def test_a_chain_of_stations_is_driven_in_order(replay: Replay) -> None:
-    """Five stations on a line, 10 m apart, with a battery for 11 m."""
-    x = np.array([60.0, 10.0, 20.0, 30.0, 40.0, 50.0])
-    problem = routing_arrays(
-        goals=1,
-        distance=np.abs(x[:, None] - x)[None],
-        start_distance=x[None],
-        plain=np.ones(1),
-        energy=np.array([11.0]),
-        capacity=np.array([11.0]),
-        reserve=np.zeros(1),
-    )
-    routing = exact_routing(problem)
+def test_a_chain_of_stations_is_driven_in_order(
+    chain: RoutingArrays, replay: Replay
+) -> None:
+    routing = exact_routing(chain)
     assert routing == Routing(((1, 2, 3, 4, 5, 0),), 60.0)
-    assert replay(problem, 0, routing.tours[0])[1] >= 0.0
+    assert replay(chain, 0, routing.tours[0])[1] >= 0.0
 
 
 def test_only_open_goals_are_visited(mission: Mission, oracle: Oracle) -> None:
