@@ -34,13 +34,25 @@ class UsageError(MrmgError):
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault of a file: where it is, what is wrong, and what is allowed."""
+    """One fault of a file: where it is, what is wrong, and what is allowed.
+
+    Attributes:
+        path: keys and indices that lead to it, such as "goals.9.circle.radius".
+        message: what is wrong, and what is allowed.
+        id: of the entry it is in, where that has one.
+        line: of the file, counted from 1; None for a document that is no file.
+    """
 
     path: str
     message: str
+    id: str | None = None
+    line: int | None = None
 
     def __str__(self) -> str:
-        return f"{self.path}: {self.message}" if self.path else self.message
+        place = f"{self.path} ({self.id})" if self.id else self.path
+        lines = [] if self.line is None else [f"line {self.line}"]
+        where = ", ".join([*filter(None, [place]), *lines])
+        return f"{where}: {self.message}" if where else self.message
 
 
 class FileError(MrmgError):

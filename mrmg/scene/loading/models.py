@@ -19,6 +19,7 @@ from mrmg import shipped, storage
 from mrmg.energy import EnergyPreset
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.loading.faults import faults_of, nearest
+from mrmg.scene.loading.places import lines_of
 from mrmg.scene.loading.schema import Positive, Ring, Strict
 from mrmg.scene.loading.yaml_text import read_yaml
 from mrmg.scene.robot_model import Limits, RobotModel
@@ -110,7 +111,12 @@ def load_model(
     Raises:
         SceneError: naming every fault of its `robot.yaml`.
     """
-    source = source or str(folder / "robot.yaml")
+    path = folder / "robot.yaml"
+    with lines_of(path):
+        return _checked_model(folder, source or str(path))
+
+
+def _checked_model(folder: Path, source: str) -> tuple[RobotModel, dict[str, Any]]:
     document = read_yaml(folder / "robot.yaml", source=source)
     try:
         entry = ModelDocument.model_validate(document)

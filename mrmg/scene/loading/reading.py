@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from mrmg import shipped
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.loading.assembly import Assembly
 from mrmg.scene.loading.faults import faults_of, nearest, shown
+from mrmg.scene.loading.places import id_at, lines_of
 from mrmg.scene.loading.schema import SCENE_FORMAT, SceneDocument
 from mrmg.scene.loading.yaml_text import dump_yaml, read_yaml
 from mrmg.scene.types import Scene
@@ -30,7 +32,8 @@ def load_scene(source: str | Path) -> Scene:
     document = read_yaml(path, source=str(source))
     if isinstance(document, dict):
         document.setdefault("name", path.stem)
-    return scene_from_document(document, source=str(source), base=path.parent)
+    with lines_of(path):
+        return scene_from_document(document, source=str(source), base=path.parent)
 
 
 def scene_from_document(
@@ -56,7 +59,8 @@ def scene_from_document(
     assembly = Assembly(document, base)
     faults += assembly.faults
     if faults:
-        raise SceneError(source, sorted(faults, key=_place_in(document)))
+        named = [replace(fault, id=id_at(document, fault.path)) for fault in faults]
+        raise SceneError(source, sorted(named, key=_place_in(document)))
     return assembly.scene()
 
 
@@ -100,6 +104,6 @@ def _place_in(document: dict[str, Any]) -> Callable[[Fault], tuple[int, int]]:
     def place(fault: Fault) -> tuple[int, int]:
         section, _, rest = fault.path.partition(".")
         entry = rest.partition(".")[0]
-        return order.get(section, -1), int(entry) if entry.isdigit() else -1
+        return order.get(section, -1), int(entry) if entry.isdecimal() else -1
 
     return place

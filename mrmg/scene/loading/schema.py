@@ -90,9 +90,8 @@ SCENE_FORMAT = 1
 Number = Annotated[float, Field(allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Identifier = Annotated[
-    str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$", max_length=64)
-]
+ID_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$"
+Identifier = Annotated[str, Field(pattern=ID_PATTERN, max_length=64)]
 Point = Annotated[
     list[Number], Field(min_length=2, max_length=2, description="[x, y] in m")
 ]

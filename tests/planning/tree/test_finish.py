@@ -78,7 +78,7 @@ def test_a_plan_that_ends_elsewhere_is_refused(yard: MakeScene) -> None:
 
 
 def test_a_car_cannot_be_given_a_heading(yard: MakeScene) -> None:
-    with pytest.raises(SceneError, match="finish.heading: a car cannot be given one"):
+    with pytest.raises(SceneError, match=r"heading \(r1\): a car cannot be given one"):
         yard(robots=[robot("r1", 4, 10, finish=disc(9, 9, 1, heading=1.0))])
 
 

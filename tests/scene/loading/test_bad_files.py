@@ -54,5 +54,7 @@ def test_mjcf_must_exist(tmp_path: Path) -> None:
         "format: 1\nbounds: [0, 0, 9, 9]\n"
         "robots: [{id: r, model: ./, pose: [3, 3, 0]}]\n"
     )
-    with pytest.raises(SceneError, match=r"mjcf: got 'car.xml'; no such file"):
+    with pytest.raises(
+        SceneError, match=r"mjcf, line \d+: got 'car.xml'; no such file"
+    ):
         load_scene(scene)

@@ -34,7 +34,8 @@ def test_a_station_must_give_more_than_the_robot_draws(
 
     assert load_scene(written(8.1)).robots[0].battery.charging_power_W == 8.1
     where = r"robots\.0\.battery" if own else "battery"
+    place = r" \(r\), line 3" if own else ", line 4"
     with pytest.raises(
-        SceneError, match=rf"{where}\.charging_power: got 8 W; r itself"
+        SceneError, match=rf"{where}\.charging_power{place}: got 8 W; r itself"
     ):
         load_scene(written(8.0))
