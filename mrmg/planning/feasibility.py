@@ -7,7 +7,10 @@ at all. What is impossible then is impossible.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -15,7 +18,7 @@ import shapely
 from shapely.geometry import Point, Polygon, box
 
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
-from mrmg.scene.types import Goal, Region, Robot, Scene
+from mrmg.scene.types import Region, Robot, Scene
 
 
 def proof_of_infeasibility(scene: Scene) -> str | None:
@@ -26,26 +29,96 @@ def proof_of_infeasibility(scene: Scene) -> str | None:
 
 def impossible_goals(scene: Scene) -> dict[str, str]:
     """Return the goals that no robot can visit, each with the proof's sentence."""
-    proofs = [_Reach.of(scene, robot) for robot in scene.robots]
-    reasons = {goal.id: _why_impossible(goal, proofs) for goal in scene.goals}
-    return {name: reason for name, reason in reasons.items() if reason}
+    reaches = _reaches(scene)
+    return _cut_off(scene, reaches) | _out_of_energy(scene, reaches)
 
 
-def _why_impossible(goal: Goal, proofs: list[_Reach]) -> str:
-    connected = [reach for reach in proofs if reach.is_connected(goal.region)]
-    if not connected:
-        return (
-            f"goal {goal.id} is unreachable: for every robot it is cut off from "
-            "the start by obstacles with no gap as wide as the robot"
-        )
-    missing_J = min(reach.missing_energy_J(goal.region) for reach in connected)
-    if missing_J > 0.0:
-        return (
-            f"goal {goal.id} is out of energy's reach: even on the shortest way, "
-            "over every station that can be reached, each robot that can get there "
-            f"lacks at least {missing_J:.0f} J above its reserve"
-        )
-    return ""
+def energy_warnings(scene: Scene) -> list[str]:
+    """Return sentences on the goals that batteries are known not to reach.
+
+    A goal is out of a battery's reach if the robot cannot even drive there on the
+    shortest path, recharging at any station it can reach. Goals that no robot reaches
+    make a mission infeasible; they come first.
+    """
+    reaches = _reaches(scene)
+    nobodys = _out_of_energy(scene, reaches)
+    warnings = list(nobodys.values())
+    for reach in reaches:
+        missing = {
+            goal.id: reach.missing_energy_J(goal.region)
+            for goal in scene.goals
+            if goal.id not in nobodys and reach.is_connected(goal.region)
+        }
+        far = [name for name, missing_J in missing.items() if missing_J > 0.0]
+        if far:
+            most = energy_and_metres(max(missing.values()), reach.robot)
+            warnings.append(
+                f"{reach.robot.id} cannot reach {_listed(far)} with its battery, even "
+                f"on the shortest way over every station: it lacks up to {most} above "
+                "its reserve; other robots can"
+            )
+    return warnings
+
+
+def mission_warnings(scene: Scene) -> list[str]:
+    """Return what is known to keep a mission from being done, before it is planned.
+
+    That is which goals and finishes are cut off, which finishes crowd each other, and
+    the warnings of `energy_warnings`.
+    """
+    cut_off = _cut_off(scene, _reaches(scene)).values()
+    finishes = [_unreachable_finish(scene), _crowded_finish(scene)]
+    return [*cut_off, *filter(None, finishes), *energy_warnings(scene)]
+
+
+def energy_and_metres(energy_J: float, robot: Robot) -> str:
+    """Return an energy in words, for one robot in metres of plain ground, too."""
+    metres = energy_J / robot.model.energy_model.plain_ground_J_per_m()
+    return f"{energy_J:.0f} J ({metres:.1f} m of plain ground)"
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Return names in words, the first ones of many."""
+    more = len(names) - _LISTED
+    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
+_LISTED = 8
+"""Names that a sentence lists at most."""
+
+
+def _reaches(scene: Scene) -> list[_Reach]:
+    return [_Reach.of(scene, robot) for robot in scene.robots]
+
+
+def _cut_off(scene: Scene, reaches: Sequence[_Reach]) -> dict[str, str]:
+    """Return the goals that no robot of a fleet gets into, as far as obstacles go."""
+    return {
+        goal.id: f"goal {goal.id} is unreachable: for every robot it is cut off from "
+        "the start by obstacles with no gap as wide as the robot"
+        for goal in scene.goals
+        if reaches and not any(reach.is_connected(goal.region) for reach in reaches)
+    }
+
+
+def _out_of_energy(scene: Scene, reaches: Sequence[_Reach]) -> dict[str, str]:
+    """Return the goals that are not cut off, but out of every battery's reach."""
+    found = {}
+    for goal in scene.goals:
+        missing_J, robot = math.inf, None
+        for reach in reaches:
+            if reach.is_connected(goal.region) and missing_J > 0.0:
+                own_J = reach.missing_energy_J(goal.region)
+                if own_J < missing_J:
+                    missing_J, robot = own_J, reach.robot
+        if robot is not None and missing_J > 0.0:
+            least = energy_and_metres(missing_J, robot)
+            found[goal.id] = (
+                f"goal {goal.id} is out of energy's reach: even on the shortest way, "
+                "over every station that can be reached, each robot that can get there "
+                f"lacks at least {least} above its reserve"
+            )
+    return found
 
 
 def _unreachable_finish(scene: Scene) -> str | None:
@@ -98,7 +171,7 @@ class _Reach:
         free: where the centre of a disc inside the robot may be, the part joined to
             the start.
         offset_m: distance of the disc's centre from the reference point.
-        blocked: obstacles the reference point cannot enter.
+        walls: obstacles the reference point cannot enter.
         left_J: energy above the reserve with which the robot can leave each place it
             can recharge at, and the start, at best: (region, energy).
     """
@@ -107,7 +180,7 @@ class _Reach:
     robot: Robot
     free: shapely.Geometry
     offset_m: float
-    blocked: shapely.Geometry
+    walls: Walls
     left_J: tuple[tuple[Region | Point, float], ...]
 
     @staticmethod
@@ -132,7 +205,7 @@ class _Reach:
             robot=robot,
             free=shapely.union_all(parts),
             offset_m=float(np.hypot(*centre)),
-            blocked=obstacles,
+            walls=Walls.of(obstacles),
             left_J=(),
         )
         return reach._with_stations()
@@ -150,7 +223,9 @@ class _Reach:
 
     def _with_stations(self) -> _Reach:
         battery = self.robot.battery
-        full_J = battery.capacity_J - battery.reserve_J
+        # Robots may pass through a station at speed, and roll on from there.
+        kinetic_J = self.robot.model.top_kinetic_J
+        full_J = battery.capacity_J - battery.reserve_J + kinetic_J
         start = (Point(*self.robot.pose[:2]), battery.start_J - battery.reserve_J)
         reached: list[tuple[Region | Point, float]] = [start]
         waiting = [s for s in self.scene.stations if self.is_connected(s.region)]
@@ -164,7 +239,7 @@ class _Reach:
             robot=self.robot,
             free=self.free,
             offset_m=self.offset_m,
-            blocked=self.blocked,
+            walls=self.walls,
             left_J=tuple(reached),
         )
 
@@ -176,12 +251,32 @@ class _Reach:
         end = _whole(region)
         _, high_m = height_span_m(self.scene, self.robot, start)
         low_m, _ = height_span_m(self.scene, self.robot, end)
-        way_J = joules * shortest_way_m(start, end, self.blocked)
+        way_J = joules * shortest_way_m(start, end, self.walls)
         return way_J + climb_J(self.robot, low_m - high_m)
 
 
+@dataclass(frozen=True)
+class Walls:
+    """Obstacles as shortest ways meet them.
+
+    Attributes:
+        core: their inside, prepared for many lines.
+        corners: the points of their outlines.
+    """
+
+    core: shapely.Geometry
+    corners: np.ndarray
+
+    @staticmethod
+    def of(blocked: shapely.Geometry) -> Walls:
+        """Return the walls that obstacles are."""
+        core = shapely.buffer(blocked, -1e-6)
+        shapely.prepare(core)
+        return Walls(core, shapely.points(shapely.get_coordinates(blocked)))
+
+
 def shortest_way_m(
-    start: shapely.Geometry, end: shapely.Geometry, blocked: shapely.Geometry
+    start: shapely.Geometry, end: shapely.Geometry, walls: Walls
 ) -> float:
     """Return a lower bound of the shortest way between two convex sets [m].
 
@@ -190,13 +285,27 @@ def shortest_way_m(
     """
     straight = float(start.distance(end))
     line = shapely.shortest_line(start, end)
-    if not line.intersects(shapely.buffer(blocked, -1e-6)):
+    if not line.intersects(walls.core):
         return straight
-    corners = shapely.points(shapely.get_coordinates(blocked))
-    by_corner = shapely.distance(corners, start) + shapely.distance(corners, end)
+    to_start, to_end = (shapely.distance(walls.corners, one) for one in (start, end))
+    by_corner = to_start + to_end
     return max(straight, float(by_corner.min()))
 
 
 def _whole(region: Region) -> shapely.Geometry:
-    """Return a polygon that holds the region; circles are drawn from within."""
-    return region.shape.buffer(0.002 * region.radius_m)
+    """Return a polygon that holds the region; a circle's is drawn about it."""
+    if len(region.corners):
+        return region.shape
+    return _circumscribed(*region.center, region.radius_m)
+
+
+@lru_cache(maxsize=1024)
+def _circumscribed(x: float, y: float, radius_m: float) -> shapely.Geometry:
+    """Return the regular polygon whose sides touch a circle from outside."""
+    angle = np.linspace(0.0, 2.0 * np.pi, _SIDES, endpoint=False)
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return Polygon(ring * (radius_m / np.cos(np.pi / _SIDES)) + (x, y))
+
+
+_SIDES = 32
+"""Sides of the polygons that hold circles: 0.5 % of the radius looser than circles."""

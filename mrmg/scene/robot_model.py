@@ -142,6 +142,18 @@ class RobotModel:
         return full.with_preset(self.energy_preset)
 
     @property
+    def top_speed_m_s(self) -> float:
+        """Speed that the robot exceeds in neither direction."""
+        return max(self.limits.v_max_m_s, -self.limits.v_min_m_s)
+
+    @property
+    def top_kinetic_J(self) -> float:
+        """Battery energy that the robot's motion at top speed is worth at most."""
+        energy = self.energy_model
+        kinetic_J = 0.5 * energy.effective_mass_kg * self.top_speed_m_s**2
+        return kinetic_J / energy.drive_efficiency
+
+    @property
     def usable_grip(self) -> float:
         """Force the driven axle may transmit, as a share of the weight."""
         return GRIP_SHARE * DRIVEN_LOAD_SHARE * self.friction_coefficient

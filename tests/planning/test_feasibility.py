@@ -13,13 +13,21 @@ import pytest
 import shapely
 
 import mrmg
-from mrmg.planning.feasibility import proof_of_infeasibility, shortest_way_m
+from mrmg.accounting import find_visits, plan_ledger
+from mrmg.mission import Plan, Trajectory
+from mrmg.planning.feasibility import (
+    Walls,
+    energy_warnings,
+    mission_warnings,
+    proof_of_infeasibility,
+    shortest_way_m,
+)
 from mrmg.scene.types import Scene
 from mrmg.shipped import scene_names
 
 SCENES = Path(__file__).parents[1] / "scenes"
 CAR_WIDTH_M = 1.1
-NOTHING = shapely.MultiPolygon()
+NOTHING = Walls.of(shapely.MultiPolygon())
 
 MakeScene = Callable[..., Scene]
 
@@ -248,13 +256,86 @@ def test_of_the_edge_scenes_two_are_proven_infeasible(path: Path) -> None:
         assert proof is None
 
 
+def test_a_robot_may_pass_through_a_station_at_speed(yard: MakeScene) -> None:
+    """It rolls out over the last metres: 4 m for nothing, and a valid plan."""
+    usable_m = 67.8
+    early = [circle("early", 34, 10)]
+    robots = [car("r1", 4, 10)]
+    scene = long_scene(yard, usable_m / 0.9, early, robots=robots)
+    robot = scene.robots[0]
+    rolling_m_s2 = robot.model.energy_model.rolling_force_N
+    rolling_m_s2 /= robot.model.effective_mass_kg
+    control = np.zeros((700, 2))
+    state = np.zeros((len(control) + 1, 5))
+    state[0, :2] = 4, 10
+    for k in range(len(control)):
+        left_m, speed_m_s = 104.0 - state[k, 0], state[k, 3]
+        rolls_out = left_m <= speed_m_s**2 / (2.0 * rolling_m_s2)
+        change = -rolling_m_s2 if rolls_out else 1.5
+        control[k, 0] = 10.0 * (np.clip(speed_m_s + 0.1 * change, 0, 2) - speed_m_s)
+        state[k + 1] = state[k]
+        state[k + 1, 3] += 0.1 * control[k, 0]
+        state[k + 1, 0] += 0.05 * (state[k, 3] + state[k + 1, 3])
+    trajectory = Trajectory(robot="r1", dt_s=0.1, state=state, control=control)
+    visits = find_visits(scene, trajectory, ("early", "far"))
+    plan = Plan(
+        scene_name=scene.name,
+        scene_digest=scene.digest,
+        seed=0,
+        profile="",
+        parameters_digest="",
+        versions={},
+        dt_s=0.1,
+        trajectories=(trajectory,),
+        tours={"r1": ("early", "far")},
+        visits=visits,
+        ledger=plan_ledger(scene, [trajectory], visits),
+    )
+    assert [one.message for one in mrmg.verify(scene, plan).violations] == []
+    assert proof_of_infeasibility(scene) is None
+
+
+# --- warnings before anything is planned ---------------------------------------------
+
+
+def test_a_goal_that_no_battery_reaches_is_warned_of_with_what_is_missing(
+    yard: MakeScene,
+) -> None:
+    scene = long_scene(yard, 100.0, [])
+    (warning,) = energy_warnings(scene)
+    assert warning == proof_of_infeasibility(scene)
+    assert "(10.0 m of plain ground)" in warning
+    assert energy_warnings(long_scene(yard, 112.0, [])) == []
+
+
+def test_one_robots_battery_is_warned_of_by_name(yard: MakeScene) -> None:
+    robots = [car("r1", 4, 6), car("r2", 80, 14)]
+    (warning,) = energy_warnings(long_scene(yard, 60.0, [], robots=robots))
+    assert warning.startswith("r1 cannot reach far with its battery")
+
+
+@pytest.mark.parametrize("name", ["quickstart", "scene1", "mixed", "hills", "scene4"])
+def test_shipped_scenes_give_no_warnings(name: str) -> None:
+    assert mission_warnings(mrmg.load_scene(name)) == []
+
+
+def test_missions_are_warned_of_all_that_is_cut_off(yard: MakeScene) -> None:
+    goals = [circle("free", 26, 10), circle("caged", 16, 10)]
+    robots = [car("r1", 4, 10, **finish(16, 10))]
+    scene = yard(obstacles=[RING], goals=goals, robots=robots)
+    cut_off, finishes = mission_warnings(scene)
+    assert "caged is unreachable" in cut_off
+    assert "finish of r1 is unreachable" in finishes
+    assert mission_warnings(yard(robots=[])) == []
+
+
 # --- shortest ways -----------------------------------------------------------------
 
 
 def test_with_nothing_in_the_way_it_is_the_distance() -> None:
     a, b = shapely.Point(0, 0), shapely.Point(3, 4).buffer(1.0)
     assert shortest_way_m(a, b, NOTHING) == pytest.approx(4.0, abs=0.01)
-    assert shortest_way_m(a, b, shapely.box(5, 5, 6, 6)) == a.distance(b)
+    assert shortest_way_m(a, b, Walls.of(shapely.box(5, 5, 6, 6))) == a.distance(b)
     assert shortest_way_m(b, b, NOTHING) == 0.0
 
 
@@ -280,19 +361,24 @@ def test_it_is_between_the_distance_and_the_true_way_round_obstacles(
     blocked: shapely.Geometry,
     exact_m: float,
 ) -> None:
-    way = shortest_way_m(shapely.Point(start), shapely.Point(end), blocked)
+    way = shortest_way_m(shapely.Point(start), shapely.Point(end), Walls.of(blocked))
     straight = hypot(end[0] - start[0], end[1] - start[1])
     assert straight - 1e-9 <= way <= exact_m + 1e-9
 
 
 def test_round_one_corner_it_is_exact() -> None:
-    way = shortest_way_m(shapely.Point(-2, 0.5), shapely.Point(0.5, 1.5), SQUARE)
+    way = shortest_way_m(
+        shapely.Point(-2, 0.5), shapely.Point(0.5, 1.5), Walls.of(SQUARE)
+    )
     assert way == pytest.approx(hypot(1, 0.5) + hypot(1.5, 0.5))
 
 
 def test_many_corners_fall_back_on_the_straight_distance() -> None:
     rough = shapely.Point(0, 0).buffer(1.0, quad_segs=200)
-    assert shortest_way_m(shapely.Point(-2, 0), shapely.Point(2, 0), rough) == 4.0
+    assert (
+        shortest_way_m(shapely.Point(-2, 0), shapely.Point(2, 0), Walls.of(rough))
+        == 4.0
+    )
 
 
 GRID_M = 0.25
@@ -364,7 +450,7 @@ def test_it_is_never_longer_than_a_way_on_a_fine_grid(
         if shapely.intersects(blocked, ends).any() or hypot(*(start - end)) < 8.0:
             continue
         on_grid = grid_way_m(tuple(start), tuple(end), blocked)
-        way = shortest_way_m(*ends, blocked)
+        way = shortest_way_m(*ends, Walls.of(blocked))
         assert way <= on_grid + 1e-9
         assert way >= np.hypot(*(start - end)) - 1e-9
         compared += 1
@@ -372,7 +458,7 @@ def test_it_is_never_longer_than_a_way_on_a_fine_grid(
 
 def test_between_regions_it_is_no_longer_than_between_their_points() -> None:
     rng = np.random.default_rng(4)
-    wall = shapely.box(9, 3, 11, 17)
+    wall = Walls.of(shapely.box(9, 3, 11, 17))
     for _ in range(40):
         a = shapely.Point(rng.uniform((1, 1), (6, 19))).buffer(rng.uniform(0.5, 2.5))
         b = shapely.Point(rng.uniform((14, 1), (19, 19))).buffer(rng.uniform(0.5, 2.5))

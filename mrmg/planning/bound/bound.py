@@ -251,7 +251,7 @@ class Relaxation:
         batteries = [robot.battery for robot in scene.robots]
         descents = [_descents_J(scene, robot) for robot in scene.robots]
         capacity_J = [
-            robot.battery.capacity_J + _most_kinetic_J(robot) + from_top_J
+            robot.battery.capacity_J + robot.model.top_kinetic_J + from_top_J
             for robot, (_, from_top_J) in zip(scene.robots, descents, strict=True)
         ]
         energy_J = [
@@ -292,7 +292,7 @@ def _starts(scene: Scene) -> np.ndarray:
 
 
 def _ground(scene: Scene, robot: Robot, cell_m: float, step_s: float) -> Ground:
-    step_m = top_speed_m_s(robot) * step_s
+    step_m = robot.model.top_speed_m_s * step_s
     return Ground.of(scene, robot, cell_m=cell_m, step_m=step_m)
 
 
@@ -323,18 +323,7 @@ def _descents_J(scene: Scene, robot: Robot) -> tuple[float, float]:
 def _travel_key(scene: Scene, robot: Robot) -> TravelKey:
     """Return what the ways of a robot depend on."""
     obstacles = tuple(o.id for o in scene.obstacles if o.stops(robot.id))
-    return obstacles, robot.model.inscribed_radius_m, top_speed_m_s(robot)
-
-
-def top_speed_m_s(robot: Robot) -> float:
-    """Return the speed that a robot exceeds in neither direction."""
-    return max(robot.model.limits.v_max_m_s, -robot.model.limits.v_min_m_s)
-
-
-def _most_kinetic_J(robot: Robot) -> float:
-    """Return the battery energy that stands behind a robot's top speed."""
-    kinetic_J = 0.5 * robot.model.effective_mass_kg * top_speed_m_s(robot) ** 2
-    return kinetic_J / robot.model.drive_efficiency
+    return obstacles, robot.model.inscribed_radius_m, robot.model.top_speed_m_s
 
 
 def relaxed_routing_J(problem: RoutingArrays) -> float:

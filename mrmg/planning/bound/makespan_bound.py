@@ -24,7 +24,6 @@ from mrmg.planning.bound.bound import (
     Relaxation,
     RobotWays,
     relaxed_routing_J,
-    top_speed_m_s,
 )
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import routing_arrays
@@ -95,7 +94,7 @@ def _times_s(robot: Robot, way_m: np.ndarray, stay_s: np.ndarray) -> np.ndarray:
     A robot may speed up while it stays, but not all of its ways and stays fit into less
     than both at top speed, nor its ways into less than they take from rest to rest.
     """
-    top_m_s = top_speed_m_s(robot)
+    top_m_s = robot.model.top_speed_m_s
     times_s: np.ndarray = way_m / top_m_s + stay_s
     if robot.model.motion_model not in MODEL_ID:
         return times_s  # nothing is known of how it speeds up
@@ -115,7 +114,7 @@ def _relaxed_s(scene: Scene, metres: RoutingArrays) -> float:
     That is the largest of the least times to each goal, and all driving and staying
     divided equally among all robots.
     """
-    top_m_s = np.array([top_speed_m_s(robot) for robot in scene.robots])
+    top_m_s = np.array([robot.model.top_speed_m_s for robot in scene.robots])
     times = _free_of_energy(metres, metres.cost / top_m_s[:, None, None])
     stay_s = np.array([goal.dwell_s for goal in scene.goals])
     nearest_s = times.cost[:, -1, : len(scene.goals)].min(axis=0)
