@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mrmg.capsule import CAPSULE_FILE, Capsule, Failure
-from mrmg.errors import Fault, FileError
+from mrmg.errors import Fault, FileError, UsageError
 from mrmg.run_arguments import RunArguments
 from mrmg.run_folder import RunFolder, Step
 from mrmg.steps import StepProgress, taken_up
@@ -130,6 +130,6 @@ def reproduce(
 def _arguments(capsule: Capsule, path: Path) -> RunArguments:
     try:
         return RunArguments.from_json(dict(capsule.arguments))
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, UsageError) as error:
         fault = Fault("capsule.json", f"arguments this version does not know ({error})")
         raise FileError(str(path), [fault]) from error

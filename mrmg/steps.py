@@ -7,7 +7,7 @@ a run taken up later goes through exactly the same doors as one that was never s
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -75,21 +75,8 @@ class Run:
     def fingerprint(self, step: Step) -> str:
         """Return the digest of all that decides the outcome of `step`."""
         deciding: dict[Step, Any] = {
-            Step.PLAN: [
-                self.scene.digest,
-                self.arguments.seed,
-                self.arguments.profile,
-                self.arguments.budget_s,
-                self.arguments.trees,
-                self.arguments.spare,
-            ],
-            Step.EXECUTE: [
-                self.arguments.controller,
-                self.arguments.disturb,
-                self.arguments.disturb_seed,
-                self.arguments.replan,
-                self.arguments.faults,
-            ],
+            Step.PLAN: [self.scene.digest, self.arguments.deciding("plan")],
+            Step.EXECUTE: self.arguments.deciding("drive"),
             Step.RENDER: asdict(self.arguments.video),
         }
         needs = [self.fingerprint(need) for need in NEEDS[step]]
@@ -195,6 +182,22 @@ def _verify(run: Run) -> Write:
 
     verdict = verify(run.scene, run.plan())
     return lambda: verdict.save(run.folder.path)
+
+
+def checked_drive(scene: Scene, arguments: RunArguments) -> RunArguments:
+    """Return `arguments` with the drive's in the one form that equal drives share.
+
+    Raises:
+        UsageError, FileError: if the controller, a fault or a disturbance is unknown.
+    """
+    from mrmg.execution.controller import controller_maker
+    from mrmg.execution.disturbance_spec import written_out
+    from mrmg.mission_control.faults import checked_faults
+
+    controller_maker(arguments.controller)
+    disturb = None if arguments.disturb is None else written_out(arguments.disturb)
+    faults = tuple(str(fault) for fault in checked_faults(scene, arguments.faults))
+    return replace(arguments, disturb=disturb, faults=faults)
 
 
 def drive(

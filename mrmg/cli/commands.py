@@ -8,37 +8,29 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrmg.cli import terminal
+from mrmg.cli.run_options import given
 from mrmg.errors import ExitCode
+from mrmg.run_arguments import DEFAULT_VIDEO, RunArguments, VideoArguments
 
 if TYPE_CHECKING:
-    from mrmg.scene.types import Scene
     from mrmg.steps import Run
 
 
 def run(options: argparse.Namespace) -> int:
     """Do the whole mission."""
     from mrmg import pipeline
-    from mrmg.run_arguments import DEFAULT_VIDEO
+    from mrmg.scene.loading import load_scene
 
-    scene = _scene(options)
+    scene = load_scene(options.scene)
     terminal.compile_kernels()
     with terminal.progress() as told:
         result = pipeline.run(
             scene,
-            seed=options.seed,
             out=options.out,
-            budget_s=options.budget,
-            trees=options.trees,
-            spare=options.spare,
-            workers=options.workers,
-            profile=options.profile,
-            disturb=options.disturb,
-            disturb_seed=options.disturb_seed,
-            replan=options.replan,
-            faults=options.fault,
             video=None if options.no_video else DEFAULT_VIDEO,
             on_progress=told,
             on_improvement=terminal.improvement_teller(told),
+            **given(options),
         )
     if options.json:
         terminal.print_json(result.summary)
@@ -48,36 +40,17 @@ def run(options: argparse.Namespace) -> int:
     return result.exit_code
 
 
-def _scene(options: argparse.Namespace) -> Scene:
-    """Return the scene, with the wishes of the command line in place of its own."""
-    from mrmg.scene.loading import load_scene, scene_from_document
-
-    scene = load_scene(options.scene)
-    wishes = {"objective": options.objective, "time_limit": options.time_limit}
-    changes = {key: value for key, value in wishes.items() if value is not None}
-    if not changes:
-        return scene
-    return scene_from_document({**scene.document, **changes}, source=options.scene)
-
-
 def plan(options: argparse.Namespace) -> int:
     """Plan, and start a run folder."""
     from mrmg.pipeline import default_folder
-    from mrmg.run_arguments import RunArguments
     from mrmg.run_folder import RunFolder, Step
+    from mrmg.scene.loading import load_scene
     from mrmg.steps import Run
 
-    scene = _scene(options)
+    arguments = RunArguments(**given(options))
+    scene = arguments.scene(load_scene(options.scene))
     terminal.compile_kernels()
-    folder = RunFolder(options.out or default_folder(scene, options.seed))
-    arguments = RunArguments(
-        seed=options.seed,
-        profile=options.profile,
-        budget_s=options.budget,
-        trees=options.trees,
-        spare=options.spare,
-        workers=options.workers,
-    )
+    folder = RunFolder(options.out or default_folder(scene, arguments.seed))
     with folder.opened_for_writing(), terminal.progress() as told:
         work = Run(
             scene=scene,
@@ -110,20 +83,11 @@ def verify(options: argparse.Namespace) -> int:
 
 def execute(options: argparse.Namespace) -> int:
     """Drive the plan of a run folder in MuJoCo."""
-    from mrmg.execution.disturbance_spec import written_out
     from mrmg.run_folder import Step
 
-    changes = {
-        "disturb": None,
-        "disturb_seed": options.disturb_seed,
-        "replan": options.replan,
-        "faults": tuple(options.fault),
-    }
-    if options.disturb is not None:
-        changes["disturb"] = written_out(options.disturb)
-    if options.controller is not None:
-        changes["controller"] = options.controller
-    work = _make(options.run, Step.EXECUTE, **changes)
+    undisturbed = RunArguments().deciding("drive")
+    del undisturbed["controller"]
+    work = _make(options.run, Step.EXECUTE, **{**undisturbed, **given(options)})
     log = work.folder.read_json("log.json", cure="mrmg execute")
     lost = [item for item in log["events"] if item["action"] in ("end", "give_up")]
     driven = log["completed"] and not lost
@@ -150,7 +114,6 @@ def audit(options: argparse.Namespace) -> int:
     return ExitCode.OK if account["mission_ok"] else ExitCode.MISSION_FAILED
 
 
-_VIDEO = ("view", "robot", "speed", "size", "fps", "from_s", "to_s", "gif")
 _SHOWN = ("overview.png", "energy.png", "mission.gif", "mission.mp4", "report.html")
 
 
@@ -158,11 +121,7 @@ def render(options: argparse.Namespace) -> int:
     """Make the pictures, the video and the report of a run folder."""
     from mrmg.run_folder import Step
 
-    wanted = {
-        name: getattr(options, name)
-        for name in _VIDEO
-        if getattr(options, name) is not None
-    }
+    wanted = given(options, VideoArguments)
     work = _make(options.run, Step.RENDER, Step.DRAW, Step.REPORT, video=wanted)
     for name in _SHOWN:
         if work.folder.file(name).exists():
@@ -203,16 +162,12 @@ def _make(
 ) -> Run:
     """Make steps of the run in `path` anew, with some of its arguments changed."""
     from mrmg.run_folder import existing
-    from mrmg.steps import taken_up
+    from mrmg.steps import checked_drive, taken_up
 
     with existing(path).opened_for_writing() as folder, terminal.progress() as told:
         work = taken_up(folder, told)
-        changed = replace(
-            work.arguments,
-            video=replace(work.arguments.video, **(video or {})),
-            **changes,
-        )
-        work = replace(work, arguments=changed)
+        changed = work.arguments.changed(video or {}, **changes)
+        work = replace(work, arguments=checked_drive(work.scene, changed))
         for step in steps:
             work.make(step)
     return work

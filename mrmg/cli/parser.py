@@ -6,16 +6,17 @@ import argparse
 from pathlib import Path
 
 from mrmg import __version__
+from mrmg import argument_values as values
 from mrmg.cli import (
     calibrate_command,
     commands,
-    control_arguments,
     replay_command,
     robustness_commands,
     scene_commands,
     show_commands,
-    values,
 )
+from mrmg.cli.run_options import add_options, reader
+from mrmg.run_arguments import VideoArguments
 
 EXIT_CODES = """\
 exit codes:
@@ -59,75 +60,24 @@ _Verbs = argparse._SubParsersAction
 
 def _add_run(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     run = verbs.add_parser("run", help="the whole mission, from scene to report")
-    _add_planning(run)
-    robustness_commands.add_disturbance(run)
-    control_arguments.add_faults(run)
-    control_arguments.add_replanning(run)
+    _add_planning(run, "run")
     run.add_argument("--no-video", action="store_true", help="leave out the video")
     run.set_defaults(command=commands.run)
 
 
 def _add_plan(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     plan = verbs.add_parser("plan", help="plan only")
-    _add_planning(plan)
+    _add_planning(plan, "plan")
     plan.set_defaults(command=commands.plan)
 
 
-def _add_planning(verb: argparse.ArgumentParser) -> None:
+def _add_planning(verb: argparse.ArgumentParser, name: str) -> None:
     verb.add_argument("scene", metavar="SCENE", help="path, or name of a shipped scene")
-    verb.add_argument(
-        "--seed", type=values.seed, default=0, metavar="N", help="default 0"
-    )
     verb.add_argument(
         "--out", type=Path, metavar="DIR", help="run folder; default runs/SCENE-sN"
     )
-    verb.add_argument(
-        "--objective",
-        type=values.objective,
-        metavar="energy|makespan|E:M",
-        help="what is to be small, instead of what the scene says; E and M are the "
-        "weights of each J and each s",
-    )
-    verb.add_argument(
-        "--time-limit",
-        type=values.positive,
-        metavar="SECONDS",
-        help="by when all is done, instead of what the scene says",
-    )
-    limit = verb.add_mutually_exclusive_group()
-    limit.add_argument(
-        "--budget",
-        type=values.positive,
-        metavar="SECONDS",
-        help="go on improving the plan for so long; Ctrl-C ends it earlier",
-    )
-    limit.add_argument(
-        "--trees",
-        type=values.count,
-        metavar="N",
-        help="go on improving for so many motion trees: the same plan every time",
-    )
-    verb.add_argument(
-        "--spare",
-        type=values.share,
-        metavar="SHARE",
-        help="of every battery's capacity, left above the reserve where that can be; "
-        "default 0.1",
-    )
-    verb.add_argument(
-        "--workers",
-        type=values.count,
-        default=1,
-        metavar="N",
-        help="threads that plan; default 1",
-    )
-    verb.add_argument(
-        "--profile",
-        choices=("default", "paper"),
-        default="default",
-        help="'paper' follows the published algorithms to the letter",
-    )
-    _add_json(verb, "summary.json" if verb.prog.endswith("run") else "planning.json")
+    add_options(verb, name)
+    _add_json(verb, "summary.json" if name == "run" else "planning.json")
 
 
 def _add_steps(verbs: _Verbs) -> None:  # type: ignore[type-arg]
@@ -140,11 +90,7 @@ def _add_steps(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     for name, (what, command, output) in steps.items():
         verb = verbs.add_parser(name, help=what)
         verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
-        if name == "execute":
-            control_arguments.add_controller(verb, default="mpc")
-            robustness_commands.add_disturbance(verb)
-            control_arguments.add_faults(verb)
-            control_arguments.add_replanning(verb)
+        add_options(verb, name)
         _add_json(verb, output)
         verb.set_defaults(command=command)
 
@@ -152,33 +98,7 @@ def _add_steps(verbs: _Verbs) -> None:  # type: ignore[type-arg]
 def _add_render(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     render = verbs.add_parser("render", help="make the pictures and the video")
     render.add_argument("run", type=Path, metavar="RUN", help="run folder")
-    render.add_argument("--view", choices=("top", "chase", "split"))
-    render.add_argument(
-        "--speed",
-        type=values.positive,
-        metavar="FACTOR",
-        help="simulated seconds shown per second",
-    )
-    render.add_argument(
-        "--size", type=values.size, metavar="WxH", help="such as 1280x720"
-    )
-    render.add_argument("--fps", type=values.fps, metavar="N", help="frames per second")
-    render.add_argument("--robot", metavar="ID", help="followed by the chase camera")
-    render.add_argument(
-        "--from",
-        dest="from_s",
-        type=values.time,
-        metavar="SECONDS",
-        help="mission time",
-    )
-    render.add_argument(
-        "--to", dest="to_s", type=values.time, metavar="SECONDS", help="mission time"
-    )
-    render.add_argument(
-        "--gif",
-        action=argparse.BooleanOptionalAction,
-        help="make a GIF of less than 5 MB, too",
-    )
+    add_options(render, "render", VideoArguments)
     render.set_defaults(command=commands.render)
 
 
@@ -234,7 +154,7 @@ def _add_view(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     )
     view.add_argument(
         "--port",
-        type=values.count,
+        type=reader(values.count),
         default=show_commands.PORT,
         help="port of the page; default 8080",
     )
@@ -259,7 +179,7 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     roadmap = acts.add_parser("roadmap", help="write the roadmap as GraphML")
     roadmap.add_argument("scene", metavar="SCENE")
     roadmap.add_argument(
-        "--seed", type=values.seed, default=0, metavar="N", help="default 0"
+        "--seed", type=reader(values.seed), default=0, metavar="N", help="default 0"
     )
     roadmap.add_argument(
         "-o", "--out", type=Path, metavar="OUT.graphml", help="default NAME.graphml"
@@ -270,7 +190,7 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     imported.add_argument("map", type=Path, metavar="MAP")
     imported.add_argument(
         "--longest-side",
-        type=values.positive,
+        type=reader(values.positive),
         default=100.0,
         metavar="METRES",
         help="scale the map so that its longest side measures this; default 100",
@@ -283,13 +203,13 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     for name, count in (("robots", 2), ("goals", 14), ("stations", 5)):
         populate.add_argument(
             f"--{name}",
-            type=values.count,
+            type=reader(values.count),
             default=count,
             metavar="N",
             help=f"default {count}",
         )
     populate.add_argument(
-        "--seed", type=values.seed, default=3, metavar="N", help="default 3"
+        "--seed", type=reader(values.seed), default=3, metavar="N", help="default 3"
     )
     _add_scene_out(populate)
     populate.set_defaults(command=scene_commands.populate)

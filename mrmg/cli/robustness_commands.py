@@ -9,36 +9,17 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mrmg.cli import control_arguments, terminal, values
+from mrmg import argument_values as values
+from mrmg.cli import terminal
+from mrmg.cli.run_options import add_options, given, reader
 from mrmg.errors import ExitCode
+from mrmg.run_arguments import DISTURBANCE_HELP
 
 if TYPE_CHECKING:
     from mrmg.results.robustness import Study
     from mrmg.robustness.study import OnTrial
 
-_SPEC_HELP = (
-    "drive robots that differ from their models: in mass, friction, rolling, "
-    "drive_gain, steering_gain, lag, position_noise, heading_noise, speed_noise, "
-    "delay, start_x, start_y, start_heading, capacity; SPEC is key=value,... such as "
-    "rolling=+30%%,lag=0..80ms, or a YAML file of such keys, and changes the defaults "
-    "(mass=+-5%%,friction=+-20%%,rolling=+-10%%,lag=50ms,position_noise=2cm); "
-    "a leading 'none' starts from no disturbance"
-)
-
-
 _COLUMNS = ("worst", "p05", "median", "p95")
-
-
-def add_disturbance(verb: argparse.ArgumentParser) -> None:
-    """Add the arguments of one disturbed execution."""
-    verb.add_argument("--disturb", nargs="?", const="", metavar="SPEC", help=_SPEC_HELP)
-    verb.add_argument(
-        "--disturb-seed",
-        type=values.seed,
-        default=0,
-        metavar="N",
-        help="of what is drawn from the disturbances; default 0",
-    )
 
 
 def add_robustness(verbs: Any) -> None:
@@ -52,25 +33,33 @@ def add_robustness(verbs: Any) -> None:
     )
     verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
     verb.add_argument(
-        "--trials", type=values.count, default=100, metavar="N", help="default 100"
+        "--trials",
+        type=reader(values.count),
+        default=100,
+        metavar="N",
+        help="default 100",
     )
     verb.add_argument(
         "--workers",
-        type=values.count,
+        type=reader(values.count),
         default=1,
         metavar="N",
         help="processes that drive; default 1, and no influence on the result",
     )
-    verb.add_argument("--disturb", default="", metavar="SPEC", help=_SPEC_HELP)
+    verb.add_argument(
+        "--disturb",
+        default="",
+        metavar="SPEC",
+        help=DISTURBANCE_HELP.replace("%", "%%"),
+    )
     verb.add_argument(
         "--seed",
-        type=values.seed,
+        type=reader(values.seed),
         default=0,
         metavar="N",
         help="--disturb-seed of the first trial, the next have N+1, ...; default 0",
     )
-    control_arguments.add_controller(verb, default="the run's")
-    control_arguments.add_replanning(verb)
+    add_options(verb, "robustness")
     verb.add_argument(
         "--json", action="store_true", help="print the study of robustness.json alone"
     )
@@ -85,15 +74,15 @@ def robustness(options: argparse.Namespace) -> int:
     from mrmg.run_folder import Step, existing
     from mrmg.steps import taken_up
 
+    given_drive = {
+        name: value
+        for name, value in given(options).items()
+        if name in ("controller", "replan")
+    }
     with existing(options.run).opened_for_writing() as folder:
         run = taken_up(folder)
-        changed = replace(
-            run.arguments,
-            controller=options.controller or run.arguments.controller,
-            replan=options.replan,
-            faults=(),
-        )
-        driven = replace(run, arguments=changed)
+        drive = {"replan": False, "faults": (), **given_drive}
+        driven = replace(run, arguments=replace(run.arguments, **drive))
         with terminal.progress_of("driving") as told:
             study = study_robustness(
                 driven,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from mrmg.results.report_planner import cost_chart, planner
 from mrmg.results.report_record import RunRecord, read_record
 from mrmg.results.report_robustness import robustness
 from mrmg.results.report_timeline import events, timeline
+from mrmg.run_arguments import RunArguments
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
 
@@ -217,32 +219,16 @@ def _reproduce(record: RunRecord) -> list[str]:
 
 def command(record: RunRecord) -> str:
     """Return the command line that makes the same plan and simulation again."""
-    words = [
-        "mrmg",
-        "run",
-        _source(record.scene),
-        "--seed",
-        str(record.summary["seed"]),
-    ]
-    if record.arguments.get("profile", "default") != "default":
-        words += ["--profile", str(record.arguments["profile"])]
-    if record.arguments.get("budget_s") is not None:
-        words += ["--budget", f"{record.arguments['budget_s']:g}"]
-    if record.arguments.get("disturb") is not None:
-        spec = str(record.arguments["disturb"])
-        words += ["--disturb", *([spec] if spec else [])]
-        words += ["--disturb-seed", str(record.arguments["disturb_seed"])]
-    for fault in record.arguments.get("faults", ()):
-        words += ["--fault", str(fault)]
-    if record.arguments.get("replan"):
-        words.append("--replan")
+    arguments = replace(RunArguments.from_json(record.arguments), seed=0)
+    words = ["mrmg", "run", _source(record.scene, arguments)]
+    words += ["--seed", str(record.summary["seed"]), *arguments.words()]
     return shlex.join(words)
 
 
-def _source(scene: Scene) -> str:
-    same = scene.name in shipped.scene_names()
-    if same and load_scene(scene.name).digest == scene.digest:
-        return scene.name
+def _source(scene: Scene, arguments: RunArguments) -> str:
+    if scene.name in shipped.scene_names():
+        same = arguments.scene(load_scene(scene.name)).digest == scene.digest
+        return scene.name if same else "scene.yaml"
     return "scene.yaml"
 
 

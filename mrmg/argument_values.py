@@ -1,0 +1,113 @@
+"""Readers of argument values, for the command line and the Python API alike.
+
+Each takes a text or a value of its kind, returns the value, and raises ValueError with
+a message that states what is allowed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from mrmg.scene.objective import Objective
+
+
+def seed(value: Any) -> int:
+    """Read a seed: a whole number of at least 0."""
+    return _whole(value, at_least=0)
+
+
+def count(value: Any) -> int:
+    """Read a number of things: a whole number of at least 1."""
+    return _whole(value, at_least=1)
+
+
+def _whole(value: Any, *, at_least: int) -> int:
+    try:
+        read = int(str(value))
+    except ValueError:
+        read = at_least - 1
+    if read < at_least:
+        raise ValueError(f"{value!r} is not a whole number of at least {at_least}")
+    return read
+
+
+def positive(value: Any) -> float:
+    """Read a positive number."""
+    try:
+        read = float(str(value))
+    except ValueError:
+        read = math.nan
+    if not 0.0 < read < math.inf:
+        raise ValueError(f"{value!r} is not a positive number")
+    return read
+
+
+def time(value: Any) -> float:
+    """Read a time: a number of at least 0."""
+    return 0.0 if str(value).strip() in {"0", "0.0"} else positive(value)
+
+
+def share(value: Any) -> float:
+    """Read a share: a number of at least 0 and less than 1."""
+    try:
+        read = float(str(value))
+    except ValueError:
+        read = math.nan
+    if not 0.0 <= read < 1.0:
+        raise ValueError(
+            f"{value!r} is not a share: a number of at least 0 and less than 1"
+        )
+    return read
+
+
+def switch(value: Any) -> bool:
+    """Read a switch: True or False."""
+    if not isinstance(value, bool):
+        raise ValueError(f"{value!r} is neither True nor False")
+    return value
+
+
+def words(value: Any) -> tuple[str, ...]:
+    """Read several texts."""
+    if isinstance(value, str) or not all(isinstance(word, str) for word in value):
+        raise ValueError(f"{value!r} is not a sequence of texts")
+    return tuple(value)
+
+
+def objective(value: Any) -> str | dict[str, float]:
+    """Read an objective as scene files have it.
+
+    Allowed are a name, weights of energy and makespan such as "1:50" or
+    {"energy": 1, "makespan": 50}, and an `Objective`.
+    """
+    if value in ("energy", "makespan"):
+        return str(value)
+    if isinstance(value, Objective):
+        weights: tuple[Any, ...] = (value.energy_weight, value.makespan_weight)
+    elif isinstance(value, Mapping) and {*value} <= {"energy", "makespan"}:
+        weights = (value.get("energy", 0.0), value.get("makespan", 0.0))
+    else:
+        weights = tuple(str(value).split(":"))
+    try:
+        energy, makespan = (time(weight) for weight in weights)
+    except ValueError:
+        energy = makespan = 0.0
+    if energy + makespan == 0.0:
+        raise ValueError(
+            f"{value!r} is neither energy nor makespan nor two weights such as 1:50"
+        )
+    return {"energy": energy, "makespan": makespan}
+
+
+def size(value: Any) -> tuple[int, int]:
+    """Read a size in pixels: "1280x720" or (1280, 720)."""
+    try:
+        parts = value.lower().split("x") if isinstance(value, str) else value
+        width, height = (int(str(part)) for part in parts)
+    except (TypeError, ValueError):
+        width = height = 0
+    if min(width, height) < 1:
+        raise ValueError(f"{value!r} is not a size such as 1280x720")
+    return width, height

@@ -1,0 +1,68 @@
+"""The options of a run on the command line, made from their one specification."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from typing import Any
+
+from mrmg.run_arguments import Option, RunArguments, VideoArguments, options_of
+
+_Arguments = type[RunArguments] | type[VideoArguments]
+
+
+def add_options(
+    parser: argparse.ArgumentParser, verb: str, arguments: _Arguments = RunArguments
+) -> None:
+    """Add the options of a class of arguments that a verb takes."""
+    groups: dict[str, Any] = {}
+    for option in options_of(arguments):
+        if verb not in option.verbs:
+            continue
+        place: Any = parser
+        if option.group:
+            exclusive = parser.add_mutually_exclusive_group
+            place = groups.setdefault(option.group, None) or exclusive()
+            groups[option.group] = place
+        place.add_argument(
+            option.flag,
+            dest=option.name,
+            default=argparse.SUPPRESS,
+            help=option.help.replace("%", "%%"),
+            **_details(option),
+        )
+
+
+def given(
+    options: argparse.Namespace, arguments: _Arguments = RunArguments
+) -> dict[str, Any]:
+    """Return what the command line says of a class of arguments, by field."""
+    known = [option.name for option in options_of(arguments)]
+    return {name: value for name, value in vars(options).items() if name in known}
+
+
+def reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
+    """Return a reader whose message argparse shows."""
+
+    def read_text(text: str) -> Any:
+        try:
+            return read(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return read_text
+
+
+def _details(option: Option) -> dict[str, Any]:
+    """Return the keywords of `add_argument` for one option."""
+    if isinstance(option.default, bool):
+        both = option.verbs == ("render",)  # which keeps what it was asked before
+        action: Any = argparse.BooleanOptionalAction if both else "store_true"
+        return {"action": action}
+    if option.choices:
+        return {"choices": option.choices}
+    if option.default == ():
+        return {"action": "append", "metavar": option.metavar}
+    details = {"type": reader(option.read), "metavar": option.metavar}
+    bare = {} if option.bare is None else {"nargs": "?", "const": option.bare}
+    return {**details, **bare}
