@@ -5,7 +5,8 @@ The command line prints the message alone; the Python API raises the exception.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import difflib
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -80,3 +81,9 @@ class MachineError(MrmgError):
     """Something the command needs is missing on this machine; names the cure."""
 
     exit_code = ExitCode.MACHINE
+
+
+def nearest(name: str, names: Iterable[str], *, cutoff: float = 0.5) -> str:
+    """Return " (did you mean '...'?)" for the most similar of `names`, or nothing."""
+    match = difflib.get_close_matches(name, list(names), n=1, cutoff=cutoff)
+    return f" (did you mean '{match[0]}'?)" if match else ""

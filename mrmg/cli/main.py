@@ -25,7 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code; errors are told on stderr, by their message alone.
     """
-    options = make_parser().parse_args(arguments)
+    options = make_parser().read(sys.argv[1:] if arguments is None else arguments)
     # What imports make stays: to search it for garbage again and again takes a tenth of
     # the time of a short command.
     gc.set_threshold(MOST_NEW_OBJECTS)

@@ -16,6 +16,7 @@ from mrmg.cli import (
     show_commands,
 )
 from mrmg.cli.run_options import add_options, reader
+from mrmg.cli.usage import Parser
 from mrmg.run_arguments import VideoArguments
 
 EXIT_CODES = """\
@@ -27,9 +28,9 @@ exit codes:
 """
 
 
-def make_parser() -> argparse.ArgumentParser:
+def make_parser() -> Parser:
     """Return the parser of the `mrmg` command."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="mrmg",
         description="Plan missions for fleets of energy-limited cars, drive them in "
         "MuJoCo, and account for the energy.",

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from mrmg.cli import main
+from mrmg.cli.parser import make_parser
 from mrmg.errors import ExitCode
 
 BAD_SCENE = """\
@@ -70,6 +71,54 @@ def test_wrong_usage_names_the_argument(
     assert ended.value.code == ExitCode.USAGE
     assert named in told.err
     assert told.out == ""
+
+
+@pytest.mark.parametrize(
+    ("line", "answer"),
+    [
+        ("pln", "mrmg: unknown command 'pln' (did you mean 'plan'?)"),
+        ("fly", "mrmg: unknown command 'fly'"),
+        ("scene chek", "mrmg scene: unknown command 'chek' (did you mean 'check'?)"),
+        ("chek x.yaml --json", "mrmg: unknown command 'chek'"),
+        ("check x.yaml", "mrmg: unknown command 'check' (did you mean 'scene check'?)"),
+        ("scene1", "mrmg: unknown command 'scene1' (did you mean 'run scene1'?)"),
+        ("farm.yaml", "mrmg: unknown command 'farm.yaml' (did you mean 'run farm"),
+        ("run x --sed 3", "mrmg run: unknown option '--sed' (did you mean '--seed'?)"),
+        ("run x --sed=3", "mrmg run: unknown option '--sed' (did you mean '--seed'?)"),
+        ("run --sed 3 x", "mrmg run: unknown option '--sed' (did you mean '--seed'?)"),
+        ("run x -seed 3", "mrmg run: unknown option '-seed' (did you mean '--seed'?)"),
+        ("scene draw x -out y", "unknown option '-out' (did you mean '--out'?)"),
+        ("verify x --seed 3", "mrmg verify: unknown option '--seed'\n"),
+        ("--seed 3 run x", "mrmg: unknown option '--seed'\n"),
+        ("run x y", "mrmg run: unexpected argument 'y'\nusage: mrmg run SCENE"),
+        ("run x --seed -1", "mrmg run: argument --seed: '-1' is not a whole number"),
+    ],
+)
+def test_a_mistyped_word_is_answered_with_the_nearest(
+    line: str, answer: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(line.split())
+    told = capsys.readouterr().err
+    assert ended.value.code == ExitCode.USAGE
+    assert answer in told
+    message, usage = told.splitlines()
+    assert usage.startswith("usage: mrmg")
+    assert len(message) < 100, "no wall of choices"
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "run x --se 3",  # the beginning of one option only
+        "run x --seed=3",
+        "run -- --strange",
+        "scene draw x -oy.png",
+        "view x --in browser",
+    ],
+)
+def test_words_that_argparse_knows_are_not_refused(line: str) -> None:
+    assert make_parser().read(line.split()).command
 
 
 @pytest.mark.parametrize("verb", ["run", "plan"])

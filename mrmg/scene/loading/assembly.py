@@ -19,12 +19,11 @@ from pydantic import BaseModel, ValidationError
 from shapely.geometry import Polygon
 
 from mrmg import storage
-from mrmg.errors import Fault, SceneError
+from mrmg.errors import Fault, SceneError, nearest
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.loading.batteries import battery_of
 from mrmg.scene.loading.climbing import slope_faults
 from mrmg.scene.loading.elevation import elevation_of
-from mrmg.scene.loading.faults import nearest
 from mrmg.scene.loading.geometry import footprint_at, region_of, shape_of
 from mrmg.scene.loading.models import load_model, model_folder
 from mrmg.scene.loading.schema import (

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from mrmg.errors import Fault
+from mrmg.errors import Fault, nearest
 from mrmg.scene.elevation import Elevation
-from mrmg.scene.loading.faults import nearest, shown
+from mrmg.scene.loading.faults import shown
 from mrmg.scene.loading.schema import ElevationEntry, HillEntry
 
 FORMS = ("file", "grid", "hills", "packed")

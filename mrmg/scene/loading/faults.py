@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import types
 import typing
 from collections.abc import Iterable
@@ -11,7 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from mrmg.errors import Fault
+from mrmg.errors import Fault, nearest
 
 _KINDS = {
     "float_type": "expected a number",
@@ -94,12 +93,6 @@ def unknown_key(key: str, known: Iterable[str]) -> str:
     """Return the message for a key that is not in the format."""
     names = sorted(known)
     return f"unknown key{nearest(key, names)}; known keys: {', '.join(names)}"
-
-
-def nearest(name: str, names: Iterable[str]) -> str:
-    """Return " (did you mean '...'?)" for the most similar of `names`, or nothing."""
-    match = difflib.get_close_matches(name, list(names), n=1, cutoff=0.5)
-    return f" (did you mean '{match[0]}'?)" if match else ""
 
 
 def shown(value: Any) -> str:

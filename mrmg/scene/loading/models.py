@@ -17,8 +17,8 @@ from pydantic import Field, ValidationError
 
 from mrmg import shipped, storage
 from mrmg.energy import EnergyPreset
-from mrmg.errors import Fault, SceneError
-from mrmg.scene.loading.faults import faults_of, nearest
+from mrmg.errors import Fault, SceneError, nearest
+from mrmg.scene.loading.faults import faults_of
 from mrmg.scene.loading.places import lines_of
 from mrmg.scene.loading.schema import Positive, Ring, Strict
 from mrmg.scene.loading.yaml_text import read_yaml

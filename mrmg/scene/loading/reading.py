@@ -10,9 +10,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from mrmg import shipped
-from mrmg.errors import Fault, SceneError
+from mrmg.errors import Fault, SceneError, nearest
 from mrmg.scene.loading.assembly import Assembly
-from mrmg.scene.loading.faults import faults_of, nearest, shown
+from mrmg.scene.loading.faults import faults_of, shown
 from mrmg.scene.loading.places import id_at, lines_of
 from mrmg.scene.loading.schema import SCENE_FORMAT, SceneDocument
 from mrmg.scene.loading.yaml_text import dump_yaml, read_yaml

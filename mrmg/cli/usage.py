@@ -1,0 +1,95 @@
+"""The parser of the command line, and what it answers to a mistake."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from typing import NoReturn
+
+from mrmg import shipped
+from mrmg.errors import ExitCode, nearest
+
+OPTION_SIMILARITY = 0.65
+"""Least similarity of a suggested option: two dashes alone make half of some."""
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser that answers a mistake with one message and a usage line."""
+
+    def read(self, words: Sequence[str]) -> argparse.Namespace:
+        """Return the options that `words` give; a mistake ends the program."""
+        addressed = self._addressed(words)
+        options, left = self.parse_known_args(words)
+        if left:
+            addressed.error(f"unexpected argument '{left[0]}'")
+        return options
+
+    def arguments(self) -> list[argparse.Action]:
+        """Return all arguments; argparse has no public name for them."""
+        return self._actions
+
+    def verbs(self) -> Mapping[str, Parser]:
+        """Return the parsers of the verbs by their names."""
+        for argument in self.arguments():
+            if isinstance(argument, argparse._SubParsersAction):
+                return argument.choices
+        return {}
+
+    def options(self) -> list[str]:
+        """Return the spellings of all options."""
+        return [
+            name for argument in self.arguments() for name in argument.option_strings
+        ]
+
+    def error(self, message: str) -> NoReturn:
+        """Print the message and a usage line, and end the program."""
+        names = [str(a.metavar) for a in self.arguments() if not a.option_strings]
+        rest = "..." if self.verbs() else "[options]"
+        usage = " ".join([self.prog, *names, rest])
+        text = (
+            f"{self.prog}: {message}\nusage: {usage}; '{self.prog} --help' lists them\n"
+        )
+        self.exit(ExitCode.USAGE, text)
+
+    def _addressed(self, words: Sequence[str]) -> Parser:
+        """Return the parser of the verb that `words` name, if they know its options."""
+        verbs = self.verbs()
+        for place, word in enumerate(words):
+            if word == "--":
+                break
+            if word.startswith("-"):
+                self._require_option(word)
+            elif word in verbs:
+                return verbs[word]._addressed(words[place + 1 :])
+            elif verbs:
+                self.error(f"unknown command '{word}'{self._meant(word)}")
+        return self
+
+    def _require_option(self, word: str) -> None:
+        name = word.partition("=")[0]
+        known = self.options()
+        is_short = word[:2] in known and f"-{name}" not in known
+        is_text = " " in word or word == "-" or _is_number(word)
+        if is_short or is_text or any(option.startswith(name) for option in known):
+            return
+        near = nearest(f"--{name.lstrip('-')}", known, cutoff=OPTION_SIMILARITY)
+        self.error(f"unknown option '{name}'{near}")
+
+    def _meant(self, word: str) -> str:
+        """Return the question for the command that is meant by what is no verb."""
+        verbs = self.verbs()
+        for verb, parser in verbs.items():
+            if word in parser.verbs():
+                return f" (did you mean '{verb} {word}'?)"
+        if word.endswith(".yaml") or word in shipped.scene_names():
+            verb = "run" if "run" in verbs else "check"
+            return f" (did you mean '{verb} {word}'?)"
+        return nearest(word, verbs)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
