@@ -17,6 +17,7 @@ from mrmg.run_arguments import (
     options_of,
 )
 from mrmg.run_folder import RunFolder, Step
+from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
 from mrmg.steps import OnImprovement, Run, StepProgress, checked_drive
@@ -44,6 +45,7 @@ def run(
     *,
     out: Path | None = None,
     video: VideoArguments | None = DEFAULT_VIDEO,
+    trust_code: bool = False,
     on_progress: StepProgress | None = None,
     on_improvement: OnImprovement | None = None,
     **arguments: Any,
@@ -54,6 +56,7 @@ def run(
         source: a scene, the path of a scene file, or the name of a shipped scene.
         out: the run folder; `default_folder` if None.
         video: how the video is made; None for no video.
+        trust_code: whether robot models may bring Python code (`scene.loading.trust`).
         on_progress: told (step, fraction, text).
         on_improvement: told of every plan that is cheaper than all before it.
         **arguments: fields of `RunArguments`, which are the options of `mrmg run`:
@@ -64,7 +67,12 @@ def run(
     """
     from mrmg.results.gl_backend import choose_backend
 
-    loaded = source if isinstance(source, Scene) else load_scene(source)
+    loaded = (
+        source
+        if isinstance(source, Scene)
+        else load_scene(source, trust_code=trust_code)
+    )
+    require_drivable(loaded.robots)
     asked = _arguments(loaded, {**arguments, "video": video or DEFAULT_VIDEO})
     scene = asked.scene(loaded)
     folder = RunFolder(out or default_folder(scene, asked.seed))

@@ -94,7 +94,11 @@ class Reproduction:
 
 
 def reproduce(
-    path: Path, out: Path, on_progress: StepProgress | None = None
+    path: Path,
+    out: Path,
+    on_progress: StepProgress | None = None,
+    *,
+    trust_code: bool = False,
 ) -> Reproduction:
     """Repeat the execution that a capsule holds, in a run folder of its own.
 
@@ -102,6 +106,7 @@ def reproduce(
         path: of the capsule.
         out: run folder to make, with log and audit.
         on_progress: told (step, fraction, text).
+        trust_code: whether robot models may bring Python code (`loading.trust`).
 
     Raises:
         FileError: if the capsule cannot be used.
@@ -113,7 +118,7 @@ def reproduce(
     with folder.opened_for_writing():
         folder.begin(Step.PLAN, arguments.to_json())
         capsule.unpack(out)
-        run = taken_up(folder, on_progress)
+        run = taken_up(folder, on_progress, trust_code=trust_code)
         folder.finish(Step.PLAN, run.fingerprint(Step.PLAN))
         left = folder.file(CAPSULE_FILE)
         try:

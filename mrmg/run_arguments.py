@@ -319,7 +319,8 @@ class RunArguments(_Checked):
         if not changes:
             return scene
         document = {**scene.document, **changes}
-        return scene_from_document(document, source=scene.name)
+        trust_code = scene.has_custom_motion  # or it would not have been loaded
+        return scene_from_document(document, source=scene.name, trust_code=trust_code)
 
     def changed(self, video: Mapping[str, Any], **changes: Any) -> Self:
         """Return the arguments with some of them, and of the video's, changed."""

@@ -125,10 +125,15 @@ class Run:
             self.on_progress(step, fraction, text)
 
 
-def taken_up(folder: RunFolder, on_progress: StepProgress | None = None) -> Run:
+def taken_up(
+    folder: RunFolder,
+    on_progress: StepProgress | None = None,
+    *,
+    trust_code: bool = False,
+) -> Run:
     """Return the run that `folder` holds, with the arguments it was started with."""
     return Run(
-        scene=load_scene(folder.file("scene.yaml")),
+        scene=load_scene(folder.file("scene.yaml"), trust_code=trust_code),
         arguments=RunArguments.from_json(folder.arguments()),
         folder=folder,
         on_progress=on_progress,
@@ -328,7 +333,7 @@ def _report(run: Run) -> Write:
     def write() -> None:
         summary = summarize(run.scene, run.folder.path)
         storage.write_json(run.folder.file("summary.json"), summary)
-        write_report(run.folder.path)
+        write_report(run.folder.path, trust_code=run.scene.has_custom_motion)
 
     return write
 

@@ -140,7 +140,7 @@ def benchmark_scene(path: Path, folder: Path) -> Scene:
         "robots": robots,
         "objective": "makespan",
     }  # fmt: skip
-    return scene_from_document(document, source=str(path))
+    return scene_from_document(document, source=str(path), trust_code=True)
 
 
 def robot_entry(name: str, entry: dict[str, Any], model: str) -> dict[str, Any]:

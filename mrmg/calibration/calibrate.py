@@ -15,6 +15,7 @@ from mrmg.calibration.fit import CONFIDENCE, LinearFit, fit_linear
 from mrmg.calibration.manoeuvres import manoeuvres_of
 from mrmg.calibration.measurement import PARAMETERS, UNITS, Leg, drive_legs
 from mrmg.errors import UsageError
+from mrmg.scene.driven_parts import why_not_driven
 from mrmg.scene.loading.editing import KeyPath, NewValue
 from mrmg.scene.robot_model import RobotModel
 
@@ -130,10 +131,15 @@ def calibrate(model: RobotModel, *, on_progress: Progress | None = None) -> Cali
         on_progress: called with the fraction done and what is being driven.
 
     Raises:
-        UsageError: if the robot cannot drive the manoeuvres, or moves as if it had
-            less mass than the model says.
+        UsageError: if the model can only be planned for, the robot cannot drive the
+            manoeuvres, or moves as if it had less mass than the model says.
         FileError: if its MJCF cannot be used.
     """
+    reason = why_not_driven(model)
+    if reason is not None:
+        raise UsageError(
+            f"model '{model.name}' has {reason}; there is nothing to drive in MuJoCo"
+        )
     manoeuvres = manoeuvres_of(model)
     legs: list[Leg] = []
     for index, manoeuvre in enumerate(manoeuvres):

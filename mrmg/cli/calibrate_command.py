@@ -25,7 +25,7 @@ def calibrate(options: argparse.Namespace) -> int:
     plot = options.plot or out / "calibration.png"
     require_format(plot)
     require_other_folder(folder, out)
-    model, _ = load_model(folder)
+    model, _ = load_model(folder, trust_code=options.trust_code)
     with terminal.progress_of("measuring") as told:
         calibration = calibrate(model, on_progress=told)
     write_calibration(calibration, folder, out, in_place=options.in_place)

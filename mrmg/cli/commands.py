@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrmg.cli import terminal
@@ -21,13 +20,14 @@ def run(options: argparse.Namespace) -> int:
     from mrmg import pipeline
     from mrmg.scene.loading import load_scene
 
-    scene = load_scene(options.scene)
+    scene = load_scene(options.scene, trust_code=options.trust_code)
     terminal.compile_kernels()
     with terminal.progress() as told:
         result = pipeline.run(
             scene,
             out=options.out,
             video=None if options.no_video else DEFAULT_VIDEO,
+            trust_code=options.trust_code,
             on_progress=told,
             on_improvement=terminal.improvement_teller(told),
             **given(options),
@@ -48,7 +48,8 @@ def plan(options: argparse.Namespace) -> int:
     from mrmg.steps import Run
 
     arguments = RunArguments(**given(options))
-    scene = arguments.scene(load_scene(options.scene))
+    loaded = load_scene(options.scene, trust_code=options.trust_code)
+    scene = arguments.scene(loaded)
     terminal.compile_kernels()
     folder = RunFolder(options.out or default_folder(scene, arguments.seed))
     with folder.opened_for_writing(), terminal.progress() as told:
@@ -73,7 +74,7 @@ def verify(options: argparse.Namespace) -> int:
     """Judge the plan of a run folder."""
     from mrmg.run_folder import Step
 
-    work = _make(options.run, Step.VERIFY)
+    work = _make(options, Step.VERIFY)
     verdict = work.folder.read_json("verdict.json", cure="mrmg verify")
     lines = ["valid" if verdict["ok"] else "not valid:"]
     lines += [f"  {violation['message']}" for violation in verdict["violations"]]
@@ -87,7 +88,7 @@ def execute(options: argparse.Namespace) -> int:
 
     undisturbed = RunArguments().deciding("drive")
     del undisturbed["controller"]
-    work = _make(options.run, Step.EXECUTE, **{**undisturbed, **given(options)})
+    work = _make(options, Step.EXECUTE, **{**undisturbed, **given(options)})
     log = work.folder.read_json("log.json", cure="mrmg execute")
     lost = [item for item in log["events"] if item["action"] in ("end", "give_up")]
     driven = log["completed"] and not lost
@@ -106,7 +107,7 @@ def audit(options: argparse.Namespace) -> int:
     """Compare planned, metered and measured energy of a run folder."""
     from mrmg.run_folder import Step
 
-    work = _make(options.run, Step.AUDIT)
+    work = _make(options, Step.AUDIT)
     account = work.folder.read_json("audit.json", cure="mrmg audit")
     lines = ["mission done" if account["mission_ok"] else "mission failed:"]
     lines += [f"  {reason}" for reason in account["reasons"]]
@@ -122,7 +123,7 @@ def render(options: argparse.Namespace) -> int:
     from mrmg.run_folder import Step
 
     wanted = given(options, VideoArguments)
-    work = _make(options.run, Step.RENDER, Step.DRAW, Step.REPORT, video=wanted)
+    work = _make(options, Step.RENDER, Step.DRAW, Step.REPORT, video=wanted)
     for name in _SHOWN:
         if work.folder.file(name).exists():
             print(work.folder.file(name))
@@ -133,7 +134,7 @@ def report(options: argparse.Namespace) -> int:
     """Write the summary and the report of a run folder anew."""
     from mrmg.run_folder import Step
 
-    work = _make(options.run, Step.REPORT)
+    work = _make(options, Step.REPORT)
     _print(options, work.summary(), str(work.folder.file("report.html")))
     return work.exit_code()
 
@@ -155,17 +156,18 @@ def doctor(options: argparse.Namespace) -> int:
 
 
 def _make(
-    path: Path,
+    options: argparse.Namespace,
     *steps: Any,
     video: dict[str, Any] | None = None,
     **changes: Any,
 ) -> Run:
-    """Make steps of the run in `path` anew, with some of its arguments changed."""
+    """Make steps of a run anew, with some of its arguments changed."""
     from mrmg.run_folder import existing
     from mrmg.steps import checked_drive, taken_up
 
-    with existing(path).opened_for_writing() as folder, terminal.progress() as told:
-        work = taken_up(folder, told)
+    folder = existing(options.run)
+    with folder.opened_for_writing(), terminal.progress() as told:
+        work = taken_up(folder, told, trust_code=options.trust_code)
         changed = work.arguments.changed(video or {}, **changes)
         work = replace(work, arguments=checked_drive(work.scene, changed))
         for step in steps:

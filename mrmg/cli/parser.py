@@ -15,7 +15,7 @@ from mrmg.cli import (
     scene_commands,
     show_commands,
 )
-from mrmg.cli.run_options import add_options, reader
+from mrmg.cli.run_options import add_options, add_trust, reader
 from mrmg.cli.usage import Parser
 from mrmg.run_arguments import VideoArguments
 
@@ -78,6 +78,7 @@ def _add_planning(verb: argparse.ArgumentParser, name: str) -> None:
         "--out", type=Path, metavar="DIR", help="run folder; default runs/SCENE-sN"
     )
     add_options(verb, name)
+    add_trust(verb)
     _add_json(verb, "summary.json" if name == "run" else "planning.json")
 
 
@@ -92,6 +93,7 @@ def _add_steps(verbs: _Verbs) -> None:  # type: ignore[type-arg]
         verb = verbs.add_parser(name, help=what)
         verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
         add_options(verb, name)
+        add_trust(verb)
         _add_json(verb, output)
         verb.set_defaults(command=command)
 
@@ -100,6 +102,7 @@ def _add_render(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     render = verbs.add_parser("render", help="make the pictures and the video")
     render.add_argument("run", type=Path, metavar="RUN", help="run folder")
     add_options(render, "render", VideoArguments)
+    add_trust(render)
     render.set_defaults(command=commands.render)
 
 
@@ -116,6 +119,7 @@ def _add_compare(verbs: _Verbs) -> None:  # type: ignore[type-arg]
         metavar="PAGE.html",
         help="page with table and plots; default compare.html",
     )
+    add_trust(compare)
     _add_json(compare, "the table")
     compare.set_defaults(command=show_commands.compare)
 
@@ -136,6 +140,7 @@ def _add_figure(verbs: _Verbs) -> None:  # type: ignore[type-arg]
         metavar="FIGURE.pdf",
         help="PDF, SVG or PNG by its suffix; default KIND.pdf",
     )
+    add_trust(figure)
     figure.set_defaults(command=show_commands.figure)
 
 
@@ -159,6 +164,7 @@ def _add_view(verbs: _Verbs) -> None:  # type: ignore[type-arg]
         default=show_commands.PORT,
         help="port of the page; default 8080",
     )
+    add_trust(view)
     view.set_defaults(command=show_commands.view)
 
 
@@ -168,6 +174,7 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
 
     check = acts.add_parser("check", help="report every fault of a scene")
     check.add_argument("scene", metavar="SCENE")
+    add_trust(check)
     check.set_defaults(command=scene_commands.check)
 
     draw = acts.add_parser("draw", help="draw a scene")
@@ -175,6 +182,7 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     draw.add_argument(
         "-o", "--out", type=Path, metavar="PICTURE.png", help="default NAME.png"
     )
+    add_trust(draw)
     draw.set_defaults(command=scene_commands.draw)
 
     roadmap = acts.add_parser("roadmap", help="write the roadmap as GraphML")
@@ -185,6 +193,7 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     roadmap.add_argument(
         "-o", "--out", type=Path, metavar="OUT.graphml", help="default NAME.graphml"
     )
+    add_trust(roadmap)
     roadmap.set_defaults(command=scene_commands.roadmap)
 
     imported = acts.add_parser("import", help="read a polygon or triangle map")
@@ -213,6 +222,7 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
         "--seed", type=reader(values.seed), default=3, metavar="N", help="default 3"
     )
     _add_scene_out(populate)
+    add_trust(populate)
     populate.set_defaults(command=scene_commands.populate)
 
 
@@ -241,6 +251,7 @@ def _add_calibrate(verbs: _Verbs) -> None:  # type: ignore[type-arg]
         action="store_true",
         help="change the model's own robot.yaml, too",
     )
+    add_trust(verb)
     _add_json(verb, "calibration.json")
     verb.set_defaults(command=calibrate_command.calibrate)
 

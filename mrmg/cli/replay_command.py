@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrmg.cli import show_commands, terminal
+from mrmg.cli.run_options import add_trust
 from mrmg.errors import ExitCode
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ def add_replay(verbs: Any) -> None:
     verb.add_argument(
         "--view", action="store_true", help="watch it in three dimensions"
     )
+    add_trust(verb)
     verb.add_argument("--json", action="store_true", help="print the outcome as JSON")
     verb.set_defaults(command=replay)
 
@@ -44,24 +46,24 @@ def replay(options: argparse.Namespace) -> int:
 
     out = options.out or options.capsule.parent / "replay"
     with terminal.progress() as told:
-        outcome = reproduce(options.capsule, out, told)
+        outcome = reproduce(options.capsule, out, told, trust_code=options.trust_code)
     if options.json:
         terminal.print_json(outcome.to_json())
     else:
         print("\n".join(_lines(outcome, out)))
     if options.render:
-        _render(out)
+        _render(out, options.trust_code)
     if options.view:
-        show_commands.watch(str(out))
+        show_commands.watch(str(out), trust_code=options.trust_code)
     return ExitCode.OK if outcome.same_causes else ExitCode.MISSION_FAILED
 
 
-def _render(folder: Path) -> None:
+def _render(folder: Path, trust_code: bool) -> None:
     from mrmg.run_folder import Step, existing
     from mrmg.steps import taken_up
 
     with existing(folder).opened_for_writing() as opened, terminal.progress() as told:
-        taken_up(opened, told).make(Step.RENDER)
+        taken_up(opened, told, trust_code=trust_code).make(Step.RENDER)
     print(folder / "mission.mp4")
 
 

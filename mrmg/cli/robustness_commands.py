@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from mrmg import argument_values as values
 from mrmg.cli import terminal
-from mrmg.cli.run_options import add_options, given, reader
+from mrmg.cli.run_options import add_options, add_trust, given, reader
 from mrmg.errors import ExitCode
 from mrmg.run_arguments import DISTURBANCE_HELP
 
@@ -60,6 +60,7 @@ def add_robustness(verbs: Any) -> None:
         help="--disturb-seed of the first trial, the next have N+1, ...; default 0",
     )
     add_options(verb, "robustness")
+    add_trust(verb)
     verb.add_argument(
         "--json", action="store_true", help="print the study of robustness.json alone"
     )
@@ -80,7 +81,7 @@ def robustness(options: argparse.Namespace) -> int:
         if name in ("controller", "replan")
     }
     with existing(options.run).opened_for_writing() as folder:
-        run = taken_up(folder)
+        run = taken_up(folder, trust_code=options.trust_code)
         drive = {"replan": False, "faults": (), **given_drive}
         driven = replace(run, arguments=replace(run.arguments, **drive))
         with terminal.progress_of("driving") as told:

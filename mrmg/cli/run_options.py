@@ -33,6 +33,15 @@ def add_options(
         )
 
 
+def add_trust(verb: argparse.ArgumentParser) -> None:
+    """Add the option of every verb that loads a scene, a run or a robot model."""
+    verb.add_argument(
+        "--trust-code",
+        action="store_true",
+        help="let robot models run Python code that they bring (motion_model: FILE.py)",
+    )
+
+
 def given(
     options: argparse.Namespace, arguments: _Arguments = RunArguments
 ) -> dict[str, Any]:

@@ -15,7 +15,7 @@ def check(options: argparse.Namespace) -> int:
     """Load a scene; every fault of it is in the error that loading raises."""
     from mrmg.scene.loading import load_scene
 
-    scene = load_scene(options.scene)
+    scene = load_scene(options.scene, trust_code=options.trust_code)
     print(
         f"{scene.name}: valid; {len(scene.robots)} robots, {len(scene.goals)} goals, "
         f"{len(scene.stations)} stations, {len(scene.obstacles)} obstacles, "
@@ -29,7 +29,7 @@ def draw(options: argparse.Namespace) -> int:
     from mrmg.results.scene_drawing import draw_scene
     from mrmg.scene.loading import load_scene
 
-    scene = load_scene(options.scene)
+    scene = load_scene(options.scene, trust_code=options.trust_code)
     picture = options.out or Path(f"{scene.name}.png")
     draw_scene(scene, picture)
     print(picture)
@@ -46,7 +46,7 @@ def roadmap(options: argparse.Namespace) -> int:
     from mrmg.scene.loading import load_scene
     from mrmg.world.world import World
 
-    scene = load_scene(options.scene)
+    scene = load_scene(options.scene, trust_code=options.trust_code)
     if not scene.robots:
         raise UsageError(f"{scene.name} has no robots, whose width decides the roadmap")
     params = PlannerParams()
@@ -84,7 +84,7 @@ def populate(options: argparse.Namespace) -> int:
     from mrmg.scene.loading import load_scene
 
     document = populated(
-        load_scene(options.scene).document,
+        load_scene(options.scene, trust_code=options.trust_code).document,
         robots=options.robots,
         goals=options.goals,
         stations=options.stations,

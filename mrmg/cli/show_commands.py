@@ -19,7 +19,7 @@ def compare(options: argparse.Namespace) -> int:
     from mrmg.results.compare import compare_runs
     from mrmg.results.compare_page import write_comparison
 
-    comparison = compare_runs(options.runs)
+    comparison = compare_runs(options.runs, trust_code=options.trust_code)
     write_comparison(comparison, options.out)
     if options.json:
         terminal.print_json(comparison.to_json())
@@ -33,7 +33,7 @@ def figure(options: argparse.Namespace) -> int:
     from mrmg.results.figure import draw_figure
 
     out = options.out or Path(f"{options.kind}.pdf")
-    draw_figure(options.run, options.kind, out)
+    draw_figure(options.run, options.kind, out, trust_code=options.trust_code)
     print(out)
     return ExitCode.OK
 
@@ -41,12 +41,21 @@ def figure(options: argparse.Namespace) -> int:
 def view(options: argparse.Namespace) -> int:
     """Show a run or a scene in three dimensions, until told to stop."""
     return watch(
-        options.source, place=options.place, host=options.host, port=options.port
+        options.source,
+        place=options.place,
+        host=options.host,
+        port=options.port,
+        trust_code=options.trust_code,
     )
 
 
 def watch(
-    source: str, *, place: str | None = None, host: str = LOCAL_HOST, port: int = PORT
+    source: str,
+    *,
+    place: str | None = None,
+    host: str = LOCAL_HOST,
+    port: int = PORT,
+    trust_code: bool = False,
 ) -> int:
     """Show a run or a scene until told to stop.
 
@@ -55,15 +64,16 @@ def watch(
         place: "window" or "browser"; None for a window where there is a screen.
         host: address a page is served on.
         port: of the page.
+        trust_code: whether robot models may bring Python code (`scene.loading.trust`).
     """
     from mrmg.results.replay import replay_of
     from mrmg.scene.loading import load_scene
 
     if (Path(source) / "run.json").exists():
-        replay = replay_of(Path(source))
+        replay = replay_of(Path(source), trust_code=trust_code)
         scene = replay.film.scene
     else:
-        replay, scene = None, load_scene(source)
+        replay, scene = None, load_scene(source, trust_code=trust_code)
     if (place or ("window" if _has_screen() else "browser")) == "window":
         from mrmg.results.native_view import open_window
 

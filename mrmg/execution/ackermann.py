@@ -1,7 +1,8 @@
 """The chassis of a car: two steered wheels in front, an open differential behind.
 
-The MJCF names its parts: joints `steer_fl`, `steer_fr`, `spin_rl`, `spin_rr`; actuators
-`steer_l`, `steer_r` (position servos) and `drive` (traction force at the rear axle).
+The MJCF names its parts as `scene.driven_parts` has them: the joints of steered and
+driven wheels, a position servo for each steered wheel, and a motor whose control is the
+traction force at the rear axle.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from mrmg.execution.chassis import part_ids
 from mrmg.execution.driven_wheels import DrivenWheels
 from mrmg.execution.recording import held_force_work_J
+from mrmg.scene.driven_parts import PARTS
 from mrmg.scene.types import Robot
 
 
@@ -28,18 +30,18 @@ class AckermannChassis:
         Raises:
             FileError: if an MJCF lacks one.
         """
-        self._model, self._data = model, data
+        self._model, self._data, parts = model, data, PARTS["car"]
         self._step_s = model.opt.timestep
         models = [robot.model for robot in robots]
         # What tan psi loses, by tan psi itself, to the left wheel's and to the right's.
         half_track = np.array([item.track_m / item.wheelbase_m / 2 for item in models])
         self._swing = half_track[:, None] * np.array([1.0, -1.0])
-        self._wheels = DrivenWheels(model, data, robots, ("spin_rl", "spin_rr"))
+        self._wheels = DrivenWheels(model, data, robots, parts.spin)
         joint, actuator = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_ACTUATOR
-        steer = part_ids(model, joint, robots, ("steer_fl", "steer_fr"))
+        steer = part_ids(model, joint, robots, parts.steer)
         self._steer_q = model.jnt_qposadr[steer]
-        self._steer_ctrl = part_ids(model, actuator, robots, ("steer_l", "steer_r"))
-        self._drive_ctrl = part_ids(model, actuator, robots, ("drive",))[:, 0]
+        self._steer_ctrl = part_ids(model, actuator, robots, parts.servos)
+        self._drive_ctrl = part_ids(model, actuator, robots, parts.motors)[:, 0]
         # A servo with stiffness kp and damping kv follows a ramp kv / kp late.
         servo = self._steer_ctrl[:, 0]
         self._servo_lag_s = (

@@ -1,10 +1,10 @@
 """The chassis of a differential drive: two driven wheels, and casters without drag.
 
-The MJCF names its parts: joints `spin_l`, `spin_r`; motors `drive_l`, `drive_r`
-(traction force at each wheel); tendons `axle` (way rolled by the middle of the axle)
-and `swing` (way rolled by the right wheel less that of the left). The tendons carry dry
-friction: rolling resistance on the first, what turning takes on the second, so that
-both losses add up as in the energy model.
+The MJCF names its parts as `scene.driven_parts` has them: the joints of the wheels,
+motors whose controls are the traction forces of the wheels, and tendons as long as the
+way rolled by the middle of the axle, and as the way rolled by the right wheel less that
+of the left. The tendons carry dry friction: rolling resistance on the first, what
+turning takes on the second, so that both losses add up as in the energy model.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from mrmg.execution.drive import DriveParams, axle_grip_N
 from mrmg.execution.driven_wheels import DrivenWheels
 from mrmg.execution.recording import held_force_work_J
 from mrmg.execution.speed_loop import SpeedLoop
+from mrmg.scene.driven_parts import CHASSIS, PARTS, ROOT
 from mrmg.scene.types import Robot
 
 
@@ -33,17 +34,16 @@ class DifferentialChassis:
         Raises:
             FileError: if an MJCF lacks one.
         """
-        self._model, self._data = model, data
+        self._model, self._data, parts = model, data, PARTS["unicycle"]
         models = [robot.model for robot in robots]
         self._track_m = np.array([item.track_m for item in models])
-        self._wheels = DrivenWheels(model, data, robots, ("spin_l", "spin_r"))
+        self._wheels = DrivenWheels(model, data, robots, parts.spin)
         joint, actuator = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_ACTUATOR
-        root = part_ids(model, joint, robots, ("root",))[:, 0]
+        root = part_ids(model, joint, robots, (ROOT,))[:, 0]
         self._yaw_v = model.jnt_dofadr[root] + 5
-        self._drive_ctrl = part_ids(model, actuator, robots, ("drive_l", "drive_r"))
-        self._tendon = part_ids(
-            model, mujoco.mjtObj.mjOBJ_TENDON, robots, ("axle", "swing")
-        )
+        self._drive_ctrl = part_ids(model, actuator, robots, parts.motors)
+        tendon = mujoco.mjtObj.mjOBJ_TENDON
+        self._tendon = part_ids(model, tendon, robots, parts.tendons)
         turning_N = np.array([item.energy_model.turning_force_N for item in models])
         self._turning_Nm = turning_N * self._track_m
         params = DriveParams()
@@ -127,7 +127,7 @@ class DifferentialChassis:
         mujoco.mj_forward(model, still)
         inertia = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, still, inertia)
-        body = part_ids(model, mujoco.mjtObj.mjOBJ_BODY, robots, ("chassis",))[:, 0]
+        body = part_ids(model, mujoco.mjtObj.mjOBJ_BODY, robots, (CHASSIS,))[:, 0]
         forward = still.xmat[body].reshape(-1, 3, 3)[:, :, 0]
         lead_m = ((still.subtree_com[body] - still.xpos[body]) * forward).sum(axis=1)
         return inertia[self._yaw_v, self._yaw_v], model.body_subtreemass[body] * lead_m

@@ -8,6 +8,7 @@ import numpy as np
 from mrmg.execution.disturbance import Disturbance, RobotDisturbance
 from mrmg.execution.incline import standing_pose
 from mrmg.execution.world_model import MujocoWorld
+from mrmg.scene.driven_parts import ROOT
 
 
 def disturb_world(world: MujocoWorld, disturbance: Disturbance) -> None:
@@ -34,7 +35,7 @@ def move_starts(
     for robot, item in zip(world.scene.robots, disturbance.robots, strict=True):
         if not (item.start_x_m or item.start_y_m or item.start_heading_rad):
             continue
-        root = world.model.joint(f"{robot.id}/root")
+        root = world.model.joint(f"{robot.id}/{ROOT}")
         x, y, yaw = robot.pose
         position, orientation = standing_pose(
             world.scene,

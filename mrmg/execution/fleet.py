@@ -1,8 +1,8 @@
 """The robots inside the simulation: reading their states, steering and driving them.
 
 All robots are handled as arrays in the scene's order; what differs between their kinds
-is left to a chassis for each motion model. Every MJCF names the free joint `root`, the
-body `chassis` and the geom `hull`, besides the parts its chassis needs.
+is left to a chassis for each motion model. What an MJCF must name stands in
+`scene.driven_parts`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from mrmg.execution.chassis import Chassis, chassis_maker, part_ids
 from mrmg.execution.world_model import MujocoWorld
+from mrmg.scene.driven_parts import ROOT
 from mrmg.scene.types import Scene
 
 
@@ -39,7 +40,7 @@ class Fleet:
         model, robots = world.model, world.scene.robots
         self._model, self._data = model, data
         self._groups = _grouped(model, data, world.scene)
-        root = part_ids(model, mujoco.mjtObj.mjOBJ_JOINT, robots, ("root",))
+        root = part_ids(model, mujoco.mjtObj.mjOBJ_JOINT, robots, (ROOT,))
         root_q, root_v = model.jnt_qposadr[root], model.jnt_dofadr[root]
         self._pose = root_q + np.arange(7)
         self._velocity = root_v + np.arange(2)

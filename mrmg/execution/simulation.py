@@ -34,6 +34,7 @@ from mrmg.execution.set_points import SetPoints
 from mrmg.execution.supervision import Event, Observation, Orders, Supervisor
 from mrmg.execution.world_model import MujocoWorld, build_world
 from mrmg.mission import Plan
+from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.types import Scene
 from mrmg.world.terrain import multiplier_at
 
@@ -95,6 +96,7 @@ def simulate(
             f"the plan was made for scene {plan.scene_digest}, but '{scene.name}' is "
             f"{scene.digest}; plan this scene anew"
         )
+    require_drivable(scene.robots)
     for robot in scene.robots:
         chassis_maker(robot)
     controllers = [maker(robot.model) for robot in scene.robots]

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from mrmg.errors import Fault, FileError, UsageError
+from mrmg.errors import Fault, FileError
 from mrmg.execution import palette, scenery
 from mrmg.execution.incline import standing_pose
-from mrmg.motion.dynamics import DERIVATIVES
+from mrmg.scene.driven_parts import CHASSIS, HULL, require_drivable
 from mrmg.scene.types import Robot, Scene
 
 PHYSICS_STEP_S = 0.004
@@ -65,7 +65,7 @@ def build_world(scene: Scene) -> MujocoWorld:
         body = scenery.add_obstacle(spec, scene, obstacle)
         for robot in scene.robots:
             if not obstacle.stops(robot.id):
-                spec.add_exclude(bodyname1=body.name, bodyname2=f"{robot.id}/chassis")
+                spec.add_exclude(bodyname1=body.name, bodyname2=f"{robot.id}/{CHASSIS}")
     model = spec.compile()
     return MujocoWorld(
         scene=scene,
@@ -80,7 +80,7 @@ def build_world(scene: Scene) -> MujocoWorld:
             for target in targets
         },
         chassis=np.array(
-            [model.body(f"{robot.id}/chassis").id for robot in scene.robots]
+            [model.body(f"{robot.id}/{CHASSIS}").id for robot in scene.robots]
         ),
     )
 
@@ -138,13 +138,8 @@ def _attach(
     spec: mujoco.MjSpec, scene: Scene, robot: Robot, colour: palette.Rgb
 ) -> None:
     """Attach the robot's MJCF at its start pose, its names prefixed with `<id>/`."""
+    require_drivable([robot])
     path = robot.model.mjcf
-    if path is None or robot.model.motion_model not in DERIVATIVES:
-        lacking = "no MJCF file" if path is None else "a motion of its own"
-        raise UsageError(
-            f"{robot.id}: model '{robot.model.name}' has {lacking}; its missions can "
-            "be planned for and verified, but not driven in MuJoCo"
-        )
     try:
         car = mujoco.MjSpec.from_file(str(path))
     except (ValueError, OSError) as error:
@@ -167,7 +162,7 @@ def _digest(model: mujoco.MjModel) -> str:
 def _hull_owner(scene: Scene, model: mujoco.MjModel) -> np.ndarray:
     owner = np.full(model.ngeom, -1)
     for index, robot in enumerate(scene.robots):
-        owner[model.geom(f"{robot.id}/hull").id] = index
+        owner[model.geom(f"{robot.id}/{HULL}").id] = index
     return owner
 
 
@@ -177,4 +172,4 @@ def _label(model: mujoco.MjModel, geom: int) -> str:
         return scenery.FLOOR
     if body == scenery.BOUNDS:
         return scenery.BOUNDS
-    return str(body.removeprefix("obstacle:").removesuffix("/chassis"))
+    return str(body.removeprefix("obstacle:").removesuffix(f"/{CHASSIS}"))

@@ -15,6 +15,7 @@ from mrmg.mission_control.faults import checked_faults
 from mrmg.mission_control.parameters import ControlParams
 from mrmg.mission_control.replanning import Replan, Replanner
 from mrmg.planning import PlannerParams
+from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.types import Scene
 
 
@@ -72,8 +73,9 @@ def drive_mission(
 
     Raises:
         UsageError: if the controller or a fault's robot is unknown, a fault cannot be
-            read, or the plan is of another scene.
+            read, the plan is of another scene, or a robot can only be planned for.
     """
+    require_drivable(scene.robots)
     params = params or ControlParams()
     control = MissionControl(
         scene,

@@ -21,7 +21,6 @@ verifier runs `step` as it is.
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -86,12 +85,12 @@ def user_motion(path: str) -> UserMotion:
 def _imported(path: str) -> ModuleType:
     # Named after its place, so that files of the same name do not get mixed up.
     name = f"mrmg_user_motion_{hashlib.sha256(path.encode()).hexdigest()[:12]}"
-    spec = importlib.util.spec_from_file_location(name, Path(path))
-    if spec is None or spec.loader is None:
-        raise SceneError(path, [Fault("", "is no Python file")])
-    module = importlib.util.module_from_spec(spec)
+    module = ModuleType(name)
+    module.__file__ = path
     try:
-        spec.loader.exec_module(module)
+        # Not through importlib: a __pycache__ that came along is other code than this.
+        code = compile(Path(path).read_bytes(), path, "exec", dont_inherit=True)
+        exec(code, module.__dict__)
     except Exception as error:  # a user's file may do anything
         reason = f"cannot be imported: {type(error).__name__}: {error}"
         raise SceneError(path, [Fault("", reason)]) from error

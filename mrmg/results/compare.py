@@ -93,11 +93,12 @@ class Comparison:
         )
 
 
-def compare_runs(folders: Sequence[Path]) -> Comparison:
+def compare_runs(folders: Sequence[Path], *, trust_code: bool = False) -> Comparison:
     """Read run folders to compare.
 
     Args:
         folders: at least two, none twice.
+        trust_code: whether robot models may bring Python code (`loading.trust`).
 
     Raises:
         UsageError: if there are fewer, or one is named twice.
@@ -106,7 +107,7 @@ def compare_runs(folders: Sequence[Path]) -> Comparison:
     resolved = [folder.resolve() for folder in folders]
     if len(set(resolved)) < max(len(resolved), 2):
         raise UsageError("compare needs at least two run folders, none of them twice")
-    records = tuple(read_record(folder) for folder in folders)
+    records = tuple(read_record(folder, trust_code=trust_code) for folder in folders)
     return Comparison(
         names=_names(resolved), records=records, rows=tuple(_rows(records))
     )

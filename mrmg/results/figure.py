@@ -30,13 +30,16 @@ KINDS = tuple(_DRAW)
 """What a figure can show."""
 
 
-def draw_figure(run_folder: Path, kind: str, path: Path) -> None:
+def draw_figure(
+    run_folder: Path, kind: str, path: Path, *, trust_code: bool = False
+) -> None:
     """Draw one figure of a run.
 
     Args:
         run_folder: the run; at least planned.
         kind: one of `KINDS`.
         path: file to write; its suffix, one of `print_style.FORMATS`, gives the format.
+        trust_code: whether robot models may bring Python code (`loading.trust`).
 
     Raises:
         UsageError: if kind or suffix is unknown.
@@ -45,7 +48,7 @@ def draw_figure(run_folder: Path, kind: str, path: Path) -> None:
     if kind not in _DRAW:
         raise UsageError(f"kind {kind!r} is unknown; use one of {', '.join(KINDS)}")
     require_format(path)
-    record = read_record(run_folder)
+    record = read_record(run_folder, trust_code=trust_code)
     if record.plan is None:
         reason = f"there is no plan to draw ({record.planning['reason']})"
         reason += "; 'mrmg scene draw' draws the scene"

@@ -61,13 +61,17 @@ class Replay:
         self.playing = not self.playing
 
 
-def replay_of(run_folder: Path) -> Replay:
+def replay_of(run_folder: Path, *, trust_code: bool = False) -> Replay:
     """Return the replay of a run.
+
+    Args:
+        run_folder: the run, driven.
+        trust_code: whether robot models may bring Python code (`loading.trust`).
 
     Raises:
         RunFolderError: if the run was not driven yet, or cannot be read.
     """
-    scene = load_scene(run_folder / "scene.yaml")
+    scene = load_scene(run_folder / "scene.yaml", trust_code=trust_code)
     if not (run_folder / "plan.json").exists():
         fault = Fault("plan.json", "missing: there is no plan; view the scene instead")
         raise RunFolderError(str(run_folder), [fault])

@@ -24,16 +24,17 @@ from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
 
 
-def write_report(run_folder: Path) -> None:
+def write_report(run_folder: Path, *, trust_code: bool = False) -> None:
     """Write `report.html` into a run folder, from the files that are there.
 
     Args:
         run_folder: holds at least `scene.yaml`, `planning.json` and `summary.json`.
+        trust_code: whether robot models may bring Python code (`loading.trust`).
 
     Raises:
         RunFolderError: if a file is missing or cannot be read.
     """
-    record = read_record(run_folder)
+    record = read_record(run_folder, trust_code=trust_code)
     storage.write_text(run_folder / "report.html", report_html(record))
 
 
@@ -222,6 +223,7 @@ def command(record: RunRecord) -> str:
     arguments = replace(RunArguments.from_json(record.arguments), seed=0)
     words = ["mrmg", "run", _source(record.scene, arguments)]
     words += ["--seed", str(record.summary["seed"]), *arguments.words()]
+    words += ["--trust-code"] if record.scene.has_custom_motion else []
     return shlex.join(words)
 
 

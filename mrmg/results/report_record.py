@@ -46,8 +46,12 @@ class RunRecord:
     studies: tuple[Study, ...] = ()
 
 
-def read_record(run_folder: Path) -> RunRecord:
+def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
     """Read a run folder.
+
+    Args:
+        run_folder: the run; at least planned.
+        trust_code: whether robot models may bring Python code (`loading.trust`).
 
     Raises:
         RunFolderError: if a file is missing or cannot be read.
@@ -62,7 +66,7 @@ def read_record(run_folder: Path) -> RunRecord:
 
     has_run = (run_folder / "run.json").exists()
     run = _read(run_folder, "run.json", "mrmg run") if has_run else {}
-    scene = load_scene(run_folder / "scene.yaml")
+    scene = load_scene(run_folder / "scene.yaml", trust_code=trust_code)
     summed_up = (run_folder / "summary.json").exists()
     return RunRecord(
         folder=run_folder,

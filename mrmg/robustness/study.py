@@ -18,6 +18,7 @@ from mrmg.results.robustness import Study, Trial, save_study
 from mrmg.robustness.trials import TrialJob, jobs_of, make_trial
 from mrmg.run_arguments import RunArguments
 from mrmg.run_folder import Step
+from mrmg.scene.driven_parts import require_drivable
 from mrmg.steps import Run
 
 TRIALS_FOLDER = "trials"
@@ -50,7 +51,8 @@ def study_robustness(
         on_trial: told of every trial, those of earlier calls first.
 
     Raises:
-        UsageError: if the run has no plan, or `disturb` cannot be read.
+        UsageError: if the run has no plan or a robot that can only be planned for, or
+            `disturb` cannot be read.
         MachineError: if a worker was killed; what is done is kept.
     """
     if run.status() is not PlanStatus.SOLVED:
@@ -58,6 +60,7 @@ def study_robustness(
             f"{run.folder.path} holds no plan (planning ended {run.status().value}); "
             "there is nothing to drive"
         )
+    require_drivable(run.scene.robots)
     arguments = replace(run.arguments, disturb=written_out(disturb), disturb_seed=0)
     place = _trials_folder(run, arguments)
     jobs = jobs_of(run.folder.path, arguments, place, range(seed, seed + trials))

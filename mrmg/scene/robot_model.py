@@ -120,6 +120,11 @@ class RobotModel:
     mjcf: Path | None
 
     @property
+    def has_custom_motion(self) -> bool:
+        """Whether a Python file of the model's folder defines its motion."""
+        return self.motion_model.endswith(".py")
+
+    @property
     def effective_mass_kg(self) -> float:
         """Mass that resists acceleration along the road: m + n I_w / r^2."""
         spin = self.wheel_count * self.wheel_inertia_kg_m2 / self.wheel_radius_m**2

@@ -210,6 +210,11 @@ class Scene:
     objective: Objective = ENERGY
     time_limit_s: float = math.inf
 
+    @property
+    def has_custom_motion(self) -> bool:
+        """Whether a robot moves by Python code of its model, which was trusted."""
+        return any(robot.model.has_custom_motion for robot in self.robots)
+
     def robot(self, robot_id: str) -> Robot:
         """Return the robot of that id."""
         return next(robot for robot in self.robots if robot.id == robot_id)

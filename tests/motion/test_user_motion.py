@@ -95,6 +95,7 @@ def slider_scene(folder: Path, **robot: object) -> Scene:
             ],
         },
         source="sliders",
+        trust_code=True,
     )
 
 

@@ -58,8 +58,11 @@ RESERVED_IDS = ("bounds", "floor", "world")
 class Assembly:
     """Collects the parts of a scene and their faults."""
 
-    def __init__(self, document: dict[str, Any], base: Path | None) -> None:
+    def __init__(
+        self, document: dict[str, Any], base: Path | None, *, trust_code: bool = False
+    ) -> None:
         """Read all well-formed entries of `document`; see `scene_from_document`."""
+        self._trust_code = trust_code
         self.faults: list[Fault] = []
         self._document = document
         self._base = base
@@ -214,7 +217,9 @@ class Assembly:
             return None
         try:
             self._models[robot_id] = load_model(
-                folder, source=f"{reference}/robot.yaml"
+                folder,
+                source=f"{reference}/robot.yaml",
+                trust_code=self._trust_code,
             )
         except SceneError as error:
             for fault in error.faults:

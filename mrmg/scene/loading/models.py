@@ -21,6 +21,7 @@ from mrmg.errors import Fault, SceneError, nearest
 from mrmg.scene.loading.faults import faults_of
 from mrmg.scene.loading.places import lines_of
 from mrmg.scene.loading.schema import Positive, Ring, Strict
+from mrmg.scene.loading.trust import file_within, refusal_of_code
 from mrmg.scene.loading.yaml_text import read_yaml
 from mrmg.scene.robot_model import Limits, RobotModel
 
@@ -97,13 +98,14 @@ def model_folder(reference: str, base: Path | None) -> Path | str:
 
 
 def load_model(
-    folder: Path, *, source: str | None = None
+    folder: Path, *, source: str | None = None, trust_code: bool = False
 ) -> tuple[RobotModel, dict[str, Any]]:
     """Read the model in `folder`.
 
     Args:
         folder: holds `robot.yaml`.
         source: what error messages call the file; default its path.
+        trust_code: whether a motion that is a Python file of the folder may run.
 
     Returns:
         The model, and its parameters as plain data (what a digest is taken of).
@@ -113,19 +115,21 @@ def load_model(
     """
     path = folder / "robot.yaml"
     with lines_of(path):
-        return _checked_model(folder, source or str(path))
+        return _checked_model(folder, source or str(path), trust_code=trust_code)
 
 
-def _checked_model(folder: Path, source: str) -> tuple[RobotModel, dict[str, Any]]:
+def _checked_model(
+    folder: Path, source: str, *, trust_code: bool
+) -> tuple[RobotModel, dict[str, Any]]:
     document = read_yaml(folder / "robot.yaml", source=source)
     try:
         entry = ModelDocument.model_validate(document)
     except ValidationError as error:
         raise SceneError(source, faults_of(error, ModelDocument)) from error
-    faults = [*_motion_faults(entry, folder), *_geometry_faults(entry)]
-    if entry.mjcf is not None and not (folder / entry.mjcf).is_file():
-        message = f"got '{entry.mjcf}'; no such file in the folder"
-        faults.append(Fault("mjcf", message))
+    faults = _motion_faults(entry, folder, trust_code) + _geometry_faults(entry)
+    if entry.mjcf is not None:
+        mjcf = file_within(folder, entry.mjcf)
+        faults += [Fault("mjcf", mjcf)] if isinstance(mjcf, str) else []
     if faults:
         raise SceneError(source, faults)
     # Keys left at their defaults stay out: files without them keep their digests.
@@ -137,7 +141,7 @@ def _checked_model(folder: Path, source: str) -> tuple[RobotModel, dict[str, Any
     return _model(folder, entry), parameters
 
 
-def _motion_faults(entry: ModelDocument, folder: Path) -> list[Fault]:
+def _motion_faults(entry: ModelDocument, folder: Path, trust_code: bool) -> list[Fault]:
     name = entry.motion_model
     if name in SHIPPED_MOTIONS:
         return []
@@ -147,9 +151,12 @@ def _motion_faults(entry: ModelDocument, folder: Path) -> list[Fault]:
             "in the model's folder"
         )
         return [Fault("motion_model", message)]
-    if not (folder / name).is_file():
-        return [Fault("motion_model", f"got '{name}'; no such file in the folder")]
-    return []
+    file = file_within(folder, name)
+    if isinstance(file, Path):
+        refusal = None if trust_code else refusal_of_code(file)
+    else:
+        refusal = file
+    return [] if refusal is None else [Fault("motion_model", refusal)]
 
 
 def _geometry_faults(entry: ModelDocument) -> list[Fault]:

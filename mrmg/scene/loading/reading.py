@@ -19,11 +19,12 @@ from mrmg.scene.loading.yaml_text import dump_yaml, read_yaml
 from mrmg.scene.types import Scene
 
 
-def load_scene(source: str | Path) -> Scene:
+def load_scene(source: str | Path, *, trust_code: bool = False) -> Scene:
     """Load a scene from a file, or a shipped scene by its name.
 
     Args:
         source: path of a scene file, or one of `shipped.scene_names()`.
+        trust_code: whether robot models may bring Python code (`loading.trust`).
 
     Raises:
         SceneError: naming every fault of the file.
@@ -33,11 +34,17 @@ def load_scene(source: str | Path) -> Scene:
     if isinstance(document, dict):
         document.setdefault("name", path.stem)
     with lines_of(path):
-        return scene_from_document(document, source=str(source), base=path.parent)
+        return scene_from_document(
+            document, source=str(source), base=path.parent, trust_code=trust_code
+        )
 
 
 def scene_from_document(
-    document: dict[str, Any], *, source: str, base: Path | None = None
+    document: dict[str, Any],
+    *,
+    source: str,
+    base: Path | None = None,
+    trust_code: bool = False,
 ) -> Scene:
     """Build a scene from the content of a scene file.
 
@@ -46,6 +53,7 @@ def scene_from_document(
         source: what error messages call it.
         base: folder that relative paths of robot models start from; default the
             working directory.
+        trust_code: whether robot models may bring Python code (`loading.trust`).
 
     Raises:
         SceneError: naming every fault of the document.
@@ -56,7 +64,7 @@ def scene_from_document(
         SceneDocument.model_validate(document)
     except ValidationError as error:
         faults = faults_of(error, SceneDocument)
-    assembly = Assembly(document, base)
+    assembly = Assembly(document, base, trust_code=trust_code)
     faults += assembly.faults
     if faults:
         named = [replace(fault, id=id_at(document, fault.path)) for fault in faults]
