@@ -196,6 +196,12 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     add_trust(roadmap)
     roadmap.set_defaults(command=scene_commands.roadmap)
 
+    schema = acts.add_parser("schema", help="print the JSON Schema of scene files")
+    schema.add_argument(
+        "--robot", action="store_true", help="print that of robot.yaml instead"
+    )
+    schema.set_defaults(command=scene_commands.schema)
+
     imported = acts.add_parser("import", help="read a polygon or triangle map")
     imported.add_argument("map", type=Path, metavar="MAP")
     imported.add_argument(

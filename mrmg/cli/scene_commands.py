@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -66,6 +67,15 @@ def roadmap(options: argparse.Namespace) -> int:
         f"{out}: {graph.number_of_nodes()} vertices, {graph.number_of_edges()} edges, "
         f"{parts} connected parts"
     )
+    return ExitCode.OK
+
+
+def schema(options: argparse.Namespace) -> int:
+    """Print the JSON Schema of scene files or of robot models."""
+    from mrmg.scene.loading import robot_schema, scene_schema
+
+    found = robot_schema() if options.robot else scene_schema()
+    print(json.dumps(found, indent=2))
     return ExitCode.OK
 
 

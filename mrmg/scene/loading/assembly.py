@@ -30,11 +30,11 @@ from mrmg.scene.loading.schema import (
     SECTIONS,
     BatteryEntry,
     BlendEntry,
-    CircleEntry,
     ElevationEntry,
     FinishEntry,
     SceneDocument,
 )
+from mrmg.scene.loading.shape_schema import CircleEntry
 from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import (

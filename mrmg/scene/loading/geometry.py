@@ -9,7 +9,8 @@ import shapely
 from shapely.geometry import Polygon
 
 from mrmg.errors import Fault
-from mrmg.scene.loading.schema import FinishEntry, RegionEntry, ShapedEntry
+from mrmg.scene.loading.schema import FinishEntry, RegionEntry
+from mrmg.scene.loading.shape_schema import ShapedEntry
 from mrmg.scene.types import Region, Robot
 
 CIRCLE_SIDES = 32

@@ -20,7 +20,7 @@ from mrmg.energy import EnergyPreset
 from mrmg.errors import Fault, SceneError, nearest
 from mrmg.scene.loading.faults import faults_of
 from mrmg.scene.loading.places import lines_of
-from mrmg.scene.loading.schema import Positive, Ring, Strict
+from mrmg.scene.loading.shape_schema import NotNegative, Positive, Ring, Strict
 from mrmg.scene.loading.trust import file_within, refusal_of_code
 from mrmg.scene.loading.yaml_text import read_yaml
 from mrmg.scene.robot_model import Limits, RobotModel
@@ -28,55 +28,84 @@ from mrmg.scene.robot_model import Limits, RobotModel
 SHIPPED_MOTIONS = ("car", "unicycle")
 """Motion models that need no file of their own."""
 
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Share = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
 
 
 class WheelEntry(Strict):
     """One wheel."""
 
-    radius: Positive
-    inertia: NotNegative
-    count: Annotated[int, Field(ge=1)]
-    mass: Positive
+    radius: Positive = Field(description="rolling radius in m")
+    inertia: NotNegative = Field(
+        description="spin inertia of one wheel and its share of the drive in kg m^2"
+    )
+    count: Annotated[int, Field(ge=1)] = Field(description="number of wheels")
+    mass: Positive = Field(description="mass of one wheel in kg")
 
 
 class LimitsEntry(Strict):
     """Bounds of state and control."""
 
-    v_min: Annotated[float, Field(le=0, allow_inf_nan=False)]
-    v_max: Positive
-    w_max: Positive
-    u1_max: Positive
-    u2_max: Positive
+    v_min: Annotated[float, Field(le=0, allow_inf_nan=False)] = Field(
+        description="fastest reverse speed in m/s, negative or 0"
+    )
+    v_max: Positive = Field(description="fastest forward speed in m/s")
+    w_max: Positive = Field(
+        description="steering angle in rad (car), or yaw rate in rad/s (unicycle)"
+    )
+    u1_max: Positive = Field(description="acceleration in m/s^2")
+    u2_max: Positive = Field(
+        description="steering rate in rad/s (car), or yaw acceleration in rad/s^2"
+    )
 
 
 class ModelDocument(Strict):
     """The content of `robot.yaml`."""
 
-    format: Literal[1]
+    format: Literal[1] = Field(description="format: 1")
     motion_model: Annotated[str, Field(min_length=1)] = Field(
         description="'car', 'unicycle', or a Python file of the model's folder"
     )
-    footprint: Ring
-    height: Positive
-    wheelbase: Positive
-    track: Positive
-    mass: Positive
-    center_of_mass: Annotated[float, Field(allow_inf_nan=False)] = 0.0
-    wheel: WheelEntry
-    limits: LimitsEntry
-    planning_share: Share
-    rolling_coefficient: Positive
-    turning_coefficient: NotNegative
-    friction_coefficient: Positive
-    drive_efficiency: Share
-    regeneration_efficiency: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
-    idle_power: NotNegative
-    device_power: NotNegative = 0.0
-    energy: EnergyPreset = "full"
-    battery_capacity: Positive
-    mjcf: Annotated[str, Field(min_length=1)] | None = None
+    footprint: Ring = Field(
+        description="convex outline, at least 3 corners [x, y] in m; x forward, y "
+        "left, from the middle of the rear axle"
+    )
+    height: Positive = Field(description="height of the body in m")
+    wheelbase: Positive = Field(description="distance of the axles in m")
+    track: Positive = Field(description="distance of the wheels of an axle in m")
+    mass: Positive = Field(description="mass of the whole robot in kg")
+    center_of_mass: Annotated[float, Field(allow_inf_nan=False)] = Field(
+        default=0.0, description="centre of mass ahead of the rear axle in m"
+    )
+    wheel: WheelEntry = Field(description="its wheels")
+    limits: LimitsEntry = Field(description="bounds of speed, turning and control")
+    planning_share: Share = Field(
+        description="share of the limits that plans use, in (0, 1]; the rest is for "
+        "control"
+    )
+    rolling_coefficient: Positive = Field(
+        description="rolling resistance on plain ground as a share of the weight"
+    )
+    turning_coefficient: NotNegative = Field(
+        description="tyre scrub as a share of the weight, over wheelbase times turn"
+    )
+    friction_coefficient: Positive = Field(description="friction of tyre on ground")
+    drive_efficiency: Share = Field(description="from battery to wheel, in (0, 1]")
+    regeneration_efficiency: Annotated[
+        float, Field(ge=0, le=1, allow_inf_nan=False)
+    ] = Field(description="from wheel to battery when braking, in [0, 1]")
+    idle_power: NotNegative = Field(description="power of the electronics in W")
+    device_power: NotNegative = Field(
+        default=0.0, description="power of what it carries in W"
+    )
+    energy: EnergyPreset = Field(
+        default="full", description="which parts of the energy model count"
+    )
+    battery_capacity: Positive = Field(
+        description="capacity of the standard battery in J"
+    )
+    mjcf: Annotated[str, Field(min_length=1)] | None = Field(
+        default=None, description="MJCF file in the folder; without it, not driven"
+    )
 
 
 def model_folder(reference: str, base: Path | None) -> Path | str:

@@ -12,7 +12,7 @@ from typing import Any
 import yaml
 
 from mrmg.errors import SceneError
-from mrmg.scene.loading.schema import ID_PATTERN
+from mrmg.scene.loading.shape_schema import ID_PATTERN
 
 
 @contextmanager

@@ -81,62 +81,32 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from mrmg.energy import EnergyPreset
+from mrmg.scene.loading.shape_schema import (
+    DISC,
+    ID,
+    RING,
+    CircleEntry,
+    Identifier,
+    NotNegative,
+    Number,
+    Point,
+    Positive,
+    Ring,
+    ShapedEntry,
+    Strict,
+    exactly_one,
+)
 
 SCENE_FORMAT = 1
-
-Number = Annotated[float, Field(allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-ID_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$"
-Identifier = Annotated[str, Field(pattern=ID_PATTERN, max_length=64)]
-Point = Annotated[
-    list[Number], Field(min_length=2, max_length=2, description="[x, y] in m")
-]
-_RING = "at least 3 corners [x, y] in m"
-Ring = Annotated[list[Point], Field(min_length=3, description=_RING)]
-
-
-class Strict(BaseModel):
-    """No key that is not named, no text for numbers."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
-
-
-class BoxEntry(Strict):
-    """A rectangle about its centre."""
-
-    center: Point
-    size: Annotated[list[Positive], Field(min_length=2, max_length=2)] = Field(
-        description="[length, width] in m"
-    )
-    yaw: Number = Field(default=0.0, description="turn in rad")
-
-
-class CircleEntry(Strict):
-    """A disc."""
-
-    center: Point
-    radius: Positive = Field(description="radius in m")
-
-
-class ShapedEntry(Strict):
-    """Exactly one of polygon, box, circle."""
-
-    polygon: Ring | None = Field(default=None, description=_RING)
-    holes: list[Ring] | None = Field(
-        default=None, description="rings inside the polygon"
-    )
-    box: BoxEntry | None = None
-    circle: CircleEntry | None = None
 
 
 class ObstacleEntry(ShapedEntry):
     """Ground that robots must keep off."""
 
-    id: Identifier | None = None
+    id: Identifier | None = Field(default=None, description=ID)
     height: Positive = Field(default=1.0, description="height in m")
     blocks: Annotated[list[Identifier], Field(min_length=1)] | None = Field(
         default=None, description="at least one id of a robot"
@@ -146,16 +116,18 @@ class ObstacleEntry(ShapedEntry):
 class TerrainEntry(ShapedEntry):
     """Ground that costs more energy, or less."""
 
-    id: Identifier | None = None
+    id: Identifier | None = Field(default=None, description=ID)
     multiplier: Positive = Field(description="energy relative to plain ground")
 
 
 class RegionEntry(Strict):
     """A goal or station: exactly one of circle, polygon; convex."""
 
-    id: Identifier
-    circle: CircleEntry | None = None
-    polygon: Ring | None = Field(default=None, description=_RING)
+    model_config = exactly_one("circle", "polygon")
+
+    id: Identifier = Field(description=ID)
+    circle: CircleEntry | None = Field(default=None, description=DISC)
+    polygon: Ring | None = Field(default=None, description=RING)
     dwell: NotNegative | None = Field(
         default=None, description="time in s that a visit takes"
     )
@@ -197,13 +169,15 @@ class HillEntry(Strict):
 class PackedEntry(Strict):
     """Heights as saved scenes hold them: a compressed grid."""
 
-    rows: Annotated[int, Field(ge=2)]
-    columns: Annotated[int, Field(ge=2)]
+    rows: Annotated[int, Field(ge=2)] = Field(description="from north to south")
+    columns: Annotated[int, Field(ge=2)] = Field(description="from west to east")
     heights: str = Field(description="tenths of mm, int32, zlib, base64")
 
 
 class ElevationEntry(Strict):
     """The relief: exactly one of file, grid, hills, packed."""
+
+    model_config = exactly_one("file", "grid", "hills", "packed")
 
     file: Annotated[str, Field(min_length=1)] | None = Field(
         default=None, description="path of an .npy or .png file"
@@ -214,21 +188,27 @@ class ElevationEntry(Strict):
     grid: Annotated[list[list[Number]], Field(min_length=2)] | None = Field(
         default=None, description="rows of heights in m, from north to south"
     )
-    hills: Annotated[list[HillEntry], Field(min_length=1)] | None = None
+    hills: Annotated[list[HillEntry], Field(min_length=1)] | None = Field(
+        default=None, description="round hills, which add up; heights and radii in m"
+    )
     cell: Positive | None = Field(
         default=None, description="distance of the samples of hills in m"
     )
-    packed: PackedEntry | None = None
+    packed: PackedEntry | None = Field(
+        default=None, description="heights as saved scenes hold them"
+    )
 
 
 class StartEnergyEntry(Strict):
     """Exactly one of the four."""
 
+    model_config = exactly_one("fraction", "J", "Wh", "m")
+
     fraction: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = Field(
         default=None, description="share of the capacity, in [0, 1]"
     )
-    J: Positive | None = None
-    Wh: Positive | None = None
+    J: Positive | None = Field(default=None, description="energy in J")
+    Wh: Positive | None = Field(default=None, description="energy in Wh")
     m: Positive | None = Field(default=None, description="metres of plain ground")
 
 
@@ -244,37 +224,21 @@ def _share_to_mapping(value: Any) -> Any:
     return {"fraction": value} if is_number else value
 
 
+_SHARE = {"type": "number", "minimum": 0, "maximum": 1}
 StartEnergy = Annotated[
     StartEnergyEntry,
     BeforeValidator(_share_to_mapping),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "number", "minimum": 0, "maximum": 1},
-                {
-                    "type": "object",
-                    "properties": {
-                        "fraction": {"type": "number", "minimum": 0, "maximum": 1},
-                        **{
-                            unit: {"type": "number", "exclusiveMinimum": 0}
-                            for unit in ("J", "Wh", "m")
-                        },
-                    },
-                    "minProperties": 1,
-                    "maxProperties": 1,
-                    "additionalProperties": False,
-                },
-            ]
-        }
-    ),
+    WithJsonSchema({"anyOf": [_SHARE, StartEnergyEntry.model_json_schema()]}),
 ]
 
 
 class FinishEntry(Strict):
     """Exactly one of circle, polygon; convex; perhaps with a heading."""
 
-    circle: CircleEntry | None = None
-    polygon: Ring | None = Field(default=None, description=_RING)
+    model_config = exactly_one("circle", "polygon")
+
+    circle: CircleEntry | None = Field(default=None, description=DISC)
+    polygon: Ring | None = Field(default=None, description=RING)
     heading: Number | None = Field(default=None, description="yaw in rad")
     heading_tolerance: Positive = Field(default=0.2, description="in rad")
 
@@ -282,7 +246,7 @@ class FinishEntry(Strict):
 class RobotEntry(Strict):
     """One robot of the fleet."""
 
-    id: Identifier
+    id: Identifier = Field(description=ID)
     model: Annotated[str, Field(min_length=1)] = Field(
         description="the name of a shipped model, or a folder relative to the scene"
     )
@@ -293,7 +257,9 @@ class RobotEntry(Strict):
         default=StartEnergyEntry(fraction=1.0),
         description="a share of the capacity, 0..1",
     )
-    battery: BatteryEntry | None = None
+    battery: BatteryEntry | None = Field(
+        default=None, description="its own battery; replaces what it names"
+    )
     energy: EnergyPreset | None = Field(
         default=None, description="which parts of the energy model count"
     )
@@ -310,23 +276,39 @@ class SceneDocument(Strict):
     """A whole scene file."""
 
     format: Literal[1] = Field(description="format: 1")
-    name: Annotated[str, Field(min_length=1, max_length=200)]
+    name: Annotated[str, Field(min_length=1, max_length=200)] = Field(
+        description="what the scene is called; default: the file's name"
+    )
     bounds: Annotated[list[Number], Field(min_length=4, max_length=4)] = Field(
         description="[x_min, y_min, x_max, y_max] in m"
     )
-    obstacles: list[ObstacleEntry] = []
-    terrain: list[TerrainEntry] = []
-    elevation: ElevationEntry | None = None
-    goals: list[RegionEntry] = []
-    stations: list[StationEntry] = []
-    battery: BatteryEntry = BatteryEntry()
+    obstacles: list[ObstacleEntry] = Field(
+        default=[], description="ground that robots keep off; polygon, box or circle"
+    )
+    terrain: list[TerrainEntry] = Field(
+        default=[], description="ground that costs more; the later of two counts"
+    )
+    elevation: ElevationEntry | None = Field(
+        default=None, description="heights of the ground in m; default: flat"
+    )
+    goals: list[RegionEntry] = Field(
+        default=[], description="convex regions, each to be visited by some robot"
+    )
+    stations: list[StationEntry] = Field(
+        default=[], description="convex regions in which batteries are charged"
+    )
+    battery: BatteryEntry = Field(
+        default=BatteryEntry(), description="capacity and reserve of every robot"
+    )
     objective: Literal["energy", "makespan"] | BlendEntry | None = Field(
         default=None, description="energy, makespan, or {energy: w, makespan: w}"
     )
     time_limit: Positive | None = Field(
         default=None, description="largest makespan in s"
     )
-    robots: list[RobotEntry] = []
+    robots: list[RobotEntry] = Field(
+        default=[], description="the fleet; where each robot starts, and what it is"
+    )
 
 
 SECTIONS: dict[str, type[Strict]] = {
@@ -337,12 +319,3 @@ SECTIONS: dict[str, type[Strict]] = {
     "robots": RobotEntry,
 }
 """The lists of a scene file and the model of their entries."""
-
-
-def scene_schema() -> dict[str, Any]:
-    """Return the scene format as a JSON Schema, for editors and other tools."""
-    schema = SceneDocument.model_json_schema()
-    schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
-    # A file may leave its name out: it is then called after the file.
-    schema["required"] = [key for key in schema["required"] if key != "name"]
-    return schema

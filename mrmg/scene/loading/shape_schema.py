@@ -1,0 +1,64 @@
+"""Numbers, ids and shapes, as scene files and `robot.yaml` state them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+ID_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$"
+ID = "name, unique in the whole file"
+Identifier = Annotated[str, Field(pattern=ID_PATTERN, max_length=64, description=ID)]
+Point = Annotated[
+    list[Number], Field(min_length=2, max_length=2, description="[x, y] in m")
+]
+RING = "at least 3 corners [x, y] in m"
+DISC = "a disc: its center [x, y] and its radius in m"
+Ring = Annotated[list[Point], Field(min_length=3, description=RING)]
+
+
+class Strict(BaseModel):
+    """No key that is not named, no text for numbers."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+def exactly_one(*keys: str) -> ConfigDict:
+    """Return what tells editors that exactly one of some keys is given."""
+    return ConfigDict(json_schema_extra={"oneOf": [{"required": [k]} for k in keys]})
+
+
+class BoxEntry(Strict):
+    """A rectangle about its centre."""
+
+    center: Point
+    size: Annotated[list[Positive], Field(min_length=2, max_length=2)] = Field(
+        description="[length, width] in m"
+    )
+    yaw: Number = Field(default=0.0, description="turn in rad")
+
+
+class CircleEntry(Strict):
+    """A disc."""
+
+    center: Point
+    radius: Positive = Field(description="radius in m")
+
+
+class ShapedEntry(Strict):
+    """Exactly one of polygon, box, circle."""
+
+    model_config = exactly_one("polygon", "box", "circle")
+
+    polygon: Ring | None = Field(default=None, description=RING)
+    holes: list[Ring] | None = Field(
+        default=None, description="rings inside the polygon"
+    )
+    box: BoxEntry | None = Field(
+        default=None,
+        description="a rectangle: center and size [length, width] in m, yaw in rad",
+    )
+    circle: CircleEntry | None = Field(default=None, description=DISC)
