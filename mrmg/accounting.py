@@ -27,7 +27,7 @@ from mrmg.world.relief import height_at, load_points
 from mrmg.world.terrain import multiplier_at
 
 MEASURED_PARTS = ("drive", "idle", "device")
-"""The parts that work at the wheels can be split into."""
+"""The parts that the work of the drives can be split into."""
 
 
 class Motion(Protocol):
@@ -142,7 +142,7 @@ def measured_energy_parts(
 
     Args:
         robot: whose battery is drawn from.
-        work_J: work at the wheels, driving (>= 0) and braking (<= 0), shape (n, 2).
+        work_J: work of the drives, driving (>= 0) and braking (<= 0), shape (n, 2).
         time_s: of the ticks' ends, shape (n + 1,).
 
     Returns:

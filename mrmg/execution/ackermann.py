@@ -1,8 +1,8 @@
 """The chassis of a car: two steered wheels in front, an open differential behind.
 
 The MJCF names its parts as `scene.driven_parts` has them: the joints of steered and
-driven wheels, a position servo for each steered wheel, and a motor whose control is the
-traction force at the rear axle.
+driven wheels, a position servo for each steered wheel, and the motor `drive` of wheels.
+Further motors `drive_...` share the traction force equally with it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from mrmg.execution.chassis import part_ids
 from mrmg.execution.driven_wheels import DrivenWheels
-from mrmg.execution.recording import held_force_work_J
+from mrmg.execution.drives import ForceDrives
 from mrmg.scene.driven_parts import PARTS
 from mrmg.scene.types import Robot
 
@@ -40,10 +40,11 @@ class AckermannChassis:
         joint, actuator = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_ACTUATOR
         steer = part_ids(model, joint, robots, parts.steer)
         self._steer_q = model.jnt_qposadr[steer]
-        self._steer_ctrl = part_ids(model, actuator, robots, parts.servos)
-        self._drive_ctrl = part_ids(model, actuator, robots, parts.motors)[:, 0]
+        servos = part_ids(model, actuator, robots, parts.servos)
+        self._steer_ctrl = model.actuator_ctrladr[servos]
+        self._find_drives(robots)
         # A servo with stiffness kp and damping kv follows a ramp kv / kp late.
-        servo = self._steer_ctrl[:, 0]
+        servo = servos[:, 0]
         self._servo_lag_s = (
             model.actuator_biasprm[servo, 2] / model.actuator_biasprm[servo, 1]
         )
@@ -76,26 +77,34 @@ class AckermannChassis:
         share = (np.arange(steps) / steps)[:, None] + lag
         tan_steer = np.tan(w_from + share * (w_to - w_from))[:, :, None]
         self._angles = np.arctan(tan_steer / (1.0 - self._swing * tan_steer))
-        self._force_N = force_N
-        self._speed_m_s, self._rolled_m = self.axle_speed_m_s(), self._axle_way_m()
-        self._data.ctrl[self._drive_ctrl] = force_N
+        self._drives.command((force_N / self._drive_count)[self._driven])
 
     def apply(self, step: int) -> None:
         """Give the servos the angles of physics step `step`."""
         self._data.ctrl[self._steer_ctrl] = self._angles[step]
 
-    def work_J(self) -> np.ndarray:
-        """Return the work since `command`: driving and braking, shape (K, 2)."""
-        return held_force_work_J(
-            self._force_N,
-            self._axle_way_m() - self._rolled_m,
-            self.axle_speed_m_s() - self._speed_m_s,
-            self._step_s,
+    def _find_drives(self, robots: Sequence[Robot]) -> None:
+        """Find `drive`, and what shares its work, of every robot."""
+        kind = mujoco.mjtObj.mjOBJ_ACTUATOR
+        (motor,) = PARTS["car"].motors
+        main = part_ids(self._model, kind, robots, (motor,))[:, 0]
+        names = [
+            self._model.actuator(index).name for index in range(self._model.nactuator)
+        ]
+        ids, owners = [], []
+        for place, (robot, own) in enumerate(zip(robots, main.tolist(), strict=True)):
+            start = f"{robot.id}/{motor}_"
+            others = [at for at, name in enumerate(names) if name.startswith(start)]
+            ids += [own, *others]
+            owners += [place] * (1 + len(others))
+        self._driven = np.array(owners)
+        self._drive_count = np.bincount(self._driven)
+        self._drives = ForceDrives(
+            self._model,
+            self._data,
+            [robots[place] for place in owners],
+            np.array(ids),
         )
-
-    def _axle_way_m(self) -> np.ndarray:
-        """Return the way the rear axle has rolled, forward less back, shape (K,)."""
-        return self._mean_over_axle(self._wheels.angle_rad())
 
     def _mean_over_axle(self, wheels: np.ndarray) -> np.ndarray:
         """Return the axle's motion from that of its wheels, shape (K, 2) -> (K,)."""

@@ -49,9 +49,6 @@ class Chassis(Protocol):
     def apply(self, step: int) -> None:
         """Give the actuators the controls of physics step `step`."""
 
-    def work_J(self) -> np.ndarray:
-        """Return the work since `command`: driving and braking, shape (K, 2)."""
-
 
 Maker = Callable[[mujoco.MjModel, mujoco.MjData, Sequence[Robot]], Chassis]
 

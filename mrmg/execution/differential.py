@@ -17,7 +17,7 @@ import numpy as np
 from mrmg.execution.chassis import part_ids
 from mrmg.execution.drive import DriveParams, axle_grip_N
 from mrmg.execution.driven_wheels import DrivenWheels
-from mrmg.execution.recording import held_force_work_J
+from mrmg.execution.drives import ForceDrives
 from mrmg.execution.speed_loop import SpeedLoop
 from mrmg.scene.driven_parts import CHASSIS, PARTS, ROOT
 from mrmg.scene.types import Robot
@@ -41,7 +41,9 @@ class DifferentialChassis:
         joint, actuator = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_ACTUATOR
         root = part_ids(model, joint, robots, (ROOT,))[:, 0]
         self._yaw_v = model.jnt_dofadr[root] + 5
-        self._drive_ctrl = part_ids(model, actuator, robots, parts.motors)
+        motors = part_ids(model, actuator, robots, parts.motors)
+        each = [robot for robot in robots for _ in range(2)]
+        self._drives = ForceDrives(model, data, each, motors.ravel())
         tendon = mujoco.mjtObj.mjOBJ_TENDON
         self._tendon = part_ids(model, tendon, robots, parts.tendons)
         turning_N = np.array([item.energy_model.turning_force_N for item in models])
@@ -85,34 +87,15 @@ class DifferentialChassis:
         # A mass ahead of the axle wants to go straight on.
         moment_Nm += self._lead_kg_m * speed.mean(axis=1) * 0.5 * (w_from + w_to)
         swing_N = moment_Nm / self._track_m
-        self._force_N = 0.5 * force_N[:, None] + np.stack([-swing_N, swing_N], axis=1)
-        self._speed_m_s, self._rolled_m = speed, self._wheel_way_m()
-        self._data.ctrl[self._drive_ctrl] = self._force_N
+        wheels_N = 0.5 * force_N[:, None] + np.stack([-swing_N, swing_N], axis=1)
+        self._drives.command(wheels_N.ravel())
 
     def apply(self, step: int) -> None:
         """Do nothing: the motors hold their forces."""
 
-    def work_J(self) -> np.ndarray:
-        """Return the work of both wheels since `command`, shape (K, 2).
-
-        Driving and braking are told apart wheel by wheel: what one wheel brakes, the
-        other does not get.
-        """
-        work = held_force_work_J(
-            self._force_N,
-            self._wheel_way_m() - self._rolled_m,
-            self._wheel_speed_m_s() - self._speed_m_s,
-            self._model.opt.timestep,
-        )
-        return np.asarray(work.sum(axis=1))
-
     def _wheel_speed_m_s(self) -> np.ndarray:
         """Return the speed each wheel rolls at, left and right, shape (K, 2)."""
         return np.asarray(self._wheels.rate_rad_s() * self._wheels.radius_m[:, None])
-
-    def _wheel_way_m(self) -> np.ndarray:
-        """Return the way each wheel has rolled, left and right, shape (K, 2)."""
-        return np.asarray(self._wheels.angle_rad() * self._wheels.radius_m[:, None])
 
     def _inertia_about_axle(
         self, robots: Sequence[Robot]

@@ -1,4 +1,4 @@
-"""The two driven wheels of robots: what they have turned, and how fast they turn."""
+"""The two driven wheels of robots: where they are, and how fast they turn."""
 
 from __future__ import annotations
 
@@ -33,13 +33,8 @@ class DrivenWheels:
         """
         self._data = data
         ids = part_ids(model, mujoco.mjtObj.mjOBJ_JOINT, robots, joints)
-        self._angle = model.jnt_qposadr[ids]
         self.dof = model.jnt_dofadr[ids]
         self.radius_m = np.array([robot.model.wheel_radius_m for robot in robots])
-
-    def angle_rad(self) -> np.ndarray:
-        """Return what each wheel has turned, shape (K, 2)."""
-        return np.asarray(self._data.qpos[self._angle])
 
     def rate_rad_s(self) -> np.ndarray:
         """Return how fast each wheel turns, shape (K, 2)."""

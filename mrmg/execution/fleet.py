@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 
 from mrmg.execution.chassis import Chassis, chassis_maker, part_ids
+from mrmg.execution.drives import WorkMeter
 from mrmg.execution.world_model import MujocoWorld
 from mrmg.scene.driven_parts import ROOT
 from mrmg.scene.types import Scene
@@ -40,6 +41,7 @@ class Fleet:
         model, robots = world.model, world.scene.robots
         self._model, self._data = model, data
         self._groups = _grouped(model, data, world.scene)
+        self._work = WorkMeter(model, data, robots)
         root = part_ids(model, mujoco.mjtObj.mjOBJ_JOINT, robots, (ROOT,))
         root_q, root_v = model.jnt_qposadr[root], model.jnt_dofadr[root]
         self._pose = root_q + np.arange(7)
@@ -90,16 +92,18 @@ class Fleet:
             steps: number of physics steps.
 
         Returns:
-            Work at the wheels, driving (>= 0) and braking (<= 0) [J], shape (R, 2).
+            Work of the drives, driving (>= 0) and braking (<= 0) [J], shape (R, 2).
         """
         for group in self._groups:
             own = group.index
             group.chassis.command(force_N[own], w_from[own], w_to[own], steps)
+        self._work.start(steps)
         for step in range(steps):
             for group in self._groups:
                 group.chassis.apply(step)
             mujoco.mj_step(self._model, self._data)
-        return self._gather([group.chassis.work_J() for group in self._groups])
+            self._work.look(step)
+        return self._work.work_J()
 
     def _gather(self, parts: list[np.ndarray]) -> np.ndarray:
         """Return the groups' values in the scene's order, shape (R, ...)."""

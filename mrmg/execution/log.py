@@ -68,8 +68,8 @@ class ExecutionLog:
         reference: the plan at clock_s, shape (R, n, 5).
         command: set-points (v [m/s], psi [rad]) given at each tick, shape (R, n, 2).
         multiplier: terrain under the rear axle, shape (R, n).
-        force_N: drive force held over the tick, shape (R, n - 1).
-        work_J: work at the wheels over the tick, driving (>= 0) and braking (<= 0),
+        force_N: drive force commanded over the tick, shape (R, n - 1).
+        work_J: work of the drives over the tick, driving (>= 0) and braking (<= 0),
             shape (R, n - 1, 2).
         qpos: MuJoCo's positions, shape (n, nq); what a video is drawn from.
         contacts: every contact other than wheel and floor.

@@ -34,31 +34,3 @@ class Recording:
         if not rows:
             return np.empty((robots, 0))
         return np.ascontiguousarray(np.swapaxes(np.array(rows), 0, 1))
-
-
-def held_force_work_J(
-    force_N: np.ndarray,
-    rolled_m: np.ndarray,
-    speed_gain_m_s: np.ndarray,
-    physics_step_s: float,
-) -> np.ndarray:
-    """Return the work of forces held over several physics steps, shape (..., 2).
-
-    The integrator moves the wheels at the speed of each step's end; taken at the mean
-    of both ends, as kinetic energy is, the way is shorter by dt / 2 times the gain of
-    speed.
-
-    Args:
-        force_N: the forces, of any shape.
-        rolled_m: way rolled under each.
-        speed_gain_m_s: speed at the end less speed at the start.
-        physics_step_s: dt of the integrator.
-
-    Returns:
-        Driving work (>= 0) and braking work (<= 0) [J].
-    """
-    work = force_N * (rolled_m - 0.5 * physics_step_s * speed_gain_m_s)
-    parts = np.zeros((*work.shape, 2))
-    np.maximum(work, 0.0, out=parts[..., 0])
-    np.minimum(work, 0.0, out=parts[..., 1])
-    return parts

@@ -44,7 +44,7 @@ class Observation:
         rate: plan seconds per simulated second.
         state: true (x, y, theta, v, psi), shape (R, 5).
         planned: the plan at `clock_s`, shape (R, 5).
-        work_J: work at the wheels during the tick, driving and braking, shape (R, 2).
+        work_J: work of the drives during the tick, driving and braking, shape (R, 2).
         ended: whether the fleet is at rest after the end of its plan.
     """
 

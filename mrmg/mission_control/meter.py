@@ -81,7 +81,7 @@ class RobotMeter:
         Args:
             time_s: of the state before the first tick and after each, shape (n + 1,).
             state: at these times, shape (n + 1, 5).
-            work_J: at the wheels over each tick, driving and braking, shape (n, 2).
+            work_J: of the drives over each tick, driving and braking, shape (n, 2).
         """
         parts_J = measured_energy_parts(self.robot, work_J, time_s)
         draw_J = parts_J.sum(axis=1)

@@ -2,7 +2,7 @@
 
 Three meters: *planned* is the energy model over the plan, *metered* the same model over
 the simulated motion, both with the parameters believed at the time, *measured* the work
-done at the simulated wheels,
+of the simulated drives,
 
     E = W_driving / eta + regeneration * W_braking + (P_idle + P_device) t.
 

@@ -41,7 +41,7 @@ class RobotAudit:
         robot: its id.
         planned_J: energy model over the plan.
         metered_J: energy model over the simulated motion.
-        measured_J: from the work at the simulated wheels.
+        measured_J: from the work of the simulated drives.
         metered_error_pct, measured_error_pct: difference from planned, in percent of
             planned (or of one metre of plain ground where less was planned).
         min_charge_fraction: least measured battery content over the capacity.

@@ -61,7 +61,7 @@ def planned_curves(scene: Scene, plan: Plan) -> tuple[BatteryCurve, ...]:
 def measured_curves(
     scene: Scene, plan: Plan, log: ExecutionLog
 ) -> tuple[BatteryCurve, ...]:
-    """Return the battery content by the work at the simulated wheels."""
+    """Return the battery content by the work of the simulated drives."""
     if log.disturbance is not None:
         scene = log.disturbance.actual_scene(scene)
     curves = []
@@ -92,7 +92,7 @@ def draw_energy(
     Args:
         scene: gives capacity and reserve.
         plan: what was predicted.
-        log: adds the content by the work at the simulated wheels.
+        log: adds the content by the work of the simulated drives.
         path: picture to write (PNG, SVG or PDF by its suffix).
     """
     planned = {curve.robot: curve for curve in planned_curves(scene, plan)}

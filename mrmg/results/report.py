@@ -165,7 +165,7 @@ def _main_figures(record: RunRecord) -> list[tuple[str, str, str]]:
             (
                 "Simulated energy",
                 sections.kJ(energy["measured_J"]),
-                "work at the wheels",
+                "work of the drives",
             ),
             (
                 "Lowest charge",

@@ -53,7 +53,7 @@ def energy(record: RunRecord) -> list[str]:
         html.table(head, rows, text_columns=(0, 1, 2), sums=sums),
         html.note(
             "Planned: energy model over the plan. Metered: the same model over the "
-            "simulated motion. Measured: work of the simulated wheels, which has no "
+            "simulated motion. Measured: work of the simulated drives, which has no "
             "parts but driving and the consumers that run at all times."
         ),
     ]

@@ -24,7 +24,7 @@ class DrivenParts:
         spin: hinge joints of the driven wheels.
         steer: hinge joints of the steered wheels.
         servos: position servos of the steered wheels.
-        motors: actuators whose control is a traction force [N].
+        motors: actuators of the wheels that are commanded as forces.
         tendons: way rolled by the axle's middle, and by right wheel less left wheel.
     """
 

@@ -1,10 +1,10 @@
-"""Rows in, arrays out; and the work of a held force, exactly."""
+"""Rows in, arrays out."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from mrmg.execution.recording import Recording, held_force_work_J
+from mrmg.execution.recording import Recording
 
 
 def test_rows_become_arrays_by_time_and_by_robot() -> None:
@@ -26,9 +26,3 @@ def test_rows_are_copies() -> None:
 
 def test_without_ticks_there_is_an_empty_row_for_each_robot() -> None:
     assert Recording().by_robot("force_N", 3).shape == (3, 0)
-
-
-def test_driving_and_braking_are_kept_apart() -> None:
-    force, way = np.array([100.0, -50.0, -20.0]), np.array([2.0, 1.0, -3.0])
-    work = held_force_work_J(force, way, np.zeros(3), 0.004)
-    np.testing.assert_allclose(work, [[200.0, 0.0], [0.0, -50.0], [60.0, 0.0]])
