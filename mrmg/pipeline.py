@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import inspect
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 from mrmg.errors import ExitCode
 from mrmg.mission import PlanStatus
+from mrmg.replacing import recorded, require_room
 from mrmg.run_arguments import (
     DEFAULT_VIDEO,
     RunArguments,
@@ -44,6 +45,7 @@ def run(
     source: str | Path | Scene,
     *,
     out: Path | None = None,
+    overwrite: bool = False,
     video: VideoArguments | None = DEFAULT_VIDEO,
     trust_code: bool = False,
     on_progress: StepProgress | None = None,
@@ -55,6 +57,8 @@ def run(
     Args:
         source: a scene, the path of a scene file, or the name of a shipped scene.
         out: the run folder; `default_folder` if None.
+        overwrite: replace results that the folder holds of another scene, of other
+            arguments or of another version; refused if not.
         video: how the video is made; None for no video.
         trust_code: whether robot models may bring Python code (`scene.loading.trust`).
         on_progress: told (step, fraction, text).
@@ -84,6 +88,10 @@ def run(
             on_progress=on_progress,
             on_improvement=on_improvement,
         )
+        if not overwrite:
+            require_room(work)
+        if video == DEFAULT_VIDEO and folder.holds(Step.RENDER):
+            work = replace(work, arguments=_with_video_of(folder, asked))
         if video is not None and not work.is_done(Step.RENDER):
             choose_backend()  # better told now than after minutes of driving
         work.ensure(Step.PLAN)
@@ -101,6 +109,11 @@ def run(
             reason=work.planning()["reason"],
             exit_code=work.exit_code(),
         )
+
+
+def _with_video_of(folder: RunFolder, asked: RunArguments) -> RunArguments:
+    """Return the arguments with those of the folder's video, which is to be kept."""
+    return replace(asked, video=recorded(folder).video)
 
 
 def _arguments(scene: Scene, given: dict[str, Any]) -> RunArguments:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import fcntl
 import os
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
@@ -72,6 +72,10 @@ NEEDS: dict[Step, tuple[Step, ...]] = {
 """Steps whose outcome a step is made from."""
 
 
+CLOCK_FILES = ("timing.json",)
+"""Outputs that differ between equal executions: they hold readings of the clock."""
+
+
 def stale_after(step: Step) -> list[Step]:
     """Return `step` and every step that is made from it, in order."""
     stale = [step]
@@ -127,16 +131,40 @@ class RunFolder:
         done = self.marks().get(step) == fingerprint
         return done and self.file(OUTPUTS[step][-1]).exists()
 
-    def begin(self, step: Step, arguments: dict[str, Any]) -> None:
+    def holds(self, step: Step) -> bool:
+        """Return whether an outcome of `step` is there, whatever it was made with."""
+        return step in self.marks() and self.file(OUTPUTS[step][-1]).exists()
+
+    def content(self, step: Step) -> dict[str, str]:
+        """Return a digest of each file that `step` left, those of the clock apart."""
+        names = {*OUTPUTS[step], *ON_REQUEST.get(step, ())} - {*CLOCK_FILES}
+        paths = [self.file(name) for name in sorted(names)]
+        return {
+            path.name: storage.bytes_digest(path.read_bytes())
+            for path in paths
+            if path.exists()
+        }
+
+    def begin(
+        self, step: Step, arguments: dict[str, Any], *, keep: Collection[Step] = ()
+    ) -> None:
         """Make room for a new outcome of `step`, made with `arguments`.
 
-        Removes the marks and files of `step` and of all steps made from it.
+        Removes the marks and files of `step` and of all steps made from it, except
+        those in `keep`.
         """
-        stale = stale_after(step)
-        marks = {name: mark for name, mark in self.marks().items() if name not in stale}
+        stale = [each for each in stale_after(step) if each not in keep]
+        self._remove(stale, arguments)
+
+    def drop(self, steps: Collection[Step]) -> None:
+        """Remove the marks and files of `steps`."""
+        self._remove([step for step in Step if step in steps], self.arguments())
+
+    def _remove(self, steps: list[Step], arguments: dict[str, Any]) -> None:
+        marks = {name: mark for name, mark in self.marks().items() if name not in steps}
         self._write(arguments, marks)
-        for later in reversed(stale):
-            for name in reversed((*ON_REQUEST.get(later, ()), *OUTPUTS[later])):
+        for step in reversed(steps):
+            for name in reversed((*ON_REQUEST.get(step, ()), *OUTPUTS[step])):
                 self.file(name).unlink(missing_ok=True)
 
     def finish(self, step: Step, fingerprint: str) -> None:

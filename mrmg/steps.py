@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 import mrmg
 from mrmg import storage
-from mrmg.errors import ExitCode, MrmgError
+from mrmg.errors import ExitCode, MrmgError, RunFolderError
 from mrmg.mission import Plan, PlanStatus, plan_in_force
 from mrmg.run_arguments import RunArguments
-from mrmg.run_folder import NEEDS, RunFolder, Step
+from mrmg.run_folder import NEEDS, RunFolder, Step, stale_after
 from mrmg.scene.loading import dump_scene, load_scene
 from mrmg.scene.types import Scene
 from mrmg.shipped import models_folder
@@ -58,16 +58,36 @@ class Run:
         """Tell whether the folder holds the outcome of `step`."""
         return self.folder.is_done(step, self.fingerprint(step))
 
+    def is_readable(self, step: Step) -> bool:
+        """Return whether the outcome of planning or driving is there and whole."""
+        if not self.is_done(step):
+            return False
+        try:
+            if step is Step.EXECUTE:
+                self.log()
+            elif self.status() is PlanStatus.SOLVED:
+                self.plan()
+        except RunFolderError:
+            return False
+        return True
+
     def make(self, step: Step) -> None:
-        """Make `step`, and make everything that came of its last outcome stale.
+        """Make `step`, and remove what came of another outcome of it.
 
         The folder changes only once the work is done: arguments that turn out to be
-        wrong, and a process that is stopped, leave what was there before.
+        wrong, and a process that is stopped, leave what was there before. What was made
+        from an equal outcome stays.
         """
         self._told(step, 0.0)
         write = _WORK[step](self)
-        self.folder.begin(step, self.arguments.to_json())
+        later = stale_after(step)[1:]
+        current = [each for each in later if self.is_done(each)]
+        before = self.folder.content(step)
+        self.folder.begin(step, self.arguments.to_json(), keep=current)
         write()
+        after = self.folder.content(step)
+        if any(after.get(name) != digest for name, digest in before.items()):
+            self.folder.drop(current)
         if step is not Step.PLAN or self.status() in _FINAL:
             self.folder.finish(step, self.fingerprint(step))
         self._told(step, 1.0)
@@ -85,7 +105,9 @@ class Run:
 
     def planning(self) -> dict[str, Any]:
         """Return how planning ended: status, reason, statistics."""
-        return dict(self.folder.read_json("planning.json", cure="mrmg plan"))
+        return dict(
+            self.folder.read_json("planning.json", cure="mrmg plan --overwrite")
+        )
 
     def status(self) -> PlanStatus:
         """Return the status planning ended with."""
@@ -173,13 +195,15 @@ def _plan(run: Run) -> Write:
         "statistics": dict(result.statistics),
     }
 
-    def write() -> None:
-        storage.write_text(run.folder.file("scene.yaml"), dump_scene(run.scene))
-        if result.plan is not None:
-            result.plan.save(run.folder.path)
-        storage.write_json(run.folder.file("planning.json"), outcome)
+    return lambda: write_planning(run, result.plan, outcome)
 
-    return write
+
+def write_planning(run: Run, plan: Plan | None, outcome: dict[str, Any]) -> None:
+    """Write the scene, the plan, and how planning ended."""
+    storage.write_text(run.folder.file("scene.yaml"), dump_scene(run.scene))
+    if plan is not None:
+        plan.save(run.folder.path)
+    storage.write_json(run.folder.file("planning.json"), outcome)
 
 
 def _verify(run: Run) -> Write:

@@ -107,4 +107,9 @@ def user_cache_folder() -> Path:
 
 def digest(text: str) -> str:
     """Return a short hexadecimal fingerprint of `text`."""
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+    return bytes_digest(text.encode())
+
+
+def bytes_digest(data: bytes) -> str:
+    """Return a short hexadecimal fingerprint of `data`."""
+    return hashlib.sha256(data).hexdigest()[:16]

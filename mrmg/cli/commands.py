@@ -26,6 +26,7 @@ def run(options: argparse.Namespace) -> int:
         result = pipeline.run(
             scene,
             out=options.out,
+            overwrite=options.overwrite,
             video=None if options.no_video else DEFAULT_VIDEO,
             trust_code=options.trust_code,
             on_progress=told,
@@ -43,6 +44,7 @@ def run(options: argparse.Namespace) -> int:
 def plan(options: argparse.Namespace) -> int:
     """Plan, and start a run folder."""
     from mrmg.pipeline import default_folder
+    from mrmg.replacing import require_room
     from mrmg.run_folder import RunFolder, Step
     from mrmg.scene.loading import load_scene
     from mrmg.steps import Run
@@ -60,13 +62,19 @@ def plan(options: argparse.Namespace) -> int:
             on_progress=told,
             on_improvement=terminal.improvement_teller(told),
         )
-        work.make(Step.PLAN)
+        if not options.overwrite:
+            require_room(work)
+        kept = work.is_readable(Step.PLAN) and not options.overwrite
+        if not kept:
+            work.make(Step.PLAN)
     outcome = work.planning()
     text = f"{scene.name}: {outcome['status']}"
     text += f"; {outcome['reason']}" if outcome["reason"] else ""
     if outcome["statistics"]["improvements"]:
         text += f"\n  {terminal.quality(outcome['statistics']['improvements'][-1])}"
-    _print(options, outcome, f"{text}\n  in {folder.path}")
+    text += f"\n  in {folder.path}"
+    text += "; planned before, --overwrite plans again" if kept else ""
+    _print(options, outcome, text)
     return work.status().exit_code
 
 
@@ -86,10 +94,8 @@ def execute(options: argparse.Namespace) -> int:
     """Drive the plan of a run folder in MuJoCo."""
     from mrmg.run_folder import Step
 
-    undisturbed = RunArguments().deciding("drive")
-    del undisturbed["controller"]
-    work = _make(options, Step.EXECUTE, **{**undisturbed, **given(options)})
-    log = work.folder.read_json("log.json", cure="mrmg execute")
+    work, note = _driven(options)
+    log = work.folder.read_json("log.json", cure="mrmg execute --overwrite")
     lost = [item for item in log["events"] if item["action"] in ("end", "give_up")]
     driven = log["completed"] and not lost
     ended = "driven to the end" if driven else "given up on the way"
@@ -98,9 +104,49 @@ def execute(options: argparse.Namespace) -> int:
         f"  {touch['robot']} touched {touch['other']} at {touch['time_s']:.2f} s"
         for touch in log["contacts"]
     ]
-    lines = [f"{ended}, {len(touches)} contacts", *told, *touches]
+    lines = [f"{ended}, {len(touches)} contacts", *told, *touches, f"  {note}"]
+    good = driven and not touches
+    if work.folder.path != options.run and work.folder.holds(Step.AUDIT):
+        account = work.folder.read_json("audit.json", cure="mrmg audit")
+        good = good and account["mission_ok"]
+        lines[1:1] = [f"  {reason}" for reason in account["reasons"]]
     _print(options, log, "\n".join(lines))
-    return ExitCode.OK if driven and not touches else ExitCode.MISSION_FAILED
+    return ExitCode.OK if good else ExitCode.MISSION_FAILED
+
+
+def _driven(options: argparse.Namespace) -> tuple[Run, str]:
+    """Drive as the command line wants it; return the run of it and a note on it.
+
+    A drive other than that of the run goes to a folder of its own.
+    """
+    from mrmg.run_folder import RunFolder, existing
+    from mrmg.separate_drives import (
+        begin_drive,
+        drive_again,
+        drive_apart,
+        folder_beside,
+    )
+    from mrmg.steps import checked_drive, taken_up
+
+    undisturbed = RunArguments().deciding("drive")
+    del undisturbed["controller"]
+    again = {"overwrite": options.overwrite}
+    kept = "driven before, --overwrite drives again"
+    with existing(options.run).opened_for_writing() as folder, terminal.progress() as p:
+        run = taken_up(folder, p, trust_code=options.trust_code)
+        drive = {**undisturbed, **given(options)}
+        asked = checked_drive(run.scene, replace(run.arguments, **drive))
+        own = asked.deciding("drive") == run.arguments.deciding("drive")
+        place = options.out or (folder.path if own else folder_beside(run, asked))
+        if place.resolve() == folder.path.resolve():
+            run = replace(run, arguments=asked)
+            made = drive_again(run, **again)
+            return run, f"in {folder.path}" if made else f"in {folder.path}; {kept}"
+        with RunFolder(place).opened_for_writing() as other:
+            work = begin_drive(run, other, asked, **again)
+            made = drive_apart(work, **again)
+    page = place / "report.html"
+    return work, f"report     {page}" if made else f"report     {page}; {kept}"
 
 
 def audit(options: argparse.Namespace) -> int:
@@ -162,7 +208,7 @@ def _make(
     **changes: Any,
 ) -> Run:
     """Make steps of a run anew, with some of its arguments changed."""
-    from mrmg.run_folder import existing
+    from mrmg.run_folder import Step, existing
     from mrmg.steps import checked_drive, taken_up
 
     folder = existing(options.run)
@@ -170,8 +216,12 @@ def _make(
         work = taken_up(folder, told, trust_code=options.trust_code)
         changed = work.arguments.changed(video or {}, **changes)
         work = replace(work, arguments=checked_drive(work.scene, changed))
+        shown = [step for step in (Step.DRAW, Step.REPORT) if folder.holds(step)]
         for step in steps:
             work.make(step)
+        for step in shown:
+            if not folder.holds(step):  # made from another outcome than there is now
+                work.make(step)
     return work
 
 

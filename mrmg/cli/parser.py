@@ -15,7 +15,7 @@ from mrmg.cli import (
     scene_commands,
     show_commands,
 )
-from mrmg.cli.run_options import add_options, add_trust, reader
+from mrmg.cli.run_options import add_options, add_overwrite, add_trust, reader
 from mrmg.cli.usage import Parser
 from mrmg.run_arguments import VideoArguments
 
@@ -77,6 +77,7 @@ def _add_planning(verb: argparse.ArgumentParser, name: str) -> None:
     verb.add_argument(
         "--out", type=Path, metavar="DIR", help="run folder; default runs/SCENE-sN"
     )
+    add_overwrite(verb, "another plan, drive or video")
     add_options(verb, name)
     add_trust(verb)
     _add_json(verb, "summary.json" if name == "run" else "planning.json")
@@ -92,6 +93,15 @@ def _add_steps(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     for name, (what, command, output) in steps.items():
         verb = verbs.add_parser(name, help=what)
         verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
+        if name == "execute":
+            verb.add_argument(
+                "--out",
+                type=Path,
+                metavar="DIR",
+                help="run folder for the drive; default RUN for the drive that RUN was "
+                "started with, a folder beside it for any other",
+            )
+            add_overwrite(verb, "a drive")
         add_options(verb, name)
         add_trust(verb)
         _add_json(verb, output)

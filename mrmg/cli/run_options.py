@@ -50,6 +50,13 @@ def given(
     return {name: value for name, value in vars(options).items() if name in known}
 
 
+def add_overwrite(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add the option that lets a verb replace finished results, named by `what`."""
+    parser.add_argument(
+        "--overwrite", action="store_true", help=f"replace {what} that is there"
+    )
+
+
 def reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
     """Return a reader whose message argparse shows."""
 
