@@ -157,6 +157,13 @@ class Capsule:
         except (ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
             raise _refused(path, f"no usable capsule ({error})") from error
 
+    def lies_in(self, folder: Path) -> bool:
+        """Return whether a folder holds the scene and the plan of this capsule."""
+        return all(
+            (folder / name).exists() and (folder / name).read_bytes() == content
+            for name, content in self.files.items()
+        )
+
     def unpack(self, folder: Path) -> None:
         """Write scene and plan into a run folder."""
         for name in _RUN_FILES:

@@ -10,6 +10,7 @@ import numpy as np
 
 from mrmg.capsule import CAPSULE_FILE, Capsule, Failure
 from mrmg.errors import Fault, FileError, UsageError
+from mrmg.replacing import recorded, require_room
 from mrmg.run_arguments import RunArguments
 from mrmg.run_folder import RunFolder, Step
 from mrmg.steps import StepProgress, taken_up
@@ -98,6 +99,7 @@ def reproduce(
     out: Path,
     on_progress: StepProgress | None = None,
     *,
+    overwrite: bool = False,
     trust_code: bool = False,
 ) -> Reproduction:
     """Repeat the execution that a capsule holds, in a run folder of its own.
@@ -106,19 +108,29 @@ def reproduce(
         path: of the capsule.
         out: run folder to make, with log and audit.
         on_progress: told (step, fraction, text).
+        overwrite: replace another run, or a drive by another version, in `out`.
         trust_code: whether robot models may bring Python code (`loading.trust`).
 
     Raises:
         FileError: if the capsule cannot be used.
-        UsageError: if `out` holds something other than a run.
+        UsageError: if `out` holds something else that is not to be replaced.
     """
     capsule = Capsule.load(path)
     arguments = _arguments(capsule, path)
     folder = RunFolder(out)
     with folder.opened_for_writing():
-        folder.begin(Step.PLAN, arguments.to_json())
-        capsule.unpack(out)
+        repeated = capsule.lies_in(out) and recorded(folder) == arguments
+        if not repeated:
+            if folder.holds(Step.PLAN) and not overwrite:
+                raise UsageError(
+                    f"{out} holds another run; --overwrite replaces it, another --out "
+                    "DIR keeps it"
+                )
+            folder.begin(Step.PLAN, arguments.to_json())
+            capsule.unpack(out)
         run = taken_up(folder, on_progress, trust_code=trust_code)
+        if repeated and not overwrite:
+            require_room(run, Step.EXECUTE)
         folder.finish(Step.PLAN, run.fingerprint(Step.PLAN))
         left = folder.file(CAPSULE_FILE)
         try:

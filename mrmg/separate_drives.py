@@ -26,7 +26,8 @@ def folder_beside(run: Run, arguments: RunArguments) -> Path:
     if path.name in ("", ".."):
         path = path.resolve()
     words = list(_description(run.arguments, arguments)) or ["again"]
-    name = re.sub(r"[^\w.+]+", "-", "-".join(words)).strip("-")
+    plain = re.sub(r"[=%]", "", "-".join(words))
+    name = re.sub(r"[^\w.+]+", "-", plain).strip("-")
     if len(name) > LONGEST_NAME:
         name = f"drive-{storage.digest(name)}"
     return path.parent / f"{path.name}-{name}"

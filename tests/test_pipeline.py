@@ -7,7 +7,7 @@ import jsonschema
 import pytest
 
 from mrmg import pipeline
-from mrmg.errors import ExitCode
+from mrmg.errors import ExitCode, UsageError
 from mrmg.mission import Plan
 from mrmg.results.summary import summary_schema
 from mrmg.run_arguments import RunArguments, VideoArguments
@@ -64,7 +64,10 @@ def test_only_what_is_missing_is_made(own_run: Path, lost: str) -> None:
 
 def test_another_seed_begins_with_planning(own_run: Path) -> None:
     before = written(own_run)
-    result = pipeline.run("quickstart", seed=1, out=own_run, video=None)
+    with pytest.raises(UsageError, match="overwrite=True"):
+        pipeline.run("quickstart", seed=1, out=own_run, video=None)
+    assert written(own_run) == before
+    result = pipeline.run("quickstart", seed=1, out=own_run, video=None, overwrite=True)
     after = written(own_run)
     assert result.summary["seed"] == 1
     assert Plan.load(own_run).seed == 1

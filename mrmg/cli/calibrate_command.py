@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 def calibrate(options: argparse.Namespace) -> int:
     """Calibrate a robot model, and leave a calibrated copy with the plot of the fit."""
     from mrmg.calibration import calibrate, require_other_folder, write_calibration
+    from mrmg.replacing import require_absent
     from mrmg.results.calibration_plot import draw_calibration
     from mrmg.results.print_style import require_format
     from mrmg.scene.loading.models import load_model
@@ -25,6 +26,7 @@ def calibrate(options: argparse.Namespace) -> int:
     plot = options.plot or out / "calibration.png"
     require_format(plot)
     require_other_folder(folder, out)
+    require_absent(out, overwrite=options.overwrite)
     model, _ = load_model(folder, trust_code=options.trust_code)
     with terminal.progress_of("measuring") as told:
         calibration = calibrate(model, on_progress=told)

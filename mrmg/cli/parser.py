@@ -256,6 +256,7 @@ def _add_calibrate(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     verb.add_argument(
         "-o", "--out", type=Path, metavar="DIR", help="default calibrated-MODEL"
     )
+    add_overwrite(verb, "the folder's content")
     verb.add_argument(
         "--plot",
         type=Path,
@@ -273,6 +274,7 @@ def _add_calibrate(verbs: _Verbs) -> None:  # type: ignore[type-arg]
 
 
 def _add_scene_out(verb: argparse.ArgumentParser) -> None:
+    add_overwrite(verb, "the file")
     verb.add_argument(
         "-o",
         "--out",

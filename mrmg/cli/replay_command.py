@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrmg.cli import show_commands, terminal
-from mrmg.cli.run_options import add_trust
+from mrmg.cli.run_options import add_overwrite, add_trust
 from mrmg.errors import ExitCode
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ def add_replay(verbs: Any) -> None:
         metavar="DIR",
         help="run folder for what is repeated; default 'replay' beside the capsule",
     )
+    add_overwrite(verb, "another run")
     verb.add_argument("--render", action="store_true", help="make the video, too")
     verb.add_argument(
         "--view", action="store_true", help="watch it in three dimensions"
@@ -46,7 +47,13 @@ def replay(options: argparse.Namespace) -> int:
 
     out = options.out or options.capsule.parent / "replay"
     with terminal.progress() as told:
-        outcome = reproduce(options.capsule, out, told, trust_code=options.trust_code)
+        outcome = reproduce(
+            options.capsule,
+            out,
+            told,
+            overwrite=options.overwrite,
+            trust_code=options.trust_code,
+        )
     if options.json:
         terminal.print_json(outcome.to_json())
     else:

@@ -83,6 +83,7 @@ def import_(options: argparse.Namespace) -> int:
     """Read a map drawn elsewhere into a scene without robots and goals."""
     from mrmg.authoring import import_map
 
+    _require_absent(options)
     document = import_map(options.map, longest_side_m=options.longest_side)
     _write(document, options.out)
     return ExitCode.OK
@@ -93,6 +94,7 @@ def populate(options: argparse.Namespace) -> int:
     from mrmg.authoring import populate as populated
     from mrmg.scene.loading import load_scene
 
+    _require_absent(options)
     document = populated(
         load_scene(options.scene, trust_code=options.trust_code).document,
         robots=options.robots,
@@ -102,6 +104,13 @@ def populate(options: argparse.Namespace) -> int:
     )
     _write(document, options.out)
     return ExitCode.OK
+
+
+def _require_absent(options: argparse.Namespace) -> None:
+    from mrmg.replacing import require_absent
+
+    if options.out is not None:  # a scene may have been edited by hand
+        require_absent(options.out, overwrite=options.overwrite)
 
 
 def _write(document: dict[str, Any], out: Path | None) -> None:

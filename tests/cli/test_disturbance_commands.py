@@ -31,22 +31,27 @@ def run(planned: Path, tmp_path: Path) -> Path:
 
 def test_an_execution_is_disturbed_as_asked(run: Path) -> None:
     assert main(["execute", str(run), "--disturb"]) == ExitCode.OK
-    log = ExecutionLog.load(run)
+    log = ExecutionLog.load(run.parent / "run-disturbed-s0")
     assert log.disturbance == DEFAULT_RANGES.draw(0, ["r1"])
     command = ["execute", str(run), "--disturb", "rolling=+30%", "--disturb-seed", "4"]
     assert main(command) == ExitCode.OK
-    disturbance = ExecutionLog.load(run).disturbance
+    folder = run.parent / "run-disturbed-rolling+30-s4"
+    disturbance = ExecutionLog.load(folder).disturbance
     assert disturbance is not None
     assert (disturbance.seed, disturbance.robots[0].rolling) == (4, 0.3)
-    arguments = json.loads((run / "run.json").read_text())["arguments"]
+    arguments = json.loads((folder / "run.json").read_text())["arguments"]
     assert (arguments["disturb"], arguments["disturb_seed"]) == ("rolling=+30%", 4)
 
 
-def test_the_next_execution_is_undisturbed_again(planned: Path, run: Path) -> None:
-    main(["execute", str(run), "--disturb"])
-    assert main(["execute", str(run)]) == ExitCode.OK
-    assert ExecutionLog.load(run).disturbance is None
-    assert (run / "log.npz").read_bytes() == (planned / "log.npz").read_bytes()
+def test_a_disturbed_run_is_driven_undisturbed_beside_it(
+    planned: Path, tmp_path: Path
+) -> None:
+    out = ["--out", str(tmp_path / "run")]
+    main(["run", str(SCENE), "--no-video", "--disturb", *out])
+    assert main(["execute", str(tmp_path / "run")]) == ExitCode.OK
+    assert ExecutionLog.load(tmp_path / "run").disturbance is not None
+    own = tmp_path / "run-undisturbed"
+    assert (own / "log.npz").read_bytes() == (planned / "log.npz").read_bytes()
 
 
 @pytest.mark.parametrize("verb", ["execute", "robustness"])
@@ -101,7 +106,8 @@ def test_a_study_is_printed_and_its_worst_case_repeatable(
     assert words[:3] == ["mrmg", "execute", str(run)]
     study = json.loads((run / "robustness.json").read_text())["studies"][0]
     assert main(words[1:]) == ExitCode.OK
-    log = ExecutionLog.load(run)
+    (folder,) = run.parent.glob("run-disturbed-*")
+    log = ExecutionLog.load(folder)
     assert log.disturbance is not None
     assert log.disturbance.seed == study["worst"]["seed"]
     assert log.digest == study["outcomes"][log.disturbance.seed]["log_digest"]
@@ -122,7 +128,10 @@ def test_a_study_speaks_json(run: Path, capsys: pytest.CaptureFixture[str]) -> N
 def test_a_failed_execution_is_replayed(
     run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    main(["execute", str(run), "--disturb", "capacity=-90%"])
+    out = ["--out", str(run.parent / "failed")]
+    command = ["execute", str(run), "--disturb", "capacity=-90%", *out]
+    assert main(command) == ExitCode.MISSION_FAILED
+    run = run.parent / "failed"
     assert main(["replay", str(run / "capsule.zip")]) == ExitCode.OK
     told = capsys.readouterr().out
     assert "fails in the same way, bit for bit" in told
