@@ -77,6 +77,10 @@ class RunFolderError(FileError):
     """A run folder lacks or contradicts what a step needs."""
 
 
+class IdentityError(RunFolderError, UsageError):
+    """A plan or log is used with a scene or plan that it was not made for."""
+
+
 class MachineError(MrmgError):
     """Something the command needs is missing on this machine; names the cure."""
 

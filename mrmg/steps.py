@@ -21,7 +21,6 @@ from mrmg.run_arguments import RunArguments
 from mrmg.run_folder import NEEDS, RunFolder, Step, stale_after
 from mrmg.scene.loading import dump_scene, load_scene
 from mrmg.scene.types import Scene
-from mrmg.shipped import models_folder
 
 if TYPE_CHECKING:
     from mrmg.capsule import Failure
@@ -166,8 +165,8 @@ def taken_up(
 def _code_digest() -> str:
     # The version alone would keep results of code that has been edited since.
     package = Path(mrmg.__file__).parent
-    sources = [*package.rglob("*.py"), *models_folder().glob("*/*.xml")]
-    code = [storage.digest(path.read_text()) for path in sorted(sources)]
+    sources = sorted(package.rglob("*.py"))
+    code = [storage.digest(path.read_text()) for path in sources]
     return storage.digest("".join([mrmg.__version__, version("mujoco"), *code]))
 
 

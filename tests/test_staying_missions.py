@@ -44,6 +44,9 @@ def test_the_audit_names_what_the_simulation_owes() -> None:
     first = next(goal for goal in scene.goals if goal.dwell_s > 0.0)
     longer = replace(first, dwell_s=first.dwell_s + 10.0)
     goals = tuple(longer if goal is first else goal for goal in scene.goals)
-    account = audit(replace(scene, goals=goals), plan, log)
+    scene = replace(scene, goals=goals)
+    plan = replace(plan, scene_digest=scene.digest)
+    log = replace(log, scene_digest=scene.digest, plan_digest=plan.digest)
+    account = audit(scene, plan, log)
     assert account.causes == ("goal missed",)
     assert first.id not in account.goals_visited

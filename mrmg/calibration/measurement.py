@@ -138,8 +138,6 @@ def _plain(model: RobotModel, multiplier: float, reach_m: float) -> Scene:
         goals=(),
         stations=(),
         robots=(Robot(id=_ROBOT, model=model, pose=(0.0, 0.0, 0.0), battery=battery),),
-        document={},
-        digest=f"plain of {multiplier} for {model.name}",
     )
 
 

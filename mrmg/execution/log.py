@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 
 from mrmg import storage
-from mrmg.errors import Fault, RunFolderError
+from mrmg.errors import Fault, IdentityError, RunFolderError
 from mrmg.execution.disturbance import Disturbance
 from mrmg.execution.supervision import Event
+from mrmg.mission import Plan
+from mrmg.scene.types import Scene
 
 LOG_FORMAT = 1
 
@@ -161,3 +163,31 @@ class ExecutionLog:
         except (OSError, ValueError, KeyError, TypeError) as error:
             fault = Fault("log.json", f"no readable log ({error}); run 'mrmg execute'")
             raise RunFolderError(str(folder), [fault]) from error
+
+
+def require_same_mission(
+    scene: Scene, plan: Plan | None, log: ExecutionLog | None = None
+) -> None:
+    """Refuse a plan or log that was made for something else.
+
+    Raises:
+        IdentityError: naming what belongs to what.
+    """
+    faults = []
+    this = f"this is {scene.name} ({scene.digest})"
+    if plan is not None and not scene.is_named(plan.scene_digest):
+        made_for = f"{plan.scene_name} ({plan.scene_digest})"
+        message = f"plan of another scene, {made_for}; {this}; plan this scene anew"
+        faults.append(Fault("plan.json", message))
+    if log is not None and not scene.is_named(log.scene_digest):
+        message = f"log of another scene ({log.scene_digest}); {this}; drive it anew"
+        faults.append(Fault("log.json", message))
+    if plan is not None and log is not None and log.plan_digest != plan.digest:
+        message = f"log of another plan ({log.plan_digest}); this is {plan.digest}"
+        faults.append(Fault("log.json", f"{message}; run 'mrmg execute'"))
+    expected = tuple(robot.id for robot in scene.robots)
+    if log is not None and log.robots != expected:
+        message = f"log of robots {list(log.robots)}, the scene has {list(expected)}"
+        faults.append(Fault("log.json", f"{message}; run 'mrmg execute'"))
+    if faults:
+        raise IdentityError(scene.name, faults)

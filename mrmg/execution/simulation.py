@@ -10,7 +10,6 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 
-from mrmg.errors import UsageError
 from mrmg.execution.actuation import actuation_of
 from mrmg.execution.chassis import chassis_maker
 from mrmg.execution.contacts import ContactWatch
@@ -26,7 +25,7 @@ from mrmg.execution.ground import (
     true_resistance,
 )
 from mrmg.execution.incline import Incline
-from mrmg.execution.log import ExecutionLog, package_versions
+from mrmg.execution.log import ExecutionLog, package_versions, require_same_mission
 from mrmg.execution.recording import Recording
 from mrmg.execution.reference import FleetReference, speed_states
 from mrmg.execution.sensing import sensing_of
@@ -87,15 +86,12 @@ def simulate(
         on_progress: called with the fraction done and a text.
 
     Raises:
-        UsageError: if the controller is unknown, the plan is of another scene, or a
-            robot is of a kind that cannot be executed.
+        UsageError: if the controller is unknown, or a robot is of a kind that cannot
+            be executed.
+        IdentityError: if the plan is of another scene.
     """
     maker = controller_maker(controller)
-    if plan.scene_digest != scene.digest:
-        raise UsageError(
-            f"the plan was made for scene {plan.scene_digest}, but '{scene.name}' is "
-            f"{scene.digest}; plan this scene anew"
-        )
+    require_same_mission(scene, plan)
     require_drivable(scene.robots)
     for robot in scene.robots:
         chassis_maker(robot)

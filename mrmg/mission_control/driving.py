@@ -9,6 +9,7 @@ from pathlib import Path
 from mrmg import storage
 from mrmg.execution import ExecutionLog, simulate
 from mrmg.execution.disturbance import Disturbance
+from mrmg.execution.log import require_same_mission
 from mrmg.mission import DRIVEN_PLAN, Plan
 from mrmg.mission_control.control import MissionControl
 from mrmg.mission_control.faults import checked_faults
@@ -73,8 +74,10 @@ def drive_mission(
 
     Raises:
         UsageError: if the controller or a fault's robot is unknown, a fault cannot be
-            read, the plan is of another scene, or a robot can only be planned for.
+            read, or a robot can only be planned for.
+        IdentityError: if the plan is of another scene.
     """
+    require_same_mission(scene, plan)
     require_drivable(scene.robots)
     params = params or ControlParams()
     control = MissionControl(

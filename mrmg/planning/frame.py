@@ -92,7 +92,7 @@ class Frame:
         return round(remainder(turned - SEAM_RAD, tau) + SEAM_RAD, DECIMALS)
 
     def scene(self, scene: Scene) -> Scene:
-        """Return the mission in the frame; its document and digest stay."""
+        """Return the mission in the frame."""
         if self.is_the_maps:
             return scene
         corners = self.points(np.array(self.bounds).reshape(2, 2))

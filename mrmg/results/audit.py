@@ -30,8 +30,7 @@ from mrmg.accounting import (
     measured_energy_parts,
     plan_ledger,
 )
-from mrmg.errors import Fault, RunFolderError
-from mrmg.execution.log import ExecutionLog
+from mrmg.execution.log import ExecutionLog, require_same_mission
 from mrmg.ledger import EnergyLedger, LedgerEntry
 from mrmg.mission import Plan, Visit
 from mrmg.results.energy_audit import EnergyAudit, RobotAudit, SimulatedVisit
@@ -85,7 +84,7 @@ def audit(scene: Scene, plan: Plan, log: ExecutionLog) -> EnergyAudit:
     Raises:
         RunFolderError: if the log is of another scene, plan or fleet.
     """
-    _check_same_mission(scene, plan, log)
+    require_same_mission(scene, plan, log)
     if log.disturbance is not None:
         scene = log.disturbance.actual_scene(scene)
     measured = [_measure(scene, plan, log, index) for index in range(len(log.robots))]
@@ -131,22 +130,6 @@ def audit(scene: Scene, plan: Plan, log: ExecutionLog) -> EnergyAudit:
         metered=metered_ledger,
         measured=measured_ledger,
     )
-
-
-def _check_same_mission(scene: Scene, plan: Plan, log: ExecutionLog) -> None:
-    expected = tuple(robot.id for robot in scene.robots)
-    faults = []
-    if plan.scene_digest != scene.digest:
-        faults.append(Fault("plan.json", "plan of another scene; run 'mrmg plan'"))
-    if log.scene_digest != scene.digest:
-        faults.append(Fault("log.json", "log of another scene; run 'mrmg execute'"))
-    if log.plan_digest != plan.digest:
-        faults.append(Fault("log.json", "log of another plan; run 'mrmg execute'"))
-    if log.robots != expected:
-        text = f"log of robots {list(log.robots)}, the scene has {list(expected)}"
-        faults.append(Fault("log.json", f"{text}; run 'mrmg execute'"))
-    if faults:
-        raise RunFolderError(scene.name, faults)
 
 
 def _measure(scene: Scene, plan: Plan, log: ExecutionLog, index: int) -> _Measured:

@@ -17,7 +17,7 @@ from mrmg.accounting import (
     battery_profile,
     find_visits,
 )
-from mrmg.execution.log import ExecutionLog
+from mrmg.execution.log import ExecutionLog, require_same_mission
 from mrmg.mission import Plan, Visit
 from mrmg.results import scene_drawing, style
 from mrmg.results.audit import measured_step_energy
@@ -94,7 +94,11 @@ def draw_energy(
         plan: what was predicted.
         log: adds the content by the work of the simulated drives.
         path: picture to write (PNG, SVG or PDF by its suffix).
+
+    Raises:
+        IdentityError: if scene, plan and log do not belong together.
     """
+    require_same_mission(scene, plan, log)
     planned = {curve.robot: curve for curve in planned_curves(scene, plan)}
     simulated = {
         curve.robot: curve

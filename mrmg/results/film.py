@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from mrmg.execution.log import ExecutionLog
+from mrmg.execution.log import ExecutionLog, require_same_mission
 from mrmg.execution.world_model import build_world
 from mrmg.mission import Plan
 from mrmg.results import style
@@ -40,7 +40,12 @@ class Film:
     def __init__(
         self, scene: Scene, plan: Plan, log: ExecutionLog, options: VideoOptions
     ) -> None:
-        """Compute everything that no frame changes."""
+        """Compute everything that no frame changes.
+
+        Raises:
+            IdentityError: if scene, plan and log do not belong together.
+        """
+        require_same_mission(scene, plan, log)
         self.scene, self.plan, self.log, self.options = scene, plan, log, options
         self.world = build_world(scene)
         self.frame = floor_frame(self.world)

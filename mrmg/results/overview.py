@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
-from mrmg.execution.log import ExecutionLog
+from mrmg.execution.log import ExecutionLog, require_same_mission
 from mrmg.mission import Plan
 from mrmg.results import scene_drawing, style
 from mrmg.scene.types import Scene
@@ -35,7 +35,11 @@ def draw_overview(
         plan: adds planned paths, their ends and the order of visits.
         log: adds driven paths and contacts.
         path: picture to write (PNG, SVG or PDF by its suffix).
+
+    Raises:
+        IdentityError: if scene, plan and log do not belong together.
     """
+    require_same_mission(scene, plan, log)
     figure, axes = scene_drawing.new_map_figure(scene)
     handles = draw_mission(axes, scene, plan, log)
     scene_drawing.add_legend(axes, handles)

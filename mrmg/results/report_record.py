@@ -9,7 +9,7 @@ from typing import Any
 
 from mrmg import storage
 from mrmg.errors import Fault, RunFolderError
-from mrmg.execution.log import ExecutionLog
+from mrmg.execution.log import ExecutionLog, require_same_mission
 from mrmg.mission import Plan, PlanStatus, plan_in_force
 from mrmg.results.energy_audit import EnergyAudit
 from mrmg.results.robustness import ROBUSTNESS_FILE, Study, load_studies
@@ -54,7 +54,7 @@ def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
         trust_code: whether robot models may bring Python code (`loading.trust`).
 
     Raises:
-        RunFolderError: if a file is missing or cannot be read.
+        RunFolderError: if a file is missing, cannot be read, or is of another scene.
     """
     if not (run_folder / "planning.json").exists():
         raise RunFolderError(str(run_folder), [_why_no_record(run_folder)])
@@ -67,6 +67,9 @@ def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
     has_run = (run_folder / "run.json").exists()
     run = _read(run_folder, "run.json", "mrmg run") if has_run else {}
     scene = load_scene(run_folder / "scene.yaml", trust_code=trust_code)
+    plan = plan_in_force(run_folder) if left("plan.json") else None
+    log = ExecutionLog.load(run_folder) if left("log.json") else None
+    require_same_mission(scene, plan, log)
     summed_up = (run_folder / "summary.json").exists()
     return RunRecord(
         folder=run_folder,
@@ -76,9 +79,9 @@ def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
         else summarize(scene, run_folder),
         planning=planning,
         arguments=run.get("arguments", {}),
-        plan=plan_in_force(run_folder) if left("plan.json") else None,
+        plan=plan,
         verdict=Verdict.load(run_folder) if left("verdict.json") else None,
-        log=ExecutionLog.load(run_folder) if left("log.json") else None,
+        log=log,
         audit=EnergyAudit.load(run_folder) if left("audit.json") else None,
         studies=load_studies(run_folder, Plan.load(run_folder))
         if left(ROBUSTNESS_FILE)

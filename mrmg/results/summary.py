@@ -14,7 +14,7 @@ from typing import Any
 import mrmg
 from mrmg import storage
 from mrmg.errors import Fault, RunFolderError
-from mrmg.execution.log import ExecutionLog
+from mrmg.execution.log import ExecutionLog, require_same_mission
 from mrmg.mission import Plan, PlanStatus
 from mrmg.results.energy_audit import EnergyAudit
 from mrmg.results.verdict import Verdict
@@ -36,7 +36,8 @@ def summarize(scene: Scene, folder: Path) -> dict[str, Any]:
         folder: holds `planning.json`, and what later steps have left.
 
     Raises:
-        RunFolderError: if nothing was planned, or a file cannot be read.
+        RunFolderError: if nothing was planned, a file cannot be read, or plan or log
+            are of another scene.
     """
     planning = _read(folder, "planning.json")
     solved = planning["status"] == PlanStatus.SOLVED.value
@@ -45,13 +46,16 @@ def summarize(scene: Scene, folder: Path) -> dict[str, Any]:
     def left(name: str) -> bool:
         return solved and (folder / name).exists()
 
+    log = ExecutionLog.load(folder) if left("log.json") else None
+    require_same_mission(scene, plan)
+    require_same_mission(scene, None, log)  # it may be of a plan joined on the way
     return summary_of(
         scene,
         planning,
         seed=plan.seed if plan else _read(folder, "run.json")["arguments"]["seed"],
         plan=plan,
         verdict=Verdict.load(folder) if left("verdict.json") else None,
-        log=ExecutionLog.load(folder) if left("log.json") else None,
+        log=log,
         audit=EnergyAudit.load(folder) if left("audit.json") else None,
     )
 

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from mrmg.accounting import Motion
-from mrmg.execution.log import ExecutionLog
+from mrmg.execution.log import ExecutionLog, require_same_mission
 from mrmg.mission import Plan
 from mrmg.results import mission_series as series
 from mrmg.results import scene_drawing, style
@@ -47,7 +47,11 @@ def draw_timeline(
         plan: what was to be driven; shown where there is no log.
         log: what was driven.
         path: picture to write (PNG, SVG or PDF by its suffix).
+
+    Raises:
+        IdentityError: if scene, plan and log do not belong together.
     """
+    require_same_mission(scene, plan, log)
     motions = series.shown_motions(plan, log)
     figure = Figure(
         figsize=(_WIDTH_INCHES, 1.0 + _ROW_INCHES * len(motions)),

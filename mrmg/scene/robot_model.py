@@ -9,10 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import shapely
 
 from mrmg.energy import GRAVITY_M_S2, EnergyModel, EnergyPreset
+from mrmg.scene.content import content, contents
+from mrmg.scene.model_files import ModelFiles
 
 GRIP_SHARE = 0.8
 """Share of the driven axle's static grip that is used."""
@@ -60,6 +64,19 @@ class Limits:
         )
 
 
+@dataclass(frozen=True, slots=True)
+class ModelOrigin:
+    """Where a model was loaded from.
+
+    Attributes:
+        reference: what a scene file calls it: a shipped model's name, or a folder.
+        model: as its `robot.yaml` has it.
+    """
+
+    reference: str
+    model: RobotModel
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotModel:
     """Everything the planner and the physics must agree on about one kind of robot.
@@ -93,6 +110,9 @@ class RobotModel:
         energy_preset: which parts of the energy model count.
         battery_capacity_J: of the standard battery.
         mjcf: path of the MJCF file; None for a model that is only planned for.
+        files: what the MJCF and a custom motion consist of, read when the model was
+            made.
+        origin: where it was loaded from; None for one made in memory.
     """
 
     name: str
@@ -118,6 +138,26 @@ class RobotModel:
     energy_preset: EnergyPreset
     battery_capacity_J: float
     mjcf: Path | None
+    files: ModelFiles = ModelFiles((), ())
+    origin: ModelOrigin | None = None
+
+    def __post_init__(self) -> None:
+        named = (self.mjcf, Path(self.motion_model) if self.is_custom_motion else None)
+        roots = tuple(path for path in named if path is not None)
+        if self.files.roots != roots:
+            object.__setattr__(self, "files", ModelFiles.of(*roots))
+
+    @property
+    def is_custom_motion(self) -> bool:
+        """Whether a Python file defines the motion."""
+        return self.motion_model.endswith(".py")
+
+    def content(self) -> dict[str, Any]:
+        """Return what counts for a digest: what the model says, not where it lies."""
+        known = contents(self, without=("name", "mjcf", "origin"))
+        motion = "custom" if self.is_custom_motion else self.motion_model
+        outline = content(shapely.Polygon(self.footprint_m))
+        return {**known, "motion_model": motion, "footprint_m": outline}
 
     @property
     def has_custom_motion(self) -> bool:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from shapely.geometry import Polygon
 
+from mrmg.scene.content import content, content_digest, contents
+from mrmg.scene.document import is_as_loaded, scene_document
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.objective import ENERGY, Objective
 from mrmg.scene.robot_model import RobotModel
@@ -58,6 +62,17 @@ class Region:
     center: np.ndarray
     radius_m: float
     corners: np.ndarray
+
+    def content(self) -> dict[str, Any]:
+        """Return what counts for a digest; the last bits of a centroid do not."""
+        if not len(self.corners):
+            return contents(self)
+        center = [round(float(value), 9) for value in self.center]
+        return {
+            **contents(self),
+            "center": content(center),
+            "corners": content(Polygon(self.corners)),
+        }
 
     @cached_property
     def shape(self) -> Polygon:
@@ -180,21 +195,40 @@ class Robot:
 
 
 @dataclass(frozen=True, kw_only=True)
+class WrittenScene:
+    """How a scene was written down, for as much of it as is not changed since.
+
+    Attributes:
+        document: the scene file's content with defaults filled in, as plain data.
+        loaded: the scene as it was loaded, without this.
+        legacy_digest: what versions up to 0.1.0 made of the document and the values in
+            the models' `robot.yaml`; plans and logs of theirs have it.
+        base: folder that relative paths start from; None for the working directory.
+    """
+
+    document: Mapping[str, Any]
+    loaded: Scene
+    legacy_digest: str
+    base: Path | None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Scene:
     """A mission: map, terrain, goals, stations and the fleet.
+
+    Scenes are equal when all that counts for planning and driving is: they have the
+    same digest then.
 
     Attributes:
         name: short name.
         bounds: (x_min, y_min, x_max, y_max) [m].
         obstacles, terrain, goals, stations, robots: in the order of the file; where
             terrain areas overlap, the later one counts.
-        document: the scene file's content with defaults filled in, as plain data: what
-            `scene.loading.scene_from_document` turns back into an equal scene.
-        digest: fingerprint of the content, models included.
         elevation: the relief; None is flat ground at height 0.
         objective: what its plans are judged by.
         time_limit_s: by when all robots must be at rest, everything done; inf for any
             time.
+        written: how the file put it; None for a scene made in memory.
     """
 
     name: str
@@ -204,11 +238,50 @@ class Scene:
     goals: tuple[Goal, ...]
     stations: tuple[Station, ...]
     robots: tuple[Robot, ...]
-    document: dict[str, Any]
-    digest: str
     elevation: Elevation | None = None
     objective: Objective = ENERGY
     time_limit_s: float = math.inf
+    written: WrittenScene | None = field(default=None, repr=False)
+
+    @cached_property
+    def digest(self) -> str:
+        """Fingerprint of the content, models and their files included."""
+        return content_digest(self)
+
+    @property
+    def document(self) -> dict[str, Any]:
+        """The scene as a scene file's content, as plain data.
+
+        `scene.loading.scene_from_document` turns it back into an equal scene. What is
+        as it was loaded is as it was written.
+
+        Raises:
+            SceneError: if a scene file cannot say what was changed in memory.
+        """
+        return scene_document(self)
+
+    def content(self) -> dict[str, Any]:
+        """Return what counts for the digest."""
+        return contents(self, without=("written",))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scene) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def is_named(self, digest: str) -> bool:
+        """Tell whether a digest is this scene's, by this version or an older one."""
+        if digest == self.digest:
+            return True
+        legacy = self.written is not None and digest == self.written.legacy_digest
+        return legacy and self.is_as_loaded
+
+    @property
+    def is_as_loaded(self) -> bool:
+        """Whether nothing was changed in memory since a file or document was loaded."""
+        names = {item.name for item in fields(self)} - {"written"}
+        return all(is_as_loaded(self, name) for name in names)
 
     @property
     def has_custom_motion(self) -> bool:

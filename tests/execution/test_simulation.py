@@ -390,6 +390,7 @@ def test_a_robot_of_another_kind_is_refused(wild: tuple[Scene, Plan]) -> None:
     robot = scene.robots[0]
     model = replace(robot.model, motion_model="hovercraft")
     strange = replace(scene, robots=(replace(robot, model=model), *scene.robots[1:]))
+    plan = replace(plan, scene_digest=strange.digest)
     with pytest.raises(UsageError, match="'r1'.* cannot be executed; allowed: car, u"):
         simulate(strange, plan)
 

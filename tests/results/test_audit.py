@@ -114,11 +114,19 @@ def test_low_battery_just_before_a_recharge_counts(mission: Any) -> None:
     assert least == account.recharges[0].energy_J / 20000 < 0.05
 
 
+def asked(scene: Scene, plan: Plan, log: ExecutionLog, **changes: Any) -> Any:
+    """Return a changed scene, with plan and log as if they had been made for that."""
+    changed = replace(scene, **changes)
+    plan = replace(plan, scene_digest=changed.digest)
+    log = replace(log, scene_digest=changed.digest, plan_digest=plan.digest)
+    return changed, plan, log
+
+
 def test_idle_power_is_drawn_at_all_times(mission: Any) -> None:
     scene, plan, log = mission()
     model = replace(scene.robots[1].model, idle_power_W=7.0)
     parked = replace(scene.robots[1], model=model)
-    account = audit(replace(scene, robots=(scene.robots[0], parked)), plan, log)
+    account = audit(*asked(scene, plan, log, robots=(scene.robots[0], parked)))
     idle_J = account.measured.total_J(robot="r2", part="idle")
     assert idle_J == pytest.approx(7.0 * log.time_s[-1])
     assert account.robot("r2").measured_J == pytest.approx(idle_J)
@@ -128,12 +136,11 @@ def test_idle_power_is_drawn_at_all_times(mission: Any) -> None:
 def test_braking_feeds_back_by_the_regeneration_efficiency(mission: Any) -> None:
     scene, plan, log = mission()
     model = replace(scene.robots[0].model, regeneration_efficiency=0.5)
-    kinder = replace(
-        scene, robots=(replace(scene.robots[0], model=model), scene.robots[1])
-    )
+    robots = (replace(scene.robots[0], model=model), scene.robots[1])
+    kinder = asked(scene, plan, log, robots=robots)
     braking_J = log.work_J[0, :, 1].sum()
     difference_J = (
-        audit(kinder, plan, log).robot("r1").measured_J
+        audit(*kinder).robot("r1").measured_J
         - audit(scene, plan, log).robot("r1").measured_J
     )
     assert braking_J < -10.0
@@ -255,11 +262,12 @@ def test_a_mission_is_late_from_when_the_last_robot_rests(mission: Any) -> None:
     ]
     assert over_s(scene, log) == pytest.approx(log.time_s[moving + 1])
     assert over_s(scene, log) < plan.makespan_s + 0.1
-    account = audit(replace(scene, time_limit_s=over_s(scene, log) - 0.5), plan, log)
+    late = asked(scene, plan, log, time_limit_s=over_s(scene, log) - 0.5)
+    account = audit(*late)
     assert account.causes == ("late",)
     assert "0.50 s after its time limit" in account.reasons[0]
-    in_time = replace(scene, time_limit_s=over_s(scene, log))
-    assert audit(in_time, plan, log).mission_ok
+    in_time = asked(scene, plan, log, time_limit_s=over_s(scene, log))
+    assert audit(*in_time).mission_ok
 
 
 def test_a_mission_is_not_over_while_a_robot_has_to_stay(mission: Any) -> None:

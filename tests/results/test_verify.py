@@ -57,6 +57,12 @@ def only(verdict: Verdict, kind: ViolationKind) -> Violation:
     return violation
 
 
+def asked(scene: Scene, plan: Plan, **changes: Any) -> Case:
+    """Return a changed scene, and the plan as if it had been made for that."""
+    changed = replace(scene, **changes)
+    return changed, replace(plan, scene_digest=changed.digest)
+
+
 def broken_scene_mismatch(case: Any, drive: Any) -> Case:
     scene, plan = case()
     return scene, replace(plan, scene_digest="another")
@@ -72,7 +78,7 @@ def broken_malformed(case: Any, drive: Any) -> Case:
 def broken_start(case: Any, drive: Any) -> Case:
     scene, plan = case()
     robot = replace(scene.robots[0], pose=(5.25, 10.0, 0.0))
-    return replace(scene, robots=(robot,)), plan
+    return asked(scene, plan, robots=(robot,))
 
 
 def broken_final_rest(case: Any, drive: Any) -> Case:
@@ -84,7 +90,7 @@ def broken_finish(case: Any, drive: Any) -> Case:
     ring = np.zeros((0, 2))
     region = Region(center=np.array([1.0, 1.0]), radius_m=0.1, corners=ring)
     finish = Finish(region=region, heading_rad=None, heading_tolerance_rad=0.1)
-    return replace(scene, robots=(replace(scene.robots[0], finish=finish),)), plan
+    return asked(scene, plan, robots=(replace(scene.robots[0], finish=finish),))
 
 
 def broken_dynamics(case: Any, drive: Any) -> Case:
@@ -128,15 +134,14 @@ def broken_goal_missed(case: Any, drive: Any) -> Case:
 
 def broken_dwell(case: Any, drive: Any) -> Case:
     scene, plan = case()
-    return replace(scene, goals=(replace(scene.goals[0], dwell_s=900.0),)), plan
+    return asked(scene, plan, goals=(replace(scene.goals[0], dwell_s=900.0),))
 
 
 def broken_occupied(case: Any, drive: Any) -> Case:
     station = {"id": "s", "circle": {"center": [5, 12], "radius": 3}}
     scene, plan = case(robots=TWO_ROBOTS, stations=[station])
-    return replace(
-        scene, stations=(replace(scene.stations[0], one_at_a_time=True),)
-    ), plan
+    lone = replace(scene.stations[0], one_at_a_time=True)
+    return asked(scene, plan, stations=(lone,))
 
 
 def broken_tour(case: Any, drive: Any) -> Case:
@@ -160,12 +165,12 @@ def broken_energy(case: Any, drive: Any) -> Case:
     scene, plan = case()
     battery = Battery(capacity_J=20000.0, start_J=2000.0, reserve_fraction=0.05)
     robot = replace(scene.robots[0], battery=battery)
-    return replace(scene, robots=(robot,)), plan
+    return asked(scene, plan, robots=(robot,))
 
 
 def broken_late(case: Any, drive: Any) -> Case:
     scene, plan = case()
-    return replace(scene, time_limit_s=plan.makespan_s - 0.5), plan
+    return asked(scene, plan, time_limit_s=plan.makespan_s - 0.5)
 
 
 def broken_ledger(case: Any, drive: Any) -> Case:
@@ -265,7 +270,7 @@ def test_lateness_is_measured_from_the_limit(case: Any, drive: Any) -> None:
     violation = only(verify(scene, plan), Kind.LATE)
     assert violation.amount == pytest.approx(0.5)
     assert violation.time_s == plan.makespan_s
-    assert verify(replace(scene, time_limit_s=plan.makespan_s), plan).ok
+    assert verify(*asked(scene, plan, time_limit_s=plan.makespan_s)).ok
 
 
 def test_recharge_keeps_the_battery_above_the_reserve(case: Any) -> None:
@@ -324,7 +329,7 @@ def test_battery_must_hold_the_reserve_on_arrival_at_a_station(case: Any) -> Non
     spent_J = 20000.0 - plan.visits[0].energy_J
     battery = replace(scene.robots[0].battery, start_J=1000.0 + spent_J - 10.0)
     robot = replace(scene.robots[0], battery=battery)
-    violation = only(verify(replace(scene, robots=(robot,)), plan), Kind.ENERGY)
+    violation = only(verify(*asked(scene, plan, robots=(robot,))), Kind.ENERGY)
     assert violation.amount == pytest.approx(10.0)
     assert violation.time_s == pytest.approx(plan.visits[0].time_s)
 

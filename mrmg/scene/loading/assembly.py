@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 import shapely
-from pydantic import BaseModel, ValidationError
 from shapely.geometry import Polygon
 
 from mrmg import storage
@@ -24,6 +23,7 @@ from mrmg.scene.elevation import Elevation
 from mrmg.scene.loading.batteries import battery_of
 from mrmg.scene.loading.climbing import slope_faults
 from mrmg.scene.loading.elevation import elevation_of
+from mrmg.scene.loading.faults import parsed
 from mrmg.scene.loading.geometry import footprint_at, region_of, shape_of
 from mrmg.scene.loading.models import load_model, model_folder
 from mrmg.scene.loading.schema import (
@@ -46,6 +46,7 @@ from mrmg.scene.types import (
     Scene,
     Station,
     TerrainArea,
+    WrittenScene,
 )
 
 HOME_RADIUS_M = 1.0
@@ -67,7 +68,7 @@ class Assembly:
         self._document = document
         self._base = base
         self._models: dict[str, tuple[RobotModel, dict[str, Any]]] = {}
-        self._references: dict[str, str] = {}
+        self._references: dict[str, Any] = {}
         self._elevation_document: dict[str, Any] = {}
         self.ids = self._unique_ids()
         self.bounds = self._bounds()
@@ -100,13 +101,14 @@ class Assembly:
             robot["model"] = self._references[robot["id"]]
         if self.elevation is not None:
             document["elevation"] = self._elevation_document
-        # What a model says counts, not the folder it lies in.
+        # Older versions took digests of documents with the models' parameters in place.
         parameters = {robot.id: self._models[robot.id][1] for robot in self.robots}
-        content = {**document, "robots": []}
-        for robot in document["robots"]:
-            content["robots"].append({**robot, "model": parameters[robot["id"]]})
+        robots = [
+            {**robot, "model": parameters[robot["id"]]} for robot in document["robots"]
+        ]
+        content = {**document, "robots": robots}
         assert self.bounds is not None
-        return Scene(
+        loaded = Scene(
             name=document["name"],
             bounds=self.bounds,
             obstacles=tuple(self.obstacles),
@@ -117,9 +119,12 @@ class Assembly:
             elevation=self.elevation,
             objective=self.objective,
             time_limit_s=document.get("time_limit", math.inf),
-            document=document,
-            digest=storage.digest(storage.canonical_json(content)),
         )
+        legacy = storage.digest(storage.canonical_json(content))
+        written = WrittenScene(
+            document=document, loaded=loaded, legacy_digest=legacy, base=self._base
+        )
+        return replace(loaded, written=written)
 
     def _fault(self, path: str, message: str) -> None:
         self.faults.append(Fault(path, message))
@@ -127,7 +132,7 @@ class Assembly:
     def _entries(self, section: str) -> Iterator[tuple[int, str, Any]]:
         """Yield (index, path, entry) of the well-formed entries of one list."""
         for index, item in enumerate(self._items(section)):
-            entry = _parsed(SECTIONS[section], item)
+            entry = parsed(SECTIONS[section], item)
             if entry is not None:
                 yield index, f"{section}.{index}", entry
 
@@ -154,7 +159,7 @@ class Assembly:
 
     def _bounds(self) -> tuple[float, float, float, float] | None:
         raw = self._document.get("bounds")
-        header = _parsed(SceneDocument, {"format": 1, "name": "map", "bounds": raw})
+        header = parsed(SceneDocument, {"format": 1, "name": "map", "bounds": raw})
         if not isinstance(header, SceneDocument):
             return None
         x_min, y_min, x_max, y_max = header.bounds
@@ -166,7 +171,7 @@ class Assembly:
 
     def _robots(self) -> Iterator[Robot]:
         fleet = self._document.get("battery", {})
-        default = _parsed(BatteryEntry, fleet) or BatteryEntry()
+        default = parsed(BatteryEntry, fleet) or BatteryEntry()
         for _, path, entry in self._entries("robots"):
             model = self._model(entry.id, entry.model, path)
             if model is None:
@@ -210,7 +215,9 @@ class Assembly:
             heading_tolerance_rad=wanted.heading_tolerance,
         )
 
-    def _model(self, robot_id: str, reference: str, path: str) -> RobotModel | None:
+    def _model(self, robot_id: str, wanted: Any, path: str) -> RobotModel | None:
+        changes = dict(wanted) if isinstance(wanted, dict) else {}
+        reference: str = changes.pop("like", wanted)
         folder = model_folder(reference, self._base)
         if isinstance(folder, str):
             self._fault(f"{path}.model", folder)
@@ -219,14 +226,15 @@ class Assembly:
             self._models[robot_id] = load_model(
                 folder,
                 source=f"{reference}/robot.yaml",
+                changes=changes,
                 trust_code=self._trust_code,
             )
         except SceneError as error:
             for fault in error.faults:
                 self._fault(f"{path}.model", f"{error.source}: {fault}")
             return None
-        is_path = "/" in reference
-        self._references[robot_id] = str(folder) if is_path else reference
+        found = str(folder) if "/" in reference else reference
+        self._references[robot_id] = {"like": found, **changes} if changes else found
         return self._models[robot_id][0]
 
     def _obstacles(self) -> Iterator[Obstacle]:
@@ -260,7 +268,7 @@ class Assembly:
                 )
 
     def _elevation(self) -> Elevation | None:
-        entry = _parsed(ElevationEntry, self._document.get("elevation"))
+        entry = parsed(ElevationEntry, self._document.get("elevation"))
         if entry is None or self.bounds is None:
             return None
         found = elevation_of(entry, self.bounds, self._base)
@@ -275,7 +283,7 @@ class Assembly:
 
     def _objective(self) -> Objective:
         wanted = self._document.get("objective")
-        blend = _parsed(BlendEntry, wanted)
+        blend = parsed(BlendEntry, wanted)
         if blend is None:
             return MAKESPAN if wanted == "makespan" else ENERGY
         if not blend.energy and not blend.makespan:
@@ -333,14 +341,6 @@ class Assembly:
                         "is for one robot at a time"
                     )
                     self._fault(f"{self.ids[second.id]}.pose", message)
-
-
-def _parsed(model: type[BaseModel], item: Any) -> Any:
-    """Return `item` as an entry, or None: its faults are reported with the file's."""
-    try:
-        return model.model_validate(item)
-    except ValidationError:
-        return None
 
 
 def _default_id(section: str, index: int) -> str:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from mrmg.errors import Fault, nearest
+from mrmg.scene.document import PACKED_M, packed_heights
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.loading.faults import shown
 from mrmg.scene.loading.schema import ElevationEntry, HillEntry
@@ -25,9 +26,6 @@ FORMS = ("file", "grid", "hills", "packed")
 
 DEFAULT_CELL_M = 0.5
 MOST_NODES = 1_000_000
-
-_PACKED_M = 1e-4
-"""Heights from files are kept to a tenth of a millimetre."""
 
 Bounds = tuple[float, float, float, float]
 
@@ -166,11 +164,8 @@ def _from_picture(
 
 def _packed(heights: np.ndarray) -> tuple[np.ndarray, dict[str, Any]]:
     """Return heights as they are kept, and the entry that keeps them."""
-    steps = np.round(heights / _PACKED_M).astype("<i4")
-    text = base64.b64encode(zlib.compress(steps.tobytes(), 9)).decode("ascii")
-    rows, columns = steps.shape
-    entry = {"packed": {"rows": rows, "columns": columns, "heights": text}}
-    return steps * _PACKED_M, entry
+    steps = np.round(heights / PACKED_M).astype("<i4")
+    return steps * PACKED_M, packed_heights(steps)
 
 
 def _unpacked(rows: int, columns: int, text: str) -> np.ndarray | Fault:
@@ -185,7 +180,7 @@ def _unpacked(rows: int, columns: int, text: str) -> np.ndarray | Fault:
     if len(data) != 4 * rows * columns:
         message = f"holds {len(data) // 4} heights; expected {rows} x {columns}"
         return Fault(where, message)
-    return np.frombuffer(data, "<i4").reshape(rows, columns) * _PACKED_M
+    return np.frombuffer(data, "<i4").reshape(rows, columns) * PACKED_M
 
 
 def _sampled(hills: list[HillEntry], cell_m: float, bounds: Bounds) -> np.ndarray:

@@ -25,6 +25,14 @@ _KINDS = {
 }
 
 
+def parsed(model: type[BaseModel], item: Any) -> Any:
+    """Return `item` as an entry, or None: its faults are reported with the file's."""
+    try:
+        return model.model_validate(item)
+    except ValidationError:
+        return None
+
+
 def faults_of(error: ValidationError, model: type[BaseModel]) -> list[Fault]:
     """Return one fault per error: its path, the value, and what is allowed there."""
     details = [dict(detail) for detail in error.errors()]
@@ -68,6 +76,8 @@ def _fault(detail: dict[str, Any], model: type[BaseModel]) -> Fault:
     if kind in ("model_type", "model_attributes_type", "dict_type"):
         keys = ", ".join(_known_keys(model, loc))
         return Fault(path, f"got {shown(value)}; expected a mapping with keys {keys}")
+    if kind == "model_reference":
+        return Fault(path, f"got {shown(value)}; expected {detail['msg']}")
     rule = _KINDS.get(kind) or f"must be {_allowed(detail)}"
     about = f" ({wanted})" if wanted else ""
     return Fault(path, f"got {shown(value)}; {rule}{about}")

@@ -8,6 +8,8 @@ Units: m, kg, s, rad, J.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -23,7 +25,7 @@ from mrmg.scene.loading.places import lines_of
 from mrmg.scene.loading.shape_schema import NotNegative, Positive, Ring, Strict
 from mrmg.scene.loading.trust import file_within, refusal_of_code
 from mrmg.scene.loading.yaml_text import read_yaml
-from mrmg.scene.robot_model import Limits, RobotModel
+from mrmg.scene.robot_model import Limits, ModelOrigin, RobotModel
 
 SHIPPED_MOTIONS = ("car", "unicycle")
 """Motion models that need no file of their own."""
@@ -127,30 +129,51 @@ def model_folder(reference: str, base: Path | None) -> Path | str:
 
 
 def load_model(
-    folder: Path, *, source: str | None = None, trust_code: bool = False
+    folder: Path,
+    *,
+    source: str | None = None,
+    changes: Mapping[str, Any] | None = None,
+    trust_code: bool = False,
 ) -> tuple[RobotModel, dict[str, Any]]:
     """Read the model in `folder`.
 
     Args:
         folder: holds `robot.yaml`.
         source: what error messages call the file; default its path.
+        changes: values that replace some of the file's, by its keys.
         trust_code: whether a motion that is a Python file of the folder may run.
 
     Returns:
-        The model, and its parameters as plain data (what a digest is taken of).
+        The model, and its parameters as plain data, for `WrittenScene.legacy_digest`.
 
     Raises:
         SceneError: naming every fault of its `robot.yaml`.
     """
     path = folder / "robot.yaml"
+    source = source or str(path)
+    is_shipped = folder.parent == shipped.models_folder()
     with lines_of(path):
-        return _checked_model(folder, source or str(path), trust_code=trust_code)
+        document = read_yaml(path, source=source)
+        model, parameters = _checked_model(folder, document, source, trust_code)
+        origin = ModelOrigin(folder.name if is_shipped else str(folder), model)
+        if changes:
+            changed = _merged(document, changes)
+            model, parameters = _checked_model(folder, changed, source, trust_code)
+    return replace(model, origin=origin), parameters
+
+
+def _merged(document: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(document)
+    for key, value in changes.items():
+        both = isinstance(value, Mapping) and isinstance(merged.get(key), Mapping)
+        merged[key] = _merged(merged[key], value) if both else value
+    return merged
 
 
 def _checked_model(
-    folder: Path, source: str, *, trust_code: bool
+    folder: Path, document: Any, source: str, trust_code: bool
 ) -> tuple[RobotModel, dict[str, Any]]:
-    document = read_yaml(folder / "robot.yaml", source=source)
+    """Return the model that the content of a `robot.yaml` states."""
     try:
         entry = ModelDocument.model_validate(document)
     except ValidationError as error:

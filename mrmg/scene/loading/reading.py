@@ -73,8 +73,34 @@ def scene_from_document(
 
 
 def dump_scene(scene: Scene) -> str:
-    """Return a scene as YAML text that loads as an equal scene from any folder."""
-    return dump_yaml(scene.document)
+    """Return a scene as YAML text that loads as an equal scene from any folder.
+
+    Raises:
+        SceneError: if a scene file cannot say what was changed in memory.
+    """
+    document = scene.document
+    require_faithful(scene, document)
+    return dump_yaml(document)
+
+
+def require_faithful(scene: Scene, document: dict[str, Any]) -> None:
+    """Refuse a document that does not load as `scene`.
+
+    Raises:
+        SceneError: naming what differs, or what is wrong with it as it is.
+    """
+    if scene.is_as_loaded:
+        return
+    trust_code = scene.has_custom_motion  # or it would not have been loaded
+    again = scene_from_document(document, source=scene.name, trust_code=trust_code)
+    if again == scene:
+        return
+    found, wanted = again.content(), scene.content()
+    message = "was changed in memory into what no scene file can say"
+    raise SceneError(
+        scene.name,
+        [Fault(key, message) for key in wanted if found[key] != wanted[key]],
+    )
 
 
 def _path_of(source: str | Path) -> Path:

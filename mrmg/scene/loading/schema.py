@@ -62,7 +62,8 @@ Details:
   `heading_tolerance`, default 0.2) if it matters. Robots that turn on the spot can be
   given a heading, cars cannot.
 - `model` is the name of a shipped model, or a folder (with a `/` in it), relative to
-  the scene file, that holds a `robot.yaml`.
+  the scene file, that holds a `robot.yaml`; or either with values other than in its
+  `robot.yaml`: `{like: car, rolling_coefficient: 0.08}`.
 - `energy: paper` (of a robot here, or in its `robot.yaml`) charges only distance times
   terrain and turning, the cost of the published method; the default `full` also counts
   inertia, slopes, and idle and device power.
@@ -82,6 +83,7 @@ from __future__ import annotations
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic_core import PydanticCustomError
 
 from mrmg.energy import EnergyPreset
 from mrmg.scene.loading.shape_schema import (
@@ -243,13 +245,42 @@ class FinishEntry(Strict):
     heading_tolerance: Positive = Field(default=0.2, description="in rad")
 
 
+_MODEL = (
+    "the name of a shipped model, a folder relative to the scene, or {like: one of "
+    "both, and values in place of its robot.yaml's}"
+)
+
+
+def _model_reference(value: Any) -> Any:
+    name = value.get("like") if isinstance(value, dict) else value
+    if not isinstance(name, str) or not name:
+        raise PydanticCustomError("model_reference", _MODEL)
+    return value
+
+
+Model = Annotated[
+    Any,
+    BeforeValidator(_model_reference),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "string", "minLength": 1},
+                {
+                    "type": "object",
+                    "properties": {"like": {"type": "string", "minLength": 1}},
+                    "required": ["like"],
+                },
+            ]
+        }
+    ),
+]
+
+
 class RobotEntry(Strict):
     """One robot of the fleet."""
 
     id: Identifier = Field(description=ID)
-    model: Annotated[str, Field(min_length=1)] = Field(
-        description="the name of a shipped model, or a folder relative to the scene"
-    )
+    model: Model = Field(description=_MODEL)
     pose: Annotated[list[Number], Field(min_length=3, max_length=3)] = Field(
         description="[x in m, y in m, yaw in rad]"
     )

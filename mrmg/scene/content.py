@@ -1,0 +1,61 @@
+"""The digest of values: a fingerprint of everything that is planned or driven."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from numbers import Real
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from mrmg import storage
+
+
+def content_digest(value: Any) -> str:
+    """Return the fingerprint of a value; values of equal content have equal ones."""
+    return storage.digest(storage.canonical_json(content(value)))
+
+
+def content(value: Any) -> Any:
+    """Return a value's content as plain data.
+
+    A class states what counts of it by a method `content`; of any other dataclass all
+    fields count. How the rings of a shape are oriented and where they begin does not.
+    """
+    if hasattr(value, "content"):
+        return value.content()
+    if is_dataclass(value) and not isinstance(value, type):
+        return contents(value)
+    if isinstance(value, BaseGeometry):
+        return _fingerprint(shapely.normalize(shapely.force_2d(value)).wkb)
+    if isinstance(value, np.ndarray):
+        # Adding 0.0 makes zeros of both signs equal.
+        numbers = np.ascontiguousarray(value, dtype=float) + 0.0
+        return [list(value.shape), _fingerprint(numbers.tobytes())]
+    if isinstance(value, Mapping):
+        return {str(key): content(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [content(item) for item in value]
+    if isinstance(value, bool | str) or value is None:
+        return value
+    if isinstance(value, Real):
+        number = float(value) + 0.0
+        return number if math.isfinite(number) else str(number)
+    raise TypeError(f"{type(value).__name__} is no part of a scene: {value!r}")
+
+
+def contents(value: Any, *, without: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return the content of a dataclass's fields by name."""
+    names = (field.name for field in fields(value))
+    return {
+        name: content(getattr(value, name)) for name in names if name not in without
+    }
+
+
+def _fingerprint(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()[:16]

@@ -1,0 +1,319 @@
+"""From a scene's values back to the content of a scene file.
+
+What is as it was loaded is put as the file put it; what was changed in memory is put in
+plain terms: polygons, joules, differences from a model's `robot.yaml`.
+"""
+
+from __future__ import annotations
+
+import base64
+import copy
+import math
+import zlib
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+
+from mrmg.errors import Fault, SceneError
+from mrmg.scene.elevation import Elevation
+from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
+from mrmg.scene.robot_model import RobotModel
+
+if TYPE_CHECKING:
+    from mrmg.scene.types import (
+        Battery,
+        Finish,
+        Goal,
+        Obstacle,
+        Region,
+        Robot,
+        Scene,
+        Station,
+        TerrainArea,
+    )
+
+PACKED_M = 1e-4
+"""Resolution of packed heights."""
+
+_ROUNDING_M = 1e-9
+"""By how much a stored centroid may differ from one worked out anew."""
+
+_Entry = dict[str, Any]
+
+
+def scene_document(scene: Scene) -> _Entry:
+    """Return the content of a scene file that loads as `scene`.
+
+    Raises:
+        SceneError: if the format cannot say something that was changed in memory.
+    """
+    written = scene.written
+    document: _Entry = copy.deepcopy(dict(written.document)) if written else {}
+    document |= {"format": 1, "name": scene.name}
+    document["bounds"] = [float(value) for value in scene.bounds]
+    for section, write in _WRITERS.items():
+        document[section] = _entries(scene, document.get(section, []), section, write)
+    if not (is_as_loaded(scene, "elevation") and is_as_loaded(scene, "bounds")):
+        document["elevation"] = _elevation(scene)
+    if not is_as_loaded(scene, "objective"):
+        document["objective"] = objective_entry(scene.objective)
+    if not is_as_loaded(scene, "time_limit_s"):
+        limit_s = float(scene.time_limit_s)
+        document["time_limit"] = limit_s if math.isfinite(limit_s) else None
+    document["battery"], document["robots"] = _robots(scene, document)
+    return {key: value for key, value in document.items() if value is not None}
+
+
+def is_as_loaded(scene: Scene, name: str) -> bool:
+    """Tell whether a field of a scene holds what it was loaded as."""
+    if scene.written is None:
+        return False
+    now, then = getattr(scene, name), getattr(scene.written.loaded, name)
+    if isinstance(now, tuple):
+        # Values are immutable: what is the same object has not changed.
+        pairs = zip(now, then, strict=False)
+        return len(now) == len(then) and all(a is b or _equal(a, b) for a, b in pairs)
+    return now is then or _equal(now, then)
+
+
+def _equal(now: Any, then: Any) -> bool:
+    simple = isinstance(now, float | int | str | Objective)
+    return simple and bool(now == then)
+
+
+def _entries(
+    scene: Scene, entries: list[_Entry], section: str, write: Callable[[Any], _Entry]
+) -> list[_Entry]:
+    """Return the entries of a section: those of unchanged values as written."""
+    if is_as_loaded(scene, section):
+        return entries
+    before = getattr(scene.written.loaded, section) if scene.written else ()
+    known = {id(value): entry for value, entry in zip(before, entries, strict=True)}
+    return [
+        {"id": value.id, **known[id(value)]} if id(value) in known else write(value)
+        for value in getattr(scene, section)
+    ]
+
+
+def _robots(scene: Scene, document: _Entry) -> tuple[_Entry, list[_Entry]]:
+    """Return the fleet's battery and the robots' entries."""
+    fleet = document.get("battery", {})
+    kept = {id(robot) for robot in scene.written.loaded.robots} if scene.written else ()
+    changed = [robot for robot in scene.robots if id(robot) not in kept]
+    at_once = any(not robot.battery.takes_time_to_fill for robot in changed)
+    if at_once and "charging_power" in fleet:
+        # A robot's own battery cannot take a charging power of the fleet's back.
+        return {}, [robot_entry(robot) for robot in scene.robots]
+    return fleet, _entries(scene, document.get("robots", []), "robots", robot_entry)
+
+
+def obstacle_entry(obstacle: Obstacle) -> _Entry:
+    """Return the entry of an obstacle."""
+    entry = {"id": obstacle.id, **_polygon(obstacle.shape)}
+    entry["height"] = float(obstacle.height_m)
+    if obstacle.blocks is not None:
+        entry["blocks"] = list(obstacle.blocks)
+    return entry
+
+
+def terrain_entry(area: TerrainArea) -> _Entry:
+    """Return the entry of a terrain area."""
+    entry = {"id": area.id, **_polygon(area.shape)}
+    return {**entry, "multiplier": float(area.multiplier)}
+
+
+def goal_entry(goal: Goal) -> _Entry:
+    """Return the entry of a goal."""
+    entry = {"id": goal.id, **_region(goal.region)}
+    return {**entry, "dwell": float(goal.dwell_s)} if goal.dwell_s else entry
+
+
+def station_entry(station: Station) -> _Entry:
+    """Return the entry of a station."""
+    entry = {"id": station.id, **_region(station.region)}
+    if station.dwell_s:
+        entry["dwell"] = float(station.dwell_s)
+    return {**entry, "capacity": 1} if station.one_at_a_time else entry
+
+
+def robot_entry(robot: Robot) -> _Entry:
+    """Return the entry of a robot, independent of the fleet's battery.
+
+    Raises:
+        SceneError: if its model cannot be told from a `robot.yaml`.
+    """
+    entry: _Entry = {
+        "id": robot.id,
+        **_model(robot),
+        "pose": [float(value) for value in robot.pose],
+        **_battery(robot.battery),
+    }
+    if robot.finish is not None:
+        entry["finish"] = _finish(robot.finish)
+    return entry
+
+
+def elevation_entry(elevation: Elevation) -> _Entry:
+    """Return the entry of a relief: packed where that is exact."""
+    southward = np.asarray(elevation.height_m, dtype=float)[::-1]
+    steps = np.round(southward / PACKED_M)
+    small = float(np.abs(steps).max(initial=0.0)) < 2**31
+    if not small or not np.array_equal(steps * PACKED_M, southward):
+        return {"grid": southward.tolist()}
+    return packed_heights(steps.astype("<i4"))
+
+
+def packed_heights(steps: np.ndarray) -> _Entry:
+    """Return the entry of heights in steps of `PACKED_M`, rows from north to south."""
+    text = base64.b64encode(zlib.compress(steps.tobytes(), 9)).decode("ascii")
+    rows, columns = steps.shape
+    return {"packed": {"rows": rows, "columns": columns, "heights": text}}
+
+
+def objective_entry(objective: Objective) -> str | _Entry:
+    """Return the entry of an objective."""
+    if objective in (ENERGY, MAKESPAN):
+        return objective.name
+    return {
+        "energy": float(objective.energy_weight),
+        "makespan": float(objective.makespan_weight),
+    }
+
+
+def _elevation(scene: Scene) -> _Entry | None:
+    if scene.elevation is None:
+        return None
+    if tuple(scene.elevation.bounds) != tuple(scene.bounds):
+        message = (
+            f"spans {list(scene.elevation.bounds)}, the scene {list(scene.bounds)}; "
+            "change both with scene.with_(bounds=..., elevation=...)"
+        )
+        raise SceneError(scene.name, [Fault("elevation", message)])
+    return elevation_entry(scene.elevation)
+
+
+def _polygon(shape: Any) -> _Entry:
+    rings = [_points(ring.coords[:-1]) for ring in (shape.exterior, *shape.interiors)]
+    return {"polygon": rings[0], **({"holes": rings[1:]} if rings[1:] else {})}
+
+
+def _points(points: Any) -> list[list[float]]:
+    return [[float(x), float(y)] for x, y, *_ in points]
+
+
+def _region(region: Region) -> _Entry:
+    if len(region.corners):
+        off_m = (
+            np.array(shapely.Polygon(region.corners).centroid.coords) - region.center
+        )
+        if region.radius_m or np.abs(off_m).max() > _ROUNDING_M:
+            message = (
+                "a region with corners has radius 0 and its centroid for a centre; "
+                f"got radius {region.radius_m:g} m and {np.asarray(region.center)}"
+            )
+            raise SceneError("scene", [Fault("region", message)])
+        return {"polygon": _points(region.corners)}
+    (center,) = _points([region.center])
+    return {"circle": {"center": center, "radius": float(region.radius_m)}}
+
+
+def _finish(finish: Finish) -> _Entry:
+    entry = _region(finish.region)
+    if finish.heading_rad is not None:
+        entry["heading"] = float(finish.heading_rad)
+    entry["heading_tolerance"] = float(finish.heading_tolerance_rad)
+    return entry
+
+
+def _battery(battery: Battery) -> _Entry:
+    capacity_J, start_J = float(battery.capacity_J), float(battery.start_J)
+    own = {"capacity_J": capacity_J, "reserve": float(battery.reserve_fraction)}
+    if battery.takes_time_to_fill:
+        own["charging_power"] = float(battery.charging_power_W)
+    share = start_J / capacity_J
+    exact = share * capacity_J == start_J
+    start = {"fraction": share} if exact else {"J": start_J}
+    return {"start_energy": start, "battery": own}
+
+
+def _model(robot: Robot) -> _Entry:
+    """Return what tells a robot's model: its origin, and what differs from that."""
+    model, origin = robot.model, robot.model.origin
+    if origin is None or (model.mjcf, model.motion_model) != (
+        origin.model.mjcf,
+        origin.model.motion_model,
+    ):
+        message = (
+            f"{robot.id}'s model '{model.name}' was made in memory; give it a folder "
+            "with robot.yaml and its MJCF, and name that as the robot's model"
+        )
+        raise SceneError("scene", [Fault(f"robots.{robot.id}.model", message)])
+    entry: _Entry = {"model": origin.reference}
+    changes = _differences(model_parameters(origin.model), model_parameters(model))
+    if "energy" in changes:
+        entry["energy"] = changes.pop("energy")
+    base, own = origin.model.rolling_coefficient, model.rolling_coefficient
+    if "rolling_coefficient" in changes and base * (own / base) == own:
+        entry["rolling_factor"] = own / base
+        del changes["rolling_coefficient"]
+    if changes:
+        entry["model"] = {"like": origin.reference, **changes}
+    return entry
+
+
+def model_parameters(model: RobotModel) -> _Entry:
+    """Return a model's values under the keys of `robot.yaml`, without its files."""
+    limits = model.limits
+    return {
+        "footprint": _points(model.footprint_m),
+        "height": float(model.height_m),
+        "wheelbase": float(model.wheelbase_m),
+        "track": float(model.track_m),
+        "mass": float(model.mass_kg),
+        "center_of_mass": float(model.center_of_mass_m),
+        "wheel": {
+            "radius": float(model.wheel_radius_m),
+            "inertia": float(model.wheel_inertia_kg_m2),
+            "count": int(model.wheel_count),
+        },
+        "limits": {
+            "v_min": float(limits.v_min_m_s),
+            "v_max": float(limits.v_max_m_s),
+            "w_max": float(limits.w_max),
+            "u1_max": float(limits.u1_max_m_s2),
+            "u2_max": float(limits.u2_max),
+        },
+        "planning_share": float(model.planning_share),
+        "rolling_coefficient": float(model.rolling_coefficient),
+        "turning_coefficient": float(model.turning_coefficient),
+        "friction_coefficient": float(model.friction_coefficient),
+        "drive_efficiency": float(model.drive_efficiency),
+        "regeneration_efficiency": float(model.regeneration_efficiency),
+        "idle_power": float(model.idle_power_W),
+        "device_power": float(model.device_power_W),
+        "energy": model.energy_preset,
+        "battery_capacity": float(model.battery_capacity_J),
+    }
+
+
+def _differences(before: Mapping[str, Any], after: Mapping[str, Any]) -> _Entry:
+    """Return what `after` says otherwise than `before`, part by part."""
+    found: _Entry = {}
+    for key, value in after.items():
+        if isinstance(value, dict):
+            inner = _differences(before[key], value)
+            if inner:
+                found[key] = inner
+        elif value != before[key]:
+            found[key] = value
+    return found
+
+
+_WRITERS: dict[str, Callable[[Any], _Entry]] = {
+    "obstacles": obstacle_entry,
+    "terrain": terrain_entry,
+    "goals": goal_entry,
+    "stations": station_entry,
+}
