@@ -1,6 +1,7 @@
-"""Making scenes: reading foreign maps, and populating maps with missions."""
+"""Making scenes: new ones, foreign maps, and missions placed on maps."""
 
 from mrmg.authoring.importing import import_map
+from mrmg.authoring.new_scene import new_scene
 from mrmg.authoring.populate import populate
 
-__all__ = ["import_map", "populate"]
+__all__ = ["import_map", "new_scene", "populate"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,15 +13,15 @@ from mrmg.errors import ExitCode
 from mrmg.run_arguments import DEFAULT_VIDEO, RunArguments, VideoArguments
 
 if TYPE_CHECKING:
+    from mrmg.scene.types import Scene
     from mrmg.steps import Run
 
 
 def run(options: argparse.Namespace) -> int:
     """Do the whole mission."""
     from mrmg import pipeline
-    from mrmg.scene.loading import load_scene
 
-    scene = load_scene(options.scene, trust_code=options.trust_code)
+    scene = _scene(options)
     terminal.compile_kernels()
     with terminal.progress() as told:
         result = pipeline.run(
@@ -41,16 +42,25 @@ def run(options: argparse.Namespace) -> int:
     return result.exit_code
 
 
+def _scene(options: argparse.Namespace) -> Scene:
+    """Return the scene of the command line, and warn of what it may not mean."""
+    from mrmg.scene.loading import heading_hints, load_scene
+
+    scene = load_scene(options.scene, trust_code=options.trust_code)
+    more = f"mrmg scene check {shlex.quote(options.scene)}"
+    terminal.print_warnings(heading_hints(options.scene), more=more)
+    return scene
+
+
 def plan(options: argparse.Namespace) -> int:
     """Plan, and start a run folder."""
     from mrmg.pipeline import default_folder
     from mrmg.replacing import require_room
     from mrmg.run_folder import RunFolder, Step
-    from mrmg.scene.loading import load_scene
     from mrmg.steps import Run
 
     arguments = RunArguments(**given(options))
-    loaded = load_scene(options.scene, trust_code=options.trust_code)
+    loaded = _scene(options)
     scene = arguments.scene(loaded)
     terminal.compile_kernels()
     folder = RunFolder(options.out or default_folder(scene, arguments.seed))

@@ -179,12 +179,21 @@ def _add_view(verbs: _Verbs) -> None:  # type: ignore[type-arg]
 
 
 def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
-    scene = verbs.add_parser("scene", help="check, draw, import or populate scenes")
+    scene = verbs.add_parser("scene", help="make, check, draw or import scenes")
     acts = scene.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    new = acts.add_parser("new", help="write a commented scene to begin with")
+    new.add_argument("name", metavar="NAME")
+    new.add_argument("-o", "--out", type=Path, metavar="FILE", help="default NAME.yaml")
+    new.set_defaults(command=scene_commands.new)
+
+    listed = acts.add_parser("list", help="list the shipped scenes")
+    listed.set_defaults(command=scene_commands.list_)
 
     check = acts.add_parser("check", help="report every fault of a scene")
     check.add_argument("scene", metavar="SCENE")
     add_trust(check)
+    _add_json(check, "faults and warnings")
     check.set_defaults(command=scene_commands.check)
 
     draw = acts.add_parser("draw", help="draw a scene")

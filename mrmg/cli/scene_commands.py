@@ -1,28 +1,91 @@
-"""The verbs that check, draw, import and populate scenes."""
+"""The verbs that make, check, draw, import and populate scenes."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
+import shlex
 import sys
+from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from mrmg import storage
-from mrmg.errors import ExitCode, UsageError
+from mrmg.cli import terminal
+from mrmg.errors import ExitCode, Fault, SceneError, UsageError
+
+
+def new(options: argparse.Namespace) -> int:
+    """Write a commented scene to begin with."""
+    from mrmg.authoring import new_scene
+
+    given = options.name.removesuffix(".yaml")
+    out = options.out or Path(f"{given}.yaml")
+    if os.path.lexists(out):
+        raise UsageError(f"{out} is there already; give another name, or -o FILE")
+    storage.write_text(out, new_scene(Path(given).name))
+    print(f"{out}\nnext:")
+    for verb in ("scene check", "scene draw", "run"):
+        print(f"  mrmg {verb} {shlex.quote(str(out))}")
+    return ExitCode.OK
+
+
+def list_(options: argparse.Namespace) -> int:
+    """List the shipped scenes with their figures and what they are for."""
+    from mrmg import shipped
+    from mrmg.scene.loading.yaml_text import parse_yaml
+
+    print(f"{'scene':<12}{'robots':>7}{'goals':>7}{'stations':>10}{'size [m]':>12}")
+    for name in shipped.scene_names():
+        text = (shipped.scenes_folder() / f"{name}.yaml").read_text(encoding="utf-8")
+        scene = parse_yaml(text, source=name)
+        x_min, y_min, x_max, y_max = scene["bounds"]
+        counts = [len(scene.get(key, [])) for key in ("robots", "goals", "stations")]
+        why = text.splitlines()[0].removeprefix("# Why: ")
+        print(
+            "{:<12}{:>7}{:>7}{:>10}".format(name, *counts)
+            + f"{f'{x_max - x_min:g} x {y_max - y_min:g}':>12}  {why}"
+        )
+    return ExitCode.OK
 
 
 def check(options: argparse.Namespace) -> int:
-    """Load a scene; every fault of it is in the error that loading raises."""
-    from mrmg.scene.loading import load_scene
+    """Report the faults of a scene, as loading raises them, and what it warns of."""
+    from mrmg.planning.feasibility import mission_warnings
+    from mrmg.scene.loading import heading_hints, load_scene
 
-    scene = load_scene(options.scene, trust_code=options.trust_code)
-    print(
-        f"{scene.name}: valid; {len(scene.robots)} robots, {len(scene.goals)} goals, "
-        f"{len(scene.stations)} stations, {len(scene.obstacles)} obstacles, "
-        f"{len(scene.terrain)} terrain areas"
-    )
+    warnings = heading_hints(options.scene)
+    try:
+        scene = load_scene(options.scene, trust_code=options.trust_code)
+    except SceneError as error:
+        if options.json:
+            _print_findings(error.faults, warnings)
+        else:
+            terminal.print_warnings(warnings)
+        raise
+    warnings += [Fault("", message) for message in mission_warnings(scene)]
+    if options.json:
+        _print_findings([], warnings)
+        return ExitCode.OK
+    counts = {
+        "robot": len(scene.robots),
+        "goal": len(scene.goals),
+        "station": len(scene.stations),
+        "obstacle": len(scene.obstacles),
+        "terrain area": len(scene.terrain),
+    }
+    held = ", ".join(f"{n} {name}{'' if n == 1 else 's'}" for name, n in counts.items())
+    print("\n  warning: ".join([f"{scene.name}: valid; {held}", *map(str, warnings)]))
     return ExitCode.OK
+
+
+def _print_findings(faults: Sequence[Fault], warnings: Sequence[Fault]) -> None:
+    findings = {"faults": faults, "warnings": warnings}
+    terminal.print_json(
+        {name: [asdict(item) for item in items] for name, items in findings.items()}
+    )
 
 
 def draw(options: argparse.Namespace) -> int:

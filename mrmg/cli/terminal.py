@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from mrmg import storage
+from mrmg.errors import Fault
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -127,6 +128,20 @@ def compile_kernels() -> None:
         took_s = time.perf_counter() - began
     text = f"compiled {compiled_kernels()} kernels in {took_s:.0f} s"
     print(f"{text}, once for this version", file=sys.stderr)
+
+
+def print_warnings(warnings: Sequence[Fault], *, more: str = "") -> None:
+    """Print warnings on stderr: all, or the first one and where to find the others.
+
+    Args:
+        warnings: what to print.
+        more: the command that prints them all.
+    """
+    shown = warnings[:1] if more else warnings
+    left = len(warnings) - len(shown)
+    for warning in shown:
+        others = f" (and {left} more: {more})" if left else ""
+        print(f"mrmg: warning: {warning}{others}", file=sys.stderr)
 
 
 def print_json(value: Any) -> None:

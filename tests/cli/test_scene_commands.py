@@ -1,14 +1,24 @@
 from __future__ import annotations
 
+import json
+import re
+import shlex
+import tempfile
 from math import hypot
 from pathlib import Path
 
 import networkx as nx
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
+from mrmg import shipped
+from mrmg.authoring import new_scene
 from mrmg.cli import main
 from mrmg.errors import ExitCode
-from mrmg.scene.loading import load_scene
+from mrmg.scene.loading import heading_hints, load_scene, scene_from_document
+from mrmg.scene.loading.schema import SECTIONS, BatteryEntry, SceneDocument
+from mrmg.scene.loading.yaml_text import dump_yaml, parse_yaml
 
 SQUARE_MAP = """\
 [SCALE]
@@ -42,6 +52,170 @@ def test_check_tells_what_a_scene_holds(capsys: pytest.CaptureFixture[str]) -> N
     assert main(["scene", "check", "quickstart"]) == ExitCode.OK
     scene = load_scene("quickstart")
     assert f"{len(scene.goals)} goals" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_new_scene_is_written_once_and_can_be_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["scene", "new", "my farm"]) == ExitCode.OK
+    path, _, *steps = capsys.readouterr().out.splitlines()
+    assert path == "my farm.yaml"
+    text = (tmp_path / path).read_text()
+    assert load_scene(path).name == "my farm"
+    for step in steps[:-1]:
+        assert main(shlex.split(step)[1:]) == ExitCode.OK
+    assert (
+        capsys.readouterr().out.splitlines()[0].startswith("my farm: valid; 2 robots")
+    )
+    assert main([*shlex.split(steps[-1])[1:], "--no-video"]) == ExitCode.OK
+
+    assert main(["scene", "new", "my farm.yaml"]) == ExitCode.USAGE
+    assert main(["scene", "new", "other", "-o", path]) == ExitCode.USAGE
+    assert "is there already" in capsys.readouterr().err
+    assert (tmp_path / path).read_text() == text
+
+
+@pytest.mark.parametrize("name", ["1e3", "no", "a: b", "x" * 60, "sub/farm", "#1"])
+def test_a_new_scene_may_have_any_name(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["scene", "new", name]) == ExitCode.OK
+    assert load_scene(f"{name}.yaml").name == Path(name).name
+
+
+def test_a_new_scene_shows_every_common_key() -> None:
+    """The keys that are not in use are right, one by one and together."""
+    lines = new_scene("field").splitlines()
+    unused = [n for n, line in enumerate(lines) if re.match(r"#(\w|  )", line)]
+    assert len(unused) >= 6
+    for chosen in [*([n] for n in unused), unused]:
+        text = "\n".join(
+            line[1:] if n in chosen else line for n, line in enumerate(lines)
+        )
+        scene_from_document(parse_yaml(text, source="new"), source="new")
+    shown = set(re.findall(r"\w+", "\n".join(lines)))
+    for entry in (SceneDocument, *SECTIONS.values(), BatteryEntry):
+        assert set(entry.model_fields) - {"holes", "rolling_factor"} <= shown
+
+
+def test_the_list_shows_every_shipped_scene(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scene", "list"]) == ExitCode.OK
+    _, *rows = capsys.readouterr().out.splitlines()
+    assert [row.split()[0] for row in rows] == shipped.scene_names()
+    for row in rows:
+        name, *figures = row.split()[:7]
+        scene = load_scene(name)
+        x_min, y_min, x_max, y_max = scene.bounds
+        size = [f"{x_max - x_min:g}", "x", f"{y_max - y_min:g}"]
+        counts = [len(scene.robots), len(scene.goals), len(scene.stations)]
+        assert figures == [*map(str, counts), *size]
+        assert row.endswith(".")
+        assert len(row) < 150
+
+
+DEGREES = """\
+format: 1
+bounds: [0, 0, 60, 40]
+obstacles:
+  - {id: shed, box: {center: [30, 30], size: [6, 4], yaw: -45}}
+terrain:
+  - {box: {center: [10, 30], size: [6, 4], yaw: 6.2}, multiplier: 2}
+goals:
+  - {id: g1, circle: {center: [50, 20], radius: 1.5}}
+battery: {capacity_m: 20}
+robots:
+  - {id: r1, model: car, pose: [5, 5, -3.1416]}
+  - id: r2
+    model: diffdrive
+    pose:
+      - 5
+      - 15
+      - 90
+    finish:
+      circle: {center: [9, 9], radius: 1}
+      heading: 180
+"""
+
+
+def test_check_warns_of_degrees_and_of_batteries(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "turned.yaml"
+    path.write_text(DEGREES)
+    assert main(["scene", "check", str(path)]) == ExitCode.OK
+    first, *warnings = capsys.readouterr().out.splitlines()
+    assert first.startswith("turned: valid; 2 robots, 1 goal, 0 stations")
+    looks = "rad looks like degrees;"
+    assert warnings[:3] == [
+        f"  warning: robots.1 (r2), line 17: heading 90 {looks} 90 deg is 1.5708 rad",
+        "  warning: robots.1 (r2), line 20: "
+        f"finish heading 180 {looks} 180 deg is 3.1416 rad",
+        "  warning: obstacles.0 (shed), line 4: "
+        f"yaw -45 {looks} -45 deg is -0.7854 rad",
+    ]
+    assert any("g1" in line and "above its reserve" in line for line in warnings[3:])
+
+    assert main(["scene", "check", "--json", str(path)]) == ExitCode.OK
+    found = json.loads(capsys.readouterr().out)
+    assert found["faults"] == []
+    assert len(found["warnings"]) == len(warnings)
+    assert (found["warnings"][0]["id"], found["warnings"][0]["line"]) == ("r2", 17)
+
+    main(["plan", str(path), "--out", str(tmp_path / "run")])
+    err = capsys.readouterr().err
+    assert err.count("looks like degrees") == 1
+    assert "(and 2 more: mrmg scene check " in err
+
+
+def test_check_gives_faults_as_json(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "turned.yaml"
+    path.write_text(DEGREES.replace("radius: 1.5", "radius: -1"))
+    assert main(["scene", "check", "--json", str(path)]) == ExitCode.INVALID_FILE
+    told = capsys.readouterr()
+    found = json.loads(told.out)
+    (fault,) = found["faults"]
+    assert (fault["path"], fault["id"], fault["line"]) == (
+        "goals.0.circle.radius",
+        "g1",
+        8,
+    )
+    assert fault["message"] in told.err
+    assert len(found["warnings"]) == 3
+
+
+@pytest.mark.parametrize("name", shipped.scene_names())
+def test_nothing_is_amiss_with_shipped_scenes(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["scene", "check", name]) == ExitCode.OK
+    assert "warning" not in capsys.readouterr().out
+
+
+@given(
+    st.recursive(
+        st.none() | st.floats() | st.integers() | st.text(max_size=3),
+        lambda inner: (
+            st.lists(inner, max_size=4)
+            | st.dictionaries(
+                st.sampled_from(["pose", "box", "yaw", "finish", "heading"]), inner
+            )
+        ),
+        max_leaves=8,
+    ),
+    st.sampled_from(["robots", "obstacles", "terrain"]),
+)
+@settings(max_examples=50, deadline=None)
+def test_hints_of_any_content_are_faults_only(value: object, section: str) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "any.yaml"
+        path.write_text(dump_yaml({section: value}), encoding="utf-8")
+        for hint in heading_hints(path):
+            assert "looks like degrees" in hint.message
 
 
 def test_draw_leaves_a_picture(tmp_path: Path) -> None:

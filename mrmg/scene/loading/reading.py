@@ -29,7 +29,7 @@ def load_scene(source: str | Path, *, trust_code: bool = False) -> Scene:
     Raises:
         SceneError: naming every fault of the file.
     """
-    path = _path_of(source)
+    path = scene_path(source)
     document = read_yaml(path, source=str(source))
     if isinstance(document, dict):
         document.setdefault("name", path.stem)
@@ -103,7 +103,12 @@ def require_faithful(scene: Scene, document: dict[str, Any]) -> None:
     )
 
 
-def _path_of(source: str | Path) -> Path:
+def scene_path(source: str | Path) -> Path:
+    """Return the file of a scene that is given by its path or shipped name.
+
+    Raises:
+        SceneError: if there is none.
+    """
     names = shipped.scene_names()
     if str(source) in names:
         return shipped.scenes_folder() / f"{source}.yaml"
