@@ -24,11 +24,17 @@ _FACTOR = ".rolling_factor"
 
 
 class PlanStatus(Enum):
-    """How planning ended."""
+    """How planning ended.
+
+    INFEASIBLE is a proof, TIMEOUT a budget that was set and is over, NO_PLAN_FOUND a
+    search that ended without a plan, a proof or a budget. Older versions wrote TIMEOUT
+    for NO_PLAN_FOUND, too.
+    """
 
     SOLVED = "solved"
     INFEASIBLE = "infeasible"
     TIMEOUT = "timeout"
+    NO_PLAN_FOUND = "no_plan_found"
     INVALID_SCENE = "invalid_scene"
     CANCELLED = "cancelled"
 
@@ -39,6 +45,7 @@ class PlanStatus(Enum):
             PlanStatus.SOLVED: ExitCode.OK,
             PlanStatus.INFEASIBLE: ExitCode.INFEASIBLE,
             PlanStatus.TIMEOUT: ExitCode.OUT_OF_BUDGET,
+            PlanStatus.NO_PLAN_FOUND: ExitCode.OUT_OF_BUDGET,
             PlanStatus.INVALID_SCENE: ExitCode.INVALID_FILE,
             PlanStatus.CANCELLED: ExitCode.OUT_OF_BUDGET,
         }[self]

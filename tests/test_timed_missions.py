@@ -127,7 +127,7 @@ def test_a_limit_below_the_bound_is_proven_impossible() -> None:
 def test_a_limit_that_nothing_found_keeps_is_no_proof() -> None:
     bound_s = planned(0, objective="makespan").statistics["bound_s"]
     result = planned(0, time_limit=bound_s + 0.5)
-    assert result.status is PlanStatus.TIMEOUT
+    assert result.status is PlanStatus.NO_PLAN_FOUND
     assert "time limit" in result.reason
 
 

@@ -7,6 +7,7 @@ from importlib.metadata import version
 
 from mrmg.accounting import battery_profile, find_visits, plan_ledger
 from mrmg.mission import Plan, Trajectory, Visit
+from mrmg.planning.feasibility import energy_and_metres
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.tree.motion_tree import Problem
 from mrmg.visiting import crowded_stations
@@ -61,3 +62,24 @@ def make_plan(
         visits=tuple(visits),
         ledger=plan_ledger(scene, trajectories, visits),
     )
+
+
+def why_refused(
+    problem: Problem,
+    trajectories: Sequence[Trajectory],
+    tours: Mapping[str, tuple[str, ...]],
+) -> str:
+    """Return in words why `make_plan` refuses trajectories."""
+    for trajectory in trajectories:
+        robot = problem.scene.robot(trajectory.robot)
+        tour = tours[robot.id]
+        own = find_visits(problem.scene, trajectory, tour)
+        if len(own) < len(tour):
+            return f"{robot.id} misses {tour[len(own)]}"
+        battery = robot.battery
+        least_J = battery.reserve_J + problem.spare * battery.capacity_J
+        missing_J = least_J - battery_profile(problem.scene, trajectory, own).min()
+        if missing_J > 0.0:
+            missing = energy_and_metres(missing_J, robot)
+            return f"{robot.id} ends {missing} short of what its battery must keep"
+    return "two robots are at a station for one at a time"

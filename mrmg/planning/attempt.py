@@ -62,11 +62,25 @@ class Attempt:
         routing_s: time the tours took.
         counts: drafts (fleets driven along tours), router calls, and those of the tree;
             empty if no tours were found for a tree.
+        tours_found: whether the router found any.
+        blocked: what stood in the way of a plan along them; "" if nothing did.
     """
 
     plans: Sequence[tuple[float, Plan]] = ()
     routing_s: float = 0.0
     counts: Mapping[str, int] = field(default_factory=dict)
+    tours_found: bool = False
+    blocked: str = ""
+
+
+def router_problem(problem: Problem, params: PlannerParams) -> Problem:
+    """Return the problem of the least energies that tours are drawn for.
+
+    A plan may be found along tours that it has, though not with every draw of tours.
+    """
+    if params.drafts and draftable(problem):
+        return problem.with_margin(0.0).with_spare(LEAST_SPARE)
+    return problem.with_margin(params.route_margin).with_spare(0.0)
 
 
 def attempt_plan(
@@ -85,8 +99,9 @@ def attempt_plan(
         halt: shape (1,); the attempt ends soon after it has turned true.
     """
     problem = problem.with_limit(LIMITS[number % len(LIMITS)])
-    routing_s = 0.0
+    routing_s, tours_found, blocked = 0.0, False, ""
     counts: Counter[str] = Counter()
+    drafted = Attempt()
     spares = sorted({max(params.spare, LEAST_SPARE), LEAST_SPARE}, reverse=True)
     drafting = params.drafts and draftable(problem)
     # The first attempt draws but once: where that fails, other tours may not.
@@ -96,16 +111,20 @@ def attempt_plan(
         drafted = draft_plans(spared, seed, params, number, halt, drawn=drawn)
         routing_s += drafted.routing_s
         counts.update(drafted.counts)
+        tours_found |= drafted.tours_found
+        blocked = drafted.blocked or blocked
         if drafted.plans or halt[0]:
-            return replace(drafted, routing_s=routing_s, counts=counts)
-    for spare in SPARES[number % len(SPARES)]:
-        spared = problem.with_spare(spare * params.spare)
-        tree = tree_plans(spared, seed, params, number, halt)
-        routing_s += tree.routing_s
-        counts.update(tree.counts)
-        if tree.counts:
             break
-    return replace(tree, routing_s=routing_s, counts=counts)
+    found = drafted
+    for spare in () if found.plans or halt[0] else SPARES[number % len(SPARES)]:
+        spared = problem.with_spare(spare * params.spare)
+        found = tree_plans(spared, seed, params, number, halt)
+        routing_s += found.routing_s
+        counts.update(found.counts)
+        tours_found |= found.tours_found
+        if found.tours_found:
+            break
+    return Attempt(found.plans, routing_s, counts, tours_found, blocked)
 
 
 def tree_plans(
@@ -123,7 +142,7 @@ def tree_plans(
     routing = route(problem.mission.routing, params.router, draw)
     routing_s = time.perf_counter() - began
     if not routing.feasible or halt[0]:
-        return Attempt(routing_s=routing_s)
+        return Attempt(routing_s=routing_s, tours_found=routing.feasible)
     growth = grow_tree(
         problem, params, routing, seeding.stream_seed(seed, "tree", number), halt
     )
@@ -139,7 +158,8 @@ def tree_plans(
         enough = not problem.preference.gains(better, plan, LEAST_GAIN)
         plan = better if better is not plan else None
         left = 0 if enough else left - 1
-    return Attempt(plans, routing_s + growth.routing_s, growth.counts)
+    counts = {**growth.counts, "trees": 1}
+    return Attempt(plans, routing_s + growth.routing_s, counts, tours_found=True)
 
 
 def draft_plans(
@@ -171,6 +191,7 @@ def draft_plans(
     problem = problem.with_margin(0.0)
     preference = problem.preference
     plans: list[tuple[float, Plan]] = []
+    failures = [""]
     driven = 0
     for tours, hurried in product(choice, (False, True)):
         if halt[0] or (plans and not preference.late_s(plans[-1][1])):
@@ -179,10 +200,20 @@ def draft_plans(
             continue
         driven += 1
         pressed = replace(problem, hurried=hurried)
-        for plan in drafts(pressed, params, tours, seed, halt, hasty=number == 0):
+        made = drafts(
+            pressed,
+            params,
+            tours,
+            seed,
+            halt,
+            hasty=number == 0,
+            on_failure=failures.append,
+        )
+        for plan in made:
             if not plans or preference.rank(plan) < preference.rank(plans[-1][1]):
                 plans.append((time.perf_counter(), plan))
-    return Attempt(plans, routing_s, {"drafts": driven, "router_calls": len(draws)})
+    counts = {"drafts": driven, "router_calls": len(draws)}
+    return Attempt(plans, routing_s, counts, bool(choice), failures[-1])
 
 
 def _draws(problem: Problem, number: int, drawn: int) -> range:

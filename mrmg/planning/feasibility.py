@@ -17,6 +17,13 @@ import numpy as np
 import shapely
 from shapely.geometry import Point, Polygon, box
 
+from mrmg.planning.endings import (
+    FINISH_CUT_OFF,
+    FINISHES_CROWDED,
+    GOAL_CUT_OFF,
+    GOAL_OUT_OF_ENERGY,
+    listed,
+)
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
 from mrmg.scene.types import Region, Robot, Scene
 
@@ -53,9 +60,9 @@ def energy_warnings(scene: Scene) -> list[str]:
         if far:
             most = energy_and_metres(max(missing.values()), reach.robot)
             warnings.append(
-                f"{reach.robot.id} cannot reach {_listed(far)} with its battery, even "
-                f"on the shortest way over every station: it lacks up to {most} above "
-                "its reserve; other robots can"
+                f"{reach.robot.id} cannot reach {listed(far)} with its battery, even "
+                f"on the shortest path over every station: it is short of up to "
+                f"{most} above its reserve; other robots can"
             )
     return warnings
 
@@ -77,16 +84,6 @@ def energy_and_metres(energy_J: float, robot: Robot) -> str:
     return f"{energy_J:.0f} J ({metres:.1f} m of plain ground)"
 
 
-def _listed(names: Sequence[str]) -> str:
-    """Return names in words, the first ones of many."""
-    more = len(names) - _LISTED
-    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
-
-
-_LISTED = 8
-"""Names that a sentence lists at most."""
-
-
 def _reaches(scene: Scene) -> list[_Reach]:
     return [_Reach.of(scene, robot) for robot in scene.robots]
 
@@ -94,8 +91,7 @@ def _reaches(scene: Scene) -> list[_Reach]:
 def _cut_off(scene: Scene, reaches: Sequence[_Reach]) -> dict[str, str]:
     """Return the goals that no robot of a fleet gets into, as far as obstacles go."""
     return {
-        goal.id: f"goal {goal.id} is unreachable: for every robot it is cut off from "
-        "the start by obstacles with no gap as wide as the robot"
+        goal.id: GOAL_CUT_OFF.reason(goal=goal.id)
         for goal in scene.goals
         if reaches and not any(reach.is_connected(goal.region) for reach in reaches)
     }
@@ -112,12 +108,8 @@ def _out_of_energy(scene: Scene, reaches: Sequence[_Reach]) -> dict[str, str]:
                 if own_J < missing_J:
                     missing_J, robot = own_J, reach.robot
         if robot is not None and missing_J > 0.0:
-            least = energy_and_metres(missing_J, robot)
-            found[goal.id] = (
-                f"goal {goal.id} is out of energy's reach: even on the shortest way, "
-                "over every station that can be reached, each robot that can get there "
-                f"lacks at least {least} above its reserve"
-            )
+            missing = energy_and_metres(missing_J, robot)
+            found[goal.id] = GOAL_OUT_OF_ENERGY.reason(goal=goal.id, missing=missing)
     return found
 
 
@@ -127,10 +119,7 @@ def _unreachable_finish(scene: Scene) -> str | None:
         if robot.finish and not _Reach.of(scene, robot).is_connected(
             robot.finish.region
         ):
-            return (
-                f"the finish of {robot.id} is unreachable: it is cut off from the "
-                "start by obstacles with no gap as wide as the robot"
-            )
+            return FINISH_CUT_OFF.reason(robot=robot.id)
     return None
 
 
@@ -141,16 +130,16 @@ def _crowded_finish(scene: Scene) -> str | None:
     in their finishes the two stand.
     """
     bound = [
-        (robot, _whole(robot.finish.region)) for robot in scene.robots if robot.finish
+        (robot, outer_polygon(robot.finish.region))
+        for robot in scene.robots
+        if robot.finish
     ]
     for (first, first_region), (second, second_region) in combinations(bound, 2):
         widest_m = _longest_distance_m(first_region, second_region)
         needed_m = first.model.inscribed_radius_m + second.model.inscribed_radius_m
         if widest_m < needed_m:
-            return (
-                f"{first.id} and {second.id} cannot both stand at their finishes: no "
-                f"two points of these are {needed_m:.2f} m apart, as the robots' "
-                "bodies need"
+            return FINISHES_CROWDED.reason(
+                first=first.id, second=second.id, needed_m=needed_m
             )
     return None
 
@@ -212,7 +201,7 @@ class _Reach:
 
     def is_connected(self, region: Region) -> bool:
         """Tell whether the robot may get into a region as far as obstacles go."""
-        near = _whole(region).buffer(self.offset_m + 0.05)
+        near = outer_polygon(region).buffer(self.offset_m + 0.05)
         return bool(self.free.intersects(near))
 
     def missing_energy_J(self, region: Region) -> float:
@@ -247,8 +236,8 @@ class _Reach:
         """Return a lower bound of the energy from a place to a region."""
         cheapest = min([1.0, *(area.multiplier for area in self.scene.terrain)])
         joules = cheapest * self.robot.model.energy_model.plain_ground_J_per_m()
-        start = place if isinstance(place, Point) else _whole(place)
-        end = _whole(region)
+        start = place if isinstance(place, Point) else outer_polygon(place)
+        end = outer_polygon(region)
         _, high_m = height_span_m(self.scene, self.robot, start)
         low_m, _ = height_span_m(self.scene, self.robot, end)
         way_J = joules * shortest_way_m(start, end, self.walls)
@@ -292,7 +281,7 @@ def shortest_way_m(
     return max(straight, float(by_corner.min()))
 
 
-def _whole(region: Region) -> shapely.Geometry:
+def outer_polygon(region: Region) -> shapely.Geometry:
     """Return a polygon that holds the region; a circle's is drawn about it."""
     if len(region.corners):
         return region.shape

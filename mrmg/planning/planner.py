@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import threading
 from collections.abc import Callable
@@ -30,18 +29,18 @@ from mrmg.planning.bound.bound import (
     lower_bound_J,
 )
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
-from mrmg.planning.feasibility import proof_of_infeasibility
+from mrmg.planning.diagnosis import Proofs, unjoined_goals, why_no_plan
 from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.preference import TIME_MARGIN_S, Preference
-from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
+from mrmg.planning.preference import Preference
+from mrmg.planning.roadmap.roadmap import build_roadmap
 from mrmg.planning.routing.routing import Routing
 from mrmg.planning.search import OnImprovement, Progress, Search
 from mrmg.planning.statistics import UNKNOWN, Bounds, Statistics
 from mrmg.planning.tree.haste import priced_world, with_energies
 from mrmg.planning.tree.motion_tree import Problem, grow_tree, state_problem
 from mrmg.scene.loading import scene_from_document
-from mrmg.scene.objective import Objective, overtime_s
+from mrmg.scene.objective import Objective
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
 
@@ -99,9 +98,12 @@ def plan_mission(
         found = attempt_plan(problem, seed, params, number, halt)
         return on_the_map(found, problem, scene, params)
 
-    @cache
+    proofs = Proofs(own, params.dt_s)
+
     def proof() -> str | None:
-        return proof_of_infeasibility(scene) or proof_of_lateness(own, params.dt_s)
+        return proofs.reason(
+            tours_missing=search.attempts > 0 and not search.tours_found
+        )
 
     with ThreadPoolExecutor(1, initializer=_give_way) as beside:
         bounding = None
@@ -134,11 +136,11 @@ def plan_mission(
             statistics=statistics.as_dict(),
         )
     statistics.bounds = UNKNOWN  # they are bounds of plans
+    status, reason = PlanStatus.INFEASIBLE, proof()
+    if reason is None:
+        status, reason = why_no_plan(problem, params, seed, search)
     return PlanResult(
-        status=PlanStatus.INFEASIBLE if proof() else PlanStatus.TIMEOUT,
-        plan=None,
-        reason=proof() or _why_not(problem, statistics, search.earliest_s),
-        statistics=statistics.as_dict(),
+        status=status, plan=None, reason=reason, statistics=statistics.as_dict()
     )
 
 
@@ -261,14 +263,6 @@ def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
     return state_problem(scene, world, roadmap, params)
 
 
-def unjoined_goals(scene: Scene, roadmap: Roadmap) -> list[str]:
-    """Return the goals to which the roadmap knows no way for any robot."""
-    joined = np.isfinite(roadmap.start_distance).any(axis=0)
-    return [
-        goal.id for goal, fine in zip(scene.goals, joined, strict=False) if not fine
-    ]
-
-
 def bounds_of(
     scene: Scene, step_s: float, *, cells: int = CELLS, finer: int = FINER
 ) -> Bounds:
@@ -286,41 +280,3 @@ def bounds_of(
     if scene.objective.makespan_weight:
         makespan_s = makespan_bound_s(scene, step_s=step_s, cells=cells)
     return Bounds(energy_J=energy_J, makespan_s=makespan_s)
-
-
-def proof_of_lateness(scene: Scene, step_s: float) -> str | None:
-    """Return why no plan can keep the time limit, or None if no proof is known."""
-    if math.isinf(scene.time_limit_s):
-        return None
-    least_s = makespan_bound_s(scene, step_s=step_s)
-    if not overtime_s(scene.time_limit_s, least_s):
-        return None
-    return (
-        f"the time limit of {scene.time_limit_s:g} s is too short: even at top speed "
-        f"on the shortest ways no plan is over before {least_s:.1f} s"
-    )
-
-
-def _why_not(problem: Problem, statistics: Statistics, earliest_s: float) -> str:
-    unjoined = unjoined_goals(problem.scene, problem.roadmap)
-    if unjoined:
-        return (
-            f"the roadmap found no way to {', '.join(unjoined)}, and no proof that "
-            "there is none"
-        )
-    if "routing" not in statistics.time_s:
-        return "the time limit was over before the first tours were drawn"
-    limit_s = problem.scene.time_limit_s
-    timely = f" and the time limit of {limit_s:g} s" if math.isfinite(limit_s) else ""
-    if math.isfinite(earliest_s):
-        return (
-            f"plans were found, but none in time: the earliest is over at "
-            f"{earliest_s:.1f} s, the time limit is {limit_s:g} s, and "
-            f"{TIME_MARGIN_S:g} s of it are kept for execution"
-        )
-    if not statistics.counts:
-        return (
-            "the router found no tours that keep every battery above its reserve"
-            f"{timely}"
-        )
-    return "no motion tree reached all goals within its size and the time limit"

@@ -47,6 +47,9 @@ class Search:
         preference: what plans are compared by.
         best: the best plan so far that is in time.
         earliest_s: when the earliest of all plans is over.
+        attempts: their number so far.
+        tours_found: whether the router found tours in any of them.
+        blocked: what stood in the way of the last plan along tours; "" if nothing did.
     """
 
     attempt: Callable[[int, np.ndarray], Attempt]
@@ -59,6 +62,9 @@ class Search:
     preference: Preference = field(default_factory=Preference)
     best: Plan | None = None
     earliest_s: float = math.inf
+    attempts: int = 0
+    tours_found: bool = False
+    blocked: str = ""
     halt: np.ndarray = field(default_factory=lambda: np.zeros(1, np.bool_))
 
     def run(self) -> Plan | None:
@@ -67,19 +73,21 @@ class Search:
         An interrupt during a time limit ends the search as if the limit were reached,
         provided there is a plan to keep.
         """
-        number = found = 0
-        if self._enough(number, found):
+        found = 0
+        if self._enough(found):
             return None
         with ThreadPoolExecutor(self.workers) as pool, self._limited():
             try:
                 for attempt in self._attempts(pool):
-                    number += 1
+                    self.attempts += 1
+                    self.tours_found |= attempt.tours_found
+                    self.blocked = attempt.blocked or self.blocked
                     self.statistics.add(dict(attempt.counts), attempt.routing_s)
                     found += any([self._take(*each) for each in attempt.plans])
-                    self.on_progress(self._fraction(number, found), f"{found} plans")
-                    if self._enough(number, found):
+                    self.on_progress(self._fraction(found), f"{found} plans")
+                    if self._enough(found):
                         break
-                    if number == 1 and not found and self.proof():
+                    if self.attempts == 1 and not found and self.proof():
                         break
             except KeyboardInterrupt:
                 if self.best is None or self.params.budget_s is None:
@@ -139,15 +147,15 @@ class Search:
         self.on_improvement(improvement)
         return True
 
-    def _enough(self, number: int, found: int) -> bool:
-        params = self.params
+    def _enough(self, found: int) -> bool:
+        params, number = self.params, self.attempts
         if params.budget_s is not None:
             hopeless = found == 0 and number >= HOPELESS * params.trees
             return self.statistics.elapsed() > params.budget_s or hopeless
         return found > params.improvements or number >= params.trees
 
-    def _fraction(self, number: int, found: int) -> float:
-        params = self.params
+    def _fraction(self, found: int) -> float:
+        params, number = self.params, self.attempts
         if params.budget_s is not None:
             done = self.statistics.elapsed() / params.budget_s
         else:

@@ -83,7 +83,7 @@ def test_a_proof_is_given_even_without_time() -> None:
 def test_trees_too_small_end_without_a_plan() -> None:
     params = PlannerParams(max_vertices=4, trees=3, drafts=False)
     result = plan_mission(edge_scene("one_goal"), params=params)
-    assert result.status is PlanStatus.TIMEOUT
+    assert result.status is PlanStatus.NO_PLAN_FOUND
     assert "no motion tree" in result.reason
     assert result.statistics["vertices"] == 3 * 4
 

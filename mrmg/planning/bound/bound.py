@@ -232,15 +232,30 @@ class Relaxation:
     price: np.ndarray
 
     @staticmethod
-    def of(scene: Scene, *, step_s: float = 0.1, cells: int = CELLS) -> Relaxation:
+    def of(
+        scene: Scene,
+        *,
+        step_s: float = 0.1,
+        cells: int = CELLS,
+        with_finishes: bool = False,
+    ) -> Relaxation:
         """Relax a mission.
 
         Between recharges a robot may bring kinetic energy along and use its height,
         which is added to its capacity and to its energy at the start.
+
+        Args:
+            scene: the mission.
+            step_s: time step of its plans.
+            cells: cells of the grid on which ways are bounded.
+            with_finishes: whether tours lead on to where robots must end.
         """
         x_min, y_min, x_max, y_max = scene.bounds
         cell_m = math.sqrt((x_max - x_min) * (y_max - y_min) / cells)
         regions = [target.region for target in scene.targets()]
+        targets = len(regions)
+        ends = {r: one.finish for r, one in enumerate(scene.robots) if one.finish}
+        regions += [finish.region for finish in ends.values() if with_finishes]
         starts = _starts(scene)
         keys = [_travel_key(scene, robot) for robot in scene.robots]
         ways = {}
@@ -259,12 +274,16 @@ class Relaxation:
             for battery, (from_start_J, _) in zip(batteries, descents, strict=True)
         ]
         price = [r.model.energy_model.plain_ground_J_per_m() for r in scene.robots]
+        leg = np.stack([ways[key].between for key in keys])
+        first = np.stack([ways[key].from_start[r] for r, key in enumerate(keys)])
+        last = np.zeros((len(keys), targets + 1))
+        for place, r in enumerate(ends if with_finishes else (), start=targets):
+            last[r] = [*leg[r, :targets, place], first[r, place]]
         problem = routing_arrays(
             goals=len(scene.goals),
-            distance=np.stack([ways[key].between for key in keys]),
-            start_distance=np.stack(
-                [ways[key].from_start[r] for r, key in enumerate(keys)]
-            ),
+            distance=leg[:, :targets, :targets],
+            start_distance=first[:, :targets],
+            finish_distance=last,
             plain=np.array(price),
             energy=np.array(energy_J),
             capacity=np.array(capacity_J),

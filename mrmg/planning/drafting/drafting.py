@@ -16,12 +16,12 @@ import numpy as np
 
 from mrmg.mission import Plan
 from mrmg.motion._kernels import CAR, UNICYCLE
-from mrmg.planning.assembly import make_plan
+from mrmg.planning.assembly import make_plan, why_refused
 from mrmg.planning.drafting._band_kernels import Surface
 from mrmg.planning.drafting.band import TRACKING_M, Path, tightened
 from mrmg.planning.drafting.errand import Errand
 from mrmg.planning.drafting.gears import with_best_gears
-from mrmg.planning.drafting.refine import run_errands, surfaces_of
+from mrmg.planning.drafting.refine import OnFailure, run_errands, surfaces_of
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.routing.routing import Routing
 from mrmg.planning.tree.motion_tree import Problem
@@ -71,6 +71,7 @@ def drafts(
     halt: np.ndarray,
     *,
     hasty: bool = False,
+    on_failure: OnFailure = lambda reason: None,
 ) -> Iterator[Plan]:
     """Yield plans along tours, in the order found; none if driving them fails.
 
@@ -85,6 +86,7 @@ def drafts(
         seed: of the search that the plan belongs to.
         halt: shape (1,); drafting ends soon after it has turned true.
         hasty: find the first plan soon rather than a cheap one.
+        on_failure: receives why driving failed, in words, each time it does.
     """
     surfaces = surfaces_of(problem)
     stops = [whole_tour(problem, routing, r) for r in range(len(surfaces))]
@@ -111,9 +113,11 @@ def drafts(
             ]
         errands = [Errand(*one) for one in zip(stops, paths, surfaces, strict=True)]
         found = False
-        for trajectories in run_errands(problem, params, errands, halt):
+        for trajectories in run_errands(problem, params, errands, halt, on_failure):
             plan = make_plan(problem, seed, params, trajectories, tours)
-            if plan is not None:
+            if plan is None:
+                on_failure(why_refused(problem, trajectories, tours))
+            else:
                 found = True
                 yield plan
         if found or halt[0]:

@@ -13,7 +13,7 @@ keeps every battery above its reserve, and is better by the scene's objective.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -56,6 +56,12 @@ SWERVES = 3
 
 NEAR_M = 3.0
 """How near to each other two places are the same."""
+
+OnFailure = Callable[[str], None]
+"""Receives why driving along paths failed, in words."""
+
+BLOCKING_M = 4.0
+"""Distance within which another robot counts as being in the way."""
 
 REPEATED_S = 4.0
 """How long after the place where a robot got stuck it still drives as before."""
@@ -100,8 +106,11 @@ def run_errands(
     params: PlannerParams,
     errands: list[Errand],
     halt: np.ndarray,
+    on_failure: OnFailure = lambda reason: None,
 ) -> Iterator[tuple[Trajectory, ...]]:
     """Draw paths tight and drive along them until nothing goes wrong any more.
+
+    `on_failure` receives why driving failed, in words, if it does.
 
     Yields:
         The trajectories of all robots whenever they visit all targets: the first time,
@@ -128,6 +137,7 @@ def run_errands(
         tries += 1
         if outcome.stuck >= 0:
             if not _put_right(problem, errands[outcome.stuck], outcome.place):
+                on_failure(_no_progress(problem, errands, outcome))
                 return
             continue
         missed = [
@@ -139,10 +149,32 @@ def run_errands(
         if any(missed):
             continue
         if not _ends_well(problem, outcome):
+            on_failure("not every robot ends where its finish asks for")
             return
         yield outcome.trajectories
         if not slowed:
             return
+    on_failure(_no_progress(problem, errands, outcome))
+
+
+def _no_progress(problem: Problem, errands: Sequence[Errand], outcome: Drive) -> str:
+    """Return which robot made no progress in words, and where; "" if none did."""
+    r = outcome.stuck
+    if r < 0:
+        return "robots miss targets of their tours"
+    scene, path = problem.scene, errands[r].path
+    ahead = np.flatnonzero(path.way[path.stop] > outcome.driven[r])
+    target = int(path.target[ahead[0]]) if len(ahead) else -1
+    places = [one.id for one in scene.targets()]
+    where = (
+        f"on its way to {places[target]}" if 0 <= target < len(places) else "at last"
+    )
+    apart_m = np.hypot(*(outcome.state[:, :2] - outcome.place).T)
+    apart_m[r] = np.inf
+    other = int(apart_m.argmin())
+    near = apart_m[other] < BLOCKING_M
+    by = f", with {scene.robots[other].id} in its way" if near else ""
+    return f"{scene.robots[r].id} makes no progress {where}{by}"
 
 
 def surfaces_of(problem: Problem) -> list[Surface]:

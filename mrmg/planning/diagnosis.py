@@ -1,0 +1,194 @@
+"""Why a search ended without a plan: a proof that there is none, or an obstacle.
+
+Roadmap energies prove nothing, as there may be better paths; proofs are of relaxed
+missions (`feasibility`, `bound`).
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+
+from mrmg import seeding
+from mrmg.mission import PlanStatus
+from mrmg.planning import endings
+from mrmg.planning.attempt import router_problem
+from mrmg.planning.bound.makespan_bound import makespan_bound_s
+from mrmg.planning.bound.tour_existence import NoTours, proof_of_no_tours
+from mrmg.planning.endings import counted, listed
+from mrmg.planning.feasibility import energy_and_metres, proof_of_infeasibility
+from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.preference import TIME_MARGIN_S
+from mrmg.planning.roadmap.roadmap import Roadmap
+from mrmg.planning.routing.shortfall import shortfall
+from mrmg.planning.search import Search
+from mrmg.planning.tree.motion_tree import Problem
+from mrmg.planning.tree.targets import finish_of
+from mrmg.scene.objective import overtime_s
+from mrmg.scene.types import Robot, Scene
+
+
+class Proofs:
+    """The proofs that a mission has no solution, each sought once and when needed."""
+
+    def __init__(self, scene: Scene, step_s: float) -> None:
+        self.scene = scene
+        self.step_s = step_s
+
+    def reason(self, *, tours_missing: bool) -> str | None:
+        """Return why no plan exists, or None if no proof is known.
+
+        Args:
+            tours_missing: whether to search all tours, which takes seconds, and is of
+                no use where the router found some.
+        """
+        simple = self._simple
+        return simple or (self._of_no_tours if tours_missing else None)
+
+    @cached_property
+    def _simple(self) -> str | None:
+        scene = self.scene
+        return proof_of_infeasibility(scene) or proof_of_lateness(scene, self.step_s)
+
+    @cached_property
+    def _of_no_tours(self) -> str | None:
+        proof = proof_of_no_tours(self.scene, self.step_s)
+        return None if proof is None else _sentence(self.scene, proof)
+
+
+def proof_of_lateness(scene: Scene, step_s: float) -> str | None:
+    """Return why no plan can keep the time limit, or None if no proof is known."""
+    if math.isinf(scene.time_limit_s):
+        return None
+    least_s = makespan_bound_s(scene, step_s=step_s)
+    if math.isinf(least_s) or not overtime_s(scene.time_limit_s, least_s):
+        return None
+    return endings.TOO_LATE.reason(limit_s=scene.time_limit_s, least_s=least_s)
+
+
+def _sentence(scene: Scene, proof: NoTours) -> str:
+    """Return the reason that a proof gives."""
+    names = [goal.id for goal in scene.goals]
+    if proof.unreachable:
+        return endings.GOAL_CUT_OFF.reason(goal=names[proof.unreachable[0]])
+    if proof.cut_off:
+        return endings.FINISH_CUT_OFF.reason(robot=scene.robots[proof.cut_off[0]].id)
+    if proof.homeless:
+        robot = scene.robots[proof.homeless[0]]
+        more = _more_energy(robot, proof.share)
+        return endings.FINISH_OUT_OF_ENERGY.reason(robot=robot.id, more=more)
+    robot = max(scene.robots, key=_usable_J)
+    return endings.NO_TOURS.reason(
+        served=len(proof.goals) - len(proof.left_out),
+        goals=f"{len(proof.goals)} goals"
+        if len(proof.goals) == len(names)
+        else f"the {len(proof.goals)} most remote goals",
+        left_out=listed([names[g] for g in proof.left_out]),
+        more=_more_energy(robot, proof.share),
+    )
+
+
+def _usable_J(robot: Robot) -> float:
+    return robot.battery.capacity_J - robot.battery.reserve_J
+
+
+def _more_energy(robot: Robot, share: float) -> str:
+    """Return in words how much more usable energy batteries must hold."""
+    if math.isinf(share):
+        return "many times the usable energy"
+    more = energy_and_metres(share * _usable_J(robot), robot)
+    return f"{share:.0%} more usable energy, which is {more} for {robot.id}"
+
+
+def unjoined_goals(scene: Scene, roadmap: Roadmap) -> list[str]:
+    """Return the goals to which the roadmap knows no path for any robot."""
+    joined = np.isfinite(roadmap.start_distance).any(axis=0)
+    return [
+        goal.id for goal, fine in zip(scene.goals, joined, strict=False) if not fine
+    ]
+
+
+def _unjoined_finishes(scene: Scene, roadmap: Roadmap) -> list[str]:
+    """Return the finishes to which the roadmap knows no path for their robots."""
+    return [
+        f"the finish of {robot.id}"
+        for r, (robot, place) in enumerate(
+            zip(scene.robots, finish_of(scene), strict=True)
+        )
+        if place >= 0 and not np.isfinite(roadmap.start_distance[r, place])
+    ]
+
+
+def why_no_plan(
+    problem: Problem, params: PlannerParams, seed: int, search: Search
+) -> tuple[PlanStatus, str]:
+    """Return how a search ended that found neither a plan nor a proof, and why."""
+    budget_s, statistics = params.budget_s, search.statistics
+    if budget_s is None or statistics.elapsed() <= budget_s:
+        return PlanStatus.NO_PLAN_FOUND, _obstacle(problem, params, seed, search)
+    if not search.attempts:
+        return PlanStatus.TIMEOUT, endings.BUDGET_FOR_ROADMAP.reason(
+            budget_s=budget_s, init_s=statistics.time_s["init"]
+        )
+    return PlanStatus.TIMEOUT, endings.BUDGET_OVER.reason(
+        budget_s=budget_s,
+        attempts=counted(search.attempts, "attempt"),
+        so_far=_obstacle(problem, params, seed, search),
+    )
+
+
+def _obstacle(
+    problem: Problem, params: PlannerParams, seed: int, search: Search
+) -> str:
+    """Return what stood in the way of a plan."""
+    scene, roadmap = problem.scene, problem.roadmap
+    unjoined = unjoined_goals(scene, roadmap) + _unjoined_finishes(scene, roadmap)
+    if unjoined:
+        return endings.NO_PATH.reason(
+            places=listed(unjoined), margin_m=params.obstacle_margin_m
+        )
+    if not search.tours_found:
+        return _missing_tours(problem, params, seed)
+    if math.isfinite(search.earliest_s):
+        return endings.LATE.reason(
+            earliest_s=search.earliest_s,
+            limit_s=scene.time_limit_s,
+            margin_s=TIME_MARGIN_S,
+        )
+    trees = search.statistics.counts.get("trees", 0)
+    if search.blocked:
+        grown = f", and none of {counted(trees, 'motion tree')} reached all goals"
+        return endings.NO_PROGRESS.reason(
+            blocked=search.blocked, trees=grown if trees else ""
+        )
+    return endings.TREES_FAILED.reason(
+        trees=counted(trees, "tree"), size=params.max_vertices
+    )
+
+
+def _missing_tours(problem: Problem, params: PlannerParams, seed: int) -> str:
+    """Return which goals tours leave out on the roadmap, and what they are short of."""
+    scene = problem.scene
+    missing = shortfall(
+        router_problem(problem, params).mission.routing,
+        params.router,
+        seeding.stream_seed(seed, "shortfall"),
+    )
+    names = [scene.goals[g].id for g in missing.left_out]
+    left_out = f"leave out {listed(names)}" if names else "cannot be driven"
+    robot = max(scene.robots, key=_usable_J)
+    if missing.time_share:
+        longer_s = missing.time_share * scene.time_limit_s
+        remedy = f"they need a time limit about {longer_s:.0f} s longer"
+    else:
+        more = _more_energy(robot, missing.battery_share)
+        remedy = f"they need batteries with about {more}"
+        if math.isinf(missing.battery_share):
+            remedy = "larger batteries do not help"
+    if math.isinf(scene.time_limit_s):
+        return endings.NO_TOURS_FOUND.reason(left_out=left_out, remedy=remedy)
+    return endings.NO_TOURS_IN_TIME.reason(
+        limit_s=scene.time_limit_s, left_out=left_out, remedy=remedy
+    )

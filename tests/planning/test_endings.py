@@ -1,0 +1,211 @@
+"""Every way in which planning ends: one mission each, through the public doors."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import mrmg
+from mrmg.cli.main import main
+from mrmg.errors import ExitCode, SceneError
+from mrmg.mission import PlanStatus
+from mrmg.planning import PlannerParams, endings
+from mrmg.planning.endings import ENDINGS, Ending, counted, listed
+from mrmg.scene.loading import dump_scene
+from mrmg.scene.types import Scene
+
+MakeScene = Callable[..., Scene]
+
+RING = {
+    "id": "ring",
+    "polygon": [[12, 5], [20, 5], [20, 15], [12, 15]],
+    "holes": [[[13, 6], [19, 6], [19, 14], [13, 14]]],
+    "height": 1,
+}
+EXIT_CODES = {
+    PlanStatus.SOLVED: ExitCode.OK,
+    PlanStatus.INFEASIBLE: ExitCode.INFEASIBLE,
+    PlanStatus.TIMEOUT: ExitCode.OUT_OF_BUDGET,
+    PlanStatus.NO_PLAN_FOUND: ExitCode.OUT_OF_BUDGET,
+}
+
+
+def circle(name: str, x: float, y: float, radius: float = 1.5) -> dict[str, Any]:
+    return {"id": name, "circle": {"center": [x, y], "radius": radius}}
+
+
+def car(name: str, x: float, y: float, yaw: float = 0.0, **more: Any) -> dict[str, Any]:
+    return {"id": name, "model": "car", "pose": [x, y, yaw], **more}
+
+
+def ends_at(x: float, y: float, radius: float = 0.5) -> dict[str, Any]:
+    return {"circle": {"center": [x, y], "radius": radius}}
+
+
+def wall_with_gap(gap_m: float) -> list[dict[str, Any]]:
+    half_m = 0.25 * (20.0 - gap_m)
+    return [
+        {"id": name, "box": {"center": [15, y], "size": [0.4, 2 * half_m]}}
+        for name, y in (("south", half_m), ("north", 20.0 - half_m))
+    ]
+
+
+SWAP = {
+    "bounds": [0, 0, 30, 2.4],
+    "goals": [circle("east", 27, 1.2, 1.0), circle("west", 3, 1.2, 1.0)],
+    "robots": [
+        car("r1", 8, 1.2, finish=ends_at(27, 1.2)),
+        car("r2", 22, 1.2, 3.1416, finish=ends_at(3, 1.2)),
+    ],
+}
+"""Two robots that must get past each other where there is no room for it."""
+
+NARROW = PlannerParams(max_vertices=60, trees=1)
+
+
+@dataclass(frozen=True)
+class Row:
+    """A mission that ends in one way.
+
+    Attributes:
+        ending: how.
+        changes: of the yard.
+        words: that the reason holds.
+        params: that it takes; without any, the command line is tried, too.
+        options: of the command line.
+    """
+
+    ending: Ending
+    changes: dict[str, Any]
+    words: tuple[str, ...] = ()
+    params: PlannerParams | None = None
+    options: tuple[str, ...] = field(default=())
+
+
+ROWS = (
+    Row(endings.SOLVED, {}),
+    Row(
+        endings.GOAL_CUT_OFF,
+        {"obstacles": [RING], "goals": [circle("caged", 16, 10, 1.0)]},
+        ("caged",),
+    ),
+    Row(
+        endings.GOAL_OUT_OF_ENERGY,
+        {"battery": {"capacity_m": 10, "reserve": 0.0}},
+        ("goal g", "10.5 m of plain ground"),
+    ),
+    Row(
+        endings.FINISH_CUT_OFF,
+        {"obstacles": [RING], "robots": [car("r1", 4, 10, finish=ends_at(16, 10))]},
+        ("r1",),
+    ),
+    Row(
+        endings.FINISH_OUT_OF_ENERGY,
+        {
+            "goals": [circle("g", 8, 10)],
+            "battery": {"capacity_m": 10, "reserve": 0.0},
+            "robots": [car("r1", 4, 10, finish=ends_at(26, 10))],
+        },
+        ("r1", "m of plain ground"),
+    ),
+    Row(
+        endings.FINISHES_CROWDED,
+        {
+            "robots": [
+                car("r1", 4, 6, finish=ends_at(20, 10, 0.1)),
+                car("r2", 4, 14, finish=ends_at(20, 10, 0.1)),
+            ]
+        },
+        ("r1 and r2",),
+    ),
+    Row(
+        endings.NO_TOURS,
+        {
+            "goals": [circle("east", 26, 10), circle("west", 3, 10, 1.0)],
+            "robots": [car("r1", 14, 10)],
+            "battery": {"capacity_m": 20, "reserve": 0.0},
+        },
+        ("at most 1 of 2 goals", "% more usable energy", "m of plain ground"),
+    ),
+    Row(endings.TOO_LATE, {"time_limit": 8}, ("8 s",)),
+    Row(endings.NO_PATH, {"obstacles": wall_with_gap(1.2)}, ("to g", "0.25 m")),
+    Row(
+        endings.NO_TOURS_FOUND,
+        {
+            "goals": [circle("g", 25, 10, 4.5)],
+            "battery": {"capacity_m": 16.8, "reserve": 0.0},
+        },
+        ("leave out g", "% more usable energy"),
+    ),
+    Row(endings.NO_TOURS_IN_TIME, {"time_limit": 11.8}, ("11.8 s", "s longer")),
+    Row(endings.LATE, {"time_limit": 13.0}, ("the time limit is 13 s",)),
+    Row(
+        endings.NO_PROGRESS,
+        SWAP,
+        ("makes no progress", "in its way", "1 motion tree"),
+        NARROW,
+    ),
+    Row(
+        endings.TREES_FAILED,
+        {},
+        ("3 trees", "4 vertices"),
+        PlannerParams(max_vertices=4, trees=3, drafts=False),
+    ),
+    Row(endings.BUDGET_FOR_ROADMAP, {}, ("1e-06 s",), options=("--budget", "1e-6")),
+    Row(endings.BUDGET_OVER, SWAP, ("2 s", "no progress"), options=("--budget", "2")),
+)
+
+
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.ending.name)
+def test_planning_ends_with_its_status_reason_and_exit_code(
+    row: Row, yard: MakeScene, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scene = yard(**row.changes)
+    if row.params is not None:
+        result = mrmg.plan(scene, params=row.params)
+        status, reason = result.status, result.reason
+    else:
+        path = tmp_path / "scene.yaml"
+        path.write_text(dump_scene(scene))
+        run = tmp_path / "run"
+        code = main(["plan", str(path), "--out", str(run), *row.options])
+        planning = json.loads((run / "planning.json").read_text())
+        status, reason = PlanStatus(planning["status"]), planning["reason"]
+        assert code == EXIT_CODES[status]
+        first = capsys.readouterr().out.splitlines()[0]
+        assert first == f"yard: {status.value}" + (f"; {reason}" if reason else "")
+    assert status is row.ending.status, reason
+    assert status.exit_code == EXIT_CODES[status]
+    pattern = re.sub(r"\\{[^}]*\\}", ".*", re.escape(row.ending.sentence))
+    assert re.fullmatch(pattern, reason)
+    assert [word for word in row.words if word not in reason] == []
+
+
+def test_every_ending_has_its_row() -> None:
+    assert [row.ending.name for row in ROWS] == [one.name for one in ENDINGS]
+
+
+def test_a_mission_without_robots_is_not_planned(yard: MakeScene) -> None:
+    with pytest.raises(SceneError) as caught:
+        mrmg.plan(yard(robots=[]))
+    assert caught.value.exit_code == ExitCode.INVALID_FILE
+
+
+def test_only_a_proof_is_called_infeasible_and_only_a_budget_a_timeout() -> None:
+    for one in ENDINGS:
+        proven = one.status is PlanStatus.INFEASIBLE
+        assert proven == (one.status.exit_code == ExitCode.INFEASIBLE)
+        assert ("budget" in one.sentence) == (one.status is PlanStatus.TIMEOUT)
+
+
+def test_numbers_and_lists_in_words() -> None:
+    assert counted(1, "tree") == "1 tree"
+    assert counted(2, "tree") == "2 trees"
+    assert listed(["a", "b"]) == "a, b"
+    assert listed([str(n) for n in range(11)]).endswith("7 and 3 more")
