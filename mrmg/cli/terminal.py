@@ -152,9 +152,8 @@ def print_json(value: Any) -> None:
 def print_summary(summary: dict[str, Any], reason: str) -> None:
     """Print the outcome of a run in a few lines."""
     outcome = "done" if summary["mission_ok"] else f"not done ({summary['status']})"
-    print(f"{summary['scene']}, seed {summary['seed']}: mission {outcome}")
-    if reason:
-        print(f"  reason     {reason}")
+    why = f"; {reason}" if reason else ""
+    print(f"{summary['scene']}, seed {summary['seed']}: mission {outcome}{why}")
     for line in _summary_lines(summary):
         print(f"  {line}")
 
