@@ -312,15 +312,11 @@ class RunArguments(_Checked):
 
     def scene(self, scene: Scene) -> Scene:
         """Return `scene` with the objective and the time limit of the arguments."""
-        from mrmg.scene.loading import scene_from_document
-
         wanted = {"objective": self.objective, "time_limit": self.time_limit_s}
-        changes = {key: value for key, value in wanted.items() if value is not None}
-        if not changes:
-            return scene
-        document = {**scene.document, **changes}
-        trust_code = scene.has_custom_motion  # or it would not have been loaded
-        return scene_from_document(document, source=scene.name, trust_code=trust_code)
+        changes: dict[str, Any] = {
+            key: value for key, value in wanted.items() if value is not None
+        }
+        return scene.with_(**changes) if changes else scene
 
     def changed(self, video: Mapping[str, Any], **changes: Any) -> Self:
         """Return the arguments with some of them, and of the video's, changed."""

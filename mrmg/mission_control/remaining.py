@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -67,7 +66,7 @@ def remaining_scene(
     Raises:
         SceneError: if robots touch each other or an obstacle.
     """
-    document = copy.deepcopy(scene.document)
+    document = scene.document
     gone = condition.out_of_service
     document["goals"] = [
         _still_to_stay(goal, condition.stays.get(goal["id"]))
@@ -138,14 +137,14 @@ def _continued(
     # A scene's own factor is in the robot's model already.
     factor = entry.get("rolling_factor", 1.0) * condition.rolling_factor[robot.id]
     reserve = _reserve_left(battery, energy_J / battery.capacity_J, reserve_share)
+    own: dict[str, Any] = {"capacity_J": battery.capacity_J, "reserve": reserve}
+    if battery.takes_time_to_fill:
+        own["charging_power"] = battery.charging_power_W
     return {
         **entry,
         "pose": [float(value) for value in condition.pose[robot.id]],
         "start_energy": {"J": float(energy_J)},
-        "battery": {
-            "capacity_J": battery.capacity_J,
-            "reserve": reserve,
-        },
+        "battery": own,
         "rolling_factor": float(factor),
         **_home(entry, robot),
     }

@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 
 from mrmg.energy import GRAVITY_M_S2, EnergyModel, EnergyPreset
-from mrmg.scene.content import content, contents
+from mrmg.scene.content import ByContent, content, contents
 from mrmg.scene.model_files import ModelFiles
 
 GRIP_SHARE = 0.8
@@ -77,8 +77,8 @@ class ModelOrigin:
     model: RobotModel
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RobotModel:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RobotModel(ByContent):
     """Everything the planner and the physics must agree on about one kind of robot.
 
     Attributes:

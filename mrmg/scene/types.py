@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from shapely.geometry import Polygon
 
-from mrmg.scene.content import content, content_digest, contents
+from mrmg.scene.content import ByContent, content, content_digest, contents
 from mrmg.scene.document import is_as_loaded, scene_document
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.objective import ENERGY, Objective
@@ -49,8 +49,8 @@ class TerrainArea:
     multiplier: float
 
 
-@dataclass(frozen=True, kw_only=True)
-class Region:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Region(ByContent):
     """A convex set of positions: a circle or a convex polygon.
 
     Attributes:
@@ -259,6 +259,43 @@ class Scene:
             SceneError: if a scene file cannot say what was changed in memory.
         """
         return scene_document(self)
+
+    def with_(self, *, trust_code: bool = False, **changes: Any) -> Scene:
+        """Return this scene with some keys of its file changed, checked as a file is.
+
+        `scene.with_(battery={"capacity_m": 300}, time_limit=200)`. Values are as in
+        scene files, or values of another scene's fields; lists may mix both:
+        `scene.with_(goals=[*scene.goals, {"id": "g9", "circle": {...}}])`. None takes
+        a key back to its default. A `battery` holds for the whole fleet: it replaces
+        what it names of the fleet's and of every robot's own, and nothing else.
+
+        Args:
+            trust_code: whether robot models may bring Python code; those that this
+                scene has already may.
+            changes: name, bounds, obstacles, terrain, elevation, goals, stations,
+                battery, objective, time_limit, robots.
+
+        Raises:
+            SceneError: naming every fault, unknown keys among them.
+        """
+        from mrmg.scene.loading.changes import changed_scene
+
+        return changed_scene(self, changes, trust_code=trust_code)
+
+    def with_robot(
+        self, robot_id: str, *, trust_code: bool = False, **changes: Any
+    ) -> Scene:
+        """Return this scene with one robot changed, checked as a file is.
+
+        `scene.with_robot("r1", battery={"capacity_Wh": 12}, pose=[5, 5, 0])`. Values
+        are those of the robot's entry in a scene file; of its battery what is named.
+
+        Raises:
+            SceneError: naming every fault; an unknown robot and unknown keys, too.
+        """
+        from mrmg.scene.loading.changes import changed_robot
+
+        return changed_robot(self, robot_id, changes, trust_code=trust_code)
 
     def content(self) -> dict[str, Any]:
         """Return what counts for the digest."""

@@ -1,0 +1,173 @@
+"""Scenes with some values changed, under the checks that a scene file goes through."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrmg.errors import Fault, SceneError, nearest
+from mrmg.scene.document import (
+    elevation_entry,
+    goal_entry,
+    objective_entry,
+    obstacle_entry,
+    robot_entry,
+    station_entry,
+    terrain_entry,
+)
+from mrmg.scene.elevation import Elevation
+from mrmg.scene.loading.faults import unknown_key
+from mrmg.scene.loading.reading import scene_from_document
+from mrmg.scene.loading.schema import SECTIONS, RobotEntry, SceneDocument
+from mrmg.scene.objective import Objective
+from mrmg.scene.types import Goal, Obstacle, Robot, Scene, Station, TerrainArea
+
+_Entry = dict[str, Any]
+
+_WRITERS: dict[type, Callable[[Any], Any]] = {
+    Elevation: elevation_entry,
+    Goal: goal_entry,
+    Objective: objective_entry,
+    Obstacle: obstacle_entry,
+    Robot: robot_entry,
+    Station: station_entry,
+    TerrainArea: terrain_entry,
+}
+
+
+def changed_scene(
+    scene: Scene, changes: Mapping[str, Any], *, trust_code: bool = False
+) -> Scene:
+    """Return a scene with some of its file's keys changed; see `Scene.with_`.
+
+    Raises:
+        SceneError: naming every fault, unknown keys among them.
+    """
+    source = f"{scene.name} with {', '.join(changes) or 'no change'}"
+    _refuse_unknown(changes, set(SceneDocument.model_fields) - {"format"}, source, "")
+    before = scene.document
+    given = _plain(changes, _entries_by_value(scene, before))
+    document = before | given
+    if given.get("battery") is not None:
+        document["battery"] = _merged_battery(before["battery"], given["battery"])
+        if "robots" not in given:
+            document["robots"] = [
+                _without_own(robot, given["battery"]) for robot in before["robots"]
+            ]
+    return _checked(scene, document, source, trust_code)
+
+
+def changed_robot(
+    scene: Scene,
+    robot_id: str,
+    changes: Mapping[str, Any],
+    *,
+    trust_code: bool = False,
+) -> Scene:
+    """Return a scene with one robot changed; see `Scene.with_robot`.
+
+    Raises:
+        SceneError: naming every fault; an unknown robot and unknown keys, too.
+    """
+    source = f"{scene.name} with {robot_id}'s {', '.join(changes) or 'nothing'}"
+    names = [robot.id for robot in scene.robots]
+    if robot_id not in names:
+        known = f"robots: {', '.join(names) or 'none'}"
+        message = f"no robot '{robot_id}'{nearest(robot_id, names)}; {known}"
+        raise SceneError(source, [Fault("robots", message)])
+    place = names.index(robot_id)
+    _refuse_unknown(changes, RobotEntry.model_fields, source, f"robots.{place}.")
+    document = scene.document
+    entry = document["robots"][place]
+    given = _plain(changes, {})
+    if isinstance(given.get("battery"), dict):
+        own = entry.get("battery", {})
+        given["battery"] = _merged_battery(own, given["battery"])
+    document["robots"][place] = _without_none(entry | given)
+    return _checked(scene, document, source, trust_code)
+
+
+def _checked(scene: Scene, document: _Entry, source: str, trust_code: bool) -> Scene:
+    """Return the scene of a document; it may run the code that `scene` runs."""
+    robots = document.get("robots")
+    known = [robot["model"] for robot in scene.document["robots"]]
+    same = isinstance(robots, list) and all(
+        isinstance(robot, dict) and robot.get("model") in known for robot in robots
+    )
+    return scene_from_document(
+        _without_none(document),
+        source=source,
+        base=scene.written.base if scene.written else None,
+        trust_code=trust_code or (scene.has_custom_motion and same),
+    )
+
+
+def _refuse_unknown(
+    changes: Iterable[str], known: Iterable[str], source: str, prefix: str
+) -> None:
+    names = set(known)
+    faults = [
+        Fault(f"{prefix}{key}", unknown_key(key, names))
+        for key in changes
+        if key not in names
+    ]
+    if faults:
+        raise SceneError(source, faults)
+
+
+def _entries_by_value(scene: Scene, document: _Entry) -> dict[int, _Entry]:
+    """Return how the scene's own values are written, by their identity."""
+    return {
+        id(value): {"id": value.id, **entry}
+        for section in SECTIONS
+        for value, entry in zip(getattr(scene, section), document[section], strict=True)
+    }
+
+
+def _plain(value: Any, written: Mapping[int, _Entry]) -> Any:
+    """Return a value as a scene file has it; `written` are the scene's own."""
+    if id(value) in written:
+        return written[id(value)]
+    if type(value) in _WRITERS:
+        return _WRITERS[type(value)](value)
+    if isinstance(value, Mapping):
+        return {key: _plain(item, written) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item, written) for item in value]
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist(), written)
+    if isinstance(value, Path):
+        return str(value)
+    # Scenes have inf for no limit, files leave it out.
+    return None if isinstance(value, float) and math.isinf(value) else value
+
+
+def _merged_battery(battery: _Entry, given: Any) -> Any:
+    """Return a battery's entry with what is given in place of what it named."""
+    if not isinstance(given, dict):
+        return given  # and the loader says what is wrong
+    kept = {key: item for key, item in battery.items() if not _named(key, given)}
+    return _without_none(kept | given)
+
+
+def _named(key: str, given: _Entry) -> bool:
+    """Tell whether a battery's entry names a key, in whatever unit."""
+    capacities = [name for name in given if name.startswith("capacity_")]
+    return key in given or (key.startswith("capacity_") and bool(capacities))
+
+
+def _without_own(robot: _Entry, given: Any) -> _Entry:
+    """Return a robot's entry without what the fleet's battery is given now."""
+    if not isinstance(given, dict) or "battery" not in robot:
+        return robot
+    own = robot["battery"]
+    kept = {key: item for key, item in own.items() if not _named(key, given)}
+    return {**robot, "battery": kept}
+
+
+def _without_none(entry: _Entry) -> _Entry:
+    return {key: value for key, value in entry.items() if value is not None}
