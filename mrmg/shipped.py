@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
+from typing import Any
+
+from mrmg import storage
 
 _PACKAGE = Path(__file__).resolve().parent
 _MODELINE = "# yaml-language-server: $schema="
@@ -48,6 +52,21 @@ def with_modeline(text: str, schema: Path) -> str:
 def scene_names() -> list[str]:
     """Return the names under which the shipped scenes can be called."""
     return sorted(path.stem for path in scenes_folder().glob("*.yaml"))
+
+
+_MODEL_DIGESTS = ("c2048aae4bf6fcee", "0590ee15471381dd", "f1fa31d9af8b02f1")
+"""`model_digest` of each shipped model; a test holds that its two files agree."""
+
+
+def model_digest(parameters: Mapping[str, Any], mjcf: Path) -> str:
+    """Return a digest of what `robot.yaml` says and of the MJCF file."""
+    text = mjcf.read_text("latin-1")
+    return storage.digest(storage.canonical_json(parameters) + text)
+
+
+def is_unchanged_model(parameters: Mapping[str, Any], mjcf: Path) -> bool:
+    """Return whether both files of a model are those of a shipped one, or copies."""
+    return model_digest(parameters, mjcf) in _MODEL_DIGESTS
 
 
 def model_names() -> list[str]:

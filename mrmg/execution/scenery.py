@@ -20,10 +20,10 @@ from mrmg.execution.ground_shape import (
     draped_mark,
     height_span,
 )
+from mrmg.scene.driven_parts import FLOOR_BIT, OBSTACLE_BIT
 from mrmg.scene.types import Obstacle, Region, Scene
 from mrmg.world.terrain import multiplier_at
 
-_FLOOR_BIT, _OBSTACLE_BIT = 1, 4
 _DRAWN_GROUP, _SOLID_GROUP = 1, 3
 
 FLOOR = "floor"
@@ -57,7 +57,7 @@ def add_floor(spec: mujoco.MjSpec, scene: Scene) -> None:
     options = {
         "name": FLOOR,
         "material": FLOOR,
-        "contype": _FLOOR_BIT,
+        "contype": FLOOR_BIT,
         "conaffinity": 0,
         "castshadow": False,
     }
@@ -127,7 +127,7 @@ def add_obstacle(
             name=name,
             type=mujoco.mjtGeom.mjGEOM_MESH,
             meshname=name,
-            contype=_OBSTACLE_BIT,
+            contype=OBSTACLE_BIT,
             conaffinity=0,
             group=_SOLID_GROUP,
         )
@@ -165,7 +165,7 @@ def add_bounds(spec: mujoco.MjSpec, scene: Scene) -> None:
                 type=mujoco.mjtGeom.mjGEOM_BOX,
                 pos=[*at, foot_m + tall],
                 size=[*size, tall],
-                contype=_OBSTACLE_BIT,
+                contype=OBSTACLE_BIT,
                 conaffinity=0,
                 group=_DRAWN_GROUP,
                 rgba=[*palette.WALL, 1.0],

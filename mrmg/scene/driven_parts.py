@@ -12,6 +12,10 @@ from mrmg.scene.types import Robot
 ROOT, CHASSIS, HULL = "root", "chassis", "hull"
 """Free joint at the reference point, its body, and the geom that touches obstacles."""
 
+FLOOR_BIT, HULL_BIT, OBSTACLE_BIT = 1, 2, 4
+"""Collision bits: what touches the floor, other robots' hulls, obstacles and walls has
+them in its `conaffinity`."""
+
 NUMERICS = ("rolling_coefficient", "turning_coefficient")
 """Custom numerics: what the simulated tyres lose."""
 

@@ -68,6 +68,7 @@ class Assembly:
         self._document = document
         self._base = base
         self._models: dict[str, tuple[RobotModel, dict[str, Any]]] = {}
+        self._loaded: dict[str, tuple[RobotModel, dict[str, Any]] | None] = {}
         self._references: dict[str, Any] = {}
         self._elevation_document: dict[str, Any] = {}
         self.ids = self._unique_ids()
@@ -222,17 +223,24 @@ class Assembly:
         if isinstance(folder, str):
             self._fault(f"{path}.model", folder)
             return None
-        try:
-            self._models[robot_id] = load_model(
-                folder,
-                source=f"{reference}/robot.yaml",
-                changes=changes,
-                trust_code=self._trust_code,
-            )
-        except SceneError as error:
-            for fault in error.faults:
-                self._fault(f"{path}.model", f"{error.source}: {fault}")
+        kind = f"{folder} {changes}"
+        if kind not in self._loaded:
+            # Once for all robots of a kind: its faults are told once, too.
+            try:
+                self._loaded[kind] = load_model(
+                    folder,
+                    source=f"{reference}/robot.yaml",
+                    changes=changes,
+                    trust_code=self._trust_code,
+                )
+            except SceneError as error:
+                self._loaded[kind] = None
+                for fault in error.faults:
+                    self._fault(f"{path}.model", f"{error.source}: {fault}")
+        loaded = self._loaded[kind]
+        if loaded is None:
             return None
+        self._models[robot_id] = loaded
         found = str(folder) if "/" in reference else reference
         self._references[robot_id] = {"like": found, **changes} if changes else found
         return self._models[robot_id][0]

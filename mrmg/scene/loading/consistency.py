@@ -1,0 +1,392 @@
+"""Whether `robot.yaml` and the MJCF of a model describe the same robot.
+
+The planner, the drive control and the energy model go by `robot.yaml`, the simulation
+by the MJCF. What both state must agree; all differences are faults of the model. The
+coefficients of rolling and turning are not compared: those of the MJCF are what the
+tyres lose, those of `robot.yaml` what is believed, and calibration finds the former.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from mrmg.energy import GRAVITY_M_S2
+from mrmg.errors import Fault
+from mrmg.scene.driven_parts import (
+    CHASSIS,
+    HULL,
+    HULL_BIT,
+    NUMERICS,
+    OBSTACLE_BIT,
+    PARTS,
+    ROOT,
+    DrivenParts,
+)
+from mrmg.scene.loading.mjcf import CompiledRobot
+from mrmg.scene.robot_model import RobotModel
+
+MASS_SHARE = 0.01
+"""Allowed difference of mass. Planned energy is proportional to
+mass, and measured within 2 % of it; half of that may come from the model."""
+
+INERTIA_SHARE = 0.05
+"""Allowed difference of the effective mass by the inertia of the wheels: it counts only
+when speeds change, and calibration may set it to what the robot was found to have."""
+
+LENGTH_SHARE = 0.01
+"""Allowed difference of wheelbase, track and wheel radius: of yaw rate and speed."""
+
+PLACE_M = 0.01
+"""How far the driven axle may be from the reference point, and wheels off the
+footprint: half of the default noise of measured positions."""
+
+HULL_BEYOND_M = 0.005
+"""How far the hull may reach beyond the footprint: a third of how far robots as
+modelled stray from their plans, which is what clearances have to take in anyway."""
+
+FOOTPRINT_BEYOND_SHARE, FOOTPRINT_BEYOND_M = 0.1, 0.1
+"""How far the footprint may reach beyond the hull, as a share of its extent that way
+and at least: padding is sensible, gaps given up for nothing are not."""
+
+HEIGHT_SHARE = 0.05
+"""Allowed difference of heights, which decide what is drawn and what a robot that
+broke down is as an obstacle."""
+
+CENTER_SHARE = 0.02
+"""Allowed difference of the centre of mass, as a share of the wheelbase: it is where
+the height of the ground counts."""
+
+GRIP_SHARE_MISSING = 0.05
+"""By how much less the simulated tyres may grip than `robot.yaml` says."""
+
+_AXIS_COSINE = 0.999
+
+
+def mjcf_faults(
+    model: RobotModel, path: Path, *, center_stated: bool = True
+) -> list[Fault]:
+    """Return what keeps a model from being driven, and where its two files differ.
+
+    Args:
+        model: as `robot.yaml` has it; its motion is one of `PARTS`.
+        path: of the MJCF file.
+        center_stated: whether `robot.yaml` states the centre of mass.
+    """
+    try:
+        robot = CompiledRobot(path)
+    except (ValueError, OSError) as error:
+        reason = " ".join(str(error).split())
+        return [Fault("mjcf", f"MuJoCo cannot use {path.name}: {reason}")]
+    parts = PARTS[model.motion_model]
+    missing = [
+        _missing(robot.file, kind, name)
+        for kind, name in _needed(parts)
+        if not robot.has(kind, name)
+    ]
+    if missing:
+        return missing
+    wrong = list(_wrong_parts(robot, parts))
+    if wrong:
+        return wrong
+    return [
+        *_mass(model, robot, center_stated),
+        *_hull(model, robot, parts),
+        *_wheels(model, robot, parts),
+        *_steering(model, robot, parts),
+        *_traction(model, robot, parts),
+    ]
+
+
+def _needed(parts: DrivenParts) -> Iterator[tuple[str, str]]:
+    yield from (("body", CHASSIS), ("joint", ROOT), ("geom", HULL))
+    yield from (("joint", name) for name in (*parts.spin, *parts.steer))
+    yield from (("actuator", name) for name in (*parts.motors, *parts.servos))
+    yield from (("tendon", name) for name in parts.tendons)
+    yield from (("numeric", name) for name in NUMERICS)
+
+
+def _missing(file: str, kind: str, name: str) -> Fault:
+    message = f"{file} has no {kind} '{name}', which a robot of its kind needs"
+    if kind == "numeric":
+        message += (
+            f'; add <custom><numeric name="{name}" data="..."/></custom>: the force '
+            "over the weight that the simulated tyres lose"
+        )
+    return Fault("mjcf", message)
+
+
+def _wrong_parts(robot: CompiledRobot, parts: DrivenParts) -> Iterator[Fault]:
+    """Yield parts that are there, but not what the simulation takes them for."""
+    if not robot.has_free_root():
+        yield Fault("mjcf", f"joint '{ROOT}' must be a free joint of body '{CHASSIS}'")
+    off_m = float(np.hypot(*robot.origin_m[:2]))
+    if off_m > PLACE_M or robot.heading[0] < _AXIS_COSINE:
+        x, y, _ = robot.origin_m
+        message = f"body '{CHASSIS}' stands at ({x:g}, {y:g}) m; it must stand at "
+        yield Fault("mjcf", message + "(0, 0) and look along x")
+    for names, axis in ((parts.spin, (0, 1, 0)), (parts.steer, (0, 0, 1))):
+        for name in names:
+            found = robot.axis(name)
+            if found @ axis < _AXIS_COSINE:
+                is_axis = ", ".join(f"{value:.3g}" for value in found)
+                message = f"joint '{name}' turns about ({is_axis})"
+                message += f"; it must be a hinge about {axis}"
+                yield Fault("mjcf", message)
+    for name in parts.spin:
+        if name not in robot.wheels and robot.axis(name)[1] >= _AXIS_COSINE:
+            message = f"the wheel of joint '{name}' has no geom that touches the floor"
+            yield Fault("mjcf", f"{message}; give its tyre conaffinity=1")
+    for name in parts.motors:
+        if not robot.is_motor(name):
+            message = f"actuator '{name}' must be a motor: its control is a force"
+            yield Fault("mjcf", message)
+    for name in parts.servos:
+        if abs(robot.servo_gain(name) - 1.0) > LENGTH_SHARE:
+            message = f"actuator '{name}' must be a position servo that holds the angle"
+            yield Fault("mjcf", f"{message} of its control (gear 1)")
+    if not robot.touches(HULL, HULL_BIT | OBSTACLE_BIT):
+        message = f"obstacles and other robots cannot touch geom '{HULL}'; give it "
+        yield Fault("mjcf", message + f"contype={HULL_BIT} conaffinity=6")
+    for name in robot.touching():
+        if name != HULL:
+            message = f"obstacles can touch geom '{name}', but only touches of '{HULL}'"
+            message += " are seen; let that one hold it, and give it conaffinity=0"
+            yield Fault("mjcf", message)
+
+
+def _mass(
+    model: RobotModel, robot: CompiledRobot, center_stated: bool
+) -> Iterator[Fault]:
+    if abs(robot.mass_kg - model.mass_kg) > MASS_SHARE * model.mass_kg:
+        yield _difference(
+            "mass", model.mass_kg, robot.mass_kg, "kg", f"{MASS_SHARE:.0%}", robot.file
+        )
+    allowed_m = CENTER_SHARE * model.wheelbase_m
+    lead_m = robot.center_of_mass_m
+    if center_stated and _apart(lead_m, model.center_of_mass_m, allowed_m):
+        yield _difference(
+            "center_of_mass",
+            model.center_of_mass_m,
+            lead_m,
+            "m ahead of the driven axle",
+            f"{allowed_m:.2g} m",
+            robot.file,
+        )
+
+
+def _hull(
+    model: RobotModel, robot: CompiledRobot, parts: DrivenParts
+) -> Iterator[Fault]:
+    start = model.footprint_m
+    edge = np.roll(start, -1, axis=0) - start
+    start, edge = start[edge.any(axis=1)], edge[edge.any(axis=1)]
+    normals = np.stack([edge[:, 1], -edge[:, 0]], axis=1)
+    normals /= np.hypot(edge[:, 0], edge[:, 1])[:, None]
+    wheels = [robot.place_m(name)[:2] for name in (*parts.spin, *parts.steer)]
+    for normal, corner in zip(normals, start, strict=True):
+        side = _side(normal)
+        outline_m = float(normal @ corner)
+        hull_m = robot.reach_m(HULL, normal)
+        wheels_m = max(float(normal @ place) for place in wheels)
+        allowed_m = max(
+            FOOTPRINT_BEYOND_M, FOOTPRINT_BEYOND_SHARE * float(np.ptp(start @ normal))
+        )
+        if hull_m - outline_m > HULL_BEYOND_M:
+            yield Fault(
+                "footprint",
+                f"{side} it ends {outline_m:.4g} m from the reference point, but the "
+                f"hull of {robot.file} reaches {hull_m:.4g} m: clearances would be "
+                f"worth nothing (allowed: {HULL_BEYOND_M:g} m); enlarge the footprint "
+                "or shrink the hull",
+            )
+        elif outline_m - hull_m > allowed_m:
+            yield Fault(
+                "footprint",
+                f"{side} it ends {outline_m:.4g} m from the reference point, but the "
+                f"hull of {robot.file} reaches only {hull_m:.4g} m (allowed: "
+                f"{allowed_m:.2g} m less); shrink the footprint or enlarge the hull",
+            )
+        elif wheels_m - outline_m > PLACE_M:
+            yield Fault(
+                "footprint",
+                f"{side} it ends {outline_m:.4g} m from the reference point, but a "
+                f"wheel of {robot.file} stands at {wheels_m:.4g} m (allowed: "
+                f"{PLACE_M:g} m more); enlarge the footprint",
+            )
+    top_m = robot.reach_m(HULL, (0.0, 0.0, 1.0)) + float(robot.origin_m[2])
+    if _apart(top_m, model.height_m, HEIGHT_SHARE * model.height_m):
+        allowed = f"{HEIGHT_SHARE:.0%}"
+        yield _difference("height", model.height_m, top_m, "m", allowed, robot.file)
+
+
+def _side(normal: np.ndarray) -> str:
+    """Return where a side of the footprint is that looks along `normal`."""
+    x, y = normal
+    if abs(x) < 0.1 or abs(y) < 0.1:
+        if abs(x) > abs(y):
+            return "in front" if x > 0 else "behind"
+        return "on the left" if y > 0 else "on the right"
+    return f"towards ({x:.2f}, {y:.2f})"
+
+
+def _wheels(
+    model: RobotModel, robot: CompiledRobot, parts: DrivenParts
+) -> Iterator[Fault]:
+    axle = np.mean([robot.place_m(name) for name in parts.spin], axis=0)
+    if abs(axle[0]) > PLACE_M or abs(axle[1]) > PLACE_M:
+        message = (
+            f"the driven axle of {robot.file} is at ({axle[0]:.4g}, {axle[1]:.4g}) m; "
+            f"it must be at the chassis' origin (allowed: {PLACE_M:g} m)"
+        )
+        yield Fault("mjcf", message)
+    lengths = [("track", model.track_m, _gap_m(robot, parts.spin))]
+    if parts.steer:
+        front = np.mean([robot.place_m(name) for name in parts.steer], axis=0)
+        lengths += [
+            ("wheelbase", model.wheelbase_m, float(front[0] - axle[0])),
+            ("track", model.track_m, _gap_m(robot, parts.steer)),
+        ]
+    lengths += [
+        ("wheel.radius", model.wheel_radius_m, robot.radius_m(name))
+        for name in robot.wheels
+    ]
+    seen = set()
+    for key, stated_m, found_m in lengths:
+        wrong = _apart(found_m, stated_m, LENGTH_SHARE * stated_m)
+        if wrong and (key, round(found_m, 6)) not in seen:
+            seen.add((key, round(found_m, 6)))
+            allowed = f"{LENGTH_SHARE:.0%}"
+            yield _difference(key, stated_m, found_m, "m", allowed, robot.file)
+    yield from _tendons(model, robot, parts)
+    yield from _spin(model, robot)
+    grip = min(robot.grip(name) for name in parts.spin)
+    if grip < (1.0 - GRIP_SHARE_MISSING) * model.friction_coefficient:
+        yield _difference(
+            "friction_coefficient",
+            model.friction_coefficient,
+            grip,
+            "for driven tyres",
+            f"{GRIP_SHARE_MISSING:.0%} less",
+            robot.file,
+        )
+
+
+def _gap_m(robot: CompiledRobot, pair: tuple[str, ...]) -> float:
+    left, right = (robot.place_m(name)[1] for name in pair)
+    return float(left - right)
+
+
+def _tendons(
+    model: RobotModel, robot: CompiledRobot, parts: DrivenParts
+) -> Iterator[Fault]:
+    """Yield tendons whose lengths are not the ways rolled that they stand for."""
+    radius_m = model.wheel_radius_m
+    ways_m = ((radius_m / 2, radius_m / 2), (-radius_m, radius_m))
+    for tendon, per_rad_m in zip(parts.tendons, ways_m, strict=False):
+        for joint, wanted_m in zip(parts.spin, per_rad_m, strict=True):
+            found_m = robot.tendon_per_rad_m(tendon, joint)
+            if _apart(found_m, wanted_m, LENGTH_SHARE * radius_m):
+                yield Fault(
+                    "wheel.radius",
+                    f"with {radius_m:g} m, tendon '{tendon}' of {robot.file} must "
+                    f"have a coefficient of {wanted_m:.4g} m for joint '{joint}', not "
+                    f"{found_m:.4g} m (at most {LENGTH_SHARE:.0%} apart); correct "
+                    "the one that is wrong",
+                )
+
+
+def _spin(model: RobotModel, robot: CompiledRobot) -> Iterator[Fault]:
+    count = len(robot.wheels)
+    if count != model.wheel_count:
+        stated = float(model.wheel_count)
+        yield _difference("wheel.count", stated, count, "wheels", "0", robot.file)
+        return
+    inertia = [robot.spin_inertia_kg_m2(name) for name in robot.wheels]
+    mean_kg_m2 = float(np.mean(inertia))
+    allowed_kg_m2 = (
+        INERTIA_SHARE * model.effective_mass_kg * model.wheel_radius_m**2 / count
+    )
+    if _apart(mean_kg_m2, model.wheel_inertia_kg_m2, allowed_kg_m2):
+        yield _difference(
+            "wheel.inertia",
+            model.wheel_inertia_kg_m2,
+            mean_kg_m2,
+            "kg m^2 a wheel",
+            f"{allowed_kg_m2:.2g} kg m^2",
+            robot.file,
+        )
+
+
+def _steering(
+    model: RobotModel, robot: CompiledRobot, parts: DrivenParts
+) -> Iterator[Fault]:
+    """Yield what keeps the steered wheels from the angles that `w_max` asks for."""
+    if not parts.steer:
+        return
+    tan_psi = math.tan(model.limits.w_max)
+    inward = 1.0 - model.track_m / model.wheelbase_m / 2 * tan_psi
+    psi = f"{model.limits.w_max:g} rad"
+    if inward <= 0.0:
+        message = f"{psi} would have the car turn about a point between its wheels"
+        yield Fault("limits.w_max", f"{message}; lower it")
+        return
+    wanted = math.atan(tan_psi / inward)
+    narrow: dict[tuple[float, float], list[str]] = {}
+    for name in (*parts.steer, *parts.servos):
+        joint = name in parts.steer
+        low, high = (
+            robot.joint_range_rad(name) if joint else robot.servo_range_rad(name)
+        )
+        if min(-low, high) < wanted * (1.0 - 1e-3):
+            narrow.setdefault((low, high), []).append(name)
+    for (low, high), names in narrow.items():
+        yield Fault(
+            "limits.w_max",
+            f"{psi} asks the inner wheel for {wanted:.4g} rad, but {', '.join(names)} "
+            f"of {robot.file} may only go from {low:.4g} to {high:.4g} rad; lower "
+            "w_max or widen the range",
+        )
+
+
+def _traction(
+    model: RobotModel, robot: CompiledRobot, parts: DrivenParts
+) -> Iterator[Fault]:
+    """Yield motors too weak for the acceleration that plans use."""
+    limits = model.limits.scaled(model.planning_share)
+    energy = model.energy_model
+    most_N = model.usable_grip * model.mass_kg * GRAVITY_M_S2
+    asked_N = min(
+        model.effective_mass_kg * limits.u1_max_m_s2 + energy.rolling_force_N, most_N
+    )
+    share = len(parts.motors)
+    groups = [parts.spin] if share == 1 else [(name,) for name in parts.spin]
+    for motor, joints in zip(parts.motors, groups, strict=True):
+        forward_N = robot.traction_N(motor, joints, most_N / share)
+        backward_N = -robot.traction_N(motor, joints, -most_N / share)
+        least_N = min(forward_N, backward_N)
+        if least_N < asked_N / share * (1.0 - MASS_SHARE):
+            yield Fault(
+                "limits.u1_max",
+                f"{limits.u1_max_m_s2:.3g} m/s^2 (planning_share included) asks for "
+                f"{asked_N / share:.0f} N of traction on plain ground, but actuator "
+                f"'{motor}' of {robot.file} gives {least_N:.0f} N at most; lower the "
+                "limit or strengthen the drive",
+            )
+
+
+def _apart(found: float, stated: float, allowed: float) -> bool:
+    return not abs(found - stated) <= allowed + 1e-9
+
+
+def _difference(
+    key: str, stated: float, found: float, unit: str, allowed: str, file: str
+) -> Fault:
+    return Fault(
+        key,
+        f"robot.yaml says {stated:.6g} {unit}, {file} has {found:.6g} {unit} (allowed "
+        f"difference: {allowed}); correct the one that is wrong",
+    )

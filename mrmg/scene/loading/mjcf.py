@@ -1,0 +1,242 @@
+"""What a robot's MJCF says of it, measured in the compiled model.
+
+The only module below `execution` that needs MuJoCo, which it imports late: that takes a
+fifth of a second at best, and unchanged shipped models need no look.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from mrmg.scene.driven_parts import CHASSIS, FLOOR_BIT, OBSTACLE_BIT, ROOT
+
+_TURNED_RAD = 1.0
+"""By which a wheel is turned to see how long that makes a tendon."""
+
+
+class CompiledRobot:
+    """A robot as its MJCF has it, alone and at rest, in the frame of its chassis.
+
+    Attributes:
+        file: name of the MJCF file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Compile the MJCF file at `path`.
+
+        Raises:
+            ValueError: if MuJoCo cannot use it, with its message.
+        """
+        import mujoco
+
+        self.file = path.name
+        self._mujoco = mujoco
+        self._model = mujoco.MjSpec.from_file(str(path)).compile()
+        self._data = mujoco.MjData(self._model)
+        mujoco.mj_forward(self._model, self._data)
+
+    def has(self, kind: str, name: str) -> bool:
+        """Return whether there is a joint, body, geom, actuator, ... of that name."""
+        return self._id(kind, name) >= 0
+
+    def has_free_root(self) -> bool:
+        """Return whether the joint `root` is free, and that of the chassis."""
+        joint = self._id("joint", ROOT)
+        free = self._model.jnt_type[joint] == self._mujoco.mjtJoint.mjJNT_FREE
+        return bool(free and self._model.jnt_bodyid[joint] == self._chassis)
+
+    @property
+    def mass_kg(self) -> float:
+        """Mass of all bodies."""
+        return float(self._model.body_mass.sum())
+
+    @property
+    def center_of_mass_m(self) -> float:
+        """How far ahead of the chassis' origin the centre of all masses lies."""
+        return float(self._data.subtree_com[0, 0] - self.origin_m[0])
+
+    @property
+    def origin_m(self) -> np.ndarray:
+        """Where the chassis stands, shape (3,)."""
+        return np.asarray(self._data.xpos[self._chassis])
+
+    @property
+    def heading(self) -> np.ndarray:
+        """Forward axis of the chassis, shape (3,)."""
+        return np.asarray(self._data.xmat[self._chassis].reshape(3, 3)[:, 0])
+
+    def axis(self, joint: str) -> np.ndarray:
+        """Return the axis of a hinge, shape (3,); zeros for a joint that is none."""
+        at = self._id("joint", joint)
+        hinge = self._model.jnt_type[at] == self._mujoco.mjtJoint.mjJNT_HINGE
+        return np.asarray(self._data.xaxis[at]) if hinge else np.zeros(3)
+
+    def place_m(self, joint: str) -> np.ndarray:
+        """Return where a joint is, seen from the chassis' origin, shape (3,)."""
+        at = self._id("joint", joint)
+        return np.asarray(self._data.xanchor[at] - self.origin_m)
+
+    def joint_range_rad(self, joint: str) -> tuple[float, float]:
+        """Return how far a joint turns."""
+        at = self._id("joint", joint)
+        return _range(self._model.jnt_limited[at], self._model.jnt_range[at])
+
+    @cached_property
+    def wheels(self) -> tuple[str, ...]:
+        """Names of the joints of all wheels: hinges across, with a tyre on the floor.
+
+        A joint without a name is called by its number.
+        """
+        joints = range(self._model.njnt)
+        named = [self._model.joint(at).name or f"#{at}" for at in joints]
+        hinges = [name for name in named if self._across(name)]
+        return tuple(name for name in hinges if self._tyres(name))
+
+    def radius_m(self, joint: str) -> float:
+        """Return how far the tyres of a wheel reach below its joint."""
+        down = np.array([0.0, 0.0, -1.0])
+        middle = down @ self._data.xanchor[self._id("joint", joint)]
+        lowest = max(self._support_m(geom, down) for geom in self._tyres(joint))
+        return float(lowest - middle)
+
+    def spin_inertia_kg_m2(self, joint: str) -> float:
+        """Return the inertia about a wheel's joint, armature included."""
+        dof = self._model.jnt_dofadr[self._id("joint", joint)]
+        return float(self._model.dof_M0[dof])
+
+    def grip(self, joint: str) -> float:
+        """Return the friction coefficient of a wheel on the simulated floor."""
+        model = self._model
+        best = 0.0
+        for geom in self._tyres(joint):
+            own = float(model.geom_friction[geom, 0])
+            if model.geom_priority[geom] == 0:  # as the floor's: the larger one counts
+                best = max(best, own, 1.0)
+            elif model.geom_condim[geom] > 1:
+                best = max(best, own)
+        return best
+
+    def touching(self) -> list[str]:
+        """Return the names of all geoms that obstacles and walls can touch."""
+        solid = np.flatnonzero(self._model.geom_conaffinity & OBSTACLE_BIT)
+        return [self._model.geom(geom).name or f"#{geom}" for geom in solid]
+
+    def touches(self, geom: str, bits: int) -> bool:
+        """Return whether a geom touches everything that has one of some bits."""
+        affinity = int(self._model.geom_conaffinity[self._id("geom", geom)])
+        return affinity & bits == bits
+
+    def reach_m(self, geom: str, direction: Sequence[float]) -> float:
+        """Return how far a geom reaches from the chassis' origin along a unit vector.
+
+        Infinity for planes and height fields.
+        """
+        vector = np.array([*direction, 0.0, 0.0, 0.0])[:3]
+        return self._support_m(self._id("geom", geom), vector) - float(
+            vector @ self.origin_m
+        )
+
+    def traction_N(self, motor: str, joints: Sequence[str], control: float) -> float:
+        """Return the force of wheels on the ground under the control of one motor."""
+        self._data.ctrl[:] = 0.0
+        self._data.ctrl[self._id("actuator", motor)] = control
+        self._mujoco.mj_forward(self._model, self._data)
+        force_N = 0.0
+        for joint in joints:
+            dof = self._model.jnt_dofadr[self._id("joint", joint)]
+            force_N += float(self._data.qfrc_actuator[dof]) / self.radius_m(joint)
+        return force_N
+
+    def is_motor(self, actuator: str) -> bool:
+        """Return whether its force follows from its control alone, and at once."""
+        at, model, types = self._id("actuator", actuator), self._model, self._mujoco
+        return bool(
+            model.actuator_biastype[at] == types.mjtBias.mjBIAS_NONE
+            and model.actuator_dyntype[at] == types.mjtDyn.mjDYN_NONE
+        )
+
+    def servo_gain(self, servo: str) -> float:
+        """Return the angle a position servo holds for a control of 1; else 0."""
+        at, model, types = self._id("actuator", servo), self._model, self._mujoco
+        stiffness = -float(model.actuator_biasprm[at, 1])
+        affine = model.actuator_biastype[at] == types.mjtBias.mjBIAS_AFFINE
+        at_once = model.actuator_dyntype[at] == types.mjtDyn.mjDYN_NONE
+        gear = float(model.actuator_gear[at, 0])
+        if not (affine and at_once and stiffness > 0.0 and gear):
+            return 0.0
+        return float(model.actuator_gainprm[at, 0]) / stiffness / gear
+
+    def servo_range_rad(self, servo: str) -> tuple[float, float]:
+        """Return the angles a position servo can be given."""
+        at = self._id("actuator", servo)
+        limited = self._model.actuator_ctrllimited[at]
+        low, high = _range(limited, self._model.actuator_ctrlrange[at])
+        return self.servo_gain(servo) * low, self.servo_gain(servo) * high
+
+    def tendon_per_rad_m(self, tendon: str, joint: str) -> float:
+        """Return by how much a tendon grows when a wheel turns by one radian."""
+        tendon_at = self._id("tendon", tendon)
+        place = self._model.jnt_qposadr[self._id("joint", joint)]
+        before = float(self._data.ten_length[tendon_at])
+        self._data.qpos[place] += _TURNED_RAD
+        self._mujoco.mj_fwdPosition(self._model, self._data)
+        grown_m = float(self._data.ten_length[tendon_at]) - before
+        self._data.qpos[place] -= _TURNED_RAD
+        self._mujoco.mj_fwdPosition(self._model, self._data)
+        return grown_m / _TURNED_RAD
+
+    @cached_property
+    def _chassis(self) -> int:
+        return self._id("body", CHASSIS)
+
+    def _id(self, kind: str, name: str) -> int:
+        if name.startswith("#"):
+            return int(name[1:])
+        kinds = self._mujoco.mjtObj
+        code = getattr(kinds, f"mjOBJ_{kind.upper()}")
+        return int(self._mujoco.mj_name2id(self._model, code, name))
+
+    def _across(self, joint: str) -> bool:
+        return bool(abs(self.axis(joint)[1]) > 0.9)
+
+    def _tyres(self, joint: str) -> list[int]:
+        """Return the geoms of a wheel that touch the floor."""
+        model = self._model
+        body = model.body_weldid[model.jnt_bodyid[self._id("joint", joint)]]
+        return [
+            int(geom)
+            for geom in np.flatnonzero(model.geom_conaffinity & FLOOR_BIT)
+            if model.body_weldid[model.geom_bodyid[geom]] == body
+        ]
+
+    def _support_m(self, geom: int, direction: np.ndarray) -> float:
+        """Return the largest coordinate of a geom along a unit vector [m]."""
+        model, kinds = self._model, self._mujoco.mjtGeom
+        kind, size = model.geom_type[geom], model.geom_size[geom]
+        own = self._data.geom_xmat[geom].reshape(3, 3).T @ direction
+        if kind == kinds.mjGEOM_SPHERE:
+            reach = size[0]
+        elif kind == kinds.mjGEOM_CAPSULE:
+            reach = size[0] + size[1] * abs(own[2])
+        elif kind == kinds.mjGEOM_CYLINDER:
+            reach = size[0] * np.hypot(own[0], own[1]) + size[1] * abs(own[2])
+        elif kind == kinds.mjGEOM_ELLIPSOID:
+            reach = np.linalg.norm(size * own)
+        elif kind == kinds.mjGEOM_BOX:
+            reach = size @ np.abs(own)
+        elif kind == kinds.mjGEOM_MESH:
+            mesh = model.geom_dataid[geom]
+            first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+            reach = (model.mesh_vert[first : first + count] @ own).max()
+        else:
+            return float("inf")
+        return float(reach + self._data.geom_xpos[geom] @ direction)
+
+
+def _range(limited: bool, ends: np.ndarray) -> tuple[float, float]:
+    low, high = map(float, ends)
+    return (low, high) if limited else (-float("inf"), float("inf"))
