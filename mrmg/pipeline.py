@@ -31,7 +31,7 @@ class RunResult:
     Attributes:
         folder: where everything lies.
         summary: content of `summary.json`.
-        reason: one sentence where planning ended without a plan.
+        reason: why there is no plan, or why the mission failed; "" if it did not.
         exit_code: what the command line would end with.
     """
 
@@ -106,7 +106,7 @@ def run(
         return RunResult(
             folder=folder.path,
             summary=work.summary(),
-            reason=work.planning()["reason"],
+            reason=work.reason(),
             exit_code=work.exit_code(),
         )
 

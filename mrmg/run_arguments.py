@@ -27,7 +27,12 @@ DISTURBANCE_HELP = (
 )
 
 _OPTION = "option"
-_VERBS = {"plan": ("run", "plan"), "drive": ("run", "execute"), "": ()}
+_VERBS = {
+    "plan": ("run", "plan"),
+    "drive": ("run", "execute"),
+    "audit": ("run", "execute", "audit"),
+    "": (),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,7 +45,7 @@ class Option:
         flag: of the command line.
         help: what it does.
         read: returns the value of a text or of a value, or raises ValueError.
-        decides: "plan" or "drive", what its value decides; "" for neither.
+        decides: "plan", "drive" or "audit", what its value decides; "" for none.
         verbs: of the command line that take it.
         metavar: name of its value in the help; None for a switch or with `choices`.
         choices: allowed values, where they are few.
@@ -291,10 +296,19 @@ class RunArguments(_Checked):
         verbs=("run", "execute", "robustness"),
         read=values.switch,
     )
+    energy_tolerance_pct: float = _option(
+        5.0,
+        "by which a robot's measured energy may differ from planned in an undisturbed "
+        "drive; beyond it the model does not describe the robot; default 5",
+        decides="audit",
+        flag="--energy-tolerance",
+        read=values.positive,
+        metavar="PERCENT",
+    )
     video: VideoArguments = DEFAULT_VIDEO
 
     def deciding(self, what: str) -> dict[str, Any]:
-        """Return the arguments that decide the "plan" or the "drive", by name."""
+        """Return the arguments that decide "plan", "drive" or "audit", by name."""
         return {
             option.name: getattr(self, option.name)
             for option in options_of(RunArguments)

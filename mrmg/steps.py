@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from mrmg.execution.log import ExecutionLog
     from mrmg.mission_control import Drive
     from mrmg.planning import Improvement
+    from mrmg.results.energy_audit import EnergyAudit
 
 StepProgress = Callable[[Step, float, str], None]
 """Told (step, fraction 0..1, text) while a step is under way."""
@@ -96,6 +97,7 @@ class Run:
         deciding: dict[Step, Any] = {
             Step.PLAN: [self.scene.digest, self.arguments.deciding("plan")],
             Step.EXECUTE: self.arguments.deciding("drive"),
+            Step.AUDIT: self.arguments.deciding("audit"),
             Step.RENDER: asdict(self.arguments.video),
         }
         needs = [self.fingerprint(need) for need in NEEDS[step]]
@@ -125,6 +127,20 @@ class Run:
         from mrmg.execution.log import ExecutionLog
 
         return ExecutionLog.load(self.folder.path)
+
+    def account(self, plan: Plan, log: ExecutionLog) -> EnergyAudit:
+        """Return the audit of a drive of `plan`, the plan in force."""
+        from mrmg.results.audit import audit
+
+        decided = self.arguments.deciding("audit")
+        return audit(self.scene, plan, log, **decided)
+
+    def reason(self) -> str:
+        """Return why there is no plan, or why the mission failed; "" if it did not."""
+        if self.status() is not PlanStatus.SOLVED or not self.folder.holds(Step.AUDIT):
+            return str(self.planning()["reason"])
+        account = self.folder.read_json("audit.json", cure="mrmg audit")
+        return "; ".join(account["reasons"])
 
     def summary(self) -> dict[str, Any]:
         """Return the content of `summary.json`."""
@@ -271,11 +287,12 @@ def _execute(run: Run) -> Write:
         raise
 
     def write() -> None:
-        from mrmg.results.audit import audit
+        from mrmg.results.energy_audit import MODEL_MISMATCH
 
         driven.save(run.folder.path)
-        account = audit(run.scene, driven.plan, driven.log)
-        if not account.mission_ok:
+        account = run.account(driven.plan, driven.log)
+        # A drive that only took another energy has nothing to be repeated for.
+        if {*account.causes} - {MODEL_MISMATCH}:
             _keep(run, Failure.of(driven.log, account.causes, account.reasons))
 
     return write
@@ -291,9 +308,7 @@ def _keep(run: Run, failure: Failure) -> Path:
 
 
 def _audit(run: Run) -> Write:
-    from mrmg.results.audit import audit
-
-    account = audit(run.scene, run.plan_in_force(), run.log())
+    account = run.account(run.plan_in_force(), run.log())
     return lambda: account.save(run.folder.path)
 
 

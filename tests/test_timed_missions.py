@@ -12,7 +12,8 @@ import pytest
 from mrmg.execution import simulate
 from mrmg.mission import Plan, PlanResult, PlanStatus
 from mrmg.planning import PlannerParams, plan_mission
-from mrmg.results.audit import audit, over_s
+from mrmg.results.audit import audit
+from mrmg.results.mission_failures import over_s
 from mrmg.results.verify import verify
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.types import Scene

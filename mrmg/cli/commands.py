@@ -102,26 +102,22 @@ def verify(options: argparse.Namespace) -> int:
 
 def execute(options: argparse.Namespace) -> int:
     """Drive the plan of a run folder in MuJoCo."""
-    from mrmg.run_folder import Step
-
     work, note = _driven(options)
     log = work.folder.read_json("log.json", cure="mrmg execute --overwrite")
     lost = [item for item in log["events"] if item["action"] in ("end", "give_up")]
     driven = log["completed"] and not lost
     ended = "driven to the end" if driven else "given up on the way"
     told = [f"{item['time_s']:>7.1f} s  {item['message']}" for item in log["events"]]
-    touches = [
-        f"  {touch['robot']} touched {touch['other']} at {touch['time_s']:.2f} s"
-        for touch in log["contacts"]
+    account = work.account(work.plan_in_force(), work.log())
+    lines = [
+        f"{ended}, {len(log['contacts'])} contacts",
+        *(f"  {reason}" for reason in account.reasons),
+        *told,
+        f"  {note}",
     ]
-    lines = [f"{ended}, {len(touches)} contacts", *told, *touches, f"  {note}"]
-    good = driven and not touches
-    if work.folder.path != options.run and work.folder.holds(Step.AUDIT):
-        account = work.folder.read_json("audit.json", cure="mrmg audit")
-        good = good and account["mission_ok"]
-        lines[1:1] = [f"  {reason}" for reason in account["reasons"]]
     _print(options, log, "\n".join(lines))
-    return ExitCode.OK if good else ExitCode.MISSION_FAILED
+    done = driven and account.mission_ok
+    return ExitCode.OK if done else ExitCode.MISSION_FAILED
 
 
 def _driven(options: argparse.Namespace) -> tuple[Run, str]:
@@ -163,7 +159,7 @@ def audit(options: argparse.Namespace) -> int:
     """Compare planned, metered and measured energy of a run folder."""
     from mrmg.run_folder import Step
 
-    work = _make(options, Step.AUDIT)
+    work = _make(options, Step.AUDIT, **given(options))
     account = work.folder.read_json("audit.json", cure="mrmg audit")
     lines = ["mission done" if account["mission_ok"] else "mission failed:"]
     lines += [f"  {reason}" for reason in account["reasons"]]

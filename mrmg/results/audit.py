@@ -13,6 +13,10 @@ No battery may fall below its reserve, by what was measured: the rule the verifi
 plans to, whether or not the robots are as modelled. Under disturbances a battery is as
 the disturbance has it. Where there is a time limit, all robots must be at rest by then,
 and every visit over.
+
+Where a robot was driven as planned, and yet measured differs from planned by more than
+a tolerance, its model does not describe it, and the mission has failed, too
+(`model_mismatch`).
 """
 
 from __future__ import annotations
@@ -33,20 +37,16 @@ from mrmg.accounting import (
 from mrmg.execution.log import ExecutionLog, require_same_mission
 from mrmg.ledger import EnergyLedger, LedgerEntry
 from mrmg.mission import Plan, Visit
-from mrmg.results.energy_audit import EnergyAudit, RobotAudit, SimulatedVisit
-from mrmg.scene.objective import overtime_s
+from mrmg.results.energy_audit import (
+    MODEL_MISMATCH,
+    EnergyAudit,
+    RobotAudit,
+    SimulatedVisit,
+)
+from mrmg.results.mission_failures import mission_failures
+from mrmg.results.model_mismatch import model_mismatches
 from mrmg.scene.types import Robot, Scene
-from mrmg.visiting import crowded_stations, first_stay
-
-AT_REST = 0.02
-"""Speed below which a simulated robot is at rest [m/s], and rate of turning [rad/s]."""
-
-_TROUBLE = {
-    "lost": "a robot was too far from its plan",
-    "diverged": "the physics got out of hand",
-    "stalled": "the fleet did not get on",
-    "restless": "the fleet did not come to rest",
-}
+from mrmg.visiting import first_stay
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,13 +73,25 @@ class _Measured:
         return min([float(self.content_J.min()), *self.arrival_J])
 
 
-def audit(scene: Scene, plan: Plan, log: ExecutionLog) -> EnergyAudit:
+ENERGY_TOLERANCE_PCT = 5.0
+"""Largest deviation of measured from planned energy of a robot as modelled [%]."""
+
+
+def audit(
+    scene: Scene,
+    plan: Plan,
+    log: ExecutionLog,
+    *,
+    energy_tolerance_pct: float = ENERGY_TOLERANCE_PCT,
+) -> EnergyAudit:
     """Return the account of a mission that was planned and then simulated.
 
     Args:
         scene: what both were made for.
         plan: what was to be driven.
         log: what was driven.
+        energy_tolerance_pct: by which measured may differ from planned energy of a
+            robot, in percent, where nothing was meant to go otherwise than modelled.
 
     Raises:
         RunFolderError: if the log is of another scene, plan or fleet.
@@ -99,31 +111,29 @@ def audit(scene: Scene, plan: Plan, log: ExecutionLog) -> EnergyAudit:
         tuple(entry for item in measured for entry in _measured_entries(item))
     )
     goals_visited = _goals_visited(scene, log)
+    robots = tuple(
+        _robot_audit(
+            scene,
+            log,
+            item,
+            planned_J=planned_ledger.total_J(robot=item.motion.robot),
+            metered_J=metered_ledger.total_J(robot=item.motion.robot),
+        )
+        for item in measured
+    )
+    least_J = {item.motion.robot: item.least_J for item in measured}
     failures = {
-        log.gave_up or "unfinished": _unfinished(log),
-        "ended": _given_up(log, missed=len(goals_visited) < len(scene.goals)),
-        "goal missed": _goals_missed(scene, goals_visited),
-        "contact": _contacts(log),
-        "station shared": _crowded(scene, log),
-        "late": _late(scene, log),
-        "below reserve": _below_reserve(scene, measured),
-        "battery empty": _ran_empty(measured),
+        **mission_failures(scene, log, goals_visited, least_J),
+        MODEL_MISMATCH: model_mismatches(
+            scene, plan, log, robots, energy_tolerance_pct
+        ),
     }
     reasons = tuple(reason for found in failures.values() for reason in found)
     return EnergyAudit(
         mission_ok=not reasons,
         causes=tuple(cause for cause, found in failures.items() if found),
         reasons=reasons,
-        robots=tuple(
-            _robot_audit(
-                scene,
-                log,
-                item,
-                planned_J=planned_ledger.total_J(robot=item.motion.robot),
-                metered_J=metered_ledger.total_J(robot=item.motion.robot),
-            )
-            for item in measured
-        ),
+        robots=robots,
         visits=_simulated_visits(measured),
         goals_visited=goals_visited,
         planned=planned_ledger,
@@ -232,92 +242,3 @@ def _goals_visited(scene: Scene, log: ExecutionLog) -> tuple[str, ...]:
             for state in log.state
         )
     )
-
-
-def _unfinished(log: ExecutionLog) -> list[str]:
-    if log.completed:
-        return []
-    why = f" ({_TROUBLE[log.gave_up]})" if log.gave_up in _TROUBLE else ""
-    return [f"the simulation was ended early, at {log.time_s[-1]:.1f} s{why}"]
-
-
-def _given_up(log: ExecutionLog, *, missed: bool) -> list[str]:
-    said = {"end": "the mission was ended", "give_up": "goals were given up"}
-    return [
-        f"{said[event.action]} at {event.time_s:.1f} s: {event.message}"
-        for event in log.events
-        if event.action in said and missed
-    ]
-
-
-def _goals_missed(scene: Scene, visited: tuple[str, ...]) -> list[str]:
-    return [
-        f"goal {goal.id} was visited by no robot"
-        for goal in scene.goals
-        if goal.id not in visited
-    ]
-
-
-def _crowded(scene: Scene, log: ExecutionLog) -> list[str]:
-    ways = dict(zip(log.robots, log.state[:, :, :2], strict=True))
-    return [
-        f"{' and '.join(found.robots)} were both at {found.station} at "
-        f"{log.time_s[found.first]:.1f} s, which is for one robot at a time"
-        for found in crowded_stations(scene, ways)
-    ]
-
-
-def over_s(scene: Scene, log: ExecutionLog) -> float:
-    """Return when a simulated mission was over: all at rest, no stay too short [s].
-
-    Goals that were not visited do not count.
-    """
-    turning = [robot.model.motion_model != "car" for robot in scene.robots]
-    rates = np.concatenate([log.state[:, :, 3], log.state[turning, :, 4]])
-    moving = np.flatnonzero((np.abs(rates) > AT_REST).any(axis=0))
-    last = min(int(moving.max(initial=-1)) + 1, len(log.time_s) - 1)
-    stays = [
-        [first_stay(goal, log.time_s, state[:, :2], 0) for state in log.state]
-        for goal in scene.goals
-    ]
-    ends = [[stay.over for stay in found if stay] for found in stays]
-    return float(log.time_s[max([last, *(min(found) for found in ends if found)])])
-
-
-def _late(scene: Scene, log: ExecutionLog) -> list[str]:
-    done_s = over_s(scene, log)
-    late_s = overtime_s(scene.time_limit_s, done_s)
-    if not late_s:
-        return []
-    return [
-        f"the mission was over at {done_s:.2f} s, {late_s:.2f} s after its time limit "
-        f"of {scene.time_limit_s:g} s"
-    ]
-
-
-def _contacts(log: ExecutionLog) -> list[str]:
-    return [
-        f"{contact.robot} touched {contact.other} at {contact.time_s:.2f} s "
-        f"near ({contact.x_m:.2f}, {contact.y_m:.2f})"
-        for contact in log.contacts
-    ]
-
-
-def _below_reserve(scene: Scene, measured: list[_Measured]) -> list[str]:
-    reasons = []
-    for item in measured:
-        reserve_J = scene.robot(item.motion.robot).battery.reserve_J
-        if 0.0 <= item.least_J < reserve_J:
-            reasons.append(
-                f"{item.motion.robot}'s battery fell to {item.least_J:.0f} J, "
-                f"below its reserve of {reserve_J:.0f} J"
-            )
-    return reasons
-
-
-def _ran_empty(measured: list[_Measured]) -> list[str]:
-    return [
-        f"{item.motion.robot}'s battery ran empty, {-item.least_J:.0f} J short"
-        for item in measured
-        if item.least_J < 0.0
-    ]

@@ -13,6 +13,9 @@ from mrmg.ledger import EnergyLedger
 
 AUDIT_FORMAT = 1
 
+MODEL_MISMATCH = "model mismatch"
+"""Cause of a mission that failed in nothing but the energy its models predict."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatedVisit:
@@ -66,11 +69,12 @@ class EnergyAudit:
 
     Attributes:
         mission_ok: all goals visited, no contact, no battery below its reserve,
-            and the simulation ran to the end.
+            the simulation ran to the end, and robots took the energy planned.
         reasons: why not, one sentence each.
         causes: the kinds of these reasons: why the simulation was given up
             (`ExecutionLog.gave_up`), "ended" by mission control, "goal missed",
-            "contact", "station shared", "below reserve", "battery empty".
+            "contact", "station shared", "late", "below reserve", "battery empty",
+            `MODEL_MISMATCH`.
         robots: one account per robot, in the scene's order.
         visits: of tours' targets in the simulation, in order of time.
         goals_visited: ids of the goals some robot visited, in the scene's order.

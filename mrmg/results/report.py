@@ -123,7 +123,9 @@ def _verdict_line(record: RunRecord) -> str:
         reasons += record.audit.reasons
         more = f" (and {len(reasons) - 1} more, see Checks)" if len(reasons) > 1 else ""
         first = reasons[0] if reasons else "see Checks"
-        return html.verdict_line(False, "Mission failed: ", first + more)
+        mismatch = summary["status"] == "model_mismatch"
+        word = "Model mismatch: " if mismatch else "Mission failed: "
+        return html.verdict_line(False, word, first + more)
     energy = summary["energy"]
     fleet = _count(len(scene.robots), "robot")
     number = len(scene.goals)

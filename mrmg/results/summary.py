@@ -16,7 +16,7 @@ from mrmg import storage
 from mrmg.errors import Fault, RunFolderError
 from mrmg.execution.log import ExecutionLog, require_same_mission
 from mrmg.mission import Plan, PlanStatus
-from mrmg.results.energy_audit import EnergyAudit
+from mrmg.results.energy_audit import MODEL_MISMATCH, EnergyAudit
 from mrmg.results.verdict import Verdict
 from mrmg.scene.types import Scene
 
@@ -81,8 +81,9 @@ def summary_of(
         log: None if the plan was not executed.
         audit: None if the execution was not audited.
     """
+    mismatch = audit is not None and MODEL_MISMATCH in audit.causes
     return {
-        "status": planning["status"],
+        "status": "model_mismatch" if mismatch else planning["status"],
         "mission_ok": bool(verdict and verdict.ok and audit and audit.mission_ok),
         "scene": scene.name,
         "seed": seed,

@@ -9,7 +9,8 @@ import pytest
 
 from mrmg.mission_control import drive_mission
 from mrmg.planning import plan_mission
-from mrmg.results.audit import audit, over_s
+from mrmg.results.audit import audit
+from mrmg.results.mission_failures import over_s
 from mrmg.scene.types import Scene
 
 

@@ -11,10 +11,13 @@ import numpy as np
 import pytest
 
 from mrmg.errors import RunFolderError
+from mrmg.execution.disturbance import DEFAULT_RANGES
 from mrmg.execution.log import Contact, ExecutionLog
+from mrmg.execution.supervision import Event
 from mrmg.mission import Plan
-from mrmg.results.audit import AT_REST, audit, over_s
-from mrmg.results.energy_audit import EnergyAudit
+from mrmg.results.audit import audit
+from mrmg.results.energy_audit import MODEL_MISMATCH, EnergyAudit
+from mrmg.results.mission_failures import AT_REST, over_s
 from mrmg.scene.types import Scene
 
 STATION = {"id": "s", "circle": {"center": [10, 10], "radius": 1}}
@@ -207,7 +210,8 @@ def test_battery_below_reserve_fails_the_mission(mission: Any) -> None:
     work_J = made[2].work_J.copy()
     work_J[0, 10, 0] += 0.85 * 19000.0
     account = failed(made, work_J=work_J)
-    (reason,) = account.reasons
+    assert account.causes == ("below reserve", MODEL_MISMATCH)
+    reason = account.reasons[0]
     assert "r1's battery fell to" in reason
     assert "reserve of 1000 J" in reason
     assert account.robot("r1").min_charge_fraction < 0.05
@@ -218,8 +222,55 @@ def test_an_empty_battery_fails_the_mission_and_is_told_as_such(mission: Any) ->
     work_J = made[2].work_J.copy()
     work_J[0, 10, 0] += 0.85 * 21000.0
     account = failed(made, work_J=work_J)
-    assert account.causes == ("battery empty",)
+    assert account.causes == ("battery empty", MODEL_MISMATCH)
     assert "r1's battery ran empty" in account.reasons[0]
+
+
+def more_work(mission: Mission, factor: float) -> Mission:
+    """The mission with r1 having worked `factor` times as much."""
+    scene, plan, log = mission
+    work_J = log.work_J.copy()
+    work_J[0] *= factor
+    return scene, plan, replace(log, work_J=work_J)
+
+
+@pytest.mark.parametrize(("factor", "sign"), [(1.051, "+5.1"), (0.9499, "-5.01")])
+def test_energy_off_by_more_than_the_tolerance_fails_the_mission(
+    mission: Any, factor: float, sign: str
+) -> None:
+    scene, plan, log = more_work(mission(), factor)
+    account = audit(scene, plan, log)
+    assert account.causes == (MODEL_MISMATCH,)
+    (reason,) = account.reasons
+    assert "'car' does not describe r1" in reason
+    assert f"{sign} %, tolerance 5" in reason
+    assert "'mrmg calibrate car'" in reason
+    assert audit(scene, plan, log, energy_tolerance_pct=5.2).mission_ok
+
+
+@pytest.mark.parametrize("factor", [1.049, 0.951])
+def test_energy_within_the_tolerance_is_as_planned(mission: Any, factor: float) -> None:
+    scene, plan, log = more_work(mission(), factor)
+    assert audit(scene, plan, log).mission_ok
+    assert not audit(scene, plan, log, energy_tolerance_pct=4.8).mission_ok
+
+
+def test_drives_other_than_modelled_only_report_the_deviation(mission: Any) -> None:
+    scene, plan, log = more_work(mission(), 1.3)
+    disturbance = DEFAULT_RANGES.draw(0, ["r1", "r2"])
+    event = Event(time_s=1.0, cause="fault", robot="r2", action="stop", message="r2")
+    factor = {"r1": np.full(plan.trajectories[0].control.shape[0], 1.01)}
+    believing = replace(plan, rolling_factor=factor)
+    for other, driven in (
+        (plan, replace(log, disturbance=disturbance)),
+        (plan, replace(log, events=(event,))),
+        (believing, replace(log, plan_digest=believing.digest)),
+    ):
+        account = audit(scene, other, driven)
+        assert account.mission_ok, account.reasons
+        assert account.robot("r1").measured_error_pct > 25.0
+    early = audit(scene, plan, replace(log, completed=False))
+    assert MODEL_MISMATCH not in early.causes
 
 
 def test_early_end_fails_the_mission(mission: Any) -> None:

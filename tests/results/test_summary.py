@@ -187,6 +187,18 @@ def test_invalid_plan_makes_no_mission_however_well_it_was_driven(
     assert summary["verdict"]["violations"] == len(verdict.violations) > 0
 
 
+def test_a_model_mismatch_is_a_status_of_its_own(parts: Any) -> None:
+    scene, planning, plan, verdict, log, _ = parts
+    driven = replace(log, work_J=1.5 * log.work_J)
+    account = audit(scene, plan, driven)
+    summary = summary_of(
+        scene, planning, seed=3, plan=plan, verdict=verdict, log=driven, audit=account
+    )
+    check(summary)
+    assert summary["status"] == "model_mismatch"
+    assert not summary["mission_ok"]
+
+
 def test_unknown_keys_are_refused(parts: Any) -> None:
     summary = summary_of(parts[0], parts[1], seed=0)
     with pytest.raises(jsonschema.ValidationError):
