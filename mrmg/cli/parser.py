@@ -10,6 +10,7 @@ from mrmg import argument_values as values
 from mrmg.cli import (
     calibrate_command,
     commands,
+    completion,
     replay_command,
     robustness_commands,
     scene_commands,
@@ -50,6 +51,9 @@ def make_parser() -> Parser:
     _add_view(verbs)
     _add_scene(verbs)
     _add_calibrate(verbs)
+    shells = verbs.add_parser("completion", help="print the completion of a shell")
+    shells.add_argument("shell", choices=completion.SHELLS, metavar="bash|zsh|fish")
+    shells.set_defaults(command=completion.completion)
     doctor = verbs.add_parser("doctor", help="check this machine, with cures")
     _add_json(doctor, "the findings")
     doctor.set_defaults(command=commands.doctor)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from mrmg import shipped
 from mrmg.errors import ExitCode, nearest
@@ -13,8 +13,26 @@ OPTION_SIMILARITY = 0.65
 """Least similarity of a suggested option: two dashes alone make half of some."""
 
 
+class _Verbs(argparse._SubParsersAction):  # type: ignore[type-arg]
+    """The verbs of a parser, each of which shows its help text on its own page, too."""
+
+    def add_parser(self, name: str, **details: Any) -> Any:
+        """Add a verb; see argparse."""
+        summary = details.get("help", "")
+        verb = super().add_parser(name, **{"description": summary, **details})
+        verb.summary = summary
+        return verb
+
+
 class Parser(argparse.ArgumentParser):
     """An argument parser that answers a mistake with one message and a usage line."""
+
+    summary = ""
+    """What its verb does, in a few words."""
+
+    def __init__(self, *args: Any, **details: Any) -> None:
+        super().__init__(*args, **details)
+        self.register("action", "parsers", _Verbs)
 
     def read(self, words: Sequence[str]) -> argparse.Namespace:
         """Return the options that `words` give; a mistake ends the program."""
@@ -31,7 +49,7 @@ class Parser(argparse.ArgumentParser):
     def verbs(self) -> Mapping[str, Parser]:
         """Return the parsers of the verbs by their names."""
         for argument in self.arguments():
-            if isinstance(argument, argparse._SubParsersAction):
+            if isinstance(argument, _Verbs):
                 return argument.choices
         return {}
 
