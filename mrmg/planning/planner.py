@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 from collections.abc import Callable
@@ -28,6 +29,7 @@ from mrmg.planning.bound.bound import (
     exact_routing,
     lower_bound_J,
 )
+from mrmg.planning.bound.joint_bound import Divisions
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.diagnosis import Proofs, unjoined_goals, why_no_plan
 from mrmg.planning.frame import Frame, on_the_map
@@ -274,9 +276,16 @@ def bounds_of(
         cells: of the grid; more take longer and bring the bound nearer to the truth.
         finer: parts into which cells are cut in the end; as `cells`.
     """
-    energy_J = makespan_s = None
-    if scene.objective.energy_weight:
-        energy_J = lower_bound_J(scene, step_s=step_s, cells=cells, finer=finer)
-    if scene.objective.makespan_weight:
+    objective, limit_s = scene.objective, scene.time_limit_s
+    energy_J = makespan_s = blend = None
+    if objective.makespan_weight:
         makespan_s = makespan_bound_s(scene, step_s=step_s, cells=cells)
-    return Bounds(energy_J=energy_J, makespan_s=makespan_s)
+    if objective.energy_weight:
+        energy_J = lower_bound_J(scene, step_s=step_s, cells=cells, finer=finer)
+        timed = objective.makespan_weight > 0.0 or math.isfinite(limit_s)
+        divisions = Divisions.of(scene, step_s=step_s, cells=cells) if timed else None
+        if divisions is not None:
+            energy_J = max(energy_J, divisions.energy_within_J(limit_s))
+            if objective.makespan_weight:
+                blend = divisions.value(objective, limit_s)
+    return Bounds(energy_J=energy_J, makespan_s=makespan_s, blend=blend)

@@ -16,10 +16,12 @@ class Bounds:
     Attributes:
         energy_J: of the fleet; None while it is not known, or not wanted.
         makespan_s: as `energy_J`.
+        blend: value of an objective in which both count; None as `energy_J`.
     """
 
     energy_J: float | None = None
     makespan_s: float | None = None
+    blend: float | None = None
 
     def of(self, objective: Objective) -> float | None:
         """Return what the objective's value cannot undercut; None if unknown."""
@@ -27,7 +29,8 @@ class Bounds:
             return None
         if objective.makespan_weight and self.makespan_s is None:
             return None
-        return objective.value(self.energy_J or 0.0, self.makespan_s or 0.0)
+        value = objective.value(self.energy_J or 0.0, self.makespan_s or 0.0)
+        return value if self.blend is None else max(value, self.blend)
 
 
 UNKNOWN = Bounds()

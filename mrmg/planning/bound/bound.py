@@ -208,7 +208,7 @@ def lower_bound_J(
             bound = max(bound, routing.cost_J)
         else:
             bound = routing.cost_J
-    bound -= sum(_most_descent_J(scene, robot) for robot in scene.robots)
+    bound -= sum(most_descent_J(scene, robot) for robot in scene.robots)
     return max(0.0, bound) * (1.0 - ROUNDING_SHARE)
 
 
@@ -315,7 +315,7 @@ def _ground(scene: Scene, robot: Robot, cell_m: float, step_s: float) -> Ground:
     return Ground.of(scene, robot, cell_m=cell_m, step_m=step_m)
 
 
-def _most_descent_J(scene: Scene, robot: Robot) -> float:
+def most_descent_J(scene: Scene, robot: Robot) -> float:
     """Return the battery energy that a start above the mission's end is worth.
 
     Without regeneration the battery never gains, so the mission counts as ended at a

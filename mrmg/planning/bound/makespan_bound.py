@@ -44,21 +44,33 @@ def makespan_bound_s(scene: Scene, *, step_s: float = 0.1, cells: int = CELLS) -
     """
     if not scene.goals:
         return 0.0
-    flat = replace(scene, terrain=(), elevation=None)
-    ways = Relaxation.of(flat, step_s=step_s, cells=cells).problem
-    metres = _free_of_energy(ways, ways.cost / _plain_of(flat)[:, None, None])
     if len(scene.goals) > MOST_GOALS:
-        bound_s = _relaxed_s(scene, metres)
+        bound_s = _relaxed_s(scene, _metres(scene, step_s, cells))
     else:
         fleet = np.full(1 << len(scene.goals), inf)
         fleet[0] = 0.0
-        for r, robot in enumerate(scene.robots):
-            way_m = RobotWays(metres, r, np.arange(len(scene.goals))).cost
-            fleet = _bound_kernels.join_longest(
-                fleet, _times_s(robot, way_m, _stays_s(scene))
-            )
+        for own_s in least_times_s(scene, step_s=step_s, cells=cells):
+            fleet = _bound_kernels.join_longest(fleet, own_s)
         bound_s = float(fleet[-1])
     return max(0.0, bound_s) * (1.0 - ROUNDING_SHARE)
+
+
+def least_times_s(scene: Scene, *, step_s: float, cells: int) -> np.ndarray:
+    """Return the least time of each robot for each subset of the goals, (R, 2^G)."""
+    metres, goals = _metres(scene, step_s, cells), np.arange(len(scene.goals))
+    return np.array(
+        [
+            _times_s(robot, RobotWays(metres, r, goals).cost, _stays_s(scene))
+            for r, robot in enumerate(scene.robots)
+        ]
+    )
+
+
+def _metres(scene: Scene, step_s: float, cells: int) -> RoutingArrays:
+    """Return the problem whose costs are lengths, and whose batteries never run out."""
+    flat = replace(scene, terrain=(), elevation=None)
+    ways = Relaxation.of(flat, step_s=step_s, cells=cells).problem
+    return _free_of_energy(ways, ways.cost / _plain_of(flat)[:, None, None])
 
 
 def _plain_of(scene: Scene) -> np.ndarray:

@@ -1,0 +1,89 @@
+"""Proven lower bounds where energy and time both count: time limits and blends.
+
+With e_r(S) the least energy and t_r(S) the least time of robot r for the goals S, each
+on its own, a plan that divides the goals as (S_1 .. S_R) needs at least
+
+    E = sum_r e_r(S_r)  and  T = max_r t_r(S_r).
+
+The least E of all divisions with T <= limit bounds the energy of plans that keep the
+limit. A blend is bounded level by level: divisions with T in (T_i, T_i+1] are worth at
+least w_E E(T_i+1) + w_T T_i, with E(T) the least energy of divisions up to T.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrmg.planning.bound import _bound_kernels
+from mrmg.planning.bound.bound import (
+    CELLS,
+    MOST_GOALS,
+    ROUNDING_SHARE,
+    Relaxation,
+    RobotWays,
+    most_descent_J,
+)
+from mrmg.planning.bound.makespan_bound import least_times_s
+from mrmg.scene.objective import Objective
+from mrmg.scene.types import Scene
+
+LEVELS = 40
+"""Levels of time into which divisions of the goals are sorted."""
+
+
+@dataclass(frozen=True)
+class Divisions:
+    """What each robot needs at least for each subset of the goals.
+
+    Attributes:
+        energy_J: shape (R, 2^G), inf where batteries do not allow it.
+        time_s: shape (R, 2^G).
+        descent_J: what the fleet can gain by ending on low ground.
+    """
+
+    energy_J: np.ndarray
+    time_s: np.ndarray
+    descent_J: float
+
+    @staticmethod
+    def of(
+        scene: Scene, *, step_s: float = 0.1, cells: int = CELLS
+    ) -> Divisions | None:
+        """Return the divisions of a mission; None if it is too large for that."""
+        if not 0 < len(scene.goals) <= MOST_GOALS:
+            return None
+        problem = Relaxation.of(scene, step_s=step_s, cells=cells).problem
+        goals = np.arange(len(scene.goals))
+        ways = [RobotWays(problem, r, goals) for r in range(len(scene.robots))]
+        if not all(way.complete for way in ways):
+            return None
+        return Divisions(
+            energy_J=np.array([way.cost for way in ways]),
+            time_s=least_times_s(scene, step_s=step_s, cells=cells),
+            descent_J=sum(most_descent_J(scene, robot) for robot in scene.robots),
+        )
+
+    def energy_within_J(self, limit_s: float) -> float:
+        """Return an energy that no plan undercuts which is over by `limit_s`."""
+        fleet = np.full(self.energy_J.shape[1], np.inf)
+        fleet[0] = 0.0
+        for energy_J, time_s in zip(self.energy_J, self.time_s, strict=True):
+            timely_J = np.where(time_s <= limit_s, energy_J, np.inf)
+            fleet, _ = _bound_kernels.join_robot(fleet, timely_J)
+        least_J = float(fleet[-1]) - self.descent_J
+        return max(0.0, least_J) * (1.0 - ROUNDING_SHARE)
+
+    def value(self, objective: Objective, limit_s: float = math.inf) -> float:
+        """Return a value of an objective that no plan undercuts within a limit."""
+        times_s = np.unique(self.time_s[np.isfinite(self.time_s)])
+        step = max(1, len(times_s) // LEVELS)
+        levels_s = [0.0, *times_s[step - 1 :: step].tolist(), math.inf]
+        least = math.inf
+        for low_s, high_s in zip(levels_s, levels_s[1:], strict=False):
+            if low_s <= limit_s:
+                energy_J = self.energy_within_J(min(high_s, limit_s))
+                least = min(least, objective.value(energy_J, low_s))
+        return least * (1.0 - ROUNDING_SHARE)
