@@ -268,9 +268,11 @@ class PlanResult:
         plan: the plan, or None.
         reason: one sentence for a status other than SOLVED; names the proof.
         statistics: counts and times (`vertices`, `groups`, `router_calls`, `time_s`).
+        hints: sentences on the plan, such as which robots it leaves unused.
     """
 
     status: PlanStatus
     plan: Plan | None
     reason: str
     statistics: Mapping[str, Any]
+    hints: tuple[str, ...] = ()

@@ -207,6 +207,7 @@ def _plan(run: Run) -> Write:
     outcome = {
         "status": result.status.value,
         "reason": result.reason,
+        "hints": list(result.hints),
         "statistics": dict(result.statistics),
     }
 

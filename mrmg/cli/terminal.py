@@ -167,6 +167,8 @@ def _summary_lines(summary: dict[str, Any]) -> Iterator[str]:
             f"planned in {plan['time_s']['total']:.2f} s"
         )
         yield f"quality    {quality(plan)}"
+    for hint in summary.get("hints", ()):
+        yield f"hint       {hint}"
     if verdict:
         yield (
             f"verdict    {verdict['violations']} violations; clearance to obstacles "

@@ -33,6 +33,7 @@ from mrmg.planning.bound.joint_bound import Divisions
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.diagnosis import Proofs, unjoined_goals, why_no_plan
 from mrmg.planning.frame import Frame, on_the_map
+from mrmg.planning.hints import hints_on
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
 from mrmg.planning.roadmap.roadmap import build_roadmap
@@ -131,11 +132,13 @@ def plan_mission(
         if best is not None and bounding is not None:
             bounding.result()
     if best is not None:
+        gap = statistics.gap
         return PlanResult(
             status=PlanStatus.SOLVED,
             plan=best,
             reason="",
             statistics=statistics.as_dict(),
+            hints=tuple(hints_on(scene, best, gap)),
         )
     statistics.bounds = UNKNOWN  # they are bounds of plans
     status, reason = PlanStatus.INFEASIBLE, proof()

@@ -111,13 +111,23 @@ class Statistics:
             self.counts[name] = self.counts.get(name, 0) + value
         self.time_s["routing"] = self.time_s.get("routing", 0.0) + routing_s
 
+    @property
+    def gap(self) -> float | None:
+        """The gap of the best plan so far; None without one, or without a bound."""
+        judged = self._judged()
+        return judged[-1].gap if judged else None
+
+    def _judged(self) -> list[Improvement]:
+        """Return the improvements, each against what is known by now."""
+        return [replace(found, bounds=self.bounds) for found in self.improvements]
+
     def as_dict(self) -> dict[str, object]:
         """Return counts, times and improvements; the total time is the time so far."""
         first = self.time_s.get("first_solution", 0.0)
         times = {"init": 0.0, "routing": 0.0, **self.time_s, "first_solution": first}
-        names = ("drafts", "vertices", "groups", "router_calls", "expansions")
+        names = ("drafts", "trees", "vertices", "groups", "router_calls", "expansions")
         counts = dict.fromkeys(names, 0)
-        judged = [replace(found, bounds=self.bounds) for found in self.improvements]
+        judged = self._judged()
         return {
             **counts,
             **self.counts,
@@ -125,6 +135,6 @@ class Statistics:
             "bound_J": self.bounds.energy_J,
             "bound_s": self.bounds.makespan_s,
             "bound": self.bounds.of(judged[-1].objective) if judged else None,
-            "gap": judged[-1].gap if judged else None,
+            "gap": self.gap,
             "time_s": {**times, "total": self.elapsed()},
         }

@@ -52,6 +52,7 @@ def planner(record: RunRecord) -> list[str]:
     chart = cost_chart(record)
     return [
         _quality(record.summary["plan"]),
+        html.bullets(record.planning.get("hints", [])),
         html.charts([(COST, chart["title"])] if chart else []),
         html.beside(
             html.table(["Statistic", "Value"], rows),

@@ -90,6 +90,7 @@ def summary_of(
         "robots": len(scene.robots),
         "goals": len(scene.goals),
         "stations": len(scene.stations),
+        "hints": list(planning.get("hints", ())),
         "plan": _plan_figures(scene, plan, planning["statistics"]) if plan else None,
         "verdict": _verdict_figures(verdict) if verdict else None,
         "execution": _execution_figures(log, audit) if log and audit else None,

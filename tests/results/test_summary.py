@@ -61,7 +61,7 @@ SECTIONS = {
         "recharges",
     },
 }
-TOP = {"status", "mission_ok", "scene", "seed", "robots", "goals", "stations"}
+TOP = {"hints", "status", "mission_ok", "scene", "seed", "robots", "goals", "stations"}
 STATISTICS = {
     "drafts": 2,
     "vertices": 100,

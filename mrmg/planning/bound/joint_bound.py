@@ -6,8 +6,8 @@ on its own, a plan that divides the goals as (S_1 .. S_R) needs at least
     E = sum_r e_r(S_r)  and  T = max_r t_r(S_r).
 
 The least E of all divisions with T <= limit bounds the energy of plans that keep the
-limit. A blend is bounded level by level: divisions with T in (T_i, T_i+1] are worth at
-least w_E E(T_i+1) + w_T T_i, with E(T) the least energy of divisions up to T.
+limit. A blend is bounded level by level: divisions with T in [a, b] are worth at least
+w_E E(b) + w_T a, with E(b) the least energy of divisions with T <= b.
 """
 
 from __future__ import annotations
@@ -78,12 +78,9 @@ class Divisions:
 
     def value(self, objective: Objective, limit_s: float = math.inf) -> float:
         """Return a value of an objective that no plan undercuts within a limit."""
-        times_s = np.unique(self.time_s[np.isfinite(self.time_s)])
-        step = max(1, len(times_s) // LEVELS)
-        levels_s = [0.0, *times_s[step - 1 :: step].tolist(), math.inf]
+        times_s = np.unique(self.time_s[self.time_s <= limit_s])
         least = math.inf
-        for low_s, high_s in zip(levels_s, levels_s[1:], strict=False):
-            if low_s <= limit_s:
-                energy_J = self.energy_within_J(min(high_s, limit_s))
-                least = min(least, objective.value(energy_J, low_s))
+        for level_s in np.array_split(times_s, min(LEVELS, len(times_s))):
+            energy_J = self.energy_within_J(float(level_s[-1]))
+            least = min(least, objective.value(energy_J, float(level_s[0])))
         return least * (1.0 - ROUNDING_SHARE)

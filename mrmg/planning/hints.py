@@ -1,0 +1,52 @@
+"""Hints on a plan that one line can give."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from mrmg.mission import Plan
+from mrmg.planning.bound.bound import MOST_GOALS
+from mrmg.planning.endings import listed
+from mrmg.scene.types import Scene
+
+LARGE_GAP = 0.15
+"""Gap from which on it is said why it is not all room for better plans."""
+
+
+def hints_on(scene: Scene, plan: Plan, gap: float | None) -> Iterator[str]:
+    """Yield hints on a plan.
+
+    Args:
+        scene: the mission.
+        plan: the answer.
+        gap: of the plan's objective to its bound; None if it is not known.
+    """
+    objective = scene.objective
+    goals = {goal.id for goal in scene.goals}
+    unused = [name for name, tour in plan.tours.items() if not goals & set(tour)]
+    if goals and unused and objective.energy_weight:
+        wish = "'--objective makespan' shares the work among more robots"
+        if objective.makespan_weight:
+            wish = "a larger weight of the makespan shares the work among more robots"
+        visit = "visits" if len(unused) == 1 else "visit"
+        yield f"{listed(unused)} {visit} no goal, as that takes less energy; {wish}"
+    if gap is None or gap <= LARGE_GAP:
+        return
+    if len(goals) > MOST_GOALS:
+        yield (
+            f"the proven bound is loose for more than {MOST_GOALS} goals: much of the "
+            f"gap of {gap:.0%} need not be room for better plans"
+        )
+    elif objective.makespan_weight or math.isfinite(scene.time_limit_s):
+        share = min(robot.model.planning_share for robot in scene.robots)
+        cause = (
+            f"the time limit of {scene.time_limit_s:g} s"
+            if math.isfinite(scene.time_limit_s)
+            else f"the objective {objective.name}"
+        )
+        yield (
+            f"{cause} makes the gap of {gap:.0%} look large: the proven bound has "
+            "robots drive at top speed and turn in no time, while plans use "
+            f"{share:.0%} of it"
+        )
