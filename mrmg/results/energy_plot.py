@@ -21,9 +21,17 @@ from mrmg.execution.log import ExecutionLog, require_same_mission
 from mrmg.mission import Plan, Visit
 from mrmg.results import scene_drawing, style
 from mrmg.results.audit import measured_step_energy
+from mrmg.results.timeline_rows import HIDDEN, named_visits
 from mrmg.scene.types import Robot, Scene
 
 _PANEL_INCHES = (9.5, 2.5)
+_NAME_POINTS, _NAMES_EM = 8.5, 7.8 * 72.0 / 8.5
+"""Size of the visits' names, and width of the time axis, at least, in such letters."""
+_LINE_SHARE = 0.082
+"""Height of a line of names, in heights of the panel."""
+_FULL_SHARE = 1.04
+"""Upper end of the curves' room, in full batteries."""
+_SHORTEST_S = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,17 +148,26 @@ def draw_battery(
     color = style.scene_robot_colors(scene)[robot.id]
     capacity_kJ = robot.battery.capacity_J / 1000.0
     reserve_kJ = robot.battery.reserve_J / 1000.0
-    _plot(axes, planned, color=color, linewidth=5.0, alpha=0.3, label="planned")
-    if simulated is not None:
-        _plot(axes, simulated, color=color, linewidth=1.3, label="simulated")
+    curves = {
+        "planned": (planned, style.PLANNED),
+        "simulated": (simulated, style.DRIVEN),
+    }
+    for label, (curve, look) in curves.items():
+        if curve is not None:
+            width = look.width_em * scene_drawing.LETTER_POINTS
+            alpha = look.opacity
+            _plot(axes, curve, color=color, linewidth=width, alpha=alpha, label=label)
     axes.axhline(
         reserve_kJ, color=style.RESERVE, linewidth=1.2, linestyle="--", label="reserve"
     )
     axes.axhspan(0.0, reserve_kJ, color=style.RESERVE, alpha=0.08, linewidth=0)
-    _mark_visits(axes, scene, (simulated or planned).visits)
-    # The room above a full battery is for the names of the visits.
-    axes.set_ylim(0.0, 1.22 * capacity_kJ)
-    axes.set_xlim(left=0.0)
+    shown = [curve for curve in (planned, simulated) if curve is not None]
+    axes.set_xlim(0.0, max(_SHORTEST_S, *(float(curve.time_s[-1]) for curve in shown)))
+    room = _mark_visits(axes, scene, (simulated or planned).visits)
+    least = min(float(with_recharge_jumps(curve)[1].min()) for curve in shown)
+    low = min(0.0, 1.05 * least / robot.battery.capacity_J)
+    high = low + (_FULL_SHARE - low) / (1.0 - room)
+    axes.set_ylim(low * capacity_kJ, high * capacity_kJ)
     axes.set_ylabel("battery [kJ]")
     axes.set_title(robot.id, loc="left", fontsize=11, fontweight="bold", color=color)
     axes.grid(color="#E4E6EA", linewidth=0.7)
@@ -158,7 +175,7 @@ def draw_battery(
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     percent = axes.twinx()
-    percent.set_ylim(0.0, 122.0)
+    percent.set_ylim(100.0 * low, 100.0 * high)
     percent.set_yticks([0, 25, 50, 75, 100])
     percent.set_ylabel("charge [%]")
     percent.spines["top"].set_visible(False)
@@ -178,28 +195,34 @@ def _plot(axes: Axes, curve: BatteryCurve, **look: Any) -> None:
     axes.plot(time_s, energy_J / 1000.0, solid_joinstyle="round", **look)
 
 
-def _mark_visits(axes: Axes, scene: Scene, visits: tuple[Visit, ...]) -> None:
-    labels = {**style.goal_labels(scene), **style.station_labels(scene)}
-    below_axis_top = axes.get_xaxis_transform()
-    for visit in visits:
-        station = visit.kind == "station"
+def _mark_visits(axes: Axes, scene: Scene, visits: tuple[Visit, ...]) -> float:
+    """Mark and name visits; return the share of the height that the names take."""
+    end_s = float(axes.get_xlim()[1])
+    named = named_visits(scene, visits, end_s, (_NAMES_EM,))
+    rows = max([1, *(item.lines[0] + 1 for item in named)])
+    for item in named:
+        station, line = item.visit.kind == "station", item.lines[0]
+        bottom = 1.0 - _LINE_SHARE * (rows - max(line, 0))
         axes.axvline(
-            visit.time_s,
-            ymax=0.91 if station else 0.83,
+            item.visit.time_s,
+            ymax=bottom,
             color=style.STATION_EDGE if station else "#B9BEC7",
             linewidth=1.0 if station else 0.7,
             linestyle="-" if station else ":",
             zorder=0.5,
         )
-        axes.text(
-            visit.time_s,
-            0.985 if station else 0.90,
-            f"⚡{labels[visit.target]}" if station else labels[visit.target],
-            transform=below_axis_top,
-            fontsize=8.5,
-            fontweight="bold" if station else "normal",
-            color=style.STATION_EDGE if station else style.MUTED,
-            ha="center",
-            va="top",
-            bbox={"fc": "white", "ec": "none", "pad": 0.8},
-        )
+        if line != HIDDEN:
+            half_s = 0.5 * item.width_em / _NAMES_EM * end_s
+            axes.text(
+                min(max(item.visit.time_s, half_s), end_s - half_s),
+                bottom,
+                item.text,
+                transform=axes.get_xaxis_transform(),
+                fontsize=_NAME_POINTS,
+                fontweight="bold" if station else "normal",
+                color=style.STATION_EDGE if station else style.MUTED,
+                ha="center",
+                va="bottom",
+                bbox={"fc": "white", "ec": "none", "pad": 0.3},
+            )
+    return rows * _LINE_SHARE

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
+
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
@@ -11,9 +13,11 @@ from mrmg.mission import Plan
 from mrmg.results import style
 from mrmg.results.audit import measured_step_energy
 from mrmg.results.energy_plot import BatteryCurve, measured_curves
-from mrmg.results.ground_image import TrailPainter
+from mrmg.results.ground_image import TrailPainter, video_labels
+from mrmg.results.map_shapes import enclosing_circle
+from mrmg.results.mission_series import breakdowns, standing_of
 from mrmg.results.overlay import Panel, Reading, RobotReading
-from mrmg.results.tags import Label, Tag
+from mrmg.results.tags import Label, Tag, letter_px, place_tags
 from mrmg.results.top_view import TopView
 from mrmg.results.video_options import VideoOptions
 from mrmg.results.world_view import (
@@ -83,15 +87,15 @@ class Film:
         self.map_height_m = _MAP_MARGIN * max(
             y_max - y_min, (x_max - x_min) / pane_ratio
         )
+        self.em_m = letter_px(height) * self.map_height_m / height
         self.map_center = np.array([(x_min + x_max) / 2, (y_min + y_max) / 2])
 
     def reading(self, tick: int) -> Reading:
         """Return what the panel says at a tick."""
         goals = {goal.id for goal in self.scene.goals}
+        now_s = self.log.time_s[tick]
         broken_down = {
-            event.robot
-            for event in self.log.events
-            if event.cause == "fault" and event.time_s <= self.log.time_s[tick]
+            robot for robot, at_s in breakdowns(self.log).items() if at_s <= now_s
         }
         return Reading(
             time_s=float(self.log.time_s[tick]),
@@ -107,14 +111,23 @@ class Film:
                     robot=curve.robot,
                     charge=float(curve.energy_J[tick]) / capacity_J,
                     speed_m_s=round(float(state[tick, 3]), 1) + 0.0,
-                    heading_for=_next_target(self.plan, curve, tick),
+                    heading_for=self._heading_for(curve, tick),
                     broken_down=curve.robot in broken_down,
+                    used=standing_of(curve.robot, self.plan, self.log) != "not used",
                 )
                 for curve, state, capacity_J in zip(
                     self.curves, self.log.state, self.capacity_J, strict=True
                 )
             ),
         )
+
+    def _heading_for(self, curve: BatteryCurve, tick: int) -> str:
+        done = sum(visit.step <= tick for visit in curve.visits)
+        tour = self.plan.tours.get(curve.robot, ())
+        if done < len(tour):
+            return tour[done]
+        # The plan in force does not know where one was going that broke down.
+        return "…" if curve.robot in breakdowns(self.log) else ""
 
 
 def _used_J(scene: Scene, log: ExecutionLog) -> np.ndarray:
@@ -124,12 +137,6 @@ def _used_J(scene: Scene, log: ExecutionLog) -> np.ndarray:
         draw_J = measured_step_energy(scene.robot(robot), log, index)
         used_J[1:] += np.cumsum(draw_J.sum(axis=1))
     return used_J
-
-
-def _next_target(plan: Plan, curve: BatteryCurve, tick: int) -> str:
-    done = sum(visit.step <= tick for visit in curve.visits)
-    tour = plan.tours.get(curve.robot, ())
-    return tour[done] if done < len(tour) else ""
 
 
 class Stage:
@@ -151,11 +158,20 @@ class Stage:
         self._tags = [
             Tag(robot, film.colors[robot.id], height) for robot in film.scene.robots
         ]
-        self._labels = _labels(film.scene, height)
+        self._target_labels = _labels(film, height, ("goal", "station"))
+        self._labels = self._target_labels + _labels(film, height, ("obstacle",))
+        self._cross = Label("✖", style.RESERVE, height, size_em=1.6)
         self._painter = TrailPainter(ground, film.frame)
         self._painted = 0
         self._trailed = 0
         self._top = self._make_top_view()
+        places = np.array([at for _, at in self._labels]).reshape(-1, 2)
+        self._named = [
+            (spot, label.half)
+            for (label, _), spot in zip(
+                self._labels, self._top.to_pixels(places), strict=True
+            )
+        ]
         self._marked: set[str] = set()
         for goal in film.scene.goals:
             view.color_target(goal.id, _OPEN)
@@ -205,9 +221,17 @@ class Stage:
             for color, points in trails.items():
                 self._top.extend_trail(points[self._trailed - 1 :], color)
         self._trailed = tick + 1
-        spots = log.state[:, tick, :2]
-        self._top.draw(log.qpos[tick], list(spots), pane)
-        self._lay_tags(pane, self._top.to_pixels(spots), reading)
+        at_m = log.state[:, tick, :2]
+        self._top.draw(log.qpos[tick], list(at_m), pane)
+        circles = [
+            enclosing_circle(robot, tuple(state[tick, :3]))
+            for robot, state in zip(self._film.scene.robots, log.state, strict=True)
+        ]
+        spots = self._top.to_pixels(np.array([middle for middle, _ in circles]))
+        reaches = [radius_m / self._top.pixel_m for _, radius_m in circles]
+        size = (pane.shape[1], pane.shape[0])
+        beside = place_tags(self._tags, spots, reaches, self._named, size)
+        self._lay_tags(pane, spots, beside, reading)
 
     def _draw_chase(self, pane: np.ndarray, tick: int, reading: Reading) -> None:
         film = self._film
@@ -217,18 +241,31 @@ class Stage:
         camera = chase_camera(float(x_m), float(y_m), float(z_m), float(film.yaw[tick]))
         self._view.draw(camera, fovy=CHASE_FOVY_DEG, shadows=True, out=pane)
         near_m = np.array([x_m, y_m])
-        for label, spot in self._labels:
+        for label, spot in self._target_labels:
             if np.hypot(*(spot - near_m)) < _NAMED_WITHIN_M:
-                label.blit(pane, self._view.project(lifted(film.scene, spot, 0.0))[0])
+                label.blit_about(
+                    pane, self._view.project(lifted(film.scene, spot, 0.0))[0]
+                )
         tops = [
             lifted(film.scene, state[tick, :2], robot.model.height_m + _TAG_LIFT_M)
             for robot, state in zip(film.scene.robots, film.log.state, strict=True)
         ]
-        self._lay_tags(pane, self._view.project(np.concatenate(tops)), reading)
+        spots = self._view.project(np.concatenate(tops))
+        self._lay_tags(pane, spots, spots, reading)
 
-    def _lay_tags(self, pane: np.ndarray, spots: np.ndarray, reading: Reading) -> None:
-        for tag, spot, robot in zip(self._tags, spots, reading.robots, strict=True):
-            tag.blit(pane, spot, robot.charge)
+    def _lay_tags(
+        self,
+        pane: np.ndarray,
+        spots: Iterable[np.ndarray],
+        beside: Iterable[np.ndarray],
+        reading: Reading,
+    ) -> None:
+        for tag, spot, at, robot in zip(
+            self._tags, spots, beside, reading.robots, strict=True
+        ):
+            if robot.broken_down:
+                self._cross.blit_about(pane, spot)
+            tag.blit(pane, at, robot.charge, broken=robot.broken_down)
 
     def _extend_ground_trails(self, tick: int) -> None:
         # Painting ahead, by less than a car's length, makes uploads rare.
@@ -260,17 +297,22 @@ def _rgba(color: str) -> tuple[float, float, float, float]:
     return red / 255.0, green / 255.0, blue / 255.0, 0.9
 
 
-def _labels(scene: Scene, height: int) -> list[tuple[Label, np.ndarray]]:
-    """Return the names of all targets, each with its place [m]."""
-    texts = {
-        **style.goal_labels(scene),
-        **{name: f"⚡{text}" for name, text in style.station_labels(scene).items()},
-    }
-    stations = {station.id for station in scene.stations}
-    labels = []
-    for target in scene.targets():
-        color = style.STATION_EDGE if target.id in stations else style.INK
-        x_min, _, x_max, y_max = target.region.shape.bounds
-        corner = np.array([x_max - 0.12 * (x_max - x_min), y_max])
-        labels.append((Label(texts[target.id], color, height), corner))
-    return labels
+def _labels(
+    film: Film, height: int, kinds: Collection[str]
+) -> list[tuple[Label, np.ndarray]]:
+    """Return the names laid over the map, each with its place [m]."""
+    colors = {"goal": style.INK, "station": style.STATION_EDGE}
+    colors["obstacle"] = style.ON_OBSTACLE
+    return [
+        (
+            Label(
+                label.text,
+                colors[label.kind],
+                height,
+                size_em=label.size_em,
+            ),
+            np.array([label.x_m, label.y_m]),
+        )
+        for label in video_labels(film.scene, film.em_m)
+        if label.kind in kinds
+    ]

@@ -18,6 +18,7 @@ from PIL import Image, ImageDraw
 
 from mrmg.mission import Plan
 from mrmg.results import scene_drawing, style
+from mrmg.results.map_labels import MapLabel, map_labels
 from mrmg.scene.types import Scene
 from mrmg.world.relief import lifted
 
@@ -25,11 +26,10 @@ PIXELS = 2048
 """Longer side of the image."""
 
 _DPI = 100
-_TRAIL_SHARE = 0.0045
-_PLANNED_PIXELS = 4.0
 _SPACING_M = 0.3
 _SUPERSAMPLING = 4
-_LABEL_PIXELS = 40.0
+_LETTER_PIXELS = 40.0
+_PAINTED = ("terrain", "height")
 _RELIEF_CELL_M = 0.25
 
 
@@ -62,14 +62,19 @@ class GroundFrame:
         return np.asarray((points - corner) * (1.0, -1.0) * self.pixels_per_m)
 
 
-def paint_ground(scene: Scene, plan: Plan | None, frame: GroundFrame) -> np.ndarray:
+def paint_ground(
+    scene: Scene, plan: Plan | None, frame: GroundFrame, em_m: float | None = None
+) -> np.ndarray:
     """Return the ground from above, north up, shape (height, width, 3) of bytes.
 
     Args:
         scene: the map.
         plan: adds planned paths.
         frame: what the picture covers.
+        em_m: size of the letters on the ground; None for one that suits the map.
     """
+    if em_m is None:
+        em_m = _LETTER_PIXELS / frame.pixels_per_m
     width, height = frame.size
     figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI)
     canvas = FigureCanvasAgg(figure)
@@ -79,15 +84,23 @@ def paint_ground(scene: Scene, plan: Plan | None, frame: GroundFrame) -> np.ndar
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
     figure.set_facecolor("#DADCD6")
-    scene_drawing.draw_ground(
-        axes, scene, hatched=False, label_points=_points(_LABEL_PIXELS)
-    )
+    scene_drawing.draw_ground(axes, scene, hatched=False)
+    letter_points = _points(em_m * frame.pixels_per_m)
     if plan is not None:
-        _paint_paths(axes, scene, plan)
+        _paint_paths(axes, scene, plan, letter_points)
     _paint_rims(axes, scene)
+    painted = [label for label in video_labels(scene, em_m) if label.kind in _PAINTED]
+    scene_drawing.draw_labels(axes, scene, painted, letter_points)
     canvas.draw()  # type: ignore[no-untyped-call]
     pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
     return np.array(pixels[:, :, :3])
+
+
+def video_labels(scene: Scene, em_m: float) -> tuple[MapLabel, ...]:
+    """Return the names on the map of a video; those of robots go with the robots."""
+    return map_labels(
+        scene, em_m=em_m, kinds=("goal", "station", "obstacle", *_PAINTED)
+    )
 
 
 def painted_relief(
@@ -122,7 +135,7 @@ class TrailPainter:
         """Start on a ground image, which is copied."""
         self._image = ground.copy()
         self._frame = frame
-        self._width = max(round(_TRAIL_SHARE * PIXELS), 3)
+        self._width = style.DRIVEN.width_em * _LETTER_PIXELS
 
     def paint(self, points: np.ndarray, color: str, target: np.ndarray) -> None:
         """Paint a line through `points` [m] and copy what changed to `target`.
@@ -187,15 +200,16 @@ def _spaced(points: np.ndarray, spacing_m: float) -> np.ndarray:
     return np.asarray(points[keep])
 
 
-def _paint_paths(axes: Axes, scene: Scene, plan: Plan) -> None:
+def _paint_paths(axes: Axes, scene: Scene, plan: Plan, letter_points: float) -> None:
     colors = style.scene_robot_colors(scene)
     for trajectory in plan.trajectories:
         axes.plot(
             trajectory.state[:, 0],
             trajectory.state[:, 1],
             color=colors[trajectory.robot],
-            linewidth=_points(_PLANNED_PIXELS),
-            alpha=0.75,
+            linewidth=style.PLANNED.width_em * letter_points,
+            alpha=style.PLANNED.opacity,
+            solid_capstyle="round",
             zorder=4,
         )
 

@@ -61,9 +61,9 @@ def draw_method(
         panels = own.subplots(1, _PANELS)
         for axes, title in zip(panels, _TITLES, strict=True):
             prepare_map(axes, scene)
-            scene_drawing.draw_ground(axes, scene, hatched=False, label_points=None)
+            scene_drawing.draw_ground(axes, scene, hatched=False)
             draw_targets(axes, scene)
-            draw_starts(axes, scene, named=False)
+            draw_starts(axes, scene)
             axes.set_title(title, fontsize=TEXT_PT)
         _draw_roadmap(panels[0], roadmap, multiplier)
         dashes = dict(zip(tours, _DASHES * len(tours), strict=False))

@@ -21,6 +21,7 @@ from mrmg.visiting import runs
 from mrmg.world.terrain import multiplier_at
 
 DRIVING, WAITING, CHARGING, FINISHED = "driving", "waiting", "charging", "finished"
+BROKEN = "broken"
 """What a robot can be doing."""
 
 _STANDING_M_S = 0.02
@@ -33,8 +34,8 @@ class Activity:
 
     Attributes:
         kind: `DRIVING`; `WAITING`, standing for half a second or more; `CHARGING`, from
-            entering a station of its tour to leaving the region; or `FINISHED`,
-            standing to the end.
+            entering a station of its tour to leaving the region; `FINISHED`, standing
+            to the end; or `BROKEN`, from when it broke down.
         start_s, end_s: when.
         target: id of the station where charging, else "".
     """
@@ -64,7 +65,10 @@ def shown_visits(scene: Scene, plan: Plan, motion: Motion) -> tuple[Visit, ...]:
 
 
 def activities(
-    scene: Scene, motion: Motion, visits: Iterable[Visit]
+    scene: Scene,
+    motion: Motion,
+    visits: Iterable[Visit],
+    broken_s: float | None = None,
 ) -> tuple[Activity, ...]:
     """Return what a robot does, span by span, without gaps.
 
@@ -72,6 +76,7 @@ def activities(
         scene: gives the stations' regions.
         motion: planned or driven.
         visits: of this robot; those of stations begin spans of charging.
+        broken_s: when it broke down; None if it did not.
     """
     kinds = np.full(len(motion.time_s), DRIVING, dtype=object)
     standing = np.abs(motion.state[:, 3]) < _STANDING_M_S
@@ -88,6 +93,9 @@ def activities(
             left = visit.step + (len(inside) if inside.all() else int(inside.argmin()))
             kinds[visit.step : left] = CHARGING
             names[visit.step : left] = visit.target
+    if broken_s is not None:
+        kinds[motion.time_s >= broken_s] = BROKEN
+        names[motion.time_s >= broken_s] = ""
     changes = (kinds[1:] != kinds[:-1]) | (names[1:] != names[:-1])
     edges = [0, *(np.flatnonzero(changes) + 1).tolist(), len(kinds) - 1]
     return tuple(
@@ -100,6 +108,34 @@ def activities(
         for start, end in zip(edges, edges[1:], strict=False)
         if end > start
     )
+
+
+def visit_ranks(plan: Plan) -> dict[str, list[tuple[str, int]]]:
+    """Return the visits of each target as (robot, rank in its tour from 1)."""
+    ranks: dict[str, list[tuple[str, int]]] = {}
+    for robot, tour in plan.tours.items():
+        for rank, target in enumerate(tour, start=1):
+            ranks.setdefault(target, []).append((robot, rank))
+    return ranks
+
+
+def way_to(states: np.ndarray) -> np.ndarray:
+    """Return the way driven up to each state [m], shape (n,)."""
+    steps_m = np.hypot(*np.diff(states[:, :2], axis=0).T)
+    return np.concatenate([[0.0], np.cumsum(steps_m)])
+
+
+def breakdowns(log: ExecutionLog | None) -> dict[str, float]:
+    """Return when each robot that broke down did so [s], by robot."""
+    events = log.events if log is not None else ()
+    return {event.robot: event.time_s for event in events if event.cause == "fault"}
+
+
+def standing_of(robot: str, plan: Plan, log: ExecutionLog | None) -> str:
+    """Return "broken down", "not used" of a robot without a tour, or ""."""
+    if robot in breakdowns(log):
+        return "broken down"
+    return "" if plan.tours.get(robot) else "not used"
 
 
 def tracking_error(log: ExecutionLog) -> np.ndarray:

@@ -8,13 +8,15 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from mrmg.results import style
-from mrmg.results.tags import draw_bar, font
+from mrmg.results.tags import draw_bar, font, text_width_em
 from mrmg.scene.types import Robot, Scene
 
 _BACKGROUND = "#14181E"
 _CARD = "#202730"
 _TEXT = "#F2F4F7"
 _FAINT = "#A4ADBA"
+_MOST_CHIP_ROWS = 5
+_UNNAMED_CHIP = 12.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,6 +29,7 @@ class RobotReading:
         speed_m_s: signed speed.
         heading_for: label of the next target; "" after the last.
         broken_down: whether it will not move any more.
+        used: whether it has a tour.
     """
 
     robot: str
@@ -34,11 +37,14 @@ class RobotReading:
     speed_m_s: float
     heading_for: str
     broken_down: bool = False
+    used: bool = True
 
     def way(self, towards: str) -> str:
         """Return where the robot is going, after the word for towards."""
         if self.broken_down:
             return "broken down"
+        if not self.used:
+            return "not used"
         return f"{towards} {self.heading_for}" if self.heading_for else "tour done"
 
 
@@ -121,12 +127,24 @@ class Panel:
             fill=_FAINT,
             anchor="ra",
         )
-        rows = 1 + (len(self._scene.goals) - 1) // self._goals_per_row
+        per_row, _ = self._chips()
+        rows = 1 + (len(self._scene.goals) - 1) // per_row
         return self._px(122) + rows * self._px(26)
 
-    @property
-    def _goals_per_row(self) -> int:
-        return max(int((self._size[0] - self._px(36)) // self._px(38)), 1)
+    def _chips(self) -> tuple[int, float]:
+        """Return how many goals stand in a row, and the width of each [pixels].
+
+        Where names would take too many rows, goals are marks without names.
+        """
+        widest = max(
+            (text_width_em(name, bold=True) for name in self._labels.values()),
+            default=0.0,
+        )
+        for width in (max(34.0, 12.0 * widest + 10.0), _UNNAMED_CHIP):
+            per_row = max(int((self._size[0] - self._px(36)) // self._px(width + 4)), 1)
+            if len(self._labels) <= per_row * _MOST_CHIP_ROWS:
+                break
+        return per_row, self._px(width)
 
     def _draw_clock(self, pen: ImageDraw.ImageDraw, reading: Reading) -> None:
         left = self._px(18)
@@ -148,24 +166,26 @@ class Panel:
 
     def _draw_goals(self, pen: ImageDraw.ImageDraw, reading: Reading) -> None:
         small = self._font(12, bold=True)
+        per_row, width = self._chips()
         for number, goal in enumerate(self._scene.goals):
-            row, column = divmod(number, self._goals_per_row)
-            x = self._px(18) + column * self._px(38)
+            row, column = divmod(number, per_row)
+            x = self._px(18) + column * (width + self._px(4))
             y = self._px(115) + row * self._px(26)
             robot = reading.visited.get(goal.id)
             pen.rounded_rectangle(
-                (x, y, x + self._px(34), y + self._px(21)),
+                (x, y, x + width, y + self._px(21)),
                 radius=self._px(5),
                 fill=self._colors[robot] if robot else _BACKGROUND,
                 outline=_TEXT if robot else _FAINT,
             )
-            pen.text(
-                (x + self._px(17), y + self._px(10.5)),
-                self._labels[goal.id],
-                font=small,
-                fill=_TEXT if robot else _FAINT,
-                anchor="mm",
-            )
+            if width > self._px(_UNNAMED_CHIP):
+                pen.text(
+                    (x + 0.5 * width, y + self._px(10.5)),
+                    self._labels[goal.id],
+                    font=small,
+                    fill=_TEXT if robot else _FAINT,
+                    anchor="mm",
+                )
 
     def _draw_card(
         self,
@@ -206,44 +226,36 @@ class Panel:
         bar = (left + self._px(20), row - half, right - self._px(74), row + half)
         draw_bar(pen, bar, reading.charge, robot.battery.reserve_fraction)
 
-    def _legend_entries(self) -> list[tuple[str, str]]:
-        entries = [("goal", "#E9EBEE"), ("charging station", style.STATION)]
-        entries += [
-            (look.label, look.color)
-            for look in style.terrain_classes(self._scene).values()
-        ]
-        entries.append(("obstacle", style.OBSTACLE))
-        if any(obstacle.blocks is not None for obstacle in self._scene.obstacles):
-            entries.append(("... for some robots", style.PARTIAL_OBSTACLE))
-        return entries
-
     @property
     def _legend_height(self) -> float:
-        return self._px(52 + 22 * ((len(self._legend_entries()) + 1) // 2))
+        return self._px(52 + 22 * ((len(style.map_key(self._scene)) + 1) // 2))
 
     def _draw_legend(self, pen: ImageDraw.ImageDraw) -> float:
-        small = self._font(13)
-        entries = self._legend_entries()
+        entries = style.map_key(self._scene)
+        room = 0.5 * self._size[0] - self._px(18 + 26 + 18)
+        widest = max(text_width_em(entry.label) for entry in entries)
+        small = self._font(min(13.0, room / widest / self._unit))
         rows = (len(entries) + 1) // 2
         top = self._size[1] - self._px(40) - rows * self._px(22)
-        for number, (label, color) in enumerate(entries):
+        for number, entry in enumerate(entries):
             row, column = divmod(number, 2)
             x = self._px(18) + column * 0.5 * self._size[0]
             y = top + row * self._px(22)
+            middle = y + self._px(7)
+            area = (x, y, x + self._px(18), y + self._px(14))
+            line = entry.look == "line"
             pen.rectangle(
-                (x, y, x + self._px(18), y + self._px(14)), fill=color, outline=_FAINT
+                area, fill=style.GROUND if line else entry.color, outline=_FAINT
             )
-            pen.text(
-                (x + self._px(26), y + self._px(7)),
-                label,
-                font=small,
-                fill=_FAINT,
-                anchor="lm",
-            )
+            if line:
+                across = (x, middle, x + self._px(18), middle)
+                pen.line(across, fill=entry.color, width=max(round(self._px(2)), 1))
+            spot = (x + self._px(26), middle)
+            pen.text(spot, entry.label, font=small, fill=_FAINT, anchor="lm")
         pen.text(
             (self._px(18), top + rows * self._px(22) + self._px(4)),
-            "thin line: planned    wide line: driven",
-            font=small,
+            "wide, pale line: planned    thin line: driven",
+            font=self._font(13),
             fill=_FAINT,
         )
         return top - self._px(12)

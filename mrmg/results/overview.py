@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Circle, Patch
 from matplotlib.patheffects import withStroke
 
 from mrmg.execution.log import ExecutionLog, require_same_mission
 from mrmg.mission import Plan
 from mrmg.results import scene_drawing, style
+from mrmg.results.map_labels import map_labels
+from mrmg.results.map_shapes import end_poses, end_ring
+from mrmg.results.mission_series import breakdowns, standing_of, visit_ranks, way_to
 from mrmg.scene.types import Scene
 
-_ARROW_SPACING_M = 18.0
-_SHORTEST_NAMED_M = 15.0
+_ARROWS_PER_MAP = 5.5
+_STILL = 0.01
+_CROSS: Any = {
+    "marker": "X",
+    "markersize": 11,
+    "markerfacecolor": style.RESERVE,
+    "markeredgecolor": "white",
+}
 
 
 def draw_overview(
@@ -41,103 +51,55 @@ def draw_overview(
     """
     require_same_mission(scene, plan, log)
     figure, axes = scene_drawing.new_map_figure(scene)
-    handles = draw_mission(axes, scene, plan, log)
-    scene_drawing.add_legend(axes, handles)
     axes.set_title(_title(scene, plan), loc="left", fontsize=12, color=style.INK)
+    draw_mission(axes, scene, plan, log)
     scene_drawing.write_figure(figure, path)
 
 
 def draw_mission(
     axes: Axes, scene: Scene, plan: Plan | None, log: ExecutionLog | None
 ) -> list[Patch | Line2D]:
-    """Draw map, paths and visits on `axes`; return the legend's handles."""
+    """Draw map, paths, visits and legend on `axes`; return the legend's handles."""
     scene_drawing.draw_ground(axes, scene)
     colors = style.scene_robot_colors(scene)
     if plan is not None:
         for trajectory in plan.trajectories:
-            _draw_planned(axes, trajectory.state, colors[trajectory.robot])
+            color = colors[trajectory.robot]
+            _draw_path(axes, trajectory.state, color, style.PLANNED, 4.2)
+            _draw_arrows(axes, trajectory.state, color)
     if log is not None:
         for robot, state in zip(log.robots, log.state, strict=True):
-            _draw_driven(axes, state, colors[robot])
+            _draw_path(axes, state, colors[robot], style.DRIVEN, 4.4)
         _draw_contacts(axes, log)
     _draw_targets(axes, scene, plan)
     scene_drawing.draw_robots(axes, scene)
-    if plan is not None:
-        _draw_ends(axes, scene, plan, log)
-        _name_paths(axes, scene, plan)
-    return _legend(scene, plan, log)
+    handles = _legend(scene, plan, log)
+    scene_drawing.add_legend(axes, handles)
+    em_m = scene_drawing.letter_m(axes)
+    _draw_ends(axes, scene, plan, log, em_m)
+    labels = map_labels(scene, plan, log, em_m=em_m)
+    scene_drawing.draw_labels(axes, scene, labels)
+    return handles
 
 
-def visit_ranks(plan: Plan) -> dict[str, list[tuple[str, int]]]:
-    """Return the visits of each target as (robot, rank in its tour from 1)."""
-    ranks: dict[str, list[tuple[str, int]]] = {}
-    for robot, tour in plan.tours.items():
-        for rank, target in enumerate(tour, start=1):
-            ranks.setdefault(target, []).append((robot, rank))
-    return ranks
-
-
-def _draw_planned(axes: Axes, state: np.ndarray, color: str) -> None:
+def _draw_path(
+    axes: Axes, state: np.ndarray, color: str, look: style.LineLook, zorder: float
+) -> None:
     axes.plot(
         state[:, 0],
         state[:, 1],
         color=color,
-        linewidth=4.5,
-        alpha=0.30,
+        linewidth=look.width_em * scene_drawing.LETTER_POINTS,
+        alpha=look.opacity,
         solid_capstyle="round",
-        zorder=4.2,
+        zorder=zorder,
     )
-    _draw_arrows(axes, state, color)
-
-
-def _name_paths(axes: Axes, scene: Scene, plan: Plan) -> None:
-    """Write its robot's name on each path, for those who see no colours."""
-    colors = style.scene_robot_colors(scene)
-    for robot, (x_m, y_m) in name_spots(scene, plan).items():
-        axes.text(
-            x_m,
-            y_m,
-            robot,
-            fontsize=9,
-            fontweight="bold",
-            color=colors[robot],
-            ha="center",
-            va="center",
-            path_effects=scene_drawing.HALO,
-            zorder=8.6,
-        )
-
-
-def name_spots(scene: Scene, plan: Plan) -> dict[str, tuple[float, float]]:
-    """Return where each path has most room for its robot's name [m], by robot.
-
-    Paths that are too short for one are left out.
-    """
-    names = [target.region.center for target in scene.targets()]
-    names += [np.array(robot.pose[:2]) for robot in scene.robots]
-    spots = {}
-    for trajectory in plan.trajectories:
-        if way_to(trajectory.state)[-1] > _SHORTEST_NAMED_M:
-            points = trajectory.state[:, :2]
-            apart_m = np.hypot(*(points[:, None] - np.array(names)).T).min(axis=0)
-            x_m, y_m = points[int(np.argmax(apart_m))].tolist()
-            spots[trajectory.robot] = (x_m, y_m)
-    return spots
-
-
-def way_to(states: np.ndarray) -> np.ndarray:
-    """Return the way driven up to each state [m], shape (n,)."""
-    steps_m = np.hypot(*np.diff(states[:, :2], axis=0).T)
-    return np.concatenate([[0.0], np.cumsum(steps_m)])
-
-
-def _draw_driven(axes: Axes, state: np.ndarray, color: str) -> None:
-    axes.plot(state[:, 0], state[:, 1], color=color, linewidth=1.2, zorder=4.4)
 
 
 def _draw_arrows(axes: Axes, state: np.ndarray, color: str) -> None:
     way_m = way_to(state)
-    marks_m = np.arange(_ARROW_SPACING_M / 2, way_m[-1], _ARROW_SPACING_M)
+    spacing_m = abs(axes.get_xlim()[1] - axes.get_xlim()[0]) / _ARROWS_PER_MAP
+    marks_m = np.arange(spacing_m / 2, way_m[-1], spacing_m)
     for index in np.searchsorted(way_m, marks_m):
         step = state[index, :2] - state[index - 1, :2]
         length_m = float(np.hypot(*step))
@@ -158,31 +120,24 @@ def _draw_arrows(axes: Axes, state: np.ndarray, color: str) -> None:
 
 def _draw_contacts(axes: Axes, log: ExecutionLog) -> None:
     for contact in log.contacts:
-        axes.plot(
-            contact.x_m,
-            contact.y_m,
-            marker="X",
-            markersize=12,
-            markerfacecolor=style.RESERVE,
-            markeredgecolor="white",
-            zorder=10,
-        )
+        _draw_cross(axes, contact.x_m, contact.y_m)
+
+
+def _draw_cross(axes: Axes, x_m: float, y_m: float) -> None:
+    axes.plot(x_m, y_m, zorder=10, **_CROSS)
 
 
 def _draw_targets(axes: Axes, scene: Scene, plan: Plan | None) -> None:
     ranks = visit_ranks(plan) if plan is not None else {}
     colors = style.scene_robot_colors(scene)
-    goal_labels, station_labels = style.goal_labels(scene), style.station_labels(scene)
     for goal in scene.goals:
         visits = ranks.get(goal.id, [])
         face = colors[visits[0][0]] if visits else style.GOAL_OPEN
-        scene_drawing.draw_goal(axes, goal, goal_labels[goal.id], color=face)
+        scene_drawing.draw_goal(axes, goal, color=face)
         if visits:
             _draw_rank(axes, goal.region.center, str(visits[0][1]))
     for station in scene.stations:
-        visits = ranks.get(station.id, [])
-        scene_drawing.draw_station(axes, station, station_labels[station.id])
-        _draw_station_visits(axes, station.region.center, visits, colors)
+        scene_drawing.draw_station(axes, station)
 
 
 def _draw_rank(axes: Axes, center: np.ndarray, text: str) -> None:
@@ -200,47 +155,35 @@ def _draw_rank(axes: Axes, center: np.ndarray, text: str) -> None:
     )
 
 
-def _draw_station_visits(
+def _draw_ends(
     axes: Axes,
-    center: np.ndarray,
-    visits: list[tuple[str, int]],
-    colors: dict[str, str],
+    scene: Scene,
+    plan: Plan | None,
+    log: ExecutionLog | None,
+    em_m: float,
 ) -> None:
-    for row, (robot, rank) in enumerate(visits):
-        axes.annotate(
-            f"{rank}",
-            (float(center[0]), float(center[1])),
-            xytext=(12 + 15 * row, -10),
-            textcoords="offset points",
-            fontsize=8.5,
-            fontweight="bold",
-            color="white",
-            ha="center",
-            va="center",
-            bbox={"boxstyle": "round,pad=0.22", "fc": colors[robot], "ec": "white"},
-            zorder=8.5,
-        )
-
-
-def _draw_ends(axes: Axes, scene: Scene, plan: Plan, log: ExecutionLog | None) -> None:
-    colors = style.scene_robot_colors(scene)
-    ends = {item.robot: item.state[-1] for item in plan.trajectories}
-    if log is not None:
-        ends = dict(zip(log.robots, log.state[:, -1], strict=True))
-    for robot, state in ends.items():
-        pose = (float(state[0]), float(state[1]), float(state[2]))
+    """Draw each robot where it came to rest, with a ring around it."""
+    colors, broken = style.scene_robot_colors(scene), breakdowns(log)
+    for robot_id, pose in end_poses(plan, log).items():
+        robot = scene.robot(robot_id)
+        if np.allclose(pose, robot.pose, atol=_STILL) and robot_id not in broken:
+            continue
         scene_drawing.draw_footprint(
-            axes, scene.robot(robot), pose, facecolor=colors[robot], alpha=0.55
+            axes, robot, pose, facecolor=colors[robot_id], alpha=1.0
         )
-        axes.plot(
-            *pose[:2],
-            marker="o",
-            markersize=15,
-            markerfacecolor="none",
-            markeredgecolor=colors[robot],
-            markeredgewidth=1.8,
-            zorder=7.5,
+        middle, radius_m = end_ring(robot, pose, em_m)
+        ring = Circle(
+            (float(middle[0]), float(middle[1])),
+            radius_m,
+            facecolor="none",
+            edgecolor=style.RESERVE if robot_id in broken else colors[robot_id],
+            linewidth=1.4,
+            path_effects=[withStroke(linewidth=2.6, foreground="white")],
+            zorder=6.9,
         )
+        axes.add_patch(ring)
+        if robot_id in broken:
+            _draw_cross(axes, *middle)
 
 
 def _legend(
@@ -249,41 +192,43 @@ def _legend(
     colors = style.scene_robot_colors(scene)
     handles: list[Patch | Line2D] = []
     for robot in scene.robots:
-        tour = plan.tours.get(robot.id, ()) if plan is not None else ()
-        goals = sum(target in {goal.id for goal in scene.goals} for target in tour)
-        text = f"{robot.id}: {goals} goal{'' if goals == 1 else 's'}"
-        text = robot.id if plan is None else text
-        handles.append(Patch(facecolor=colors[robot.id], label=text))
-    if plan is not None:
-        handles += [
-            Line2D(
-                [],
-                [],
-                color=style.MUTED,
-                linewidth=4.5,
-                alpha=0.4,
-                label="planned path",
-            ),
-        ]
-    if log is not None:
-        handles.append(
-            Line2D([], [], color=style.MUTED, linewidth=1.2, label="driven path")
+        text = (
+            robot.id
+            if plan is None
+            else f"{robot.id}: {_work(scene, plan, log, robot.id)}"
         )
+        handles.append(Patch(facecolor=colors[robot.id], label=text))
+    looks = {"planned path": (style.PLANNED, plan), "driven path": (style.DRIVEN, log)}
+    handles += [
+        Line2D(
+            [],
+            [],
+            color=style.MUTED,
+            linewidth=look.width_em * scene_drawing.LETTER_POINTS,
+            alpha=look.opacity,
+            label=label,
+        )
+        for label, (look, shown) in looks.items()
+        if shown is not None
+    ]
     if plan is not None:
         handles.append(_ring("end of the drive"))
         handles.append(_ring("n: nth stop of the tour", text="$n$"))
-    if log is not None and log.contacts:
-        handles.append(
-            Line2D(
-                [],
-                [],
-                linestyle="none",
-                marker="X",
-                color=style.RESERVE,
-                label="contact",
-            )
-        )
+    crosses = {"contact": log.contacts if log else (), "broken down": breakdowns(log)}
+    handles += [
+        Line2D([], [], linestyle="none", label=label, **_CROSS)
+        for label, shown in crosses.items()
+        if shown
+    ]
     return handles + scene_drawing.map_legend(scene)
+
+
+def _work(scene: Scene, plan: Plan, log: ExecutionLog | None, robot: str) -> str:
+    """Return what a robot's tour amounts to, and what became of the robot."""
+    tour = plan.tours.get(robot, ())
+    goals = sum(target in {goal.id for goal in scene.goals} for target in tour)
+    words = [f"{goals} goal{'' if goals == 1 else 's'}"] if tour else []
+    return ", ".join([*words, *filter(None, [standing_of(robot, plan, log)])])
 
 
 def _ring(label: str, text: str = "o") -> Line2D:

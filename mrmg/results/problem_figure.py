@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -13,6 +13,7 @@ from matplotlib.markers import MarkerStyle
 from matplotlib.patches import Patch
 
 from mrmg.results import scene_drawing, style
+from mrmg.results.map_labels import KINDS, map_labels
 from mrmg.results.print_style import COLUMN_IN, PAGE_IN, SMALL_PT, TEXT_PT, print_figure
 from mrmg.scene.types import Goal, Scene, Station
 
@@ -34,15 +35,14 @@ def draw_problem(scene: Scene, path: Path) -> None:
     with print_figure((COLUMN_IN, COLUMN_IN * aspect(scene) + legend_in), path) as own:
         axes = own.add_subplot()
         prepare_map(axes, scene)
-        scene_drawing.draw_ground(axes, scene, label_points=SMALL_PT)
-        names = {**style.goal_labels(scene), **style.station_labels(scene)}
+        scene_drawing.draw_ground(axes, scene)
         for goal in scene.goals:
-            scene_drawing.draw_goal(axes, goal, names[goal.id], points=SMALL_PT)
+            scene_drawing.draw_goal(axes, goal, points=SMALL_PT)
         for station in scene.stations:
-            name = names[station.id]
-            scene_drawing.draw_station(axes, station, name, points=SMALL_PT)
-        draw_starts(axes, scene, named=True)
+            scene_drawing.draw_station(axes, station, points=SMALL_PT)
+        draw_starts(axes, scene)
         add_legend(own, handles, columns=2)
+        _draw_labels(axes, scene, set(KINDS) - {"obstacle"})
 
 
 def draw_problems(scenes: Sequence[Scene], path: Path) -> None:
@@ -60,13 +60,21 @@ def draw_problems(scenes: Sequence[Scene], path: Path) -> None:
         panels = own.subplots(rows, _ABREAST, squeeze=False).ravel()
         for number, (axes, scene) in enumerate(zip(panels, scenes, strict=False)):
             prepare_map(axes, scene)
-            scene_drawing.draw_ground(axes, scene, label_points=SMALL_PT)
+            scene_drawing.draw_ground(axes, scene)
             draw_targets(axes, scene)
-            draw_starts(axes, scene, named=False)
+            draw_starts(axes, scene)
             axes.set_title(f"({chr(ord('a') + number)}) {scene.name}", fontsize=TEXT_PT)
         for axes in panels[len(scenes) :]:
             axes.remove()
         add_legend(own, handles, columns=_LEGEND_COLUMNS)
+        for axes, scene in zip(panels, scenes, strict=False):
+            _draw_labels(axes, scene, ("terrain", "height"))
+
+
+def _draw_labels(axes: Axes, scene: Scene, kinds: Collection[str]) -> None:
+    em_m = scene_drawing.letter_m(axes, SMALL_PT)
+    labels = map_labels(scene, em_m=em_m, kinds=kinds)
+    scene_drawing.draw_labels(axes, scene, labels, SMALL_PT)
 
 
 def aspect(scene: Scene) -> float:
@@ -104,7 +112,7 @@ def draw_targets(axes: Axes, scene: Scene) -> None:
         )
 
 
-def draw_starts(axes: Axes, scene: Scene, *, named: bool) -> None:
+def draw_starts(axes: Axes, scene: Scene) -> None:
     """Draw every robot's start as an arrowhead that points where the robot heads."""
     for robot, color in zip(
         scene.robots, style.scene_robot_colors(scene).values(), strict=True
@@ -120,20 +128,6 @@ def draw_starts(axes: Axes, scene: Scene, *, named: bool) -> None:
             markeredgewidth=0.4,
             zorder=9,
         )
-        if named:
-            axes.annotate(
-                robot.id,
-                (x_m, y_m),
-                xytext=(0, -0.8 * _ROBOT_PT),
-                textcoords="offset points",
-                fontsize=SMALL_PT,
-                fontweight="bold",
-                color=color,
-                ha="center",
-                va="top",
-                path_effects=scene_drawing.HALO,
-                zorder=9,
-            )
 
 
 def problem_legend(scenes: Sequence[Scene]) -> list[Patch | Line2D]:

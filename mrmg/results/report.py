@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from mrmg import shipped, storage
+from mrmg.mission import Plan
 from mrmg.results import report_page as html
 from mrmg.results import report_sections as sections
 from mrmg.results import style
+from mrmg.results.mission_series import breakdowns, standing_of
 from mrmg.results.report_charts import chart_data
 from mrmg.results.report_map import mission_map
 from mrmg.results.report_planner import cost_chart, planner
@@ -91,7 +93,9 @@ def _map(record: RunRecord) -> list[str]:
         boxes.append(html.toggle("layer", "driven", "driven paths"))
     if record.plan is not None:
         boxes += [
-            html.toggle("owner", robot.id, html.robot_dot(index, robot.id))
+            html.toggle(
+                "owner", robot.id, html.robot_dot(index, _named(record, robot.id))
+            )
             for index, robot in enumerate(record.scene.robots)
         ]
     lines = "Wide line: planned. Thin line: driven. " if record.plan else ""
@@ -109,6 +113,13 @@ def _map(record: RunRecord) -> list[str]:
     ]
 
 
+def _named(record: RunRecord, robot: str) -> str:
+    """Return a robot's id, and what is to be said of it."""
+    assert record.plan is not None
+    standing = standing_of(robot, record.plan, record.log)
+    return f"{robot} ({standing})" if standing else robot
+
+
 def _verdict_line(record: RunRecord) -> str:
     summary, scene = record.summary, record.scene
     if record.plan is None:
@@ -118,6 +129,7 @@ def _verdict_line(record: RunRecord) -> str:
         return html.verdict_line(
             False, "Not finished:", " the plan was not driven yet."
         )
+    broken = _breakdowns(record)
     if not summary["mission_ok"]:
         reasons = [item.message for item in record.verdict.violations]
         reasons += record.audit.reasons
@@ -125,9 +137,9 @@ def _verdict_line(record: RunRecord) -> str:
         first = reasons[0] if reasons else "see Checks"
         mismatch = summary["status"] == "model_mismatch"
         word = "Model mismatch: " if mismatch else "Mission failed: "
-        return html.verdict_line(False, word, first + more)
+        return html.verdict_line(False, word, first + more + broken)
     energy = summary["energy"]
-    fleet = _count(len(scene.robots), "robot")
+    fleet = _fleet(record.plan, len(scene.robots))
     number = len(scene.goals)
     all_goals = "the goal" if number == 1 else f"all {number} goals"
     return html.verdict_line(
@@ -137,7 +149,22 @@ def _verdict_line(record: RunRecord) -> str:
         f"{energy['measured_J'] / 1000:.1f} kJ "
         f"({sections.signed(energy['measured_error_pct'], 1)} % against plan for the "
         f"worst robot) and never fell below "
-        f"{100 * energy['min_charge_fraction']:.0f} % charge{_on_the_way(summary)}.",
+        f"{100 * energy['min_charge_fraction']:.0f} % charge"
+        f"{broken}{_on_the_way(summary)}.",
+    )
+
+
+def _fleet(plan: Plan, robots: int) -> str:
+    """Return how many robots have a tour, of how many."""
+    used = sum(bool(tour) for tour in plan.tours.values())
+    return _count(robots, "robot") if used == robots else f"{used} of {robots} robots"
+
+
+def _breakdowns(record: RunRecord) -> str:
+    """Return which robots broke down, and when."""
+    return "".join(
+        f"; {robot} broke down at {time_s:.1f} s"
+        for robot, time_s in breakdowns(record.log).items()
     )
 
 

@@ -98,14 +98,19 @@ def _charge_charts(
             )
         ]
         lines.append(line("reserve", "limit", owner, reserve))
+        limits = _percent_limits(line["values"] for line in lines)
         title = f"{planned.robot}, battery of {battery.capacity_J / 1000:.1f} kJ"
         name = f"charge-{planned.robot}"
         charts.append(
-            chart(
-                name, title, "%", lines, group="charge", digits=1, limits=(0.0, 105.0)
-            )
+            chart(name, title, "%", lines, group="charge", digits=1, limits=limits)
         )
     return charts
+
+
+def _percent_limits(values: Iterable[list[float | None]]) -> tuple[float, float]:
+    """Return the limits of an axis of charge, which batteries in debt go below."""
+    low = min(value for line in values for value in line if value is not None)
+    return (0.0 if low >= 0.0 else 1.05 * low), 105.0
 
 
 def _percent(curve: BatteryCurve, battery: Battery, time_s: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 from html import escape
 
 import numpy as np
@@ -12,12 +12,17 @@ from shapely.geometry import Polygon
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan
 from mrmg.results import style
-from mrmg.results.contours import contour_lines, label_spot
-from mrmg.results.overview import name_spots, visit_ranks, way_to
-from mrmg.results.scene_drawing import polygons_of, terrain_spots
+from mrmg.results.contours import contour_lines
+from mrmg.results.map_labels import KINDS, MapLabel, map_labels
+from mrmg.results.map_shapes import enclosing_circle, end_poses
+from mrmg.results.mission_series import breakdowns, visit_ranks, way_to
+from mrmg.results.scene_drawing import polygons_of
 from mrmg.scene.types import Goal, Robot, Scene, Station
 
 _PATH_SPACING_M = 0.25
+_GROUND_KINDS = ("terrain", "obstacle", "height")
+_TARGET_KINDS = ("goal", "station")
+_ROBOT_KINDS = ("path", "breakdown")
 
 
 def mission_map(scene: Scene, plan: Plan | None, log: ExecutionLog | None) -> str:
@@ -30,12 +35,21 @@ def mission_map(scene: Scene, plan: Plan | None, log: ExecutionLog | None) -> st
     width, height = x_max - x_min, y_max - y_min
     letter = max(width, height) / 48.0
     canvas = _Canvas(scene)
+    kinds = [kind for kind in KINDS if kind != "stop"]
+    labels = map_labels(scene, plan, log, em_m=letter, kinds=kinds)
+    names = {label.of: label for label in labels if label.kind == "robot"}
     layers = [
-        canvas.group("ground", canvas.ground()),
+        canvas.group(
+            "ground", [*canvas.ground(), *canvas.texts(labels, _GROUND_KINDS)]
+        ),
         canvas.group("planned", canvas.planned(plan)),
-        canvas.group("driven", canvas.driven(log)),
-        canvas.group("targets", canvas.targets(plan)),
-        canvas.group("robots", [*canvas.owners(plan), *canvas.robots()]),
+        canvas.group("driven", [*canvas.driven(log), *canvas.breakdowns(plan, log)]),
+        canvas.group(
+            "targets", [*canvas.targets(plan), *canvas.texts(labels, _TARGET_KINDS)]
+        ),
+        canvas.group(
+            "robots", [*canvas.texts(labels, _ROBOT_KINDS), *canvas.robots(names)]
+        ),
     ]
     margin = 0.6 * letter
     return (
@@ -73,19 +87,29 @@ class _Canvas:
                 f'<polyline class="contour" points="{points}" '
                 f'data-tip="{level_m:g} m high"/>'
             )
-            spot = label_spot(line)
-            if spot is not None:
-                x, y = self._point(*spot)
-                yield f'<text class="height" x="{x}" y="{y}">{level_m:g}</text>'
         for obstacle in self._scene.obstacles:
             look, tip = "obstacle", f"{obstacle.id}: obstacle"
             if obstacle.blocks is not None:
                 look += " partial"
                 tip += f" for {', '.join(obstacle.blocks)}"
             yield self._shape(obstacle.shape, look, tip)
-        for x_m, y_m, multiplier in terrain_spots(self._scene):
-            x, y = self._point(x_m, y_m)
-            yield f'<text class="hint" x="{x}" y="{y}">×{multiplier:g}</text>'
+
+    def texts(
+        self, labels: Iterable[MapLabel], kinds: Collection[str]
+    ) -> Iterable[str]:
+        """Write the names of some kinds where they were placed."""
+        for label in labels:
+            if label.kind in kinds:
+                x, y = self._point(label.x_m, label.y_m)
+                of_robot = label.of in self._index
+                owner = f' data-robot="{escape(label.of)}"' if of_robot else ""
+                color = f"--c:var(--r{self._index[label.of]});" if of_robot else ""
+                look = f"label {label.kind}-name"
+                yield (
+                    f'<text class="{look}"{owner} x="{x}" y="{y}" '
+                    f'style="{color}font-size:{label.size_em:g}em">'
+                    f"{escape(label.text)}</text>"
+                )
 
     def planned(self, plan: Plan | None) -> Iterable[str]:
         for item in plan.trajectories if plan else ():
@@ -104,18 +128,23 @@ class _Canvas:
                 "✖</text>"
             )
 
+    def breakdowns(self, plan: Plan | None, log: ExecutionLog | None) -> Iterable[str]:
+        ends = end_poses(plan, log)
+        for robot, time_s in breakdowns(log).items():
+            middle, _ = enclosing_circle(self._scene.robot(robot), ends[robot])
+            x, y = self._point(*middle)
+            tip = f"{robot} broke down at {time_s:.1f} s"
+            yield (
+                f'<text class="contact" x="{x}" y="{y}" data-tip="{escape(tip)}">'
+                "✖</text>"
+            )
+
     def targets(self, plan: Plan | None) -> Iterable[str]:
         ranks = visit_ranks(plan) if plan else {}
-        names = {
-            **style.goal_labels(self._scene),
-            **style.station_labels(self._scene),
-        }
         for target in self._scene.targets():
-            yield self._target(target, names[target.id], ranks.get(target.id, []))
+            yield self._target(target, ranks.get(target.id, []))
 
-    def _target(
-        self, target: Goal | Station, name: str, visits: list[tuple[str, int]]
-    ) -> str:
+    def _target(self, target: Goal | Station, visits: list[tuple[str, int]]) -> str:
         station = isinstance(target, Station)
         tip = f"{target.id}: {'recharging station' if station else 'goal'}"
         tip += "".join(f"; stop {rank} of {robot}" for robot, rank in visits)
@@ -124,36 +153,23 @@ class _Canvas:
             robot = visits[0][0]
             look += " assigned"
             color = f"--c:var(--r{self._index[robot]})"
-        x, y = self._point(*target.region.center)
-        _, top = self._point(target.region.center[0], target.region.shape.bounds[3])
-        label = f"⚡{name}" if station else name
-        return (
-            f"{self._shape(target.region.shape, look, tip, color, target.id)}"
-            f'<text class="name" x="{x}" y="{top - 0.25}">{escape(label)}</text>'
-        )
+        return self._shape(target.region.shape, look, tip, color, target.id)
 
-    def owners(self, plan: Plan | None) -> Iterable[str]:
-        """Write its robot's name on each path, for those who see no colours."""
-        spots = name_spots(self._scene, plan) if plan else {}
-        for robot, spot in spots.items():
-            x, y = self._point(*spot)
-            yield (
-                f'<text class="whose" data-robot="{escape(robot)}" x="{x}" '
-                f'y="{y}" style="--c:var(--r{self._index[robot]})">'
-                f"{escape(robot)}</text>"
-            )
-
-    def robots(self) -> Iterable[str]:
+    def robots(self, names: Mapping[str, MapLabel]) -> Iterable[str]:
+        """Draw the robots at their starts, with names that go with them."""
         for at, robot in enumerate(self._scene.robots):
             outline = " ".join(f"{x:.3f},{-y:.3f}" for x, y in robot.model.footprint_m)
             x, y = self._point(*robot.pose[:2])
             turn = -np.degrees(robot.pose[2])
+            name = names[robot.id]
+            beside = name.x_m - robot.pose[0], robot.pose[1] - name.y_m
             yield (
                 f'<g class="robot" data-robot="{escape(robot.id)}" '
                 f'style="--c:var(--r{at})" data-tip="{escape(_about(robot))}">'
                 f'<g class="body" transform="translate({x} {y}) rotate({turn:.2f})">'
                 f'<polygon points="{outline}"/><circle r="0.18"/></g>'
-                f'<text class="name" x="{x}" y="{y}" dy="2em">{escape(robot.id)}'
+                f'<text class="label" x="{x + beside[0]:.2f}" y="{y + beside[1]:.2f}" '
+                f'data-beside="{beside[0]:.2f} {beside[1]:.2f}">{escape(robot.id)}'
                 "</text></g>"
             )
 

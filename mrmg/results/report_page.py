@@ -15,6 +15,8 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from mrmg.results import style
+
 _PAGE = Template("""<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -91,7 +93,12 @@ def _script(source: str) -> str:
 def _color_rules(colors: list[tuple[str, str]]) -> list[str]:
     light = "".join(f"--r{at}:{one};" for at, (one, _) in enumerate(colors))
     dark = "".join(f"--r{at}:{one};" for at, (_, one) in enumerate(colors))
-    return [f":root {{ {light} }}", f":root[data-theme=dark] {{ {dark} }}"]
+    looks = {"planned": style.PLANNED, "driven": style.DRIVEN}
+    lines = "".join(
+        f"--{name}-width:{look.width_em:g};--{name}-opacity:{look.opacity:g};"
+        for name, look in looks.items()
+    )
+    return [f":root {{ {light}{lines} }}", f":root[data-theme=dark] {{ {dark} }}"]
 
 
 def heading(title: str) -> str:

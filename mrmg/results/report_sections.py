@@ -7,7 +7,7 @@ from mrmg.ledger import EnergyLedger
 from mrmg.mission import Plan
 from mrmg.results import report_page as html
 from mrmg.results.energy_audit import EnergyAudit
-from mrmg.results.mission_series import energy_by_terrain
+from mrmg.results.mission_series import energy_by_terrain, standing_of
 from mrmg.results.report_record import RunRecord
 from mrmg.results.style import terrain_classes
 
@@ -20,6 +20,7 @@ _PART_COLORS = {
     "device": "#AA3377",
 }
 _MAX_LISTED = 20
+_KJ_DIGITS = 2
 
 
 def energy(record: RunRecord) -> list[str]:
@@ -127,7 +128,7 @@ def tours(record: RunRecord) -> list[str]:
         rows = _tour_rows(record, record.plan, robot)
         parts.append(
             html.table(head, rows, text_columns=(0, 1, 2))
-            or html.note("stays where it is")
+            or html.note(standing_of(robot, record.plan, record.log))
         )
     return parts
 
@@ -214,7 +215,7 @@ def _shortened(items: list[str]) -> list[str]:
 
 def kJ(energy_J: float) -> str:
     """Return an energy as text."""
-    return f"{energy_J / 1000.0:.2f} kJ"
+    return f"{energy_J / 1000.0 + 0.0:.{_KJ_DIGITS}f} kJ"
 
 
 def _distance(distance_m: float | None) -> str:
@@ -225,7 +226,10 @@ def _distance(distance_m: float | None) -> str:
 
 
 def _percent(value: float, base: float) -> str:
-    return f"{signed(100.0 * (value - base) / base, 2)} %" if base else ""
+    shown = round(
+        base / 1000.0, _KJ_DIGITS
+    )  # of what shows as 0.00 a share says nothing
+    return f"{signed(100.0 * (value - base) / base, 2)} %" if shown else "–"
 
 
 def signed(value: float, digits: int) -> str:

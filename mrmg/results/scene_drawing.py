@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -14,19 +14,21 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.patheffects import withStroke
-from shapely import MultiPolygon, Polygon, box, maximum_inscribed_circle, unary_union
+from shapely import MultiPolygon, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from mrmg import storage
 from mrmg.results import style
 from mrmg.results.contours import draw_contours
+from mrmg.results.map_labels import BOLD, MapLabel, map_labels
+from mrmg.results.map_shapes import footprint_at
 from mrmg.scene.types import Goal, Region, Robot, Scene, Station
 
 DPI = 110
 _MAP_INCHES = 8.6
 _LEGEND_INCHES = 2.6
-_LABEL_M = 1.5
-_PARTIAL = style.OBSTACLE + "66"
+LETTER_POINTS = 10.0
+"""Size of the names on maps: one em."""
 _TIMELESS: dict[str, dict[str, Any]] = {
     "png": {"Software": None},
     "pdf": {"CreationDate": None},
@@ -35,6 +37,16 @@ _TIMELESS: dict[str, dict[str, Any]] = {
 """Metadata by format, such that equal figures give equal files."""
 HALO = [withStroke(linewidth=2.5, foreground="white")]
 """What keeps text readable on anything."""
+_MARKERS = {"goal": "o", "station": "s"}
+_LABEL_COLORS = {
+    "goal": style.INK,
+    "station": style.STATION_EDGE,
+    "breakdown": style.RESERVE,
+    "terrain": style.INK,
+    "obstacle": style.ON_OBSTACLE,
+    "height": style.CONTOUR,
+}
+"""Of all kinds but those of robots, which have their robot's."""
 
 
 def new_map_figure(scene: Scene) -> tuple[Figure, Axes]:
@@ -84,31 +96,73 @@ def draw_scene(scene: Scene, path: Path) -> None:
     figure, axes = new_map_figure(scene)
     draw_ground(axes, scene)
     for goal in scene.goals:
-        draw_goal(axes, goal, style.goal_labels(scene)[goal.id])
+        draw_goal(axes, goal)
     for station in scene.stations:
-        draw_station(axes, station, style.station_labels(scene)[station.id])
+        draw_station(axes, station)
     draw_robots(axes, scene)
     axes.set_title(_title(scene), loc="left", fontsize=12, color=style.INK)
-    handles = map_legend(scene)
-    add_legend(axes, handles)
+    add_legend(axes, map_legend(scene))
+    draw_labels(axes, scene, map_labels(scene, em_m=letter_m(axes)))
     write_figure(figure, path)
 
 
-def draw_ground(
+def letter_m(axes: Axes, points: float = LETTER_POINTS) -> float:
+    """Return the size of letters on the ground [m].
+
+    Args:
+        axes: in metres; all that decides their place in the figure is there.
+        points: size of the letters.
+    """
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    figure.draw_without_rendering()
+    pixels_per_m = axes.transData.get_matrix()[0, 0]
+    return float(points / 72.0 * figure.dpi / pixels_per_m)
+
+
+def draw_labels(
     axes: Axes,
     scene: Scene,
-    *,
-    hatched: bool = True,
-    label_points: float | None = 9.0,
+    labels: Iterable[MapLabel],
+    points: float = LETTER_POINTS,
 ) -> None:
+    """Write the names on a map.
+
+    Args:
+        axes: where to draw, in metres.
+        scene: gives the robots' colours.
+        labels: with their places.
+        points: size of one em.
+    """
+    robots = style.scene_robot_colors(scene)
+    for label in labels:
+        color = _LABEL_COLORS.get(label.kind) or robots[label.of]
+        look: dict[str, Any] = {"color": color, "path_effects": HALO}
+        if label.kind == "stop":
+            bbox = {"boxstyle": "round,pad=0.12", "fc": color, "ec": "white"}
+            look = {"color": "white", "bbox": bbox}
+        elif label.kind == "obstacle":
+            look = {"color": color}
+        axes.text(
+            label.x_m,
+            label.y_m,
+            label.text,
+            fontsize=points * label.size_em,
+            fontweight="bold" if label.kind in BOLD else "normal",
+            ha="center",
+            va="center",
+            zorder=9,
+            **look,
+        ).set_in_layout(False)
+
+
+def draw_ground(axes: Axes, scene: Scene, *, hatched: bool = True) -> None:
     """Draw bounds, terrain classes, contour lines and obstacles.
 
     Args:
         axes: where to draw, in metres.
         scene: what to draw.
         hatched: hatch the terrain classes.
-        label_points: size of the multipliers printed on terrain areas, and nearly that
-            of heights; None for neither.
     """
     bounds = box(*scene.bounds)
     _add_shape(
@@ -131,34 +185,30 @@ def draw_ground(
         _add_shape(
             axes,
             obstacle.shape,
-            facecolor=_PARTIAL if partial else style.OBSTACLE,
+            facecolor=style.PARTIAL_OBSTACLE if partial else style.OBSTACLE,
             edgecolor=style.OBSTACLE_EDGE,
             linewidth=0.7,
             linestyle="--" if partial else "-",
             zorder=3,
         )
-    draw_contours(axes, scene, label_points)
-    if label_points is not None:
-        _label_terrain(axes, scene, label_points)
+    draw_contours(axes, scene)
 
 
 def draw_goal(
     axes: Axes,
     goal: Goal,
-    label: str,
     *,
     color: str = style.GOAL_OPEN,
-    points: float = 10.0,
+    points: float = LETTER_POINTS,
 ) -> None:
-    """Draw a goal region and its label; a colour other than white means visited."""
+    """Draw a goal region; a colour other than white means visited."""
     draw_region(axes, goal.region, color, style.GOAL_EDGE, 0.13 * points)
-    _draw_label(axes, goal.region, label, style.INK, points)
 
 
 def draw_station(
-    axes: Axes, station: Station, label: str, *, points: float = 10.0
+    axes: Axes, station: Station, *, points: float = LETTER_POINTS
 ) -> None:
-    """Draw a recharging station: its region with a square and its label."""
+    """Draw a recharging station: its region with a square."""
     width = 0.13 * points
     draw_region(axes, station.region, style.STATION, style.STATION_EDGE, width)
     axes.plot(
@@ -170,7 +220,6 @@ def draw_station(
         markeredgewidth=0.1 * points,
         zorder=6,
     )
-    _draw_label(axes, station.region, f"⚡{label}", style.STATION_EDGE, points)
 
 
 def draw_region(
@@ -188,24 +237,10 @@ def draw_region(
 
 
 def draw_robots(axes: Axes, scene: Scene) -> None:
-    """Draw every robot's footprint at its start, its heading and its id."""
+    """Draw every robot's footprint at its start."""
     colors = style.scene_robot_colors(scene)
     for robot in scene.robots:
         draw_footprint(axes, robot, robot.pose, facecolor=colors[robot.id], alpha=1.0)
-        outline = footprint_at(robot, robot.pose)
-        axes.annotate(
-            robot.id,
-            (float(outline[:, 0].mean()), float(outline[:, 1].min())),
-            xytext=(0, -3),
-            textcoords="offset points",
-            fontsize=10,
-            fontweight="bold",
-            color=colors[robot.id],
-            ha="center",
-            va="top",
-            path_effects=HALO,
-            zorder=9,
-        )
 
 
 def draw_footprint(
@@ -228,56 +263,23 @@ def draw_footprint(
     )
 
 
-def footprint_at(robot: Robot, pose: tuple[float, float, float]) -> np.ndarray:
-    """Return a robot's outline at a pose, in the world's frame [m], shape (m, 2)."""
-    x_m, y_m, yaw = pose
-    turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
-    return np.asarray(robot.model.footprint_m @ turn.T + (x_m, y_m))
-
-
 def map_legend(scene: Scene) -> list[Patch | Line2D]:
     """Return legend handles for all kinds of things the scene holds."""
-    handles: list[Patch | Line2D] = []
-    if scene.goals:
-        handles.append(_marker("o", style.GOAL_OPEN, style.GOAL_EDGE, "goal"))
-    if scene.stations:
-        handles.append(
-            _marker("s", style.STATION, style.STATION_EDGE, "recharging station ⚡")
+    return [_handle(entry) for entry in style.map_key(scene)]
+
+
+def _handle(entry: style.KeyEntry) -> Patch | Line2D:
+    if entry.look == "line":
+        return Line2D([], [], color=entry.color, label=entry.label)
+    if entry.look == "area":
+        return Patch(
+            facecolor=entry.color,
+            edgecolor=entry.edge,
+            hatch=entry.hatch or None,
+            linestyle="--" if entry.dashed else "-",
+            label=entry.label,
         )
-    if any(obstacle.blocks is None for obstacle in scene.obstacles):
-        handles.append(
-            Patch(
-                facecolor=style.OBSTACLE,
-                edgecolor=style.OBSTACLE_EDGE,
-                label="obstacle",
-            )
-        )
-    if any(obstacle.blocks is not None for obstacle in scene.obstacles):
-        handles.append(
-            Patch(
-                facecolor=_PARTIAL,
-                edgecolor=style.OBSTACLE_EDGE,
-                linestyle="--",
-                label="obstacle for some robots",
-            )
-        )
-    if scene.terrain and 1.0 not in style.terrain_classes(scene):
-        plain = Patch(
-            facecolor=style.GROUND, edgecolor=style.MUTED, label="plain ground ×1"
-        )
-        handles.append(plain)
-    if scene.elevation is not None:
-        handles.append(Line2D([], [], color=style.CONTOUR, label="contour line"))
-    handles += [
-        Patch(
-            facecolor=look.color,
-            edgecolor="#00000060",
-            hatch=look.hatch,
-            label=look.label,
-        )
-        for look in style.terrain_classes(scene).values()
-    ]
-    return handles
+    return _marker(_MARKERS[entry.look], entry.color, entry.edge, entry.label)
 
 
 def add_legend(axes: Axes, handles: list[Patch | Line2D]) -> None:
@@ -303,60 +305,6 @@ def _title(scene: Scene) -> str:
     ]
     words = [f"{count} {noun}{'' if count == 1 else 's'}" for count, noun in counts]
     return f"{scene.name}: " + ", ".join(words)
-
-
-def terrain_spots(scene: Scene) -> list[tuple[float, float, float]]:
-    """Return where each visible terrain area has room for its name: (x, y, multiplier).
-
-    Areas that obstacles, targets or later areas cover altogether are left out.
-    """
-    taken = [obstacle.shape for obstacle in scene.obstacles]
-    taken += [target.region.shape.buffer(_LABEL_M) for target in scene.targets()]
-    free = box(*scene.bounds).difference(unary_union(taken))
-    spots = []
-    for rank, area in enumerate(scene.terrain):
-        visible = area.shape.intersection(free)
-        for later in scene.terrain[rank + 1 :]:
-            visible = visible.difference(later.shape)
-        if not visible.is_empty:
-            widest = max(polygons_of(visible), key=lambda part: part.area)
-            x_m, y_m = maximum_inscribed_circle(widest, tolerance=0.5).coords[0]
-            spots.append((x_m, y_m, area.multiplier))
-    return spots
-
-
-def _label_terrain(axes: Axes, scene: Scene, points: float) -> None:
-    for x_m, y_m, multiplier in terrain_spots(scene):
-        axes.text(
-            x_m,
-            y_m,
-            f"×{multiplier:g}",
-            fontsize=points,
-            color=style.INK,
-            ha="center",
-            va="center",
-            path_effects=HALO,
-            zorder=4,
-        )
-
-
-def _draw_label(
-    axes: Axes, region: Region, text: str, color: str, points: float
-) -> None:
-    x_min, _, x_max, y_max = region.shape.bounds
-    # Towards the upper right corner of the region's box, where a circle leaves room.
-    axes.annotate(
-        text,
-        (x_max - 0.12 * (x_max - x_min), y_max),
-        xytext=(1, -1),
-        textcoords="offset points",
-        fontsize=points,
-        fontweight="bold",
-        color=color,
-        va="bottom",
-        path_effects=HALO,
-        zorder=8,
-    )
 
 
 def _marker(shape: str, face: str, edge: str, label: str) -> Line2D:

@@ -18,6 +18,7 @@ MUTED = "#5F6773"
 GROUND = "#F7F7F3"
 OBSTACLE = "#5B6068"
 OBSTACLE_EDGE = "#33373D"
+ON_OBSTACLE = "#FFFFFF"
 CONTOUR = "#7A6A50"
 GOAL_OPEN = "#FFFFFF"
 GOAL_EDGE = "#1F2328"
@@ -28,6 +29,24 @@ RESERVE = "#B00020"
 PARTIAL_OBSTACLE = "#9E8CAD"
 """As `palette.PARTIAL_OBSTACLE`, which videos show."""
 
+
+@dataclass(frozen=True, slots=True)
+class LineLook:
+    """How a path or course is drawn: in its robot's colour, without dashes.
+
+    Attributes:
+        width_em: width, in sizes of the picture's letters.
+        opacity: 0..1.
+    """
+
+    width_em: float
+    opacity: float
+
+
+PLANNED, DRIVEN = LineLook(0.45, 0.33), LineLook(0.16, 1.0)
+"""What was planned is wide and pale, what was driven thin: on maps and in charts."""
+
+_LONGEST_NAME = 10
 _HATCHES = ("..", "//", "xx", "\\\\", "++")
 _PALENESS = 0.25
 _WHITE = (1.0, 1.0, 1.0)
@@ -75,6 +94,55 @@ def terrain_classes(scene: Scene) -> dict[float, TerrainClass]:
     return classes
 
 
+@dataclass(frozen=True, slots=True)
+class KeyEntry:
+    """A line of a map's legend.
+
+    Attributes:
+        label: what it explains.
+        look: "goal", "station", "area" or "line".
+        color: fill, or colour of the line.
+        edge: colour of the rim.
+        hatch: matplotlib hatch pattern.
+        dashed: whether the rim is.
+    """
+
+    label: str
+    look: str
+    color: str
+    edge: str = MUTED
+    hatch: str = ""
+    dashed: bool = False
+
+
+def map_key(scene: Scene) -> list[KeyEntry]:
+    """Return the legend of a scene's map: all kinds of things that it holds."""
+    blocking = {obstacle.blocks is None for obstacle in scene.obstacles}
+    classes = terrain_classes(scene)
+    entries = {
+        KeyEntry("goal", "goal", GOAL_OPEN, GOAL_EDGE): bool(scene.goals),
+        KeyEntry("recharging station ⚡", "station", STATION, STATION_EDGE): bool(
+            scene.stations
+        ),
+        KeyEntry("obstacle", "area", OBSTACLE, OBSTACLE_EDGE): True in blocking,
+        KeyEntry(
+            "obstacle for some robots",
+            "area",
+            PARTIAL_OBSTACLE,
+            OBSTACLE_EDGE,
+            dashed=True,
+        ): False in blocking,
+        KeyEntry("plain ground ×1", "area", GROUND): bool(classes)
+        and 1.0 not in classes,
+        KeyEntry("contour line", "line", CONTOUR): scene.elevation is not None,
+    }
+    areas = [
+        KeyEntry(look.label, "area", look.color, hatch=look.hatch)
+        for look in classes.values()
+    ]
+    return [*(entry for entry, shown in entries.items() if shown), *areas]
+
+
 def robot_colors(robots: Sequence[str]) -> dict[str, str]:
     """Return a colour by robot id (scene's order) that is dark enough for lines."""
     return {
@@ -94,17 +162,17 @@ def scene_robot_colors(scene: Scene) -> dict[str, str]:
 
 
 def goal_labels(scene: Scene) -> dict[str, str]:
-    """Return a short text for each goal: its id if all are short, else a number."""
+    """Return a text for each goal: its id if no id is long, else a number."""
     return _labels([goal.id for goal in scene.goals], "")
 
 
 def station_labels(scene: Scene) -> dict[str, str]:
-    """Return a short text for each station."""
+    """Return a text for each station, as `goal_labels` does."""
     return _labels([station.id for station in scene.stations], "S")
 
 
 def _labels(ids: Sequence[str], prefix: str) -> dict[str, str]:
-    if all(len(name) <= 3 for name in ids):
+    if all(len(name) <= _LONGEST_NAME for name in ids):
         return {name: name for name in ids}
     return {name: f"{prefix}{number}" for number, name in enumerate(ids, start=1)}
 

@@ -13,11 +13,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from mrmg.results import style
 from mrmg.results.ground_image import paint_line
-from mrmg.results.tags import Label
+from mrmg.results.tags import Label, letter_px
 from mrmg.results.world_view import WorldView, top_camera
 
-_TRAIL_PIXELS = 3.2
+_LEAST_TRAIL_PIXELS = 2.0
 _MARGIN_M = 0.3
 _DIFFERENCE = 10
 
@@ -46,16 +47,17 @@ class TopView:
         self._view = view
         self._center_m = center_m
         self._size = size
-        self._pixel_m = height_m / size[1]
-        self._half = math.ceil((radius_m + _MARGIN_M) / self._pixel_m)
-        self._trail_width = _TRAIL_PIXELS * max(size[1] / 720.0, 0.6)
+        self.pixel_m = height_m / size[1]
+        self._half = math.ceil((radius_m + _MARGIN_M) / self.pixel_m)
+        width = style.DRIVEN.width_em * letter_px(size[1])
+        self._trail_width = max(width, _LEAST_TRAIL_PIXELS)
         self._still = np.empty((size[1], size[0], 3), dtype=np.uint8)
         self._background = self._still.copy()
 
     def to_pixels(self, points: np.ndarray) -> np.ndarray:
         """Return (column, row) of points [m], shape (n, 2)."""
         middle = np.array(self._size) / 2.0
-        offset = (points[:, :2] - self._center_m) * (1.0, -1.0) / self._pixel_m
+        offset = (points[:, :2] - self._center_m) * (1.0, -1.0) / self.pixel_m
         return np.asarray(offset + middle)
 
     def draw_background(
@@ -73,13 +75,13 @@ class TopView:
         """
         self._view.place_robots_away(qpos)
         camera = top_camera(self._center_m)
-        height_m = self._pixel_m * self._size[1]
+        height_m = self.pixel_m * self._size[1]
         self._view.draw(camera, fovy=height_m, shadows=False, out=self._still)
         self._background = self._still.copy()
         for color, points in trails.items():
             self.extend_trail(points, color)
         for label, spot in labels:
-            label.blit(self._background, self.to_pixels(spot[None])[0])
+            label.blit_about(self._background, self.to_pixels(spot[None])[0])
 
     def extend_trail(self, points: np.ndarray, color: str) -> None:
         """Paint a driven way through points [m], shape (n, 2), onto the background."""
@@ -104,8 +106,8 @@ class TopView:
         half = self._half
         patch = np.empty((2 * half, 2 * half, 3), dtype=np.uint8)
         middle = np.array(self._size) / 2.0
-        at = self._center_m + ((column, row) - middle) * (1.0, -1.0) * self._pixel_m
-        fovy = 2 * half * self._pixel_m
+        at = self._center_m + ((column, row) - middle) * (1.0, -1.0) * self.pixel_m
+        fovy = 2 * half * self.pixel_m
         self._view.draw(top_camera(at), fovy=fovy, shadows=False, out=patch)
         top, left = max(row - half, 0), max(column - half, 0)
         bottom, right = (

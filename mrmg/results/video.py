@@ -89,7 +89,7 @@ def pictures(
     Raises:
         MachineError: if this machine has no OpenGL that draws offscreen.
     """
-    ground = paint_ground(film.scene, film.plan, film.frame)
+    ground = paint_ground(film.scene, film.plan, film.frame, film.em_m)
     # All of a chase is drawn anew in every frame, where moving edges are seldom seen.
     smooth = film.options.view != "chase"
     with open_view(film.world, ground, film.options.size, smooth=smooth) as view:

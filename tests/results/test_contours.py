@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrmg.results.contours import contour_lines, label_spot, levels_m
+from mrmg.results.contours import contour_lines, levels_m
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.world.relief import height_at
@@ -44,9 +44,3 @@ def test_levels_are_round_and_few(low: float, high: float, step: float) -> None:
     assert high - step - 1e-9 <= levels[-1] < high
     assert np.abs(levels / step - np.round(levels / step)).max() < 1e-6
     assert len(levels) <= 12
-
-
-def test_labels_lie_half_way_along_long_lines() -> None:
-    long = np.stack([np.linspace(0.0, 20.0, 41), np.zeros(41)], axis=1)
-    assert label_spot(long) == (10.0, 0.0)
-    assert label_spot(long[:5]) is None

@@ -9,8 +9,9 @@ from xml.etree import ElementTree
 import pytest
 
 from mrmg.execution.log import Contact
+from mrmg.execution.supervision import Event
+from mrmg.results.map_labels import KINDS, map_labels
 from mrmg.results.mission_series import activities, logged_motions, shown_visits
-from mrmg.results.overview import name_spots
 from mrmg.results.report_map import mission_map
 from mrmg.results.report_timeline import timeline
 
@@ -53,27 +54,56 @@ def corners(path: ElementTree.Element) -> list[tuple[float, float]]:
     return [tuple(map(float, xy.split(","))) for xy in path.get("points").split()]
 
 
-def test_long_paths_bear_their_robot_s_name_away_from_other_names(
-    make_scene, make_plan, make_log, straight
+def test_names_are_where_they_were_placed_and_robots_names_go_with_them(
+    mission,
 ) -> None:
-    scene = make_scene(
-        robots=[
-            {"id": "r1", "model": "car", "pose": [5, 10, 0]},
-            {"id": "r2", "model": "car", "pose": [5, 5, 0]},
-        ]
+    scene, plan, log = mission
+    parts = layers(mission_map(scene, plan, log))
+    texts = [item for part in parts.values() for item in part.iter("text")]
+    drawn = {
+        (item.get("class"), item.text): (float(item.get("x")), float(item.get("y")))
+        for item in texts
+    }
+    labels = map_labels(scene, plan, log, em_m=40.0 / 48.0, kinds=set(KINDS) - {"stop"})
+    assert {label.kind for label in labels} >= {"goal", "station", "robot", "obstacle"}
+    for label in labels:
+        look = "label" if label.kind == "robot" else f"label {label.kind}-name"
+        spot = label.x_m, 20.0 - label.y_m
+        assert drawn[look, label.text] == pytest.approx(spot, abs=0.011)
+    name = next(item for item in texts if item.get("data-beside") and item.text == "r1")
+    right, down = map(float, name.get("data-beside").split())
+    assert (5.0 + right, 10.0 + down) == pytest.approx(drawn["label", "r1"], abs=0.011)
+
+
+def test_a_breakdown_is_marked_on_map_and_timeline(mission) -> None:
+    scene, plan, log = mission
+    event = Event(
+        time_s=4.0,
+        cause="fault",
+        robot="r2",
+        action="stop",
+        message="r2 has broken down",
     )
-    controls = {"r1": straight(30.0), "r2": straight(4.0)}
-    plan = make_plan(scene, controls, {"r1": ("g",), "r2": ()})
-    spots = name_spots(scene, plan)
-    assert list(spots) == ["r1"]  # the other path is too short
-    x_m, y_m = spots["r1"]
-    assert (x_m, y_m) == pytest.approx((35.0, 10.0), abs=0.5)  # far from the goal
-    robots = layers(mission_map(scene, plan, None))["robots"]
-    (name,) = [item for item in robots if item.get("class") == "whose"]
-    assert (name.get("data-robot"), name.text) == ("r1", "r1")
-    assert (float(name.get("x")), float(name.get("y"))) == pytest.approx(
-        (x_m, 20.0 - y_m), abs=0.01
-    )
+    log = replace(log, events=(event,))
+    parts = layers(mission_map(scene, plan, log))
+    assert "r2 broke down at 4.0 s" in tips(parts["driven"])
+    assert [t.text for t in parts["robots"].iter("text")].count("r2 broke down") == 1
+    page = timeline(scene, plan, log)
+    end_s = log.time_s[-1]
+    assert f"r2 has broken down from 4.0 to {end_s:.1f} s" in page
+    assert "✖ broken down</em>" in page
+    assert "not used" not in page
+
+
+def test_a_robot_without_a_tour_is_not_used(mission) -> None:
+    scene, plan, log = mission
+    still = replace(log, state=log.state.copy())
+    still.state[1] = still.state[1, 0]
+    for shown in (log, still):
+        page = timeline(scene, plan, shown)
+        assert "not used</em>" in page
+        assert "r2 has finished" not in page
+        assert "r1 has finished" in page
 
 
 def test_everything_on_the_map_says_what_it_is(mission) -> None:

@@ -48,11 +48,15 @@
   const charts = [];
   const hiddenOwners = new Set();
   const DASHES = [[], [9, 4], [3, 3], [12, 3, 3, 3]];
+  const EM = 11;  // of a chart's letters, in pixels
+  const number = (name) => Number(color(name));
+  const faded = (hex, share) => hex + Math.round(255 * share).toString(16).padStart(2, "0");
   function lineOf(series) {
     const own = color(`--r${series.color}`);
     const looks = {
-      planned: { stroke: `${own}66`, width: 5, dash: [] },
-      simulated: { stroke: own, width: 1.6, dash: [] },
+      planned: { stroke: faded(own, number("--planned-opacity")),
+        width: EM * number("--planned-width"), dash: [] },
+      simulated: { stroke: own, width: EM * number("--driven-width"), dash: [] },
       limit: { stroke: color("--bad"), width: 1.4, dash: [6, 4] },
       course: { stroke: color("--accent"), width: 1.8, dash: [] },
       own: { stroke: own, width: 1.6, dash: DASHES[series.color % DASHES.length] },
@@ -82,7 +86,7 @@
       return { label: item.label, value: valueText(chart), points: { show: own && item.look === "course" },
         show: !hiddenOwners.has(item.owner), ...held, ...look };
     });
-    const range = chart.range ? () => chart.range : (u, low, high) => [0, (high || 1) * 1.06];
+    const range = chart.range ? () => chart.range : (u, low, high) => [Math.min(0, low) * 1.06, (high || 1) * 1.06];
     const plot = new uPlot({
       width: place.clientWidth,
       height: 190,
@@ -117,6 +121,16 @@
     charts.push(...data.charts.map(drawChart));
   }
 
+  /* Beside a robot at the border its name goes inwards. */
+  function keepInside(name) {
+    const own = name.getBBox(), room = one(".map .ground").getBBox();
+    for (const [at, size] of [["x", "width"], ["y", "height"]]) {
+      const before = Math.max(0, room[at] - own[at]);
+      const after = Math.min(0, room[at] + room[size] - own[at] - own[size]);
+      name.setAttribute(at, Number(name.getAttribute(at)) + before + after);
+    }
+  }
+
   /* The time shown. */
   const slider = one("#time");
   let shownIndex = 0;
@@ -129,9 +143,11 @@
       const group = one(`.map .robot[data-robot="${CSS.escape(robot.id)}"]`);
       const x = robot.x[index], y = robot.y[index];
       group.querySelector(".body").setAttribute("transform", `translate(${x} ${y}) rotate(${robot.turn[index]})`);
-      const name = group.querySelector(".name");
-      name.setAttribute("x", x);
-      name.setAttribute("y", y);
+      const name = group.querySelector(".label");
+      const [right, down] = name.dataset.beside.split(" ").map(Number);
+      name.setAttribute("x", x + right);
+      name.setAttribute("y", y + down);
+      keepInside(name);
     });
     const done = new Map(data.visits
       .filter((visit) => visit.kind === "goal" && visit.time_s <= time + 1e-6)

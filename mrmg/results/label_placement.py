@@ -1,0 +1,220 @@
+"""Point-feature label placement: each text gets the least costly of its candidates.
+
+Every label has a finite set of candidate positions with a preference (Christensen,
+Marks and Shieber 1995). Its cost there is the preference, plus a large constant and the
+overlapped area for each overlap with an occupied shape or another label, plus small
+terms for what is merely near or crosses a line. Labels are placed greedily, those with
+the fewest free candidates first, and then moved one by one to their least costly
+candidate until none improves. Pair costs are symmetric, so that the sum of all costs
+falls with every move and the sweeps end: at the end no label overlaps anything while
+one of its own candidates is free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry import MultiPoint
+from shapely.geometry.base import BaseGeometry
+
+OVERLAP_COST = 100.0
+"""Cost of any overlap; above the sum of all other costs a candidate can have."""
+
+_NEAR_COST = 0.6
+_LINE_COST_PER_EM = 0.4
+_MOST_LINE_COST = 4.0
+_GAP_EM = 0.2
+"""What lies within this distance of a label is near it."""
+
+_DIRECTIONS = 16
+_RINGS_EM = (0.12, 0.5, 1.0, 2.0)
+"""Distances between a shape and the labels around it."""
+
+_RING_COST, _DIRECTION_COST = 1.2, 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LabelBox:
+    """A rectangle that is to be placed.
+
+    Attributes:
+        half_m: half its width and height, shape (2,).
+        spots_m: candidates for its centre, shape (n, 2).
+        cost: of each candidate, below `OVERLAP_COST`, shape (n,).
+        owner: what it names; it may lie on shapes and lines of that owner.
+        optional: whether it is left out where no candidate is free.
+    """
+
+    half_m: np.ndarray
+    spots_m: np.ndarray
+    cost: np.ndarray
+    owner: str
+    optional: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Occupied:
+    """A shape or line on the map, and what it belongs to; "" is nobody's."""
+
+    shape: BaseGeometry
+    owner: str
+
+
+def spots_around(
+    shape: BaseGeometry, half_m: np.ndarray, em_m: float, preferred_rad: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return candidates for a box beside a shape: centres (n, 2) and their costs.
+
+    A box touches a convex shape exactly when its centre is on the boundary of the
+    Minkowski sum of both; the candidates lie on that boundary, and on others further
+    out.
+
+    Args:
+        shape: what is labelled; its convex hull counts.
+        half_m: half the width and height of the box.
+        em_m: size of the letters.
+        preferred_rad: direction of the candidate that costs least.
+    """
+    hull = shapely.get_coordinates(shape.convex_hull)
+    middle = 0.5 * (hull.min(axis=0) + hull.max(axis=0))
+    angle = 2.0 * np.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    direction = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    turned = np.abs((angle - preferred_rad + np.pi) % (2.0 * np.pi) - np.pi) / np.pi
+    signs = np.array([[-1.0, -1.0], [-1.0, 1.0], [1.0, -1.0], [1.0, 1.0]])
+    spots, costs = [], []
+    for ring, gap_em in enumerate(_RINGS_EM):
+        corners = (hull[:, None] + signs * (half_m + gap_em * em_m)).reshape(-1, 2)
+        touching = shapely.get_coordinates(MultiPoint(corners).convex_hull)
+        spots.append(middle + _reach(touching - middle, direction) * direction)
+        costs.append(_DIRECTION_COST * turned + _RING_COST * ring)
+    return np.concatenate(spots), np.concatenate(costs)
+
+
+def _reach(ring: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Return how far a convex ring about the origin lies in each direction, (n, 1)."""
+    edge = np.diff(ring, axis=0)
+    normal = np.stack([edge[:, 1], -edge[:, 0]], axis=1)
+    offset = (normal * ring[:-1]).sum(axis=1)
+    normal *= np.where(offset < 0.0, -1.0, 1.0)[:, None]
+    along = direction @ normal.T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        far = np.where(along > 1e-12, np.abs(offset) / along, np.inf)
+    return np.asarray(far.min(axis=1, keepdims=True))
+
+
+def place(
+    labels: Sequence[LabelBox],
+    shapes: Sequence[Occupied],
+    lines: Sequence[Occupied],
+    em_m: float,
+) -> list[np.ndarray | None]:
+    """Return the centre of each label, or None for optional ones without room.
+
+    Args:
+        labels: earlier optional labels are placed before later ones.
+        shapes: must not be overlapped.
+        lines: should not be crossed.
+        em_m: size of the letters.
+    """
+    static = _static_costs(labels, shapes, lines, em_m)
+    chosen: list[np.ndarray | None] = [None] * len(labels)
+    needed = [at for at, label in enumerate(labels) if not label.optional]
+    needed.sort(key=lambda at: int((static[at] < OVERLAP_COST).sum()))
+    moved = True
+    while moved:
+        moved = False
+        for at in needed:
+            moved |= _improve(at, labels, static, chosen, em_m)
+    for at, label in enumerate(labels):
+        if label.optional:
+            _improve(at, labels, static, chosen, em_m)
+    return chosen
+
+
+def _improve(
+    at: int,
+    labels: Sequence[LabelBox],
+    static: Sequence[np.ndarray],
+    chosen: list[np.ndarray | None],
+    em_m: float,
+) -> bool:
+    """Move a label to its least costly candidate; return whether that changed."""
+    label = labels[at]
+    cost = static[at] + _pair_costs(at, labels, chosen, em_m)
+    if not len(cost) or (label.optional and cost.min() >= OVERLAP_COST):
+        return False
+    best = label.spots_m[int(np.argmin(cost))]
+    before = chosen[at]
+    if before is not None:
+        same = (label.spots_m == before).all(axis=1)
+        if cost.min() > cost[same].min() - 1e-9:
+            return False
+    chosen[at] = best
+    return True
+
+
+def _pair_costs(
+    at: int,
+    labels: Sequence[LabelBox],
+    chosen: Sequence[np.ndarray | None],
+    em_m: float,
+) -> np.ndarray:
+    """Return the cost of each candidate against the other labels where they are."""
+    label = labels[at]
+    others = [
+        (spot, labels[other].half_m)
+        for other, spot in enumerate(chosen)
+        if spot is not None and other != at
+    ]
+    if not others:
+        return np.zeros(len(label.spots_m))
+    spots, halves = (np.array(part) for part in zip(*others, strict=True))
+    apart = np.abs(label.spots_m[:, None] - spots) - (label.half_m + halves)
+    overlaps = (apart < 0.0).all(axis=2)
+    area = np.prod(np.minimum(apart, 0.0), axis=2) / em_m**2
+    near = ~overlaps & (apart.max(axis=2) < _GAP_EM * em_m)
+    cost = np.where(overlaps, OVERLAP_COST * (1.0 + area), _NEAR_COST * near)
+    return np.asarray(cost.sum(axis=1))
+
+
+def _static_costs(
+    labels: Sequence[LabelBox],
+    shapes: Sequence[Occupied],
+    lines: Sequence[Occupied],
+    em_m: float,
+) -> list[np.ndarray]:
+    """Return the costs of all candidates that no other label changes."""
+    counts = [len(label.spots_m) for label in labels]
+    if not sum(counts):
+        return [np.zeros(0) for _ in labels]
+    owner = np.repeat(np.array([label.owner for label in labels]), counts)
+    low, high = (
+        np.concatenate([label.spots_m + sign * label.half_m for label in labels])
+        for sign in (-1.0, 1.0)
+    )
+    boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
+    cost = np.concatenate([label.cost for label in labels]).astype(float)
+    at, hit = _foreign(boxes, shapes, owner, _GAP_EM * em_m)
+    near = shapely.distance(boxes[at], hit) > 0.0
+    area = shapely.area(shapely.intersection(boxes[at], hit)) / em_m**2
+    np.add.at(cost, at, np.where(near, _NEAR_COST, OVERLAP_COST * (1.0 + area)))
+    at, hit = _foreign(boxes, lines, owner, 0.0)
+    length_em = shapely.length(shapely.intersection(boxes[at], hit)) / em_m
+    np.add.at(cost, at, np.minimum(_LINE_COST_PER_EM * length_em, _MOST_LINE_COST))
+    return np.split(cost, np.cumsum(counts)[:-1])
+
+
+def _foreign(
+    boxes: np.ndarray, things: Sequence[Occupied], owner: np.ndarray, within_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return each box's index and shape of every thing of others within a distance."""
+    shapes = np.array([thing.shape for thing in things], dtype=object)
+    if not len(shapes):
+        return np.zeros(0, dtype=int), shapes
+    at, hit = shapely.STRtree(shapes).query(boxes, "dwithin", within_m)
+    whose = np.array([thing.owner for thing in things])[hit]
+    foreign = (whose == "") | (owner[at] != whose)
+    return at[foreign], shapes[hit[foreign]]
