@@ -7,7 +7,12 @@ from mrmg.ledger import EnergyLedger
 from mrmg.mission import Plan
 from mrmg.results import report_page as html
 from mrmg.results.energy_audit import EnergyAudit
-from mrmg.results.mission_series import energy_by_terrain, standing_of
+from mrmg.results.mission_series import (
+    energy_by_terrain,
+    shown_motions,
+    standing_of,
+    way_to,
+)
 from mrmg.results.report_record import RunRecord
 from mrmg.results.style import terrain_classes
 
@@ -21,6 +26,7 @@ _PART_COLORS = {
 }
 _MAX_LISTED = 20
 _KJ_DIGITS = 2
+_STILL_M = 0.1
 
 
 def energy(record: RunRecord) -> list[str]:
@@ -128,9 +134,16 @@ def tours(record: RunRecord) -> list[str]:
         rows = _tour_rows(record, record.plan, robot)
         parts.append(
             html.table(head, rows, text_columns=(0, 1, 2))
-            or html.note(standing_of(robot, record.plan, record.log))
+            or html.note(_without_tour(record, record.plan, robot))
         )
     return parts
+
+
+def _without_tour(record: RunRecord, plan: Plan, robot: str) -> str:
+    motions = {item.robot: item.state for item in shown_motions(plan, record.log)}
+    stays = way_to(motions[robot])[-1] < _STILL_M
+    standing = standing_of(robot, plan, record.log)
+    return f"{standing}: stays where it is" if stays else standing
 
 
 def _tour_rows(record: RunRecord, plan: Plan, robot: str) -> list[list[str]]:
