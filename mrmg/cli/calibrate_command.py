@@ -21,7 +21,7 @@ def calibrate(options: argparse.Namespace) -> int:
     from mrmg.results.print_style import require_format
     from mrmg.scene.loading.models import load_model
 
-    folder = _folder_of(options.model)
+    folder = folder_of_model(options.model)
     out = options.out or Path(f"calibrated-{folder.name}")
     plot = options.plot or out / "calibration.png"
     require_format(plot)
@@ -39,7 +39,8 @@ def calibrate(options: argparse.Namespace) -> int:
     return ExitCode.OK
 
 
-def _folder_of(reference: str) -> Path:
+def folder_of_model(reference: str) -> Path:
+    """Return the folder that a MODEL of the command line names."""
     from mrmg.scene.loading.models import model_folder
 
     # A folder in the working directory needs no slash here, as it does in a scene.

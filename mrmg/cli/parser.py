@@ -12,6 +12,7 @@ from mrmg.cli import (
     commands,
     completion,
     replay_command,
+    robot_commands,
     robustness_commands,
     scene_commands,
     show_commands,
@@ -50,6 +51,7 @@ def make_parser() -> Parser:
     _add_figure(verbs)
     _add_view(verbs)
     _add_scene(verbs)
+    robot_commands.add_robot(verbs)
     _add_calibrate(verbs)
     shells = verbs.add_parser("completion", help="print the completion of a shell")
     shells.add_argument("shell", choices=completion.SHELLS, metavar="bash|zsh|fish")

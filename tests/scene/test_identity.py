@@ -170,6 +170,13 @@ REFUSED = {
     "heading_rad",
     "id",
     "start_J",
+    # Of another robot than the MJCF describes:
+    "center_of_mass_m",
+    "mass_kg",
+    "track_m",
+    "wheel_count",
+    "wheel_radius_m",
+    "wheelbase_m",
 }
 """Changed alone these make no valid scene, or none that a file can state."""
 
@@ -285,24 +292,26 @@ def own_model(folder: Path, document: dict[str, Any] | None = None) -> Scene:
         xml.write_text(text.replace("</mujoco>", f"{asset}</mujoco>"))
         (folder / "car" / "parts" / "more.xml").write_text(
             '<mujoco><compiler meshdir="../meshes"/><asset>'
-            '<mesh name="box" file="box.stl"/></asset></mujoco>'
+            '<mesh name="box" file="box.obj"/></asset></mujoco>'
         )
         (folder / "meshes").mkdir()
-        (folder / "meshes" / "box.stl").write_bytes(b"solid")
+        corners = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
+        sides = "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+        (folder / "meshes" / "box.obj").write_text(corners + sides)
     robots = [{"id": "r1", "model": f"{folder}/car", "pose": [4, 5, 0]}]
     field = {"format": 1, "name": "field", "bounds": [0, 0, 20, 10], "robots": robots}
     return scene_from_document({**field, **(document or {})}, source="field")
 
 
 @pytest.mark.parametrize(
-    "file", ["car/car.xml", "car/parts/more.xml", "meshes/box.stl"]
+    "file", ["car/car.xml", "car/parts/more.xml", "meshes/box.obj"]
 )
 def test_an_edited_file_of_a_model_is_another_scene(tmp_path: Path, file: str) -> None:
     folder = tmp_path / "own"
     scene = own_model(folder)
     assert own_model(folder) == scene
     with (folder / file).open("a") as edited:
-        edited.write("<!-- edited -->")
+        edited.write("# edited" if file.endswith(".obj") else "<!-- edited -->")
     assert own_model(folder) != scene
     (changed_file,) = scene.robots[0].model.files.changed()
     assert changed_file.resolve() == (folder / file).resolve()

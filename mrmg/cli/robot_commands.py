@@ -1,0 +1,148 @@
+"""The verbs about robot models: check and show one, begin one, list shipped ones."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from mrmg.cli import terminal
+from mrmg.cli.run_options import add_trust
+from mrmg.errors import ExitCode, MachineError, SceneError
+
+
+def add_robot(verbs: Any) -> None:
+    """Add the verb `robot`."""
+    robot = verbs.add_parser("robot", help="check, make or list robot models")
+    acts = robot.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    check = acts.add_parser(
+        "check",
+        help="compare a model's robot.yaml with its MJCF, and show the robot",
+        description="Report every fault of a robot model, differences between its "
+        "robot.yaml and its MJCF included, or else print its figures and draw it. "
+        "Exit code 0 if it is valid, 3 if not.",
+    )
+    check.add_argument(
+        "model",
+        metavar="FOLDER",
+        help="a model's folder, or the name of a shipped model",
+    )
+    check.add_argument(
+        "-o", "--out", type=Path, metavar="PICTURE.png", help="default NAME.png"
+    )
+    add_trust(check)
+    check.add_argument(
+        "--json", action="store_true", help="print faults and figures alone"
+    )
+    check.set_defaults(command=check_robot)
+
+    new = acts.add_parser("new", help="begin a robot model of your own")
+    new.add_argument("name", metavar="NAME", help="of the model, and of its folder")
+    new.add_argument(
+        "--like", default="car", metavar="MODEL", help="shipped model; default car"
+    )
+    new.set_defaults(command=new_robot)
+
+    listed = acts.add_parser("list", help="list the shipped robot models")
+    listed.add_argument(
+        "--json", action="store_true", help="print their figures as JSON"
+    )
+    listed.set_defaults(command=list_robots)
+
+
+def check_robot(options: argparse.Namespace) -> int:
+    """Report the faults of a robot model, or show it."""
+    from mrmg.cli.calibrate_command import folder_of_model
+    from mrmg.scene.loading.models import load_model
+    from mrmg.scene.robot_figures import figure_lines, robot_figures
+
+    folder = folder_of_model(options.model)
+    try:
+        model, _ = load_model(folder, trust_code=options.trust_code)
+        if model.has_custom_motion:
+            from mrmg.motion.user_motion import user_motion
+
+            limits = model.limits.scaled(model.planning_share)
+            user_motion(model.motion_model).compiled(limits.as_tuple())
+    except SceneError as error:
+        if options.json:
+            faults = [asdict(fault) for fault in error.faults]
+            terminal.print_json({"model": folder.name, "ok": False, "faults": faults})
+        raise
+    picture = _draw(model, options.out)
+    if options.json:
+        found = {"model": model.name, "ok": True, "faults": []}
+        found |= {"figures": robot_figures(model), "picture": picture}
+        terminal.print_json(found)
+    else:
+        print(f"{model.name}: valid")
+        print("\n".join(f"  {line}" for line in figure_lines(model)))
+        if picture is not None:
+            print(picture)
+    return ExitCode.OK
+
+
+def _draw(model: Any, out: Path | None) -> str | None:
+    """Draw a robot; a machine that cannot fails only if the picture was asked for."""
+    from mrmg.results.robot_drawing import draw_robot
+
+    picture = out or Path(f"{model.name}.png")
+    try:
+        draw_robot(model, picture)
+    except MachineError as error:
+        if out is not None:
+            raise
+        print(f"mrmg: no picture: {error}", file=sys.stderr)
+        return None
+    return str(picture)
+
+
+def new_robot(options: argparse.Namespace) -> int:
+    """Begin a robot model of the user's own."""
+    from mrmg.authoring import new_robot as written
+
+    folder = Path(options.name)
+    for file in written(folder, like=options.like):
+        print(file)
+    name = shlex.quote(str(folder))
+    reference = str(folder) if folder.is_absolute() else f"./{folder}"
+    print(f"next, after changing both files:\n  mrmg robot check {name}")
+    print(f"  mrmg calibrate {name}")
+    print(f"in a scene: {{id: r1, model: {reference}, pose: [5, 5, 0]}}")
+    return ExitCode.OK
+
+
+def list_robots(options: argparse.Namespace) -> int:
+    """List the shipped robot models with their figures."""
+    from mrmg import shipped
+    from mrmg.scene.loading.models import load_model
+    from mrmg.scene.robot_figures import robot_figures
+
+    found = {}
+    for name in shipped.model_names():
+        model, _ = load_model(shipped.models_folder() / name)
+        found[name] = robot_figures(model)
+    if options.json:
+        terminal.print_json(found)
+        return ExitCode.OK
+    heads = ("model", "motion", "size [m]", "mass", "top speed", "plain", "range")
+    rows = [
+        (
+            name,
+            each["motion_model"],
+            f"{each['length_m']:g} x {each['width_m']:g}",
+            f"{each['mass_kg']:g} kg",
+            f"{each['v_max_m_s']:g} m/s",
+            f"{each['plain_ground_J_per_m']:.0f} J/m",
+            f"{each['battery_range_m']:.0f} m",
+        )
+        for name, each in found.items()
+    ]
+    for row in (heads, *rows):
+        first, second, *others = row
+        print(f"{first:<12}{second:<10}" + "".join(f"{cell:>13}" for cell in others))
+    return ExitCode.OK
