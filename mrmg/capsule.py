@@ -21,8 +21,10 @@ import numpy as np
 from mrmg import storage
 from mrmg.errors import Fault, FileError
 from mrmg.execution.log import ExecutionLog, package_versions
+from mrmg.scene.loading.carrying import safe_path
 
-CAPSULE_FORMAT = 1
+CAPSULE_FORMAT = 2
+"""Format 2 also has models of the user's own; format 1 is still read."""
 CAPSULE_FILE = "capsule.zip"
 
 LAST_TICKS = 250
@@ -32,6 +34,9 @@ _RUN_FILES = ("scene.yaml", "planning.json", "plan.json", "plan.npz")
 _STATES = ("time_s", "clock_s", "state", "reference", "command", "qpos")
 _HEADER = "capsule.json"
 _LAST = "last.npz"
+_MOST_BYTES = 2**31
+"""What a capsule may unpack to."""
+
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -102,9 +107,23 @@ class Capsule:
     files: Mapping[str, bytes]
 
     @staticmethod
-    def of_run(folder: Path, arguments: Mapping[str, Any], failure: Failure) -> Capsule:
-        """Return the capsule of an execution of the plan that lies in a run folder."""
+    def of_run(
+        folder: Path,
+        arguments: Mapping[str, Any],
+        failure: Failure,
+        carried: Mapping[str, bytes] | None = None,
+    ) -> Capsule:
+        """Return the capsule of an execution of the plan that lies in a run folder.
+
+        Args:
+            folder: of the run.
+            arguments: of the run, as JSON data.
+            failure: what came of it.
+            carried: the scene and its models (`scene.loading.carrying`); without them
+                the folder's scene, which names shipped models only.
+        """
         files = {name: (folder / name).read_bytes() for name in _RUN_FILES}
+        files |= carried or {}
         return Capsule(arguments=arguments, failure=failure, files=files)
 
     def save(self, path: Path) -> None:
@@ -141,8 +160,8 @@ class Capsule:
         try:
             members = _members(path)
             header = json.loads(members.pop(_HEADER))
-            if header["format"] != CAPSULE_FORMAT:
-                raise ValueError(f"this version reads format {CAPSULE_FORMAT} only")
+            if header["format"] not in (1, CAPSULE_FORMAT):
+                raise ValueError(f"this version reads formats 1 and {CAPSULE_FORMAT}")
             failure = Failure(
                 causes=tuple(header["causes"]),
                 reasons=tuple(header["reasons"]),
@@ -165,18 +184,25 @@ class Capsule:
         )
 
     def unpack(self, folder: Path) -> None:
-        """Write scene and plan into a run folder."""
-        for name in _RUN_FILES:
-            storage.write_bytes(folder / name, self.files[name])
+        """Write the scene with its models, and the plan, into a run folder."""
+        for name, content in self.files.items():
+            storage.write_bytes(folder / name, content)
 
 
 def _members(path: Path) -> dict[str, bytes]:
     """Return the content of exactly those members that a capsule has."""
-    expected = (_HEADER, *_RUN_FILES, _LAST)
+    expected: tuple[str, ...] = (_HEADER, *_RUN_FILES, _LAST)
     with zipfile.ZipFile(path) as archive:
         missing = sorted({*expected} - {*archive.namelist()})
         if missing:
             raise ValueError(f"{missing[0]} is missing")
+        models = {*archive.namelist()} - {*expected}
+        unsafe = sorted(name for name in models if not safe_path(name))
+        if unsafe:
+            raise ValueError(f"{unsafe[0]!r} is no file of a capsule")
+        expected += tuple(sorted(models))
+        if sum(info.file_size for info in archive.infolist()) > _MOST_BYTES:
+            raise ValueError(f"unpacks to more than {_MOST_BYTES // 2**30} GiB")
         try:
             return {name: archive.read(name) for name in expected}
         except (RuntimeError, NotImplementedError, EOFError, zlib.error) as error:

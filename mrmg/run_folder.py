@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import shutil
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from typing import Any
 
 from mrmg import storage
 from mrmg.errors import Fault, RunFolderError, UsageError
+from mrmg.scene.model_files import MODELS_FOLDER
 
 RUN_FORMAT = 1
 
@@ -166,6 +168,8 @@ class RunFolder:
         for step in reversed(steps):
             for name in reversed((*ON_REQUEST.get(step, ()), *OUTPUTS[step])):
                 self.file(name).unlink(missing_ok=True)
+        if Step.PLAN in steps:
+            shutil.rmtree(self.file(MODELS_FOLDER), ignore_errors=True)
 
     def finish(self, step: Step, fingerprint: str) -> None:
         """Mark `step` as finished under `fingerprint`."""

@@ -11,6 +11,7 @@ from mrmg import storage
 from mrmg.replacing import require_room
 from mrmg.run_arguments import RunArguments
 from mrmg.run_folder import RunFolder, Step
+from mrmg.scene.loading.carrying import carried_files
 from mrmg.steps import Run, write_planning
 
 LONGEST_NAME = 60
@@ -66,8 +67,9 @@ def begin_drive(
     if not overwrite:
         require_room(other, plan=plan)
     if not other.is_done(Step.PLAN) or other.plan().digest != plan.digest:
+        files = carried_files(run.scene)
         folder.begin(Step.PLAN, arguments.to_json())
-        write_planning(other, plan, run.planning())
+        write_planning(folder, files, plan, run.planning())
         folder.finish(Step.PLAN, other.fingerprint(Step.PLAN))
     return other
 

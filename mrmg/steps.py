@@ -6,7 +6,7 @@ a run taken up later goes through exactly the same doors as one that was never s
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib.metadata import version
@@ -19,7 +19,8 @@ from mrmg.errors import ExitCode, MrmgError, RunFolderError
 from mrmg.mission import Plan, PlanStatus, plan_in_force
 from mrmg.run_arguments import RunArguments
 from mrmg.run_folder import NEEDS, RunFolder, Step, stale_after
-from mrmg.scene.loading import dump_scene, load_scene
+from mrmg.scene.loading import load_scene
+from mrmg.scene.loading.carrying import carried_files
 from mrmg.scene.types import Scene
 
 if TYPE_CHECKING:
@@ -189,7 +190,7 @@ def _code_digest() -> str:
 def _plan(run: Run) -> Write:
     from mrmg.planning import plan_mission, profile_params
 
-    arguments = run.arguments
+    arguments, files = run.arguments, carried_files(run.scene)
     result = plan_mission(
         run.scene,
         seed=arguments.seed,
@@ -211,15 +212,21 @@ def _plan(run: Run) -> Write:
         "statistics": dict(result.statistics),
     }
 
-    return lambda: write_planning(run, result.plan, outcome)
+    return lambda: write_planning(run.folder, files, result.plan, outcome)
 
 
-def write_planning(run: Run, plan: Plan | None, outcome: dict[str, Any]) -> None:
-    """Write the scene, the plan, and how planning ended."""
-    storage.write_text(run.folder.file("scene.yaml"), dump_scene(run.scene))
+def write_planning(
+    folder: RunFolder,
+    files: Mapping[str, bytes],
+    plan: Plan | None,
+    outcome: dict[str, Any],
+) -> None:
+    """Write the files of the scene, the plan, and how planning ended."""
+    for name, data in files.items():
+        storage.write_bytes(folder.file(name), data)
     if plan is not None:
-        plan.save(run.folder.path)
-    storage.write_json(run.folder.file("planning.json"), outcome)
+        plan.save(folder.path)
+    storage.write_json(folder.file("planning.json"), outcome)
 
 
 def _verify(run: Run) -> Write:
@@ -304,7 +311,8 @@ def _keep(run: Run, failure: Failure) -> Path:
     from mrmg.capsule import CAPSULE_FILE, Capsule
 
     path = run.folder.file(CAPSULE_FILE)
-    Capsule.of_run(run.folder.path, run.arguments.to_json(), failure).save(path)
+    arguments, carried = run.arguments.to_json(), carried_files(run.scene)
+    Capsule.of_run(run.folder.path, arguments, failure, carried).save(path)
     return path
 
 
@@ -369,8 +377,9 @@ def _report(run: Run) -> Write:
     from mrmg.results.report import write_report
     from mrmg.results.summary import summarize
 
+    summary = summarize(run.scene, run.folder.path)
+
     def write() -> None:
-        summary = summarize(run.scene, run.folder.path)
         storage.write_json(run.folder.file("summary.json"), summary)
         write_report(run.folder.path, trust_code=run.scene.has_custom_motion)
 

@@ -142,7 +142,7 @@ SPOILERS: dict[str, tuple[Callable[[Path], object], str]] = {
     "no states": (lambda path: without(path, "last.npz"), "last.npz is missing"),
     "later format": (
         with_header(lambda header: header.update(format=99)),
-        "this version reads format 1 only",
+        "this version reads formats 1 and 2",
     ),
     "no causes": (with_header(lambda header: header.pop("causes")), "no usable"),
     "odd versions": (

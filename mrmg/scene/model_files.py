@@ -14,6 +14,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePath
 
+MODELS_FOLDER = "models"
+"""Folder beside a scene file that carries models of the user's own."""
+
 _FILE = re.compile(r"""\bfile\w*\s*=\s*(?:"([^"]+)"|'([^']+)')""")
 _DIR = re.compile(r"""\b(?:mesh|texture|asset)dir\s*=\s*(?:"([^"]+)"|'([^']+)')""")
 _MJCF = (".xml", ".mjcf", ".urdf")

@@ -70,10 +70,12 @@ class ModelOrigin:
 
     Attributes:
         reference: what a scene file calls it: a shipped model's name, or a folder.
-        model: as its `robot.yaml` has it.
+        text: of its `robot.yaml`.
+        model: as that has it.
     """
 
     reference: str
+    text: str
     model: RobotModel
 
 

@@ -25,7 +25,7 @@ from mrmg.scene.loading.faults import faults_of
 from mrmg.scene.loading.places import lines_of
 from mrmg.scene.loading.shape_schema import NotNegative, Positive, Ring, Strict
 from mrmg.scene.loading.trust import file_within, refusal_of_code
-from mrmg.scene.loading.yaml_text import read_yaml
+from mrmg.scene.loading.yaml_text import parse_yaml, read_text
 from mrmg.scene.robot_model import Limits, ModelOrigin, RobotModel
 
 SHIPPED_MOTIONS = ("car", "unicycle")
@@ -154,9 +154,11 @@ def load_model(
     source = source or str(path)
     is_shipped = folder.parent == shipped.models_folder()
     with lines_of(path):
-        document = read_yaml(path, source=source)
+        text = read_text(path, source=source)
+        document = parse_yaml(text, source=source)
         model, parameters = _checked_model(folder, document, source, trust_code)
-        origin = ModelOrigin(folder.name if is_shipped else str(folder), model)
+        reference = folder.name if is_shipped else str(folder)
+        origin = ModelOrigin(reference, text, model)
         if changes:
             changed = _merged(document, changes)
             model, parameters = _checked_model(folder, changed, source, trust_code)

@@ -79,15 +79,23 @@ def read_yaml(path: Path, *, source: str) -> Any:
     Raises:
         SceneError: if it cannot be read or is no YAML; names the line.
     """
+    return parse_yaml(read_text(path, source=source), source=source)
+
+
+def read_text(path: Path, *, source: str) -> str:
+    """Read a text file.
+
+    Raises:
+        SceneError: if it cannot be read.
+    """
     try:
-        text = path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         message = f"not a text file in UTF-8 (byte {error.start})"
         raise SceneError(source, [Fault("", message)]) from error
     except OSError as error:
         message = f"cannot be read ({error.strerror})"
         raise SceneError(source, [Fault("", message)]) from error
-    return parse_yaml(text, source=source)
 
 
 def parse_yaml(text: str, *, source: str) -> Any:
