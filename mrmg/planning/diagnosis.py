@@ -15,6 +15,7 @@ from mrmg import seeding
 from mrmg.mission import PlanStatus
 from mrmg.planning import endings
 from mrmg.planning.attempt import router_problem
+from mrmg.planning.bound.joint_bound import Divisions
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.bound.tour_existence import NoTours, proof_of_no_tours
 from mrmg.planning.endings import counted, listed
@@ -42,7 +43,7 @@ class Proofs:
 
         Args:
             tours_missing: whether to search all tours, which takes seconds, and is of
-                no use where the router found some.
+                no use where the router found some or the bound of energy is finite.
         """
         simple = self._simple
         return simple or (self._of_no_tours if tours_missing else None)
@@ -55,7 +56,15 @@ class Proofs:
     @cached_property
     def _of_no_tours(self) -> str | None:
         proof = proof_of_no_tours(self.scene, self.step_s)
-        return None if proof is None else _sentence(self.scene, proof)
+        if proof is not None:
+            return _sentence(self.scene, proof)
+        limit_s = self.scene.time_limit_s
+        divisions = None
+        if math.isfinite(limit_s):
+            divisions = Divisions.of(self.scene, step_s=self.step_s)
+        if divisions is None or math.isfinite(divisions.energy_within_J(limit_s)):
+            return None
+        return endings.NO_TIMELY_TOURS.reason(limit_s=limit_s)
 
 
 def proof_of_lateness(scene: Scene, step_s: float) -> str | None:

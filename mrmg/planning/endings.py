@@ -81,6 +81,13 @@ TOO_LATE = Ending(
     "the time limit of {limit_s:g} s is too short: even at top speed on the shortest "
     "paths no plan is over before {least_s:.1f} s",
 )
+NO_TIMELY_TOURS = Ending(
+    "no tours exist in time",
+    PlanStatus.INFEASIBLE,
+    "no tours exist that keep every battery above its reserve and the time limit of "
+    "{limit_s:g} s: even at top speed on the shortest paths, with any recharging, "
+    "whatever share of the goals each robot visits",
+)
 NO_PATH = Ending(
     "the roadmap finds no path",
     PlanStatus.NO_PLAN_FOUND,
@@ -138,6 +145,7 @@ ENDINGS = (
     FINISHES_CROWDED,
     NO_TOURS,
     TOO_LATE,
+    NO_TIMELY_TOURS,
     NO_PATH,
     NO_TOURS_FOUND,
     NO_TOURS_IN_TIME,

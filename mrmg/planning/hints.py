@@ -13,6 +13,8 @@ from mrmg.scene.types import Scene
 LARGE_GAP = 0.15
 """Gap from which on it is said why it is not all room for better plans."""
 
+INTERRUPTED = "planning was stopped by Ctrl-C; this is the best plan found until then"
+
 
 def hints_on(scene: Scene, plan: Plan, gap: float | None) -> Iterator[str]:
     """Yield hints on a plan.

@@ -33,7 +33,7 @@ from mrmg.planning.bound.joint_bound import Divisions
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.diagnosis import Proofs, unjoined_goals, why_no_plan
 from mrmg.planning.frame import Frame, on_the_map
-from mrmg.planning.hints import hints_on
+from mrmg.planning.hints import INTERRUPTED, hints_on
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
 from mrmg.planning.roadmap.roadmap import build_roadmap
@@ -104,9 +104,9 @@ def plan_mission(
     proofs = Proofs(own, params.dt_s)
 
     def proof() -> str | None:
-        return proofs.reason(
-            tours_missing=search.attempts > 0 and not search.tours_found
-        )
+        unbounded = math.isinf(statistics.bounds.energy_J or 0.0)
+        tours_missing = search.attempts > 0 and not search.tours_found
+        return proofs.reason(tours_missing=tours_missing or unbounded)
 
     with ThreadPoolExecutor(1, initializer=_give_way) as beside:
         bounding = None
@@ -132,18 +132,20 @@ def plan_mission(
         if best is not None and bounding is not None:
             bounding.result()
     if best is not None:
-        gap = statistics.gap
         return PlanResult(
             status=PlanStatus.SOLVED,
             plan=best,
             reason="",
             statistics=statistics.as_dict(),
-            hints=tuple(hints_on(scene, best, gap)),
+            hints=(
+                *([INTERRUPTED] if search.interrupted else []),
+                *hints_on(scene, best, statistics.gap),
+            ),
         )
-    statistics.bounds = UNKNOWN  # they are bounds of plans
     status, reason = PlanStatus.INFEASIBLE, proof()
     if reason is None:
         status, reason = why_no_plan(problem, params, seed, search)
+    statistics.bounds = UNKNOWN  # they are bounds of plans
     return PlanResult(
         status=status, plan=None, reason=reason, statistics=statistics.as_dict()
     )

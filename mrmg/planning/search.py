@@ -50,6 +50,7 @@ class Search:
         attempts: their number so far.
         tours_found: whether the router found tours in any of them.
         blocked: what stood in the way of the last plan along tours; "" if nothing did.
+        interrupted: whether an interrupt ended the search.
     """
 
     attempt: Callable[[int, np.ndarray], Attempt]
@@ -65,6 +66,7 @@ class Search:
     attempts: int = 0
     tours_found: bool = False
     blocked: str = ""
+    interrupted: bool = False
     halt: np.ndarray = field(default_factory=lambda: np.zeros(1, np.bool_))
 
     def run(self) -> Plan | None:
@@ -92,6 +94,7 @@ class Search:
             except KeyboardInterrupt:
                 if self.best is None or self.params.budget_s is None:
                     raise
+                self.interrupted = True
             finally:
                 self.halt[0] = True
         return self.best

@@ -21,6 +21,7 @@ _NAMES = {
     "time_s.first_solution": "First plan after",
     "time_s.total": "Time of planning in all",
     "router_calls": "Calls of the discrete solver",
+    "trees": "Motion trees",
     "drafts": "Times the fleet was driven along tours without a tree",
     "expansions": "Expansions of motion trees",
     "vertices": "Vertices of motion trees",
@@ -48,6 +49,7 @@ def planner(record: RunRecord) -> list[str]:
         [html.text(_NAMES.get(place, place)), html.text(_said(place, value, times))]
         for place, value in _flat(statistics)
         if place not in _TOLD_IN_WORDS
+        and (record.plan is not None or place != "time_s.first_solution")
     ]
     chart = cost_chart(record)
     return [

@@ -111,6 +111,27 @@ def test_an_infeasible_mission_ends_with_its_code(
     assert "g1 is unreachable" in first
 
 
+def test_a_run_that_an_older_version_called_a_timeout_is_readable(
+    walled_scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It wrote so without a budget, too, and no hints."""
+    run = tmp_path / "run"
+    assert main(["plan", str(walled_scene), "--out", str(run)]) == ExitCode.INFEASIBLE
+    planning = json.loads((run / "planning.json").read_text())
+    old = {"status": "timeout", "reason": "no motion tree reached all goals"}
+    statistics = dict(planning["statistics"])
+    del statistics["trees"]
+    storage.write_json(run / "planning.json", {**old, "statistics": statistics})
+    capsys.readouterr()
+    assert main(["report", str(run), "--json"]) == ExitCode.OUT_OF_BUDGET
+    summary = json.loads(capsys.readouterr().out)
+    assert summary["status"] == "timeout"
+    assert summary["hints"] == []
+    page = (run / "report.html").read_text()
+    assert "Timeout" in page
+    assert "First plan after" not in page
+
+
 @pytest.mark.slow
 def test_a_budget_too_small_ends_with_its_code_and_is_tried_again(
     tmp_path: Path,

@@ -134,6 +134,18 @@ ROWS = (
         ("at most 1 of 2 goals", "% more usable energy", "m of plain ground"),
     ),
     Row(endings.TOO_LATE, {"time_limit": 8}, ("8 s",)),
+    Row(
+        endings.NO_TIMELY_TOURS,
+        {
+            "goals": [circle("east", 27, 10), circle("west", 3, 10)],
+            "robots": [
+                car("r1", 15, 10),
+                car("r2", 15, 5, battery={"capacity_m": 5.0, "reserve": 0.0}),
+            ],
+            "time_limit": 13,
+        },
+        ("13 s",),
+    ),
     Row(endings.NO_PATH, {"obstacles": wall_with_gap(1.2)}, ("to g", "0.25 m")),
     Row(
         endings.NO_TOURS_FOUND,

@@ -115,6 +115,7 @@ def test_an_interrupt_keeps_the_plan_of_a_search_with_a_limit(
         return
     found: Any = work.run()
     assert found.number == 0
+    assert work.interrupted
 
 
 def test_an_interrupt_before_the_first_plan_is_passed_on() -> None:

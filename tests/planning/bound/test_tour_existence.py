@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import mrmg
+from mrmg.planning.bound.bound import lower_bound_J
 from mrmg.planning.bound.tour_existence import (
     NoTours,
     RelaxedFleet,
@@ -182,6 +183,17 @@ def test_what_is_solved_is_never_proven_impossible_and_little_less_is(
     proof = proof_of_no_tours(scene, 0.1)
     assert proof is not None
     assert proof.share > 0.0
+
+
+@pytest.mark.parametrize("name", ["quickstart", "diffdrive", "hills"])
+def test_an_infinite_bound_of_energy_is_proven_by_tours_too(name: str) -> None:
+    proven = []
+    for capacity_m in (12.0, 18.0, 21.0, 24.0):
+        scene = with_capacity(name, capacity_m)
+        infinite = np.isinf(lower_bound_J(scene, cells=2000))
+        proven.append(proof_of_no_tours(scene, 0.1) is not None)
+        assert proven[-1] or not infinite
+    assert proven[0]
 
 
 def test_a_way_home_counts() -> None:
