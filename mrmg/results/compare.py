@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from mrmg.errors import UsageError
+from mrmg.results.compare_parameters import (
+    MISSING,
+    differences,
+    parameters,
+    problem_digest,
+)
 from mrmg.results.report_record import RunRecord, read_record
 
-MISSING = "–"
 _MEASURES = ("kJ", "s", "m", "cm")
 
 
@@ -61,36 +66,54 @@ class Comparison:
         names: what tells the runs apart, one per run.
         records: of the runs.
         rows: their figures.
+        differences: what they were made with, as far as it differs, by its name: one
+            text per run.
     """
 
     names: tuple[str, ...]
     records: tuple[RunRecord, ...]
     rows: tuple[Row, ...]
+    differences: Mapping[str, tuple[str, ...]]
 
     def to_json(self) -> dict[str, Any]:
-        """Return names and figures as JSON data."""
+        """Return names, differences and figures as JSON data."""
         return {
             "runs": list(self.names),
+            "differences": [
+                {"name": name, "values": list(texts)}
+                for name, texts in self.differences.items()
+            ],
             "figures": [
                 {"name": row.name, "unit": row.unit, "values": list(row.values)}
                 for row in self.rows
             ],
         }
 
+    def difference_table(self) -> list[list[str]]:
+        """Return head and lines of a table: a line per run, a column per difference."""
+        runs = zip(self.names, *self.differences.values(), strict=True)
+        return [["run", *self.differences], *map(list, runs)]
+
     def to_text(self) -> str:
-        """Return the table as text with aligned columns."""
+        """Return the tables as text with aligned columns."""
         table = [["", *self.names], *([row.name, *row.cells()] for row in self.rows)]
-        widths = [max(len(line[at]) for line in table) for at in range(len(table[0]))]
-        return "\n".join(
-            "  ".join(
-                [line[0].ljust(widths[0])]
-                + [
-                    cell.rjust(width)
-                    for cell, width in zip(line[1:], widths[1:], strict=True)
-                ]
-            ).rstrip()
-            for line in table
-        )
+        if not self.differences:
+            return _aligned(table)
+        return f"{_aligned(self.difference_table())}\n\n{_aligned(table)}"
+
+
+def _aligned(table: Sequence[Sequence[str]]) -> str:
+    widths = [max(len(line[at]) for line in table) for at in range(len(table[0]))]
+    return "\n".join(
+        "  ".join(
+            [line[0].ljust(widths[0])]
+            + [
+                cell.rjust(width)
+                for cell, width in zip(line[1:], widths[1:], strict=True)
+            ]
+        ).rstrip()
+        for line in table
+    )
 
 
 def compare_runs(folders: Sequence[Path], *, trust_code: bool = False) -> Comparison:
@@ -109,7 +132,10 @@ def compare_runs(folders: Sequence[Path], *, trust_code: bool = False) -> Compar
         raise UsageError("compare needs at least two run folders, none of them twice")
     records = tuple(read_record(folder, trust_code=trust_code) for folder in folders)
     return Comparison(
-        names=_names(resolved), records=records, rows=tuple(_rows(records))
+        names=_names(resolved),
+        records=records,
+        rows=tuple(_rows(records)),
+        differences=differences(records),
     )
 
 
@@ -155,19 +181,17 @@ _FIGURES: tuple[tuple[str, str, int, float, tuple[str, ...]], ...] = (
 
 
 def _rows(records: Sequence[RunRecord]) -> list[Row]:
-    def texts(name: str, of: Callable[[RunRecord], str]) -> Row:
-        return Row(name=name, unit="", values=tuple(of(record) for record in records))
-
-    alike = tuple(item.scene.digest == records[0].scene.digest for item in records)
+    problems = [problem_digest(record) for record in records]
+    alike = tuple(problem == problems[0] for problem in problems)
+    texts = parameters(records)
     rows = [
-        texts("scene", lambda record: _scene_name(record, records)),
-        texts("seed", lambda record: str(record.summary["seed"])),
-        texts("profile", lambda record: str(record.arguments.get("profile", MISSING))),
-        texts("objective", _objective),
-        texts("outcome", _outcome),
+        Row(name=name, unit="", values=texts[name])
+        for name in ("scene", "seed", "profile", "objective")
     ]
+    outcomes = tuple(_outcome(record) for record in records)
+    rows.append(Row(name="outcome", unit="", values=outcomes))
     for name, unit, digits, factor, place in _FIGURES:
-        values = [_at(record.summary, place) for record in records]
+        values = [_figure(record, place) for record in records]
         if any(value is not None for value in values):
             scaled = tuple(
                 None if value is None else factor * value for value in values
@@ -184,29 +208,27 @@ def _rows(records: Sequence[RunRecord]) -> list[Row]:
     return rows
 
 
-def _scene_name(record: RunRecord, records: Sequence[RunRecord]) -> str:
-    """Return the scene's name, with its digest if others of that name differ."""
-    scene = record.scene
-    named = {item.scene.digest for item in records if item.scene.name == scene.name}
-    return scene.name if len(named) == 1 else f"{scene.name} ({scene.digest[:6]})"
-
-
-def _objective(record: RunRecord) -> str:
-    objective = record.scene.objective
-    if objective.name != "blend":
-        return objective.name
-    return (
-        f"{objective.energy_weight:g} / J energy, "
-        f"{objective.makespan_weight:g} / s makespan"
-    )
-
-
 def _outcome(record: RunRecord) -> str:
     if record.plan is None:
         return str(record.planning["status"]).replace("_", " ")
     if record.audit is None:
         return "planned"
     return "accomplished" if record.summary["mission_ok"] else "failed"
+
+
+def _figure(record: RunRecord, place: tuple[str, ...]) -> float | None:
+    """Return a figure of a run; of its plan in force where it was replanned."""
+    first, plan = _at(record.summary, place), record.plan
+    replanned = plan is not None and plan.cost_J != record.summary["plan"]["cost_J"]
+    if plan is None or not replanned or place[0] != "plan":
+        return first
+    # The gap is that of the first plan; the plan in force has gone other ways.
+    in_force: dict[str, float | None] = {
+        "cost_J": plan.cost_J,
+        "makespan_s": plan.makespan_s,
+        "gap": None,
+    }
+    return in_force.get(place[-1], first)
 
 
 def _at(summary: Mapping[str, Any], place: Sequence[str]) -> float | None:

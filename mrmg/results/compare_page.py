@@ -51,6 +51,7 @@ def comparison_html(comparison: Comparison) -> str:
         "Comparison of runs",
         [
             html.heading(f"Comparison of {len(names)} runs"),
+            html.section("Differences", *_differences(comparison)),
             html.section(
                 "Figures",
                 html.table(
@@ -62,7 +63,7 @@ def comparison_html(comparison: Comparison) -> str:
                 ),
                 html.note(
                     "In brackets: the difference from the first run, where it is one "
-                    "of the same scene."
+                    "of the same scene, whatever the objective."
                 ),
             ),
             html.section("Courses", html.controls(*toggles), html.charts(places))
@@ -73,6 +74,13 @@ def comparison_html(comparison: Comparison) -> str:
         colors=[(light[at], dark[at]) for at in numbers],
         data=charts,
     )
+
+
+def _differences(comparison: Comparison) -> list[str]:
+    if not comparison.differences:
+        return [html.note("These runs were made with the same scene and parameters.")]
+    head, *rows = comparison.difference_table()
+    return [html.table(head, [[html.text(cell) for cell in row] for row in rows])]
 
 
 def _owner(number: int) -> str:

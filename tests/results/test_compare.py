@@ -13,12 +13,26 @@ from mrmg import pipeline
 from mrmg.cli import main
 from mrmg.errors import ExitCode, RunFolderError, UsageError
 from mrmg.execution.log import ExecutionLog
+from mrmg.ledger import EnergyLedger
+from mrmg.mission import DRIVEN_PLAN, Plan
 from mrmg.results.compare import Row, compare_runs
 from mrmg.results.compare_page import comparison_html
+from mrmg.results.report import report_html
+from mrmg.results.report_record import read_record
+from mrmg.scene.loading import load_scene
 
 
 def data_of(page: str) -> dict:
     return json.loads(re.search(r'id="data">(.*?)</script>', page, re.DOTALL).group(1))
+
+
+def made_one(run: Path, name: str = "plan") -> None:
+    """Make plan and log those of the scene that lies beside them."""
+    digest = load_scene(run / "scene.yaml").digest
+    replace(Plan.load(run, name), scene_digest=digest).save(run, name)
+    plan_digest = Plan.load(run, name).digest
+    log = ExecutionLog.load(run)
+    replace(log, scene_digest=digest, plan_digest=plan_digest).save(run)
 
 
 def test_measures_come_with_their_difference_and_counts_without() -> None:
@@ -39,6 +53,7 @@ def test_only_runs_of_one_scene_come_with_differences(
     assert some.cells() == ["10 kJ", "9 kJ", "8 kJ (−20.0 %)"]
     scene = own_run / "scene.yaml"
     scene.write_text(scene.read_text().replace("reserve: 0.05", "reserve: 0.04"))
+    made_one(own_run)
     rows = {row.name: row for row in compare_runs([quickstart_run, own_run]).rows}
     assert "(" not in rows["planned energy"].cells()[1]
     names = rows["scene"].cells()
@@ -170,3 +185,49 @@ def test_missions_that_take_no_time_can_be_shown(
     assert main(["compare", *runs, "-o", str(page)]) == ExitCode.OK
     assert "stays where it is" in (tmp_path / "run" / "report.html").read_text()
     assert "Traceback" not in capsys.readouterr().err
+
+
+def test_what_differs_is_a_column_and_the_same_scene_is_one(
+    quickstart_run: Path, tmp_path: Path
+) -> None:
+    other = {"objective": "makespan", "time_limit": 500, "controller": "tvlqr"}
+    pipeline.run("quickstart", out=tmp_path / "run", video=None, **other)
+    comparison = compare_runs([quickstart_run, tmp_path / "run"])
+    assert comparison.differences == {
+        "objective": ("energy", "makespan"),
+        "time limit": ("–", "500 s"),
+        "controller": ("mpc", "tvlqr"),
+    }
+    head, first, second = comparison.difference_table()
+    assert head == ["run", "objective", "time limit", "controller"]
+    assert (first[1], second[1]) == ("energy", "makespan")
+    told = comparison.to_json()["differences"]
+    assert {"name": "objective", "values": ["energy", "makespan"]} in told
+    assert "tvlqr" in comparison.to_text().splitlines()[2]
+    assert "<td>tvlqr</td>" in comparison_html(comparison)
+    rows = {row.name: row.cells() for row in comparison.rows}
+    assert rows["scene"] == ["quickstart", "quickstart"]
+    assert rows["planned energy"][1].endswith(" %)")
+
+
+def test_equal_runs_differ_in_nothing(quickstart_run: Path, own_run: Path) -> None:
+    comparison = compare_runs([quickstart_run, own_run])
+    assert comparison.differences == {}
+    assert "same scene and parameters" in comparison_html(comparison)
+
+
+def test_replanned_runs_have_the_figures_of_their_reports(
+    quickstart_run: Path, own_run: Path
+) -> None:
+    plan = Plan.load(own_run)
+    doubled = [
+        replace(item, energy_J=2 * item.energy_J) for item in plan.ledger.entries
+    ]
+    joined = replace(plan, ledger=EnergyLedger(tuple(doubled)))
+    joined.save(own_run, DRIVEN_PLAN)
+    made_one(own_run, DRIVEN_PLAN)
+    found = {row.name: row for row in compare_runs([quickstart_run, own_run]).rows}
+    assert found["planned energy"].values[1] == pytest.approx(joined.cost_J / 1000)
+    assert found["above the bound"].values[1] is None
+    cell = found["planned energy"].cells()[1].split(" (")[0]
+    assert cell in report_html(read_record(own_run))

@@ -76,6 +76,34 @@
       ...extra,
     };
   }
+  /* Round numbers up the axis: at most five steps, whole ones where nothing is between. */
+  function stepOf(span, chart) {
+    const power = Math.pow(10, Math.floor(Math.log10(span / 5)));
+    const fitting = [1, 2, 5, 10].map((factor) => factor * power);
+    const step = fitting.find((each) => span / each <= 5.000001);
+    return chart.digits === 0 ? Math.max(1, step) : step;
+  }
+  /* The axis ends at such numbers, beyond all that is drawn. */
+  function reach(chart, low, high) {
+    const [least, most] = chart.range || [0, 0];
+    const bottom = Math.min(least, low ?? 0), top = Math.max(most, high ?? 0);
+    const step = stepOf(top - bottom || 1, chart);
+    const ends = [Math.floor(bottom / step) * step, Math.ceil(top / step) * step];
+    const stroke = 0.03 * (ends[1] - ends[0] || step);
+    return [ends[0] - stroke, (ends[1] || step) + stroke];
+  }
+  function splits(chart, low, high) {
+    const step = stepOf((high - low) / 1.06, chart);
+    const first = Math.ceil(low / step - 1e-6), last = Math.floor(high / step + 1e-6);
+    return Array.from({ length: last - first + 1 }, (_, at) => (first + at) * step);
+  }
+  function tickText(chart) {
+    return (u, ticks) => ticks.map((at) => `${Number(at.toPrecision(6))} ${chart.unit}`);
+  }
+  const LETTER_PX = 7;
+  function labelWidth(u, labels) {
+    return 20 + LETTER_PX * Math.max(5, ...(labels || []).map((label) => label.length));
+  }
   function drawChart(chart) {
     const place = document.getElementById(`chart-${chart.id}`);
     place.replaceChildren();
@@ -86,7 +114,7 @@
       return { label: item.label, value: valueText(chart), points: { show: own && item.look === "course" },
         show: !hiddenOwners.has(item.owner), ...held, ...look };
     });
-    const range = chart.range ? () => chart.range : (u, low, high) => [Math.min(0, low) * 1.06, (high || 1) * 1.06];
+    const range = (u, low, high) => reach(chart, low, high);
     const plot = new uPlot({
       width: place.clientWidth,
       height: 190,
@@ -94,7 +122,8 @@
       scales: { x: { time: false }, y: { range } },
       axes: [
         axis({ values: (u, ticks) => ticks.map((at) => `${at} s`), size: 34 }),
-        axis({ values: (u, ticks) => ticks.map((at) => `${at} ${chart.unit}`), size: 58 }),
+        axis({ values: tickText(chart), splits: (u, at, low, high) => splits(chart, low, high),
+          size: labelWidth }),
       ],
       series: [{ label: "time", value: (u, at) => (at === null ? "–" : `${at.toFixed(own ? 2 : 1)} s`) },
         ...series],
