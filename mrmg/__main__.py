@@ -1,8 +1,6 @@
 """`python -m mrmg` is the `mrmg` command."""
 
-import sys
-
-from mrmg.cli import main
+from mrmg.cli import command
 
 if __name__ == "__main__":
-    sys.exit(main())
+    command()

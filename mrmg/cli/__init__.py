@@ -1,5 +1,5 @@
 """The `mrmg` command: arguments in, exit code out."""
 
-from mrmg.cli.main import main
+from mrmg.cli.main import command, main
 
-__all__ = ["main"]
+__all__ = ["command", "main"]

@@ -8,7 +8,9 @@ import gc
 import os
 import sys
 from collections.abc import Sequence
+from typing import NoReturn
 
+from mrmg import background
 from mrmg.cli.parser import make_parser
 from mrmg.errors import ExitCode, MrmgError
 
@@ -17,6 +19,16 @@ INTERRUPTED = 130
 
 MOST_NEW_OBJECTS = 50_000
 """New objects after which there is a search for garbage."""
+
+
+def command() -> NoReturn:
+    """Run the command line of the process, and end the process with its exit code."""
+    code = main()
+    if background.is_running():
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -7,6 +7,7 @@ missions (`feasibility`, `bound`).
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from functools import cached_property
 
 import numpy as np
@@ -20,11 +21,13 @@ from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.bound.tour_existence import NoTours, proof_of_no_tours
 from mrmg.planning.endings import counted, listed
 from mrmg.planning.feasibility import energy_and_metres, proof_of_infeasibility
+from mrmg.planning.halting import NEVER, Halted
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import TIME_MARGIN_S
 from mrmg.planning.roadmap.roadmap import Roadmap
 from mrmg.planning.routing.shortfall import shortfall
 from mrmg.planning.search import Search
+from mrmg.planning.statistics import Statistics
 from mrmg.planning.tree.motion_tree import Problem
 from mrmg.planning.tree.targets import finish_of
 from mrmg.scene.objective import overtime_s
@@ -32,11 +35,15 @@ from mrmg.scene.types import Robot, Scene
 
 
 class Proofs:
-    """The proofs that a mission has no solution, each sought once and when needed."""
+    """The proofs that a mission has no solution, each sought once and when needed.
 
-    def __init__(self, scene: Scene, step_s: float) -> None:
+    They are given up once `halt[0]` has turned true.
+    """
+
+    def __init__(self, scene: Scene, step_s: float, halt: np.ndarray = NEVER) -> None:
         self.scene = scene
         self.step_s = step_s
+        self.halt = halt
 
     def reason(self, *, tours_missing: bool) -> str | None:
         """Return why no plan exists, or None if no proof is known.
@@ -45,33 +52,38 @@ class Proofs:
             tours_missing: whether to search all tours, which takes seconds, and is of
                 no use where the router found some or the bound of energy is finite.
         """
-        simple = self._simple
-        return simple or (self._of_no_tours if tours_missing else None)
+        with suppress(Halted):
+            return self._simple or (self._of_no_tours if tours_missing else None)
+        return None
 
     @cached_property
     def _simple(self) -> str | None:
         scene = self.scene
-        return proof_of_infeasibility(scene) or proof_of_lateness(scene, self.step_s)
+        return proof_of_infeasibility(scene, self.halt) or proof_of_lateness(
+            scene, self.step_s, self.halt
+        )
 
     @cached_property
     def _of_no_tours(self) -> str | None:
-        proof = proof_of_no_tours(self.scene, self.step_s)
+        proof = proof_of_no_tours(self.scene, self.step_s, self.halt)
         if proof is not None:
             return _sentence(self.scene, proof)
         limit_s = self.scene.time_limit_s
         divisions = None
         if math.isfinite(limit_s):
-            divisions = Divisions.of(self.scene, step_s=self.step_s)
+            divisions = Divisions.of(self.scene, step_s=self.step_s, halt=self.halt)
         if divisions is None or math.isfinite(divisions.energy_within_J(limit_s)):
             return None
         return endings.NO_TIMELY_TOURS.reason(limit_s=limit_s)
 
 
-def proof_of_lateness(scene: Scene, step_s: float) -> str | None:
+def proof_of_lateness(
+    scene: Scene, step_s: float, halt: np.ndarray = NEVER
+) -> str | None:
     """Return why no plan can keep the time limit, or None if no proof is known."""
     if math.isinf(scene.time_limit_s):
         return None
-    least_s = makespan_bound_s(scene, step_s=step_s)
+    least_s = makespan_bound_s(scene, step_s=step_s, halt=halt)
     if math.isinf(least_s) or not overtime_s(scene.time_limit_s, least_s):
         return None
     return endings.TOO_LATE.reason(limit_s=scene.time_limit_s, least_s=least_s)
@@ -137,14 +149,35 @@ def why_no_plan(
     budget_s, statistics = params.budget_s, search.statistics
     if budget_s is None or statistics.elapsed() <= budget_s:
         return PlanStatus.NO_PLAN_FOUND, _obstacle(problem, params, seed, search)
+    if not search.begun:
+        return why_no_roadmap(params, statistics)
     if not search.attempts:
-        return PlanStatus.TIMEOUT, endings.BUDGET_FOR_ROADMAP.reason(
-            budget_s=budget_s, init_s=statistics.time_s["init"]
-        )
+        return why_in_short(params, search)
+    return _budget_over(params, search, _obstacle(problem, params, seed, search))
+
+
+def why_no_roadmap(
+    params: PlannerParams, statistics: Statistics
+) -> tuple[PlanStatus, str]:
+    """Return how planning ended whose budget was over with the roadmap, or before."""
+    return PlanStatus.TIMEOUT, endings.BUDGET_FOR_ROADMAP.reason(
+        budget_s=params.budget_s, init_s=statistics.time_s["init"]
+    )
+
+
+def why_in_short(params: PlannerParams, search: Search) -> tuple[PlanStatus, str]:
+    """Return how a search ended, where the budget leaves no time to say more."""
+    return _budget_over(params, search, "no plan was found")
+
+
+def _budget_over(
+    params: PlannerParams, search: Search, so_far: str
+) -> tuple[PlanStatus, str]:
+    made = counted(search.attempts, "attempt")
     return PlanStatus.TIMEOUT, endings.BUDGET_OVER.reason(
-        budget_s=budget_s,
-        attempts=counted(search.attempts, "attempt"),
-        so_far=_obstacle(problem, params, seed, search),
+        budget_s=params.budget_s,
+        attempts=made if search.attempts else "less than one attempt",
+        so_far=so_far,
     )
 
 

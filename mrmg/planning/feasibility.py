@@ -24,20 +24,29 @@ from mrmg.planning.endings import (
     GOAL_OUT_OF_ENERGY,
     listed,
 )
+from mrmg.planning.halting import NEVER, check
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
 from mrmg.scene.types import Region, Robot, Scene
 
 
-def proof_of_infeasibility(scene: Scene) -> str | None:
-    """Return why the mission has no solution, or None if no proof is known."""
-    goals = next(iter(impossible_goals(scene).values()), None)
+def proof_of_infeasibility(scene: Scene, halt: np.ndarray = NEVER) -> str | None:
+    """Return why the mission has no solution, or None if no proof is known.
+
+    Raises:
+        Halted: once `halt[0]` has turned true.
+    """
+    goals = next(iter(impossible_goals(scene, halt).values()), None)
     return goals or _unreachable_finish(scene) or _crowded_finish(scene)
 
 
-def impossible_goals(scene: Scene) -> dict[str, str]:
-    """Return the goals that no robot can visit, each with the proof's sentence."""
-    reaches = _reaches(scene)
-    return _cut_off(scene, reaches) | _out_of_energy(scene, reaches)
+def impossible_goals(scene: Scene, halt: np.ndarray = NEVER) -> dict[str, str]:
+    """Return the goals that no robot can visit, each with the proof's sentence.
+
+    Raises:
+        Halted: once `halt[0]` has turned true.
+    """
+    reaches = _reaches(scene, halt)
+    return _cut_off(scene, reaches) | _out_of_energy(scene, reaches, halt)
 
 
 def energy_warnings(scene: Scene) -> list[str]:
@@ -84,8 +93,12 @@ def energy_and_metres(energy_J: float, robot: Robot) -> str:
     return f"{energy_J:.0f} J ({metres:.1f} m of plain ground)"
 
 
-def _reaches(scene: Scene) -> list[_Reach]:
-    return [_Reach.of(scene, robot) for robot in scene.robots]
+def _reaches(scene: Scene, halt: np.ndarray = NEVER) -> list[_Reach]:
+    found = []
+    for robot in scene.robots:
+        check(halt)
+        found.append(_Reach.of(scene, robot))
+    return found
 
 
 def _cut_off(scene: Scene, reaches: Sequence[_Reach]) -> dict[str, str]:
@@ -97,12 +110,15 @@ def _cut_off(scene: Scene, reaches: Sequence[_Reach]) -> dict[str, str]:
     }
 
 
-def _out_of_energy(scene: Scene, reaches: Sequence[_Reach]) -> dict[str, str]:
+def _out_of_energy(
+    scene: Scene, reaches: Sequence[_Reach], halt: np.ndarray = NEVER
+) -> dict[str, str]:
     """Return the goals that are not cut off, but out of every battery's reach."""
     found = {}
     for goal in scene.goals:
         missing_J, robot = math.inf, None
         for reach in reaches:
+            check(halt)
             if reach.is_connected(goal.region) and missing_J > 0.0:
                 own_J = reach.missing_energy_J(goal.region)
                 if own_J < missing_J:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-import os
-import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
 from mrmg import seeding
+from mrmg.background import Result, within
 from mrmg.compilation import (
     compile_in_processes,
     kernels_are_compiled,
@@ -22,24 +20,24 @@ from mrmg.compilation import (
 from mrmg.errors import Fault, SceneError, UsageError
 from mrmg.mission import PlanResult, PlanStatus
 from mrmg.planning.attempt import Attempt, attempt_plan, draft_plans, tree_plans
-from mrmg.planning.bound.bound import (
-    CELLS,
-    FINER,
-    Relaxation,
-    exact_routing,
-    lower_bound_J,
-)
-from mrmg.planning.bound.joint_bound import Divisions
+from mrmg.planning.bound.bound import Relaxation, exact_routing, lower_bound_J
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
-from mrmg.planning.diagnosis import Proofs, unjoined_goals, why_no_plan
+from mrmg.planning.bounding import bounds_beside, bounds_of
+from mrmg.planning.diagnosis import (
+    Proofs,
+    unjoined_goals,
+    why_in_short,
+    why_no_plan,
+    why_no_roadmap,
+)
 from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.hints import INTERRUPTED, hints_on
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
 from mrmg.planning.roadmap.roadmap import build_roadmap
 from mrmg.planning.routing.routing import Routing
-from mrmg.planning.search import OnImprovement, Progress, Search
-from mrmg.planning.statistics import UNKNOWN, Bounds, Statistics
+from mrmg.planning.search import GRACE_S, OnImprovement, Progress, Search
+from mrmg.planning.statistics import UNKNOWN, Statistics
 from mrmg.planning.tree.haste import priced_world, with_energies
 from mrmg.planning.tree.motion_tree import Problem, grow_tree, state_problem
 from mrmg.scene.loading import scene_from_document
@@ -83,69 +81,111 @@ def plan_mission(
         UsageError: if there is to be no worker.
     """
     params = params or PlannerParams()
-    tell = on_progress or (lambda fraction, text: None)
     if not scene.robots:
         fault = Fault("robots", "there are none; a mission needs at least one")
         raise SceneError(scene.name, [fault])
     if workers < 1:
         raise UsageError(f"workers = {workers}; planning needs at least 1")
     compile_kernels()
+    halt = np.zeros(1, np.bool_)
+    try:
+        return _planned(
+            scene,
+            seed,
+            params,
+            workers,
+            halt,
+            with_bound=with_bound,
+            on_progress=on_progress or (lambda fraction, text: None),
+            on_improvement=on_improvement or (lambda improvement: None),
+        )
+    finally:
+        halt[0] = True  # nobody waits any longer for what is still under way
+
+
+def _planned(
+    scene: Scene,
+    seed: int,
+    params: PlannerParams,
+    workers: int,
+    halt: np.ndarray,
+    *,
+    with_bound: bool,
+    on_progress: Progress,
+    on_improvement: OnImprovement,
+) -> PlanResult:
     statistics = Statistics()
     own = Frame.of(scene).scene(scene)
-    preference = Preference.of(scene)
+    bounding = None
+    if with_bound:
+        _load_bounds(scene.objective)  # what holds the interpreter's lock first
+        anytime = params.budget_s is not None
+        bounding = bounds_beside(
+            own, params.dt_s, statistics, anytime=anytime, halt=halt
+        )
+    _load_kernels(trees=not params.drafts)
+    statistics.begin()
 
-    def state_bound() -> None:
-        statistics.bounds = bounds_of(own, params.dt_s)
+    proofs = Proofs(own, params.dt_s, halt)
 
+    def in_time(call: Callable[[], Result]) -> Result | None:
+        return within(call, statistics.left_s(params.budget_s) + GRACE_S)
+
+    problem = in_time(partial(state_mission, own, seed, params))
+    statistics.time_s["init"] = statistics.elapsed()
+    if problem is None:
+        proof = in_time(partial(proofs.reason, tours_missing=False))
+        return _unsolved(statistics, proof, why_no_roadmap(params, statistics))
+    on_progress(0.1, "roadmap built")
+
+    def tours_missing() -> bool:
+        unbounded = math.isinf(statistics.bounds.energy_J or 0.0)
+        return search.tours_missing or unbounded
+
+    search = Search(
+        attempt=_attempts_at(problem, scene, seed, params),
+        params=params,
+        statistics=statistics,
+        workers=workers,
+        on_progress=on_progress,
+        on_improvement=on_improvement,
+        proof=lambda: in_time(partial(proofs.reason, tours_missing=tours_missing())),
+        preference=Preference.of(scene),
+    )
+    best = search.run()
+    if best is None:
+        proof = search.proof()
+        why = in_time(partial(why_no_plan, problem, params, seed, search))
+        return _unsolved(statistics, proof, why or why_in_short(params, search))
+    if bounding is not None:
+        in_time(bounding.result)
+    return PlanResult(
+        status=PlanStatus.SOLVED,
+        plan=best,
+        reason="",
+        statistics=statistics.as_dict(),
+        hints=(
+            *([INTERRUPTED] if search.interrupted else []),
+            *hints_on(scene, best, statistics.gap),
+        ),
+    )
+
+
+def _attempts_at(
+    problem: Problem, scene: Scene, seed: int, params: PlannerParams
+) -> Callable[[int, np.ndarray], Attempt]:
     def attempt(number: int, halt: np.ndarray) -> Attempt:
         found = attempt_plan(problem, seed, params, number, halt)
         return on_the_map(found, problem, scene, params)
 
-    proofs = Proofs(own, params.dt_s)
+    return attempt
 
-    def proof() -> str | None:
-        unbounded = math.isinf(statistics.bounds.energy_J or 0.0)
-        tours_missing = search.attempts > 0 and not search.tours_found
-        return proofs.reason(tours_missing=tours_missing or unbounded)
 
-    with ThreadPoolExecutor(1, initializer=_give_way) as beside:
-        bounding = None
-        if with_bound:
-            _load_bounds(scene.objective)  # what holds the interpreter's lock first
-            bounding = beside.submit(state_bound)
-        _load_kernels(trees=not params.drafts)
-        statistics.begin()
-        problem = state_mission(own, seed, params)
-        statistics.time_s["init"] = statistics.elapsed()
-        tell(0.1, "roadmap built")
-        search = Search(
-            attempt=attempt,
-            params=params,
-            statistics=statistics,
-            workers=workers,
-            on_progress=tell,
-            on_improvement=on_improvement or (lambda improvement: None),
-            proof=proof,
-            preference=preference,
-        )
-        best = search.run()
-        if best is not None and bounding is not None:
-            bounding.result()
-    if best is not None:
-        return PlanResult(
-            status=PlanStatus.SOLVED,
-            plan=best,
-            reason="",
-            statistics=statistics.as_dict(),
-            hints=(
-                *([INTERRUPTED] if search.interrupted else []),
-                *hints_on(scene, best, statistics.gap),
-            ),
-        )
-    status, reason = PlanStatus.INFEASIBLE, proof()
-    if reason is None:
-        status, reason = why_no_plan(problem, params, seed, search)
+def _unsolved(
+    statistics: Statistics, proof: str | None, why: tuple[PlanStatus, str]
+) -> PlanResult:
     statistics.bounds = UNKNOWN  # they are bounds of plans
+    status, reason = (PlanStatus.INFEASIBLE, proof) if proof else why
     return PlanResult(
         status=status, plan=None, reason=reason, statistics=statistics.as_dict()
     )
@@ -178,16 +218,6 @@ def _load_kernels(*, trees: bool) -> None:
     draft_smallest()
     if trees:
         _find_in_smallest(tree_plans)
-
-
-def _give_way() -> None:
-    """Leave the processors to other threads; so do all threads that this one starts."""
-    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), _NICENESS)
-
-
-_NICENESS = 15
-"""Of the bound, on the system's scale: the first plan comes as soon as without one
-(measured; with 5, two to three times as late where other processes ran, too)."""
 
 
 def grow_smallest() -> None:
@@ -268,29 +298,3 @@ def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
     if priced is not world:
         roadmap = with_energies(roadmap, scene, world, params.obstacle_margin_m)
     return state_problem(scene, world, roadmap, params)
-
-
-def bounds_of(
-    scene: Scene, step_s: float, *, cells: int = CELLS, finer: int = FINER
-) -> Bounds:
-    """Return what no plan of a mission undercuts, as far as its objective needs it.
-
-    Args:
-        scene: the mission.
-        step_s: time step of the plans.
-        cells: of the grid; more take longer and bring the bound nearer to the truth.
-        finer: parts into which cells are cut in the end; as `cells`.
-    """
-    objective, limit_s = scene.objective, scene.time_limit_s
-    energy_J = makespan_s = blend = None
-    if objective.makespan_weight:
-        makespan_s = makespan_bound_s(scene, step_s=step_s, cells=cells)
-    if objective.energy_weight:
-        energy_J = lower_bound_J(scene, step_s=step_s, cells=cells, finer=finer)
-        timed = objective.makespan_weight > 0.0 or math.isfinite(limit_s)
-        divisions = Divisions.of(scene, step_s=step_s, cells=cells) if timed else None
-        if divisions is not None:
-            energy_J = max(energy_J, divisions.energy_within_J(limit_s))
-            if objective.makespan_weight:
-                blend = divisions.value(objective, limit_s)
-    return Bounds(energy_J=energy_J, makespan_s=makespan_s, blend=blend)

@@ -10,12 +10,14 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
+from mrmg.background import finished, in_background
 from mrmg.mission import Plan
 from mrmg.planning.attempt import Attempt
 from mrmg.planning.parameters import PlannerParams
@@ -27,6 +29,9 @@ Progress = Callable[[float, str], None]
 
 OnImprovement = Callable[[Improvement], None]
 """Receives each plan that is better than all before it, as soon as it counts."""
+
+GRACE_S = 0.3
+"""How long after a time limit attempts that were halted may still hand in plans [s]."""
 
 HOPELESS = 10
 """With a time limit, times the number of trees after which finding none ends it."""
@@ -47,7 +52,8 @@ class Search:
         preference: what plans are compared by.
         best: the best plan so far that is in time.
         earliest_s: when the earliest of all plans is over.
-        attempts: their number so far.
+        begun: number of attempts that were begun.
+        attempts: number of those that have ended.
         tours_found: whether the router found tours in any of them.
         blocked: what stood in the way of the last plan along tours; "" if nothing did.
         interrupted: whether an interrupt ended the search.
@@ -63,11 +69,17 @@ class Search:
     preference: Preference = field(default_factory=Preference)
     best: Plan | None = None
     earliest_s: float = math.inf
+    begun: int = 0
     attempts: int = 0
     tours_found: bool = False
     blocked: str = ""
     interrupted: bool = False
     halt: np.ndarray = field(default_factory=lambda: np.zeros(1, np.bool_))
+
+    @property
+    def tours_missing(self) -> bool:
+        """Whether attempts have been made, and none found tours."""
+        return self.attempts > 0 and not self.tours_found
 
     def run(self) -> Plan | None:
         """Return the best plan found.
@@ -78,9 +90,9 @@ class Search:
         found = 0
         if self._enough(found):
             return None
-        with ThreadPoolExecutor(self.workers) as pool, self._limited():
+        with self._limited():
             try:
-                for attempt in self._attempts(pool):
+                for attempt in self._attempts():
                     self.attempts += 1
                     self.tours_found |= attempt.tours_found
                     self.blocked = attempt.blocked or self.blocked
@@ -99,16 +111,22 @@ class Search:
                 self.halt[0] = True
         return self.best
 
-    def _attempts(self, pool: ThreadPoolExecutor) -> Iterator[Attempt]:
-        """Yield attempts, keeping every worker busy with one."""
+    def _attempts(self) -> Iterator[Attempt]:
+        """Yield attempts, keeping every worker busy with one.
+
+        Attempts that do not end soon after a time limit are left behind.
+        """
         free = self.params.budget_s is not None
         pending: list[Future[Attempt]] = []
-        number = 0
         while True:
             while len(pending) < self.workers:
-                pending.append(pool.submit(self.attempt, number, self.halt))
-                number += 1
-            done = wait(pending, return_when=FIRST_COMPLETED).done if free else ()
+                attempt = partial(self.attempt, self.begun, self.halt)
+                pending.append(in_background(attempt))
+                self.begun += 1
+            left_s = self.statistics.left_s(self.params.budget_s) + GRACE_S
+            done = finished(pending, left_s) if free else set()
+            if free and not done:
+                return
             ready = next((one for one in pending if one in done), pending[0])
             pending.remove(ready)
             yield ready.result()
@@ -119,8 +137,9 @@ class Search:
         if self.params.budget_s is None:
             yield
             return
-        left = max(0.0, self.params.budget_s - self.statistics.elapsed())
-        alarm = threading.Timer(left, lambda: self.halt.fill(True))
+        alarm = threading.Timer(
+            self.statistics.left_s(self.params.budget_s), lambda: self.halt.fill(True)
+        )
         alarm.daemon = True
         alarm.start()
         try:

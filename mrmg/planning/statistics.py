@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -31,6 +32,19 @@ class Bounds:
             return None
         value = objective.value(self.energy_J or 0.0, self.makespan_s or 0.0)
         return value if self.blend is None else max(value, self.blend)
+
+    def raised_by(self, other: Bounds) -> Bounds:
+        """Return the greater of each two bounds."""
+        return Bounds(
+            energy_J=_greater(self.energy_J, other.energy_J),
+            makespan_s=_greater(self.makespan_s, other.makespan_s),
+            blend=_greater(self.blend, other.blend),
+        )
+
+
+def _greater(first: float | None, second: float | None) -> float | None:
+    known = [bound for bound in (first, second) if bound is not None]
+    return max(known, default=None)
 
 
 UNKNOWN = Bounds()
@@ -89,7 +103,15 @@ def gap_of(value: float, bound: float | None) -> float | None:
 
 @dataclass
 class Statistics:
-    """Counts and times of one planning run."""
+    """Counts and times of one planning run.
+
+    Attributes:
+        time_s: by what it was spent on.
+        counts: of what was done.
+        improvements: plans, each better than all before it.
+        bounds: what is known that no plan undercuts.
+        started: when planning began, by `time.perf_counter()`.
+    """
 
     time_s: dict[str, float] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=dict)
@@ -104,6 +126,10 @@ class Statistics:
     def elapsed(self) -> float:
         """Return the time since planning began [s]."""
         return time.perf_counter() - self.started
+
+    def left_s(self, budget_s: float | None) -> float:
+        """Return what is left of a budget [s], at least 0; inf of None."""
+        return math.inf if budget_s is None else max(0.0, budget_s - self.elapsed())
 
     def add(self, counts: dict[str, int], routing_s: float) -> None:
         """Add the counts of one tree, and the time its tours took."""

@@ -85,6 +85,19 @@ def test_a_time_limit_halts_what_is_under_way() -> None:
     assert work.statistics.elapsed() >= 0.2
 
 
+def test_an_attempt_that_does_not_end_is_left_behind() -> None:
+    never = threading.Event()
+
+    def stubborn(number: int, halt: np.ndarray) -> Attempt:
+        if number:
+            never.wait()
+        return made(0, halt)
+
+    found: Any = search(PlannerParams(budget_s=0.2), 1, stubborn).run()
+    assert found.number == 0
+    never.set()
+
+
 def test_no_time_means_no_attempt() -> None:
     work = search(PlannerParams(budget_s=1e-9), 1, made)
     assert work.run() is None

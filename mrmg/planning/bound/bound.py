@@ -41,6 +41,7 @@ from mrmg.planning.bound import _bound_kernels
 from mrmg.planning.bound.arcs import ArcWays
 from mrmg.planning.bound.geodesic import Ground, Ways
 from mrmg.planning.bound.touring import Completions, near_routing, touring_bound_J
+from mrmg.planning.halting import NEVER, check
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import Routing, routing_arrays
@@ -175,6 +176,7 @@ def lower_bound_J(
     cells: int = CELLS,
     rounds: int = ROUNDS,
     finer: int = FINER,
+    halt: np.ndarray = NEVER,
 ) -> float:
     """Return an energy [J] that no plan of a mission undercuts.
 
@@ -185,13 +187,17 @@ def lower_bound_J(
             to the truth.
         rounds: how often the ways of the cheapest tours are tightened; as `cells`.
         finer: parts into which cells are cut for that; as `cells`.
+        halt: shape (1,); once it has turned true, what is proven is returned.
 
     Returns:
         The bound, at least 0; inf if the mission is proven to have no solution.
+
+    Raises:
+        Halted: if nothing is proven by then.
     """
     if not scene.goals:
         return 0.0
-    relaxed = Relaxation.of(scene, step_s=step_s, cells=cells)
+    relaxed = Relaxation.of(scene, step_s=step_s, cells=cells, halt=halt)
     problem = relaxed.problem
     if len(scene.goals) > MOST_GOALS:
         bound = relaxed_routing_J(problem)
@@ -200,10 +206,16 @@ def lower_bound_J(
         routing = near_routing(problem, completions) or exact_routing(problem)
         if routing is None:
             bound = relaxed_routing_J(problem)
-        elif routing.feasible and rounds:
+        elif routing.feasible and rounds and not halt[0]:
             ways = relaxed.arc_ways(finer)
             bound = touring_bound_J(
-                problem, completions, routing.tours, ways, relaxed.price, rounds=rounds
+                problem,
+                completions,
+                routing.tours,
+                ways,
+                relaxed.price,
+                rounds=rounds,
+                halt=halt,
             )
             bound = max(bound, routing.cost_J)
         else:
@@ -238,6 +250,7 @@ class Relaxation:
         step_s: float = 0.1,
         cells: int = CELLS,
         with_finishes: bool = False,
+        halt: np.ndarray = NEVER,
     ) -> Relaxation:
         """Relax a mission.
 
@@ -249,6 +262,10 @@ class Relaxation:
             step_s: time step of its plans.
             cells: cells of the grid on which ways are bounded.
             with_finishes: whether tours lead on to where robots must end.
+            halt: shape (1,); it is given up once it has turned true.
+
+        Raises:
+            Halted: once `halt[0]` has turned true.
         """
         x_min, y_min, x_max, y_max = scene.bounds
         cell_m = math.sqrt((x_max - x_min) * (y_max - y_min) / cells)
@@ -261,8 +278,9 @@ class Relaxation:
         ways = {}
         for key, robot in zip(keys, scene.robots, strict=True):
             if key not in ways:
+                check(halt)
                 ground = _ground(scene, robot, cell_m, step_s)
-                ways[key] = Ways.of(ground, regions, starts)
+                ways[key] = Ways.of(ground, regions, starts, halt)
         batteries = [robot.battery for robot in scene.robots]
         descents = [_descents_J(scene, robot) for robot in scene.robots]
         capacity_J = [

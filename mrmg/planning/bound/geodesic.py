@@ -20,6 +20,7 @@ from shapely.geometry import Point
 from mrmg.planning.bound import _eikonal_kernels
 from mrmg.planning.bound._eikonal_kernels import UNREACHED
 from mrmg.planning.bound.prices import least_prices
+from mrmg.planning.halting import NEVER, check
 from mrmg.scene.types import Region, Robot, Scene
 
 ROUNDS = 3
@@ -242,15 +243,31 @@ class Ways:
     from_start: np.ndarray
 
     @staticmethod
-    def of(ground: Ground, regions: Sequence[Region], starts: np.ndarray) -> Ways:
-        """Bound all ways between regions, and from starts (R, 2) to regions."""
+    def of(
+        ground: Ground,
+        regions: Sequence[Region],
+        starts: np.ndarray,
+        halt: np.ndarray = NEVER,
+    ) -> Ways:
+        """Bound all ways between regions, and from starts (R, 2) to regions.
+
+        Raises:
+            Halted: once `halt[0]` has turned true.
+        """
+
+        def field_from(region: Region) -> Field:
+            check(halt)
+            return ground.field_from(region)
+
         with ThreadPoolExecutor() as threads:
-            fields = list(threads.map(ground.field_from, regions))
+            fields = list(threads.map(field_from, regions))
         looks = [ground.look_at(border(one), 0.5 * SPACING_M) for one in regions]
         highest = np.array(
             [highest_of(*pair) for pair in zip(fields, looks, strict=True)]
         )
+        check(halt)
         lowest = _lowest_by_arc(fields, looks)
+        check(halt)
         floor = float(np.min(ground.price, initial=1.0))
         apart_m = _distances_m(regions)
         certified = lowest.min(axis=2, initial=UNREACHED) - highest[:, None]
@@ -258,6 +275,7 @@ class Ways:
         way = np.where(apart_m > 0.0, np.maximum(way, way.T), 0.0)
         start_way = np.zeros((len(starts), len(regions)))
         for r, start in enumerate(starts):
+            check(halt)
             look = ground.look_at(start[None], 0.0)
             for i, field in enumerate(fields):
                 apart = float(-regions[i].depth(start)[0])

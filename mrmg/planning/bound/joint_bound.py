@@ -27,6 +27,7 @@ from mrmg.planning.bound.bound import (
     most_descent_J,
 )
 from mrmg.planning.bound.makespan_bound import least_times_s
+from mrmg.planning.halting import NEVER
 from mrmg.scene.objective import Objective
 from mrmg.scene.types import Scene
 
@@ -50,19 +51,27 @@ class Divisions:
 
     @staticmethod
     def of(
-        scene: Scene, *, step_s: float = 0.1, cells: int = CELLS
+        scene: Scene,
+        *,
+        step_s: float = 0.1,
+        cells: int = CELLS,
+        halt: np.ndarray = NEVER,
     ) -> Divisions | None:
-        """Return the divisions of a mission; None if it is too large for that."""
+        """Return the divisions of a mission; None if it is too large for that.
+
+        Raises:
+            Halted: once `halt[0]` has turned true.
+        """
         if not 0 < len(scene.goals) <= MOST_GOALS:
             return None
-        problem = Relaxation.of(scene, step_s=step_s, cells=cells).problem
+        problem = Relaxation.of(scene, step_s=step_s, cells=cells, halt=halt).problem
         goals = np.arange(len(scene.goals))
         ways = [RobotWays(problem, r, goals) for r in range(len(scene.robots))]
         if not all(way.complete for way in ways):
             return None
         return Divisions(
             energy_J=np.array([way.cost for way in ways]),
-            time_s=least_times_s(scene, step_s=step_s, cells=cells),
+            time_s=least_times_s(scene, step_s=step_s, cells=cells, halt=halt),
             descent_J=sum(most_descent_J(scene, robot) for robot in scene.robots),
         )
 

@@ -25,12 +25,19 @@ from mrmg.planning.bound.bound import (
     RobotWays,
     relaxed_routing_J,
 )
+from mrmg.planning.halting import NEVER, check
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import routing_arrays
 from mrmg.scene.types import Robot, Scene
 
 
-def makespan_bound_s(scene: Scene, *, step_s: float = 0.1, cells: int = CELLS) -> float:
+def makespan_bound_s(
+    scene: Scene,
+    *,
+    step_s: float = 0.1,
+    cells: int = CELLS,
+    halt: np.ndarray = NEVER,
+) -> float:
     """Return a time [s] before which no plan of a mission is over.
 
     Args:
@@ -38,38 +45,48 @@ def makespan_bound_s(scene: Scene, *, step_s: float = 0.1, cells: int = CELLS) -
         step_s: time step of the plans.
         cells: cells of the grid on which ways are bounded; more bring the bound nearer
             to the truth.
+        halt: shape (1,); the bound is given up once it has turned true.
 
     Returns:
         The bound, at least 0; inf if some goal cannot be reached.
+
+    Raises:
+        Halted: if it was given up.
     """
     if not scene.goals:
         return 0.0
     if len(scene.goals) > MOST_GOALS:
-        bound_s = _relaxed_s(scene, _metres(scene, step_s, cells))
+        bound_s = _relaxed_s(scene, _metres(scene, step_s, cells, halt))
     else:
         fleet = np.full(1 << len(scene.goals), inf)
         fleet[0] = 0.0
-        for own_s in least_times_s(scene, step_s=step_s, cells=cells):
+        for own_s in least_times_s(scene, step_s=step_s, cells=cells, halt=halt):
             fleet = _bound_kernels.join_longest(fleet, own_s)
         bound_s = float(fleet[-1])
     return max(0.0, bound_s) * (1.0 - ROUNDING_SHARE)
 
 
-def least_times_s(scene: Scene, *, step_s: float, cells: int) -> np.ndarray:
-    """Return the least time of each robot for each subset of the goals, (R, 2^G)."""
-    metres, goals = _metres(scene, step_s, cells), np.arange(len(scene.goals))
-    return np.array(
-        [
-            _times_s(robot, RobotWays(metres, r, goals).cost, _stays_s(scene))
-            for r, robot in enumerate(scene.robots)
-        ]
-    )
+def least_times_s(
+    scene: Scene, *, step_s: float, cells: int, halt: np.ndarray = NEVER
+) -> np.ndarray:
+    """Return the least time of each robot for each subset of the goals, (R, 2^G).
+
+    Raises:
+        Halted: once `halt[0]` has turned true.
+    """
+    metres, goals = _metres(scene, step_s, cells, halt), np.arange(len(scene.goals))
+    times_s = []
+    for r, robot in enumerate(scene.robots):
+        check(halt)
+        way_m = RobotWays(metres, r, goals).cost
+        times_s.append(_times_s(robot, way_m, _stays_s(scene)))
+    return np.array(times_s)
 
 
-def _metres(scene: Scene, step_s: float, cells: int) -> RoutingArrays:
+def _metres(scene: Scene, step_s: float, cells: int, halt: np.ndarray) -> RoutingArrays:
     """Return the problem whose costs are lengths, and whose batteries never run out."""
     flat = replace(scene, terrain=(), elevation=None)
-    ways = Relaxation.of(flat, step_s=step_s, cells=cells).problem
+    ways = Relaxation.of(flat, step_s=step_s, cells=cells, halt=halt).problem
     return _free_of_energy(ways, ways.cost / _plain_of(flat)[:, None, None])
 
 

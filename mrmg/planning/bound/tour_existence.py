@@ -32,6 +32,7 @@ from mrmg.accounting import SHORTEST_ON_SLOPES_S
 from mrmg.planning.bound import _bound_kernels
 from mrmg.planning.bound.bound import MOST_GOALS, Relaxation
 from mrmg.planning.feasibility import outer_polygon
+from mrmg.planning.halting import NEVER, check
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.shortfall import least_share
@@ -65,20 +66,27 @@ class NoTours:
     share: float
 
 
-def proof_of_no_tours(scene: Scene, step_s: float) -> NoTours | None:
+def proof_of_no_tours(
+    scene: Scene, step_s: float, halt: np.ndarray = NEVER
+) -> NoTours | None:
     """Return the proof that no tours exist, or None if none is known.
 
     Args:
         scene: the mission.
         step_s: time step of the plans.
+        halt: shape (1,); the proof is given up once it has turned true.
+
+    Raises:
+        Halted: if it was given up.
     """
     if not scene.goals and not any(robot.finish for robot in scene.robots):
         return None
     if scene.elevation is not None and step_s < SHORTEST_ON_SLOPES_S:
         return None  # slopes are charged over longer times, in which speeds may change
-    relaxed = Relaxation.of(scene, step_s=step_s, with_finishes=True)
+    relaxed = Relaxation.of(scene, step_s=step_s, with_finishes=True, halt=halt)
     problem = _with_climbs(relaxed)
     for goals in _goals_to_try(problem):
+        check(halt)
         fleet = RelaxedFleet(problem, goals)
         if not fleet.visits()[-1]:
             return fleet.proof()

@@ -17,6 +17,7 @@ import numpy as np
 from mrmg.planning.bound import _touring_kernels
 from mrmg.planning.bound.arcs import ArcWays, Wave
 from mrmg.planning.bound.geodesic import ARCS
+from mrmg.planning.halting import NEVER
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import Routing
 
@@ -123,6 +124,7 @@ def touring_bound_J(
     price: np.ndarray,
     *,
     rounds: int,
+    halt: np.ndarray = NEVER,
 ) -> float:
     """Return a lower bound of the cost of all tours.
 
@@ -135,15 +137,16 @@ def touring_bound_J(
         ways: of each robot.
         price: cost of a metre of plain ground of each robot, shape (R,).
         rounds: how often at most.
+        halt: shape (1,); no round begins once it has turned true.
     """
     best = completions.cost_J
     leg = _leg_table(ways, price)
     for _ in range(rounds):
-        if not _tighten(ways, leg, tours):
+        if halt[0] or not _tighten(ways, leg, tours):
             break
         leg = _leg_table(ways, price)
         for _ in range(AGAIN):
-            if not _tighten(ways, leg, tours):
+            if halt[0] or not _tighten(ways, leg, tours):
                 break
             leg = _leg_table(ways, price)
         most = (1.0 + SLACK) * _cost_along(leg, tours)

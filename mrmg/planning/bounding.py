@@ -1,0 +1,103 @@
+"""The bounds of a mission's plans, proven on a thread beside the search."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+import threading
+from concurrent.futures import Future
+from contextlib import suppress
+
+import numpy as np
+
+from mrmg.background import in_background
+from mrmg.planning.bound.bound import CELLS, FINER, lower_bound_J
+from mrmg.planning.bound.joint_bound import Divisions
+from mrmg.planning.bound.makespan_bound import makespan_bound_s
+from mrmg.planning.halting import NEVER, Halted
+from mrmg.planning.statistics import Bounds, Statistics
+from mrmg.scene.types import Scene
+
+COARSE_CELLS = 1000
+"""Cells of the grid of a first bound where time is limited: a tenth of the work."""
+
+NICENESS = 15
+"""Of the bound, on the system's scale: the first plan comes as soon as without one
+(measured; with 5, two to three times as late where other processes ran, too)."""
+
+
+def bounds_of(
+    scene: Scene,
+    step_s: float,
+    *,
+    cells: int = CELLS,
+    finer: int = FINER,
+    halt: np.ndarray = NEVER,
+) -> Bounds:
+    """Return what no plan of a mission undercuts, as far as its objective needs it.
+
+    Args:
+        scene: the mission.
+        step_s: time step of the plans.
+        cells: of the grid; more take longer and bring the bound nearer to the truth.
+        finer: parts into which cells are cut in the end; as `cells`.
+        halt: shape (1,); bounds are given up once it has turned true.
+
+    Raises:
+        Halted: if they were given up.
+    """
+    objective, limit_s = scene.objective, scene.time_limit_s
+    energy_J = makespan_s = blend = None
+    if objective.makespan_weight:
+        makespan_s = makespan_bound_s(scene, step_s=step_s, cells=cells, halt=halt)
+    if objective.energy_weight:
+        energy_J = lower_bound_J(
+            scene, step_s=step_s, cells=cells, finer=finer, halt=halt
+        )
+        timed = objective.makespan_weight > 0.0 or math.isfinite(limit_s)
+        divisions = None
+        if timed:
+            divisions = Divisions.of(scene, step_s=step_s, cells=cells, halt=halt)
+        if divisions is not None:
+            energy_J = max(energy_J, divisions.energy_within_J(limit_s))
+            if objective.makespan_weight:
+                blend = divisions.value(objective, limit_s)
+    return Bounds(energy_J=energy_J, makespan_s=makespan_s, blend=blend)
+
+
+def bounds_beside(
+    scene: Scene,
+    step_s: float,
+    statistics: Statistics,
+    *,
+    anytime: bool,
+    halt: np.ndarray,
+) -> Future[None]:
+    """Prove bounds in the background, and return what is done once the best are proven.
+
+    Args:
+        scene: the mission.
+        step_s: time step of the plans.
+        statistics: receives the bounds.
+        anytime: prove coarse bounds first, as there may be no time for better ones.
+        halt: shape (1,); what is not proven is given up once it has turned true.
+    """
+
+    def prove() -> None:
+        give_way()
+        with suppress(Halted):
+            for cells in (COARSE_CELLS, CELLS) if anytime else (CELLS,):
+                found = bounds_of(scene, step_s, cells=cells, halt=halt)
+                statistics.bounds = statistics.bounds.raised_by(found)
+
+    return in_background(prove)
+
+
+def give_way() -> None:
+    """Leave the processors to other threads; so do all threads that this one starts.
+
+    Linux alone gives threads priorities of their own.
+    """
+    if sys.platform == "linux":
+        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
