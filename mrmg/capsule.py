@@ -22,6 +22,7 @@ from mrmg import storage
 from mrmg.errors import Fault, FileError
 from mrmg.execution.log import ExecutionLog, package_versions
 from mrmg.scene.loading.carrying import safe_path
+from mrmg.scene.model_files import MODELS_FOLDER
 
 CAPSULE_FORMAT = 2
 """Format 2 also has models of the user's own; format 1 is still read."""
@@ -119,11 +120,18 @@ class Capsule:
             folder: of the run.
             arguments: of the run, as JSON data.
             failure: what came of it.
-            carried: the scene and its models (`scene.loading.carrying`); without them
-                the folder's scene, which names shipped models only.
+            carried: the scene and its models (`scene.loading.carrying`); those of the
+                folder if None.
         """
         files = {name: (folder / name).read_bytes() for name in _RUN_FILES}
-        files |= carried or {}
+        if carried is None:
+            found = sorted((folder / MODELS_FOLDER).rglob("*"))
+            models = [path for path in found if path.is_file()]
+            carried = {
+                path.relative_to(folder).as_posix(): path.read_bytes()
+                for path in models
+            }
+        files |= carried
         return Capsule(arguments=arguments, failure=failure, files=files)
 
     def save(self, path: Path) -> None:

@@ -64,10 +64,10 @@ def check_robot(options: argparse.Namespace) -> int:
     try:
         model, _ = load_model(folder, trust_code=options.trust_code)
         if model.has_custom_motion:
-            from mrmg.motion.user_motion import user_motion
+            from mrmg.motion.user_motion import motion_of
 
             limits = model.limits.scaled(model.planning_share)
-            user_motion(model.motion_model).compiled(limits.as_tuple())
+            motion_of(model).compiled(limits.as_tuple())
     except SceneError as error:
         if options.json:
             faults = [asdict(fault) for fault in error.faults]

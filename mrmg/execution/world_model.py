@@ -140,10 +140,7 @@ def _attach(
     """Attach the robot's MJCF at its start pose, its names prefixed with `<id>/`."""
     require_drivable([robot])
     path = robot.model.mjcf
-    changed = robot.model.files.changed()
-    if changed:
-        message = "has changed since the scene was loaded; load the scene again"
-        raise FileError(str(path), [Fault(str(file), message) for file in changed])
+    robot.model.require_unchanged_files()
     try:
         car = mujoco.MjSpec.from_file(str(path))
     except (ValueError, OSError) as error:

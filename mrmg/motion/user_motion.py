@@ -30,6 +30,8 @@ from types import ModuleType
 from typing import Any
 
 from mrmg.errors import Fault, SceneError
+from mrmg.scene.content import content_digest
+from mrmg.scene.robot_model import RobotModel
 
 _PARAMETERS = {
     "step": ("state", "control", "length", "dt"),
@@ -60,9 +62,23 @@ class UserMotion:
         return _addresses(self, limits)
 
 
+def motion_of(model: RobotModel) -> UserMotion:
+    """Import the custom motion of a robot model.
+
+    Raises:
+        SceneError: naming what the file lacks, or that it has changed.
+    """
+    model.require_unchanged_files()
+    return user_motion(model.motion_model, content_digest(model.files))
+
+
 @cache
-def user_motion(path: str) -> UserMotion:
+def user_motion(path: str, content: str = "") -> UserMotion:
     """Import a user's motion model.
+
+    Args:
+        path: of its file.
+        content: digest of the file; it is imported once for each.
 
     Raises:
         SceneError: naming what the file lacks.

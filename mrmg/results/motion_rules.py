@@ -8,7 +8,7 @@ import numpy as np
 
 from mrmg.mission import Trajectory
 from mrmg.motion.dynamics import DERIVATIVES, Derivative, rk4_step
-from mrmg.motion.user_motion import user_motion
+from mrmg.motion.user_motion import motion_of
 from mrmg.results.verdict import Violation, ViolationKind
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Robot
@@ -156,7 +156,7 @@ def plain_step(model: RobotModel) -> Derivative:
     """Return step(x, y, theta, v, w, u1, u2, L, dt) of a model in plain Python."""
     if model.motion_model in DERIVATIVES:
         return rk4_step(DERIVATIVES[model.motion_model](math.sin, math.cos, math.tan))
-    motion = user_motion(model.motion_model)
+    motion = motion_of(model)
 
     def step(*arguments: float) -> tuple[float, ...]:
         return motion.step(arguments[:5], arguments[5:7], *arguments[7:])

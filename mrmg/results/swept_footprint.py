@@ -15,7 +15,7 @@ import numpy as np
 
 from mrmg.mission import Trajectory
 from mrmg.motion.dynamics import DERIVATIVES, rk4_step
-from mrmg.motion.user_motion import user_motion
+from mrmg.motion.user_motion import motion_of
 from mrmg.scene.robot_model import RobotModel
 
 # Covers the integrator's own error, which the bound on the exact motion leaves out:
@@ -86,7 +86,7 @@ def _states_after(
         advance = rk4_step(DERIVATIVES[model.motion_model](np.sin, np.cos, np.tan))
         length_m = model.wheelbase_m
         return np.stack(advance(*state.T, *control.T, length_m, time_s), axis=-1)
-    motion = user_motion(model.motion_model)
+    motion = motion_of(model)
     return np.array(
         [
             motion.step(tuple(before), tuple(held), model.wheelbase_m, duration)

@@ -15,6 +15,7 @@ import numpy as np
 import shapely
 
 from mrmg.energy import GRAVITY_M_S2, EnergyModel, EnergyPreset
+from mrmg.errors import Fault, SceneError
 from mrmg.scene.content import ByContent, content, contents
 from mrmg.scene.model_files import ModelFiles
 
@@ -144,20 +145,27 @@ class RobotModel(ByContent):
     origin: ModelOrigin | None = None
 
     def __post_init__(self) -> None:
-        named = (self.mjcf, Path(self.motion_model) if self.is_custom_motion else None)
+        named = (self.mjcf, Path(self.motion_model) if self.has_custom_motion else None)
         roots = tuple(path for path in named if path is not None)
         if self.files.roots != roots:
             object.__setattr__(self, "files", ModelFiles.of(*roots))
 
-    @property
-    def is_custom_motion(self) -> bool:
-        """Whether a Python file defines the motion."""
-        return self.motion_model.endswith(".py")
+    def require_unchanged_files(self) -> None:
+        """Refuse a model whose files are not any more those that its digest is of.
+
+        Raises:
+            SceneError: naming the files.
+        """
+        changed = self.files.changed()
+        if changed:
+            message = "has changed since the scene was loaded; load the scene again"
+            faults = [Fault(str(path), message) for path in changed]
+            raise SceneError(f"model '{self.name}'", faults)
 
     def content(self) -> dict[str, Any]:
         """Return what counts for a digest: what the model says, not where it lies."""
         known = contents(self, without=("name", "mjcf", "origin"))
-        motion = "custom" if self.is_custom_motion else self.motion_model
+        motion = "custom" if self.has_custom_motion else self.motion_model
         outline = content(shapely.Polygon(self.footprint_m))
         return {**known, "motion_model": motion, "footprint_m": outline}
 

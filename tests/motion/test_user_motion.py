@@ -16,7 +16,7 @@ import mrmg
 from mrmg import shipped
 from mrmg.errors import MrmgError, SceneError
 from mrmg.motion import _kernels
-from mrmg.motion.user_motion import user_motion
+from mrmg.motion.user_motion import motion_of, user_motion
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.roadmap._fleet_kernels import FLEET
 from mrmg.scene.loading import scene_from_document
@@ -138,6 +138,22 @@ def test_the_motions_text_is_part_of_the_scenes_digest(tmp_path: Path) -> None:
     other = SLIDER.replace("0.5 * w", "0.50 * w")
     assert first == same
     assert slider_scene(model_folder(tmp_path, other, "c")).digest != first
+
+
+def test_an_edited_motion_is_never_used_for_the_old_one(tmp_path: Path) -> None:
+    folder = model_folder(tmp_path, SLIDER)
+    scene = slider_scene(folder)
+    before = motion_of(scene.robots[0].model)
+    stays = "\n\ndef step(state, control, length, dt):\n    return state\n"
+    (folder / "motion.py").write_text(SLIDER + stays)
+    with pytest.raises(SceneError, match=r"motion.py: has changed since the scene"):
+        plan_mission(scene, seed=0)
+    again = slider_scene(folder)
+    assert again != scene
+    state, control = (0.0, 0.0, 0.0, 1.0, 0.5), (0.0, 1.0)
+    after = motion_of(again.robots[0].model)
+    assert before.step(state, control, 1.0, 0.5) != state
+    assert after.step(state, control, 1.0, 0.5) == state
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 
 from mrmg.errors import Fault, SceneError
 from mrmg.motion._kernels import MODEL_ID, USER
-from mrmg.motion.user_motion import user_motion
+from mrmg.motion.user_motion import motion_of
 from mrmg.planning.roadmap._fleet_kernels import FLEET, MOST_CORNERS, Spaces
 from mrmg.planning.roadmap.slopes import SlopeCost
 from mrmg.scene.types import Robot, Scene
@@ -117,7 +117,7 @@ def fleet_array(
         one = fleet[r]
         one["model"] = MODEL_ID.get(model.motion_model, USER)
         if model.motion_model not in MODEL_ID:
-            motion = user_motion(model.motion_model)
+            motion = motion_of(model)
             one["step_at"], one["steer_at"] = motion.compiled(limits.as_tuple())
         one["wheelbase"] = model.wheelbase_m
         one["track"] = model.track_m

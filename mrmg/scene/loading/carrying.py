@@ -11,7 +11,6 @@ import os
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from mrmg.errors import Fault, SceneError
 from mrmg.scene.loading.reading import require_faithful
 from mrmg.scene.loading.yaml_text import dump_yaml
 from mrmg.scene.model_files import MODELS_FOLDER
@@ -73,10 +72,7 @@ def _files_of(model: RobotModel) -> tuple[str, dict[str, bytes]]:
     """
     assert model.origin is not None
     folder = model.origin.reference
-    changed = model.files.changed()
-    if changed:
-        message = "has changed since the scene was loaded; load the scene again"
-        raise SceneError(folder, [Fault(str(path), message) for path in changed])
+    model.require_unchanged_files()
     found = {
         os.path.abspath(file.path): file.path.read_bytes()
         for file in model.files.files
