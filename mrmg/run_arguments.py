@@ -213,9 +213,22 @@ class RunArguments(_Checked):
     )
     profile: str = _option(
         "default",
-        "'paper' follows the published algorithms to the letter",
+        "'paper' is the published method: planner guided_tree with router nrpa",
         decides="plan",
         choices=("default", "paper"),
+    )
+    planner: str | None = _option(
+        None,
+        "path_following, which is the default, or guided_tree, the published method",
+        decides="plan",
+        choices=("path_following", "guided_tree"),
+    )
+    router: str | None = _option(
+        None,
+        "what finds tours: search, which is the default, nrpa or exact; guided_tree "
+        "takes nrpa only",
+        decides="plan",
+        choices=("nrpa", "search", "exact"),
     )
     objective: str | Mapping[str, float] | None = _option(
         None,

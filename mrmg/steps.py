@@ -196,6 +196,8 @@ def _plan(run: Run) -> Write:
         seed=arguments.seed,
         params=profile_params(
             arguments.profile,
+            planner=arguments.planner,
+            router=arguments.router,
             budget_s=arguments.budget_s,
             trees=arguments.trees,
             spare=arguments.spare,
@@ -276,7 +278,7 @@ def drive(
         replan=arguments.replan,
         faults=arguments.faults,
         seed=arguments.seed,
-        planner=profile_params(arguments.profile),
+        planner=profile_params(),
         on_progress=on_progress,
     )
 

@@ -32,6 +32,8 @@ OTHER: dict[str, Any] = {
     "spare": 0.25,
     "workers": 2,
     "profile": "paper",
+    "planner": "guided_tree",
+    "router": "nrpa",
     "controller": "tvlqr",
     "disturb": "rolling=+30%",
     "disturb_seed": 4,

@@ -82,6 +82,8 @@ def plan(options: argparse.Namespace) -> int:
     text += f"; {outcome['reason']}" if outcome["reason"] else ""
     if outcome["statistics"]["improvements"]:
         text += f"\n  {terminal.quality(outcome['statistics']['improvements'][-1])}"
+        if "iteration_cap" in outcome["statistics"]:
+            text += f"\n  {terminal.iterations(outcome['statistics'])}"
     text += "".join(f"\n  hint: {hint}" for hint in outcome.get("hints", ()))
     text += f"\n  in {folder.path}"
     text += "; planned before, --overwrite plans again" if kept else ""

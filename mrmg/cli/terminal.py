@@ -110,6 +110,11 @@ def quality(found: Mapping[str, Any]) -> str:
     return text
 
 
+def iterations(found: Mapping[str, Any]) -> str:
+    """Return the iterations of the guided tree and their hard cap in words."""
+    return f"{found['iterations']} of at most {found['iteration_cap']} iterations"
+
+
 def compile_kernels() -> None:
     """Compile kernels where that is to be done, and tell a person who waits for it."""
     from mrmg.compilation import compiled_kernels, kernels_are_compiled
@@ -167,6 +172,8 @@ def _summary_lines(summary: dict[str, Any]) -> Iterator[str]:
             f"planned in {plan['time_s']['total']:.2f} s"
         )
         yield f"quality    {quality(plan)}"
+        if plan.get("iteration_cap"):
+            yield f"search     {iterations(plan)}"
     for hint in summary.get("hints", ()):
         yield f"hint       {hint}"
     if verdict:

@@ -1,4 +1,4 @@
-"""From a scene to a plan: roadmap, router, motion tree."""
+"""From a scene to a plan: roadmap, routers, planners."""
 
 from mrmg.planning.parameters import (
     PROFILES as PROFILES,

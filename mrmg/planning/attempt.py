@@ -1,4 +1,4 @@
-"""One attempt at a mission: tours, a draft or a motion tree along them, its plan."""
+"""One attempt at a mission by a planner: tours, motions along them, a plan."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from mrmg.mission import Plan
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.drafting.drafting import LEAST_SPARE, draftable, drafts, path_cost_J
 from mrmg.planning.drafting.refine import refine
-from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.guided_tree.planner import grow_guided_tree
+from mrmg.planning.parameters import GUIDED_TREE, PlannerParams
 from mrmg.planning.routers import route
 from mrmg.planning.routing.routing import Routing
 from mrmg.planning.tree.motion_tree import Problem, grow_tree
@@ -86,9 +87,10 @@ def router_problem(problem: Problem, params: PlannerParams) -> Problem:
 def attempt_plan(
     problem: Problem, seed: int, params: PlannerParams, number: int, halt: np.ndarray
 ) -> Attempt:
-    """Draw tours and find a plan along them; a function of seed and number alone.
+    """Find a plan; a function of seed and number alone.
 
-    Tours are drafted first (`drafting`); where that is not possible or fails, a tree
+    Planner guided_tree is the paper's method. Planner path_following follows paths
+    along tours (`drafting`); where that is not possible or fails, an accelerated tree
     grows along tours of its own. Batteries keep `params.spare` if that can be.
 
     Args:
@@ -98,6 +100,8 @@ def attempt_plan(
         number: of the attempt; each has its own random streams.
         halt: shape (1,); the attempt ends soon after it has turned true.
     """
+    if params.planner == GUIDED_TREE:
+        return guided_plans(problem, seed, params, number, halt)
     problem = problem.with_limit(LIMITS[number % len(LIMITS)])
     routing_s, tours_found, blocked = 0.0, False, ""
     counts: Counter[str] = Counter()
@@ -125,6 +129,28 @@ def attempt_plan(
         if found.tours_found:
             break
     return Attempt(found.plans, routing_s, counts, tours_found, blocked)
+
+
+def guided_plans(
+    problem: Problem, seed: int, params: PlannerParams, number: int, halt: np.ndarray
+) -> Attempt:
+    """Grow the paper's motion tree, and return the plan that it leads to."""
+    problem = problem.with_spare(params.spare)
+    draw = seeding.stream_seed(seed, "guided tree", number)
+    growth = grow_guided_tree(problem, params, draw, halt)
+    plan = None
+    if growth.solved:
+        plan = make_plan(problem, seed, params, growth.trajectories, growth.tours)
+    plans = [] if plan is None else [(time.perf_counter(), plan)]
+    done, cap = growth.counts["iterations"], growth.counts["iteration_cap"]
+    return Attempt(
+        plans,
+        growth.routing_s,
+        growth.counts,
+        tours_found=growth.counts["vertices"] > 0,
+        blocked=f"the guided tree did not solve it in {done} of at most {cap} "
+        "iterations",
+    )
 
 
 def tree_plans(

@@ -10,10 +10,13 @@ import numpy as np
 from mrmg import seeding
 from mrmg.errors import UsageError
 from mrmg.mission import Trajectory
-from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.guided_tree.planner import Growth as GuidedGrowth
+from mrmg.planning.guided_tree.planner import grow_guided_tree
+from mrmg.planning.parameters import GUIDED_TREE, PlannerParams
 from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
 from mrmg.planning.routers import route
 from mrmg.planning.routing.routing import Routing
+from mrmg.planning.tree.motion_tree import Growth as TreeGrowth
 from mrmg.planning.tree.motion_tree import Problem, grow_tree, state_problem
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
@@ -39,7 +42,9 @@ class Insight:
 
 
 def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
-    """Plan a mission, and keep what leads to its first plan.
+    """Plan a mission by a motion tree, and keep what leads to its first plan.
+
+    The tree is the paper's for planner guided_tree, else the accelerated one.
 
     Args:
         scene: the mission.
@@ -61,11 +66,8 @@ def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
     problem = state_problem(scene, world, roadmap, params)
     for number in range(params.trees):
         draw = seeding.stream_seed(seed, "insight", number)
-        routing = route(problem.mission.routing, params.router, draw)
-        if not routing.feasible:
-            continue
-        growth = grow_tree(problem, params, routing, draw, np.zeros(1, np.bool_))
-        if growth.solved:
+        routing, growth = _grow(problem, params, draw)
+        if growth is not None and growth.solved:
             first, second, weight = roadmap.edges[0]
             edges = roadmap.arrays.vertex[np.stack([first, second], axis=1)]
             length_m = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
@@ -83,6 +85,20 @@ def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
                 trajectories=growth.trajectories,
             )
     raise UsageError(f"{scene.name}: no plan was found in {params.trees} attempts")
+
+
+def _grow(
+    problem: Problem, params: PlannerParams, draw: int
+) -> tuple[Routing, TreeGrowth | GuidedGrowth | None]:
+    """Grow a tree; return the tours it begins with and the tree, None without tours."""
+    halt = np.zeros(1, np.bool_)
+    if params.planner == GUIDED_TREE:
+        guided = grow_guided_tree(problem, params, draw, halt)
+        return Routing(guided.first_tours, cost_J=0.0), guided
+    routing = route(problem.mission.routing, params.router, draw)
+    if not routing.feasible:
+        return routing, None
+    return routing, grow_tree(problem, params, routing, draw, halt)
 
 
 def tour_way(problem: Problem, routing: Routing, robot: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Every parameter of the planner, with its symbol in the paper and its limits."""
+"""Every parameter of the planners, with its symbol in the paper and its limits."""
 
 from __future__ import annotations
 
@@ -10,32 +10,96 @@ from mrmg.planning.routing.routing import RouterParams
 
 PROFILES = ("default", "paper")
 
+PATH_FOLLOWING, GUIDED_TREE = PLANNERS = ("path_following", "guided_tree")
+"""Planners by name: path following along tours, with a motion tree where that fails;
+and the paper's method (`guided_tree`)."""
+
 THOROUGH = 6
 """Refinements of each plan when there is a budget to be spent."""
 
 
+BETA_SHARE = 0.01
+"""Largest value of beta dist in eq. (5), as a share of alpha / m for m goals."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PlannerParams:
-    """Parameters of roadmap, router and motion tree.
+class GuidedTreeParams:
+    """Parameters of the paper's Algorithms 1-3 (`guided_tree`).
 
     Attributes:
-        profile: "default", or "paper" for the method to the letter.
+        iterations: hard cap on the iterations of Algorithm 1.
+        k: steps of dt for which Algorithm 3 holds its controls, at most.
+        alpha: of eq. (5); beta follows from it (`BETA_SHARE`).
+        decline: lambda of eq. (5), in (0, 1).
+        bias: probability of selecting the group of largest weight instead of drawing.
+        vertex_spread_m: distance to the target by which a vertex becomes less likely
+            than another one of its group by a factor of e [m].
+        decay_start: Decay(0), the probability of steering in a new group.
+        decay_rate: factor of Decay for each expansion of the group, in (0, 1).
+        ahead_least_m, ahead_most_m: range from which SampleTarget draws how far along
+            its path a robot's target lies [m].
+        target_spread_m: radius of the disc about that point in which it lies [m].
+    """
+
+    iterations: int = 150_000
+    k: int = 5
+    alpha: float = 1.0
+    decline: float = 0.999
+    bias: float = 0.9
+    vertex_spread_m: float = 1.0
+    decay_start: float = 0.98
+    decay_rate: float = 0.99
+    ahead_least_m: float = 1.5
+    ahead_most_m: float = 6.0
+    target_spread_m: float = 0.5
+
+    def __post_init__(self) -> None:
+        allowed = {
+            "iterations": self.iterations >= 1,
+            "k": 1 <= self.k <= 200,
+            "alpha": self.alpha > 0.0,
+            "decline": 0.0 < self.decline < 1.0,
+            "bias": 0.0 <= self.bias <= 1.0,
+            "vertex_spread_m": self.vertex_spread_m > 0.0,
+            "decay_start": 0.0 < self.decay_start <= 1.0,
+            "decay_rate": 0.0 < self.decay_rate < 1.0,
+            "ahead_least_m": 0.0 <= self.ahead_least_m <= self.ahead_most_m,
+            "target_spread_m": self.target_spread_m >= 0.0,
+        }
+        _refuse(self, allowed, "parameters of the guided tree")
+
+
+def _refuse(params: object, allowed: dict[str, bool], what: str) -> None:
+    wrong = [name for name, fine in allowed.items() if not fine]
+    if wrong:
+        values = ", ".join(f"{name} = {getattr(params, name)!r}" for name in wrong)
+        raise UsageError(f"{what} out of range: {values}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlannerParams:
+    """Parameters of roadmap, router and planners.
+
+    Attributes:
+        profile: "default", or "paper" for the paper's method and parameters.
+        planner: one of PLANNERS.
+        guided_tree: parameters of the planner of that name.
         samples: free samples of the roadmap (ConstructPRM).
         neighbours: nearest vertices joined in the roadmap.
-        router: parameters of NRPA.
+        router: name and parameters of the router; the planner guided_tree takes nrpa.
         dt_s: step of the motion model, dt [s].
-        steps: steps of one expansion, k.
-        max_vertices: size of one tree at which it is given up.
+        steps: steps of one expansion of the tree of path_following.
+        max_vertices: size of one such tree at which it is given up.
         trees: trees grown at most; a tree that fails is followed by one with new draws.
         improvements: further trees grown after the first plan; the cheapest plan
             counts.
-        drafts: drive along tours without a tree where that succeeds.
+        drafts: follow paths along tours without a tree where that succeeds.
         spare: share of every battery's capacity that plans leave above the reserve
             where they can, for robots that take more than their models say. With a
             tenth, a robot that uses all it may on one charge can take 12 % more.
         refinements: times that the plan of each tree is drawn tight and driven again,
             as long as that saves energy.
-        group_alpha, group_beta, group_lambda: alpha, beta, lambda of eq. (5).
+        group_alpha, group_beta, group_lambda: weights of groups in such a tree.
         group_bias: probability of taking the group of largest weight instead of
             drawing.
         steer_start, steer_decay, steer_least: probability that an expansion steers
@@ -55,6 +119,8 @@ class PlannerParams:
     """
 
     profile: str = "default"
+    planner: str = PATH_FOLLOWING
+    guided_tree: GuidedTreeParams = field(default_factory=GuidedTreeParams)
     samples: int = 1500
     neighbours: int = 12
     router: RouterParams = field(default_factory=RouterParams)
@@ -82,6 +148,7 @@ class PlannerParams:
     def __post_init__(self) -> None:
         allowed = {
             "profile": self.profile in PROFILES,
+            "planner": self.planner in PLANNERS,
             "samples": self.samples >= 0,
             "neighbours": self.neighbours >= 1,
             "dt_s": 0.0 < self.dt_s <= 0.2,
@@ -102,10 +169,18 @@ class PlannerParams:
             "route_margin": 0.0 <= self.route_margin <= 1.0,
             "budget_s": self.budget_s is None or self.budget_s > 0.0,
         }
-        wrong = [name for name, fine in allowed.items() if not fine]
-        if wrong:
-            values = ", ".join(f"{name} = {getattr(self, name)!r}" for name in wrong)
-            raise UsageError(f"planner parameters out of range: {values}")
+        _refuse(self, allowed, "planner parameters")
+        if self.planner == GUIDED_TREE and self.router.method != "nrpa":
+            raise UsageError(
+                f"planner {GUIDED_TREE} finds its tours by router nrpa alone, not by "
+                f"{self.router.method}; leave the router out, or plan with "
+                f"{PATH_FOLLOWING}"
+            )
+        if self.profile == "paper" and self.planner != GUIDED_TREE:
+            raise UsageError(
+                f"profile paper is planner {GUIDED_TREE} with router nrpa; leave the "
+                f"profile out to plan with {self.planner}"
+            )
 
     @property
     def digest(self) -> str:
@@ -116,8 +191,10 @@ class PlannerParams:
 
 
 def profile_params(
-    profile: str,
+    profile: str = "default",
     *,
+    planner: str | None = None,
+    router: str | None = None,
     budget_s: float | None = None,
     trees: int | None = None,
     spare: float | None = None,
@@ -125,16 +202,27 @@ def profile_params(
     """Return the parameters of a profile.
 
     Args:
-        profile: "default" or "paper".
+        profile: "default" or "paper", which is planner guided_tree with router nrpa.
+        planner: one of PLANNERS; None for the profile's.
+        router: one of `routing.METHODS`; None for the planner's.
         budget_s: time limit [s]; None for none.
         trees: number of trees to grow, all of them; None for the profile's.
         spare: share of every battery's capacity that plans leave above the reserve
             where they can; None for the profile's.
 
     Raises:
-        UsageError: if the profile is unknown, or a number is out of range.
+        UsageError: if a name is unknown, names contradict each other, or a number is
+            out of range.
     """
-    params = _profile(profile, budget_s)
+    guided = planner == GUIDED_TREE or (planner is None and profile == "paper")
+    params = paper_params() if guided else PlannerParams()
+    if profile != "default":
+        params = replace(params, profile=profile)
+    if planner is not None:
+        params = replace(params, planner=planner)
+    if router is not None:
+        params = replace(params, router=replace(params.router, method=router))
+    params = replace(params, budget_s=budget_s)
     if params.refinements and (budget_s is not None or trees is not None):
         params = replace(params, refinements=THOROUGH)
     if spare is not None:
@@ -144,21 +232,14 @@ def profile_params(
     return params
 
 
-def _profile(profile: str, budget_s: float | None) -> PlannerParams:
-    base = PlannerParams(profile=profile, budget_s=budget_s)
-    if profile == "paper":
-        # A new tour at every reached goal, one control held for the whole expansion.
-        return replace(
-            base,
-            router=RouterParams(levels=2, iterations=20, rounds=0),
-            steps=5,
-            max_vertices=60_000,
-            trees=2,
-            improvements=0,
-            drafts=False,
-            spare=0.0,
-            refinements=0,
-            steer_decay=0.9999,
-            steer_least=0.5,
-        )
-    return base
+def paper_params() -> PlannerParams:
+    """Return the parameters of the paper's method: one tree, as its first plan is."""
+    return PlannerParams(
+        profile="paper",
+        planner=GUIDED_TREE,
+        router=RouterParams(method="nrpa", levels=2, iterations=12, rounds=0),
+        trees=1,
+        improvements=0,
+        spare=0.0,
+        refinements=0,
+    )

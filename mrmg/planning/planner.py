@@ -1,4 +1,4 @@
-"""From a scene to a plan: roadmap, tours, motion trees, the best of their finds."""
+"""From a scene to a plan: roadmap, attempts of a planner, the best of their plans."""
 
 from __future__ import annotations
 
@@ -19,7 +19,13 @@ from mrmg.compilation import (
 )
 from mrmg.errors import Fault, SceneError, UsageError
 from mrmg.mission import PlanResult, PlanStatus
-from mrmg.planning.attempt import Attempt, attempt_plan, draft_plans, tree_plans
+from mrmg.planning.attempt import (
+    Attempt,
+    attempt_plan,
+    draft_plans,
+    guided_plans,
+    tree_plans,
+)
 from mrmg.planning.bound.bound import Relaxation, exact_routing, lower_bound_J
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.bounding import bounds_beside, bounds_of
@@ -31,8 +37,15 @@ from mrmg.planning.diagnosis import (
     why_no_roadmap,
 )
 from mrmg.planning.frame import Frame, on_the_map
+from mrmg.planning.guided_tree.limits import refuse_unknown_features
 from mrmg.planning.hints import INTERRUPTED, hints_on
-from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.parameters import (
+    GUIDED_TREE,
+    PLANNERS,
+    GuidedTreeParams,
+    PlannerParams,
+    paper_params,
+)
 from mrmg.planning.preference import Preference
 from mrmg.planning.roadmap.roadmap import build_roadmap
 from mrmg.planning.routing.routing import Routing
@@ -61,16 +74,16 @@ def plan_mission(
 ) -> PlanResult:
     """Plan a mission.
 
-    Grows motion trees along routed tours until one visits all goals, then
-    `params.improvements` more, each along tours of its own draw, or as many as a time
-    limit allows, and returns the best plan by the scene's objective.
+    Makes attempts with the planner of `params` until one finds a plan, then
+    `params.improvements` more, each with draws of its own, or as many as a time limit
+    allows, and returns the best plan by the scene's objective.
 
     Args:
         scene: the mission.
         seed: of all random streams; same scene, seed and parameters give the same plan,
             whatever the number of workers, unless `params.budget_s` ends the search.
         params: parameters; the default profile's if None.
-        workers: threads that grow trees.
+        workers: threads that make attempts.
         with_bound: bound what the objective asks of all plans, too, beside the search;
             statistics of a plan then hold `bound_J` or `bound_s`, and `gap`.
         on_progress: told how far planning has got.
@@ -78,7 +91,8 @@ def plan_mission(
 
     Raises:
         SceneError: if the scene has no robots.
-        UsageError: if there is to be no worker.
+        UsageError: if there is to be no worker, or the scene has features that the
+            planner does not know.
     """
     params = params or PlannerParams()
     if not scene.robots:
@@ -86,6 +100,8 @@ def plan_mission(
         raise SceneError(scene.name, [fault])
     if workers < 1:
         raise UsageError(f"workers = {workers}; planning needs at least 1")
+    if params.planner == GUIDED_TREE:
+        refuse_unknown_features(scene)
     compile_kernels()
     halt = np.zeros(1, np.bool_)
     try:
@@ -123,7 +139,7 @@ def _planned(
         bounding = bounds_beside(
             own, params.dt_s, statistics, anytime=anytime, halt=halt
         )
-    _load_kernels(trees=not params.drafts)
+    _load_kernels(params.planner, trees=not params.drafts)
     statistics.begin()
 
     proofs = Proofs(own, params.dt_s, halt)
@@ -200,24 +216,28 @@ def compile_kernels(on_progress: Callable[[int], None] | None = None) -> None:
     """
     if kernels_are_compiled():
         return
-    calls = (grow_smallest, draft_smallest, bound_smallest)
+    calls = (grow_smallest, draft_smallest, guide_smallest, bound_smallest)
     compile_in_processes(calls, on_progress or (lambda number: None))
-    _load_kernels(trees=True)
+    for planner in PLANNERS:
+        _load_kernels(planner, trees=True)
     bound_smallest()
     with suppress(OSError):  # without a cache that can be written, plan all the same
         note_kernels_are_compiled()
 
 
 @cache
-def _load_kernels(*, trees: bool) -> None:
-    """Load the kernels of planning, so that no time limit or figure includes it.
+def _load_kernels(planner: str, *, trees: bool) -> None:
+    """Load the kernels of a planner, so that no time limit or figure includes it.
 
     Those of trees take as long as all others; few missions need them where there are
     drafts, and load them then.
     """
+    if planner == GUIDED_TREE:
+        guide_smallest()
+        return
     draft_smallest()
     if trees:
-        _find_in_smallest(tree_plans)
+        _find_in_smallest(tree_plans, SMALL_PARAMS)
 
 
 def grow_smallest() -> None:
@@ -230,7 +250,12 @@ def grow_smallest() -> None:
 
 def draft_smallest() -> None:
     """Plan the smallest mission without a tree."""
-    _find_in_smallest(draft_plans)
+    _find_in_smallest(draft_plans, SMALL_PARAMS)
+
+
+def guide_smallest() -> None:
+    """Plan the smallest mission by the paper's method."""
+    _find_in_smallest(guided_plans, SMALL_PAPER_PARAMS)
 
 
 @cache
@@ -250,11 +275,16 @@ def bound_smallest() -> None:
 SMALL_PARAMS = PlannerParams(samples=20, max_vertices=20, trees=1)
 """What suffices to plan the smallest mission."""
 
+SMALL_PAPER_PARAMS = replace(
+    paper_params(), guided_tree=GuidedTreeParams(iterations=1000)
+)
+"""The same for the paper's method."""
 
-def _find_in_smallest(find: Callable[..., Attempt]) -> None:
+
+def _find_in_smallest(find: Callable[..., Attempt], params: PlannerParams) -> None:
     scene, problem = _smallest_mission()
-    found = find(problem, 0, SMALL_PARAMS, 0, np.zeros(1, np.bool_))
-    found = on_the_map(found, problem, scene, SMALL_PARAMS)
+    found = find(problem, 0, params, 0, np.zeros(1, np.bool_))
+    found = on_the_map(found, problem, scene, params)
     assert found.plans, "the smallest mission has a plan, or not all is compiled"
 
 

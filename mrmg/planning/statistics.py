@@ -132,7 +132,7 @@ class Statistics:
         return math.inf if budget_s is None else max(0.0, budget_s - self.elapsed())
 
     def add(self, counts: dict[str, int], routing_s: float) -> None:
-        """Add the counts of one tree, and the time its tours took."""
+        """Add the counts of one attempt, and the time its tours took."""
         for name, value in counts.items():
             self.counts[name] = self.counts.get(name, 0) + value
         self.time_s["routing"] = self.time_s.get("routing", 0.0) + routing_s

@@ -24,6 +24,8 @@ _NAMES = {
     "trees": "Motion trees",
     "drafts": "Times the fleet was driven along tours without a tree",
     "expansions": "Expansions of motion trees",
+    "iterations": "Iterations of the guided tree",
+    "iteration_cap": "Most iterations it may make",
     "vertices": "Vertices of motion trees",
     "groups": "Groups of vertices",
     "dead_ends": "Expansions that led nowhere",

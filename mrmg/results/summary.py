@@ -108,6 +108,7 @@ def _plan_figures(
 ) -> dict[str, Any]:
     limit_s = scene.time_limit_s
     times = ("init", "routing", "first_solution", "total")
+    capped = ("iterations", "iteration_cap")
     return {
         "cost_J": plan.cost_J,
         "bound_J": statistics.get("bound_J"),
@@ -129,6 +130,7 @@ def _plan_figures(
         "groups": statistics["groups"],
         "router_calls": statistics["router_calls"],
         "time_s": {name: statistics["time_s"][name] for name in times},
+        **{name: statistics[name] for name in capped if name in statistics},
     }
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from mrmg.errors import UsageError
 from mrmg.planning.insight import Insight, look_inside
-from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.parameters import PROFILES, PlannerParams, profile_params
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
@@ -20,9 +20,9 @@ def scene() -> Scene:
     return load_scene("quickstart")
 
 
-@pytest.fixture(scope="module")
-def inside(scene: Scene) -> Insight:
-    return look_inside(scene, seed=0, params=PlannerParams())
+@pytest.fixture(scope="module", params=PROFILES)
+def inside(scene: Scene, request: pytest.FixtureRequest) -> Insight:
+    return look_inside(scene, seed=0, params=profile_params(request.param))
 
 
 def test_edges_of_the_roadmap_are_free_and_cost_what_their_ground_does(

@@ -11,7 +11,7 @@ import pytest
 import mrmg
 from mrmg.errors import SceneError
 from mrmg.mission import PlanResult, PlanStatus
-from mrmg.planning import PlannerParams, plan_mission, profile_params
+from mrmg.planning import PlannerParams, plan_mission
 from mrmg.scene.types import Scene
 
 SCENES = Path(__file__).parents[1] / "scenes"
@@ -129,23 +129,6 @@ def test_more_improvements_never_give_a_dearer_plan() -> None:
         assert plan is not None
         costs.append(plan.cost_J)
     assert costs == sorted(costs, reverse=True)
-
-
-@pytest.mark.parametrize("name", ["one_goal", "two_swap"])
-def test_the_papers_profile_solves_small_missions(name: str) -> None:
-    scene = edge_scene(name)
-    result = plan_mission(scene, seed=0, params=profile_params("paper"))
-    assert result.status is PlanStatus.SOLVED, result.reason
-    assert result.plan is not None
-    assert result.plan.profile == "paper"
-    assert mrmg.verify(scene, result.plan).violations == ()
-
-
-def test_the_papers_profile_is_reproducible() -> None:
-    scene = edge_scene("one_goal")
-    params = profile_params("paper")
-    results = [plan_mission(scene, seed=5, params=params) for _ in range(2)]
-    assert digest(results[0]) == digest(results[1])
 
 
 def test_very_short_steps_leave_room_for_long_braking() -> None:

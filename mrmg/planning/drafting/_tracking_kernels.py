@@ -248,7 +248,7 @@ def drive(
         that did not get on).
     """
     robots = len(fleet)
-    commitment = new_commitment(fleet, gates, dt, True)
+    commitment = new_commitment(fleet, gates, dt)
     decided = np.zeros(robots, np.bool_)
     segment = np.zeros(robots, np.int64)
     still = np.zeros(robots, np.int64)

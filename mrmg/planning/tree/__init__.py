@@ -1,5 +1,6 @@
-"""The motion tree in the composite space of all robots (Algorithms 1-3).
+"""The accelerated motion tree, which plans where path following fails.
 
-`motion_tree` states a mission for the kernels and grows trees: groups of vertices and
-their weights (eq. (5)), expansion by steering and random controls, safety.
+It keeps braking possible at every vertex, looks ahead at obstacles and inherits tours;
+the paper's own method is `guided_tree`. `motion_tree` states a mission for the kernels
+and grows trees: groups of vertices and their weights, expansion, safety.
 """

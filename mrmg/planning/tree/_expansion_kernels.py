@@ -1,4 +1,4 @@
-"""One expansion of the motion tree: every robot drives for k steps (Algorithm 3)."""
+"""One expansion of the motion tree: every robot drives for some steps."""
 
 from __future__ import annotations
 
@@ -57,6 +57,9 @@ QUEUE = 4.0
 ATTEMPTS = 5
 """Controls tried before a robot brakes as committed."""
 
+HELD_ATTEMPTS = 2
+"""The same where a motion is held."""
+
 
 @leaf_kernel
 def choose_modes(tree, v, target, params, steer, random, stuck, mode):
@@ -88,7 +91,7 @@ def choose_modes(tree, v, target, params, steer, random, stuck, mode):
             mode[r] = STEER
         elif draw >= steer:
             mode[r] = RANDOM
-        elif stuck[r] < 2 or params.literal:
+        elif stuck[r] < 2:
             mode[r] = STEER
         else:
             pick = random_unit(random)
@@ -127,7 +130,7 @@ def choose_motion(mission, r, target, state, waypoint, stuck, gear, random, moti
     """
     off = abs(wrap(atan2(waypoint[1] - state[1], waypoint[0] - state[0]) - state[2]))
     gear[r] = 1
-    if mission.fleet[r].model != CAR or mission.params.literal:
+    if mission.fleet[r].model != CAR:
         return False
     if off < AHEAD and stuck == 0:
         return False
@@ -173,7 +176,7 @@ def drive_step(mission, commitment, decided, r, v, w, held, attempts):
     For a user's model (v, w) is the waypoint, or the control that is held.
 
     Returns:
-        (u1, u2, whether it was safe; if not, the robot follows its commitment).
+        The control (u1, u2); that of its commitment where none was safe.
     """
     dt = mission.params.dt
     state = present_state(commitment, r).copy()
@@ -187,10 +190,9 @@ def drive_step(mission, commitment, decided, r, v, w, held, attempts):
         if try_control(
             mission.fleet, mission.spaces, commitment, decided, r, u1, u2, dt
         ):
-            return u1, u2, True
+            return u1, u2
     follow_braking(commitment, r)
-    u1, u2 = braking_control(mission.fleet, r, state, dt)
-    return u1, u2, False
+    return braking_control(mission.fleet, r, state, dt)
 
 
 @leaf_kernel
@@ -259,7 +261,7 @@ def expand(
     """
     fleet, params = mission.fleet, mission.params
     robots = len(target)
-    commitment = new_commitment(fleet, mission.gates, params.dt, not params.literal)
+    commitment = new_commitment(fleet, mission.gates, params.dt)
     wanted = np.zeros((robots, 2))
     held = np.zeros(robots, np.bool_)
     for r in range(robots):
@@ -280,8 +282,7 @@ def expand(
                 or must_queue(mission, commitment, r, target[r], before)
             ):
                 mode[r] = WAIT
-            safe = True
-            if mode[r] == WAIT and not params.literal:
+            if mode[r] == WAIT:
                 u1, u2 = braking_control(fleet, r, before, params.dt)
                 follow_braking(commitment, r)
             else:
@@ -292,21 +293,12 @@ def expand(
                             mission, r, target[r], before, waypoint[r], stuck[r], gear,
                             random, wanted[r],
                         )  # fmt: skip
-                if mode[r] == WAIT:
-                    wanted[r, 0] = wanted[r, 1] = 0.0
-                elif not held[r]:
+                if not held[r]:
                     set_out(mission, r, target[r], before, waypoint[r], gear, wanted[r])
-                    held[r] = params.literal and fleet[r].model != USER
-                attempts = ATTEMPTS
-                if held[r]:
-                    attempts = 1 if params.literal else 2
-                u1, u2, safe = drive_step(
+                u1, u2 = drive_step(
                     mission, commitment, decided, r, wanted[r, 0], wanted[r, 1],
-                    held[r], attempts,
+                    held[r], HELD_ATTEMPTS if held[r] else ATTEMPTS,
                 )  # fmt: skip
-            if params.literal and not safe:
-                # The paper's expansion ends before the first collision.
-                return n, False, True
             decided[r] = True
             after = present_state(commitment, r)
             energy[r] -= step_energy(mission, r, before, after, u1)

@@ -1,4 +1,4 @@
-"""The motion tree's vertices and the groups they are chosen by (Algorithm 2)."""
+"""The motion tree's vertices and the groups they are chosen by."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Tree(NamedTuple):
 
 @by_pointer
 class Groups(NamedTuple):
-    """Vertex groups: same regions of the robots, same visited goals (Algorithm 2)."""
+    """Vertex groups: same regions of the robots, same visited goals."""
 
     key: np.ndarray
     slot: np.ndarray
@@ -155,9 +155,9 @@ def add_to_group(groups, tree, n_groups, v, region):
 
 @leaf_kernel
 def group_weight(groups, g, params, initial):
-    """Return eq. (5): w = lambda^visits (alpha / |unvisited| + beta dist).
+    """Return w = lambda^visits (alpha / |unvisited| + beta dist).
 
-    dist is read as the share of the first tours' energy that is already behind the
+    dist is the share of the first tours' energy that is already behind the
     group, so that groups nearer to the end weigh more.
     """
     progress = 1.0 - groups.remaining[g] / initial

@@ -63,8 +63,6 @@ class TreeParams(NamedTuple):
     steer_least: float
     region: float
     route_margin: float
-    reroute_always: bool
-    literal: bool
     optioned: bool
     levels: int
     iterations: int

@@ -43,8 +43,8 @@ def read_rest(tree, tours, v, routes):
 def route_from(mission, tree, tours, v, random, tour, length):
     """Solve the routing problem from a vertex; return the cost [J].
 
-    The search goes on from the rest of the vertex's tours. Without rounds of search, as
-    the paper has it, NRPA draws new ones.
+    The search goes on from the rest of the vertex's tours. Without rounds of search,
+    NRPA draws new ones.
     """
     problem, params = mission.routing, mission.params
     robots, _, n_targets = problem.cost.shape

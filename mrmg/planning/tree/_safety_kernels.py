@@ -60,7 +60,6 @@ class Commitment(NamedTuple):
         length: number of states in each slot, shape (R, 2).
         active: slot in force, shape (R,).
         now: index of the present state in the active slot, shape (R,).
-        braking: False commits to nothing: only present states are kept clear.
         gates: where one robot at a time may be.
     """
 
@@ -71,12 +70,11 @@ class Commitment(NamedTuple):
     length: np.ndarray
     active: np.ndarray
     now: np.ndarray
-    braking: bool
     gates: Gates
 
 
 @kernel
-def new_commitment(fleet, gates, dt, braking):
+def new_commitment(fleet, gates, dt):
     """Return an empty commitment large enough for the fleet's longest braking."""
     robots = len(fleet)
     longest = 0
@@ -93,7 +91,6 @@ def new_commitment(fleet, gates, dt, braking):
         np.zeros((robots, 2), np.int64),
         np.zeros(robots, np.int64),
         np.zeros(robots, np.int64),
-        braking,
         gates,
     )
 
@@ -130,8 +127,7 @@ def write_braking(fleet, r, first, dt, commitment, slot):
     states = commitment.state[r, slot]
     copy_numbers(first, states[0])
     n = 1
-    most = len(states) if commitment.braking else 1
-    while n < most and not stands(fleet, r, states[n - 1]):
+    while n < len(states) and not stands(fleet, r, states[n - 1]):
         u1, u2 = braking_control(fleet, r, states[n - 1], dt)
         step(fleet[r], states[n - 1], u1, u2, dt, states[n])
         n += 1

@@ -1,4 +1,4 @@
-"""Growing the motion tree in the composite state space of all robots (Algorithm 1)."""
+"""Growing the motion tree in the composite state space of all robots ."""
 
 from __future__ import annotations
 
@@ -19,9 +19,6 @@ from mrmg.planning.tree._mission_kernels import in_target, leg_energy
 from mrmg.planning.tree._rerouting_kernels import route_from
 from mrmg.planning.tree._safety_kernels import (
     braking_control,
-    clear_of_gates,
-    clear_of_obstacles,
-    clear_of_robot,
     new_commitment,
     write_braking,
 )
@@ -98,27 +95,7 @@ def goals_left(tree, v):
 @kernel
 def is_over(mission, tree, v):
     """Tell whether the mission may end at a vertex, all robots braking from there."""
-    if goals_left(tree, v) > 0 or not all_finished(mission, tree.state[v]):
-        return False
-    return not mission.params.literal or stops_clear(mission, tree.state[v])
-
-
-@kernel
-def stops_clear(mission, state):
-    """Tell whether all robots can brake at once without touching anything."""
-    fleet = mission.fleet
-    commitment = new_commitment(fleet, mission.gates, mission.params.dt, True)
-    for r in range(len(fleet)):
-        write_braking(fleet, r, state[r], mission.params.dt, commitment, 0)
-        if not clear_of_obstacles(fleet, mission.spaces, commitment, r, 0, 0):
-            return False
-        if not clear_of_gates(commitment, r, 0):
-            return False
-        for other in range(r):
-            spacing = max(fleet[r].spacing, fleet[other].spacing)
-            if not clear_of_robot(fleet, commitment, r, 0, 0, other, 0, spacing):
-                return False
-    return True
+    return goals_left(tree, v) == 0 and all_finished(mission, tree.state[v])
 
 
 @kernel
@@ -208,7 +185,7 @@ def plant(mission, tree, tours, start, energy):
 
 @kernel
 def extend(mission, tree, v, n, target, steer, random):
-    """Expand vertex v into the unused vertex n (Algorithm 3, first half).
+    """Expand vertex v into the unused vertex n.
 
     Returns:
         (whether anybody moved, whether a target was reached, whether all stayed above
@@ -264,11 +241,11 @@ def extend(mission, tree, v, n, target, steer, random):
 
 
 @kernel
-def insert(mission, tree, tours, n, n_tours, target, event, random, counts):
-    """Keep book of vertex n (Algorithm 3, second half): tours, feasibility, new tours.
+def insert(mission, tree, tours, n, n_tours, target, random, counts):
+    """Complete vertex n: visits, the feasibility of its tours, new tours.
 
     A child follows the rest of its parent's tours as long as the batteries allow it;
-    else, or in the paper's profile whenever a target was reached, the router is called.
+    else, the router is called.
 
     Returns:
         (whether the vertex is worth keeping, number of tours).
@@ -287,7 +264,7 @@ def insert(mission, tree, tours, n, n_tours, target, event, random, counts):
     tree.remaining[n], enough = rest_of_tours(
         mission, tree, tours, n, tree.remaining[v]
     )
-    if enough and not (mission.params.reroute_always and event):
+    if enough:
         return True, n_tours
     if n_tours == len(tours.target) or goals_left(tree, n) == 0:
         return enough, n_tours
@@ -313,7 +290,7 @@ def insert(mission, tree, tours, n, n_tours, target, event, random, counts):
 
 @kernel
 def grow(mission, start, energy, random, tree, tours, counts, halt):
-    """Grow a motion tree until all goals are visited (Algorithm 1).
+    """Grow a motion tree until all goals are visited .
 
     Args:
         mission: the problem.
@@ -343,7 +320,7 @@ def grow(mission, start, energy, random, tree, tours, counts, halt):
         not halt[0]
         and n < params.max_vertices
         and counts[EXPANSIONS] < most
-        and (params.literal or counts[ROUTER_FAILURES] < FAILED_ROUTES)
+        and counts[ROUTER_FAILURES] < FAILED_ROUTES
     ):
         counts[EXPANSIONS] += 1
         v = select_vertex(groups, tree, n_groups, params, initial, random)
@@ -357,9 +334,7 @@ def grow(mission, start, energy, random, tree, tours, counts, halt):
             for r in range(len(target)):
                 tree.stalled[v, r] += target[r] >= 0
             continue
-        kept, n_tours = insert(
-            mission, tree, tours, n, n_tours, target, event, random, counts
-        )
+        kept, n_tours = insert(mission, tree, tours, n, n_tours, target, random, counts)
         if not kept:
             continue
         if is_over(mission, tree, n):
@@ -380,7 +355,7 @@ def stop_all(fleet, gates, state, dt):
     The commitments of the vertex are what is carried out, so this is always safe.
     """
     robots = len(state)
-    commitment = new_commitment(fleet, gates, dt, True)
+    commitment = new_commitment(fleet, gates, dt)
     longest = 0
     for r in range(robots):
         write_braking(fleet, r, state[r], dt, commitment, 0)

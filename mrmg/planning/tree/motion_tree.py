@@ -36,7 +36,7 @@ from mrmg.scene.types import Scene
 from mrmg.world.world import World
 
 TOUR_ROWS = 2000
-"""Most tours one tree may hold; in the paper's profile as many as vertices."""
+"""Most tours one tree may hold."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,7 +163,6 @@ def _last_legs(scene: Scene, roadmap: Roadmap, fleet: np.ndarray) -> np.ndarray:
 def tree_params(params: PlannerParams) -> TreeParams:
     """Return the numbers the kernels need."""
     router = params.router
-    paper = params.profile == "paper"
     return TreeParams(
         dt=params.dt_s,
         steps=params.steps,
@@ -177,8 +176,6 @@ def tree_params(params: PlannerParams) -> TreeParams:
         steer_least=params.steer_least,
         region=params.region_m,
         route_margin=params.route_margin,
-        reroute_always=paper,
-        literal=paper,
         optioned=False,
         levels=router.levels,
         iterations=router.iterations,
@@ -220,7 +217,7 @@ def grow_tree(
     seed: int,
     halt: np.ndarray,
 ) -> Growth:
-    """Grow one motion tree along given tours (Algorithms 1-3).
+    """Grow one motion tree along given tours.
 
     Args:
         problem: the mission.
@@ -235,10 +232,9 @@ def grow_tree(
     tree = _groups_kernels.new_tree(
         params.max_vertices, robots, mission.targets.goals, params.steps
     )
-    rows = params.max_vertices if mission.params.reroute_always else TOUR_ROWS
     tours = Tours(
-        target=np.zeros((rows, robots, width), np.int64),
-        length=np.zeros((rows, robots), np.int64),
+        target=np.zeros((TOUR_ROWS, robots, width), np.int64),
+        length=np.zeros((TOUR_ROWS, robots), np.int64),
     )
     for r, tour in enumerate(routing.tours):
         tours.target[0, r, : len(tour)] = tour

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -277,20 +276,6 @@ def test_a_growth_ends_at_rest_with_every_goal_on_one_tour(
         assert charge.min() >= scene.robots[r].battery.reserve_J
     if name == "recharge":
         assert {"s", "t"} & set(visited)
-
-
-def test_router_calls_within_a_tree_are_timed(
-    yard: MakeScene, state: MakeProblem
-) -> None:
-    """As the paper has it, a tour is sought at every goal that is reached."""
-    problem = state(yard(**MISSIONS["recharge"]), profile="paper")
-    params = PlannerParams(profile="paper")
-    routing = solve_routing(problem.mission.routing, params.router, 2)
-    began = time.perf_counter()
-    growth = grow_tree(problem, params, routing, 3, HALT)
-    taken_s = time.perf_counter() - began
-    assert growth.counts["router_calls"] > 1
-    assert 0.0 < growth.routing_s < taken_s
 
 
 def test_growing_is_a_function_of_the_seed(yard: MakeScene, state: MakeProblem) -> None:

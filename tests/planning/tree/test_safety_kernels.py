@@ -73,7 +73,7 @@ def crowd(yard: MakeScene, state: MakeProblem) -> Callable[..., Problem]:
 def committed(problem: Problem) -> Commitment:
     """Return the commitment of robots that stand at their start."""
     fleet = problem.mission.fleet
-    commitment = new_commitment(fleet, problem.mission.gates, DT_S, True)
+    commitment = new_commitment(fleet, problem.mission.gates, DT_S)
     for r in range(len(fleet)):
         write_braking(fleet, r, problem.start[r], DT_S, commitment, 0)
     return commitment

@@ -18,7 +18,7 @@ from mrmg.scene.types import Scene
 from mrmg.visiting import crowded_stations, first_stay
 
 SCENES = Path(__file__).parents[2] / "scenes"
-PROFILES = ("default", "paper")
+PLANS = {"path following": True, "tree": False}
 
 
 def changed(scene: Scene, **changes: object) -> Scene:
@@ -27,9 +27,9 @@ def changed(scene: Scene, **changes: object) -> Scene:
     return scene_from_document(document, source=scene.name)
 
 
-def planned(scene: Scene, seed: int = 0, profile: str = "default") -> Plan:
+def planned(scene: Scene, seed: int = 0, drafts: bool = True) -> Plan:
     # Without spare charge, so that robots recharge no more often than they must.
-    params = PlannerParams(profile=profile, spare=0.0)
+    params = PlannerParams(drafts=drafts, spare=0.0)
     plan = plan_mission(scene, seed=seed, params=params).plan
     assert plan is not None
     assert verify(scene, plan).violations == ()
@@ -77,10 +77,10 @@ def test_dwelling_takes_its_time() -> None:
         assert plan.makespan_s <= dwell_s + at_once.makespan_s + 6.0
 
 
-@pytest.mark.parametrize("profile", PROFILES)
-def test_a_battery_is_filled_before_a_robot_goes_on(profile: str) -> None:
+@pytest.mark.parametrize("drafts", PLANS.values(), ids=PLANS)
+def test_a_battery_is_filled_before_a_robot_goes_on(drafts: bool) -> None:
     scene = load_scene(SCENES / "charging.yaml")
-    plan = planned(scene, profile=profile)
+    plan = planned(scene, drafts=drafts)
     battery = scene.robots[0].battery
     assert "s1" in plan.tours["r1"]
     visit = next(visit for visit in plan.visits if visit.target == "s1")

@@ -1,0 +1,137 @@
+"""The mission and the parameters of the method as two values for the kernels."""
+
+from __future__ import annotations
+
+from math import cos, hypot, pi, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.compilation import by_pointer, leaf_kernel
+from mrmg.planning.roadmap._fleet_kernels import Spaces, space_of
+from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.planning.tree._mission_kernels import Targets
+from mrmg.world._kernels import (
+    TerrainGrid,
+    convex_convex_distance,
+    footprint_is_clear,
+    place_footprint,
+    point_in_convex,
+)
+
+STATE_ROUNDING = 1e-9
+"""Rounding of summed steps that is forgiven in the limits of speed and steering."""
+
+
+@by_pointer
+class Setting(NamedTuple):
+    """A mission as the method sees it.
+
+    Attributes:
+        fleet, spaces, terrain, targets: robots, world, goals and stations.
+        roadmap: what ConstructPRM returned.
+        joined: roadmap vertices with a path to some target, by class, shape (F, V).
+        routing: the routing problem at the root; costs include the route margin.
+    """
+
+    fleet: np.ndarray
+    spaces: Spaces
+    terrain: TerrainGrid
+    targets: Targets
+    roadmap: RoadmapArrays
+    joined: np.ndarray
+    routing: RoutingArrays
+
+
+@by_pointer
+class Rules(NamedTuple):
+    """Parameters of the method; see `parameters.GuidedTreeParams`."""
+
+    dt_s: float
+    k: int
+    iterations: int
+    alpha: float
+    beta_share: float
+    decline: float
+    bias: float
+    vertex_spread_m: float
+    decay_start: float
+    decay_rate: float
+    ahead_m: float
+    ahead_least_m: float
+    ahead_most_m: float
+    target_spread_m: float
+    route_margin: float
+    levels: int
+    nrpa_iterations: int
+    nrpa_alpha: float
+
+
+@leaf_kernel
+def in_region(targets, t, x, y):
+    """Return whether a point lies in a target's region."""
+    far = hypot(x - targets.center[t, 0], y - targets.center[t, 1])
+    if far > targets.reach[t]:
+        return False
+    n = targets.corners[t]
+    return n == 0 or point_in_convex(x, y, targets.corner[t, :n])
+
+
+@leaf_kernel
+def wrap(angle):
+    """Return the angle in (-pi, pi]."""
+    while angle > pi:
+        angle -= 2.0 * pi
+    while angle <= -pi:
+        angle += 2.0 * pi
+    return angle
+
+
+@leaf_kernel
+def within_limits(robot, state):
+    """Return whether speed and steering (or turning rate) keep the robot's limits."""
+    if state[3] < robot.limit[0] - STATE_ROUNDING:
+        return False
+    if state[3] > robot.limit[1] + STATE_ROUNDING:
+        return False
+    return abs(state[4]) <= robot.limit[2] + STATE_ROUNDING
+
+
+@leaf_kernel
+def collision_free(setting, state, corner, middle):
+    """Return whether a composite state keeps all limits and margins (CollisionFree).
+
+    Args:
+        setting: the mission.
+        state: composite state, shape (R, 5).
+        corner: receives the placed footprints, shape (R, M, 2).
+        middle: receives their middles, shape (R, 2).
+    """
+    fleet = setting.fleet
+    for r in range(len(fleet)):
+        if not within_limits(fleet[r], state[r]):
+            return False
+        x, y, theta = state[r, 0], state[r, 1], state[r, 2]
+        c, s = cos(theta), sin(theta)
+        mx, my = fleet[r].middle[0], fleet[r].middle[1]
+        middle[r, 0] = x + c * mx - s * my
+        middle[r, 1] = y + s * mx + c * my
+        n = fleet[r].corners
+        place_footprint(fleet[r].corner[:n], x, y, theta, corner[r])
+        if not footprint_is_clear(
+            space_of(setting.spaces, fleet[r].space), corner[r, :n],
+            middle[r, 0], middle[r, 1], fleet[r].radius, fleet[r].margin,
+        ):  # fmt: skip
+            return False
+        for other in range(r):
+            gap = max(fleet[r].spacing, fleet[other].spacing)
+            apart = hypot(
+                middle[r, 0] - middle[other, 0], middle[r, 1] - middle[other, 1]
+            )
+            if apart >= fleet[r].radius + fleet[other].radius + gap:
+                continue
+            others = corner[other, : fleet[other].corners]
+            if convex_convex_distance(corner[r, :n], others) < gap:
+                return False
+    return True
