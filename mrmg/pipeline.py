@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from mrmg.errors import ExitCode
+from mrmg.errors import ExitCode, UsageError
 from mrmg.mission import PlanStatus
 from mrmg.replacing import recorded, require_room
 from mrmg.run_arguments import (
@@ -148,6 +148,35 @@ def _document_arguments() -> None:
 
 
 _document_arguments()
+
+
+def rehearse(scene: Scene) -> list[str]:
+    """Refuse, before any planning, what `run` would refuse of a scene that was loaded.
+
+    Returns:
+        Why robots of it can be planned for, but not driven.
+
+    Raises:
+        FileError: if it has no robots, its robots' own motions cannot be used, or
+            MuJoCo cannot hold it.
+    """
+    from mrmg.motion.user_motion import user_motion
+    from mrmg.planning.feasibility import require_robots
+
+    require_robots(scene)
+    models = {robot.model.name: robot.model for robot in scene.robots}
+    for model in models.values():
+        if model.has_custom_motion:
+            limits = model.limits.scaled(model.planning_share)
+            user_motion(model.motion_model).compiled(limits.as_tuple())
+    try:
+        require_drivable(scene.robots)
+    except UsageError as error:
+        return [str(error)]
+    from mrmg.execution import build_world
+
+    build_world(scene)
+    return []
 
 
 def default_folder(scene: Scene, seed: int) -> Path:

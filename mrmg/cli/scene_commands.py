@@ -14,7 +14,7 @@ from typing import Any
 
 from mrmg import storage
 from mrmg.cli import terminal
-from mrmg.errors import ExitCode, Fault, SceneError, UsageError
+from mrmg.errors import ExitCode, Fault, FileError, UsageError
 
 
 def new(options: argparse.Namespace) -> int:
@@ -52,22 +52,24 @@ def list_(options: argparse.Namespace) -> int:
 
 
 def check(options: argparse.Namespace) -> int:
-    """Report the faults of a scene, as loading raises them, and what it warns of."""
+    """Report what `mrmg run` would refuse of a scene, and what it warns of."""
+    from mrmg.pipeline import rehearse
     from mrmg.planning.feasibility import mission_warnings
     from mrmg.scene.loading import heading_hints, load_scene
 
     warnings = heading_hints(options.scene)
     try:
         scene = load_scene(options.scene, trust_code=options.trust_code)
-    except SceneError as error:
+        notes = [Fault("", message) for message in rehearse(scene)]
+    except FileError as error:
         if options.json:
-            _print_findings(error.faults, warnings)
+            _print_findings(error.faults, warnings, [])
         else:
             terminal.print_warnings(warnings)
         raise
     warnings += [Fault("", message) for message in mission_warnings(scene)]
     if options.json:
-        _print_findings([], warnings)
+        _print_findings([], warnings, notes)
         return ExitCode.OK
     counts = {
         "robot": len(scene.robots),
@@ -78,11 +80,15 @@ def check(options: argparse.Namespace) -> int:
     }
     held = ", ".join(f"{n} {name}{'' if n == 1 else 's'}" for name, n in counts.items())
     print("\n  warning: ".join([f"{scene.name}: valid; {held}", *map(str, warnings)]))
+    for note in notes:
+        print(f"  note: {note}")
     return ExitCode.OK
 
 
-def _print_findings(faults: Sequence[Fault], warnings: Sequence[Fault]) -> None:
-    findings = {"faults": faults, "warnings": warnings}
+def _print_findings(
+    faults: Sequence[Fault], warnings: Sequence[Fault], notes: Sequence[Fault]
+) -> None:
+    findings = {"faults": faults, "warnings": warnings, "notes": notes}
     terminal.print_json(
         {name: [asdict(item) for item in items] for name, items in findings.items()}
     )

@@ -50,8 +50,18 @@ def build_world(scene: Scene) -> MujocoWorld:
     """Build and compile the MuJoCo world of a scene.
 
     Raises:
-        FileError: if a robot's MJCF cannot be used.
+        FileError: if a robot's MJCF cannot be used, or MuJoCo cannot hold the scene.
+        UsageError: if a robot can only be planned for.
     """
+    try:
+        return _built(scene)
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        fault = Fault("", f"MuJoCo cannot build its world: {reason}")
+        raise FileError(scene.name, [fault]) from error
+
+
+def _built(scene: Scene) -> MujocoWorld:
     spec = mujoco.MjSpec()
     spec.modelname = "mrmg"
     _set_options(spec, len(scene.robots))

@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 from shapely.geometry import Point, Polygon, box
 
+from mrmg.errors import Fault, SceneError
 from mrmg.planning.endings import (
     FINISH_CUT_OFF,
     FINISHES_CROWDED,
@@ -27,6 +28,17 @@ from mrmg.planning.endings import (
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
 from mrmg.scene.types import Region, Robot, Scene
+
+
+def require_robots(scene: Scene) -> None:
+    """Refuse a scene that is but a map.
+
+    Raises:
+        SceneError: if it has no robots.
+    """
+    if not scene.robots:
+        message = "there are none; a mission needs at least one (mrmg scene populate)"
+        raise SceneError(scene.name, [Fault("robots", message)])
 
 
 def proof_of_infeasibility(scene: Scene, halt: np.ndarray = NEVER) -> str | None:

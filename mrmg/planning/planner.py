@@ -17,7 +17,7 @@ from mrmg.compilation import (
     kernels_are_compiled,
     note_kernels_are_compiled,
 )
-from mrmg.errors import Fault, SceneError, UsageError
+from mrmg.errors import UsageError
 from mrmg.mission import PlanResult, PlanStatus
 from mrmg.planning.attempt import (
     Attempt,
@@ -36,6 +36,7 @@ from mrmg.planning.diagnosis import (
     why_no_plan,
     why_no_roadmap,
 )
+from mrmg.planning.feasibility import require_robots
 from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.guided_tree.limits import refuse_unknown_features
 from mrmg.planning.hints import INTERRUPTED, hints_on
@@ -95,9 +96,7 @@ def plan_mission(
             planner does not know.
     """
     params = params or PlannerParams()
-    if not scene.robots:
-        fault = Fault("robots", "there are none; a mission needs at least one")
-        raise SceneError(scene.name, [fault])
+    require_robots(scene)
     if workers < 1:
         raise UsageError(f"workers = {workers}; planning needs at least 1")
     if params.planner == GUIDED_TREE:

@@ -19,6 +19,9 @@ from mrmg.errors import Fault, SceneError
 from mrmg.scene.content import ByContent, content, contents
 from mrmg.scene.model_files import ModelFiles
 
+MAX_CORNERS = 12
+"""Largest number of corners of a footprint: what the planner's arrays hold."""
+
 GRIP_SHARE = 0.8
 """Share of the driven axle's static grip that is used."""
 

@@ -26,7 +26,7 @@ from mrmg.scene.loading.places import lines_of
 from mrmg.scene.loading.shape_schema import NotNegative, Positive, Ring, Strict
 from mrmg.scene.loading.trust import file_within, refusal_of_code
 from mrmg.scene.loading.yaml_text import parse_yaml, read_text
-from mrmg.scene.robot_model import Limits, ModelOrigin, RobotModel
+from mrmg.scene.robot_model import MAX_CORNERS, Limits, ModelOrigin, RobotModel
 
 SHIPPED_MOTIONS = ("car", "unicycle")
 """Motion models that need no file of their own."""
@@ -241,6 +241,10 @@ def _geometry_faults(entry: ModelDocument) -> list[Fault]:
     faults = []
     if outline.area < (1.0 - 1e-9) * outline.convex_hull.area or not outline.area:
         faults.append(Fault("footprint", "not convex; expected a convex outline"))
+    if len(outline.exterior.coords) - 1 > MAX_CORNERS:
+        corners = len(outline.exterior.coords) - 1
+        message = f"has {corners} corners, at most {MAX_CORNERS} are allowed"
+        faults.append(Fault("footprint", message))
     if not outline.contains(shapely.Point(0.0, 0.0)):
         message = "must hold (0, 0), the middle of the rear axle, inside"
         faults.append(Fault("footprint", message))
