@@ -12,6 +12,8 @@ from typing import Any
 
 from mrmg.scene.objective import Objective
 
+LAST_PORT = 65535
+
 
 def seed(value: Any) -> int:
     """Read a seed: a whole number of at least 0."""
@@ -21,6 +23,14 @@ def seed(value: Any) -> int:
 def count(value: Any) -> int:
     """Read a number of things: a whole number of at least 1."""
     return _whole(value, at_least=1)
+
+
+def port(value: Any) -> int:
+    """Read the number of a port."""
+    read = _whole(value, at_least=1)
+    if read > LAST_PORT:
+        raise ValueError(f"{value!r} is not a port: a whole number of 1 to {LAST_PORT}")
+    return read
 
 
 def _whole(value: Any, *, at_least: int) -> int:
@@ -46,7 +56,13 @@ def positive(value: Any) -> float:
 
 def time(value: Any) -> float:
     """Read a time: a number of at least 0."""
-    return 0.0 if str(value).strip() in {"0", "0.0"} else positive(value)
+    try:
+        read = float(str(value))
+    except ValueError:
+        read = math.nan
+    if not 0.0 <= read < math.inf:
+        raise ValueError(f"{value!r} is not a number of at least 0")
+    return read
 
 
 def share(value: Any) -> float:

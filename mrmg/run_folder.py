@@ -21,6 +21,7 @@ from typing import Any
 
 from mrmg import storage
 from mrmg.errors import Fault, RunFolderError, UsageError
+from mrmg.run_paths import why_no_run
 from mrmg.scene.model_files import MODELS_FOLDER
 
 RUN_FORMAT = 1
@@ -223,8 +224,7 @@ def existing(path: Path) -> RunFolder:
     """
     folder = RunFolder(path)
     if not folder.file("run.json").exists():
-        fault = Fault("run.json", "missing: not a run folder; make one with 'mrmg run'")
-        raise RunFolderError(str(path), [fault])
+        raise RunFolderError(str(path), [Fault("", why_no_run(path))])
     return folder
 
 

@@ -21,17 +21,28 @@ import numpy as np
 def atomic_path(path: Path) -> Iterator[Path]:
     """Yield a temporary path; rename it onto `path` when all went well."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(
-        dir=path.parent, prefix=".part-", suffix=f"-{path.name}"
-    )
+    with _errors_about(path):
+        handle, name = tempfile.mkstemp(
+            dir=path.parent, prefix=".part-", suffix=f"-{path.name}"
+        )
     os.close(handle)
     temporary = Path(name)
     try:
         yield temporary
         os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
+        with _errors_about(path):
+            os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def _errors_about(path: Path) -> Iterator[None]:
+    """Let errors name the file that is wanted, not the temporary one."""
+    try:
+        yield
+    except OSError as error:
+        raise type(error)(error.errno, error.strerror, str(path)) from error
 
 
 def write_bytes(path: Path, data: bytes) -> None:

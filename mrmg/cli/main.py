@@ -57,5 +57,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             # The reader of our output has gone; nothing is left to be told.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return int(ExitCode.OK)
-        print(f"mrmg: {error}", file=sys.stderr)
+        about = f"{error.filename}: {error.strerror}" if error.filename else error
+        print(f"mrmg: cannot read or write {about}", file=sys.stderr)
         return int(ExitCode.MACHINE)

@@ -176,7 +176,7 @@ def _add_view(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     )
     view.add_argument(
         "--port",
-        type=reader(values.count),
+        type=reader(values.port),
         default=show_commands.PORT,
         help="port of the page; default 8080",
     )

@@ -22,6 +22,8 @@ def new(options: argparse.Namespace) -> int:
     from mrmg.authoring import new_scene
 
     given = options.name.removesuffix(".yaml")
+    if Path(given).name in ("", ".."):
+        raise UsageError(f"NAME: got '{options.name}'; expected a name such as farm")
     out = options.out or Path(f"{given}.yaml")
     if os.path.lexists(out):
         raise UsageError(f"{out} is there already; give another name, or -o FILE")
@@ -96,11 +98,13 @@ def _print_findings(
 
 def draw(options: argparse.Namespace) -> int:
     """Draw a scene into a picture."""
+    from mrmg.results.print_style import require_format
     from mrmg.results.scene_drawing import draw_scene
     from mrmg.scene.loading import load_scene
 
     scene = load_scene(options.scene, trust_code=options.trust_code)
     picture = options.out or Path(f"{scene.name}.png")
+    require_format(picture)
     draw_scene(scene, picture)
     print(picture)
     return ExitCode.OK

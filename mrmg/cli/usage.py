@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 from mrmg import shipped
 from mrmg.errors import ExitCode, nearest
 
-OPTION_SIMILARITY = 0.65
+OPTION_SIMILARITY = 0.7
 """Least similarity of a suggested option: two dashes alone make half of some."""
 
 

@@ -15,6 +15,7 @@ from mrmg.results.energy_audit import EnergyAudit
 from mrmg.results.robustness import ROBUSTNESS_FILE, Study, load_studies
 from mrmg.results.summary import summarize
 from mrmg.results.verdict import Verdict
+from mrmg.run_paths import why_no_run
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
 
@@ -91,7 +92,7 @@ def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
 
 def _why_no_record(folder: Path) -> Fault:
     if not folder.is_dir():
-        return Fault("", f"no such folder; 'mrmg run SCENE --out {folder}' makes one")
+        return Fault("", why_no_run(folder))
     if not (folder / "run.json").exists():
         return Fault("planning.json", "missing: this is not a run folder")
     cure = f"'mrmg run SCENE --out {folder}' goes on with it"

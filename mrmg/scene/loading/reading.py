@@ -18,6 +18,9 @@ from mrmg.scene.loading.schema import SCENE_FORMAT, SceneDocument
 from mrmg.scene.loading.yaml_text import dump_yaml, read_yaml
 from mrmg.scene.types import Scene
 
+FILE_SIMILARITY = 0.75
+"""Least similarity of a suggested file: all of a folder's end in ".yaml"."""
+
 
 def load_scene(source: str | Path, *, trust_code: bool = False) -> Scene:
     """Load a scene from a file, or a shipped scene by its name.
@@ -114,15 +117,26 @@ def scene_path(source: str | Path) -> Path:
         return shipped.scenes_folder() / f"{source}.yaml"
     path = Path(source)
     if path.is_dir():
-        raise SceneError(str(source), [Fault("", "is a folder; expected a scene file")])
+        message = "is a folder; expected a scene file"
+        if (path / "run.json").exists():
+            message = f"is a run folder; its scene is {path / 'scene.yaml'}"
+        raise SceneError(str(source), [Fault("", message)])
     if not path.exists():
-        guess = nearest(path.stem, names)
         message = (
-            f"no such file, and no shipped scene of that name{guess}; "
-            f"shipped scenes: {', '.join(names)}"
+            f"no such file, and no shipped scene of that name{_meant(path)}; "
+            "'mrmg scene list' lists the shipped ones"
         )
         raise SceneError(str(source), [Fault("", message)])
     return path
+
+
+def _meant(path: Path) -> str:
+    """Return the question for the scene that is meant by a path where there is none."""
+    files = [str(item) for item in path.parent.glob("*.yaml")]
+    if f"{path}.yaml" in files:
+        return f" (did you mean '{path}.yaml'?)"
+    near = nearest(str(path), files, cutoff=FILE_SIMILARITY)
+    return near or nearest(path.stem, shipped.scene_names())
 
 
 def _require_format(document: Any, source: str) -> None:
