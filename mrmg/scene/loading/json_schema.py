@@ -6,7 +6,6 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from mrmg import shipped
 from mrmg.scene.loading.models import ModelDocument
 from mrmg.scene.loading.schema import SceneDocument
 
@@ -19,9 +18,6 @@ def scene_schema() -> dict[str, Any]:
     schema = _schema(SceneDocument)
     # A file may leave its name out: it is then called after the file.
     schema["required"] = [key for key in schema["required"] if key != "name"]
-    schema["$defs"]["RobotEntry"]["properties"]["model"]["examples"] = (
-        shipped.model_names()
-    )
     return schema
 
 

@@ -46,8 +46,7 @@ Details:
   full battery drives straight on at constant speed). A robot's own `battery` replaces
   what it names; without any capacity the model's standard battery counts.
 - A goal or station with `dwell` (s) counts as visited when the reference point of one
-  robot has been in its region for that long without a break. Time counts towards one
-  target of the robot's tour after the other.
+  robot has been in its region for that long without a break, one target at a time.
 - A station with `capacity: 1` is for one robot at a time: at no time are the reference
   points of two robots in its region, not even of one that only passes through. Without
   it any number of robots may be there.
@@ -64,18 +63,15 @@ Details:
 - `model` is the name of a shipped model, or a folder (with a `/` in it), relative to
   the scene file, that holds a `robot.yaml`; or either with values other than in its
   `robot.yaml`: `{like: car, rolling_coefficient: 0.08}`.
-- `energy: paper` (of a robot here, or in its `robot.yaml`) charges only distance times
-  terrain and turning, the cost of the published method; the default `full` also counts
-  inertia, slopes, and idle and device power.
+- `energy: paper` (here or in `robot.yaml`) charges only distance times terrain and
+  turning, the cost of the published method; `full`, the default, counts everything.
 - `objective` says which plan is better: that with less `energy` of the whole fleet (J,
   the default), that with the smaller `makespan`, the time at which the last robot has
   come to rest (s), or that with the smaller sum of both, each times its weight:
   `{energy: 1, makespan: 50}` has a second count as much as 50 J. Batteries must keep
   their reserves in any case.
-- `time_limit` (s) is the largest makespan allowed: by then everything is done, and all
-  robots are at rest.
-- A map without robots, goals or stations is a valid scene; nothing can be planned on it
-  until it is populated.
+- `time_limit` (s) is the largest makespan allowed.
+- A map without robots, goals or stations is valid; nothing can be planned on it.
 """
 
 from __future__ import annotations
@@ -85,6 +81,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
+from mrmg import shipped
 from mrmg.energy import EnergyPreset
 from mrmg.scene.loading.shape_schema import (
     DISC,
@@ -258,21 +255,22 @@ def _model_reference(value: Any) -> Any:
     return value
 
 
+_MODEL_NAME = {
+    "type": "string",
+    "minLength": 1,
+    "description": "name of a shipped model, or folder of one relative to the scene",
+    "examples": shipped.model_names(),
+}
+_MODEL_LIKE = {
+    "type": "object",
+    "properties": {"like": _MODEL_NAME},
+    "required": ["like"],
+    "description": "a model with values in place of its robot.yaml's",
+}
 Model = Annotated[
     Any,
     BeforeValidator(_model_reference),
-    WithJsonSchema(
-        {
-            "anyOf": [
-                {"type": "string", "minLength": 1},
-                {
-                    "type": "object",
-                    "properties": {"like": {"type": "string", "minLength": 1}},
-                    "required": ["like"],
-                },
-            ]
-        }
-    ),
+    WithJsonSchema({"anyOf": [_MODEL_NAME, _MODEL_LIKE]}),
 ]
 
 

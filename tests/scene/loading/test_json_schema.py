@@ -89,7 +89,7 @@ def test_an_editor_can_complete_keys_and_words() -> None:
     assert set(schema["properties"]) == set(SceneDocument.model_fields)
     assert set(robot_schema()["properties"]) == set(ModelDocument.model_fields)
     robot = schema["$defs"]["RobotEntry"]["properties"]
-    assert robot["model"]["examples"] == shipped.model_names()
+    assert robot["model"]["anyOf"][0]["examples"] == shipped.model_names()
     assert robot["energy"]["enum"] == ["full", "paper"]
     assert schema["properties"]["objective"]["anyOf"][0]["enum"] == [
         "energy",
