@@ -20,6 +20,7 @@ from mrmg.run_arguments import (
 from mrmg.run_folder import RunFolder, Step
 from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.loading import load_scene
+from mrmg.scene.loading.reading import require_faithful
 from mrmg.scene.types import Scene
 from mrmg.steps import OnImprovement, Run, StepProgress, checked_drive
 
@@ -79,6 +80,7 @@ def run(
     require_drivable(loaded.robots)
     asked = _arguments(loaded, {**arguments, "video": video or DEFAULT_VIDEO})
     scene = asked.scene(loaded)
+    require_faithful(scene, scene.document)  # before there is a folder
     folder = RunFolder(out or default_folder(scene, asked.seed))
     with folder.opened_for_writing():
         work = Run(

@@ -11,7 +11,13 @@ import pytest
 
 import mrmg
 from mrmg.cli.main import main
-from mrmg.errors import ExitCode, IdentityError, RunFolderError, UsageError
+from mrmg.errors import (
+    ExitCode,
+    IdentityError,
+    RunFolderError,
+    SceneError,
+    UsageError,
+)
 from mrmg.execution.log import ExecutionLog
 from mrmg.mission import Plan
 from mrmg.results.energy_plot import draw_energy
@@ -112,3 +118,33 @@ def test_a_run_stores_the_scene_that_was_changed(tmp_path: Path) -> None:
     result = mrmg.run(late, out=tmp_path / "run", video=None)
     assert load_scene(tmp_path / "run" / "scene.yaml") == late
     assert not result.summary["mission_ok"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"mjcf": Path("other.xml")}, "made in memory; give it a folder"),
+        ({"mass_kg": 300.0}, "with another mass: mass"),
+    ],
+)
+def test_a_robot_no_file_can_state_is_refused_before_any_folder(
+    change: dict[str, Any], message: str, tmp_path: Path
+) -> None:
+    scene = load_scene("quickstart")
+    first, second = scene.robots
+    other = replace(first, model=replace(first.model, **change))
+    with pytest.raises(SceneError, match=message):
+        mrmg.run(replace(scene, robots=(other, second)), out=tmp_path / "r", video=None)
+    assert not (tmp_path / "r").exists()
+
+
+def test_a_robot_changed_in_memory_is_stored_as_it_was_driven(tmp_path: Path) -> None:
+    scene = load_scene(Path(__file__).parent / "scenes" / "one_goal.yaml")
+    (robot,) = scene.robots
+    model = replace(robot.model, drive_efficiency=0.7, regeneration_efficiency=0.2)
+    changed = replace(scene, robots=(replace(robot, model=model),))
+    result = mrmg.run(changed, out=tmp_path / "run", video=None)
+    assert result.summary["mission_ok"]
+    stored = load_scene(tmp_path / "run" / "scene.yaml")
+    assert stored == changed
+    assert stored.robots[0].model.drive_efficiency == 0.7

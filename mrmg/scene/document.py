@@ -49,6 +49,13 @@ def scene_document(scene: Scene) -> _Entry:
     Raises:
         SceneError: if the format cannot say something that was changed in memory.
     """
+    try:
+        return _document(scene)
+    except SceneError as error:
+        raise SceneError(scene.name, error.faults) from None
+
+
+def _document(scene: Scene) -> _Entry:
     written = scene.written
     document: _Entry = copy.deepcopy(dict(written.document)) if written else {}
     document |= {"format": 1, "name": scene.name}
@@ -246,8 +253,8 @@ def _model(robot: Robot) -> _Entry:
         origin.model.motion_model,
     ):
         message = (
-            f"{robot.id}'s model '{model.name}' was made in memory; give it a folder "
-            "with robot.yaml and its MJCF, and name that as the robot's model"
+            f"{robot.id}'s model '{model.name}', or which files it has, was made in "
+            "memory; give it a folder with robot.yaml and MJCF, and name that folder"
         )
         raise SceneError("scene", [Fault(f"robots.{robot.id}.model", message)])
     entry: _Entry = {"model": origin.reference}

@@ -161,6 +161,7 @@ def load_model(
         origin = ModelOrigin(reference, text, model)
         if changes:
             changed = _merged(document, changes)
+            source = f"{source} with another {', '.join(changes)}"
             model, parameters = _checked_model(folder, changed, source, trust_code)
     return replace(model, origin=origin), parameters
 
