@@ -313,6 +313,6 @@ def _labels(
             ),
             np.array([label.x_m, label.y_m]),
         )
-        for label in video_labels(film.scene, film.em_m)
+        for label in video_labels(film.scene, film.plan, film.em_m)
         if label.kind in kinds
     ]

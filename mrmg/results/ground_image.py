@@ -89,18 +89,19 @@ def paint_ground(
     if plan is not None:
         _paint_paths(axes, scene, plan, letter_points)
     _paint_rims(axes, scene)
-    painted = [label for label in video_labels(scene, em_m) if label.kind in _PAINTED]
+    painted = [
+        label for label in video_labels(scene, plan, em_m) if label.kind in _PAINTED
+    ]
     scene_drawing.draw_labels(axes, scene, painted, letter_points)
     canvas.draw()  # type: ignore[no-untyped-call]
     pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
     return np.array(pixels[:, :, :3])
 
 
-def video_labels(scene: Scene, em_m: float) -> tuple[MapLabel, ...]:
+def video_labels(scene: Scene, plan: Plan | None, em_m: float) -> tuple[MapLabel, ...]:
     """Return the names on the map of a video; those of robots go with the robots."""
-    return map_labels(
-        scene, em_m=em_m, kinds=("goal", "station", "obstacle", *_PAINTED)
-    )
+    kinds = ("goal", "station", "obstacle", *_PAINTED)
+    return map_labels(scene, plan, em_m=em_m, kinds=kinds)
 
 
 def painted_relief(

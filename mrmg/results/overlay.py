@@ -17,6 +17,7 @@ _TEXT = "#F2F4F7"
 _FAINT = "#A4ADBA"
 _MOST_CHIP_ROWS = 5
 _UNNAMED_CHIP = 12.0
+_SHORTEST_ID_EM = 3.3
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +85,9 @@ class Panel:
         self._speed = speed
         self._colors = style.scene_robot_colors(scene)
         self._labels = style.goal_labels(scene)
+        self._widest_id_em = max(
+            (text_width_em(robot.id, bold=True) for robot in scene.robots), default=0.0
+        )
         self._unit = min(size[0] / 345.0, video_height / 640.0)
         self._base = Image.new("RGB", size, _BACKGROUND)
         self._cards_top = self._draw_head(ImageDraw.Draw(self._base))
@@ -204,15 +208,20 @@ class Panel:
             self._px(4),
             fill=self._colors[robot.id],
         )
-        text = self._font(min(16.0, 0.27 * pitch / self._unit), bold=True)
+        way, speed = reading.way("→"), f"{reading.speed_m_s:.1f} m/s"
+        way_em = max(_SHORTEST_ID_EM, self._widest_id_em) + 0.7
+        needed_em = way_em + text_width_em(f"{way}  {speed}", bold=True)
+        room = (right - left) / self._unit - 34.0
+        size = min(16.0, 0.27 * pitch / self._unit, room / needed_em)
+        text = self._font(size, bold=True)
         pen.text(
             (left + self._px(20), middle), robot.id, font=text, fill=_TEXT, anchor="lm"
         )
-        way = reading.way("→")
-        pen.text((left + self._px(84), middle), way, font=text, fill=_TEXT, anchor="lm")
+        start = (left + self._px(20.0 + way_em * size), middle)
+        pen.text(start, way, font=text, fill=_TEXT, anchor="lm")
         pen.text(
             (right - self._px(14), middle),
-            f"{reading.speed_m_s:.1f} m/s",
+            speed,
             font=text,
             fill=_FAINT,
             anchor="rm",

@@ -43,12 +43,17 @@ def mission_map(scene: Scene, plan: Plan | None, log: ExecutionLog | None) -> st
             "ground", [*canvas.ground(), *canvas.texts(labels, _GROUND_KINDS)]
         ),
         canvas.group("planned", canvas.planned(plan)),
-        canvas.group("driven", [*canvas.driven(log), *canvas.breakdowns(plan, log)]),
+        canvas.group("driven", canvas.driven(log)),
         canvas.group(
             "targets", [*canvas.targets(plan), *canvas.texts(labels, _TARGET_KINDS)]
         ),
         canvas.group(
-            "robots", [*canvas.texts(labels, _ROBOT_KINDS), *canvas.robots(names)]
+            "robots",
+            [
+                *canvas.texts(labels, _ROBOT_KINDS),
+                *canvas.robots(names),
+                *canvas.breakdowns(plan, log),
+            ],
         ),
     ]
     margin = 0.6 * letter
@@ -135,8 +140,8 @@ class _Canvas:
             x, y = self._point(*middle)
             tip = f"{robot} broke down at {time_s:.1f} s"
             yield (
-                f'<text class="contact" x="{x}" y="{y}" data-tip="{escape(tip)}">'
-                "✖</text>"
+                f'<text class="contact" data-robot="{escape(robot)}" x="{x}" y="{y}" '
+                f'data-tip="{escape(tip)}">✖</text>'
             )
 
     def targets(self, plan: Plan | None) -> Iterable[str]:

@@ -88,7 +88,7 @@ def terrain(record: RunRecord) -> list[str]:
                 "" if item.measured_J is None else kJ(item.measured_J),
                 ""
                 if item.measured_J is None
-                else _percent(item.measured_J, item.planned_J),
+                else percent(item.measured_J, item.planned_J),
             ]
         )
     head = ["Terrain", "Planned by terrain", "Way planned", "Way driven", "Planned"]
@@ -116,8 +116,8 @@ def _meters(
         kJ(planned_J),
         kJ(metered_J),
         "" if measured_J is None else kJ(measured_J),
-        _percent(metered_J, planned_J),
-        "" if measured_J is None else _percent(measured_J, planned_J),
+        percent(metered_J, planned_J),
+        "" if measured_J is None else percent(measured_J, planned_J),
     ]
 
 
@@ -238,13 +238,12 @@ def _distance(distance_m: float | None) -> str:
     return f"{distance_m:.2f} m" if far else f"{100.0 * distance_m:.1f} cm"
 
 
-def _percent(value: float, base: float) -> str:
-    shown = round(
-        base / 1000.0, _KJ_DIGITS
-    )  # of what shows as 0.00 a share says nothing
+def percent(value: float, base: float) -> str:
+    """Return how far an energy is above another, of which 0.00 kJ has no share."""
+    shown = round(base / 1000.0, _KJ_DIGITS)
     return f"{signed(100.0 * (value - base) / base, 2)} %" if shown else "–"
 
 
 def signed(value: float, digits: int) -> str:
-    """Return a number with its sign as text."""
-    return f"{value:+.{digits}f}".replace("-", "−")
+    """Return a number with its sign as text; zero has none that is rounded away."""
+    return f"{round(value, digits) + 0.0:+.{digits}f}".replace("-", "−")

@@ -21,6 +21,8 @@ from mrmg.scene.types import Scene
 _MOST_TICKS = 10
 _WIDE_EM, _NARROW_EM = 45.0, 22.0
 """Widths of the time axis in letters of its names: windows of 900 and 400 pixels."""
+_SHORT_EM = 4.0
+"""Width of robots' names that have room beside the axis in small windows."""
 _BROKEN_KEY = '<i class="act broken"></i>broken down '
 _EVENT_KEY = ' <i class="event"></i>the fleet is stopped, or planned for anew'
 _DONE = {"stop": "; the fleet stops", "end": "; the mission ends"}
@@ -53,7 +55,8 @@ def timeline(scene: Scene, plan: Plan, log: ExecutionLog | None) -> str:
     who_em = max(text_width_em(row.robot, bold=True) for row in shown)
     broken = any(row.standing == "broken down" for row in shown)
     return (
-        f'<div class="timeline" data-end="{end_s:.3f}" style="--who:{who_em:.2f}em">'
+        f'<div class="timeline{" long" if who_em > _SHORT_EM else ""}" '
+        f'data-end="{end_s:.3f}" style="--who:{who_em:.2f}em">'
         f'{"".join(rows)}<div class="row scale"><b class="who"></b><div class="track">'
         f"{_ticks(end_s)}"
         '<i class="now" hidden></i></div><span class="sum"></span></div></div>'

@@ -14,7 +14,7 @@ from mrmg.scene.types import Scene
 
 _SHORTEST_S = 0.1
 _GAP_EM = 0.6
-_MOST_LINES = 6
+_MOST_LINES = 8
 HIDDEN = -1
 """Line of a name that has no room."""
 

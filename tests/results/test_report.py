@@ -13,6 +13,7 @@ import pytest
 from mrmg import storage
 from mrmg.errors import RunFolderError
 from mrmg.execution.log import Contact
+from mrmg.execution.supervision import Event
 from mrmg.results import report_page as html
 from mrmg.results.audit import audit
 from mrmg.results.energy_plot import draw_energy
@@ -195,6 +196,34 @@ def test_page_of_a_failed_run_names_the_reasons(mission, tmp_path) -> None:
     page = page_of(tmp_path)
     assert "Mission failed: r1 touched wall<1> at 3.00 s" in page.words
     assert "Mission accomplished" not in page.words
+
+
+@pytest.mark.parametrize("done", [True, False])
+def test_page_says_in_its_banner_who_broke_down_and_in_tours_who_was_not_used(
+    make_scene, make_plan, make_log, straight, tmp_path, done: bool
+) -> None:
+    robots = [
+        {"id": f"r{n}", "model": "car", "pose": [5, 13 - 3 * n, 0]} for n in (1, 2, 3)
+    ]
+    scene = make_scene(robots=robots)
+    controls = {"r1": straight(12.0), "r2": straight(4.0), "r3": []}
+    plan = make_plan(scene, controls, {"r1": ("g",), "r2": (), "r3": ()})
+    event = Event(time_s=4.0, cause="fault", robot="r2", action="stop", message="r2!")
+    log = replace(make_log(scene, plan), events=(event,))
+    if not done:
+        touch = Contact(time_s=3.0, robot="r1", other="wall", x_m=1.0, y_m=2.0)
+        log = replace(log, contacts=(touch,))
+    fill(tmp_path, scene, plan, log)
+    write_report(tmp_path)
+    source = (tmp_path / "report.html").read_text()
+    banner = source[source.index('id="verdict"') :].split("</p>")[0]
+    assert ("Mission accomplished" in banner) is done
+    assert "r2 broke down at 4.0 s" in banner
+    assert ("1 of 3 robots visited the goal" in banner) is done
+    words = page_of(tmp_path).words
+    assert "r3 (not used)" in words
+    assert "not used: stays where it is" in words
+    assert "r2 (broken down)" in words
 
 
 def test_page_of_an_infeasible_mission_has_the_reason_and_the_map(

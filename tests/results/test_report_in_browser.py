@@ -15,6 +15,10 @@ from typing import Any
 import pytest
 from websockets.sync.client import ClientConnection, connect
 
+from mrmg.results import style
+from mrmg.results.report_record import read_record
+from mrmg.results.report_timeline import timeline
+
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
@@ -176,6 +180,46 @@ def test_nothing_is_wider_than_a_laptop_s_or_a_phone_s_window(
     for width in (1280, 400):
         tab.open(quickstart_run / "report.html", size=(width, 800))
         assert tab.value("document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize("width", [1280, 500, 400])
+def test_names_on_the_timeline_fit_and_lie_above_the_cursor(
+    tab: Tab, own_run: Path, width: int
+) -> None:
+    page = own_run / "report.html"
+    # As in a mission whose goals lie close together and have long names.
+    text = page.read_text()
+    record = read_record(own_run)
+    scene, plan, log = record.scene, record.plan, record.log
+    assert plan is not None
+    names = {goal.id: f"loading{at}" for at, goal in enumerate(scene.goals)}
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(style, "goal_labels", lambda _: names)
+        crowded = timeline(scene, plan, log)
+    start = text.index('<div class="timeline')
+    page.write_text(text[:start] + crowded + text[text.index("</section>", start) :])
+    tab.open(page, size=(width, 800))
+    boxes = tab.value(
+        "[...document.querySelectorAll('.timeline .track')].map(t => "
+        "[t, ...t.querySelectorAll('s')].map(e => {"
+        "const b = e.getBoundingClientRect();"
+        "return [b.left, b.top, b.right, b.bottom, e.textContent]; }))"
+    )
+    assert sum(len(names) for _, *names in boxes) >= 5
+    for (left, _, right, _, _), *names in boxes:
+        for at, (x0, y0, x1, y1, name) in enumerate(names):
+            assert left - 1 <= x0 < x1 <= right + 1, name
+            for a0, b0, a1, b1, other in names[:at]:
+                meet = min(x1, a1) > max(x0, a0) and min(y1, b1) > max(y0, b0)
+                assert not meet, (name, other)
+    depth = "Number(getComputedStyle(document.querySelector('{}')).zIndex)"
+    cursor = tab.value(depth.format(".timeline .now"))
+    assert cursor < tab.value(depth.format(".track s"))
+    assert cursor < tab.value(depth.format(".timeline .who"))
+    ground = "getComputedStyle(document.querySelector('.track s')).backgroundColor"
+    assert (
+        tab.value(ground) == "rgb(255, 255, 255)"
+    )  # the cursor does not shine through
 
 
 def test_the_button_changes_the_scheme_and_the_charts_with_it(report: Tab) -> None:

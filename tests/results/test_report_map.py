@@ -86,7 +86,7 @@ def test_a_breakdown_is_marked_on_map_and_timeline(mission) -> None:
     )
     log = replace(log, events=(event,))
     parts = layers(mission_map(scene, plan, log))
-    assert "r2 broke down at 4.0 s" in tips(parts["driven"])
+    assert "r2 broke down at 4.0 s" in tips(parts["robots"])
     assert [t.text for t in parts["robots"].iter("text")].count("r2 broke down") == 1
     page = timeline(scene, plan, log)
     end_s = log.time_s[-1]
