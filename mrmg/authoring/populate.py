@@ -103,7 +103,7 @@ def _drivable(scene: Scene, model: RobotModel) -> Ground:
     """Return the ground with the widest margin that keeps most of the map together."""
     bare = Ground.over(
         scene.bounds,
-        [obstacle.shape for obstacle in scene.obstacles],
+        [obstacle.shape for obstacle in scene.barriers],
         [(area.shape, area.multiplier) for area in scene.terrain],
         margin_m=0.0,
     )

@@ -203,7 +203,7 @@ class _Reach:
     @staticmethod
     def of(scene: Scene, robot: Robot) -> _Reach:
         obstacles = shapely.union_all(
-            [obstacle.shape for obstacle in scene.obstacles if obstacle.stops(robot.id)]
+            [obstacle.shape for obstacle in scene.barriers if obstacle.stops(robot.id)]
         )
         # The largest disc inside the footprint; shrunk by the search's tolerance.
         spoke = shapely.maximum_inscribed_circle(Polygon(robot.model.footprint_m))

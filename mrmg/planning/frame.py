@@ -104,7 +104,7 @@ class Frame:
             scene,
             bounds=bounds,
             obstacles=tuple(
-                replace(item, shape=self._shape(item.shape)) for item in scene.obstacles
+                replace(item, shape=self._shape(item.shape)) for item in scene.barriers
             ),
             terrain=tuple(
                 replace(item, shape=self._shape(item.shape)) for item in scene.terrain

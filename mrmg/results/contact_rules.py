@@ -47,7 +47,7 @@ def check_obstacles(
         BoundsGap(footprint, scene.bounds), steps, trajectory.dt_s
     )
     contacts = [_bounds_contacts(robot.id, footprint, outside, scene.bounds)]
-    obstacles = [item for item in scene.obstacles if item.stops(robot.id)]
+    obstacles = [item for item in scene.barriers if item.stops(robot.id)]
     if obstacles:
         touched = bounded_minimum(
             ObstacleGap(footprint, obstacles), steps, trajectory.dt_s

@@ -130,7 +130,7 @@ def _wanted(
         yield _beside("breakdown", robot_id, text, ring, em_m, _UPPER_RIGHT)
     yield from _paths(scene, plan, em_m)
     yield from _terrain(scene, em_m)
-    for number, obstacle in enumerate(scene.obstacles):
+    for number, obstacle in enumerate(scene.barriers):
         if obstacle.id != f"obstacle_{number}":  # else the file gives it no name
             yield _obstacle(obstacle, em_m)
     yield from _heights(scene, em_m)
@@ -190,7 +190,7 @@ def _paths(scene: Scene, plan: Plan | None, em_m: float) -> Iterator[_Wanted]:
 
 def _terrain(scene: Scene, em_m: float) -> Iterator[_Wanted]:
     """Yield the multiplier of each area, on what is seen of it."""
-    taken = [item.shape for item in scene.obstacles]
+    taken = [item.shape for item in scene.barriers]
     taken += [item.region.shape for item in scene.targets()]
     free = shapely.box(*scene.bounds).difference(shapely.unary_union(taken))
     for rank, area in enumerate(scene.terrain):

@@ -67,7 +67,7 @@ def occupied(
     beyond = x_max - x_min + y_max - y_min
     bounds = box(*scene.bounds)
     shapes = [Occupied(bounds.buffer(beyond, join_style="mitre") - bounds, "")]
-    shapes += [Occupied(item.shape, item.id) for item in scene.obstacles]
+    shapes += [Occupied(item.shape, item.id) for item in scene.barriers]
     shapes += [
         Occupied(drawn_region(item.region, em_m), item.id) for item in scene.targets()
     ]

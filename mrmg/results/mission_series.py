@@ -164,7 +164,7 @@ def obstacle_distance(scene: Scene, robot: Robot, poses: np.ndarray) -> np.ndarr
         Distance [m], 0 on contact, shape (n,).
     """
     shapes = footprints(robot.model, poses)
-    blocking = [item.shape for item in scene.obstacles if item.stops(robot.id)]
+    blocking = [item.shape for item in scene.barriers if item.stops(robot.id)]
     distance = np.asarray(
         shapely.distance(shapes, shapely.boundary(shapely.box(*scene.bounds)))
     )

@@ -99,7 +99,7 @@ def _map(record: RunRecord) -> list[str]:
             for index, robot in enumerate(record.scene.robots)
         ]
     lines = "Wide line: planned. Thin line: driven. " if record.plan else ""
-    some = any(obstacle.blocks is not None for obstacle in record.scene.obstacles)
+    some = any(obstacle.blocks is not None for obstacle in record.scene.barriers)
     partial = "Pale and dashed: an obstacle for some robots only. " if some else ""
     return [
         html.player() if record.plan else "",

@@ -92,8 +92,10 @@ class _Canvas:
                 f'<polyline class="contour" points="{points}" '
                 f'data-tip="{level_m:g} m high"/>'
             )
-        for obstacle in self._scene.obstacles:
+        for obstacle in self._scene.barriers:
             look, tip = "obstacle", f"{obstacle.id}: obstacle"
+            if obstacle.is_steep_ground:
+                look, tip = "obstacle steep", "too steep"
             if obstacle.blocks is not None:
                 look += " partial"
                 tip += f" for {', '.join(obstacle.blocks)}"

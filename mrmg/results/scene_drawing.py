@@ -180,12 +180,12 @@ def draw_ground(axes: Axes, scene: Scene, *, hatched: bool = True) -> None:
             hatch=look.hatch if hatched else None,
             zorder=1 + 0.001 * rank,
         )
-    for obstacle in scene.obstacles:
+    for obstacle in scene.barriers:
         partial = obstacle.blocks is not None
         _add_shape(
             axes,
             obstacle.shape,
-            facecolor=style.PARTIAL_OBSTACLE if partial else style.OBSTACLE,
+            facecolor=style.obstacle_color(obstacle),
             edgecolor=style.OBSTACLE_EDGE,
             linewidth=0.7,
             linestyle="--" if partial else "-",

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from mrmg.execution import palette
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Obstacle, Scene
 
 INK = "#1F2328"
 MUTED = "#5F6773"
@@ -28,6 +28,9 @@ RESERVE = "#B00020"
 
 PARTIAL_OBSTACLE = "#9E8CAD"
 """As `palette.PARTIAL_OBSTACLE`, which videos show."""
+
+STEEP_GROUND = "#9E8CAD80"
+"""Half transparent: contour lines are seen through it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,9 +118,17 @@ class KeyEntry:
     dashed: bool = False
 
 
+def obstacle_color(obstacle: Obstacle) -> str:
+    """Return the colour of an obstacle, or of ground too steep for some robots."""
+    if obstacle.is_steep_ground:
+        return STEEP_GROUND
+    return OBSTACLE if obstacle.blocks is None else PARTIAL_OBSTACLE
+
+
 def map_key(scene: Scene) -> list[KeyEntry]:
     """Return the legend of a scene's map: all kinds of things that it holds."""
     blocking = {obstacle.blocks is None for obstacle in scene.obstacles}
+    some_steep = any(obstacle.is_steep_ground for obstacle in scene.barriers)
     classes = terrain_classes(scene)
     entries = {
         KeyEntry("goal", "goal", GOAL_OPEN, GOAL_EDGE): bool(scene.goals),
@@ -132,6 +143,13 @@ def map_key(scene: Scene) -> list[KeyEntry]:
             OBSTACLE_EDGE,
             dashed=True,
         ): False in blocking,
+        KeyEntry(
+            "too steep for some robots",
+            "area",
+            STEEP_GROUND,
+            OBSTACLE_EDGE,
+            dashed=True,
+        ): some_steep,
         KeyEntry("plain ground ×1", "area", GROUND): bool(classes)
         and 1.0 not in classes,
         KeyEntry("contour line", "line", CONTOUR): scene.elevation is not None,

@@ -167,9 +167,10 @@ def elevation_entry(elevation: Elevation) -> _Entry:
     southward = np.asarray(elevation.height_m, dtype=float)[::-1]
     steps = np.round(southward / PACKED_M)
     small = float(np.abs(steps).max(initial=0.0)) < 2**31
+    slope = {"slope": "avoid"} if elevation.avoid_steep else {}
     if not small or not np.array_equal(steps * PACKED_M, southward):
-        return {"grid": southward.tolist()}
-    return packed_heights(steps.astype("<i4"))
+        return {"grid": southward.tolist(), **slope}
+    return {**packed_heights(steps.astype("<i4")), **slope}
 
 
 def packed_heights(steps: np.ndarray) -> _Entry:

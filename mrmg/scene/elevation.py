@@ -16,10 +16,13 @@ class Elevation:
         bounds: (x_min, y_min, x_max, y_max) [m]; the outermost nodes lie on them.
         height_m: of the nodes, rows from south to north, columns from west to east,
             read-only, shape (ny, nx), both at least 2.
+        avoid_steep: whether ground too steep for a robot is an obstacle for it; else
+            such ground is a fault of the scene.
     """
 
     bounds: tuple[float, float, float, float]
     height_m: np.ndarray
+    avoid_steep: bool = False
 
     @cached_property
     def cell_m(self) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from shapely.geometry import Polygon
 
+from mrmg.scene.climbing import STEEP, steep_ground
 from mrmg.scene.content import ByContent, content, content_digest, contents
 from mrmg.scene.document import is_as_loaded, scene_document
 from mrmg.scene.elevation import Elevation
@@ -26,7 +27,8 @@ class Obstacle:
     Attributes:
         id: unique name.
         shape: outline with holes [m].
-        height_m: height of the obstacle in the simulated world.
+        height_m: height of the obstacle in the simulated world; 0 for ground that is
+            too steep.
         blocks: ids of the robots it stops; None stops all.
     """
 
@@ -34,6 +36,11 @@ class Obstacle:
     shape: Polygon
     height_m: float
     blocks: tuple[str, ...] | None = None
+
+    @property
+    def is_steep_ground(self) -> bool:
+        """Whether it is ground that robots cannot climb, and no thing on the ground."""
+        return self.height_m == 0.0
 
     def stops(self, robot_id: str) -> bool:
         """Tell whether `robot_id` must keep off this obstacle."""
@@ -247,6 +254,18 @@ class Scene:
     def digest(self) -> str:
         """Fingerprint of the content, models and their files included."""
         return content_digest(self)
+
+    @cached_property
+    def barriers(self) -> tuple[Obstacle, ...]:
+        """The obstacles, and with `slope: avoid` the ground too steep for robots."""
+        if self.elevation is None or not self.elevation.avoid_steep:
+            return self.obstacles
+        steep = steep_ground(self.elevation, self.robots, self.terrain)
+        ground = tuple(
+            Obstacle(id=f"{STEEP}_{number}", shape=shape, height_m=0.0, blocks=robots)
+            for number, (shape, robots) in enumerate(steep, start=1)
+        )
+        return self.obstacles + ground
 
     @property
     def document(self) -> dict[str, Any]:

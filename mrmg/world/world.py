@@ -47,12 +47,12 @@ class World:
             robot.model.circumscribed_radius_m for robot in scene.robots
         )
         keys = [
-            tuple(i for i, o in enumerate(scene.obstacles) if o.stops(robot.id))
+            tuple(i for i, o in enumerate(scene.barriers) if o.stops(robot.id))
             for robot in scene.robots
         ]
         distinct = list(dict.fromkeys(keys))
         unions = tuple(
-            shapely.union_all([scene.obstacles[i].shape for i in key])
+            shapely.union_all([scene.barriers[i].shape for i in key])
             for key in distinct
         )
         return World(

@@ -359,7 +359,7 @@ def _descents_J(scene: Scene, robot: Robot) -> tuple[float, float]:
 
 def _travel_key(scene: Scene, robot: Robot) -> TravelKey:
     """Return what the ways of a robot depend on."""
-    obstacles = tuple(o.id for o in scene.obstacles if o.stops(robot.id))
+    obstacles = tuple(o.id for o in scene.barriers if o.stops(robot.id))
     return obstacles, robot.model.inscribed_radius_m, robot.model.top_speed_m_s
 
 

@@ -119,7 +119,7 @@ class Ground:
                 which is at most half of it away from any point of it.
         """
         radius = max(0.0, robot.model.inscribed_radius_m - CLEARANCE_TOLERANCE_M)
-        shapes = [o.shape for o in scene.obstacles if o.stops(robot.id)]
+        shapes = [o.shape for o in scene.barriers if o.stops(robot.id)]
         blocked = shapely.union_all(shapes).buffer(radius)
         price = least_prices(
             scene, blocked, cell_m=cell_m, reach_m=ROUND_MARGIN * 0.5 * step_m

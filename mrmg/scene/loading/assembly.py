@@ -19,9 +19,9 @@ from shapely.geometry import Polygon
 
 from mrmg import storage
 from mrmg.errors import Fault, SceneError, nearest
+from mrmg.scene.climbing import slope_faults, steep_ground
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.loading.batteries import battery_of
-from mrmg.scene.loading.climbing import slope_faults
 from mrmg.scene.loading.elevation import elevation_of
 from mrmg.scene.loading.faults import parsed
 from mrmg.scene.loading.geometry import footprint_at, region_of, shape_of
@@ -71,6 +71,7 @@ class Assembly:
         self._loaded: dict[str, tuple[RobotModel, dict[str, Any]] | None] = {}
         self._references: dict[str, Any] = {}
         self._elevation_document: dict[str, Any] = {}
+        self._steep: list[tuple[Polygon, tuple[str, ...]]] = []
         self.ids = self._unique_ids()
         self.bounds = self._bounds()
         self.robots = list(self._robots())
@@ -284,9 +285,11 @@ class Assembly:
             self.faults += found
             return None
         elevation, self._elevation_document = found
-        self.faults += slope_faults(
-            elevation, self.robots, self.obstacles, self.terrain
-        )
+        if elevation.avoid_steep:
+            self._steep = steep_ground(elevation, self.robots, self.terrain)
+        else:
+            ground = (self.obstacles, self.terrain)
+            self.faults += slope_faults(elevation, self.robots, *ground)
         return elevation
 
     def _objective(self) -> Objective:
@@ -337,6 +340,9 @@ class Assembly:
             for wall in self.obstacles:
                 if wall.stops(robot.id) and wall.shape.intersects(shape):
                     self._fault(where, f"{robot.id} starts on the obstacle '{wall.id}'")
+            steep = [ground for ground, names in self._steep if robot.id in names]
+            if shapely.intersects(steep, shape).any():
+                self._fault(where, f"{robot.id} starts on ground too steep for it")
         for first, second in combinations(self.robots, 2):
             if shapes[first.id].intersects(shapes[second.id]):
                 message = f"{second.id} starts where {first.id} stands"

@@ -64,7 +64,11 @@ def elevation_of(
         heights, document = _packed(heights)
     southward = np.ascontiguousarray(heights[::-1], dtype=float)
     southward.setflags(write=False)
-    return Elevation(bounds=bounds, height_m=southward), document
+    avoids = entry.slope == "avoid"
+    if avoids:
+        document["slope"] = "avoid"
+    elevation = Elevation(bounds=bounds, height_m=southward, avoid_steep=avoids)
+    return elevation, document
 
 
 def _misplaced_options(entry: ElevationEntry, form: str) -> list[Fault]:

@@ -37,7 +37,9 @@ Details:
   `range: [low, high]` says the heights in m of black and white; relative to the scene
   file. Grids are read like a map, the first row in the north, and reach from bound to
   bound; between their nodes the ground is bilinear. Saved scenes hold a file's heights
-  as `packed`.
+  as `packed`. Ground too steep for a robot makes the scene invalid where the robot
+  could get there; with `slope: avoid` it is an obstacle for that robot, with up to half
+  a cell around it.
 - Ids are letters, digits, `_`, `.` and `-`, unique in the whole file (they name bodies,
   arrays and tour targets); an obstacle or terrain area without one is named after its
   place in the list, `obstacle_0`, `terrain_0`.
@@ -195,6 +197,11 @@ class ElevationEntry(Strict):
     )
     packed: PackedEntry | None = Field(
         default=None, description="heights as saved scenes hold them"
+    )
+    slope: Literal["refuse", "avoid"] | None = Field(
+        default=None,
+        description="ground too steep for a robot: refuse the scene (default), or "
+        "avoid it, as an obstacle for that robot",
     )
 
 

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import jsonschema
 import numpy as np
 import pytest
+import shapely
+import yaml
 from PIL import Image
 
 from mrmg.errors import SceneError
+from mrmg.scene.climbing import steepest_climb
 from mrmg.scene.loading import (
     dump_scene,
     load_scene,
@@ -191,3 +196,82 @@ def test_heavy_ground_leaves_less_grip_for_slopes() -> None:
         SceneError, match=r"climbs at most 9 % \(friction 1, terrain x3"
     ):
         make_scene(gentle, terrain=[{**mud, "multiplier": 3}])
+
+
+RIDGE = {
+    "grid": np.clip(0.3 * (6 - np.abs(np.arange(21) - 10.0)), 0, 1.2)[None]
+    .repeat(11, axis=0)
+    .tolist()
+}
+"""A ridge across the map: 30 % from x = 4 to 8 and from 12 to 16, level on its top."""
+
+
+def test_the_refusal_names_avoiding_as_a_remedy() -> None:
+    with pytest.raises(SceneError, match="slope: avoid"):
+        make_scene(RIDGE)
+
+
+@pytest.mark.parametrize("excess", [1e-2, 1e-4, 1e-7])
+def test_slopes_in_the_refusal_differ_as_the_slopes_do(excess: float) -> None:
+    model = make_scene({"grid": [[0, 0], [0, 0]]}).robots[0].model
+    allowed = float(steepest_climb(model, np.ones(1))[0])
+    rise_m = 20 * (allowed + excess)
+    with pytest.raises(SceneError) as caught:
+        make_scene({"grid": [[0, rise_m], [0, rise_m]]})
+    (message,) = (fault.message for fault in caught.value.faults)
+    figures = re.findall(r"by ([\d.]+) % .* at most ([\d.]+) %", message)
+    ((found, most),) = figures
+    assert float(found) > float(most)
+
+
+def test_steep_ground_is_an_obstacle_of_those_it_stops() -> None:
+    robots = [
+        {"id": "r1", "model": "car", "pose": [1, 5, 0]},
+        {"id": "r2", "model": "diffdrive", "pose": [1, 8, 0]},
+    ]
+    scene = make_scene({**RIDGE, "slope": "avoid"}, robots=robots)
+    assert scene.obstacles == ()
+    stopped = {name for item in scene.barriers for name in item.blocks or ()}
+    assert stopped == {"r1", "r2"}
+    x, y = np.random.default_rng(1).uniform([0, 0], [20, 10], (2000, 2)).T
+    assert scene.elevation is not None
+    grade = np.hypot(*scene.elevation.gradient_at(np.stack([x, y], axis=1)).T)
+    for robot in scene.robots:
+        walls = [item.shape for item in scene.barriers if item.stops(robot.id)]
+        inside = shapely.contains_xy(shapely.union_all(walls), x, y)
+        allowed = float(steepest_climb(robot.model, np.ones(1))[0])
+        assert inside[grade > allowed].all()
+        half_m = 0.5 * min(scene.elevation.cell_m)
+        near = shapely.distance(shapely.points(x, y), shapely.union_all(walls)) > 0
+        assert near[(x > 8 + half_m) & (x < 12 - half_m)].all()
+    easy = make_scene({"grid": [[0, 0], [1, 1]], "slope": "avoid"})
+    assert easy.barriers == ()
+
+
+def test_avoiding_survives_the_scenes_document(tmp_path: Path) -> None:
+    np.save(tmp_path / "ridge.npy", np.array(RIDGE["grid"]))
+    for entry in (RIDGE, {"file": "ridge.npy"}):
+        scene = make_scene({**entry, "slope": "avoid"}, tmp_path, robots=ASIDE)
+        again = scene_from_document(yaml.safe_load(dump_scene(scene)), source="again")
+        assert again.digest == scene.digest
+        assert len(again.barriers) == len(scene.barriers) > 0
+        flat = make_scene(
+            {"grid": [[0, 0], [0, 0]], "slope": "avoid"}, tmp_path, robots=ASIDE
+        )
+        moved = replace(flat, elevation=scene.elevation)
+        told = scene_from_document(moved.document, source="told")
+        assert len(told.barriers) == len(scene.barriers)
+
+
+def test_nobody_starts_on_ground_too_steep() -> None:
+    robots = [{"id": "r1", "model": "car", "pose": [6, 5, 0]}]
+    with pytest.raises(SceneError, match="r1 starts on ground too steep for it"):
+        make_scene({**RIDGE, "slope": "avoid"}, robots=robots)
+
+
+def test_other_words_for_slopes_are_refused() -> None:
+    with pytest.raises(SceneError, match="elevation.slope"):
+        make_scene({**RIDGE, "slope": "forbid"})
+
+
+ASIDE = [{"id": "r1", "model": "car", "pose": [1, 5, 0]}]

@@ -1,0 +1,105 @@
+"""Which slopes the robots of a scene can hold and climb, and which stop them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import shapely
+
+from mrmg.compared import compared
+from mrmg.energy import GRAVITY_M_S2
+from mrmg.errors import Fault
+from mrmg.scene.elevation import Elevation
+from mrmg.scene.robot_model import RobotModel
+
+if TYPE_CHECKING:
+    from mrmg.scene.types import Obstacle, Robot, TerrainArea
+
+STEEP = "steep_ground"
+"""What the names of steep ground begin with."""
+
+
+def slope_faults(
+    elevation: Elevation,
+    robots: Sequence[Robot],
+    obstacles: Sequence[Obstacle],
+    terrain: Sequence[TerrainArea],
+) -> list[Fault]:
+    """Return the steepest place, if any, that a robot may get to but not climb."""
+    slope, multiplier = elevation.steepest().ravel(), _multiplier(elevation, terrain)
+    x, y = elevation.cell_centres().reshape(-1, 2).T
+    faults = []
+    for robot in robots:
+        walls = [wall.shape for wall in obstacles if wall.stops(robot.id)]
+        open_ground = ~shapely.contains_xy(shapely.union_all(walls), x, y)
+        allowed = np.maximum(steepest_climb(robot.model, multiplier), 0.0)
+        excess = np.where(open_ground, slope - allowed, -np.inf)
+        worst = int(np.argmax(excess))
+        if excess[worst] <= 0.0:
+            continue
+        rise, most = compared(100 * slope[worst], 100 * allowed[worst])
+        message = (
+            f"rises by {rise} % at ({x[worst]:.1f}, {y[worst]:.1f}), where {robot.id} "
+            f"climbs at most {most} % (friction {robot.model.friction_coefficient:g}, "
+            f"terrain x{multiplier[worst]:g}); flatten it, put an obstacle there, or "
+            "let robots avoid what they cannot climb with slope: avoid"
+        )
+        faults.append(Fault("elevation", message))
+    return faults
+
+
+def steep_ground(
+    elevation: Elevation, robots: Sequence[Robot], terrain: Sequence[TerrainArea]
+) -> list[tuple[shapely.Polygon, tuple[str, ...]]]:
+    """Return ground too steep to climb, and the ids of the robots it is too steep for.
+
+    It covers the cells of the elevation that are too steep, and up to half a cell
+    around them, which rounds the steps of its outline.
+    """
+    slope, multiplier = elevation.steepest().ravel(), _multiplier(elevation, terrain)
+    stopped: dict[bytes, list[str]] = {}
+    for robot in robots:
+        steep = slope > np.maximum(steepest_climb(robot.model, multiplier), 0.0)
+        stopped.setdefault(steep.tobytes(), []).append(robot.id)
+    return [
+        (part, tuple(names))
+        for mask, names in stopped.items()
+        for part in _outlines(elevation, np.frombuffer(mask, dtype=bool))
+    ]
+
+
+def steepest_climb(model: RobotModel, multiplier: np.ndarray) -> np.ndarray:
+    """Return the slope up which a robot can do what is planned for it, shape (n,).
+
+    Its driven axle transmits grip enough for slope, rolling resistance and the planned
+    acceleration together.
+    """
+    acceleration = model.planning_share * model.limits.u1_max_m_s2 / GRAVITY_M_S2
+    grip = model.usable_grip
+    return np.asarray(grip - model.rolling_coefficient * multiplier - acceleration)
+
+
+def _multiplier(elevation: Elevation, terrain: Sequence[TerrainArea]) -> np.ndarray:
+    """Return the terrain multiplier in the middle of each cell, flat."""
+    x, y = elevation.cell_centres().reshape(-1, 2).T
+    multiplier = np.ones(len(x))
+    for area in terrain:
+        multiplier[shapely.contains_xy(area.shape, x, y)] = area.multiplier
+    return multiplier
+
+
+def _outlines(elevation: Elevation, steep: np.ndarray) -> list[shapely.Polygon]:
+    if not steep.any():
+        return []
+    x_min, y_min, x_max, y_max = elevation.bounds
+    rows, columns = elevation.height_m.shape
+    x, y = np.linspace(x_min, x_max, columns), np.linspace(y_min, y_max, rows)
+    row, column = np.nonzero(steep.reshape(rows - 1, columns - 1))
+    cells = shapely.box(x[column], y[row], x[column + 1], y[row + 1])
+    half_m = 0.5 * min(elevation.cell_m)
+    grown = shapely.coverage_union_all(cells).buffer(half_m, join_style="mitre")
+    # A ring that is simplified by less than it was grown by still encloses the cells.
+    smooth = shapely.simplify(grown, 0.99 * half_m)
+    return [shapely.Polygon(part) for part in shapely.get_parts(smooth)]
