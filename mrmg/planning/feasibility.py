@@ -7,8 +7,7 @@ at all. What is impossible then is impossible.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
@@ -47,8 +46,26 @@ def proof_of_infeasibility(scene: Scene, halt: np.ndarray = NEVER) -> str | None
     Raises:
         Halted: once `halt[0]` has turned true.
     """
-    goals = next(iter(impossible_goals(scene, halt).values()), None)
-    return goals or _unreachable_finish(scene) or _crowded_finish(scene)
+    reaches = _reaches(scene, halt)
+    proofs = _cut_off(scene, reaches)
+    if proofs:
+        return _with_others(proofs, dict.fromkeys(proofs, ""))
+    short = _out_of_energy(scene, reaches, halt)
+    if short:
+        return _with_others(
+            {goal: one.sentence(goal) for goal, one in short.items()},
+            {goal: f" by {one.words}" for goal, one in short.items()},
+        )
+    return _unreachable_finish(scene) or _crowded_finish(scene)
+
+
+def _with_others(proofs: Mapping[str, str], amounts: Mapping[str, str]) -> str:
+    """Return the first goal's proof, and the other goals that it holds for, too."""
+    (_, sentence), *others = proofs.items()
+    if not others:
+        return sentence
+    names = [f"{goal}{amounts[goal]}" for goal, _ in others]
+    return f"{sentence}; so are {listed(names)}"
 
 
 def impossible_goals(scene: Scene, halt: np.ndarray = NEVER) -> dict[str, str]:
@@ -58,7 +75,10 @@ def impossible_goals(scene: Scene, halt: np.ndarray = NEVER) -> dict[str, str]:
         Halted: once `halt[0]` has turned true.
     """
     reaches = _reaches(scene, halt)
-    return _cut_off(scene, reaches) | _out_of_energy(scene, reaches, halt)
+    short = _out_of_energy(scene, reaches, halt)
+    return _cut_off(scene, reaches) | {
+        goal: one.sentence(goal) for goal, one in short.items()
+    }
 
 
 def energy_warnings(scene: Scene) -> list[str]:
@@ -70,7 +90,7 @@ def energy_warnings(scene: Scene) -> list[str]:
     """
     reaches = _reaches(scene)
     nobodys = _out_of_energy(scene, reaches)
-    warnings = list(nobodys.values())
+    warnings = [one.sentence(goal) for goal, one in nobodys.items()]
     for reach in reaches:
         missing = {
             goal.id: reach.missing_energy_J(goal.region)
@@ -122,22 +142,44 @@ def _cut_off(scene: Scene, reaches: Sequence[_Reach]) -> dict[str, str]:
     }
 
 
+@dataclass(frozen=True, slots=True)
+class _Missing:
+    """What the robot that comes nearest to a goal is short of at least.
+
+    Attributes:
+        energy_J: above its reserve.
+        robot: that robot.
+    """
+
+    energy_J: float
+    robot: Robot
+
+    @property
+    def words(self) -> str:
+        return energy_and_metres(self.energy_J, self.robot)
+
+    def sentence(self, goal: str) -> str:
+        return GOAL_OUT_OF_ENERGY.reason(goal=goal, missing=self.words)
+
+
 def _out_of_energy(
     scene: Scene, reaches: Sequence[_Reach], halt: np.ndarray = NEVER
-) -> dict[str, str]:
+) -> dict[str, _Missing]:
     """Return the goals that are not cut off, but out of every battery's reach."""
     found = {}
     for goal in scene.goals:
-        missing_J, robot = math.inf, None
+        least: _Missing | None = None
         for reach in reaches:
             check(halt)
-            if reach.is_connected(goal.region) and missing_J > 0.0:
-                own_J = reach.missing_energy_J(goal.region)
-                if own_J < missing_J:
-                    missing_J, robot = own_J, reach.robot
-        if robot is not None and missing_J > 0.0:
-            missing = energy_and_metres(missing_J, robot)
-            found[goal.id] = GOAL_OUT_OF_ENERGY.reason(goal=goal.id, missing=missing)
+            if not reach.is_connected(goal.region):
+                continue
+            missing_J = reach.missing_energy_J(goal.region)
+            if least is None or missing_J < least.energy_J:
+                least = _Missing(missing_J, reach.robot)
+            if missing_J <= 0.0:
+                break
+        if least is not None and least.energy_J > 0.0:
+            found[goal.id] = least
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import re
 from collections.abc import Callable
 from math import hypot, pi, sqrt
 from pathlib import Path
@@ -179,6 +180,25 @@ def test_the_missing_energy_is_that_of_the_missing_way(yard: MakeScene) -> None:
     proof = proof_of_infeasibility(scene)
     assert proof is not None
     assert f"at least {10.0 * joules:.0f} J" in proof
+
+
+def test_all_goals_out_of_reach_are_named_with_what_is_missing(
+    yard: MakeScene,
+) -> None:
+    goals = [circle("near", 20, 10), circle("far", 105, 10), circle("further", 115, 10)]
+    scene = yard(bounds=[0, 0, 120, 20], goals=goals, battery={"capacity_m": 90})
+    proof = str(proof_of_infeasibility(scene))
+    joules = scene.robots[0].model.energy_model.plain_ground_J_per_m()
+    usable_m = 90.0 * (1.0 - scene.robots[0].battery.reserve_fraction)
+    first, others = proof.split("; ")
+    assert first.startswith("goal far is out of energy's reach")
+    missing = [100.0 - usable_m, 110.0 - usable_m]
+    for text, missing_m in zip((first, others), missing, strict=True):
+        found = re.search(r"(\d+) J \((.*) m of plain ground\)", text)
+        assert found is not None
+        assert float(found[1]) == pytest.approx(missing_m * joules, rel=1e-3)
+        assert float(found[2]) == pytest.approx(missing_m, abs=0.06)
+    assert others.startswith("so are further by ")
 
 
 def test_climbing_counts_and_rolling_down_is_paid_back(yard: MakeScene) -> None:
