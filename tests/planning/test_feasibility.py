@@ -17,12 +17,11 @@ import mrmg
 from mrmg.accounting import find_visits, plan_ledger
 from mrmg.mission import Plan, Trajectory
 from mrmg.planning.feasibility import (
-    Walls,
     energy_warnings,
     mission_warnings,
     proof_of_infeasibility,
-    shortest_way_m,
 )
+from mrmg.planning.path_bounds import Walls, shortest_way_m
 from mrmg.scene.types import Scene
 from mrmg.shipped import scene_names
 
