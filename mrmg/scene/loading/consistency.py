@@ -8,13 +8,11 @@ tyres lose, those of `robot.yaml` what is believed, and calibration finds the fo
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from mrmg.energy import GRAVITY_M_S2
 from mrmg.errors import Fault
 from mrmg.scene.driven_parts import (
     CHASSIS,
@@ -27,22 +25,20 @@ from mrmg.scene.driven_parts import (
     DrivenParts,
 )
 from mrmg.scene.loading.mjcf import CompiledRobot
+from mrmg.scene.loading.wheel_consistency import (
+    LENGTH_SHARE,
+    PLACE_M,
+    apart,
+    difference,
+    steering_faults,
+    traction_faults,
+    wheel_faults,
+)
 from mrmg.scene.robot_model import RobotModel
 
 MASS_SHARE = 0.01
 """Allowed difference of mass. Planned energy is proportional to
 mass, and measured within 2 % of it; half of that may come from the model."""
-
-INERTIA_SHARE = 0.05
-"""Allowed difference of the effective mass by the inertia of the wheels: it counts only
-when speeds change, and calibration may set it to what the robot was found to have."""
-
-LENGTH_SHARE = 0.01
-"""Allowed difference of wheelbase, track and wheel radius: of yaw rate and speed."""
-
-PLACE_M = 0.01
-"""How far the driven axle may be from the reference point, and wheels off the
-footprint: half of the default noise of measured positions."""
 
 HULL_BEYOND_M = 0.005
 """How far the hull may reach beyond the footprint: a third of how far robots as
@@ -59,9 +55,6 @@ broke down is as an obstacle."""
 CENTER_SHARE = 0.02
 """Allowed difference of the centre of mass, as a share of the wheelbase: it is where
 the height of the ground counts."""
-
-GRIP_SHARE_MISSING = 0.05
-"""By how much less the simulated tyres may grip than `robot.yaml` says."""
 
 _AXIS_COSINE = 0.999
 
@@ -95,9 +88,9 @@ def mjcf_faults(
     return [
         *_mass(model, robot, center_stated),
         *_hull(model, robot, parts),
-        *_wheels(model, robot, parts),
-        *_steering(model, robot, parts),
-        *_traction(model, robot, parts),
+        *wheel_faults(model, robot, parts),
+        *steering_faults(model, robot, parts),
+        *traction_faults(model, robot, parts),
     ]
 
 
@@ -162,13 +155,13 @@ def _mass(
     model: RobotModel, robot: CompiledRobot, center_stated: bool
 ) -> Iterator[Fault]:
     if abs(robot.mass_kg - model.mass_kg) > MASS_SHARE * model.mass_kg:
-        yield _difference(
+        yield difference(
             "mass", model.mass_kg, robot.mass_kg, "kg", f"{MASS_SHARE:.0%}", robot.file
         )
     allowed_m = CENTER_SHARE * model.wheelbase_m
     lead_m = robot.center_of_mass_m
-    if center_stated and _apart(lead_m, model.center_of_mass_m, allowed_m):
-        yield _difference(
+    if center_stated and apart(lead_m, model.center_of_mass_m, allowed_m):
+        yield difference(
             "center_of_mass",
             model.center_of_mass_m,
             lead_m,
@@ -218,9 +211,9 @@ def _hull(
                 f"{PLACE_M:g} m more); enlarge the footprint",
             )
     top_m = robot.reach_m(HULL, (0.0, 0.0, 1.0)) + float(robot.origin_m[2])
-    if _apart(top_m, model.height_m, HEIGHT_SHARE * model.height_m):
+    if apart(top_m, model.height_m, HEIGHT_SHARE * model.height_m):
         allowed = f"{HEIGHT_SHARE:.0%}"
-        yield _difference("height", model.height_m, top_m, "m", allowed, robot.file)
+        yield difference("height", model.height_m, top_m, "m", allowed, robot.file)
 
 
 def _side(normal: np.ndarray) -> str:
@@ -231,162 +224,3 @@ def _side(normal: np.ndarray) -> str:
             return "in front" if x > 0 else "behind"
         return "on the left" if y > 0 else "on the right"
     return f"towards ({x:.2f}, {y:.2f})"
-
-
-def _wheels(
-    model: RobotModel, robot: CompiledRobot, parts: DrivenParts
-) -> Iterator[Fault]:
-    axle = np.mean([robot.place_m(name) for name in parts.spin], axis=0)
-    if abs(axle[0]) > PLACE_M or abs(axle[1]) > PLACE_M:
-        message = (
-            f"the driven axle of {robot.file} is at ({axle[0]:.4g}, {axle[1]:.4g}) m; "
-            f"it must be at the chassis' origin (allowed: {PLACE_M:g} m)"
-        )
-        yield Fault("mjcf", message)
-    lengths = [("track", model.track_m, _gap_m(robot, parts.spin))]
-    if parts.steer:
-        front = np.mean([robot.place_m(name) for name in parts.steer], axis=0)
-        lengths += [
-            ("wheelbase", model.wheelbase_m, float(front[0] - axle[0])),
-            ("track", model.track_m, _gap_m(robot, parts.steer)),
-        ]
-    lengths += [
-        ("wheel.radius", model.wheel_radius_m, robot.radius_m(name))
-        for name in robot.wheels
-    ]
-    seen = set()
-    for key, stated_m, found_m in lengths:
-        wrong = _apart(found_m, stated_m, LENGTH_SHARE * stated_m)
-        if wrong and (key, round(found_m, 6)) not in seen:
-            seen.add((key, round(found_m, 6)))
-            allowed = f"{LENGTH_SHARE:.0%}"
-            yield _difference(key, stated_m, found_m, "m", allowed, robot.file)
-    yield from _tendons(model, robot, parts)
-    yield from _spin(model, robot)
-    grip = min(robot.grip(name) for name in parts.spin)
-    if grip < (1.0 - GRIP_SHARE_MISSING) * model.friction_coefficient:
-        yield _difference(
-            "friction_coefficient",
-            model.friction_coefficient,
-            grip,
-            "for driven tyres",
-            f"{GRIP_SHARE_MISSING:.0%} less",
-            robot.file,
-        )
-
-
-def _gap_m(robot: CompiledRobot, pair: tuple[str, ...]) -> float:
-    left, right = (robot.place_m(name)[1] for name in pair)
-    return float(left - right)
-
-
-def _tendons(
-    model: RobotModel, robot: CompiledRobot, parts: DrivenParts
-) -> Iterator[Fault]:
-    """Yield tendons whose lengths are not the ways rolled that they stand for."""
-    radius_m = model.wheel_radius_m
-    ways_m = ((radius_m / 2, radius_m / 2), (-radius_m, radius_m))
-    for tendon, per_rad_m in zip(parts.tendons, ways_m, strict=False):
-        for joint, wanted_m in zip(parts.spin, per_rad_m, strict=True):
-            found_m = robot.tendon_per_rad_m(tendon, joint)
-            if _apart(found_m, wanted_m, LENGTH_SHARE * radius_m):
-                yield Fault(
-                    "wheel.radius",
-                    f"with {radius_m:g} m, tendon '{tendon}' of {robot.file} must "
-                    f"have a coefficient of {wanted_m:.4g} m for joint '{joint}', not "
-                    f"{found_m:.4g} m (at most {LENGTH_SHARE:.0%} apart); correct "
-                    "the one that is wrong",
-                )
-
-
-def _spin(model: RobotModel, robot: CompiledRobot) -> Iterator[Fault]:
-    count = len(robot.wheels)
-    if count != model.wheel_count:
-        stated = float(model.wheel_count)
-        yield _difference("wheel.count", stated, count, "wheels", "0", robot.file)
-        return
-    inertia = [robot.spin_inertia_kg_m2(name) for name in robot.wheels]
-    mean_kg_m2 = float(np.mean(inertia))
-    allowed_kg_m2 = (
-        INERTIA_SHARE * model.effective_mass_kg * model.wheel_radius_m**2 / count
-    )
-    if _apart(mean_kg_m2, model.wheel_inertia_kg_m2, allowed_kg_m2):
-        yield _difference(
-            "wheel.inertia",
-            model.wheel_inertia_kg_m2,
-            mean_kg_m2,
-            "kg m^2 a wheel",
-            f"{allowed_kg_m2:.2g} kg m^2",
-            robot.file,
-        )
-
-
-def _steering(
-    model: RobotModel, robot: CompiledRobot, parts: DrivenParts
-) -> Iterator[Fault]:
-    """Yield what keeps the steered wheels from the angles that `w_max` asks for."""
-    if not parts.steer:
-        return
-    tan_psi = math.tan(model.limits.w_max)
-    inward = 1.0 - model.track_m / model.wheelbase_m / 2 * tan_psi
-    psi = f"{model.limits.w_max:g} rad"
-    if inward <= 0.0:
-        message = f"{psi} would have the car turn about a point between its wheels"
-        yield Fault("limits.w_max", f"{message}; lower it")
-        return
-    wanted = math.atan(tan_psi / inward)
-    narrow: dict[tuple[float, float], list[str]] = {}
-    for name in (*parts.steer, *parts.servos):
-        joint = name in parts.steer
-        low, high = (
-            robot.joint_range_rad(name) if joint else robot.servo_range_rad(name)
-        )
-        if min(-low, high) < wanted * (1.0 - 1e-3):
-            narrow.setdefault((low, high), []).append(name)
-    for (low, high), names in narrow.items():
-        yield Fault(
-            "limits.w_max",
-            f"{psi} asks the inner wheel for {wanted:.4g} rad, but {', '.join(names)} "
-            f"of {robot.file} may only go from {low:.4g} to {high:.4g} rad; lower "
-            "w_max or widen the range",
-        )
-
-
-def _traction(
-    model: RobotModel, robot: CompiledRobot, parts: DrivenParts
-) -> Iterator[Fault]:
-    """Yield motors too weak for the acceleration that plans use."""
-    limits = model.limits.scaled(model.planning_share)
-    energy = model.energy_model
-    most_N = model.usable_grip * model.mass_kg * GRAVITY_M_S2
-    asked_N = min(
-        model.effective_mass_kg * limits.u1_max_m_s2 + energy.rolling_force_N, most_N
-    )
-    share = len(parts.motors)
-    groups = [parts.spin] if share == 1 else [(name,) for name in parts.spin]
-    for motor, joints in zip(parts.motors, groups, strict=True):
-        forward_N = robot.traction_N(motor, joints, most_N / share)
-        backward_N = -robot.traction_N(motor, joints, -most_N / share)
-        least_N = min(forward_N, backward_N)
-        if least_N < asked_N / share * (1.0 - MASS_SHARE):
-            yield Fault(
-                "limits.u1_max",
-                f"{limits.u1_max_m_s2:.3g} m/s^2 (planning_share included) asks for "
-                f"{asked_N / share:.0f} N of traction on plain ground, but actuator "
-                f"'{motor}' of {robot.file} gives {least_N:.0f} N at most; lower the "
-                "limit or strengthen the drive",
-            )
-
-
-def _apart(found: float, stated: float, allowed: float) -> bool:
-    return not abs(found - stated) <= allowed + 1e-9
-
-
-def _difference(
-    key: str, stated: float, found: float, unit: str, allowed: str, file: str
-) -> Fault:
-    return Fault(
-        key,
-        f"robot.yaml says {stated:.6g} {unit}, {file} has {found:.6g} {unit} (allowed "
-        f"difference: {allowed}); correct the one that is wrong",
-    )

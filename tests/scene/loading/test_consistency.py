@@ -100,6 +100,8 @@ ONE_DIFFERENCE: list[tuple[str, Change, str, str]] = [
      "limits.u1_max", r"gives 90 N"),
     ("car", ('tendon="axle" gear="1"', 'tendon="axle" gear="-1"'),
      "limits.u1_max", r"gives -706 N"),
+    ("car", ("u1_max: 1.5", "u1_max: 4.5"),
+     "limits.u1_max", r"asks for 856 N .* tyres of friction 1 transmit, 706 N"),
     ("diffdrive", ('"spin_r" gear="0.15"', '"spin_r" gear="0.01"'),
      "limits.u1_max", r"actuator 'drive_r'"),
     ("car", ('<motor name="drive"', '<motor name="engine"'),
