@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import Field, fields, is_dataclass
 from numbers import Real
 from typing import Any
 
@@ -62,11 +62,21 @@ def content(value: Any) -> Any:
 
 
 def contents(value: Any, *, without: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return the content of a dataclass's fields by name."""
-    names = (field.name for field in fields(value))
+    """Return the content of a dataclass's fields by name.
+
+    Fields at their defaults stay out, so that a field that a later version adds leaves
+    the digests as they are.
+    """
     return {
-        name: content(getattr(value, name)) for name in names if name not in without
+        field.name: content(getattr(value, field.name))
+        for field in fields(value)
+        if field.name not in without
+        and not _is_default(getattr(value, field.name), field)
     }
+
+
+def _is_default(value: Any, field: Field[Any]) -> bool:
+    return type(value) is type(field.default) and bool(value == field.default)
 
 
 def _fingerprint(data: bytes) -> str:

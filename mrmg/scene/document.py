@@ -203,6 +203,9 @@ def _elevation(scene: Scene) -> _Entry | None:
 
 
 def _polygon(shape: Any) -> _Entry:
+    if not isinstance(shape, shapely.Polygon) or shape.is_empty:
+        message = f"got a {shape.geom_type}; expected one polygon, not empty, an entry"
+        raise SceneError("scene", [Fault("polygon", message)])
     rings = [_points(ring.coords[:-1]) for ring in (shape.exterior, *shape.interiors)]
     return {"polygon": rings[0], **({"holes": rings[1:]} if rings[1:] else {})}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from shapely.geometry import Polygon
 
 from mrmg import shipped
 from mrmg.errors import SceneError
+from mrmg.scene.content import content_digest
 from mrmg.scene.loading import (
     dump_scene,
     load_scene,
@@ -281,6 +282,27 @@ def test_a_model_without_a_folder_is_refused_by_name() -> None:
         _ = replace(scene, robots=(own, scene.robots[1])).document
 
 
+@pytest.mark.parametrize(
+    "shape",
+    [
+        shapely.MultiPolygon([shapely.box(9, 2, 10, 3), shapely.box(12, 2, 13, 3)]),
+        Polygon(),
+    ],
+)
+def test_what_is_no_polygon_is_refused(shape: Any) -> None:
+    scene = rich()
+    walls = (replace(scene.obstacles[0], shape=shape), scene.obstacles[1])
+    with pytest.raises(SceneError, match="rich: 1 fault\n.*expected one polygon"):
+        dump_scene(replace(scene, obstacles=walls))
+
+
+def test_what_a_file_would_read_otherwise_is_refused() -> None:
+    scene = rich()
+    other = replace(scene.goals[0], id="g1", region=scene.goals[1].region, dwell_s=-1.0)
+    with pytest.raises(SceneError, match=r"goals.0.*dwell"):
+        dump_scene(replace(scene, goals=(other, scene.goals[1])))
+
+
 def own_model(folder: Path, document: dict[str, Any] | None = None) -> Scene:
     """Return a scene with the car in a folder of one's own, with a mesh."""
     if not folder.exists():
@@ -317,3 +339,19 @@ def test_an_edited_file_of_a_model_is_another_scene(tmp_path: Path, file: str) -
     assert changed_file.resolve() == (folder / file).resolve()
     # A value once loaded stays what it is.
     assert replace(scene, name="field").digest == scene.digest
+
+
+def test_a_field_of_a_later_version_leaves_digests_as_they_are() -> None:
+    @dataclass(frozen=True)
+    class Now:
+        x: float
+        time_limit_s: float = float("inf")
+
+    @dataclass(frozen=True)
+    class Later(Now):
+        slope: str | None = None
+        shares: tuple[float, ...] = (0.5,)
+
+    assert content_digest(Later(1.0)) == content_digest(Now(1.0))
+    assert content_digest(Later(1.0, slope="avoid")) != content_digest(Now(1.0))
+    assert content_digest(Now(1.0, 5.0)) != content_digest(Now(1.0))

@@ -102,7 +102,11 @@ def require_faithful(scene: Scene, document: dict[str, Any]) -> None:
     message = "was changed in memory into what no scene file can say"
     raise SceneError(
         scene.name,
-        [Fault(key, message) for key in wanted if found[key] != wanted[key]],
+        [
+            Fault(key, message)
+            for key in sorted({*wanted, *found})
+            if found.get(key) != wanted.get(key)
+        ],
     )
 
 
