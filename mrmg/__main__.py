@@ -1,6 +1,38 @@
-"""`python -m mrmg` is the `mrmg` command."""
+"""The `mrmg` command, also as `python -m mrmg`.
 
-from mrmg.cli import command
+Ctrl-C is taken care of before anything heavy is imported.
+"""
+
+import os
+import signal
+import sys
+from contextlib import suppress
+
+
+def command() -> None:
+    """Run the command line of this process, and end the process."""
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, lambda number, frame: os._exit(130))
+    from mrmg import interruption
+
+    interruption.install()
+    try:
+        from mrmg.cli.main import main
+
+        code = main()
+    except BaseException:
+        if interruption.is_pending():
+            interruption.end()  # whatever became of the interrupt on its way
+        raise
+    if interruption.is_pending():
+        interruption.end(told=code == interruption.EXIT_CODE)
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):
+            stream.flush()
+    # All is written. To take Python apart would be another tenth of a second, in which
+    # Ctrl-C could not be answered.
+    os._exit(code)
+
 
 if __name__ == "__main__":
     command()

@@ -4,7 +4,7 @@ The threads of `concurrent.futures.ThreadPoolExecutor` are joined when the inter
 exits, so that work which nobody waits for any longer would keep a command from ending.
 Daemon threads are not; but the process aborts if one is inside compiled code when the
 interpreter ends. So a command that leaves work behind ends without that
-(`cli.main.command`), and a script of a user's waits for the work at its end.
+(`mrmg.__main__.command`), and a script of a user's waits for the work at its end.
 """
 
 from __future__ import annotations
@@ -43,11 +43,6 @@ def in_background(call: Callable[[], Result]) -> Future[Result]:
     _running.add(thread)
     thread.start()
     return future
-
-
-def is_running() -> bool:
-    """Return whether any work is under way."""
-    return bool(_running)
 
 
 @atexit.register

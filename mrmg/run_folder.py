@@ -21,10 +21,14 @@ from typing import Any
 
 from mrmg import storage
 from mrmg.errors import Fault, RunFolderError, UsageError
+from mrmg.interruption import cleaned_up_by
 from mrmg.run_paths import why_no_run
 from mrmg.scene.model_files import MODELS_FOLDER
 
 RUN_FORMAT = 1
+
+TRIALS_FOLDER = "trials"
+"""Where trials under disturbances lie, by plan and by what decides the drive."""
 
 _UNFINISHED = ".part-"
 
@@ -117,9 +121,17 @@ class RunFolder:
         with _exclusive(self.path):
             if any(self.path.iterdir()) and not self.file("run.json").exists():
                 self._refuse_foreign_files()
-            for leftover in self.path.glob(f"{_UNFINISHED}*"):
-                leftover.unlink()
-            yield self
+            self._remove_unfinished()
+            try:
+                with cleaned_up_by(self._remove_unfinished):
+                    yield self
+            finally:
+                self._remove_unfinished()
+
+    def _remove_unfinished(self) -> None:
+        for place in (".", f"{TRIALS_FOLDER}/*/*"):
+            for leftover in self.path.glob(f"{place}/{_UNFINISHED}*"):
+                leftover.unlink(missing_ok=True)
 
     def arguments(self) -> dict[str, Any]:
         """Return the arguments its files were last made with; empty if none."""

@@ -11,10 +11,13 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+from mrmg.interruption import cleaned_up_by
 
 
 @contextmanager
@@ -27,13 +30,15 @@ def atomic_path(path: Path) -> Iterator[Path]:
         )
     os.close(handle)
     temporary = Path(name)
+    remove = partial(temporary.unlink, missing_ok=True)
     try:
-        yield temporary
-        os.chmod(temporary, 0o644)
-        with _errors_about(path):
-            os.replace(temporary, path)
+        with cleaned_up_by(remove):
+            yield temporary
+            os.chmod(temporary, 0o644)
+            with _errors_about(path):
+                os.replace(temporary, path)
     finally:
-        temporary.unlink(missing_ok=True)
+        remove()
 
 
 @contextmanager

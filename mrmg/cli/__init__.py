@@ -1,5 +1,5 @@
 """The `mrmg` command: arguments in, exit code out."""
 
-from mrmg.cli.main import command, main
+from mrmg.cli.main import main
 
-__all__ = ["command", "main"]
+__all__ = ["main"]

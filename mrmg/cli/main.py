@@ -2,33 +2,18 @@
 
 from __future__ import annotations
 
-import atexit
 import errno
 import gc
 import os
 import sys
 from collections.abc import Sequence
-from typing import NoReturn
 
-from mrmg import background
+from mrmg import interruption
 from mrmg.cli.parser import make_parser
 from mrmg.errors import ExitCode, MrmgError
 
-INTERRUPTED = 130
-"""Exit code after Ctrl-C, as shells have it."""
-
 MOST_NEW_OBJECTS = 50_000
 """New objects after which there is a search for garbage."""
-
-
-def command() -> NoReturn:
-    """Run the command line of the process, and end the process with its exit code."""
-    code = main()
-    if background.is_running():
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(code)
-    sys.exit(code)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -41,7 +26,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # What imports make stays: to search it for garbage again and again takes a tenth of
     # the time of a short command.
     gc.set_threshold(MOST_NEW_OBJECTS)
-    atexit.register(gc.freeze)  # nor need it be searched when the process ends
     try:
         code = options.command(options)
         sys.stdout.flush()
@@ -50,8 +34,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"mrmg: {error}", file=sys.stderr)
         return int(error.exit_code)
     except KeyboardInterrupt:
-        print("mrmg: stopped; the same command takes it up again", file=sys.stderr)
-        return INTERRUPTED
+        print(interruption.MESSAGE, file=sys.stderr)
+        return interruption.EXIT_CODE
     except OSError as error:
         if error.errno == errno.EPIPE:
             # The reader of our output has gone; nothing is left to be told.

@@ -7,6 +7,7 @@ import os
 import sys
 from pathlib import Path
 
+from mrmg import interruption
 from mrmg.cli import terminal
 from mrmg.errors import ExitCode
 
@@ -86,6 +87,7 @@ def watch(
     try:
         page.run()
     except KeyboardInterrupt:
+        interruption.accept()
         return ExitCode.OK
     finally:
         page.close()

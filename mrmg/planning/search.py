@@ -17,6 +17,7 @@ from functools import partial
 
 import numpy as np
 
+from mrmg import interruption
 from mrmg.background import finished, in_background
 from mrmg.mission import Plan
 from mrmg.planning.attempt import Attempt
@@ -107,6 +108,7 @@ class Search:
                 if self.best is None or self.params.budget_s is None:
                     raise
                 self.interrupted = True
+                interruption.accept()
             finally:
                 self.halt[0] = True
         return self.best

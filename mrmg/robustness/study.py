@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import multiprocessing
 import shutil
-import signal
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -13,15 +12,14 @@ from pathlib import Path
 
 from mrmg.errors import MachineError, UsageError
 from mrmg.execution.disturbance_spec import written_out
+from mrmg.interruption import end_with_parent, sheltered_children
 from mrmg.mission import PlanStatus
 from mrmg.results.robustness import Study, Trial, save_study
 from mrmg.robustness.trials import TrialJob, jobs_of, make_trial
 from mrmg.run_arguments import RunArguments
-from mrmg.run_folder import Step
+from mrmg.run_folder import TRIALS_FOLDER, Step
 from mrmg.scene.driven_parts import require_drivable
 from mrmg.steps import Run
-
-TRIALS_FOLDER = "trials"
 
 OnTrial = Callable[[int, int, int], None]
 """Told (trials done, trials in all, feasible ones) after each trial."""
@@ -115,10 +113,11 @@ def _all_trials(jobs: list[TrialJob], workers: int) -> Iterator[Trial]:
 def _made_by_workers(jobs: list[TrialJob], workers: int) -> Iterator[Trial]:
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(
-        min(workers, len(jobs)), mp_context=context, initializer=_leave_interrupts
+        min(workers, len(jobs)), mp_context=context, initializer=end_with_parent
     )
     try:
-        waiting = [pool.submit(make_trial, job) for job in jobs]
+        with sheltered_children():
+            waiting = [pool.submit(make_trial, job) for job in jobs]
         for future in as_completed(waiting):
             yield future.result()
     except BrokenProcessPool as error:
@@ -128,8 +127,3 @@ def _made_by_workers(jobs: list[TrialJob], workers: int) -> Iterator[Trial]:
         ) from error
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _leave_interrupts() -> None:
-    """Let Ctrl-C stop the parent alone, which then lets the workers finish a trial."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)

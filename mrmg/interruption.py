@@ -1,0 +1,142 @@
+"""Ctrl-C ends a command at any moment: in an orderly way if possible, else by force.
+
+Python turns the signal into an exception of the main thread. It comes late while C code
+does not return, and never where a callback, or the import of a compiled module, drops
+it. A second thread, which the system wakes at once, therefore gives the main thread
+`GRACE_S` to end, and then ends the process itself.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from types import FrameType
+from typing import Any, NoReturn
+
+EXIT_CODE = 130
+"""Exit code after Ctrl-C, as shells have it."""
+
+MESSAGE = "mrmg: stopped; the same command takes it up again"
+
+GRACE_S = 1.0
+"""Time in which the main thread may end in an orderly way."""
+
+_cleanups: list[Callable[[], object]] = []
+_accepted = threading.Event()
+_pending = threading.Event()
+
+
+def install() -> None:
+    """Let Ctrl-C end this process with `EXIT_CODE`, at the latest after `GRACE_S`.
+
+    A process that was started to ignore it, such as a shell's background job, does.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        return
+    reader, writer = os.pipe()
+    os.set_blocking(writer, False)
+    signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
+    signal.signal(signal.SIGINT, _raise)
+    sys.unraisablehook = _end_where_dropped
+    threading.Thread(target=_watch, args=(reader,), daemon=True).start()
+
+
+def is_pending() -> bool:
+    """Return whether there was a Ctrl-C that nobody has accepted."""
+    return _pending.is_set()
+
+
+def accept() -> None:
+    """State that the process goes on after this Ctrl-C, which is acted on."""
+    _pending.clear()
+    _accepted.set()
+
+
+@contextmanager
+def cleaned_up_by(cleanup: Callable[[], object]) -> Iterator[None]:
+    """Have `cleanup` called if the process is ended by force within the block."""
+    _cleanups.append(cleanup)
+    try:
+        yield
+    finally:
+        _cleanups.remove(cleanup)
+
+
+def end(*, told: bool = False) -> NoReturn:
+    """End the process at once, without children and unfinished files.
+
+    Args:
+        told: whether the user has been told.
+    """
+    for child in _children(os.getpid()):
+        with suppress(OSError):
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+    for cleanup in [*_cleanups]:
+        with suppress(Exception):
+            cleanup()
+    if not told:
+        with suppress(OSError):
+            os.write(2, f"{MESSAGE}\n".encode())
+    os._exit(EXIT_CODE)
+
+
+def end_with_parent() -> None:
+    """Leave Ctrl-C to the parent of this worker process, and end when it has ended."""
+    import multiprocessing
+    from multiprocessing.connection import wait
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = multiprocessing.parent_process()
+
+    def follow() -> None:
+        if parent is not None:
+            wait([parent.sentinel])
+            os._exit(EXIT_CODE)
+
+    threading.Thread(target=follow, daemon=True).start()
+
+
+@contextmanager
+def sheltered_children() -> Iterator[None]:
+    """Start processes in the block that Ctrl-C never reaches, not even at first."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _raise(number: int, frame: FrameType | None) -> None:
+    _pending.set()
+    raise KeyboardInterrupt
+
+
+def _watch(reader: int) -> None:
+    while True:
+        if signal.SIGINT not in os.read(reader, 64):
+            continue
+        if not _accepted.wait(GRACE_S):
+            end()
+        _accepted.clear()
+
+
+def _end_where_dropped(dropped: Any) -> None:
+    if isinstance(dropped.exc_value, KeyboardInterrupt):
+        end()
+    sys.__unraisablehook__(dropped)
+
+
+def _children(process: int) -> list[int]:
+    """Return the processes below one, the lowest first; none where /proc is missing."""
+    found: list[int] = []
+    for task in Path(f"/proc/{process}/task").glob("*/children"):
+        with suppress(OSError, ValueError):
+            for child in map(int, task.read_text().split()):
+                found += [*_children(child), child]
+    return found
