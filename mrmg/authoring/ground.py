@@ -126,7 +126,8 @@ class Ground:
 
     def distances(self, sources: Sequence[int]) -> np.ndarray:
         """Return costs from `sources` to all points [m], shape (n, rows * columns)."""
-        return np.asarray(dijkstra(self.roads, indices=list(sources)))
+        # One source at a time: SciPy holds the interpreter's lock, and Ctrl-C waits.
+        return np.array([dijkstra(self.roads, indices=source) for source in sources])
 
     def road_to_nearest(self, targets: np.ndarray) -> np.ndarray:
         """Return the cost from every point to the nearest of `targets` [m]."""

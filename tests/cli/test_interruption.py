@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import io
 import json
+import os
+import pty
 import random
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -19,6 +24,31 @@ from mrmg.errors import ExitCode
 
 pytestmark = pytest.mark.slow
 PATIENCE_S = 120.0
+PROMISED_S = 2.0
+"""Time in which Ctrl-C ends every command; judged where interruptions are counted."""
+COUNT = int(os.environ.get("MRMG_INTERRUPTIONS", "0"))
+"""Ctrl-C's to try at random moments; 0 for one a verb."""
+VERBS = {
+    "run": "run {scene} --out {new}",
+    "plan": "plan quickstart --out {new}",
+    "plan in threads": "plan quickstart --trees 6 --workers 2 --out {new}",
+    "verify": "verify {run}",
+    "execute": "execute {run} --overwrite",
+    "execute apart": "execute {run} --disturb",
+    "audit": "audit {run}",
+    "robustness": "robustness {run} --trials 4",
+    "robustness in processes": "robustness {run} --trials 6 --workers 2",
+    "render": "render {run} --size 320x240 --speed 4 --gif",
+    "report": "report {run}",
+    "compare": "compare {run} {reference} -o {new}.html",
+    "figure": "figure {run} -o {new}.pdf",
+    "scene check": "scene check quickstart",
+    "scene draw": "scene draw quickstart -o {new}.png",
+    "scene roadmap": "scene roadmap quickstart -o {new}.graphml",
+    "scene populate": "scene populate scene1 -o {new}.yaml",
+    "calibrate": "calibrate car -o {new}",
+    "doctor": "doctor",
+}
 ERRAND = """\
 format: 1
 name: errand
@@ -33,12 +63,17 @@ robots:
 
 
 def start(scene: Path, out: Path) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "mrmg", "run", str(scene), "--no-video"]
+    return started(["run", str(scene), "--no-video", "--out", str(out)])
+
+
+def started(words: list[str]) -> subprocess.Popen[str]:
+    """Start a command in a process group of its own."""
     return subprocess.Popen(
-        [*command, "--out", str(out)],
+        [sys.executable, "-m", "mrmg", *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        start_new_session=True,
     )
 
 
@@ -132,3 +167,141 @@ def test_ctrl_c_ends_in_one_line(tmp_path: Path, scene: Path, reference: Path) -
     assert process.returncode == 130
     assert told == "mrmg: stopped; the same command takes it up again\n"
     assert_finishes_like(scene, out, reference)
+
+
+def watched(words: list[str]) -> subprocess.Popen[str]:
+    """Start a command, and return once its own code takes care of Ctrl-C.
+
+    Until then Python's start ends by the signal itself, which shells show as 130, too.
+    """
+    process = started(words)
+    threads = Path(f"/proc/{process.pid}/task")
+    until = time.monotonic() + PATIENCE_S
+    while process.poll() is None and len(list(threads.iterdir())) < 2:
+        assert time.monotonic() < until
+        time.sleep(0.001)
+    return process
+
+
+@pytest.fixture(scope="module")
+def duration_s(
+    words_of: Callable[[str, Path], list[str]],
+    tmp_path_factory: pytest.TempPathFactory,
+) -> Callable[[str], float]:
+    """How long each verb takes here when nobody stops it."""
+
+    @cache
+    def measured(verb: str) -> float:
+        began = time.monotonic()
+        process = started(words_of(verb, tmp_path_factory.mktemp("measured")))
+        _, told = process.communicate()
+        assert process.returncode == ExitCode.OK, told
+        return time.monotonic() - began
+
+    return measured
+
+
+@pytest.fixture(scope="module")
+def words_of(scene: Path, reference: Path) -> Callable[[str, Path], list[str]]:
+    """The words of a verb that works on a copy of the reference in a folder."""
+
+    def words(verb: str, folder: Path) -> list[str]:
+        run = folder / "run"
+        if not run.exists():
+            shutil.copytree(reference, run)
+        places = {"scene": scene, "reference": reference, "new": folder / "new"}
+        return VERBS[verb].format(run=run, **places).split()
+
+    return words
+
+
+def left_in_group(group: int) -> list[str]:
+    """Return the living processes of a process group."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            name, _, rest = (folder / "stat").read_text().rpartition(")")
+        except OSError:
+            continue
+        state, _, its_group = rest.split()[:3]
+        if int(its_group) == group and state != "Z":
+            found.append(name)
+    return found
+
+
+@pytest.mark.parametrize("number", range(COUNT or len(VERBS)))
+def test_ctrl_c_ends_every_verb_at_any_moment(
+    number: int,
+    words_of: Callable[[str, Path], list[str]],
+    duration_s: Callable[[str], float],
+    tmp_path: Path,
+) -> None:
+    verb = list(VERBS)[number % len(VERBS)]
+    moments = random.Random(number)
+    for attempt in range(5):  # until it was stopped before it was done
+        folder = tmp_path / str(attempt)
+        folder.mkdir()
+        process = watched(words_of(verb, folder))
+        time.sleep(moments.uniform(0.0, 0.9 * duration_s(verb)))
+        if process.poll() is None:
+            break
+        process.communicate()
+    # A terminal sends the signal to all processes of the group, others to the first.
+    began = time.monotonic()
+    if moments.random() < 0.5:
+        os.killpg(process.pid, signal.SIGINT)
+    else:
+        process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=PATIENCE_S)
+    took_s = time.monotonic() - began
+    assert process.returncode == 130, told
+    assert told.endswith("mrmg: stopped; the same command takes it up again\n")
+    assert left_in_group(process.pid) == []
+    assert [path.name for path in tmp_path.rglob(".part-*")] == []
+    for made in (folder / "run", folder / "new"):
+        if made.is_dir():
+            assert_every_file_is_whole(made)
+    if COUNT:
+        assert took_s < PROMISED_S
+
+
+def test_an_interrupt_that_is_dropped_ends_the_process() -> None:
+    code = (
+        "import ctypes, time\n"
+        "from mrmg import interruption\n"
+        "interruption.install()\n"
+        "print('ready', flush=True)\n"
+        "while True:\n"
+        "    try:\n"
+        "        time.sleep(60)\n"
+        "    except BaseException:\n"
+        "        pass\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 130
+
+
+def test_ctrl_c_while_improving_keeps_the_best_plan(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    words = ["plan", "quickstart", "--budget", "600", "--out", str(out)]
+    screen, terminal = pty.openpty()  # on which each better plan is shown
+    process = subprocess.Popen(
+        [sys.executable, "-m", "mrmg", *words], stdout=subprocess.PIPE, stderr=terminal
+    )
+    os.close(terminal)
+    shown = b""
+    while b"cost" not in shown:
+        shown += os.read(screen, 1000)
+    process.send_signal(signal.SIGINT)
+    told, _ = process.communicate(timeout=PATIENCE_S)
+    os.close(screen)
+    assert process.returncode == ExitCode.OK
+    assert b"solved" in told
+    assert (out / "plan.npz").exists()
+    assert_every_file_is_whole(out)
