@@ -93,7 +93,9 @@ def run(
         if not overwrite:
             require_room(work)
         if video == DEFAULT_VIDEO and folder.holds(Step.RENDER):
-            work = replace(work, arguments=_with_video_of(folder, asked))
+            kept = replace(asked, video=recorded(folder).video)
+            if replace(work, arguments=kept).is_done(Step.RENDER):
+                work = replace(work, arguments=kept)  # `mrmg render` made it
         if video is not None and not work.is_done(Step.RENDER):
             choose_backend()  # better told now than after minutes of driving
         work.ensure(Step.PLAN)
@@ -111,11 +113,6 @@ def run(
             reason=work.reason(),
             exit_code=work.exit_code(),
         )
-
-
-def _with_video_of(folder: RunFolder, asked: RunArguments) -> RunArguments:
-    """Return the arguments with those of the folder's video, which is to be kept."""
-    return replace(asked, video=recorded(folder).video)
 
 
 def _arguments(scene: Scene, given: dict[str, Any]) -> RunArguments:
