@@ -56,12 +56,24 @@ def run(command: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.slow
 def test_the_wheel_carries_scenes_and_models(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
-    for scene in (ROOT / "scenes").glob("*.yaml"):
+    for scene in (ROOT / "scenes").iterdir():
         assert f"mrmg/_shipped/scenes/{scene.name}" in names
     for part in (ROOT / "models").rglob("*.*"):
         assert f"mrmg/_shipped/models/{part.relative_to(ROOT / 'models')}" in names
     assert "mrmg/results/summary.schema.json" in names
+    assert "mrmg/authoring/new_scene.yaml" in names
     assert not [name for name in names if name.startswith("tests/")]
+
+
+@pytest.mark.slow
+def test_new_files_name_the_installed_schemas(command: Path) -> None:
+    for verb, path in (("scene", "farm.yaml"), ("robot", "buggy/robot.yaml")):
+        ended = run(command, verb, "new", path.removesuffix(".yaml").split("/")[0])
+        assert ended.returncode == 0, ended.stderr
+        text = (command.parents[2] / path).read_text()
+        schema = text.partition("$schema=")[2].splitlines()[0]
+        assert "_shipped" in schema
+        assert json.loads(Path(schema).read_text())["properties"]["format"]
 
 
 @pytest.mark.slow
