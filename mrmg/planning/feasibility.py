@@ -276,9 +276,12 @@ class _Reach:
 
     def missing_energy_J(self, region: Region) -> float:
         """Return what the robot lacks to get to a region; not positive if it may."""
-        return min(
-            self._least_J(place, region) - energy_J for place, energy_J in self.left_J
-        )
+        missing_J = np.inf
+        for place, energy_J in self.left_J:
+            missing_J = min(missing_J, self._least_J(place, region) - energy_J)
+            if missing_J <= 0.0:
+                break
+        return missing_J
 
     def _with_stations(self) -> _Reach:
         battery = self.robot.battery
