@@ -65,7 +65,7 @@ def _with_others(proofs: Mapping[str, str], amounts: Mapping[str, str]) -> str:
     if not others:
         return sentence
     names = [f"{goal}{amounts[goal]}" for goal, _ in others]
-    return f"{sentence}; so are {listed(names)}"
+    return f"{sentence}; likewise {listed(names)}"
 
 
 def impossible_goals(scene: Scene, halt: np.ndarray = NEVER) -> dict[str, str]:

@@ -197,7 +197,7 @@ def test_all_goals_out_of_reach_are_named_with_what_is_missing(
         assert found is not None
         assert float(found[1]) == pytest.approx(missing_m * joules, rel=1e-3)
         assert float(found[2]) == pytest.approx(missing_m, abs=0.06)
-    assert others.startswith("so are further by ")
+    assert others.startswith("likewise further by ")
 
 
 def test_climbing_counts_and_rolling_down_is_paid_back(yard: MakeScene) -> None:
