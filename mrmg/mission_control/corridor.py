@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mrmg.compared import compared
 from mrmg.execution.supervision import Observation
 from mrmg.mission_control.course import Course
 from mrmg.mission_control.meter import RobotMeter
@@ -125,8 +126,9 @@ class EnergyCorridor:
             return Departure(
                 "energy",
                 robot,
-                f"{robot} has used {measured_J:.0f} J since its plan began, "
-                f"planned were {planned_J:.0f} J",
+                "{} has used {} J since its plan began, planned were {} J".format(
+                    robot, *compared(measured_J, planned_J)
+                ),
             )
         chance_J = _CHANCE_M * meter.robot.model.energy_model.plain_ground_J_per_m()
         if excess_J <= chance_J or planned_J <= 0.0 or robot not in self._reserve_J:
@@ -139,8 +141,9 @@ class EnergyCorridor:
             return Departure(
                 "energy",
                 robot,
-                f"{robot} would get to {target} with {meter.charge_J - to_go_J:.0f} J, "
-                f"its reserve is {reserve_J:.0f} J",
+                "{} would get to {} with {} J, its reserve is {} J".format(
+                    robot, target, *compared(meter.charge_J - to_go_J, reserve_J)
+                ),
             )
         return None
 

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from mrmg import seeding
+from mrmg.compared import compared
 from mrmg.mission import PlanStatus
 from mrmg.planning import endings
 from mrmg.planning.attempt import router_problem
@@ -86,7 +87,8 @@ def proof_of_lateness(
     least_s = makespan_bound_s(scene, step_s=step_s, halt=halt)
     if math.isinf(least_s) or not overtime_s(scene.time_limit_s, least_s):
         return None
-    return endings.TOO_LATE.reason(limit_s=scene.time_limit_s, least_s=least_s)
+    least, _ = compared(least_s, scene.time_limit_s, 1)
+    return endings.TOO_LATE.reason(limit_s=scene.time_limit_s, least=least)
 
 
 def _sentence(scene: Scene, proof: NoTours) -> str:
@@ -194,8 +196,9 @@ def _obstacle(
     if not search.tours_found:
         return _missing_tours(problem, params, seed)
     if math.isfinite(search.earliest_s):
+        latest_s = scene.time_limit_s - TIME_MARGIN_S
         return endings.LATE.reason(
-            earliest_s=search.earliest_s,
+            earliest=compared(search.earliest_s, latest_s, 1)[0],
             limit_s=scene.time_limit_s,
             margin_s=TIME_MARGIN_S,
         )

@@ -79,7 +79,7 @@ TOO_LATE = Ending(
     "the time limit is too short",
     PlanStatus.INFEASIBLE,
     "the time limit of {limit_s:g} s is too short: even at top speed on the shortest "
-    "paths no plan is over before {least_s:.1f} s",
+    "paths no plan is over before {least} s",
 )
 NO_TIMELY_TOURS = Ending(
     "no tours exist in time",
@@ -110,8 +110,8 @@ NO_TOURS_IN_TIME = Ending(
 LATE = Ending(
     "every plan found is late",
     PlanStatus.NO_PLAN_FOUND,
-    "plans were found, but none in time: the earliest is over at {earliest_s:.1f} s, "
-    "the time limit is {limit_s:g} s, and {margin_s:g} s of it are kept for execution",
+    "plans were found, but none in time: the earliest is over at {earliest} s, the "
+    "time limit is {limit_s:g} s, and {margin_s:g} s of it are kept for execution",
 )
 NO_PROGRESS = Ending(
     "no plan along the tours",

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mrmg.accounting import battery_profile, find_visits, plan_ledger
+from mrmg.compared import compared
 from mrmg.ledger import EnergyLedger
 from mrmg.mission import Plan, Trajectory, Visit
 from mrmg.results.motion_rules import violation_at, worst_of_runs
@@ -76,9 +77,10 @@ def _check_dwell(plan: Plan, goal: Goal) -> list[Violation]:
     if stay_s >= goal.dwell_s - ROUNDING_S:
         return []
     step = int(goal.region.depth(trajectory.state[:, :2]).argmax())
+    stay, dwell = compared(stay_s, goal.dwell_s, 1)
     message = (
-        f"stays at goal {goal.id} for {stay_s:.3g} s without a break, "
-        f"longer than others; it takes {goal.dwell_s:g} s"
+        f"stays at goal {goal.id} for {stay} s without a break, longer than others; it "
+        f"takes {dwell} s"
     )
     amount = goal.dwell_s - stay_s
     kind = ViolationKind.DWELL
@@ -223,9 +225,9 @@ def _check_time(scene: Scene, plan: Plan) -> list[Violation]:
     late_s = overtime_s(scene.time_limit_s, plan.makespan_s)
     if not late_s:
         return []
+    taken, limit = compared(plan.makespan_s, scene.time_limit_s, 1)
     message = (
-        f"the plan takes {plan.makespan_s:g} s, {late_s:.3g} s more than the limit of "
-        f"{scene.time_limit_s:g} s"
+        f"the plan takes {taken} s, {late_s:.3g} s more than the limit of {limit} s"
     )
     return [
         Violation(
@@ -251,8 +253,9 @@ def _check_energy(
             trajectory,
             step,
             ViolationKind.ENERGY,
-            f"the battery holds {content_J[step]:.6g} J, "
-            f"the reserve is {battery.reserve_J:.6g} J",
+            "the battery holds {} J, the reserve is {} J".format(
+                *compared(content_J[step], battery.reserve_J, 1)
+            ),
             amount=float(lack_J[step]),
         )
         for step in worst_of_runs(lack_J, lack_J > ENERGY_TOLERANCE_J)
@@ -269,10 +272,10 @@ def _check_ledger(scene: Scene, plan: Plan, visits: Sequence[Visit]) -> list[Vio
         return []
     worst = int(off_J.argmax())
     robot, leg, target, part = keys[worst]
+    said, takes = compared(stated[keys[worst]], recomputed[keys[worst]], 1)
     message = (
-        f"{robot or 'plan'}: the ledger says {stated[keys[worst]]:.6g} J for {part} on "
-        f"leg {leg} to {target or 'the end'}, the motion takes "
-        f"{recomputed[keys[worst]]:.6g} J"
+        f"{robot or 'plan'}: the ledger says {said} J for {part} on leg {leg} to "
+        f"{target or 'the end'}, the motion takes {takes} J"
     )
     return [
         Violation(

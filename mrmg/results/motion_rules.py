@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from mrmg.compared import compared
 from mrmg.mission import Trajectory
 from mrmg.motion.dynamics import DERIVATIVES, Derivative, rk4_step
 from mrmg.motion.user_motion import motion_of
@@ -79,10 +80,8 @@ def _check_start(robot: Robot, trajectory: Trajectory) -> list[Violation]:
         return []
     names = _COMPONENTS.get(robot.model.motion_model, _USER_COMPONENTS)
     name = names[worst]
-    message = (
-        f"the plan starts with {name} = {trajectory.state[0, worst]:.6g}, "
-        f"the scene with {expected[worst]:.6g}"
-    )
+    found, wanted = compared(trajectory.state[0, worst], expected[worst], 3)
+    message = f"the plan starts with {name} = {found}, the scene with {wanted}"
     amount = float(error[worst])
     return [violation_at(trajectory, 0, ViolationKind.START, message, amount=amount)]
 
@@ -120,10 +119,8 @@ def _check_finish(robot: Robot, trajectory: Trajectory) -> list[Violation]:
         off = abs(math.remainder(yaw - robot.finish.heading_rad, math.tau))
         excess = off - robot.finish.heading_tolerance_rad
         if excess > 0.0:
-            message = (
-                f"ends {off:.3g} rad off its finish's heading, "
-                f"{robot.finish.heading_tolerance_rad:g} are allowed"
-            )
+            found, most = compared(off, robot.finish.heading_tolerance_rad, 2)
+            message = f"ends {found} rad off its finish's heading, {most} are allowed"
             violations.append((ViolationKind.FINISH, message, excess))
     return [
         violation_at(trajectory, last, kind, message, amount=amount)
@@ -212,7 +209,7 @@ def _limit_violations(
             trajectory,
             step,
             kind,
-            f"{name} is {value[step]:.6g}, the limit is {limit:.6g}",
+            "{} is {}, the limit is {}".format(name, *compared(value[step], limit, 3)),
             amount=float(excess[step]),
         )
         for name, value, excess, limit in rules

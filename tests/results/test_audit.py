@@ -14,6 +14,7 @@ from mrmg.errors import RunFolderError
 from mrmg.execution.disturbance import DEFAULT_RANGES
 from mrmg.execution.log import Contact, ExecutionLog
 from mrmg.execution.supervision import Event
+from mrmg.ledger import EnergyLedger
 from mrmg.mission import Plan
 from mrmg.results.audit import audit
 from mrmg.results.energy_audit import MODEL_MISMATCH, EnergyAudit
@@ -253,6 +254,25 @@ def test_energy_within_the_tolerance_is_as_planned(mission: Any, factor: float) 
     scene, plan, log = more_work(mission(), factor)
     assert audit(scene, plan, log).mission_ok
     assert not audit(scene, plan, log, energy_tolerance_pct=4.8).mission_ok
+
+
+def test_what_a_slope_gives_counts_where_a_deviation_is_judged(mission: Any) -> None:
+    """Downhill little is left to pay for, and a joule of it is many percent."""
+    scene, plan, log = more_work(mission(), 1.02)
+    entries = plan.ledger.entries
+    (rolling,) = [entry for entry in entries if entry.part == "rolling"][:1]
+    given_J = -0.9 * plan.ledger.total_J(robot="r1")
+    downhill = replace(rolling, part="grade", energy_J=given_J)
+    changed = replace(plan, ledger=EnergyLedger((*entries, downhill)))
+    driven = replace(log, plan_digest=changed.digest)
+    work_J = log.work_J.copy()
+    work_J[0] *= 0.1
+    account = audit(scene, changed, replace(driven, work_J=work_J))
+    assert account.mission_ok, account.reasons
+    model = scene.robot("r2").model.energy_model
+    work_J[1, 0, 0] = 0.5 * model.rolling_force_N
+    parked = audit(scene, changed, replace(driven, work_J=work_J))
+    assert parked.causes == (MODEL_MISMATCH,)
 
 
 def test_drives_other_than_modelled_only_report_the_deviation(mission: Any) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from mrmg.compared import compared
 from mrmg.errors import Fault
 from mrmg.scene.loading.schema import BatteryEntry, RobotEntry, StartEnergyEntry
 from mrmg.scene.robot_model import RobotModel
@@ -38,17 +39,16 @@ def battery_of(
     if isinstance(start_J, Fault):
         return [start_J]
     if start_J < reserve * capacity_J:
-        message = (
-            f"got {start_J:g} J; must not be below the reserve, "
-            f"{reserve * capacity_J:g} J"
-        )
+        found, least = compared(start_J, reserve * capacity_J)
+        message = f"got {found} J; must not be below the reserve, {least} J"
         return [Fault(f"{path}.start_energy", message)]
     power_W = own.charging_power or fleet.charging_power or math.inf
     energy = model.energy_model
     least_W = energy.idle_power_W + energy.device_power_W
     if power_W <= least_W:
+        given_W, drawn_W = compared(power_W, least_W)
         message = (
-            f"got {power_W:g} W; {robot.id} itself draws {least_W:g} W at rest, so its "
+            f"got {given_W} W; {robot.id} itself draws {drawn_W} W at rest, so its "
             "battery would never be full; give more"
         )
         where = f"{path}.battery" if own.charging_power else "battery"
@@ -95,7 +95,6 @@ def _start_J(
         return entry.fraction * capacity_J
     start_J = _joules(getattr(entry, given[0]), given[0], model)
     if start_J > capacity_J * (1.0 + 1e-12):
-        return Fault(
-            path, f"got {start_J:g} J; must not exceed the capacity, {capacity_J:g} J"
-        )
+        found, most = compared(start_J, capacity_J)
+        return Fault(path, f"got {found} J; must not exceed the capacity, {most} J")
     return min(start_J, capacity_J)
