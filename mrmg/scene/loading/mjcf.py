@@ -151,6 +151,11 @@ class CompiledRobot:
             force_N += float(self._data.qfrc_actuator[dof]) / self.radius_m(joint)
         return force_N
 
+    def yaw_inertia_kg_m2(self) -> float:
+        """Return the inertia about the upright axis through the chassis' origin."""
+        first = self._model.jnt_dofadr[self._id("joint", ROOT)]
+        return float(self._model.dof_M0[first + 5])
+
     def is_motor(self, actuator: str) -> bool:
         """Return whether its force follows from its control alone, and at once."""
         at, model, types = self._id("actuator", actuator), self._model, self._mujoco

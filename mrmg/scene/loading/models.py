@@ -1,8 +1,9 @@
 """Robot models: `robot.yaml` to `RobotModel`.
 
 A model is a folder with `robot.yaml`, whose keys are those of `ModelDocument`, and the
-MJCF file it names. Without an MJCF file, or with a motion of the user's own
-(`motion_model: FILE.py`), it can be planned for and verified, but not driven in MuJoCo.
+MJCF file it names, which must describe the same robot (`consistency`). Without an MJCF
+file, or with a motion of the user's own (`motion_model: FILE.py`), it can be planned
+for and verified, but not driven in MuJoCo.
 Units: m, kg, s, rad, J.
 """
 

@@ -170,6 +170,17 @@ def traction_faults(
             f"{asked.format(needed_N)}the drive control holds what tyres of friction "
             f"{model.friction_coefficient:g} transmit, {most_N:.0f} N; lower the limit",
         )
+    swing_Nm = energy.turning_force_N * model.track_m
+    swing_Nm += robot.yaw_inertia_kg_m2() * limits.u2_max
+    most_Nm = most_N * model.track_m / 2
+    if not parts.steer and swing_Nm > most_Nm * (1.0 + FORCE_SHARE):
+        yield Fault(
+            "limits.u2_max",
+            f"{limits.u2_max:.3g} rad/s^2 (planning_share included) asks for "
+            f"{swing_Nm:.3g} N m about the upright axis of {robot.file}, but the drive "
+            f"control holds what the tyres transmit, {most_Nm:.3g} N m; lower the "
+            "limit",
+        )
     asked_N = min(needed_N, most_N)
     share = len(parts.motors)
     groups = [parts.spin] if share == 1 else [(name,) for name in parts.spin]

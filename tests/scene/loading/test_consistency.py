@@ -102,6 +102,8 @@ ONE_DIFFERENCE: list[tuple[str, Change, str, str]] = [
      "limits.u1_max", r"gives -706 N"),
     ("car", ("u1_max: 1.5", "u1_max: 4.5"),
      "limits.u1_max", r"asks for 856 N .* tyres of friction 1 transmit, 706 N"),
+    ("diffdrive", ("u2_max: 2.0", "u2_max: 60"),
+     "limits.u2_max", r"51 rad/s\^2 .* N m"),
     ("diffdrive", ('"spin_r" gear="0.15"', '"spin_r" gear="0.01"'),
      "limits.u1_max", r"actuator 'drive_r'"),
     ("car", ('<motor name="drive"', '<motor name="engine"'),
