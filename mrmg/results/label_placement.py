@@ -30,7 +30,7 @@ _GAP_EM = 0.2
 """What lies within this distance of a label is near it."""
 
 _DIRECTIONS = 16
-_RINGS_EM = (0.12, 0.5, 1.0, 2.0)
+_RINGS_EM = (0.12, 0.5, 1.0)
 """Distances between a shape and the labels around it."""
 
 _RING_COST, _DIRECTION_COST = 1.2, 1.0
@@ -57,10 +57,17 @@ class LabelBox:
 
 @dataclass(frozen=True, slots=True)
 class Occupied:
-    """A shape or line on the map, and what it belongs to; "" is nobody's."""
+    """A shape or line on the map.
+
+    Attributes:
+        shape: where it is [m].
+        owner: what it belongs to; "" is nobody's.
+        weight: what overlapping it costs, against other shapes.
+    """
 
     shape: BaseGeometry
     owner: str
+    weight: float = 1.0
 
 
 def spots_around(
@@ -120,7 +127,7 @@ def place(
         em_m: size of the letters.
     """
     static = _static_costs(labels, shapes, lines, em_m)
-    chosen: list[np.ndarray | None] = [None] * len(labels)
+    chosen = np.full((len(labels), 2), np.nan)
     needed = [at for at, label in enumerate(labels) if not label.optional]
     needed.sort(key=lambda at: int((static[at] < OVERLAP_COST).sum()))
     moved = True
@@ -131,14 +138,14 @@ def place(
     for at, label in enumerate(labels):
         if label.optional:
             _improve(at, labels, static, chosen, em_m)
-    return chosen
+    return [None if np.isnan(spot[0]) else spot for spot in chosen]
 
 
 def _improve(
     at: int,
     labels: Sequence[LabelBox],
     static: Sequence[np.ndarray],
-    chosen: list[np.ndarray | None],
+    chosen: np.ndarray,
     em_m: float,
 ) -> bool:
     """Move a label to its least costly candidate; return whether that changed."""
@@ -146,38 +153,32 @@ def _improve(
     cost = static[at] + _pair_costs(at, labels, chosen, em_m)
     if not len(cost) or (label.optional and cost.min() >= OVERLAP_COST):
         return False
-    best = label.spots_m[int(np.argmin(cost))]
-    before = chosen[at]
-    if before is not None:
-        same = (label.spots_m == before).all(axis=1)
-        if cost.min() > cost[same].min() - 1e-9:
-            return False
-    chosen[at] = best
+    same = (label.spots_m == chosen[at]).all(axis=1)
+    if same.any() and cost.min() > cost[same].min() - 1e-9:
+        return False
+    chosen[at] = label.spots_m[int(np.argmin(cost))]
     return True
 
 
 def _pair_costs(
-    at: int,
-    labels: Sequence[LabelBox],
-    chosen: Sequence[np.ndarray | None],
-    em_m: float,
+    at: int, labels: Sequence[LabelBox], chosen: np.ndarray, em_m: float
 ) -> np.ndarray:
     """Return the cost of each candidate against the other labels where they are."""
     label = labels[at]
-    others = [
-        (spot, labels[other].half_m)
-        for other, spot in enumerate(chosen)
-        if spot is not None and other != at
-    ]
-    if not others:
-        return np.zeros(len(label.spots_m))
-    spots, halves = (np.array(part) for part in zip(*others, strict=True))
-    apart = np.abs(label.spots_m[:, None] - spots) - (label.half_m + halves)
-    overlaps = (apart < 0.0).all(axis=2)
-    area = np.prod(np.minimum(apart, 0.0), axis=2) / em_m**2
-    near = ~overlaps & (apart.max(axis=2) < _GAP_EM * em_m)
-    cost = np.where(overlaps, OVERLAP_COST * (1.0 + area), _NEAR_COST * near)
-    return np.asarray(cost.sum(axis=1))
+    if not len(label.spots_m):
+        return np.zeros(0)
+    halves = np.array([other.half_m for other in labels])
+    reach = halves + label.half_m + _GAP_EM * em_m
+    low, high = label.spots_m.min(axis=0), label.spots_m.max(axis=0)
+    close = ((chosen + reach > low) & (chosen - reach < high)).all(axis=1)
+    close[at] = False
+    apart = np.abs(label.spots_m[:, None] - chosen[close]) - halves[close]
+    apart -= label.half_m
+    across, along = apart[..., 0], apart[..., 1]
+    overlaps = (across < 0.0) & (along < 0.0)
+    near = ~overlaps & (np.maximum(across, along) < _GAP_EM * em_m)
+    cost = np.where(overlaps, 1.0 + across * along / em_m**2, 0.0) * OVERLAP_COST
+    return np.asarray((cost + _NEAR_COST * near).sum(axis=1))
 
 
 def _static_costs(
@@ -197,11 +198,13 @@ def _static_costs(
     )
     boxes = shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1])
     cost = np.concatenate([label.cost for label in labels]).astype(float)
-    at, hit = _foreign(boxes, shapes, owner, _GAP_EM * em_m)
+    at, hit, weight = _foreign(boxes, shapes, owner, _GAP_EM * em_m)
     near = shapely.distance(boxes[at], hit) > 0.0
+    np.add.at(cost, at[near], _NEAR_COST)
+    at, hit, weight = at[~near], hit[~near], weight[~near]
     area = shapely.area(shapely.intersection(boxes[at], hit)) / em_m**2
-    np.add.at(cost, at, np.where(near, _NEAR_COST, OVERLAP_COST * (1.0 + area)))
-    at, hit = _foreign(boxes, lines, owner, 0.0)
+    np.add.at(cost, at, OVERLAP_COST * (1.0 + area) * weight)
+    at, hit, _ = _foreign(boxes, lines, owner, 0.0)
     length_em = shapely.length(shapely.intersection(boxes[at], hit)) / em_m
     np.add.at(cost, at, np.minimum(_LINE_COST_PER_EM * length_em, _MOST_LINE_COST))
     return np.split(cost, np.cumsum(counts)[:-1])
@@ -209,12 +212,17 @@ def _static_costs(
 
 def _foreign(
     boxes: np.ndarray, things: Sequence[Occupied], owner: np.ndarray, within_m: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return each box's index and shape of every thing of others within a distance."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return every thing of others within a distance of a box.
+
+    Returns:
+        The box's index, the thing's shape and its weight, shape (n,) each.
+    """
     shapes = np.array([thing.shape for thing in things], dtype=object)
     if not len(shapes):
-        return np.zeros(0, dtype=int), shapes
+        return np.zeros(0, dtype=int), shapes, np.zeros(0)
     at, hit = shapely.STRtree(shapes).query(boxes, "dwithin", within_m)
     whose = np.array([thing.owner for thing in things])[hit]
     foreign = (whose == "") | (owner[at] != whose)
-    return at[foreign], shapes[hit[foreign]]
+    weight = np.array([thing.weight for thing in things])
+    return at[foreign], shapes[hit[foreign]], weight[hit[foreign]]

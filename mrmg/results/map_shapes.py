@@ -15,6 +15,8 @@ from mrmg.results.label_placement import Occupied
 from mrmg.scene.types import Region, Robot, Scene
 
 _SIMPLIFIED_EM = 0.1
+_BEYOND_WEIGHT = 10.0
+"""What leaving the map costs a label, against overlapping something on it."""
 _MARK_EM = 0.55
 _END_RING_EM, _END_GAP_EM = 0.7, 0.25
 
@@ -66,7 +68,8 @@ def occupied(
     x_min, y_min, x_max, y_max = scene.bounds
     beyond = x_max - x_min + y_max - y_min
     bounds = box(*scene.bounds)
-    shapes = [Occupied(bounds.buffer(beyond, join_style="mitre") - bounds, "")]
+    around = bounds.buffer(beyond, join_style="mitre") - bounds
+    shapes = [Occupied(around, "", weight=_BEYOND_WEIGHT)]
     shapes += [Occupied(item.shape, item.id) for item in scene.barriers]
     shapes += [
         Occupied(drawn_region(item.region, em_m), item.id) for item in scene.targets()

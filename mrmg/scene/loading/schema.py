@@ -42,7 +42,8 @@ Details:
   a cell around it.
 - Ids are letters, digits, `_`, `.` and `-`, unique in the whole file (they name bodies,
   arrays and tour targets); an obstacle or terrain area without one is named after its
-  place in the list, `obstacle_0`, `terrain_0`.
+  place in the list, `obstacle_0`, `terrain_0`. Maps show an obstacle's own id on it,
+  where it has room.
 - `blocks` lists the robots an obstacle stops; without it, it stops all.
 - A capacity is given in one of J, Wh or metres of plain ground (`capacity_m`: the way a
   full battery drives straight on at constant speed). A robot's own `battery` replaces
