@@ -166,9 +166,9 @@ def smallest_solved(name: str, sizes_m: list[float], **more: Any) -> float:
 @pytest.mark.parametrize(
     ("name", "edit", "solved_m", "tight"),
     [
-        ("quickstart", lambda scene: scene, [30.0, 34.0, 48.0], 0.70),
-        ("quickstart", home, [44.0, 52.0, 70.0], 0.55),
-        ("diffdrive", lambda scene: scene, [30.0, 40.0], 0.5),
+        ("quickstart", lambda scene: scene, [30.0], 0.70),
+        ("quickstart", home, [44.0, 52.0], 0.55),
+        ("diffdrive", lambda scene: scene, [30.0], 0.5),
         pytest.param("hills", lambda s: s, [60.0], 0.5, marks=pytest.mark.slow),
         pytest.param("mixed", lambda s: s, [44.0], 0.6, marks=pytest.mark.slow),
         pytest.param("scene4", lambda s: s, [116.0], 0.8, marks=pytest.mark.slow),
@@ -188,7 +188,7 @@ def test_what_is_solved_is_never_proven_impossible_and_little_less_is(
 @pytest.mark.parametrize("name", ["quickstart", "diffdrive", "hills"])
 def test_an_infinite_bound_of_energy_is_proven_by_tours_too(name: str) -> None:
     proven = []
-    for capacity_m in (12.0, 18.0, 21.0, 24.0):
+    for capacity_m in (12.0, 21.0):
         scene = with_capacity(name, capacity_m)
         infinite = np.isinf(lower_bound_J(scene, cells=2000))
         proven.append(proof_of_no_tours(scene, 0.1) is not None)
