@@ -15,7 +15,7 @@ from mrmg import storage
 from mrmg.errors import Fault, IdentityError, RunFolderError
 from mrmg.execution.disturbance import Disturbance
 from mrmg.execution.supervision import Event
-from mrmg.mission import Plan
+from mrmg.mission import Plan, plan_in_force
 from mrmg.scene.types import Scene
 
 LOG_FORMAT = 1
@@ -163,6 +163,21 @@ class ExecutionLog:
         except (OSError, ValueError, KeyError, TypeError) as error:
             fault = Fault("log.json", f"no readable log ({error}); run 'mrmg execute'")
             raise RunFolderError(str(folder), [fault]) from error
+
+
+def log_in_force(folder: Path, scene: Scene) -> ExecutionLog | None:
+    """Return the log of the drive of a run folder's plan; None if it was not driven.
+
+    A log of a plan that the folder does not hold any more is none of its plan.
+
+    Raises:
+        RunFolderError: if a file cannot be read, or is of another scene.
+    """
+    if not (folder / "log.json").exists():
+        return None
+    log = ExecutionLog.load(folder)
+    require_same_mission(scene, None, log)
+    return log if log.plan_digest == plan_in_force(folder).digest else None
 
 
 def require_same_mission(

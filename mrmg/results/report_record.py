@@ -9,7 +9,7 @@ from typing import Any
 
 from mrmg import storage
 from mrmg.errors import Fault, RunFolderError
-from mrmg.execution.log import ExecutionLog, require_same_mission
+from mrmg.execution.log import ExecutionLog, log_in_force, require_same_mission
 from mrmg.mission import Plan, PlanStatus, plan_in_force
 from mrmg.results.energy_audit import EnergyAudit
 from mrmg.results.robustness import ROBUSTNESS_FILE, Study, load_studies
@@ -69,8 +69,8 @@ def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
     run = _read(run_folder, "run.json", "mrmg run") if has_run else {}
     scene = load_scene(run_folder / "scene.yaml", trust_code=trust_code)
     plan = plan_in_force(run_folder) if left("plan.json") else None
-    log = ExecutionLog.load(run_folder) if left("log.json") else None
-    require_same_mission(scene, plan, log)
+    require_same_mission(scene, plan)
+    log = log_in_force(run_folder, scene) if solved else None
     summed_up = (run_folder / "summary.json").exists()
     return RunRecord(
         folder=run_folder,
@@ -83,7 +83,7 @@ def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
         plan=plan,
         verdict=Verdict.load(run_folder) if left("verdict.json") else None,
         log=log,
-        audit=EnergyAudit.load(run_folder) if left("audit.json") else None,
+        audit=EnergyAudit.load(run_folder) if log and left("audit.json") else None,
         studies=load_studies(run_folder, Plan.load(run_folder))
         if left(ROBUSTNESS_FILE)
         else (),

@@ -14,7 +14,7 @@ from typing import Any
 import mrmg
 from mrmg import storage
 from mrmg.errors import Fault, RunFolderError
-from mrmg.execution.log import ExecutionLog, require_same_mission
+from mrmg.execution.log import ExecutionLog, log_in_force, require_same_mission
 from mrmg.mission import Plan, PlanStatus
 from mrmg.results.energy_audit import MODEL_MISMATCH, EnergyAudit
 from mrmg.results.verdict import Verdict
@@ -46,9 +46,8 @@ def summarize(scene: Scene, folder: Path) -> dict[str, Any]:
     def left(name: str) -> bool:
         return solved and (folder / name).exists()
 
-    log = ExecutionLog.load(folder) if left("log.json") else None
     require_same_mission(scene, plan)
-    require_same_mission(scene, None, log)  # it may be of a plan joined on the way
+    log = log_in_force(folder, scene) if solved else None
     return summary_of(
         scene,
         planning,
@@ -56,7 +55,7 @@ def summarize(scene: Scene, folder: Path) -> dict[str, Any]:
         plan=plan,
         verdict=Verdict.load(folder) if left("verdict.json") else None,
         log=log,
-        audit=EnergyAudit.load(folder) if left("audit.json") else None,
+        audit=EnergyAudit.load(folder) if log and left("audit.json") else None,
     )
 
 
