@@ -10,6 +10,10 @@ with a proven lower bound: that of the first plan, and
 with --budget S those of the best plans after each of 5 s and 30 s that S reaches. The
 quality protocol is `tools/bench --bound --budget 30 --seeds 0-9`.
 
+With --energy paper all robots are charged as in the paper, by distance, terrain and
+turning: in the planner, the bound and the verifier alike. The protocol of Table I is
+`tools/bench --seeds 0-49 --profile default paper --energy paper`.
+
 With more than one profile each seed is planned with all of them in turn, and a second
 table has the ratios to the first profile, seed by seed, where both have a plan: of the
 time to the first plan, and of the cost of the final one.
@@ -29,9 +33,12 @@ from typing import Any
 from protocol import seed_range, versions
 
 import mrmg
+from mrmg.energy import ENERGY_PRESETS, EnergyPreset
 from mrmg.planning import plan_mission, profile_params
 from mrmg.planning.planner import bounds_of
 from mrmg.planning.statistics import UNKNOWN
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.types import Scene
 
 BOUND_FINER = 7
 """Parts into which the bound's cells are cut: more than planning has time for, which
@@ -74,6 +81,11 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument(
         "--profile", nargs="+", default=["default"], choices=("default", "paper")
     )
+    parser.add_argument(
+        "--energy",
+        choices=ENERGY_PRESETS,
+        help="what counts in all robots' energy models; default: as the scenes say",
+    )
     parser.add_argument("--budget", type=float, help="seconds of planning")
     parser.add_argument("--execute", action="store_true", help="drive in MuJoCo too")
     parser.add_argument("--bound", action="store_true", help="compare with a bound")
@@ -89,9 +101,18 @@ def protocol(options: argparse.Namespace) -> str:
 
 
 def conditions(options: argparse.Namespace) -> str:
-    """Return what times depend on: budget, versions, machine."""
+    """Return what results depend on: energy, budget, versions, machine."""
     budget = f"budget {options.budget:g} s" if options.budget else "no time limit"
-    return f"{budget}; {versions()}"
+    energy = f"energy {options.energy}; " if options.energy else ""
+    return f"{energy}{budget}; {versions()}"
+
+
+def charged(scene: Scene, preset: EnergyPreset | None) -> Scene:
+    """Return a scene in which one preset counts in all robots' energy models."""
+    if preset is None:
+        return scene
+    robots = [{**robot, "energy": preset} for robot in scene.document["robots"]]
+    return scene_from_document({**scene.document, "robots": robots}, source=scene.name)
 
 
 def problem_of(scene: Any, source: str) -> dict[str, Any]:
@@ -110,7 +131,7 @@ def problem_of(scene: Any, source: str) -> dict[str, Any]:
 
 def missions(source: str, options: argparse.Namespace) -> Iterator[dict[str, Any]]:
     """Yield one row for each seed and profile."""
-    scene = mrmg.load_scene(source)
+    scene = charged(mrmg.load_scene(source), options.energy)
     # All profiles run the same kernels, and the default one is the quickest to warm.
     plan_mission(scene, seed=options.seeds.start)
     step_s = profile_params(options.profile[0]).dt_s
@@ -206,7 +227,13 @@ def driven(scene: Any, plan: Any, plan_ok: bool) -> dict[str, Any]:
     }
 
 
-COLUMNS = ("first_s median", "first_s p95", "plan_s median", "cost_m median")
+COLUMNS = (
+    "first_s median",
+    "first_s p95",
+    "plan_s median",
+    "solver share median",
+    "cost_m median",
+)
 DRIVEN = ("rms_m worst", "max_m worst", "metered% worst", "measured% worst", "x real")
 
 
@@ -258,6 +285,12 @@ def ratio_table(
     return "\n".join(lines if len(scenes) > 1 else lines[:-1])
 
 
+def solver_share(row: Mapping[str, Any]) -> float:
+    """Return the share of the discrete solver in the time of planning."""
+    time_s = row["statistics"]["time_s"]
+    return float(time_s["routing"] / time_s["total"])
+
+
 def first_s(row: Mapping[str, Any]) -> float:
     """Return the time to the first plan of a solved row [s]."""
     return float(row["statistics"]["time_s"]["first_solution"])
@@ -275,6 +308,7 @@ def table_row(
             f"{statistics.median(first):.3f}",
             f"{first[min(len(first) - 1, int(0.95 * len(first)))]:.3f}",
             f"{statistics.median(row['plan_s'] for row in solved):.3f}",
+            f"{statistics.median(map(solver_share, solved)):.2f}",
             f"{statistics.median(row['cost_m'] for row in solved):.1f}",
         ]
     if solved and options.bound:

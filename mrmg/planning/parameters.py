@@ -41,10 +41,10 @@ class GuidedTreeParams:
         target_spread_m: radius of the disc about that point in which it lies [m].
     """
 
-    iterations: int = 150_000
+    iterations: int = 300_000
     k: int = 5
     alpha: float = 1.0
-    decline: float = 0.999
+    decline: float = 0.9997
     bias: float = 0.9
     vertex_spread_m: float = 1.0
     decay_start: float = 0.98
