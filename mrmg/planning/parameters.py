@@ -35,7 +35,9 @@ class GuidedTreeParams:
         vertex_spread_m: distance to the target by which a vertex becomes less likely
             than another one of its group by a factor of e [m].
         decay_start: Decay(0), the probability of steering in a new group.
-        decay_rate: factor of Decay for each expansion of the group, in (0, 1).
+        decay_rate: factor by which Decay nears decay_least for each expansion of the
+            group, in (0, 1).
+        decay_least: what Decay falls to.
         ahead_least_m, ahead_most_m: range from which SampleTarget draws how far along
             its path a robot's target lies [m].
         target_spread_m: radius of the disc about that point in which it lies [m].
@@ -49,6 +51,7 @@ class GuidedTreeParams:
     vertex_spread_m: float = 1.0
     decay_start: float = 0.98
     decay_rate: float = 0.99
+    decay_least: float = 0.3
     ahead_least_m: float = 1.5
     ahead_most_m: float = 6.0
     target_spread_m: float = 0.5
@@ -62,6 +65,7 @@ class GuidedTreeParams:
             "bias": 0.0 <= self.bias <= 1.0,
             "vertex_spread_m": self.vertex_spread_m > 0.0,
             "decay_start": 0.0 < self.decay_start <= 1.0,
+            "decay_least": 0.0 <= self.decay_least < self.decay_start,
             "decay_rate": 0.0 < self.decay_rate < 1.0,
             "ahead_least_m": 0.0 <= self.ahead_least_m <= self.ahead_most_m,
             "target_spread_m": self.target_spread_m >= 0.0,

@@ -46,8 +46,9 @@ dist(group)). VISITS and the visits of Algorithm 3 are one number.
 
 What the paper leaves open, our choice, and why:
 
-- Decay: decay_start decay_rate^visits; the simplest function that is near 1 at 0 and
-  falls. Robots have a draw each, so that one may try something while others go on.
+- Decay: falls from decay_start, near 1, by decay_rate to decay_least, which lets groups
+  that have been expanded often go on steering. Robots have a draw each, so that one may
+  try something while others go on.
 - SampleTarget: a point of the roadmap's path from the robot's region to its first
   target, a random length ahead, moved by a random offset. Near targets follow the path,
   far ones cut corners: either may be what the place needs. A robot whose tour is over

@@ -50,9 +50,10 @@ REST = 1e-9
 def decay(visits, rules):
     """Return the probability of steering after so many expansions of the group.
 
-    Decay(n) = decay_start decay_rate^n.
+    Decay(n) = decay_least + (decay_start - decay_least) decay_rate^n.
     """
-    return rules.decay_start * rules.decay_rate**visits
+    fallen = rules.decay_rate**visits
+    return rules.decay_least + (rules.decay_start - rules.decay_least) * fallen
 
 
 @leaf_kernel

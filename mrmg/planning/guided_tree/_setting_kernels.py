@@ -58,6 +58,7 @@ class Rules(NamedTuple):
     vertex_spread_m: float
     decay_start: float
     decay_rate: float
+    decay_least: float
     ahead_m: float
     ahead_least_m: float
     ahead_most_m: float

@@ -234,7 +234,9 @@ def test_weights_selections_and_visits_are_those_of_the_paper(replay: Replay) ->
         v = int(replay.trace.vertex[i])
         assert v in members[chosen]
         # Decay of the visits of the vertex's group, with a draw for each robot.
-        chance = method.decay_start * method.decay_rate ** visits[chosen]
+        fallen = method.decay_rate ** visits[chosen]
+        least = method.decay_least
+        chance = least + (method.decay_start - least) * fallen
         for r in range(replay.robots):
             control = tuple(replay.trace.control[i, r])
             steered = steer(
