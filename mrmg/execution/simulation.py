@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 
 import mujoco
 import numpy as np
@@ -34,6 +33,7 @@ from mrmg.execution.supervision import Event, Observation, Orders, Supervisor
 from mrmg.execution.world_model import MujocoWorld, build_world
 from mrmg.mission import Plan
 from mrmg.scene.driven_parts import require_drivable
+from mrmg.scene.loading.mjcf import no_warning_file
 from mrmg.scene.types import Scene
 from mrmg.world.terrain import multiplier_at
 
@@ -98,7 +98,7 @@ def simulate(
     controllers = [maker(robot.model) for robot in scene.robots]
     run = _Run(build_world(scene), plan, controllers, disturbance)
     started, watched_s = time.perf_counter(), 0.0
-    with _no_warning_file():
+    with no_warning_file():
         while not run.ended():
             run.tick()
             if supervisor is not None:
@@ -112,17 +112,6 @@ def simulate(
     events = () if supervisor is None else supervisor.events
     # What a supervisor thinks about, new plans above all, is no part of driving.
     return run.log(controller, events, time.perf_counter() - started - watched_s)
-
-
-@contextmanager
-def _no_warning_file() -> Iterator[None]:
-    """Keep MuJoCo from writing warnings to a file in the user's folder."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        yield
-    finally:
-        mujoco.set_mju_user_warning(before)
 
 
 class _Run:

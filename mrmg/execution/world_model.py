@@ -12,6 +12,7 @@ from mrmg.errors import Fault, FileError
 from mrmg.execution import palette, scenery
 from mrmg.execution.incline import standing_pose
 from mrmg.scene.driven_parts import CHASSIS, HULL, require_drivable
+from mrmg.scene.loading.mjcf import no_warning_file
 from mrmg.scene.types import Robot, Scene
 
 PHYSICS_STEP_S = 0.004
@@ -54,7 +55,8 @@ def build_world(scene: Scene) -> MujocoWorld:
         UsageError: if a robot can only be planned for.
     """
     try:
-        return _built(scene)
+        with no_warning_file():
+            return _built(scene)
     except ValueError as error:
         reason = " ".join(str(error).split())
         fault = Fault("", f"MuJoCo cannot build its world: {reason}")

@@ -24,7 +24,7 @@ from mrmg.scene.driven_parts import (
     ROOT,
     DrivenParts,
 )
-from mrmg.scene.loading.mjcf import CompiledRobot
+from mrmg.scene.loading.mjcf import CompiledRobot, no_warning_file
 from mrmg.scene.loading.wheel_consistency import (
     LENGTH_SHARE,
     PLACE_M,
@@ -69,6 +69,11 @@ def mjcf_faults(
         path: of the MJCF file.
         center_stated: whether `robot.yaml` states the centre of mass.
     """
+    with no_warning_file():
+        return _faults(model, path, center_stated)
+
+
+def _faults(model: RobotModel, path: Path, center_stated: bool) -> list[Fault]:
     try:
         robot = CompiledRobot(path)
     except (ValueError, OSError) as error:

@@ -6,7 +6,8 @@ fifth of a second at best, and unchanged shipped models need no look.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 
@@ -16,6 +17,19 @@ from mrmg.scene.driven_parts import CHASSIS, FLOOR_BIT, OBSTACLE_BIT, ROOT
 
 _TURNED_RAD = 1.0
 """By which a wheel is turned to see how long that makes a tendon."""
+
+
+@contextmanager
+def no_warning_file() -> Iterator[None]:
+    """Keep MuJoCo from writing warnings to a file in the working directory."""
+    import mujoco
+
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(before)
 
 
 class CompiledRobot:

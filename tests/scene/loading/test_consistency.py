@@ -215,6 +215,14 @@ def test_all_differences_are_told_at_once_and_once(
     assert not (tmp_path / "runs").exists()
 
 
+def test_mujoco_leaves_no_file_of_warnings(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    faults_of(own_model(tmp_path, "car", ('kv="34"', 'kv="nan"')))
+    assert [path.name for path in tmp_path.iterdir()] == ["car"]
+
+
 def test_faults_of_the_outline_do_not_hide_others(tmp_path: Path) -> None:
     model = own_model(
         tmp_path, "car", ("mass: 180.0", "mass: 300"), (r"\[1.5, 0.55\]", "[0.0, 0.0]")
