@@ -17,12 +17,13 @@ from mrmg.run_arguments import (
     keyword,
     options_of,
 )
+from mrmg.run_drive import checked_drive
 from mrmg.run_folder import RunFolder, Step
 from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.loading import load_scene
 from mrmg.scene.loading.reading import require_faithful
 from mrmg.scene.types import Scene
-from mrmg.steps import OnImprovement, Run, StepProgress, checked_drive
+from mrmg.steps import OnImprovement, Run, StepProgress
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ a run taken up later goes through exactly the same doors as one that was never s
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -18,6 +18,7 @@ from mrmg import storage
 from mrmg.errors import ExitCode, MrmgError, RunFolderError
 from mrmg.mission import Plan, PlanStatus, plan_in_force
 from mrmg.run_arguments import RunArguments
+from mrmg.run_drive import drive
 from mrmg.run_folder import NEEDS, RunFolder, Step, stale_after
 from mrmg.scene.loading import load_scene
 from mrmg.scene.loading.carrying import carried_files
@@ -26,7 +27,6 @@ from mrmg.scene.types import Scene
 if TYPE_CHECKING:
     from mrmg.capsule import Failure
     from mrmg.execution.log import ExecutionLog
-    from mrmg.mission_control import Drive
     from mrmg.planning import Improvement
     from mrmg.results.energy_audit import EnergyAudit
 
@@ -236,51 +236,6 @@ def _verify(run: Run) -> Write:
 
     verdict = verify(run.scene, run.plan())
     return lambda: verdict.save(run.folder.path)
-
-
-def checked_drive(scene: Scene, arguments: RunArguments) -> RunArguments:
-    """Return `arguments` with the drive's in the one form that equal drives share.
-
-    Raises:
-        UsageError, FileError: if the controller, a fault or a disturbance is unknown.
-    """
-    from mrmg.execution.controller import controller_maker
-    from mrmg.execution.disturbance_spec import written_out
-    from mrmg.mission_control.faults import checked_faults
-
-    controller_maker(arguments.controller)
-    disturb = None if arguments.disturb is None else written_out(arguments.disturb)
-    faults = tuple(str(fault) for fault in checked_faults(scene, arguments.faults))
-    return replace(arguments, disturb=disturb, faults=faults)
-
-
-def drive(
-    scene: Scene,
-    plan: Plan,
-    arguments: RunArguments,
-    on_progress: Callable[[float, str], None] | None = None,
-) -> Drive:
-    """Drive a plan in MuJoCo as the arguments of its run want it."""
-    from mrmg.execution.disturbance_spec import parse_disturbance
-    from mrmg.mission_control import drive_mission
-    from mrmg.planning import profile_params
-
-    disturbance = None
-    if arguments.disturb is not None:
-        ranges = parse_disturbance(arguments.disturb)
-        ids = [robot.id for robot in scene.robots]
-        disturbance = ranges.draw(arguments.disturb_seed, ids)
-    return drive_mission(
-        scene,
-        plan,
-        controller=arguments.controller,
-        disturbance=disturbance,
-        replan=arguments.replan,
-        faults=arguments.faults,
-        seed=arguments.seed,
-        planner=profile_params(),
-        on_progress=on_progress,
-    )
 
 
 def _execute(run: Run) -> Write:

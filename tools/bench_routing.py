@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from mrmg.planning.bound.bound import exact_routing
+from mrmg.planning.bound.exact_tours import exact_routing
 from mrmg.planning.routers import route
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import RouterParams, routing_arrays

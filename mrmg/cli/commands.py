@@ -128,6 +128,7 @@ def _driven(options: argparse.Namespace) -> tuple[Run, str]:
 
     A drive other than that of the run goes to a folder of its own.
     """
+    from mrmg.run_drive import checked_drive
     from mrmg.run_folder import RunFolder, existing
     from mrmg.separate_drives import (
         begin_drive,
@@ -135,7 +136,7 @@ def _driven(options: argparse.Namespace) -> tuple[Run, str]:
         drive_apart,
         folder_beside,
     )
-    from mrmg.steps import checked_drive, taken_up
+    from mrmg.steps import taken_up
 
     undisturbed = RunArguments().deciding("drive")
     del undisturbed["controller"]
@@ -217,8 +218,9 @@ def _make(
     **changes: Any,
 ) -> Run:
     """Make steps of a run anew, with some of its arguments changed."""
+    from mrmg.run_drive import checked_drive
     from mrmg.run_folder import Step, existing
-    from mrmg.steps import checked_drive, taken_up
+    from mrmg.steps import taken_up
 
     folder = existing(options.run)
     with folder.opened_for_writing(), terminal.progress() as told:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from mrmg.mission import Plan
-from mrmg.planning.bound.bound import MOST_GOALS
+from mrmg.planning.bound.exact_tours import MOST_GOALS
 from mrmg.planning.endings import listed
 from mrmg.scene.types import Scene
 

@@ -26,7 +26,8 @@ from mrmg.planning.attempt import (
     guided_plans,
     tree_plans,
 )
-from mrmg.planning.bound.bound import Relaxation, exact_routing, lower_bound_J
+from mrmg.planning.bound.bound import Relaxation, lower_bound_J
+from mrmg.planning.bound.exact_tours import exact_routing
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.bounding import bounds_beside, bounds_of
 from mrmg.planning.diagnosis import (

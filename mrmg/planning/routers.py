@@ -7,7 +7,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Protocol
 
-from mrmg.planning.bound.bound import exact_routing
+from mrmg.planning.bound.exact_tours import exact_routing
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import RouterParams, Routing, solve_routing
 

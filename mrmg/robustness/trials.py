@@ -14,9 +14,9 @@ from mrmg import storage
 from mrmg.mission import Plan
 from mrmg.results.robustness import Trial, assess_trial
 from mrmg.run_arguments import RunArguments
+from mrmg.run_drive import drive
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
-from mrmg.steps import drive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -12,8 +12,9 @@ from mrmg.errors import UsageError
 from mrmg.mission import PlanStatus
 from mrmg.results.robustness import Study, assess_trial
 from mrmg.robustness import study_robustness
+from mrmg.run_drive import drive
 from mrmg.run_folder import RunFolder
-from mrmg.steps import Run, drive, taken_up
+from mrmg.steps import Run, taken_up
 
 SCENE = Path(__file__).parents[1] / "scenes" / "one_goal.yaml"
 

@@ -15,9 +15,9 @@ from protocol import state
 import mrmg
 from mrmg.results.robustness import Study, Trial, wilson_interval
 from mrmg.robustness import study_robustness
+from mrmg.run_drive import drive as drive_as
 from mrmg.run_folder import RunFolder, Step
 from mrmg.steps import Run, RunArguments
-from mrmg.steps import drive as drive_as
 from physics.figures import Figure, verdict
 
 SCENES = ("scene1", "scene4")

@@ -18,14 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrmg.planning.bound import _bound_kernels
-from mrmg.planning.bound.bound import (
-    CELLS,
-    MOST_GOALS,
-    ROUNDING_SHARE,
-    Relaxation,
-    RobotWays,
-    most_descent_J,
-)
+from mrmg.planning.bound.bound import CELLS, ROUNDING_SHARE, Relaxation, most_descent_J
+from mrmg.planning.bound.exact_tours import MOST_GOALS, RobotWays
 from mrmg.planning.bound.makespan_bound import least_times_s
 from mrmg.planning.halting import NEVER
 from mrmg.scene.objective import Objective

@@ -19,12 +19,11 @@ from mrmg.motion._kernels import MODEL_ID
 from mrmg.planning.bound import _bound_kernels
 from mrmg.planning.bound.bound import (
     CELLS,
-    MOST_GOALS,
     ROUNDING_SHARE,
     Relaxation,
-    RobotWays,
     relaxed_routing_J,
 )
+from mrmg.planning.bound.exact_tours import MOST_GOALS, RobotWays
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import routing_arrays

@@ -30,7 +30,8 @@ import shapely
 
 from mrmg.accounting import SHORTEST_ON_SLOPES_S
 from mrmg.planning.bound import _bound_kernels
-from mrmg.planning.bound.bound import MOST_GOALS, Relaxation
+from mrmg.planning.bound.bound import Relaxation
+from mrmg.planning.bound.exact_tours import MOST_GOALS
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.path_bounds import outer_polygon
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m

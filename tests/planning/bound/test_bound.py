@@ -13,13 +13,8 @@ import pytest
 
 from mrmg.planning import plan_mission
 from mrmg.planning.bound._eikonal_kernels import UNREACHED, certified_field
-from mrmg.planning.bound.bound import (
-    MOST_GOALS,
-    Relaxation,
-    exact_routing,
-    lower_bound_J,
-    relaxed_routing_J,
-)
+from mrmg.planning.bound.bound import Relaxation, lower_bound_J, relaxed_routing_J
+from mrmg.planning.bound.exact_tours import MOST_GOALS, exact_routing
 from mrmg.planning.bound.geodesic import Field, Look
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import (

@@ -11,7 +11,8 @@ import pytest
 
 from mrmg.planning.bound._touring_kernels import least_completions, touring_labels
 from mrmg.planning.bound.arcs import ArcWays
-from mrmg.planning.bound.bound import exact_routing, lower_bound_J
+from mrmg.planning.bound.bound import lower_bound_J
+from mrmg.planning.bound.exact_tours import exact_routing
 from mrmg.planning.bound.geodesic import Ground, Ways
 from mrmg.planning.bound.touring import Completions, near_routing
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
