@@ -11,6 +11,7 @@ import pytest
 from mrmg.cli import main
 from mrmg.errors import ExitCode
 from mrmg.execution.log import ExecutionLog
+from mrmg.results.compare import compare_runs
 from mrmg.shipped import models_folder
 
 SCENE = Path(__file__).parents[1] / "scenes" / "one_goal.yaml"
@@ -46,6 +47,9 @@ def test_a_mismatch_is_no_mission_done(
     assert summary["mission_ok"] is False
     assert "Model mismatch" in (run / "report.html").read_text()
     assert not (run / "capsule.zip").exists()
+    kept = shutil.copytree(run, tmp_path / "kept")
+    outcomes = {row.name: row.values for row in compare_runs([run, kept]).rows}
+    assert outcomes["outcome"] == ("model mismatch", "model mismatch")
     # The tolerance is an argument of every verb that judges, and of nothing else.
     digest = ExecutionLog.load(run).digest
     for verb in ("audit", "execute"):
