@@ -1,8 +1,4 @@
-"""The steps of a run, each from files of the run folder to files of the run folder.
-
-A step reads what earlier steps left and never takes their results from memory, so that
-a run taken up later goes through exactly the same doors as one that was never stopped.
-"""
+"""The steps of a run, from files to files: none takes results from memory."""
 
 from __future__ import annotations
 

@@ -19,11 +19,9 @@ turns round, the way back is not charged; that is worth less than 0.01 mm.
 
 With more obstacles no cell is cheaper, and no tours are cheaper where no leg is. What a
 field certifies of a leg in between may be less nevertheless: fields are solved and then
-divided by how much too steep they are, which depends on where fronts meet. The greatest
-field that certifies would never fall, but it is the solution of a conic programme over
-all cells, another one for each leg. So an obstacle may lower the bound: by less than
-half a percent in all that was tried. What holds among fewer obstacles holds among more:
-of two such bounds the greater one is a bound of the mission with more.
+divided by how much too steep they are, which depends on where fronts meet. The
+greatest field would take a conic programme for each leg. So an obstacle may lower the
+bound, by less than half a percent in all that was tried; the greater of both holds.
 """
 
 from __future__ import annotations
