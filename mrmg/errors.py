@@ -68,6 +68,10 @@ class FileError(MrmgError):
         lines = [f"{source}: {count}", *(f"  {fault}" for fault in self.faults)]
         super().__init__("\n".join(lines))
 
+    def __reduce__(self) -> tuple[type[FileError], tuple[str, tuple[Fault, ...]]]:
+        # Worker processes send errors; by default only the message would be sent.
+        return type(self), (self.source, self.faults)
+
 
 class SceneError(FileError):
     """A scene file is malformed or describes an impossible scene."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -148,3 +149,12 @@ def test_a_robot_changed_in_memory_is_stored_as_it_was_driven(tmp_path: Path) ->
     stored = load_scene(tmp_path / "run" / "scene.yaml")
     assert stored == changed
     assert stored.robots[0].model.drive_efficiency == 0.7
+
+
+def test_refusals_come_through_from_worker_processes(mission: Mission) -> None:
+    scene, plan, _ = mission
+    with pytest.raises(IdentityError) as refused:
+        mrmg.execute(replace(scene, name="other"), plan)
+    again = pickle.loads(pickle.dumps(refused.value))  # noqa: S301 (its own bytes)
+    assert type(again) is IdentityError
+    assert (str(again), again.faults) == (str(refused.value), refused.value.faults)
