@@ -20,22 +20,33 @@ Everything is imported on first use, so that importing the package stays cheap.
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from mrmg.execution import simulate as execute
+    from mrmg.execution.log import ExecutionLog
+    from mrmg.mission import Plan
     from mrmg.mission_control import drive_mission as drive
     from mrmg.pipeline import run
+    from mrmg.planning import PlannerParams
     from mrmg.planning import plan_mission as plan
     from mrmg.results.audit import audit
+    from mrmg.results.energy_audit import EnergyAudit
+    from mrmg.results.verdict import Verdict
     from mrmg.results.verify import verify
     from mrmg.results.video import render_video as render
     from mrmg.scene.loading import load_scene
+    from mrmg.scene.types import Scene
 
 __version__ = "0.1.0"
 
 __all__ = [
+    "EnergyAudit",
+    "ExecutionLog",
+    "Plan",
+    "PlannerParams",
+    "Scene",
+    "Verdict",
     "__version__",
     "audit",
     "drive",
@@ -48,6 +59,12 @@ __all__ = [
 ]
 
 _HOME = {
+    "EnergyAudit": ("mrmg.results.energy_audit", "EnergyAudit"),
+    "ExecutionLog": ("mrmg.execution.log", "ExecutionLog"),
+    "Plan": ("mrmg.mission", "Plan"),
+    "PlannerParams": ("mrmg.planning", "PlannerParams"),
+    "Scene": ("mrmg.scene.types", "Scene"),
+    "Verdict": ("mrmg.results.verdict", "Verdict"),
     "audit": ("mrmg.results.audit", "audit"),
     "drive": ("mrmg.mission_control", "drive_mission"),
     "execute": ("mrmg.execution", "simulate"),
@@ -57,10 +74,17 @@ _HOME = {
     "run": ("mrmg.pipeline", "run"),
     "verify": ("mrmg.results.verify", "verify"),
 }
+"""Module and name of what is imported on first use."""
 
 
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'mrmg' has no attribute {name!r}")
+    from importlib import import_module
+
     module, attribute = _HOME[name]
-    return getattr(importlib.import_module(module), attribute)
+    return getattr(import_module(module), attribute)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mrmg import storage
+from mrmg.columns import control_columns, data_frame, named, state_columns
 from mrmg.errors import ExitCode, Fault, RunFolderError
 from mrmg.ledger import EnergyLedger
 
@@ -58,18 +59,42 @@ class Trajectory:
     Attributes:
         robot: id of the robot.
         dt_s: length of one step; state i holds at time i * dt_s.
-        state: (x [m], y [m], theta [rad], v [m/s], psi [rad]), shape (n + 1, 5).
-        control: (u1 [m/s^2], u2 [rad/s]) held over each step, shape (n, 2).
+        state: x, y, theta, v and a fifth number, shape (n + 1, 5); `columns` names it.
+        control: u1, u2 held over each step, shape (n, 2).
+        motion: motion model, which decides the columns; "" where it is not recorded.
     """
 
     robot: str
     dt_s: float
     state: np.ndarray
     control: np.ndarray
+    motion: str = ""
 
     def __post_init__(self) -> None:
         self.state.setflags(write=False)
         self.control.setflags(write=False)
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """Unit of each column of `to_arrays` by its name."""
+        names = {**state_columns(self.motion), **control_columns(self.motion)}
+        return {"time_s": "s", **names}
+
+    def to_arrays(self) -> dict[str, np.ndarray]:
+        """Return time, states and controls by name, each of shape (n + 1,).
+
+        A control stands in the row in which it begins; the last row has NaN.
+        """
+        rows = len(self.state)
+        return {
+            "time_s": self.time_s,
+            **named(state_columns(self.motion), self.state, rows),
+            **named(control_columns(self.motion), self.control, rows),
+        }
+
+    def to_dataframe(self) -> Any:
+        """Return `to_arrays` as a pandas DataFrame; raises MachineError without it."""
+        return data_frame(self.to_arrays())
 
     @property
     def time_s(self) -> np.ndarray:
@@ -172,7 +197,10 @@ class Plan:
             arrays[f"{trajectory.robot}.state"] = trajectory.state
             arrays[f"{trajectory.robot}.control"] = trajectory.control
         storage.write_arrays(folder / f"{name}.npz", arrays)
-        storage.write_json(folder / f"{name}.json", self._header())
+        # Not part of the digest: the scene decides it, and older plans lack it.
+        motions = {each.robot: each.motion for each in self.trajectories}
+        header = {**self._header(), "motions": motions}
+        storage.write_json(folder / f"{name}.json", header)
 
     def _header(self) -> dict[str, Any]:
         return {
@@ -240,6 +268,7 @@ def _plan_from(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Plan:
                 dt_s=header["dt_s"],
                 state=arrays[f"{robot}.state"],
                 control=arrays[f"{robot}.control"],
+                motion=header.get("motions", {}).get(robot, ""),
             )
             for robot in header["robots"]
         ),

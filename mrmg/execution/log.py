@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from importlib.metadata import version
 from pathlib import Path
@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from mrmg import storage
-from mrmg.errors import Fault, IdentityError, RunFolderError
+from mrmg.columns import data_frame, named, state_columns
+from mrmg.errors import Fault, IdentityError, RunFolderError, UsageError
 from mrmg.execution.disturbance import Disturbance
 from mrmg.execution.supervision import Event
 from mrmg.mission import Plan, plan_in_force
@@ -66,9 +67,11 @@ class ExecutionLog:
         versions: of the packages that decide the result.
         time_s: simulated time, shape (n,).
         clock_s: plan time the fleet's shared clock had reached, shape (n,).
-        state: true (x, y, theta, v, psi), shape (R, n, 5).
+        state: true x, y, theta, v and a fifth number, shape (R, n, 5); `columns` names
+            it.
         reference: the plan at clock_s, shape (R, n, 5).
-        command: set-points (v [m/s], psi [rad]) given at each tick, shape (R, n, 2).
+        command: set-points of v and of the fifth number of the state, given at each
+            tick, shape (R, n, 2).
         multiplier: terrain under the rear axle, shape (R, n).
         force_N: drive force commanded over the tick, shape (R, n - 1).
         work_J: work of the drives over the tick, driving (>= 0) and braking (<= 0),
@@ -76,6 +79,8 @@ class ExecutionLog:
         qpos: MuJoCo's positions, shape (n, nq); what a video is drawn from.
         contacts: every contact other than wheel and floor.
         events: what a supervisor saw and did, in order of time.
+        motions: motion models of the robots, which decide the columns; empty where they
+            are not recorded.
         timing: wall_s and realtime_factor by the clock, controller_ms {median, p99} a
             robot and call by the processor. Kept apart: all else is equal between
             equal runs.
@@ -103,6 +108,47 @@ class ExecutionLog:
     events: tuple[Event, ...] = ()
     gave_up: str = ""
     disturbance: Disturbance | None = None
+    motions: tuple[str, ...] = ()
+
+    def columns(self, robot: str) -> dict[str, str]:
+        """Return the unit of each column of `to_arrays(robot)` by its name."""
+        return {name: unit for names, _ in self._tables(robot) for name, unit in names}
+
+    def to_arrays(self, robot: str) -> dict[str, np.ndarray]:
+        """Return what was recorded of a robot by name, each of shape (n,).
+
+        What holds over a tick stands in the row in which the tick begins; the last row
+        has NaN there.
+        """
+        rows = len(self.time_s)
+        return {
+            name: column
+            for names, values in self._tables(robot)
+            for name, column in named(dict(names), values, rows).items()
+        }
+
+    def to_dataframe(self, robot: str) -> Any:
+        """Return `to_arrays` as a pandas DataFrame; raises MachineError without it."""
+        return data_frame(self.to_arrays(robot))
+
+    def _tables(
+        self, robot: str
+    ) -> Iterator[tuple[Iterable[tuple[str, str]], np.ndarray]]:
+        """Yield names with units, and the values of their columns."""
+        if robot not in self.robots:
+            known = ", ".join(self.robots)
+            raise UsageError(f"the log knows no robot {robot!r}; allowed: {known}")
+        number = self.robots.index(robot)
+        names = state_columns(self.motions[number] if self.motions else "")
+        set_points = list(names.items())[3:]
+        yield [("time_s", "s")], self.time_s
+        yield [("clock_s", "s")], self.clock_s
+        yield names.items(), self.state[number]
+        yield _prefixed("reference", names.items()), self.reference[number]
+        yield _prefixed("command", set_points), self.command[number]
+        yield [("multiplier", "1")], self.multiplier[number]
+        yield [("force_N", "N")], self.force_N[number]
+        yield [("work_driving_J", "J"), ("work_braking_J", "J")], self.work_J[number]
 
     @property
     def digest(self) -> str:
@@ -153,6 +199,7 @@ class ExecutionLog:
             if header.pop("format") != LOG_FORMAT:
                 raise ValueError(f"this version reads format {LOG_FORMAT} only")
             header["robots"] = tuple(header["robots"])
+            header["motions"] = tuple(header.get("motions", ()))
             header["contacts"] = tuple(Contact(**row) for row in header["contacts"])
             header["events"] = tuple(Event(**row) for row in header.get("events", ()))
             if "disturbance" in header:
@@ -178,6 +225,10 @@ def log_in_force(folder: Path, scene: Scene) -> ExecutionLog | None:
     log = ExecutionLog.load(folder)
     require_same_mission(scene, None, log)
     return log if log.plan_digest == plan_in_force(folder).digest else None
+
+
+def _prefixed(word: str, names: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    return [(f"{word}_{name}", unit) for name, unit in names]
 
 
 def require_same_mission(

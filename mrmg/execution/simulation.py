@@ -243,6 +243,7 @@ class _Run:
             gave_up="" if self._completed() else self._trouble(),
             disturbance=self._disturbance,
             robots=tuple(robot.id for robot in scene.robots),
+            motions=tuple(robot.model.motion_name for robot in scene.robots),
             versions=package_versions(),
             time_s=recording.in_time("time_s"),
             clock_s=recording.in_time("clock_s"),

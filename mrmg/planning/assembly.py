@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 
 from mrmg.accounting import battery_profile, find_visits, plan_ledger
@@ -57,7 +58,10 @@ def make_plan(
             for name in ("mrmg", "numba", "numpy", "scipy", "shapely")
         },
         dt_s=params.dt_s,
-        trajectories=tuple(trajectories),
+        trajectories=tuple(
+            replace(each, motion=scene.robot(each.robot).model.motion_name)
+            for each in trajectories
+        ),
         tours=tours,
         visits=tuple(visits),
         ledger=plan_ledger(scene, trajectories, visits),

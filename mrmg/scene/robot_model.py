@@ -168,9 +168,13 @@ class RobotModel(ByContent):
     def content(self) -> dict[str, Any]:
         """Return what counts for a digest: what the model says, not where it lies."""
         known = contents(self, without=("name", "mjcf", "origin"))
-        motion = "custom" if self.has_custom_motion else self.motion_model
         outline = content(shapely.Polygon(self.footprint_m))
-        return {**known, "motion_model": motion, "footprint_m": outline}
+        return {**known, "motion_model": self.motion_name, "footprint_m": outline}
+
+    @property
+    def motion_name(self) -> str:
+        """Name of the motion model: "car", "unicycle" or "custom"."""
+        return "custom" if self.has_custom_motion else self.motion_model
 
     @property
     def has_custom_motion(self) -> bool:

@@ -1,0 +1,113 @@
+"""What people see of the package: its verbs, its types, and columns by name."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import mrmg
+from mrmg.errors import MachineError, UsageError
+from mrmg.execution.log import ExecutionLog
+from mrmg.mission import Plan, Trajectory
+
+VERBS = {"load_scene", "plan", "verify", "execute", "drive", "audit", "render", "run"}
+TYPES = {"Scene", "Plan", "PlannerParams", "Verdict", "ExecutionLog", "EnergyAudit"}
+
+
+def test_the_package_shows_its_verbs_and_types_and_nothing_else() -> None:
+    assert set(dir(mrmg)) == set(mrmg.__all__) == {*VERBS, *TYPES, "__version__"}
+    assert all(callable(getattr(mrmg, name)) for name in {*VERBS, *TYPES})
+    assert all(isinstance(getattr(mrmg, name), type) for name in TYPES)
+
+
+def test_importing_the_package_imports_nothing_heavy() -> None:
+    code = "import mrmg, sys; dir(mrmg); print(*sys.modules)"
+    ended = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert {"numpy", "mujoco", "casadi", "numba"}.isdisjoint(ended.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ("motion", "fifth", "control"),
+    [
+        ("car", ("psi_rad", "rad"), ("u2_rad_s", "rad/s")),
+        ("unicycle", ("omega_rad_s", "rad/s"), ("u2_rad_s2", "rad/s^2")),
+        ("custom", ("w", "SI"), ("u2", "SI")),
+        ("", ("w", "SI"), ("u2", "SI")),
+    ],
+)
+def test_a_trajectory_names_its_columns(
+    motion: str, fifth: tuple[str, str], control: tuple[str, str]
+) -> None:
+    state, held = np.arange(15.0).reshape(3, 5), np.arange(4.0).reshape(2, 2)
+    trajectory = Trajectory(
+        robot="r1", dt_s=0.1, state=state, control=held, motion=motion
+    )
+    columns = list(trajectory.columns.items())
+    assert columns[0] == ("time_s", "s")
+    assert (columns[5], columns[7]) == (fifth, control)
+    arrays = trajectory.to_arrays()
+    assert list(arrays) == list(trajectory.columns)
+    assert {len(values) for values in arrays.values()} == {3}
+    np.testing.assert_array_equal(arrays["time_s"], trajectory.time_s)
+    np.testing.assert_array_equal(arrays[fifth[0]], state[:, 4])
+    np.testing.assert_array_equal(arrays[control[0]], [1.0, 3.0, np.nan])
+
+
+@pytest.fixture(scope="module")
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run of a differential drive."""
+    folder = tmp_path_factory.mktemp("runs")
+    scene = folder / "turn.yaml"
+    scene.write_text(
+        "format: 1\nname: turn\nbounds: [0, 0, 20, 10]\n"
+        "goals:\n  - {id: g1, circle: {center: [14, 5], radius: 1.5}}\n"
+        "robots:\n  - {id: d1, model: diffdrive, pose: [4, 5, 0]}\n"
+    )
+    mrmg.run(scene, out=folder / "run", video=None)
+    return folder / "run"
+
+
+def test_plan_and_log_of_a_run_know_their_motion(mixed: Path) -> None:
+    trajectory, log = Plan.load(mixed).trajectory("d1"), ExecutionLog.load(mixed)
+    assert "omega_rad_s" in trajectory.to_arrays()
+    arrays = log.to_arrays("d1")
+    assert list(arrays) == list(log.columns("d1"))
+    assert {len(values) for values in arrays.values()} == {len(log.time_s)}
+    np.testing.assert_array_equal(arrays["omega_rad_s"], log.state[0, :, 4])
+    np.testing.assert_array_equal(arrays["command_omega_rad_s"], log.command[0, :, 1])
+    np.testing.assert_array_equal(arrays["reference_x_m"], log.reference[0, :, 0])
+    np.testing.assert_array_equal(arrays["work_braking_J"][:-1], log.work_J[0, :, 1])
+    assert np.isnan(arrays["force_N"][-1])
+    assert log.columns("d1")["force_N"] == "N"
+
+
+def test_an_older_plan_and_log_name_the_fifth_column_without_meaning(
+    mixed: Path,
+) -> None:
+    log = replace(ExecutionLog.load(mixed), motions=())
+    assert "w" in log.columns("d1")
+    plan = Plan.load(mixed)
+    unknown = tuple(replace(each, motion="") for each in plan.trajectories)
+    assert replace(plan, trajectories=unknown).digest == plan.digest
+
+
+def test_an_unknown_robot_is_answered_with_the_known_ones(mixed: Path) -> None:
+    with pytest.raises(UsageError, match="no robot 'r9'; allowed: d1"):
+        ExecutionLog.load(mixed).to_arrays("r9")
+
+
+def test_data_frames_need_pandas_only_when_asked_for(
+    mixed: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(MachineError, match="pip install pandas.*to_arrays"):
+        Plan.load(mixed).trajectories[0].to_dataframe()
+    with pytest.raises(MachineError, match="pandas"):
+        ExecutionLog.load(mixed).to_dataframe("d1")
