@@ -38,7 +38,7 @@ def main() -> None:
     figure, (above, below) = plt.subplots(2, sharex=True, layout="constrained")
     above.plot(sizes_m, energies_kJ, "o-")
     above.set_ylabel("energy of the fleet [kJ]")
-    below.step(sizes_m, recharges_made, "o-", where="mid")
+    below.plot(sizes_m, recharges_made, "o")
     below.set_ylabel("recharges")
     below.set_yticks(range(max(recharges_made) + 1))
     below.set_xlabel("battery [m of plain ground]")

@@ -14,7 +14,7 @@ CHANGES = {
     "v_max: 2.0 ": "v_max: 1.5 ",  # m/s
     "u1_max: 1.5 ": "u1_max: 1.0 ",  # m/s^2
 }
-"""What robot.yaml shall say instead. Mass, geometry and friction stand in the MJCF, too:
+"""What robot.yaml shall say instead. Mass and geometry stand in the MJCF file, too:
 `mrmg robot check FOLDER` reports where both differ."""
 
 
