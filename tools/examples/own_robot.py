@@ -30,7 +30,7 @@ def main() -> None:
         text = text.replace(before, after)
     (robot / "robot.yaml").write_text(text)
 
-    scene = mrmg.load_scene("quickstart").with_robot("r2", model=str(robot))
+    scene = mrmg.load_scene("quickstart").with_robot("r2", model=str(robot.resolve()))
     result = mrmg.plan(scene, seed=0)
     if result.plan is None:
         raise SystemExit(result.reason)
