@@ -160,10 +160,7 @@ class Run:
 
 
 def taken_up(
-    folder: RunFolder,
-    on_progress: StepProgress | None = None,
-    *,
-    trust_code: bool = False,
+    folder: RunFolder, on_progress: StepProgress | None = None, trust_code: bool = False
 ) -> Run:
     """Return the run that `folder` holds, with the arguments it was started with."""
     return Run(
