@@ -7,141 +7,18 @@ states, collisions and energies are computed anew, the geometry with shapely.
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
-from shapely import affinity
-from shapely.geometry import Point, Polygon
 
-from mrmg.motion.dynamics import car_derivative, rk4_step
 from mrmg.planning.guided_tree._tree_kernels import ENDS
 
-STEP = rk4_step(car_derivative(math.sin, math.cos, math.tan))
 BETA_SHARE = 0.01
 COLLISION, REJECTED = ENDS.index("collision"), ENDS.index("rejected by Insert")
 
 
-class Replay:
-    """Vertices, groups and expansions of a recording, as plain lists."""
-
-    def __init__(self, recording) -> None:
-        self.scene, self.params = recording.scene, recording.params
-        self.method = recording.params.guided_tree
-        self.growth = recording.growth
-        tree = recording.growth.tree
-        self.n = recording.growth.counts["vertices"]
-        self.iterations = recording.growth.counts["iterations"]
-        self.vertices, self.tours, self.trace = tree.vertices, tree.tours, tree.trace
-        self.groups = tree.groups
-        self.roadmap = recording.problem.roadmap.arrays
-        self.fleet = recording.problem.mission.fleet
-        self.routing = recording.problem.mission.routing
-        self.robots = len(self.scene.robots)
-        self.goals = len(self.scene.goals)
-        self.joined = np.isfinite(self.roadmap.cost_to_go[0]).any(axis=0)
-        self.made: list[list[int]] = [[] for _ in range(self.iterations)]
-        for v in range(1, self.n):
-            self.made[self.vertices.iteration[v]].append(v)
-
-    def visited(self, v: int) -> tuple[bool, ...]:
-        return tuple(bool(x) for x in self.groups.visited[self.vertices.group[v]])
-
-    def tour(self, v: int) -> list[list[int]]:
-        row = self.vertices.tour[v]
-        return [
-            [int(t) for t in self.tours.target[row, r, : self.tours.length[row, r]]]
-            for r in range(self.robots)
-        ]
-
-    def region(self, v: int, r: int) -> int:
-        """Return the nearest vertex of the roadmap that has a path to a target."""
-        apart = self.roadmap.vertex - self.vertices.state[v, r, :2]
-        return int(np.where(self.joined, np.hypot(*apart.T), np.inf).argmin())
-
-    def path(self, v: int, r: int, t: int) -> float:
-        """Return the energy along the roadmap from a vertex to a target [J]."""
-        w = self.region(v, r)
-        x, y = self.vertices.state[v, r, :2]
-        terrain = self.growth_terrain(x, y)
-        straight = math.dist(self.roadmap.vertex[w], (x, y)) * terrain
-        field = self.fleet[r]["field"]
-        metres = straight + self.roadmap.cost_to_go[field, t, w]
-        return metres * self.fleet[r]["plain"]
-
-    def growth_terrain(self, x: float, y: float) -> float:
-        for area in self.scene.terrain:
-            # The planner's terrain is a raster of 0.25 m.
-            cell = Point(0.25 * (x // 0.25 + 0.5), 0.25 * (y // 0.25 + 0.5))
-            if area.shape.contains(cell):
-                return area.multiplier
-        return 1.0
-
-    def feasible(self, v: int, row: int) -> bool:
-        """Return whether the batteries of a vertex last for a tour."""
-        margin = 1.0 + self.params.route_margin
-        for r in range(self.robots):
-            left = self.vertices.energy[v, r] - self.fleet[r]["reserve"]
-            targets = self.tours.target[row, r, : self.tours.length[row, r]]
-            if len(targets):
-                left -= self.path(v, r, targets[0])
-            for a, b in pairwise(targets):
-                if a >= self.goals:
-                    break
-                left -= self.routing.cost[r, a, b] / margin
-            if left < -1e-6:
-                return False
-        return True
-
-    def outline(self, r: int, state: np.ndarray) -> Polygon:
-        body = Polygon(self.scene.robots[r].model.footprint_m)
-        turned = affinity.rotate(body, state[2], origin=(0, 0), use_radians=True)
-        return affinity.translate(turned, state[0], state[1])
-
-    def collision_free(self, state: np.ndarray, slack: float) -> bool:
-        """Return whether all margins and limits hold, or nearly do (slack > 0)."""
-        x0, y0, x1, y1 = self.scene.bounds
-        frame = Polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)])
-        outlines = [self.outline(r, state[r]) for r in range(self.robots)]
-        for r, outline in enumerate(outlines):
-            low, high, psi = self.fleet[r]["limit"][:3]
-            if not low - 1e-6 <= state[r, 3] <= high + 1e-6:
-                return False
-            if abs(state[r, 4]) > psi + 1e-6:
-                return False
-            need = self.params.obstacle_margin_m - slack
-            walls = [item.shape for item in self.scene.obstacles]
-            if any(outline.distance(item) < need for item in walls):
-                return False
-            if not frame.contains(outline):
-                return False
-            if outline.distance(frame.exterior) < need:
-                return False
-            for other in outlines[:r]:
-                if outline.distance(other) < self.params.robot_margin_m - slack:
-                    return False
-        return True
-
-    def advanced(self, v: int, control: np.ndarray) -> np.ndarray:
-        """Return the composite state one step after a vertex."""
-        after = np.empty((self.robots, 5))
-        for r in range(self.robots):
-            robot = self.fleet[r]
-            after[r] = STEP(
-                *self.vertices.state[v, r],
-                *control[r],
-                float(robot["wheelbase"]),
-                self.params.dt_s,
-            )
-        return after
-
-
-@pytest.fixture(scope="module")
-def replay(recording) -> Replay:
-    return Replay(recording)
-
-
-def steer(replay: Replay, r: int, state: np.ndarray, goal: np.ndarray) -> tuple:
+def steer(replay: Any, r: int, state: np.ndarray, goal: np.ndarray) -> tuple:
     """Return Steer(v, q), of a robot's state and its target alone."""
     v_min, v_max, psi_max, u1_max, u2_max = replay.fleet[r]["limit"]
     hold_s = replay.method.k * replay.params.dt_s
@@ -167,7 +44,7 @@ def steer(replay: Replay, r: int, state: np.ndarray, goal: np.ndarray) -> tuple:
     )
 
 
-def test_the_trace_shows_all_that_can_happen(replay: Replay) -> None:
+def test_the_trace_shows_all_that_can_happen(replay: Any) -> None:
     """What is checked below must have happened at least once."""
     ended = replay.trace.ended[: replay.iterations]
     assert {0, COLLISION, REJECTED} <= set(ended.tolist())
@@ -178,7 +55,7 @@ def test_the_trace_shows_all_that_can_happen(replay: Replay) -> None:
 
 
 def test_groups_have_one_region_of_every_robot_and_one_set_of_goals(
-    replay: Replay,
+    replay: Any,
 ) -> None:
     keys = {}
     for v in range(replay.n):
@@ -190,7 +67,7 @@ def test_groups_have_one_region_of_every_robot_and_one_set_of_goals(
     assert len(set(keys.values())) == len(keys) == replay.growth.counts["groups"]
 
 
-def test_goals_are_visited_when_a_robot_is_in_them(replay: Replay) -> None:
+def test_goals_are_visited_when_a_robot_is_in_them(replay: Any) -> None:
     for v in range(replay.n):
         parent = int(replay.vertices.parent[v])
         before = replay.visited(parent) if parent >= 0 else (False,) * replay.goals
@@ -204,7 +81,7 @@ def test_goals_are_visited_when_a_robot_is_in_them(replay: Replay) -> None:
             assert replay.visited(v)[g] >= before[g]
 
 
-def test_weights_selections_and_visits_are_those_of_the_paper(replay: Replay) -> None:
+def test_weights_selections_and_visits_are_those_of_the_paper(replay: Any) -> None:
     """Eq. (5) and the draws, with groups as they were before each iteration."""
     method, m = replay.method, replay.goals
     depth, group = replay.vertices.depth, replay.vertices.group
@@ -257,7 +134,7 @@ def test_weights_selections_and_visits_are_those_of_the_paper(replay: Replay) ->
     assert visits == dict(enumerate(replay.groups.visits[: len(visits)]))
 
 
-def test_vertices_are_drawn_by_their_distance_to_their_target(replay: Replay) -> None:
+def test_vertices_are_drawn_by_their_distance_to_their_target(replay: Any) -> None:
     members: list[list[int]] = [[] for _ in range(replay.growth.counts["groups"])]
     members[replay.vertices.group[0]].append(0)
     for i in range(replay.iterations):
@@ -272,7 +149,7 @@ def test_vertices_are_drawn_by_their_distance_to_their_target(replay: Replay) ->
             members[replay.vertices.group[new]].append(new)
 
 
-def ahead(replay: Replay, v: int, r: int, length: float) -> np.ndarray:
+def ahead(replay: Any, v: int, r: int, length: float) -> np.ndarray:
     """Return the point so far along the roadmap's path of a robot."""
     t = replay.tour(v)[r][0]
     successor = replay.roadmap.successor[replay.fleet[r]["field"], t]
@@ -288,7 +165,7 @@ def ahead(replay: Replay, v: int, r: int, length: float) -> np.ndarray:
 
 
 def test_the_distance_of_a_vertex_is_to_the_middle_of_its_sampled_targets(
-    replay: Replay,
+    replay: Any,
 ) -> None:
     middle = 0.5 * (replay.method.ahead_least_m + replay.method.ahead_most_m)
     for v in range(0, replay.n, 7):
@@ -300,7 +177,7 @@ def test_the_distance_of_a_vertex_is_to_the_middle_of_its_sampled_targets(
         assert replay.vertices.to_target_m[v] == pytest.approx(expected, abs=1e-9)
 
 
-def test_targets_are_sampled_near_the_path_of_the_vertexs_tour(replay: Replay) -> None:
+def test_targets_are_sampled_near_the_path_of_the_vertexs_tour(replay: Any) -> None:
     method = replay.method
     lengths = np.linspace(method.ahead_least_m, method.ahead_most_m, 46)
     for i in range(0, replay.iterations, 5):
@@ -315,7 +192,7 @@ def test_targets_are_sampled_near_the_path_of_the_vertexs_tour(replay: Replay) -
             assert far <= method.target_spread_m + 0.06
 
 
-def test_each_step_of_held_controls_is_a_vertex_of_its_own(replay: Replay) -> None:
+def test_each_step_of_held_controls_is_a_vertex_of_its_own(replay: Any) -> None:
     """Algorithm 3: one vertex a step, each the child of the one before it."""
     for i, made in enumerate(replay.made):
         assert len(made) <= replay.method.k
@@ -331,7 +208,7 @@ def test_each_step_of_held_controls_is_a_vertex_of_its_own(replay: Replay) -> No
             assert len(made) == replay.method.k
 
 
-def test_vertices_are_free_and_a_collision_ends_the_expansion(replay: Replay) -> None:
+def test_vertices_are_free_and_a_collision_ends_the_expansion(replay: Any) -> None:
     for v in range(1, replay.n, 5):
         assert replay.collision_free(replay.vertices.state[v], slack=1e-6)
     collided = np.flatnonzero(replay.trace.ended[: replay.iterations] == COLLISION)
@@ -343,7 +220,7 @@ def test_vertices_are_free_and_a_collision_ends_the_expansion(replay: Replay) ->
         assert not replay.collision_free(rejected, slack=-1e-6)
 
 
-def test_energy_is_used_by_distance_terrain_and_turning(replay: Replay) -> None:
+def test_energy_is_used_by_distance_terrain_and_turning(replay: Any) -> None:
     """The preset `paper`, midpoint by midpoint; stations on the tour fill up."""
     for v in range(1, replay.n):
         parent = int(replay.vertices.parent[v])
@@ -371,7 +248,7 @@ def test_energy_is_used_by_distance_terrain_and_turning(replay: Replay) -> None:
             assert replay.vertices.energy[v, r] == pytest.approx(left, abs=1e-6), i
 
 
-def test_tours_are_kept_renewed_and_feasible(replay: Replay) -> None:
+def test_tours_are_kept_renewed_and_feasible(replay: Any) -> None:
     """Algorithm 2, with every vertex's tour."""
     renewed = 0
     for v in range(replay.n):
@@ -403,7 +280,7 @@ def test_tours_are_kept_renewed_and_feasible(replay: Replay) -> None:
     assert len(set(replay.vertices.tour[: replay.n].tolist())) == renewed + 1
 
 
-def test_the_solution_ends_with_a_stop_of_ours(replay: Replay) -> None:
+def test_the_solution_ends_with_a_stop_of_ours(replay: Any) -> None:
     growth = replay.growth
     assert all(replay.visited(growth.solution))
     assert growth.solution == replay.n - 1
