@@ -128,6 +128,7 @@ def _driven(options: argparse.Namespace) -> tuple[Run, str]:
 
     A drive other than that of the run goes to a folder of its own.
     """
+    from mrmg.execution.log import require_same_mission
     from mrmg.run_drive import checked_drive
     from mrmg.run_folder import RunFolder, existing
     from mrmg.separate_drives import (
@@ -152,6 +153,7 @@ def _driven(options: argparse.Namespace) -> tuple[Run, str]:
             run = replace(run, arguments=asked)
             made = drive_again(run, **again)
             return run, f"in {folder.path}" if made else f"in {folder.path}; {kept}"
+        require_same_mission(run.scene, run.plan())  # before there is a folder
         with RunFolder(place).opened_for_writing() as other:
             work = begin_drive(run, other, asked, **again)
             made = drive_apart(work, **again)

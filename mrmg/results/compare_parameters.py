@@ -88,4 +88,6 @@ def _text(value: Any) -> str:
         return " ".join(map(str, value)) or MISSING
     if isinstance(value, float):
         return f"{value:g}"
+    if value == "":  # an option that was given without a value of its own
+        return "yes"
     return MISSING if value is None else str(value)

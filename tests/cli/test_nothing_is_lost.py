@@ -192,6 +192,14 @@ def test_a_changed_verdict_renews_the_report(run: Path) -> None:
     assert (run / "report.html").read_text() != page
 
 
+def test_a_plan_of_another_scene_leaves_no_folder_for_its_drive(run: Path) -> None:
+    plan = json.loads((run / "plan.json").read_text())
+    (run / "plan.json").write_text(json.dumps({**plan, "scene_digest": "0" * 16}))
+    there = sorted(run.parent.iterdir())
+    assert main(["execute", str(run), "--disturb"]) == ExitCode.INVALID_FILE
+    assert sorted(run.parent.iterdir()) == there
+
+
 def test_a_replay_does_not_replace_another_run(run: Path, tmp_path: Path) -> None:
     failed = tmp_path / "failed"
     out = ["--out", str(failed)]
