@@ -88,7 +88,7 @@ def watch(
         page.run()
     except KeyboardInterrupt:
         interruption.accept()
-        return ExitCode.OK
+        return interruption.EXIT_CODE
     finally:
         page.close()
     return ExitCode.OK

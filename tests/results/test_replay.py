@@ -266,7 +266,7 @@ def test_the_command_serves_until_it_is_stopped(
         assert answer.status == 200
     served.send_signal(signal.SIGINT)
     _, told = served.communicate()
-    assert (served.returncode, told) == (ExitCode.OK, "")
+    assert (served.returncode, told) == (130, "")
 
 
 def test_a_file_that_is_neither_run_nor_scene_is_told(
