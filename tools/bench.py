@@ -17,20 +17,33 @@ turning: in the planner, the bound and the verifier alike. The protocol of Table
 With more than one profile each seed is planned with all of them in turn, and a second
 table has the ratios to the first profile, seed by seed, where both have a plan: of the
 time to the first plan, and of the cost of the final one.
+
+Finished missions are kept in --output FILE: the same command goes on from there after
+an interruption. Rows of --json: `scene`, `profile`, `ok` of `runs`, then the table's
+columns: times [s], costs as metres of plain ground, `cost_to_bound_...`, tracking [m],
+errors [%]. `ratios` has the second table: `profile`, `base`, `scene`, `both_ok`,
+`first_plan`, `cost`.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import statistics
 import sys
 import time
-from collections.abc import Iterator, Mapping
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache, partial
+from typing import Any, NamedTuple
 
-from protocol import seed_range, versions
+from protocol import (
+    Row,
+    Trials,
+    add_file_options,
+    run,
+    seed_range,
+    versions,
+    write_document,
+)
 
 import mrmg
 from mrmg.energy import ENERGY_PRESETS, EnergyPreset
@@ -54,21 +67,22 @@ def main() -> int:
     """Run the bench; return 1 if any mission of the first profile failed."""
     options = parse_options()
     print(protocol(options))
-    rows = []
+    trials = Trials(options.output, **deciding(options))
+    rows, table = [], []
     print(header(options))
-    for scene in options.scenes:
-        of_scene = list(missions(scene, options))
+    for source in options.scenes:
+        scene = charged(mrmg.load_scene(source), options.energy)
+        of_scene = list(missions(scene, source, options, trials))
         rows += of_scene
-        print_scene(scene, of_scene, options)
+        table += print_scene(source, of_scene, options)
     if len(options.scenes) > 1:
-        print_scene("all", rows, options)
+        table += print_scene("all", rows, options)
+    ratios: list[Row] = []
     for profile in options.profile[1:]:
-        print(ratio_table(rows, options, profile))
-    if options.output:
-        text = "".join(json.dumps(row, sort_keys=True) + "\n" for row in rows)
-        options.output.write_text(text)
-    of_first = [row for row in rows if row["profile"] == options.profile[0]]
-    return 0 if all(row["ok"] for row in of_first) else 1
+        ratios += print_ratios(rows, options, profile)
+    ok = all(row["ok"] for row in rows if row["profile"] == options.profile[0])
+    write_document(options, "bench", table, ok, ratios=ratios)
+    return 0 if ok else 1
 
 
 def parse_options() -> argparse.Namespace:
@@ -89,7 +103,7 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument("--budget", type=float, help="seconds of planning")
     parser.add_argument("--execute", action="store_true", help="drive in MuJoCo too")
     parser.add_argument("--bound", action="store_true", help="compare with a bound")
-    parser.add_argument("--output", type=Path, help="JSONL file, one line a mission")
+    add_file_options(parser)
     return parser.parse_args()
 
 
@@ -97,14 +111,26 @@ def protocol(options: argparse.Namespace) -> str:
     """Return what was measured how and on what."""
     seeds = f"{options.seeds.start}-{options.seeds.stop - 1}"
     chosen = f"profile {', '.join(options.profile)}, seeds {seeds}"
-    return f"{__doc__}\n{chosen}\n{conditions(options)}\n"
+    measured = conditions(options.budget, options.energy)
+    return f"{__doc__}\n{chosen}\n{measured}\n"
 
 
-def conditions(options: argparse.Namespace) -> str:
+def conditions(budget_s: float | None = None, preset: str | None = None) -> str:
     """Return what results depend on: energy, budget, versions, machine."""
-    budget = f"budget {options.budget:g} s" if options.budget else "no time limit"
-    energy = f"energy {options.energy}; " if options.energy else ""
+    budget = f"budget {budget_s:g} s" if budget_s else "no time limit"
+    energy = f"energy {preset}; " if preset else ""
     return f"{energy}{budget}; {versions()}"
+
+
+def deciding(options: argparse.Namespace) -> dict[str, Any]:
+    """Return the options that decide what comes of every mission."""
+    step_s = profile_params(options.profile[0]).dt_s if options.bound else None
+    return {
+        "energy": options.energy,
+        "budget_s": options.budget,
+        "execute": options.execute,
+        "bound_step_s": step_s,
+    }
 
 
 def charged(scene: Scene, preset: EnergyPreset | None) -> Scene:
@@ -129,20 +155,32 @@ def problem_of(scene: Any, source: str) -> dict[str, Any]:
     }
 
 
-def missions(source: str, options: argparse.Namespace) -> Iterator[dict[str, Any]]:
-    """Yield one row for each seed and profile."""
-    scene = charged(mrmg.load_scene(source), options.energy)
+def missions(
+    scene: Scene, source: str, options: argparse.Namespace, trials: Trials
+) -> Iterator[Row]:
+    """Yield one row for each seed and profile, made where it is not finished."""
+    ready = cache(partial(warmed, scene, options))
+    for seed in options.seeds:
+        for profile in options.profile:
+            row = trials.row(
+                partial(planned, source, scene, seed, profile, ready, options),
+                source=source,
+                digest=scene.digest,
+                seed=seed,
+                profile=profile,
+            )
+            if not row["ok"]:
+                print(f"FAILED {scene.name} seed {seed}: {row}", file=sys.stderr)
+            yield row
+
+
+def warmed(scene: Scene, options: argparse.Namespace) -> float | None:
+    """Plan a scene once before anything is timed; return its bound, if asked for."""
     # All profiles run the same kernels, and the default one is the quickest to warm.
     plan_mission(scene, seed=options.seeds.start)
     step_s = profile_params(options.profile[0]).dt_s
     bounds = bounds_of(scene, step_s, finer=BOUND_FINER) if options.bound else UNKNOWN
-    bound = bounds.of(scene.objective)
-    for seed in options.seeds:
-        for profile in options.profile:
-            row = planned(source, scene, seed, profile, bound, options)
-            if not row["ok"]:
-                print(f"FAILED {scene.name} seed {seed}: {row}", file=sys.stderr)
-            yield row
+    return bounds.of(scene.objective)
 
 
 def planned(
@@ -150,17 +188,18 @@ def planned(
     scene: Any,
     seed: int,
     profile: str,
-    bound: float | None,
+    ready: Callable[[], float | None],
     options: argparse.Namespace,
-) -> dict[str, Any]:
+) -> Row:
     """Plan, verify and, if asked to, drive a mission; return its row."""
+    bound = ready()
     params = profile_params(profile, budget_s=options.budget)
     began = time.perf_counter()
     result = plan_mission(scene, seed=seed, params=params)
     row = {
         "scene": scene.name,
         "problem": problem_of(scene, source),
-        "conditions": conditions(options),
+        "conditions": conditions(options.budget, options.energy),
         "seed": seed,
         "profile": profile,
         "status": result.status.value,
@@ -227,64 +266,6 @@ def driven(scene: Any, plan: Any, plan_ok: bool) -> dict[str, Any]:
     }
 
 
-COLUMNS = (
-    "first_s median",
-    "first_s p95",
-    "plan_s median",
-    "solver share median",
-    "cost_m median",
-)
-DRIVEN = ("rms_m worst", "max_m worst", "metered% worst", "measured% worst", "x real")
-
-
-def header(options: argparse.Namespace) -> str:
-    """Return the table's head."""
-    driven_names = DRIVEN if options.execute else ()
-    bound_names = (
-        [f"cost/bound {name}" for name in (*moments(options), "median")]
-        if options.bound
-        else []
-    )
-    return " | ".join(("scene", "ok", *COLUMNS, *bound_names, *driven_names))
-
-
-def print_scene(
-    scene: str, rows: list[dict[str, Any]], options: argparse.Namespace
-) -> None:
-    """Print one line of the table for each profile."""
-    for profile in options.profile:
-        name = f"{scene} {profile}" if len(options.profile) > 1 else scene
-        of_profile = [row for row in rows if row["profile"] == profile]
-        print(table_row(name, of_profile, options), flush=True)
-
-
-def ratio_table(
-    rows: list[dict[str, Any]], options: argparse.Namespace, profile: str
-) -> str:
-    """Return how a profile compares with the first one, seed by seed."""
-    base = options.profile[0]
-    solved = {
-        (row["scene"], row["seed"], row["profile"]): row for row in rows if row["ok"]
-    }
-    lines = [f"\n{profile} / {base}", "scene | both ok | first plan | cost"]
-    scenes = sorted({row["scene"] for row in rows})
-    for names in [*([scene] for scene in scenes), scenes]:
-        pairs = [
-            (solved[scene, seed, profile], solved[scene, seed, base])
-            for scene in names
-            for seed in options.seeds
-            if {(scene, seed, profile), (scene, seed, base)} <= solved.keys()
-        ]
-        cells = [names[0] if len(names) == 1 else "all", f"{len(pairs)}"]
-        if pairs:
-            cells += [
-                f"{statistics.median(first_s(a) / first_s(b) for a, b in pairs):.1f}",
-                f"{statistics.median(a['cost_J'] / b['cost_J'] for a, b in pairs):.3f}",
-            ]
-        lines.append(" | ".join(cells))
-    return "\n".join(lines if len(scenes) > 1 else lines[:-1])
-
-
 def solver_share(row: Mapping[str, Any]) -> float:
     """Return the share of the discrete solver in the time of planning."""
     time_s = row["statistics"]["time_s"]
@@ -296,36 +277,140 @@ def first_s(row: Mapping[str, Any]) -> float:
     return float(row["statistics"]["time_s"]["first_solution"])
 
 
-def table_row(
-    scene: str, rows: list[dict[str, Any]], options: argparse.Namespace
-) -> str:
-    """Return one scene's line of the table."""
-    solved = [row for row in rows if "cost_m" in row]
-    cells = [scene, f"{sum(row['ok'] for row in rows)}/{len(rows)}"]
-    if solved:
-        first = sorted(first_s(row) for row in solved)
-        cells += [
-            f"{statistics.median(first):.3f}",
-            f"{first[min(len(first) - 1, int(0.95 * len(first)))]:.3f}",
-            f"{statistics.median(row['plan_s'] for row in solved):.3f}",
-            f"{statistics.median(map(solver_share, solved)):.2f}",
-            f"{statistics.median(row['cost_m'] for row in solved):.1f}",
+def p95(values: list[float]) -> float:
+    """Return the value that one in twenty exceeds."""
+    return sorted(values)[min(len(values) - 1, int(0.95 * len(values)))]
+
+
+class Column(NamedTuple):
+    """A column of the table: its key in JSON, its head, and what it has of a row."""
+
+    key: str
+    head: str
+    digits: int
+    of: Callable[[Row], float | None]
+    over: Callable[[list[float]], float] = statistics.median
+
+    def value(self, solved: list[Row]) -> float | None:
+        """Return the figure over solved missions; None if it was not measured."""
+        values = [x for x in map(self.of, solved) if x is not None]
+        return self.over(values) if values else None
+
+
+def of_moment(name: str, row: Row) -> float | None:
+    """Return the cost to the bound of the best plan by a time."""
+    after: dict[str, float] = row.get("cost_to_bound_after", {})
+    return after.get(name)
+
+
+COLUMNS = (
+    Column("first_s_median", "first_s median", 3, first_s),
+    Column("first_s_p95", "first_s p95", 3, first_s, p95),
+    Column("plan_s_median", "plan_s median", 3, lambda row: row["plan_s"]),
+    Column("solver_share_median", "solver share median", 2, solver_share),
+    Column("cost_m_median", "cost_m median", 1, lambda row: row["cost_m"]),
+)
+BOUND = tuple(
+    Column(
+        f"cost_to_bound_{name.replace(' ', '_')}",
+        f"cost/bound {name}",
+        3,
+        partial(of_moment, name),
+    )
+    for name in ("first", *(f"{time_s:g} s" for time_s in MOMENTS_S))
+) + (
+    Column(
+        "cost_to_bound_median",
+        "cost/bound median",
+        3,
+        lambda row: row.get("cost_to_bound"),
+    ),
+)
+DRIVEN = (
+    Column("rms_m_worst", "rms_m worst", 4, lambda row: row.get("tracking_rms_m"), max),
+    Column("max_m_worst", "max_m worst", 4, lambda row: row.get("tracking_max_m"), max),
+    Column(
+        "metered_pct_worst",
+        "metered% worst",
+        2,
+        lambda row: row.get("metered_error_pct"),
+        max,
+    ),
+    Column(
+        "measured_pct_worst",
+        "measured% worst",
+        2,
+        lambda row: row.get("measured_error_pct"),
+        max,
+    ),
+    Column("x_real_median", "x real", 0, lambda row: row.get("realtime_factor")),
+)
+
+
+def printed(options: argparse.Namespace) -> tuple[Column, ...]:
+    """Return the columns that are printed."""
+    reached = {f"cost/bound {name}" for name in (*moments(options), "median")}
+    bound = [column for column in BOUND if options.bound and column.head in reached]
+    return (*COLUMNS, *bound, *(DRIVEN if options.execute else ()))
+
+
+def header(options: argparse.Namespace) -> str:
+    """Return the table's head."""
+    return " | ".join(("scene", "ok", *(column.head for column in printed(options))))
+
+
+def print_scene(scene: str, rows: list[Row], options: argparse.Namespace) -> list[Row]:
+    """Print one line of the table for each profile; return what they say."""
+    table = []
+    for profile in options.profile:
+        name = f"{scene} {profile}" if len(options.profile) > 1 else scene
+        of_profile = [row for row in rows if row["profile"] == profile]
+        ok, runs = sum(row["ok"] for row in of_profile), len(of_profile)
+        solved = [row for row in of_profile if "cost_m" in row]
+        line: Row = {"scene": scene, "profile": profile, "ok": ok, "runs": runs}
+        for column in (*COLUMNS, *BOUND, *DRIVEN):
+            line[column.key] = column.value(solved)
+        cells = [
+            f"{line[column.key]:.{column.digits}f}"
+            for column in printed(options)
+            if line[column.key] is not None
         ]
-    if solved and options.bound:
-        for name in moments(options):
-            of_moment = [row["cost_to_bound_after"][name] for row in solved]
-            cells.append(f"{statistics.median(of_moment):.3f}")
-        cells.append(f"{statistics.median(row['cost_to_bound'] for row in solved):.3f}")
-    if solved and options.execute:
-        cells += [
-            f"{max(row['tracking_rms_m'] for row in solved):.4f}",
-            f"{max(row['tracking_max_m'] for row in solved):.4f}",
-            f"{max(row['metered_error_pct'] for row in solved):.2f}",
-            f"{max(row['measured_error_pct'] for row in solved):.2f}",
-            f"{statistics.median(row['realtime_factor'] for row in solved):.0f}",
+        print(" | ".join((name, f"{ok}/{runs}", *cells)), flush=True)
+        table.append(line)
+    return table
+
+
+def print_ratios(
+    rows: list[Row], options: argparse.Namespace, profile: str
+) -> list[Row]:
+    """Print and return how a profile compares with the first one, seed by seed."""
+    base = options.profile[0]
+    solved = {
+        (row["scene"], row["seed"], row["profile"]): row for row in rows if row["ok"]
+    }
+    print(f"\n{profile} / {base}\nscene | both ok | first plan | cost")
+    scenes = sorted({row["scene"] for row in rows})
+    table = []
+    for names in [*([scene] for scene in scenes), *([scenes] if scenes[1:] else [])]:
+        pairs = [
+            (solved[scene, seed, profile], solved[scene, seed, base])
+            for scene in names
+            for seed in options.seeds
+            if {(scene, seed, profile), (scene, seed, base)} <= solved.keys()
         ]
-    return " | ".join(cells)
+        name = names[0] if len(names) == 1 else "all"
+        line: Row = {"profile": profile, "base": base, "scene": name}
+        line |= {"both_ok": len(pairs), "first_plan": None, "cost": None}
+        cells = [name, f"{len(pairs)}"]
+        if pairs:
+            first = statistics.median(first_s(a) / first_s(b) for a, b in pairs)
+            cost = statistics.median(a["cost_J"] / b["cost_J"] for a, b in pairs)
+            line |= {"first_plan": first, "cost": cost}
+            cells += [f"{first:.1f}", f"{cost:.3f}"]
+        print(" | ".join(cells))
+        table.append(line)
+    return table
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run(main)

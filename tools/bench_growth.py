@@ -10,17 +10,21 @@ cover 12 % of it, however many there are, and stations grow with the goals, one 
 on the map of scene6, 100 x 100 m as well. Times are wall-clock, of planning in process;
 a plan counts if the verifier finds nothing wrong with it. Memory is the process's peak
 so far. The last table has one line for the missions of one size.
+
+Finished missions are kept in --output FILE: the same command goes on from there after
+an interruption. Rows of --json are those of the last table: `series`, `size`, `robots`,
+`goals`, `obstacles`, `ok` of `missions`, `first_plan_s_median`, `first_plan_s_worst`,
+`routing_s_median`, `memory_MB`.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import resource
-import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
+from functools import cache, partial
 from math import sqrt
 from pathlib import Path
 from typing import Any
@@ -28,6 +32,7 @@ from typing import Any
 import numpy as np
 import shapely
 from bench import conditions
+from protocol import Row, Trials, add_file_options, run, write_document
 from shapely import affinity
 
 import mrmg
@@ -89,14 +94,16 @@ def main() -> int:
     """Measure all chosen series; return 1 if a mission has no verified plan."""
     options = parse_options()
     chosen = [case for name in options.series for case in SERIES[name]]
-    rows = measure(chosen, range(options.seeds), options.most)
-    print(f"\n{summary(rows)}\n")
-    if options.output:
-        text = "".join(json.dumps(row, sort_keys=True) + "\n" for row in rows)
-        options.output.write_text(text)
+    options.seeds = range(options.seeds)
+    trials = Trials(options.output)
+    rows = measure(chosen, options.seeds, trials, options.most)
+    table = sizes_of(rows)
+    print(f"\n{summary(table)}\n")
     if options.figure:
         draw(rows, options.figure)
-    return 0 if all(row["ok"] for row in rows) else 1
+    ok = all(row["ok"] for row in rows)
+    write_document(options, "bench_growth", table, ok)
+    return 0 if ok else 1
 
 
 def parse_options() -> argparse.Namespace:
@@ -105,29 +112,36 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument("--series", nargs="+", default=list(SERIES), choices=SERIES)
     parser.add_argument("--seeds", type=int, default=3, help="default 3: 0, 1 and 2")
     parser.add_argument("--most", type=int, help="leave out larger sizes")
-    parser.add_argument("--output", type=Path, help="JSONL file, one line a mission")
+    add_file_options(parser)
     parser.add_argument("--figure", type=Path, help="PDF, SVG or PNG")
     return parser.parse_args()
 
 
 def measure(
-    cases: Sequence[Case], seeds: Sequence[int], most: int | None = None
-) -> list[dict[str, Any]]:
-    """Plan all cases with all seeds; print a table and return its rows."""
-    print(f"{__doc__}\n{conditions(argparse.Namespace(budget=None))}\n")
-    compile_kernels()
-    plan_mission(mrmg.load_scene("quickstart"))  # the first mission loads much
+    cases: Sequence[Case], seeds: range, trials: Trials, most: int | None = None
+) -> list[Row]:
+    """Plan what is not finished; print a table of all and return its rows."""
+    print(f"{__doc__}\n{conditions()}\n")
     print("grows | size | seed | ok | init s | router s | first plan s | cost J | MB")
     rows = []
     for case in cases:
         for seed in seeds if most is None or case.size <= most else ():
-            rows.append(planned(case, seed))
+            make = partial(planned, case, seed)
+            rows.append(trials.row(make, **asdict(case), seed=seed))
             print(table_row(rows[-1]), flush=True)
     return rows
 
 
-def planned(case: Case, seed: int) -> dict[str, Any]:
+@cache
+def warm() -> None:
+    """Compile kernels, and plan the first mission, which loads much."""
+    compile_kernels()
+    plan_mission(mrmg.load_scene("quickstart"))
+
+
+def planned(case: Case, seed: int) -> Row:
     """Generate, plan and verify one mission; return its row."""
+    warm()
     scene = scene_from_document(document_of(case, seed), source=f"{case}")
     params = replace(PlannerParams(), improvements=0)
     began = time.perf_counter()
@@ -144,7 +158,7 @@ def planned(case: Case, seed: int) -> dict[str, Any]:
         "reason": result.reason,
         "plan_s": time.perf_counter() - began,
         "time_s": dict(result.statistics["time_s"]),
-        "conditions": conditions(argparse.Namespace(budget=None)),
+        "conditions": conditions(),
         "ok": False,
     }
     if result.plan is not None:
@@ -154,7 +168,7 @@ def planned(case: Case, seed: int) -> dict[str, Any]:
     return row
 
 
-def table_row(row: dict[str, Any]) -> str:
+def table_row(row: Row) -> str:
     """Return one line of the table."""
     first_s = row["time_s"].get("first_solution", np.nan)
     return (
@@ -165,32 +179,50 @@ def table_row(row: dict[str, Any]) -> str:
     )
 
 
-def summary(rows: Sequence[dict[str, Any]]) -> str:
+def sizes_of(rows: Sequence[Row]) -> list[Row]:
+    """Return what the missions of each size came to."""
+    sizes: dict[tuple[str, int], list[Row]] = {}
+    for row in rows:
+        sizes.setdefault((row["series"], row["size"]), []).append(row)
+    table = []
+    for same in sizes.values():
+        times = [row["time_s"] for row in same]
+        first_s = [each.get("first_solution", np.nan) for each in times]
+        routing_s = [each.get("routing", np.nan) for each in times]
+        of_all = ("series", "size", "robots", "goals", "obstacles")
+        line: Row = {key: same[0][key] for key in of_all}
+        table.append(
+            line
+            | {
+                "ok": sum(row["ok"] for row in same),
+                "missions": len(same),
+                "first_plan_s_median": np.median(first_s),
+                "first_plan_s_worst": np.max(first_s),
+                "routing_s_median": np.median(routing_s),
+                "memory_MB": max(row["memory_MB"] for row in same),
+            }
+        )
+    return table
+
+
+def summary(table: Sequence[Row]) -> str:
     """Return a table for documents: the missions of one size in a line."""
     lines = [
         "| grows | robots | goals | obstacles | ok | first plan: median, worst [s] "
         "| routing [s] | memory [MB] |",
         "|---" * 8 + "|",
     ]
-    sizes: dict[tuple[str, int], list[dict[str, Any]]] = {}
-    for row in rows:
-        sizes.setdefault((row["series"], row["size"]), []).append(row)
-    for (series, _), same in sizes.items():
-        times = [row["time_s"] for row in same]
-        first_s = [each.get("first_solution", np.nan) for each in times]
-        routing_s = [each.get("routing", np.nan) for each in times]
-        lines.append(
-            f"| {series} | {same[0]['robots']} | {same[0]['goals']} "
-            f"| {same[0]['obstacles']} "
-            f"| {sum(row['ok'] for row in same)} of {len(same)} "
-            f"| {np.median(first_s):.2f}, {np.max(first_s):.2f} "
-            f"| {np.median(routing_s):.2f} "
-            f"| {max(row['memory_MB'] for row in same):.0f} |"
-        )
+    lines += [
+        f"| {row['series']} | {row['robots']} | {row['goals']} | {row['obstacles']} "
+        f"| {row['ok']} of {row['missions']} "
+        f"| {row['first_plan_s_median']:.2f}, {row['first_plan_s_worst']:.2f} "
+        f"| {row['routing_s_median']:.2f} | {row['memory_MB']:.0f} |"
+        for row in table
+    ]
     return "\n".join(lines)
 
 
-def draw(rows: Sequence[dict[str, Any]], path: Path) -> None:
+def draw(rows: Sequence[Row], path: Path) -> None:
     """Draw the series that grow."""
     series: dict[str, list[GrowthPoint]] = {}
     for row in rows:
@@ -273,4 +305,4 @@ def _free_boxes(
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run(main)

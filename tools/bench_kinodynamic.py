@@ -8,6 +8,11 @@ and with robots that have arrived included: `mrmg.verify` judges that, with true
 headings. As the files bound only the centres of robots, the bounds are wider by half a
 robot, so that centres stay within the file's. A file that is called infeasible must be
 answered so.
+
+Finished plans are kept in --output FILE: the same command goes on from there after an
+interruption. Rows of --json: `file`, `solved` of `runs`, `plan_s_median`, `plan_s_p95`,
+`makespan_s_median`, `to_straight_line`; for a file that is called infeasible `status`
+and `reason` of the last answer.
 """
 
 from __future__ import annotations
@@ -17,14 +22,17 @@ import statistics
 import sys
 import tempfile
 import time
+from collections.abc import Callable
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import yaml
-from protocol import seed_range
+from protocol import Row, Trials, add_file_options, run, seed_range, write_document
 
 import mrmg
+from mrmg import storage
 from mrmg.mission import PlanStatus
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.scene.loading import scene_from_document
@@ -64,48 +72,82 @@ def main() -> int:
     parser.add_argument(
         "--seeds", type=seed_range, default="0-9", help="first-last, default 0-9"
     )
+    add_file_options(parser)
     options = parser.parse_args()
     files = sorted(p for p in options.folder.glob("*.yaml") if options.only in p.name)
     if not files:
         print(f"no benchmark files in {options.folder}", file=sys.stderr)
         return 1
     print(__doc__)
+    trials = Trials(options.output)
     print("file | solved | plan_s median | p95 | makespan_s median | / straight line")
     with tempfile.TemporaryDirectory() as folder:
-        solved = [bench(path, options.seeds, Path(folder)) for path in files]
-    return 0 if all(solved) else 1
+        table = [bench(path, options.seeds, Path(folder), trials) for path in files]
+    ok = all(row["solved"] == row["runs"] for row in table)
+    write_document(options, "bench_kinodynamic", table, ok)
+    return 0 if ok else 1
 
 
-def bench(path: Path, seeds: range, folder: Path) -> bool:
-    """Plan one file for all seeds; tell whether all answers were right."""
+def bench(path: Path, seeds: range, folder: Path, trials: Trials) -> Row:
+    """Plan one file for all seeds; print and return its row."""
     scene = benchmark_scene(path, folder)
-    plan_mission(scene, seed=seeds.start, params=PARAMS)
-    infeasible = path.stem.startswith("infeasible")
-    times, makespans, right = [], [], 0
+    ready = cache(partial(plan_mission, scene, seed=seeds.start, params=PARAMS))
+    digest = storage.bytes_digest(path.read_bytes())
+    rows = []
     for seed in seeds:
-        began = time.perf_counter()
-        result = plan_mission(scene, seed=seed, params=PARAMS)
-        times.append(time.perf_counter() - began)
-        if infeasible:
-            right += result.status is PlanStatus.INFEASIBLE
-        elif result.plan is not None:
-            verdict = mrmg.verify(scene, result.plan)
-            right += verdict.ok
-            makespans.append(result.plan.makespan_s)
-            if not verdict.ok:
-                print(f"seed {seed}: {verdict.violations[0].message}", file=sys.stderr)
-        else:
-            print(f"seed {seed}: {result.reason}", file=sys.stderr)
-    late = sorted(times)[int(0.95 * (len(times) - 1))]
-    middle_s = statistics.median(times)
-    row = f"{path.stem} | {right}/{len(times)} | {middle_s:.2f} | {late:.2f}"
+        make = partial(planned, path.stem, scene, seed, ready)
+        rows.append(trials.row(make, file=path.stem, digest=digest, seed=seed))
+        if not rows[-1]["ok"]:
+            print(f"seed {seed}: {rows[-1]['fault']}", file=sys.stderr)
+    times = sorted(row["plan_s"] for row in rows)
+    makespans = [row["makespan_s"] for row in rows if row["makespan_s"] is not None]
+    middle_s = statistics.median(makespans) if makespans else None
+    infeasible = is_infeasible(path.stem)
+    line: Row = {
+        "file": path.stem,
+        "solved": sum(row["ok"] for row in rows),
+        "runs": len(rows),
+        "plan_s_median": statistics.median(times),
+        "plan_s_p95": times[int(0.95 * (len(times) - 1))],
+        "makespan_s_median": middle_s,
+        "to_straight_line": middle_s and middle_s / straight_line_s(scene),
+        "status": rows[-1]["status"] if infeasible else None,
+        "reason": rows[-1]["reason"] if infeasible else None,
+    }
+    cells = "{file} | {solved}/{runs} | {plan_s_median:.2f} | {plan_s_p95:.2f}"
     if infeasible:
-        print(f"{row} | {result.status.value}: {result.reason}", flush=True)
-    else:
-        middle = statistics.median(makespans) if makespans else float("nan")
-        share = middle / straight_line_s(scene)
-        print(f"{row} | {middle:.1f} | {share:.2f}", flush=True)
-    return right == len(times)
+        cells += " | {status}: {reason}"
+    elif makespans:
+        cells += " | {makespan_s_median:.1f} | {to_straight_line:.2f}"
+    print(cells.format(**line), flush=True)
+    return line
+
+
+def is_infeasible(name: str) -> bool:
+    """Tell whether a benchmark must be answered by its infeasibility."""
+    return name.startswith("infeasible")
+
+
+def planned(name: str, scene: Scene, seed: int, ready: Callable[[], Any]) -> Row:
+    """Plan a file with one seed and judge the answer; return its row."""
+    ready()
+    began = time.perf_counter()
+    result = plan_mission(scene, seed=seed, params=PARAMS)
+    row: Row = {
+        "file": name,
+        "seed": seed,
+        "status": result.status.value,
+        "reason": result.reason,
+        "plan_s": time.perf_counter() - began,
+        "makespan_s": None,
+        "ok": is_infeasible(name) and result.status is PlanStatus.INFEASIBLE,
+        "fault": result.reason,
+    }
+    if result.plan is not None and not is_infeasible(name):
+        verdict = mrmg.verify(scene, result.plan)
+        fault = verdict.violations[0].message if verdict.violations else ""
+        row.update(makespan_s=result.plan.makespan_s, ok=verdict.ok, fault=fault)
+    return row
 
 
 def straight_line_s(scene: Scene) -> float:
@@ -185,4 +227,4 @@ def robot_model(entry: dict[str, Any], folder: Path) -> tuple[str, float]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run(main)

@@ -3,24 +3,24 @@
 Protocol: each map is scaled to a longest side of 100 m and populated once, with robots,
 goals and five charging stations; what follows is that of `tools/bench`, one row a map.
 The maps of the default are narrow ones.
+
+Finished missions are kept in --output FILE: the same command goes on from there after
+an interruption. Rows of --json are those of `tools/bench`, with the map's name as
+`scene`.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import sys
-import tempfile
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import bench
-from protocol import seed_range
+from protocol import Row, Trials, add_file_options, run, seed_range, write_document
 
-from mrmg import storage
 from mrmg.authoring import import_map, populate
-from mrmg.scene.loading import dump_scene, scene_from_document
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.types import Scene
 
 FOLDER = Path(__file__).resolve().parents[2] / "shared" / "maps"
 
@@ -39,17 +39,19 @@ def main() -> int:
         return 2
     print(f"{__doc__}\n{options.robots} robots, {options.goals} goals, "
           f"placement {options.placement}\n\n{bench.protocol(options)}")  # fmt: skip
+    trials = Trials(options.output, **bench.deciding(options))
+    rows: list[Row] = []
+    table: list[Row] = []
     print(bench.header(options))
-    rows = []
-    with tempfile.TemporaryDirectory() as folder:
-        for path in options.maps:
-            of_map = list(missions(path, Path(folder), options))
-            rows += of_map
-            bench.print_scene(path.stem, of_map, options)
-    if options.output:
-        text = "".join(json.dumps(row, sort_keys=True) + "\n" for row in rows)
-        options.output.write_text(text)
-    return 0 if all(row["ok"] for row in rows) else 1
+    for path in options.maps:
+        of_map = list(
+            bench.missions(populated(path, options), str(path), options, trials)
+        )
+        rows += of_map
+        table += bench.print_scene(path.stem, of_map, options)
+    ok = all(row["ok"] for row in rows)
+    write_document(options, "bench_maps", table, ok)
+    return 0 if ok else 1
 
 
 def parse_options() -> argparse.Namespace:
@@ -65,29 +67,21 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument("--budget", type=float, help="seconds of planning")
     parser.add_argument("--execute", action="store_true", help="drive in MuJoCo too")
     parser.add_argument("--bound", action="store_true", help="compare with a bound")
-    parser.add_argument("--output", type=Path, help="JSONL file, one line a mission")
-    options = parser.parse_args()
-    options.profile = ["default"]
-    return options
+    add_file_options(parser)
+    parser.set_defaults(profile=["default"], energy=None)
+    return parser.parse_args()
 
 
-def missions(
-    path: Path, folder: Path, options: argparse.Namespace
-) -> Iterator[dict[str, Any]]:
-    """Yield one row of the bench for each seed on a map."""
+def populated(path: Path, options: argparse.Namespace) -> Scene:
+    """Return the scene of a map."""
     document = populate(
         import_map(path),
         robots=options.robots,
         goals=options.goals,
         seed=options.placement,
     )
-    scene = folder / f"{path.stem}.yaml"
-    text = dump_scene(scene_from_document(document, source=str(path)))
-    storage.write_text(scene, text)
-    for row in bench.missions(str(scene), options):
-        row["problem"]["source"] = str(path)
-        yield row
+    return scene_from_document(document, source=str(path))
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run(main)

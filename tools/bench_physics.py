@@ -21,19 +21,37 @@ Missions are kept in the file --output and trials in the folder --runs: the same
 goes on from there after an interruption. What was made with other sources, models,
 scenes, versions or on another processor is not used. The last table names each figure,
 what was found and what is asked: PASS or FAIL; the exit code is 1 if any fails.
+
+Rows of --json: `scene`, `robots`, `feasible` of `missions`, errors `metered_pct_...`
+and `measured_pct_...` (`median`, `worst`), `rms_m_worst`, `max_m_worst`,
+`x_real_processor`, `x_real_clock`, `control_ms_median`, `control_ms_p99_worst`,
+`faults`. `yaw` has the circles: `robot`, `turn`, `unit`, `speeds_m_s`, `errors_pct`,
+`worst_pct`. `disturbances` has the trials: `scene`, `plans`, `disturb`, `replan`,
+`feasible` of `trials`, `interval_95`, `charge_worst`, `charge_median`, `failures` by
+cause, `least` share that must be feasible. `figures` has the last table: `what`,
+`found`, `asked`, `holds`, `value`, `limit`.
 """
 
 from __future__ import annotations
 
 import argparse
-import sys
+from dataclasses import asdict
 from pathlib import Path
 
-from physics.figures import print_figures
+from physics.figures import Figure, print_figures
 from physics.missions import mission_figures
 from physics.trials import TrialOptions, disturbance_figures
 from physics.yaw import yaw_figures
-from protocol import seed_range, state, versions
+from protocol import (
+    Row,
+    Trials,
+    add_file_options,
+    run,
+    seed_range,
+    state,
+    versions,
+    write_document,
+)
 
 from mrmg import shipped
 
@@ -43,13 +61,14 @@ def main() -> int:
     options = parse_options()
     seeds = f"seeds {options.seeds.start}-{options.seeds.stop - 1}"
     print(f"{__doc__}\n{seeds}; {versions()}; state {state()}", flush=True)
-    figures = []
+    parts: list[tuple[list[Figure], list[Row]]] = [([], []), ([], []), ([], [])]
     if options.scenes:
-        figures += mission_figures(
-            options.scenes, options.seeds, options.output, options.workers
+        finished = Trials(options.output)
+        parts[0] = mission_figures(
+            options.scenes, options.seeds, finished, options.workers
         )
     if not options.no_yaw:
-        figures += yaw_figures()
+        parts[1] = yaw_figures()
     if options.disturb:
         trials = TrialOptions(
             trials=options.trials,
@@ -57,9 +76,21 @@ def main() -> int:
             workers=options.workers,
             runs=options.runs,
         )
-        figures += disturbance_figures(trials)
+        parts[2] = disturbance_figures(trials)
+    figures = [figure for found, _ in parts for figure in found]
     print_figures(figures)
-    return 0 if all(figure.holds for figure in figures) else 1
+    ok = all(figure.holds for figure in figures)
+    (_, rows), (_, yaw), (_, disturbances) = parts
+    write_document(
+        options,
+        "bench_physics",
+        rows,
+        ok,
+        yaw=yaw,
+        disturbances=disturbances,
+        figures=list(map(asdict, figures)),
+    )
+    return 0 if ok else 1
 
 
 def parse_options() -> argparse.Namespace:
@@ -75,7 +106,7 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument(
         "--seeds", type=seed_range, default="0-9", help="first-last, default 0-9"
     )
-    parser.add_argument("--output", type=Path, help="JSONL file, one line a mission")
+    add_file_options(parser)
     parser.add_argument("--no-yaw", action="store_true", help="leave out yaw rates")
     parser.add_argument("--disturb", action="store_true", help="robustness, too")
     parser.add_argument("--trials", type=int, default=100, help="of each row of it")
@@ -101,4 +132,4 @@ def parse_options() -> argparse.Namespace:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run(main)

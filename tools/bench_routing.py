@@ -5,20 +5,26 @@ table is of generated missions on 100 x 100 m of uneven ground whose cheapest to
 recharge at least once, against exact tours. The second is of Green VRP instances
 (closed routes of any number of vehicles, dwell and route time limits, stations
 revisited freely) against proven optima; it needs their folder.
+
+Finished missions are kept in --output FILE: the same command goes on from there after
+an interruption. Rows of --json: `router`, `within_1_pct` and `optimal` of `missions`,
+`worst_gap_pct`, `median_s`, `slowest_s`. `instances` has the second table: `instance`,
+`proven`, `found` [miles], `routes`, `seconds`.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from protocol import Row, Trials, add_file_options, run, write_document
 
+from mrmg import storage
 from mrmg.planning.bound.exact_tours import exact_routing
 from mrmg.planning.routers import route
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
@@ -58,37 +64,59 @@ def main() -> int:
     """Run the bench; return 1 if a target is missed."""
     options = parse_options()
     print(f"{__doc__}\n")
-    rows = against_exact(options.instances)
+    trials = Trials(options.output)
+    rows, table = against_exact(options.instances, trials)
+    instances: list[Row] = []
     if options.folder.is_dir():
-        rows += against_proven(options.folder, RouterParams(rounds=options.rounds))
+        params = RouterParams(rounds=options.rounds)
+        instances = against_proven(options.folder, params, trials)
     else:
         print(f"\nno Green VRP instances: {options.folder} is not there")
-    if options.output:
-        text = "".join(json.dumps(row, sort_keys=True) + "\n" for row in rows)
-        options.output.write_text(text)
-    held = [row for row in rows if row["router"] != "nrpa"]
-    return 0 if all(row["gap"] <= row["allowed"] for row in held) else 1
+    held = [row for row in rows + instances if row["router"] != "nrpa"]
+    ok = all(row["gap"] <= row["allowed"] for row in held)
+    keys = ("instance", "proven", "found", "routes", "seconds")
+    shown = [{key: row[key] for key in keys} for row in instances]
+    write_document(options, "bench_routing", table, ok, instances=shown)
+    return 0 if ok else 1
 
 
-def against_exact(instances: int) -> list[dict[str, Any]]:
-    """Compare the routers on generated missions; print and return their rows."""
+def against_exact(instances: int, trials: Trials) -> tuple[list[Row], list[Row]]:
+    """Compare the routers on generated missions; return all rows, and the table's."""
     cases = list(generated(instances))
-    rows = []
+    rows, table = [], []
     print("router | within 1 % | optimal | worst gap | median s | slowest s")
     for params in COMPARED:
-        route(cases[0][1], params, 0)
-        of_router = [compared(params, *case) for case in cases]
+        ready = cache(partial(route, cases[0][1], params, 0))
+        of_router = [
+            trials.row(
+                partial(compared, ready, params, *case),
+                router=params.method,
+                mission=case[0],
+            )
+            for case in cases
+        ]
         rows += of_router
-        print(generated_row(params.method, of_router), flush=True)
-    return rows
+        table.append(generated_row(params.method, of_router))
+        print(
+            "{router} | {within_1_pct}/{missions} | {optimal} | {worst_gap_pct:.2f} % "
+            "| {median_s:.4f} | {slowest_s:.4f}".format(**table[-1]),
+            flush=True,
+        )
+    return rows, table
 
 
-def against_proven(folder: Path, params: RouterParams) -> list[dict[str, Any]]:
+def against_proven(folder: Path, params: RouterParams, trials: Trials) -> list[Row]:
     """Solve the Green VRP instances; print and return their rows."""
     rows = []
     print("\ninstance | proven | found | routes | s")
     for name, optimum in PROVEN.items():
-        row = green_row(folder / f"{name}.txt", optimum, params)
+        path = folder / f"{name}.txt"
+        row = trials.row(
+            partial(green_row, path, optimum, params),
+            instance=name,
+            digest=storage.bytes_digest(path.read_bytes()),
+            rounds=params.rounds,
+        )
         rows.append(row)
         print(
             f"{name} | {optimum} | {row['found']:.2f} | {row['routes']} | "
@@ -106,7 +134,7 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument(
         "--rounds", type=int, default=10_000, help="of the search on Green VRP"
     )
-    parser.add_argument("--output", type=Path, help="JSONL file")
+    add_file_options(parser)
     return parser.parse_args()
 
 
@@ -177,9 +205,14 @@ def uneven_mission(
 
 
 def compared(
-    params: RouterParams, seed: int, problem: RoutingArrays, optimum: float
-) -> dict[str, Any]:
-    """Solve one mission."""
+    ready: Callable[[], Any],
+    params: RouterParams,
+    seed: int,
+    problem: RoutingArrays,
+    optimum: float,
+) -> Row:
+    """Solve one mission, with a router that has been at work before."""
+    ready()
     began = time.perf_counter()
     routing = route(problem, params, seed)
     return {
@@ -191,17 +224,22 @@ def compared(
     }
 
 
-def generated_row(name: str, rows: list[dict[str, Any]]) -> str:
-    """Return one router's line of the table."""
+def generated_row(name: str, rows: list[Row]) -> Row:
+    """Return one router's row of the table."""
     gap = np.array([row["gap"] for row in rows])
     seconds = np.array([row["seconds"] for row in rows])
-    return (
-        f"{name} | {(gap <= 0.01).sum()}/{len(gap)} | {(gap <= 1e-9).sum()} | "
-        f"{100 * gap.max():.2f} % | {np.median(seconds):.4f} | {seconds.max():.4f}"
-    )
+    return {
+        "router": name,
+        "missions": len(gap),
+        "within_1_pct": (gap <= 0.01).sum(),
+        "optimal": (gap <= 1e-9).sum(),
+        "worst_gap_pct": 100.0 * gap.max(),
+        "median_s": np.median(seconds),
+        "slowest_s": seconds.max(),
+    }
 
 
-def green_row(path: Path, optimum: float, params: RouterParams) -> dict[str, Any]:
+def green_row(path: Path, optimum: float, params: RouterParams) -> Row:
     """Solve a Green VRP instance."""
     problem = read_green_vrp(path)
     began = time.perf_counter()
@@ -256,4 +294,4 @@ def haversine(point: np.ndarray) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run(main)

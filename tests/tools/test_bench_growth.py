@@ -42,6 +42,8 @@ def test_rows_and_figure(
     output, figure = tmp_path / "rows.jsonl", tmp_path / "growth.svg"
     arguments = ["bench_growth", "--series", "robots", "--seeds", "1"]
     arguments += ["--output", str(output), "--figure", str(figure)]
+    document = tmp_path / "growth.json"
+    arguments += ["--json", str(document)]
     monkeypatch.setattr(sys, "argv", arguments)
     monkeypatch.setattr(bench_growth, "SERIES", {"robots": TINY})
     assert bench_growth.main() == 0
@@ -50,6 +52,9 @@ def test_rows_and_figure(
     assert all(row["ok"] and row["time_s"]["first_solution"] > 0.0 for row in rows)
     assert "time to the first plan" in figure.read_text()
     assert "robots | 2 | 0 | yes" in capsys.readouterr().out
+    written = json.loads(document.read_text())
+    assert [(row["size"], row["ok"]) for row in written["rows"]] == [(1, 1), (2, 1)]
+    assert written["ok"] is True
 
 
 def test_the_summary_has_a_line_for_the_missions_of_one_size() -> None:
@@ -61,7 +66,7 @@ def test_the_summary_has_a_line_for_the_missions_of_one_size() -> None:
         }  # fmt: skip
 
     rows = [row(2, 0.5), row(2, 0.7), row(2, 1.5, ok=False), row(4, 2.0)]
-    lines = bench_growth.summary(rows).splitlines()
+    lines = bench_growth.summary(bench_growth.sizes_of(rows)).splitlines()
     assert lines[2] == "| robots | 2 | 20 | 50 | 2 of 3 | 0.70, 1.50 | 0.25 | 250 |"
     assert lines[3] == "| robots | 4 | 20 | 50 | 1 of 1 | 2.00, 2.00 | 0.25 | 250 |"
     assert {line.count("|") for line in lines} == {9}

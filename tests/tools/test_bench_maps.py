@@ -33,6 +33,7 @@ def test_the_bench_plans_on_a_map_and_writes_rows(
     path, output = tmp_path / "hall.txt", tmp_path / "rows.jsonl"
     path.write_text(MAP)
     options = ["--robots", "2", "--goals", "3", "--seeds", "0-1"]
+    options += ["--json", str(tmp_path / "maps.json")]
     monkeypatch.setattr(
         sys, "argv", ["bench", str(path), *options, "--output", str(output)]
     )
@@ -44,6 +45,10 @@ def test_the_bench_plans_on_a_map_and_writes_rows(
         assert row["problem"]["source"] == str(path)
         assert (row["problem"]["robots"], row["problem"]["goals"]) == (2, 3)
         assert row["violations"] == 0
+    written = json.loads((tmp_path / "maps.json").read_text())
+    (line,) = written["rows"]
+    assert (line["scene"], line["ok"], line["runs"]) == ("hall", 2, 2)
+    assert written["protocol"]["maps"] == [str(path)]
 
 
 def test_a_map_that_is_not_there_is_named(

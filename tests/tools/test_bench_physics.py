@@ -149,21 +149,6 @@ def test_every_figure_is_told_and_judged(
     assert told.endswith("1 figures FAIL\n")
 
 
-def test_rows_are_kept_for_the_same_state_only(
-    bench: SimpleNamespace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "rows.jsonl"
-    first = bench.missions.Kept.of(path)
-    assert first.rows == {}
-    mine = first.add(row(3, scene="a"))
-    path.write_text(path.read_text() + '{"broken')
-    again = bench.missions.Kept.of(path)
-    assert again.rows == {("a", 3): mine}
-    assert "broken" not in path.read_text()
-    monkeypatch.setattr(bench.missions, "state", lambda: "another")
-    assert bench.missions.Kept.of(path).rows == {}
-
-
 def test_rows_that_nothing_is_asked_of_are_told_but_not_judged(
     bench: SimpleNamespace,
     capsys: pytest.CaptureFixture[str],
@@ -176,10 +161,11 @@ def test_rows_that_nothing_is_asked_of_are_told_but_not_judged(
     monkeypatch.setattr(
         trials, "study_of", lambda _, kind, __: study(10 if kind.least else 1, 10)
     )
-    figures = trials.disturbance_figures(None)
+    figures, table = trials.disturbance_figures(None)
     told = capsys.readouterr().out.splitlines()
     rows = [line.split(" | ") for line in told if line.startswith("scene")][1:]
     assert {row[4]: row[-1] for row in rows} == {"10/10": "holds", "1/10": "not judged"}
+    assert [line["feasible"] for line in table] == [10, 1, 10, 1, 10] * 2
     names = [figure.what for figure in figures]
     assert len(names) == 2 * 3 + 2
     assert all(figure.holds for figure in figures)
@@ -192,7 +178,12 @@ def test_a_mission_without_plan_is_told_and_breaks_nothing(
 ) -> None:
     lost = {"seed": 4, "fleet": 2, "feasible": False, "reasons": ["x"], "robots": []}
     assert bench.missions.faults_of([lost]) == ["seed 4 infeasible"]
-    assert bench.missions.cells("somewhere", [lost]) == ["somewhere", "2", "0/1"]
+    line = bench.missions.line_of("somewhere", [lost])
+    assert bench.missions.cells(line) == ["somewhere", "2", "0/1"]
+    assert line["rms_m_worst"] is None
+    driven = bench.missions.line_of("somewhere", [row(0), lost])
+    assert driven.keys() == line.keys()
+    assert (driven["rms_m_worst"], driven["x_real_clock"]) == (0.003, 10.0)
     assert bench.missions.faults_of([row(0), lost]) == ["seed 4 infeasible"]
 
 
@@ -212,7 +203,9 @@ def test_the_quickstart_is_driven_kept_and_not_driven_again(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     output = tmp_path / "rows.jsonl"
+    document = tmp_path / "bench.json"
     arguments = ["--scenes", "quickstart", "--no-yaw", "--output", str(output)]
+    arguments += ["--json", str(document)]
     monkeypatch.setattr(sys, "argv", ["bench", *arguments, "--seeds", "0-1"])
     code = bench.script.main()
     told = capsys.readouterr().out
@@ -231,7 +224,14 @@ def test_the_quickstart_is_driven_kept_and_not_driven_again(
         sys, "argv", ["bench", *arguments, "--seeds", "0-2", "--workers", "2"]
     )
     bench.script.main()
-    assert f"2 of 3 missions are in {output}" in capsys.readouterr().out
+    assert f"2 trials are in {output}" in capsys.readouterr().out
     more = [json.loads(item) for item in output.read_text().splitlines()]
     assert more[:2] == rows
     assert [item["seed"] for item in more] == [0, 1, 2]
+    written = json.loads(document.read_text())
+    assert written["protocol"]["seeds"] == [0, 1, 2]
+    assert written["ok"] == all(figure["holds"] for figure in written["figures"])
+    assert (written["yaw"], written["disturbances"]) == ([], [])
+    (line,) = written["rows"]
+    assert (line["scene"], line["feasible"], line["missions"]) == ("quickstart", 3, 3)
+    assert 0.0 < line["measured_pct_worst"] < 4.0

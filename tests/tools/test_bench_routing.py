@@ -62,6 +62,7 @@ def test_the_bench_prints_tables_and_writes_rows(
 ) -> None:
     output = tmp_path / "rows.jsonl"
     options = ["--instances", "5", "--folder", str(tmp_path / "none")]
+    options += ["--json", str(tmp_path / "routing.json")]
     monkeypatch.setattr(sys, "argv", ["bench", *options, "--output", str(output)])
     assert bench_routing.main() == 0
     printed = capsys.readouterr().out
@@ -70,3 +71,8 @@ def test_the_bench_prints_tables_and_writes_rows(
     rows = [json.loads(line) for line in output.read_text().splitlines()]
     assert len(rows) == 15
     assert all(row["gap"] <= 1e-9 for row in rows if row["router"] == "exact")
+    written = json.loads((tmp_path / "routing.json").read_text())
+    assert [row["router"] for row in written["rows"]] == ["nrpa", "search", "exact"]
+    assert [row["missions"] for row in written["rows"]] == [5, 5, 5]
+    assert written["rows"][2]["optimal"] == 5
+    assert written["instances"] == []

@@ -20,6 +20,11 @@ def test_other_words_are_no_seeds() -> None:
         seed_range("some")
 
 
+def test_no_seeds_are_refused() -> None:
+    with pytest.raises(ValueError, match="no seeds from 5 to 3"):
+        seed_range("5-3")
+
+
 def test_versions_name_packages_python_and_processor() -> None:
     told = versions()
     assert "mujoco " in told

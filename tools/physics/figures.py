@@ -8,28 +8,37 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """One figure: what it is of, what was found, what is asked, whether that holds."""
+    """One figure: what it is of, what was found, what is asked, whether that holds.
+
+    Attributes:
+        what, found, asked, holds: as they are printed.
+        value, limit: found and asked as numbers, where they are.
+    """
 
     what: str
     found: str
     asked: str
     holds: bool
+    value: float | None = None
+    limit: float | None = None
 
     @staticmethod
     def at_most(what: str, value: float, bound: float, unit: str = "") -> Figure:
         """Return a figure that must not exceed a bound."""
-        return Figure(what, f"{value:.3g}{unit}", f"<= {bound:g}{unit}", value <= bound)
+        found, asked = f"{value:.3g}{unit}", f"<= {bound:g}{unit}"
+        return Figure(what, found, asked, value <= bound, value, bound)
 
     @staticmethod
     def at_least(what: str, value: float, bound: float, unit: str = "") -> Figure:
         """Return a figure that must reach a bound."""
-        return Figure(what, f"{value:.3g}{unit}", f">= {bound:g}{unit}", value >= bound)
+        found, asked = f"{value:.3g}{unit}", f">= {bound:g}{unit}"
+        return Figure(what, found, asked, value >= bound, value, bound)
 
     @staticmethod
     def count(what: str, found: int, of: int, least: int) -> Figure:
         """Return how many of a number hold, of which so many must."""
         asked = "all" if least == of else f">= {least}/{of}"
-        return Figure(what, f"{found}/{of}", asked, found >= least)
+        return Figure(what, f"{found}/{of}", asked, found >= least, found, least)
 
 
 def verdict(faults: Iterable[str]) -> str:

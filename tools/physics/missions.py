@@ -1,31 +1,25 @@
 """Missions of scenes and seeds: planned, verified, driven, audited, and judged.
 
-A row is what one mission came to. Rows are kept in a file, if one is given, and are not
-made twice in the same state of the project.
+A row is what one mission came to; a line of the table is what those of a scene did.
 """
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 import statistics
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from functools import cache
 from importlib import import_module
-from pathlib import Path
-from typing import Any
 
-from protocol import state
+from protocol import Row, Trials
 
 import mrmg
 from mrmg.execution.controller import controller_maker
 from mrmg.planning import plan_mission
 from physics.figures import Figure, verdict
 
-Row = dict[str, Any]
 Job = tuple[str, int]
 """Scene and seed."""
 
@@ -41,6 +35,13 @@ HEAD = (
     "worst", "rms m worst", "max m worst", "x real (processor)", "(clock)",
     "control ms median", "p99 worst", "",
 )  # fmt: skip
+
+PRINTED = {
+    "metered_pct_median": 2, "metered_pct_worst": 2, "measured_pct_median": 2,
+    "measured_pct_worst": 2, "rms_m_worst": 4, "max_m_worst": 4, "x_real_processor": 0,
+    "x_real_clock": 0, "control_ms_median": 2, "control_ms_p99_worst": 2,
+}  # fmt: skip
+"""Figures of a line by their keys, and how many decimals are printed."""
 
 
 def mission(job: Job) -> Row:
@@ -90,79 +91,44 @@ def _warm(source: str) -> None:
         controller_maker("mpc")(robot.model)
 
 
-@dataclass(frozen=True, slots=True)
-class Kept:
-    """Rows that were made before, in a file of JSON lines.
-
-    Attributes:
-        rows: of the present state of the project.
-        path: where new ones go; None to keep none.
-    """
-
-    rows: dict[Job, Row]
-    path: Path | None
-
-    @staticmethod
-    def of(path: Path | None) -> Kept:
-        """Read a file, and drop from it what is of another state or broken."""
-        rows: dict[Job, Row] = {}
-        if path is not None and path.exists():
-            for line in path.read_text().splitlines():
-                try:
-                    row = json.loads(line)
-                    if row.pop("state") == state():
-                        rows[row["scene"], row["seed"]] = row
-                except (ValueError, KeyError):
-                    continue
-        kept = Kept(rows, path)
-        if path is not None:
-            path.write_text("".join(map(_line, rows.values())))
-        return kept
-
-    def add(self, row: Row) -> Row:
-        """Keep and return a new row."""
-        if self.path is not None:
-            with self.path.open("a") as file:
-                file.write(_line(row))
-        return row
-
-
-def _line(row: Row) -> str:
-    return json.dumps({**row, "state": state()}, sort_keys=True) + "\n"
-
-
 def mission_figures(
-    scenes: Sequence[str], seeds: range, output: Path | None, workers: int
-) -> list[Figure]:
-    """Drive what is missing, print a row per scene, and return what all came to."""
-    kept = Kept.of(output)
+    scenes: Sequence[str], seeds: range, trials: Trials, workers: int
+) -> tuple[list[Figure], list[Row]]:
+    """Drive what is missing, print a line per scene; return figures and lines."""
+    digests = {scene: mrmg.load_scene(scene).digest for scene in scenes}
+
+    def finished(scene: str, seed: int) -> Row | None:
+        return trials.get(scene=scene, digest=digests[scene], seed=seed)
+
     jobs = [(scene, seed) for scene in scenes for seed in seeds]
-    missing = [job for job in jobs if job not in kept.rows]
-    if len(missing) < len(jobs):
-        print(f"\n{len(jobs) - len(missing)} of {len(jobs)} missions are in {output}")
+    made = _made([job for job in jobs if finished(*job) is None], workers)
     print("\n" + " | ".join(HEAD))
-    made = _made(missing, workers)
     rows: list[Row] = []
+    lines: list[Row] = []
     for scene in scenes:
-        own = [
-            kept.rows[scene, seed]
-            if (scene, seed) in kept.rows
-            else kept.add(next(made))
-            for seed in seeds
-        ]
+        while not all(finished(scene, seed) for seed in seeds):
+            row = next(made)
+            of = row["scene"]
+            trials.add(row, scene=of, digest=digests[of], seed=row["seed"])
+        own = [row for seed in seeds if (row := finished(scene, seed))]
         rows += own
-        print(" | ".join([*cells(scene, own), verdict(faults_of(own))]), flush=True)
-    return [*figures_of(rows), _repeated(rows)]
+        lines.append(line_of(scene, own))
+        print(" | ".join([*cells(lines[-1]), verdict(faults_of(own))]), flush=True)
+    return [*figures_of(rows), _repeated(rows)], lines
 
 
 def _made(jobs: Sequence[Job], workers: int) -> Iterator[Row]:
-    """Yield the rows of jobs in their order."""
+    """Yield the rows of jobs as they are finished."""
     if workers == 1:
         yield from map(mission, jobs)
         return
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        yield from pool.map(mission, jobs)
+        try:
+            for future in as_completed([pool.submit(mission, job) for job in jobs]):
+                yield future.result()
+        finally:  # after an interruption nobody waits for missions not yet begun
+            pool.shutdown(cancel_futures=True)
 
 
 def _repeated(rows: Sequence[Row]) -> Figure:
@@ -262,21 +228,31 @@ def typical(rows: Sequence[Row], figure: Callable[[Row], float]) -> float:
     return statistics.median(figure(row) for row in rows)
 
 
-def cells(scene: str, rows: Sequence[Row]) -> list[str]:
-    """Return a scene's row of the table."""
-    feasible = f"{sum(row['feasible'] for row in rows)}/{len(rows)}"
-    start = [scene, str(rows[0]["fleet"]), feasible]
+def line_of(scene: str, rows: Sequence[Row]) -> Row:
+    """Return a scene's line of the table, as numbers; None for what was not driven."""
+    line: Row = {"scene": scene, "robots": rows[0]["fleet"]}
+    line |= {"feasible": sum(row["feasible"] for row in rows), "missions": len(rows)}
+    faults = {"faults": faults_of(rows)}
     driven = [row for row in rows if row["robots"]]
     if not driven:
-        return start
+        return line | dict.fromkeys(PRINTED) | faults
     for key in MEDIAN_PCT:
-        sizes = of_robots(driven, key)
-        start += [f"{statistics.median(sizes):.2f}", f"{max(sizes):.2f}"]
-    start += [f"{max(of_robots(driven, key)):.4f}" for key in TRACKING_M]
-    return [
-        *start,
-        f"{typical(driven, lambda row: row['realtime']):.0f}",
-        f"{typical(driven, lambda row: row['realtime_clock']):.0f}",
-        f"{typical(driven, lambda row: row['controller_ms']['median']):.2f}",
-        f"{max(row['controller_ms']['p99'] for row in driven):.2f}",
-    ]
+        line[f"{key}_median"] = statistics.median(of_robots(driven, key))
+    for key in (*MEDIAN_PCT, *TRACKING_M):
+        line[f"{key}_worst"] = max(of_robots(driven, key))
+    return line | {
+        "x_real_processor": typical(driven, lambda row: row["realtime"]),
+        "x_real_clock": typical(driven, lambda row: row["realtime_clock"]),
+        "control_ms_median": _controller_ms(driven, "median"),
+        "control_ms_p99_worst": max(row["controller_ms"]["p99"] for row in driven),
+        **faults,
+    }
+
+
+def cells(line: Row) -> list[str]:
+    """Return a scene's line of the table, as it is printed."""
+    start = [line["scene"], str(line["robots"])]
+    start.append(f"{line['feasible']}/{line['missions']}")
+    if line["x_real_clock"] is None:
+        return start
+    return start + [f"{line[key]:.{digits}f}" for key, digits in PRINTED.items()]

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from protocol import state
+from protocol import Row, state
 
 import mrmg
 from mrmg.results.robustness import Study, Trial, wilson_interval
@@ -81,10 +81,11 @@ class TrialOptions:
     runs: Path
 
 
-def disturbance_figures(options: TrialOptions) -> list[Figure]:
+def disturbance_figures(options: TrialOptions) -> tuple[list[Figure], list[Row]]:
     """Print a row per scene and kind of disturbance; return what they came to."""
     print("\n" + " | ".join(HEAD))
     figures: list[Figure] = []
+    rows: list[Row] = []
     studies: dict[Kind, list[Study]] = {kind: [] for kind in KINDS}
     for source in SCENES:
         for kind in KINDS:
@@ -93,14 +94,12 @@ def disturbance_figures(options: TrialOptions) -> list[Figure]:
             figure = figure_of(source, kind, study)
             faults = [] if figure.holds else [f"{figure.found} not {figure.asked}"]
             told = verdict(faults) if kind.least else "not judged"
-            print(" | ".join([*cells(source, kind, study), told]), flush=True)
+            rows.append(study_row(source, kind, study))
+            print(" | ".join([*cells(rows[-1]), told]), flush=True)
             if kind.least:
                 figures.append(figure)
-    return [
-        *figures,
-        gain_figure(studies[TIGHT], studies[SAVED]),
-        repeated_figure(options),
-    ]
+    figures.append(gain_figure(studies[TIGHT], studies[SAVED]))
+    return [*figures, repeated_figure(options)], rows
 
 
 def figure_of(source: str, kind: Kind, study: Study) -> Figure:
@@ -122,7 +121,8 @@ def gain_figure(alone: Sequence[Study], replanned: Sequence[Study]) -> Figure:
     gain = share(replanned) - share(alone)
     asked = f">= {VISIBLE_GAIN:+.0%}"
     what = "gain by replanning over both scenes"
-    return Figure(what, f"{gain:+.1%}", asked, gain >= VISIBLE_GAIN)
+    holds = gain >= VISIBLE_GAIN
+    return Figure(what, f"{gain:+.1%}", asked, holds, gain, VISIBLE_GAIN)
 
 
 def share(studies: Sequence[Study]) -> float:
@@ -131,19 +131,37 @@ def share(studies: Sequence[Study]) -> float:
     return sum(study.feasible for study in studies) / trials
 
 
-def cells(source: str, kind: Kind, study: Study) -> list[str]:
-    """Return the table's row of one study."""
+def study_row(source: str, kind: Kind, study: Study) -> Row:
+    """Return the table's row of one study, as numbers."""
     low, high = wilson_interval(study.feasible, len(study.trials))
     charges = [trial.charge_fraction for trial in study.trials]
+    return {
+        "scene": source,
+        "plans": kind.plans,
+        "disturb": f"default, {kind.disturb}" if kind.disturb else "default",
+        "replan": kind.replan,
+        "feasible": study.feasible,
+        "trials": len(study.trials),
+        "interval_95": [low, high],
+        "charge_worst": min(charges),
+        "charge_median": statistics.median(charges),
+        "failures": causes(study),
+        "least": kind.least or None,
+    }
+
+
+def cells(row: Row) -> list[str]:
+    """Return the table's row of one study, as it is printed."""
+    low, high = row["interval_95"]
     return [
-        source,
-        kind.plans,
-        f"default, {kind.disturb}" if kind.disturb else "default",
-        "yes" if kind.replan else "no",
-        f"{study.feasible}/{len(study.trials)}",
+        row["scene"],
+        row["plans"],
+        row["disturb"],
+        "yes" if row["replan"] else "no",
+        f"{row['feasible']}/{row['trials']}",
         f"{low:.3f}-{high:.3f}",
-        f"{min(charges):.2f}, {statistics.median(charges):.2f}",
-        ", ".join(f"{n} {cause}" for cause, n in causes(study).items()),
+        f"{row['charge_worst']:.2f}, {row['charge_median']:.2f}",
+        ", ".join(f"{n} {cause}" for cause, n in row["failures"].items()),
     ]
 
 

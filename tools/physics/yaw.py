@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import mujoco
 import numpy as np
+from protocol import Row
 
 from mrmg import shipped
 from mrmg.calibration.manoeuvres import CRUISE_S, STEP_S, circle
@@ -22,26 +23,29 @@ STEERS_RAD = (0.05, 0.2, 0.35, 0.5)
 TURN_RATES_RAD_S = (0.2, 0.5, 1.0)
 
 
-def yaw_figures() -> list[Figure]:
-    """Print the error of the yaw rate over speed and turn; return the worst.
+def yaw_figures() -> tuple[list[Figure], list[Row]]:
+    """Print the error of the yaw rate over speed and turn; return the worst, and rows.
 
     Robots get the limits that the table's speeds and angles take.
     """
     speeds = " | ".join(f"{speed:g} m/s" for speed in SPEEDS_M_S)
     print(f"\nyaw rate against the kinematic model [%] | {speeds} | ")
-    found = []
+    rows: list[Row] = []
     for name in shipped.model_names():
         model, _ = load_model(shipped.models_folder() / name)
         spins = model.motion_model == "unicycle"
         for turn in TURN_RATES_RAD_S if spins else STEERS_RAD:
             errors = [yaw_error_pct(model, speed, turn) for speed in SPEEDS_M_S]
             worst = max(map(abs, errors))
-            found.append(worst)
             faults = [f"{worst:.2f} > {YAW_ERROR_PCT}"] if worst > YAW_ERROR_PCT else []
             unit = "rad/s" if spins else "rad"
             shown = [f"{name} {turn:g} {unit}", *(f"{item:+.3f}" for item in errors)]
             print(" | ".join([*shown, verdict(faults)]), flush=True)
-    return [Figure.at_most("yaw rate, worst circle", max(found), YAW_ERROR_PCT, " %")]
+            circle_row: Row = {"robot": name, "turn": turn, "unit": unit}
+            circle_row |= {"speeds_m_s": SPEEDS_M_S, "errors_pct": errors}
+            rows.append(circle_row | {"worst_pct": worst})
+    worst = max(row["worst_pct"] for row in rows)
+    return [Figure.at_most("yaw rate, worst circle", worst, YAW_ERROR_PCT, " %")], rows
 
 
 def yaw_error_pct(model: RobotModel, speed_m_s: float, turn: float) -> float:
