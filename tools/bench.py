@@ -28,13 +28,13 @@ errors [%]. `ratios` has the second table: `profile`, `base`, `scene`, `both_ok`
 from __future__ import annotations
 
 import argparse
-import statistics
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, partial
-from typing import Any, NamedTuple
+from typing import Any
 
+from mission_tables import header, moments, print_ratios, print_scene
 from protocol import (
     Row,
     Trials,
@@ -56,9 +56,6 @@ from mrmg.scene.types import Scene
 BOUND_FINER = 7
 """Parts into which the bound's cells are cut: more than planning has time for, which
 brings it up to half a percent nearer to the truth."""
-
-MOMENTS_S = (5.0, 30.0)
-"""Times after which a budget's plans are compared with the bound."""
 
 TABLE = ("scene1", "scene2", "scene3", "scene4", "scene5", "scene6")
 
@@ -232,12 +229,6 @@ def planned(
     return row
 
 
-def moments(options: argparse.Namespace) -> dict[str, float | None]:
-    """Return the times whose best plans are compared with the bound; None: first."""
-    reached = [time_s for time_s in MOMENTS_S if time_s <= (options.budget or 0.0)]
-    return {"first": None, **{f"{time_s:g} s": time_s for time_s in reached}}
-
-
 def value_after(statistics: Mapping[str, Any], time_s: float | None) -> float:
     """Return the objective of the best plan by a time, or of the first one."""
     found = statistics["improvements"]
@@ -264,152 +255,6 @@ def driven(scene: Any, plan: Any, plan_ok: bool) -> dict[str, Any]:
         "metered_error_pct": max(abs(robot.metered_error_pct) for robot in robots),
         "measured_error_pct": max(abs(robot.measured_error_pct) for robot in robots),
     }
-
-
-def solver_share(row: Mapping[str, Any]) -> float:
-    """Return the share of the discrete solver in the time of planning."""
-    time_s = row["statistics"]["time_s"]
-    return float(time_s["routing"] / time_s["total"])
-
-
-def first_s(row: Mapping[str, Any]) -> float:
-    """Return the time to the first plan of a solved row [s]."""
-    return float(row["statistics"]["time_s"]["first_solution"])
-
-
-def p95(values: list[float]) -> float:
-    """Return the value that one in twenty exceeds."""
-    return sorted(values)[min(len(values) - 1, int(0.95 * len(values)))]
-
-
-class Column(NamedTuple):
-    """A column of the table: its key in JSON, its head, and what it has of a row."""
-
-    key: str
-    head: str
-    digits: int
-    of: Callable[[Row], float | None]
-    over: Callable[[list[float]], float] = statistics.median
-
-    def value(self, solved: list[Row]) -> float | None:
-        """Return the figure over solved missions; None if it was not measured."""
-        values = [x for x in map(self.of, solved) if x is not None]
-        return self.over(values) if values else None
-
-
-def of_moment(name: str, row: Row) -> float | None:
-    """Return the cost to the bound of the best plan by a time."""
-    after: dict[str, float] = row.get("cost_to_bound_after", {})
-    return after.get(name)
-
-
-COLUMNS = (
-    Column("first_s_median", "first_s median", 3, first_s),
-    Column("first_s_p95", "first_s p95", 3, first_s, p95),
-    Column("plan_s_median", "plan_s median", 3, lambda row: row["plan_s"]),
-    Column("solver_share_median", "solver share median", 2, solver_share),
-    Column("cost_m_median", "cost_m median", 1, lambda row: row["cost_m"]),
-)
-BOUND = tuple(
-    Column(
-        f"cost_to_bound_{name.replace(' ', '_')}",
-        f"cost/bound {name}",
-        3,
-        partial(of_moment, name),
-    )
-    for name in ("first", *(f"{time_s:g} s" for time_s in MOMENTS_S))
-) + (
-    Column(
-        "cost_to_bound_median",
-        "cost/bound median",
-        3,
-        lambda row: row.get("cost_to_bound"),
-    ),
-)
-DRIVEN = (
-    Column("rms_m_worst", "rms_m worst", 4, lambda row: row.get("tracking_rms_m"), max),
-    Column("max_m_worst", "max_m worst", 4, lambda row: row.get("tracking_max_m"), max),
-    Column(
-        "metered_pct_worst",
-        "metered% worst",
-        2,
-        lambda row: row.get("metered_error_pct"),
-        max,
-    ),
-    Column(
-        "measured_pct_worst",
-        "measured% worst",
-        2,
-        lambda row: row.get("measured_error_pct"),
-        max,
-    ),
-    Column("x_real_median", "x real", 0, lambda row: row.get("realtime_factor")),
-)
-
-
-def printed(options: argparse.Namespace) -> tuple[Column, ...]:
-    """Return the columns that are printed."""
-    reached = {f"cost/bound {name}" for name in (*moments(options), "median")}
-    bound = [column for column in BOUND if options.bound and column.head in reached]
-    return (*COLUMNS, *bound, *(DRIVEN if options.execute else ()))
-
-
-def header(options: argparse.Namespace) -> str:
-    """Return the table's head."""
-    return " | ".join(("scene", "ok", *(column.head for column in printed(options))))
-
-
-def print_scene(scene: str, rows: list[Row], options: argparse.Namespace) -> list[Row]:
-    """Print one line of the table for each profile; return what they say."""
-    table = []
-    for profile in options.profile:
-        name = f"{scene} {profile}" if len(options.profile) > 1 else scene
-        of_profile = [row for row in rows if row["profile"] == profile]
-        ok, runs = sum(row["ok"] for row in of_profile), len(of_profile)
-        solved = [row for row in of_profile if "cost_m" in row]
-        line: Row = {"scene": scene, "profile": profile, "ok": ok, "runs": runs}
-        for column in (*COLUMNS, *BOUND, *DRIVEN):
-            line[column.key] = column.value(solved)
-        cells = [
-            f"{line[column.key]:.{column.digits}f}"
-            for column in printed(options)
-            if line[column.key] is not None
-        ]
-        print(" | ".join((name, f"{ok}/{runs}", *cells)), flush=True)
-        table.append(line)
-    return table
-
-
-def print_ratios(
-    rows: list[Row], options: argparse.Namespace, profile: str
-) -> list[Row]:
-    """Print and return how a profile compares with the first one, seed by seed."""
-    base = options.profile[0]
-    solved = {
-        (row["scene"], row["seed"], row["profile"]): row for row in rows if row["ok"]
-    }
-    print(f"\n{profile} / {base}\nscene | both ok | first plan | cost")
-    scenes = sorted({row["scene"] for row in rows})
-    table = []
-    for names in [*([scene] for scene in scenes), *([scenes] if scenes[1:] else [])]:
-        pairs = [
-            (solved[scene, seed, profile], solved[scene, seed, base])
-            for scene in names
-            for seed in options.seeds
-            if {(scene, seed, profile), (scene, seed, base)} <= solved.keys()
-        ]
-        name = names[0] if len(names) == 1 else "all"
-        line: Row = {"profile": profile, "base": base, "scene": name}
-        line |= {"both_ok": len(pairs), "first_plan": None, "cost": None}
-        cells = [name, f"{len(pairs)}"]
-        if pairs:
-            first = statistics.median(first_s(a) / first_s(b) for a, b in pairs)
-            cost = statistics.median(a["cost_J"] / b["cost_J"] for a, b in pairs)
-            line |= {"first_plan": first, "cost": cost}
-            cells += [f"{first:.1f}", f"{cost:.3f}"]
-        print(" | ".join(cells))
-        table.append(line)
-    return table
 
 
 if __name__ == "__main__":

@@ -16,6 +16,7 @@ import sys
 from pathlib import Path
 
 import bench
+from mission_tables import header, print_scene
 from protocol import Row, Trials, add_file_options, run, seed_range, write_document
 
 from mrmg.authoring import import_map, populate
@@ -42,13 +43,13 @@ def main() -> int:
     trials = Trials(options.output, **bench.deciding(options))
     rows: list[Row] = []
     table: list[Row] = []
-    print(bench.header(options))
+    print(header(options))
     for path in options.maps:
         of_map = list(
             bench.missions(populated(path, options), str(path), options, trials)
         )
         rows += of_map
-        table += bench.print_scene(path.stem, of_map, options)
+        table += print_scene(path.stem, of_map, options)
     ok = all(row["ok"] for row in rows)
     write_document(options, "bench_maps", table, ok)
     return 0 if ok else 1

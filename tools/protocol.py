@@ -181,7 +181,8 @@ class Trials:
 
     Each line has the trial's row, and what decides it: `state`, and in `trial` the
     bench's arguments and what is tried. Lines of another state or other arguments, and
-    one that a killed process left half-written, are dropped.
+    one that a killed process left half-written, are dropped; the file as it was is kept
+    beside it, its name ending in `.old`.
     """
 
     def __init__(self, path: Path | None, **arguments: Any) -> None:
@@ -202,8 +203,11 @@ class Trials:
         if used:
             print(f"{len(used)} trials are in {path} and are not made again")
         if len(used) < len(lines):
+            old = path.with_name(f"{path.name}.old")
+            storage.write_text(old, text)
             dropped = f"{len(lines) - len(used)} lines of other code or arguments"
-            print(f"{path}: {dropped}, or broken, are dropped", file=sys.stderr)
+            told = f"{path}: {dropped}, or broken, are dropped; {old} has them"
+            print(told, file=sys.stderr)
         whole = "".join(f"{line}\n" for line in used)
         if whole != text:
             storage.write_text(path, whole)

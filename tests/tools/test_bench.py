@@ -85,10 +85,13 @@ def test_trials_of_other_arguments_or_code_are_made_again(
     quickstart: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     quickstart.run("--seeds", "0")
+    first = quickstart.lines()
     charged = quickstart.run("--seeds", "0", "--energy", "paper")
     assert [seed for seed, _ in quickstart.planned] == [0]
     assert charged["protocol"]["energy"] == "paper"
     assert len(quickstart.lines()) == 1
+    old = quickstart.output.with_name("rows.jsonl.old")
+    assert old.read_text().splitlines() == first
     monkeypatch.setattr(protocol, "state", lambda: "another")
     other = quickstart.run("--seeds", "0", "--energy", "paper")
     assert [seed for seed, _ in quickstart.planned] == [0]
