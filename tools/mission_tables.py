@@ -8,7 +8,9 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
+import numpy as np
 from protocol import Row
+from scipy.stats import bootstrap
 
 MOMENTS_S = (5.0, 30.0)
 """Times after which a budget's plans are compared with the bound."""
@@ -134,10 +136,22 @@ def print_scene(scene: str, rows: list[Row], options: argparse.Namespace) -> lis
     return table
 
 
+def median_interval(values: list[float]) -> tuple[float | None, float | None]:
+    """Return the 95 % percentile bootstrap interval of a median; None of too few."""
+    if len(values) < 2:
+        return None, None
+    found = bootstrap((values,), np.median, method="percentile", random_state=0)
+    low, high = found.confidence_interval
+    return float(low), float(high)
+
+
 def print_ratios(
     rows: list[Row], options: argparse.Namespace, profile: str
 ) -> list[Row]:
-    """Print and return how a profile compares with the first one, seed by seed."""
+    """Print and return how a profile compares with the first one, seed by seed.
+
+    Medians of ratios have 95 % bootstrap intervals over the seeds.
+    """
     base = options.profile[0]
     solved = {
         (row["scene"], row["seed"], row["profile"]): row for row in rows if row["ok"]
@@ -154,13 +168,18 @@ def print_ratios(
         ]
         name = names[0] if len(names) == 1 else "all"
         line: Row = {"profile": profile, "base": base, "scene": name}
-        line |= {"both_ok": len(pairs), "first_plan": None, "cost": None}
+        line["both_ok"] = len(pairs)
         cells = [name, f"{len(pairs)}"]
-        if pairs:
-            first = statistics.median(first_s(a) / first_s(b) for a, b in pairs)
-            cost = statistics.median(a["cost_J"] / b["cost_J"] for a, b in pairs)
-            line |= {"first_plan": first, "cost": cost}
-            cells += [f"{first:.1f}", f"{cost:.3f}"]
+        for key, digits, ratios in (
+            ("first_plan", 1, [first_s(a) / first_s(b) for a, b in pairs]),
+            ("cost", 3, [a["cost_J"] / b["cost_J"] for a, b in pairs]),
+        ):
+            line[key] = statistics.median(ratios) if ratios else None
+            low, high = line[f"{key}_interval"] = median_interval(ratios)
+            if ratios:
+                text = f"{line[key]:.{digits}f}"
+                text += f" [{low:.{digits}f}, {high:.{digits}f}]" if low else ""
+                cells.append(text)
         print(" | ".join(cells))
         table.append(line)
     return table
