@@ -46,7 +46,7 @@ class RunResult:
 def run(
     source: str | Path | Scene,
     *,
-    out: Path | None = None,
+    out: str | Path | None = None,
     overwrite: bool = False,
     video: VideoArguments | None = DEFAULT_VIDEO,
     trust_code: bool = False,
@@ -82,7 +82,7 @@ def run(
     asked = _arguments(loaded, {**arguments, "video": video or DEFAULT_VIDEO})
     scene = asked.scene(loaded)
     require_faithful(scene, scene.document)  # before there is a folder
-    folder = RunFolder(out or default_folder(scene, asked.seed))
+    folder = RunFolder(Path(out or default_folder(scene, asked.seed)))
     with folder.opened_for_writing():
         work = Run(
             scene=scene,

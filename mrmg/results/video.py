@@ -27,7 +27,7 @@ def render_video(
     scene: Scene,
     plan: Plan,
     log: ExecutionLog,
-    path: Path,
+    path: str | Path,
     *,
     view: str = "top",
     robot: str | None = None,
@@ -72,7 +72,7 @@ def render_video(
         fitting_s=_FITTING_S,
     )
     ticks = frame_ticks(log, options)
-    with storage.atomic_path(path) as temporary:
+    with storage.atomic_path(Path(path)) as temporary:
         _write_video(temporary, Film(scene, plan, log, options), ticks, on_progress)
 
 
