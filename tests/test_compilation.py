@@ -105,6 +105,7 @@ def copy_of_package(folder: Path) -> Path:
         "compilation/pointers.py",
         "compilation/sharing.py",
         "compilation/shortcuts.py",
+        "interruption.py",
         "storage.py",
         "errors.py",
         "motion/_kernels.py",
