@@ -69,7 +69,7 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument("--execute", action="store_true", help="drive in MuJoCo too")
     parser.add_argument("--bound", action="store_true", help="compare with a bound")
     add_file_options(parser)
-    parser.set_defaults(profile=["default"], energy=None)
+    parser.set_defaults(profile=["default"], energy=None, nrpa=None)
     return parser.parse_args()
 
 

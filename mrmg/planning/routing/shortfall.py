@@ -42,11 +42,12 @@ def shortfall(problem: RoutingArrays, params: RouterParams, seed: int) -> Shortf
 
     def tours(battery_share: float, time_share: float) -> Routing:
         larger = 1.0 + battery_share
-        reserve = problem.reserve
+        reserve, limit = problem.reserve, problem.limit
+        endless = np.full_like(limit, math.inf)  # also where the limit is 0
         eased = problem._replace(
             energy=reserve + larger * (problem.energy - reserve),
             capacity=reserve + larger * (problem.capacity - reserve),
-            limit=problem.limit * (1.0 + time_share),
+            limit=endless if math.isinf(time_share) else limit * (1.0 + time_share),
         )
         return solve_routing(eased, params, seed)
 
