@@ -43,12 +43,17 @@ def _whole(value: Any, *, at_least: int) -> int:
     return read
 
 
+def _number(value: Any) -> float:
+    """Return the number that a text or value stands for; NaN if it is none."""
+    try:
+        return float(str(value))
+    except ValueError:
+        return math.nan
+
+
 def positive(value: Any) -> float:
     """Read a positive number."""
-    try:
-        read = float(str(value))
-    except ValueError:
-        read = math.nan
+    read = _number(value)
     if not 0.0 < read < math.inf:
         raise ValueError(f"{value!r} is not a positive number")
     return read
@@ -56,10 +61,7 @@ def positive(value: Any) -> float:
 
 def time(value: Any) -> float:
     """Read a time: a number of at least 0."""
-    try:
-        read = float(str(value))
-    except ValueError:
-        read = math.nan
+    read = _number(value)
     if not 0.0 <= read < math.inf:
         raise ValueError(f"{value!r} is not a number of at least 0")
     return read
@@ -67,10 +69,7 @@ def time(value: Any) -> float:
 
 def share(value: Any) -> float:
     """Read a share: a number of at least 0 and less than 1."""
-    try:
-        read = float(str(value))
-    except ValueError:
-        read = math.nan
+    read = _number(value)
     if not 0.0 <= read < 1.0:
         raise ValueError(
             f"{value!r} is not a share: a number of at least 0 and less than 1"
