@@ -10,14 +10,73 @@ import sys
 from pathlib import Path
 
 import pytest
+import size
 
 import mrmg
 
 PACKAGE = Path(mrmg.__file__).parent
 MODULES = sorted(PACKAGE.rglob("*.py"))
-LONGEST_MODULE = 400
 DRAWERS = {"utils", "util", "common", "helpers", "helper", "misc", "tools"}
 HEAVY = {"av", "casadi", "matplotlib", "mujoco", "numba", "pydantic", "rich", "scipy"}
+
+LONG_MODULES = {
+    "simulation": 361,
+    "geodesic": 377,
+    "_tracking_kernels": 352,
+    "band": 356,
+    "tracking": 353,
+    "_refuel_kernels": 371,
+    "_tree_kernels": 369,
+    "motion_tree": 353,
+    "run_arguments": 370,
+    "assembly": 361,
+    "schema": 358,
+    "types": 353,
+}
+"""Modules that are still too long, with their lines; the list may only shrink."""
+
+LONG_FUNCTIONS = {
+    "populate.populate": 61,
+    "parser._add_scene": 71,
+    "pipeline.run": 71,
+    "_bound_kernels.subset_labels": 82,
+    "_touring_kernels.touring_labels": 98,
+    "bound.Relaxation.of": 64,
+    "_tracking_kernels.drive": 104,
+    "planner._planned": 66,
+    "roadmap.build_roadmap": 73,
+    "routing.routing_arrays": 65,
+    "_expansion_kernels.expand": 72,
+    "_rerouting_kernels.route_from": 62,
+    "audit.audit": 63,
+    "world.free_space": 66,
+}
+"""Functions that are still too long, with their lines; the list may only shrink."""
+
+WIDE_FUNCTIONS = {
+    "driving.drive_mission": 10,
+    "_pointer_kernels.call_steer": 12,
+    "_pointer_kernels.call_step": 11,
+    "dynamics.rk4_step.step": 9,
+    "_bound_kernels._station_values": 9,
+    "_touring_kernels._append_stations": 12,
+    "_band_kernels.band_cost": 9,
+    "_tracking_kernels.drive": 12,
+    "_roadmap_kernels.best_vertex": 9,
+    "_roadmap_kernels.find_waypoint": 10,
+    "_refuel_kernels.add_label": 9,
+    "_refuel_kernels.value_with": 10,
+    "routing.routing_arrays": 15,
+    "_expansion_kernels.choose_motion": 9,
+    "_expansion_kernels.expand": 13,
+    "_maneuver_kernels.best_sequel": 9,
+    "gif.render_gif": 10,
+    "video.render_video": 12,
+    "video_options.video_options": 10,
+    "_raster_kernels._offer": 9,
+    "_raster_kernels.correct_near": 9,
+}
+"""Functions of too many parameters, with their number; the list may only shrink."""
 
 FACADES = [
     name
@@ -31,9 +90,25 @@ def relative(path: Path) -> str:
 
 
 @pytest.mark.parametrize("path", MODULES, ids=relative)
-def test_modules_stay_readable(path: Path) -> None:
-    assert len(path.read_text().splitlines()) <= LONGEST_MODULE
-    assert path.stem not in DRAWERS, "name a module after its subject"
+def test_modules_are_named_after_their_subjects(path: Path) -> None:
+    assert path.stem not in DRAWERS
+
+
+@pytest.mark.parametrize(
+    ("kind", "known"),
+    [
+        ("long_modules", LONG_MODULES),
+        ("long_functions", LONG_FUNCTIONS),
+        ("wide_functions", WIDE_FUNCTIONS),
+    ],
+)
+def test_modules_and_functions_stay_readable(kind: str, known: dict[str, int]) -> None:
+    """Split what is new here; the exceptions above may shrink, and never grow."""
+    found = {}
+    for module, *function, number in map(dict.values, size.measure(PACKAGE)[kind]):
+        found[".".join([module.split(".")[-1], *function])] = number
+    longer = {name: n for name, n in found.items() if n > known.get(name, 0)}
+    assert longer == {}
 
 
 @pytest.mark.parametrize("name", ["mrmg", *FACADES])
