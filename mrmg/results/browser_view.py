@@ -12,8 +12,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from mrmg.errors import MachineError
 from mrmg.execution.world_model import build_world
+from mrmg.extras import import_extra
 from mrmg.mission import Plan
 from mrmg.results import style
 from mrmg.results.ground_image import paint_ground, painted_relief
@@ -278,13 +278,7 @@ def _bar(share: float) -> str:
 
 
 def _serve(host: str, port: int) -> Any:
-    try:
-        import viser
-    except ImportError as error:
-        raise MachineError(
-            "viser, which shows missions in the browser, is not installed: "
-            "pip install 'mrmg[view]'"
-        ) from error
+    viser = import_extra("viser", extra="view", purpose="shows missions in the browser")
     # It tells its address in a box of its own.
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host=host, port=port, label="mrmg", verbose=False)
