@@ -23,20 +23,20 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from mrmg.execution import simulate as execute
-    from mrmg.execution.log import ExecutionLog
-    from mrmg.mission import Plan
-    from mrmg.mission_control import drive_mission as drive
-    from mrmg.pipeline import run
+    from mrmg.energy.audit import audit
+    from mrmg.energy.audit_record import EnergyAudit
     from mrmg.planning import PlannerParams
     from mrmg.planning import plan_mission as plan
-    from mrmg.results.audit import audit
-    from mrmg.results.energy_audit import EnergyAudit
-    from mrmg.results.verdict import Verdict
-    from mrmg.results.verify import verify
-    from mrmg.results.video import render_video as render
+    from mrmg.plans import Plan
+    from mrmg.runs.pipeline import run
     from mrmg.scene.loading import load_scene
     from mrmg.scene.types import Scene
+    from mrmg.simulation import simulate as execute
+    from mrmg.simulation.log import ExecutionLog
+    from mrmg.supervision import drive_mission as drive
+    from mrmg.verification.verdict import Verdict
+    from mrmg.verification.verify import verify
+    from mrmg.viz.video import render_video as render
 
 __version__ = "0.1.0"
 
@@ -59,20 +59,20 @@ __all__ = [
 ]
 
 _HOME = {
-    "EnergyAudit": ("mrmg.results.energy_audit", "EnergyAudit"),
-    "ExecutionLog": ("mrmg.execution.log", "ExecutionLog"),
-    "Plan": ("mrmg.mission", "Plan"),
+    "EnergyAudit": ("mrmg.energy.audit_record", "EnergyAudit"),
+    "ExecutionLog": ("mrmg.simulation.log", "ExecutionLog"),
+    "Plan": ("mrmg.plans", "Plan"),
     "PlannerParams": ("mrmg.planning", "PlannerParams"),
     "Scene": ("mrmg.scene.types", "Scene"),
-    "Verdict": ("mrmg.results.verdict", "Verdict"),
-    "audit": ("mrmg.results.audit", "audit"),
-    "drive": ("mrmg.mission_control", "drive_mission"),
-    "execute": ("mrmg.execution", "simulate"),
+    "Verdict": ("mrmg.verification.verdict", "Verdict"),
+    "audit": ("mrmg.energy.audit", "audit"),
+    "drive": ("mrmg.supervision", "drive_mission"),
+    "execute": ("mrmg.simulation", "simulate"),
     "load_scene": ("mrmg.scene.loading", "load_scene"),
     "plan": ("mrmg.planning", "plan_mission"),
-    "render": ("mrmg.results.video", "render_video"),
-    "run": ("mrmg.pipeline", "run"),
-    "verify": ("mrmg.results.verify", "verify"),
+    "render": ("mrmg.viz.video", "render_video"),
+    "run": ("mrmg.runs.pipeline", "run"),
+    "verify": ("mrmg.verification.verify", "verify"),
 }
 """Module and name of what is imported on first use."""
 

@@ -143,7 +143,7 @@ def _kernel_cache() -> Finding:
 
 
 def _offscreen_drawing() -> Finding:
-    from mrmg.results.gl_backend import choose_backend
+    from mrmg.viz.gl_backend import choose_backend
 
     try:
         return Finding(name="offscreen GL", found=choose_backend())

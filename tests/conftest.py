@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+pytest_plugins = ("handmade",)
+
 # Equal examples whenever the tests run, and none judged by its time.
 settings.register_profile("mrmg", derandomize=True, deadline=None)
 settings.load_profile("mrmg")
@@ -55,7 +57,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session")
 def quickstart_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The run folder of a quickstart without video; only to be read."""
-    from mrmg import pipeline
+    from mrmg.runs import pipeline
 
     folder = tmp_path_factory.mktemp("runs") / "quickstart"
     pipeline.run("quickstart", out=folder, video=None)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from mrmg.background import in_background, within
-from mrmg.mission import PlanStatus
 from mrmg.planning import planner
 from mrmg.planning.bound.bound import lower_bound_J
 from mrmg.planning.bounding import bounds_beside, bounds_of
@@ -18,6 +17,7 @@ from mrmg.planning.halting import NEVER, Halted
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.planner import plan_mission
 from mrmg.planning.statistics import Bounds, Statistics
+from mrmg.plans import PlanStatus
 from mrmg.scene.loading import load_scene
 
 SET = np.ones(1, np.bool_)

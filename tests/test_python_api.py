@@ -12,8 +12,8 @@ import pytest
 
 import mrmg
 from mrmg.errors import MachineError, UsageError
-from mrmg.execution.log import ExecutionLog
-from mrmg.mission import Plan, Trajectory
+from mrmg.plans import Plan, Trajectory
+from mrmg.simulation.log import ExecutionLog
 
 VERBS = {"load_scene", "plan", "verify", "execute", "drive", "audit", "render", "run"}
 TYPES = {"Scene", "Plan", "PlannerParams", "Verdict", "ExecutionLog", "EnergyAudit"}

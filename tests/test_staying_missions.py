@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from mrmg.execution import simulate
+from mrmg.energy.audit import audit
 from mrmg.planning import plan_mission
-from mrmg.results.audit import audit
-from mrmg.results.verify import verify
 from mrmg.scene.loading import load_scene
+from mrmg.simulation import simulate
+from mrmg.verification.verify import verify
 
 SCENES = Path(__file__).parent / "scenes"
 

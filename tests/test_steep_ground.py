@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 import shapely
 
-from mrmg.execution import simulate
+from mrmg.energy.audit import audit
 from mrmg.planning import plan_mission
-from mrmg.results.audit import audit
-from mrmg.results.verify import verify
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
+from mrmg.simulation import simulate
+from mrmg.verification.verify import verify
 
 HILL = {"center": [16, 12], "height": 5, "radius": 7}
 

@@ -9,14 +9,14 @@ from typing import Any
 
 import pytest
 
-from mrmg.execution import simulate
-from mrmg.mission import Plan, PlanResult, PlanStatus
+from mrmg.energy.audit import audit
+from mrmg.energy.mission_failures import over_s
 from mrmg.planning import PlannerParams, plan_mission
-from mrmg.results.audit import audit
-from mrmg.results.mission_failures import over_s
-from mrmg.results.verify import verify
+from mrmg.plans import Plan, PlanResult, PlanStatus
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.types import Scene
+from mrmg.simulation import simulate
+from mrmg.verification.verify import verify
 
 ERRANDS = Path(__file__).parent / "scenes" / "errands.yaml"
 QUICK = PlannerParams(samples=400)

@@ -49,7 +49,7 @@ from protocol import (
 )
 
 import mrmg
-from mrmg.energy import ENERGY_PRESETS, EnergyPreset
+from mrmg.energy.model import ENERGY_PRESETS, EnergyPreset
 from mrmg.planning import plan_mission, profile_params
 from mrmg.planning.planner import bounds_of
 from mrmg.planning.statistics import UNKNOWN

@@ -32,17 +32,17 @@ from typing import Any
 import numpy as np
 import shapely
 from bench import conditions
+from growth_figure import GrowthPoint, draw_growth
 from protocol import Row, Trials, add_file_options, run, write_document
 from shapely import affinity
 
 import mrmg
 from mrmg import seeding
-from mrmg.authoring import populate
 from mrmg.errors import UsageError
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.planner import compile_kernels
-from mrmg.results.growth_figure import GrowthPoint, draw_growth
 from mrmg.scene.loading import scene_from_document
+from mrmg.scene.populating import populate
 
 SIDE_M = 100.0
 COVERED = 0.12

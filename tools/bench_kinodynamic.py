@@ -33,8 +33,8 @@ from protocol import Row, Trials, add_file_options, run, seed_range, write_docum
 
 import mrmg
 from mrmg import storage
-from mrmg.mission import PlanStatus
 from mrmg.planning import PlannerParams, plan_mission
+from mrmg.plans import PlanStatus
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 

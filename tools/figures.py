@@ -13,15 +13,16 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from bench_figure import HEAD, draw_runtimes, table_rows
+from bench_record import BenchRow, read_rows
+from method_figure import draw_method
+from problem_figure import draw_problem, draw_problems
+
 import mrmg
 from mrmg import storage
 from mrmg.errors import MrmgError
 from mrmg.planning import profile_params
 from mrmg.planning.insight import look_inside
-from mrmg.results.bench_figure import HEAD, draw_runtimes, table_rows
-from mrmg.results.bench_record import BenchRow, read_rows
-from mrmg.results.method_figure import draw_method
-from mrmg.results.problem_figure import draw_problem, draw_problems
 
 
 def main() -> int:

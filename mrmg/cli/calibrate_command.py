@@ -10,16 +10,20 @@ from mrmg.cli import terminal
 from mrmg.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
-    from mrmg.calibration import Calibration
+    from mrmg.studies.calibration import Calibration
 
 
 def calibrate(options: argparse.Namespace) -> int:
     """Calibrate a robot model, and leave a calibrated copy with the plot of the fit."""
-    from mrmg.calibration import calibrate, require_other_folder, write_calibration
-    from mrmg.replacing import require_absent
-    from mrmg.results.calibration_plot import draw_calibration
-    from mrmg.results.print_style import require_format
+    from mrmg.runs.replacing import require_absent
     from mrmg.scene.loading.models import load_model
+    from mrmg.studies.calibration import (
+        calibrate,
+        require_other_folder,
+        write_calibration,
+    )
+    from mrmg.viz.calibration_plot import draw_calibration
+    from mrmg.viz.print_style import require_format
 
     folder = folder_of_model(options.model)
     out = options.out or Path(f"calibrated-{folder.name}")

@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 from mrmg.cli import terminal
 from mrmg.cli.run_options import given
 from mrmg.errors import ExitCode
-from mrmg.run_arguments import DEFAULT_VIDEO, RunArguments, VideoArguments
+from mrmg.runs.arguments import DEFAULT_VIDEO, RunArguments, VideoArguments
 
 if TYPE_CHECKING:
+    from mrmg.runs.steps import Run
     from mrmg.scene.types import Scene
-    from mrmg.steps import Run
 
 
 def run(options: argparse.Namespace) -> int:
     """Do the whole mission."""
-    from mrmg import pipeline
+    from mrmg.runs import pipeline
 
     scene = _scene(options)
     terminal.compile_kernels()
@@ -54,10 +54,10 @@ def _scene(options: argparse.Namespace) -> Scene:
 
 def plan(options: argparse.Namespace) -> int:
     """Plan, and start a run folder."""
-    from mrmg.pipeline import default_folder
-    from mrmg.replacing import require_room
-    from mrmg.run_folder import RunFolder, Step
-    from mrmg.steps import Run
+    from mrmg.runs.folder import RunFolder, Step
+    from mrmg.runs.pipeline import default_folder
+    from mrmg.runs.replacing import require_room
+    from mrmg.runs.steps import Run
 
     arguments = RunArguments(**given(options))
     loaded = _scene(options)
@@ -93,7 +93,7 @@ def plan(options: argparse.Namespace) -> int:
 
 def verify(options: argparse.Namespace) -> int:
     """Judge the plan of a run folder."""
-    from mrmg.run_folder import Step
+    from mrmg.runs.folder import Step
 
     work = _make(options, Step.VERIFY)
     verdict = work.folder.read_json("verdict.json", cure="mrmg verify")
@@ -128,16 +128,16 @@ def _driven(options: argparse.Namespace) -> tuple[Run, str]:
 
     A drive other than that of the run goes to a folder of its own.
     """
-    from mrmg.execution.log import require_same_mission
-    from mrmg.run_drive import checked_drive
-    from mrmg.run_folder import RunFolder, existing
-    from mrmg.separate_drives import (
+    from mrmg.runs.drive import checked_drive
+    from mrmg.runs.folder import RunFolder, existing
+    from mrmg.runs.separate_drives import (
         begin_drive,
         drive_again,
         drive_apart,
         folder_beside,
     )
-    from mrmg.steps import taken_up
+    from mrmg.runs.steps import taken_up
+    from mrmg.simulation.log import require_same_mission
 
     undisturbed = RunArguments().deciding("drive")
     del undisturbed["controller"]
@@ -163,7 +163,7 @@ def _driven(options: argparse.Namespace) -> tuple[Run, str]:
 
 def audit(options: argparse.Namespace) -> int:
     """Compare planned, metered and measured energy of a run folder."""
-    from mrmg.run_folder import Step
+    from mrmg.runs.folder import Step
 
     work = _make(options, Step.AUDIT, **given(options))
     account = work.folder.read_json("audit.json", cure="mrmg audit")
@@ -178,7 +178,7 @@ _SHOWN = ("overview.png", "energy.png", "mission.gif", "mission.mp4", "report.ht
 
 def render(options: argparse.Namespace) -> int:
     """Make the pictures, the video and the report of a run folder."""
-    from mrmg.run_folder import Step
+    from mrmg.runs.folder import Step
 
     wanted = given(options, VideoArguments)
     work = _make(options, Step.RENDER, Step.DRAW, Step.REPORT, video=wanted)
@@ -190,7 +190,7 @@ def render(options: argparse.Namespace) -> int:
 
 def report(options: argparse.Namespace) -> int:
     """Write the summary and the report of a run folder anew."""
-    from mrmg.run_folder import Step
+    from mrmg.runs.folder import Step
 
     work = _make(options, Step.REPORT)
     _print(options, work.summary(), str(work.folder.file("report.html")))
@@ -220,9 +220,9 @@ def _make(
     **changes: Any,
 ) -> Run:
     """Make steps of a run anew, with some of its arguments changed."""
-    from mrmg.run_drive import checked_drive
-    from mrmg.run_folder import Step, existing
-    from mrmg.steps import taken_up
+    from mrmg.runs.drive import checked_drive
+    from mrmg.runs.folder import Step, existing
+    from mrmg.runs.steps import taken_up
 
     folder = existing(options.run)
     with folder.opened_for_writing(), terminal.progress() as told:

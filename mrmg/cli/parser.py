@@ -6,7 +6,6 @@ import argparse
 from pathlib import Path
 
 from mrmg import __version__
-from mrmg import argument_values as values
 from mrmg.cli import (
     calibrate_command,
     commands,
@@ -19,7 +18,8 @@ from mrmg.cli import (
 )
 from mrmg.cli.run_options import add_options, add_overwrite, add_trust, reader
 from mrmg.cli.usage import Parser
-from mrmg.run_arguments import VideoArguments
+from mrmg.runs import argument_values as values
+from mrmg.runs.arguments import VideoArguments
 
 EXIT_CODES = """\
 exit codes:

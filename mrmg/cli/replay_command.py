@@ -12,7 +12,7 @@ from mrmg.cli.run_options import add_overwrite, add_trust
 from mrmg.errors import ExitCode
 
 if TYPE_CHECKING:
-    from mrmg.reproduction import Reproduction
+    from mrmg.runs.reproduction import Reproduction
 
 
 def add_replay(verbs: Any) -> None:
@@ -43,7 +43,7 @@ def add_replay(verbs: Any) -> None:
 
 def replay(options: argparse.Namespace) -> int:
     """Repeat a failed execution, and compare."""
-    from mrmg.reproduction import reproduce
+    from mrmg.runs.reproduction import reproduce
 
     out = options.out or options.capsule.parent / "replay"
     with terminal.progress() as told:
@@ -66,8 +66,8 @@ def replay(options: argparse.Namespace) -> int:
 
 
 def _render(folder: Path, trust_code: bool) -> None:
-    from mrmg.run_folder import Step, existing
-    from mrmg.steps import taken_up
+    from mrmg.runs.folder import Step, existing
+    from mrmg.runs.steps import taken_up
 
     with existing(folder).opened_for_writing() as opened, terminal.progress() as told:
         taken_up(opened, told, trust_code=trust_code).make(Step.RENDER)

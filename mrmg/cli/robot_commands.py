@@ -88,7 +88,7 @@ def check_robot(options: argparse.Namespace) -> int:
 
 def _draw(model: Any, out: Path | None) -> str | None:
     """Draw a robot; a machine that cannot fails only if the picture was asked for."""
-    from mrmg.results.robot_drawing import draw_robot
+    from mrmg.viz.robot_drawing import draw_robot
 
     picture = out or Path(f"{model.name}.png")
     try:
@@ -103,7 +103,7 @@ def _draw(model: Any, out: Path | None) -> str | None:
 
 def new_robot(options: argparse.Namespace) -> int:
     """Begin a robot model of the user's own."""
-    from mrmg.authoring import new_robot as written
+    from mrmg.scene.new_robot import new_robot as written
 
     folder = Path(options.name)
     for file in written(folder, like=options.like):

@@ -9,15 +9,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mrmg import argument_values as values
 from mrmg.cli import terminal
 from mrmg.cli.run_options import add_options, add_trust, given, reader
 from mrmg.errors import ExitCode
-from mrmg.run_arguments import DISTURBANCE_HELP
+from mrmg.runs import argument_values as values
+from mrmg.runs.arguments import DISTURBANCE_HELP
 
 if TYPE_CHECKING:
-    from mrmg.results.robustness import Study
-    from mrmg.robustness.study import OnTrial
+    from mrmg.studies.outcomes import Study
+    from mrmg.studies.robustness.study import OnTrial
 
 _COLUMNS = ("worst", "p05", "median", "p95")
 
@@ -71,9 +71,9 @@ def robustness(options: argparse.Namespace) -> int:
     """Drive a plan under many disturbances."""
     from dataclasses import replace
 
-    from mrmg.robustness import study_robustness
-    from mrmg.run_folder import Step, existing
-    from mrmg.steps import taken_up
+    from mrmg.runs.folder import Step, existing
+    from mrmg.runs.steps import taken_up
+    from mrmg.studies.robustness import study_robustness
 
     given_drive = {
         name: value

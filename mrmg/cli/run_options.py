@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable
 from typing import Any
 
-from mrmg.run_arguments import Option, RunArguments, VideoArguments, options_of
+from mrmg.runs.arguments import Option, RunArguments, VideoArguments, options_of
 
 _Arguments = type[RunArguments] | type[VideoArguments]
 

@@ -19,7 +19,7 @@ from mrmg.errors import ExitCode, Fault, FileError, UsageError
 
 def new(options: argparse.Namespace) -> int:
     """Write a commented scene to begin with."""
-    from mrmg.authoring import new_scene
+    from mrmg.scene.new_scene import new_scene
 
     given = options.name.removesuffix(".yaml")
     if Path(given).name in ("", ".."):
@@ -55,8 +55,8 @@ def list_(options: argparse.Namespace) -> int:
 
 def check(options: argparse.Namespace) -> int:
     """Report what `mrmg run` would refuse of a scene, and what it warns of."""
-    from mrmg.pipeline import rehearse
     from mrmg.planning.feasibility import mission_warnings
+    from mrmg.runs.pipeline import rehearse
     from mrmg.scene.loading import heading_hints, load_scene
 
     warnings = heading_hints(options.scene)
@@ -98,9 +98,9 @@ def _print_findings(
 
 def draw(options: argparse.Namespace) -> int:
     """Draw a scene into a picture."""
-    from mrmg.results.print_style import require_format
-    from mrmg.results.scene_drawing import draw_scene
     from mrmg.scene.loading import load_scene
+    from mrmg.viz.print_style import require_format
+    from mrmg.viz.scene_drawing import draw_scene
 
     scene = load_scene(options.scene, trust_code=options.trust_code)
     picture = options.out or Path(f"{scene.name}.png")
@@ -154,7 +154,7 @@ def schema(options: argparse.Namespace) -> int:
 
 def import_(options: argparse.Namespace) -> int:
     """Read a map drawn elsewhere into a scene without robots and goals."""
-    from mrmg.authoring import import_map
+    from mrmg.scene.importing import import_map
 
     _require_absent(options)
     document = import_map(options.map, longest_side_m=options.longest_side)
@@ -164,8 +164,8 @@ def import_(options: argparse.Namespace) -> int:
 
 def populate(options: argparse.Namespace) -> int:
     """Place robots, goals and stations in a scene."""
-    from mrmg.authoring import populate as populated
     from mrmg.scene.loading import load_scene
+    from mrmg.scene.populating import populate as populated
 
     _require_absent(options)
     document = populated(
@@ -180,7 +180,7 @@ def populate(options: argparse.Namespace) -> int:
 
 
 def _require_absent(options: argparse.Namespace) -> None:
-    from mrmg.replacing import require_absent
+    from mrmg.runs.replacing import require_absent
 
     if options.out is not None:  # a scene may have been edited by hand
         require_absent(options.out, overwrite=options.overwrite)

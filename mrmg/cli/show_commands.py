@@ -17,8 +17,8 @@ PORT = 8080
 
 def compare(options: argparse.Namespace) -> int:
     """Set runs side by side: a table, and a page with their courses."""
-    from mrmg.results.compare import compare_runs
-    from mrmg.results.compare_page import write_comparison
+    from mrmg.report.compare import compare_runs
+    from mrmg.report.compare_page import write_comparison
 
     comparison = compare_runs(options.runs, trust_code=options.trust_code)
     write_comparison(comparison, options.out)
@@ -31,7 +31,7 @@ def compare(options: argparse.Namespace) -> int:
 
 def figure(options: argparse.Namespace) -> int:
     """Draw one figure of a run for a paper."""
-    from mrmg.results.figure import draw_figure
+    from mrmg.viz.figure import draw_figure
 
     out = options.out or Path(f"{options.kind}.pdf")
     draw_figure(options.run, options.kind, out, trust_code=options.trust_code)
@@ -67,8 +67,8 @@ def watch(
         port: of the page.
         trust_code: whether robot models may bring Python code (`scene.loading.trust`).
     """
-    from mrmg.results.replay import replay_of
     from mrmg.scene.loading import load_scene
+    from mrmg.viz.replay import replay_of
 
     if (Path(source) / "run.json").exists():
         replay = replay_of(Path(source), trust_code=trust_code)
@@ -76,11 +76,11 @@ def watch(
     else:
         replay, scene = None, load_scene(source, trust_code=trust_code)
     if (place or ("window" if _has_screen() else "browser")) == "window":
-        from mrmg.results.native_view import open_window
+        from mrmg.viz.native_view import open_window
 
         open_window(scene, replay)
         return ExitCode.OK
-    from mrmg.results.browser_view import BrowserView
+    from mrmg.viz.browser_view import BrowserView
 
     page = BrowserView(scene, replay, host=host, port=port)
     print(f"{scene.name}: open {page.address} in a browser; Ctrl-C ends", flush=True)

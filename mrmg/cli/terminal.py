@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
     from mrmg.planning import Improvement
-    from mrmg.run_folder import Step
-    from mrmg.steps import StepProgress
+    from mrmg.runs.folder import Step
+    from mrmg.runs.steps import StepProgress
 
 _DOING = {
     "plan": "planning",

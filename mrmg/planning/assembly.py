@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 
-from mrmg.accounting import battery_profile, find_visits, plan_ledger
-from mrmg.mission import Plan, Trajectory, Visit
+from mrmg.energy.metering import battery_profile, find_visits, plan_ledger
+from mrmg.energy.visits import crowded_stations
 from mrmg.planning.feasibility import energy_and_metres
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.tree.motion_tree import Problem
-from mrmg.visiting import crowded_stations
+from mrmg.plans import Plan, Trajectory, Visit
 
 
 def make_plan(

@@ -12,7 +12,6 @@ from itertools import product
 import numpy as np
 
 from mrmg import seeding
-from mrmg.mission import Plan
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.drafting.drafting import LEAST_SPARE, draftable, drafts, path_cost_J
 from mrmg.planning.drafting.refine import refine
@@ -21,6 +20,7 @@ from mrmg.planning.parameters import GUIDED_TREE, PlannerParams
 from mrmg.planning.routers import route
 from mrmg.planning.routing.routing import Routing
 from mrmg.planning.tree.motion_tree import Problem, grow_tree
+from mrmg.plans import Plan
 
 MARGINS = (1.0, 0.0, 2.0)
 """Multiples of the route margin that successive trees are grown with."""

@@ -14,7 +14,6 @@ import numpy as np
 
 from mrmg import seeding
 from mrmg.compared import compared
-from mrmg.mission import PlanStatus
 from mrmg.planning import endings
 from mrmg.planning.attempt import router_problem
 from mrmg.planning.bound.joint_bound import Divisions
@@ -31,6 +30,7 @@ from mrmg.planning.search import Search
 from mrmg.planning.statistics import Statistics
 from mrmg.planning.tree.motion_tree import Problem
 from mrmg.planning.tree.targets import finish_of
+from mrmg.plans import PlanStatus
 from mrmg.scene.objective import overtime_s
 from mrmg.scene.types import Robot, Scene
 

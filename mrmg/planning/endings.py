@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mrmg.mission import PlanStatus
+from mrmg.plans import PlanStatus
 
 MAX_LISTED = 8
 """Names that a sentence lists at most."""

@@ -16,13 +16,13 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from mrmg.mission import Plan
 from mrmg.motion._kernels import MODEL_ID
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.attempt import Attempt
 from mrmg.planning.drafting import _tracking_kernels
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.tree.motion_tree import Problem
+from mrmg.plans import Plan
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.types import Finish, Region, Robot, Scene
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from mrmg.mission import Plan
 from mrmg.planning.bound.exact_tours import MOST_GOALS
 from mrmg.planning.endings import listed
+from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 
 LARGE_GAP = 0.15

@@ -9,7 +9,6 @@ import numpy as np
 
 from mrmg import seeding
 from mrmg.errors import UsageError
-from mrmg.mission import Trajectory
 from mrmg.planning.guided_tree.planner import Growth as GuidedGrowth
 from mrmg.planning.guided_tree.planner import grow_guided_tree
 from mrmg.planning.parameters import GUIDED_TREE, PlannerParams
@@ -18,6 +17,7 @@ from mrmg.planning.routers import route
 from mrmg.planning.routing.routing import Routing
 from mrmg.planning.tree.motion_tree import Growth as TreeGrowth
 from mrmg.planning.tree.motion_tree import Problem, grow_tree, state_problem
+from mrmg.plans import Trajectory
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
 

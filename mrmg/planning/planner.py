@@ -18,7 +18,6 @@ from mrmg.compilation import (
     note_kernels_are_compiled,
 )
 from mrmg.errors import UsageError
-from mrmg.mission import PlanResult, PlanStatus
 from mrmg.planning.attempt import (
     Attempt,
     attempt_plan,
@@ -55,6 +54,7 @@ from mrmg.planning.search import GRACE_S, OnImprovement, Progress, Search
 from mrmg.planning.statistics import UNKNOWN, Statistics
 from mrmg.planning.tree.haste import priced_world, with_energies
 from mrmg.planning.tree.motion_tree import Problem, grow_tree, state_problem
+from mrmg.plans import PlanResult, PlanStatus
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.objective import Objective
 from mrmg.scene.types import Scene

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from mrmg.mission import Plan
+from mrmg.plans import Plan
 from mrmg.scene.objective import ENERGY, Objective, overtime_s
 from mrmg.scene.types import Scene
 

@@ -19,11 +19,11 @@ import numpy as np
 
 from mrmg import interruption
 from mrmg.background import finished, in_background
-from mrmg.mission import Plan
 from mrmg.planning.attempt import Attempt
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
 from mrmg.planning.statistics import Improvement, Statistics
+from mrmg.plans import Plan
 
 Progress = Callable[[float, str], None]
 """Receives the fraction done, in [0, 1], and a short text."""

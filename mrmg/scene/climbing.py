@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from mrmg.compared import compared
-from mrmg.energy import GRAVITY_M_S2
+from mrmg.energy.model import GRAVITY_M_S2
 from mrmg.errors import Fault
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.robot_model import RobotModel

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from mrmg.energy import GRAVITY_M_S2, EnergyModel, EnergyPreset
+from mrmg.energy.model import GRAVITY_M_S2, EnergyModel, EnergyPreset
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.content import ByContent, content, contents
 from mrmg.scene.model_files import ModelFiles

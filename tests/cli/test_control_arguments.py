@@ -9,17 +9,17 @@ import jsonschema
 import numpy as np
 import pytest
 
-from mrmg import pipeline
 from mrmg.cli.main import main
 from mrmg.errors import ExitCode
-from mrmg.execution.log import ExecutionLog
-from mrmg.mission import Plan, plan_in_force
-from mrmg.results.compare import compare_runs
-from mrmg.results.figure import draw_figure
-from mrmg.results.replay import replay_of
-from mrmg.results.summary import summary_schema
-from mrmg.run_arguments import RunArguments
+from mrmg.plans import Plan, plan_in_force
+from mrmg.report.compare import compare_runs
+from mrmg.runs import pipeline
+from mrmg.runs.arguments import RunArguments
+from mrmg.runs.summary import summary_schema
 from mrmg.scene.loading import scene_from_document
+from mrmg.simulation.log import ExecutionLog
+from mrmg.viz.figure import draw_figure
+from mrmg.viz.replay import replay_of
 
 CONTROL_FILES = ("driven_plan.json", "driven_plan.npz", "replans.json")
 

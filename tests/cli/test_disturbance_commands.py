@@ -11,8 +11,8 @@ import pytest
 
 from mrmg.cli import main
 from mrmg.errors import ExitCode
-from mrmg.execution.disturbance import DEFAULT_RANGES
-from mrmg.execution.log import ExecutionLog
+from mrmg.simulation.disturbance import DEFAULT_RANGES
+from mrmg.simulation.log import ExecutionLog
 
 SCENE = Path(__file__).parents[1] / "scenes" / "one_goal.yaml"
 

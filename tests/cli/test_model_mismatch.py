@@ -10,9 +10,9 @@ import pytest
 
 from mrmg.cli import main
 from mrmg.errors import ExitCode
-from mrmg.execution.log import ExecutionLog
-from mrmg.results.compare import compare_runs
+from mrmg.report.compare import compare_runs
 from mrmg.shipped import models_folder
+from mrmg.simulation.log import ExecutionLog
 
 SCENE = Path(__file__).parents[1] / "scenes" / "one_goal.yaml"
 ROLLING = 'name="rolling_coefficient" data="0.06"'

@@ -11,9 +11,9 @@ import pytest
 
 from mrmg.cli import main
 from mrmg.errors import ExitCode
-from mrmg.execution.log import ExecutionLog
-from mrmg.mission import Plan
-from mrmg.run_folder import OUTPUTS, Step
+from mrmg.plans import Plan
+from mrmg.runs.folder import OUTPUTS, Step
+from mrmg.simulation.log import ExecutionLog
 
 SCENE = Path(__file__).parents[1] / "scenes" / "one_goal.yaml"
 SQUARE_MAP = "[SCALE]\n1\n[BORDER]\n0 0\n200 0\n200 150\n0 150\n"

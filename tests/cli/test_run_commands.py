@@ -14,7 +14,7 @@ import pytest
 from mrmg import storage
 from mrmg.cli import main
 from mrmg.errors import ExitCode
-from mrmg.results.summary import summary_schema
+from mrmg.runs.summary import summary_schema
 from mrmg.scene.loading import load_scene
 from mrmg.scene.objective import Objective
 

@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 
 import mrmg
-from mrmg.accounting import battery_profile
-from mrmg.mission import Plan
+from mrmg.energy.metering import battery_profile
 from mrmg.planning import PlannerParams, attempt
 from mrmg.planning.attempt import Attempt, attempt_plan, draft_plans, tree_plans
 from mrmg.planning.planner import state_mission
 from mrmg.planning.tree.motion_tree import Problem
+from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 
 SCENES = Path(__file__).parents[1] / "scenes"

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 import mrmg
-from mrmg.accounting import battery_profile
-from mrmg.mission import Plan
+from mrmg.energy.metering import battery_profile
 from mrmg.planning.diagnosis import Proofs
+from mrmg.plans import Plan
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.types import Scene
 

@@ -14,9 +14,9 @@ import pytest
 import mrmg
 from mrmg.cli.main import main
 from mrmg.errors import ExitCode, SceneError
-from mrmg.mission import PlanStatus
 from mrmg.planning import PlannerParams, endings
 from mrmg.planning.endings import ENDINGS, Ending, counted, listed
+from mrmg.plans import PlanStatus
 from mrmg.scene.loading import dump_scene
 from mrmg.scene.types import Scene
 

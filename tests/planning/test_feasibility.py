@@ -14,14 +14,14 @@ import pytest
 import shapely
 
 import mrmg
-from mrmg.accounting import find_visits, plan_ledger
-from mrmg.mission import Plan, Trajectory
+from mrmg.energy.metering import find_visits, plan_ledger
 from mrmg.planning.feasibility import (
     energy_warnings,
     mission_warnings,
     proof_of_infeasibility,
 )
 from mrmg.planning.path_bounds import Walls, shortest_way_m
+from mrmg.plans import Plan, Trajectory
 from mrmg.scene.types import Scene
 from mrmg.shipped import scene_names
 

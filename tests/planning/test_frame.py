@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 
 import mrmg
-from mrmg.mission import Plan
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.frame import Frame
 from mrmg.planning.planner import state_mission
+from mrmg.plans import Plan
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 

@@ -18,12 +18,12 @@ from hypothesis import strategies as st
 from shapely.geometry import Point, Polygon, box
 
 import mrmg
-from mrmg.mission import Plan
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.bound.bound import lower_bound_J
 from mrmg.planning.bound.exact_tours import exact_routing
 from mrmg.planning.bound.geodesic import Ground
 from mrmg.planning.routing.routing import routing_arrays
+from mrmg.plans import Plan
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 

@@ -10,8 +10,8 @@ import pytest
 
 import mrmg
 from mrmg.errors import SceneError
-from mrmg.mission import PlanResult, PlanStatus
 from mrmg.planning import PlannerParams, plan_mission
+from mrmg.plans import PlanResult, PlanStatus
 from mrmg.scene.types import Scene
 
 SCENES = Path(__file__).parents[1] / "scenes"

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import mrmg
-from mrmg.mission import Plan
 from mrmg.planning import Improvement, PlannerParams, plan_mission
 from mrmg.planning.attempt import Attempt
 from mrmg.planning.search import Search
 from mrmg.planning.statistics import Statistics, gap_of
+from mrmg.plans import Plan
 
 COSTS = (90.0, None, 70.0, 80.0, 60.0, 65.0, 50.0, None, 55.0, 40.0)
 """Energy of the plan of each attempt; None for none."""

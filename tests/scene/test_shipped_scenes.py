@@ -12,8 +12,8 @@ from shapely import affinity
 from shapely.geometry import Polygon
 
 from mrmg import shipped
-from mrmg.authoring.ground import Ground
 from mrmg.scene.loading import load_scene
+from mrmg.scene.populating.ground import Ground
 from mrmg.scene.types import Scene
 
 # name: robots, goals, stations, terrain areas, capacity in metres of plain ground

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from mrmg import shipped
-from mrmg.results.robustness import Study, Trial
 from mrmg.scene.loading.models import load_model
+from mrmg.studies.outcomes import Study, Trial
 
 TOOLS = Path(__file__).parents[2] / "tools"
 

@@ -13,8 +13,8 @@ import yaml
 
 from mrmg.cli.parser import make_parser
 from mrmg.errors import ExitCode
-from mrmg.results.summary import summary_schema
-from mrmg.run_folder import OUTPUTS
+from mrmg.runs.folder import OUTPUTS
+from mrmg.runs.summary import summary_schema
 from mrmg.scene.loading import scene_from_document
 
 ROOT = Path(__file__).parents[2]

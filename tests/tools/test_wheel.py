@@ -60,8 +60,8 @@ def test_the_wheel_carries_scenes_and_models(wheel: Path) -> None:
         assert f"mrmg/_shipped/scenes/{scene.name}" in names
     for part in (ROOT / "models").rglob("*.*"):
         assert f"mrmg/_shipped/models/{part.relative_to(ROOT / 'models')}" in names
-    assert "mrmg/results/summary.schema.json" in names
-    assert "mrmg/authoring/new_scene.yaml" in names
+    assert "mrmg/runs/summary.schema.json" in names
+    assert "mrmg/scene/new_scene.yaml" in names
     assert not [name for name in names if name.startswith("tests/")]
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import mrmg
-from mrmg.mission import Plan, PlanStatus
+from mrmg.plans import Plan, PlanStatus
 from mrmg.scene.types import Scene
 
 SCENES = Path(__file__).parents[1] / "scenes"

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from mrmg import pipeline
-from mrmg.authoring import import_map, populate
 from mrmg.errors import ExitCode
+from mrmg.runs import pipeline
+from mrmg.scene.importing import import_map
 from mrmg.scene.loading import scene_from_document
+from mrmg.scene.populating import populate
 
 MAPS = Path(__file__).parents[3] / "shared/maps"
 

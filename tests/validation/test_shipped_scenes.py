@@ -11,13 +11,13 @@ import os
 import pytest
 
 import mrmg
-from mrmg.energy import PARTS
-from mrmg.execution.log import ExecutionLog
-from mrmg.mission import Plan, PlanStatus
-from mrmg.results.energy_audit import EnergyAudit
-from mrmg.results.verdict import Verdict
+from mrmg.energy.audit_record import EnergyAudit
+from mrmg.energy.model import PARTS
+from mrmg.plans import Plan, PlanStatus
 from mrmg.scene.types import Scene
 from mrmg.shipped import scene_names
+from mrmg.simulation.log import ExecutionLog
+from mrmg.verification.verdict import Verdict
 
 METERED_PCT = 3.0
 MEASURED_PCT = 5.0

@@ -16,8 +16,8 @@ from importlib import import_module
 from protocol import Row, Trials
 
 import mrmg
-from mrmg.execution.controller import controller_maker
 from mrmg.planning import plan_mission
+from mrmg.simulation.controller import controller_maker
 from physics.figures import Figure, verdict
 
 Job = tuple[str, int]
@@ -86,7 +86,7 @@ def mission(job: Job) -> Row:
 @cache
 def _warm(source: str) -> None:
     """Import what drives, and set the controllers of a scene up, once a process."""
-    import_module("mrmg.execution.simulation")
+    import_module("mrmg.simulation.simulation")
     for robot in mrmg.load_scene(source).robots:
         controller_maker("mpc")(robot.model)
 

@@ -13,11 +13,11 @@ from pathlib import Path
 from protocol import Row, state
 
 import mrmg
-from mrmg.results.robustness import Study, Trial, wilson_interval
-from mrmg.robustness import study_robustness
-from mrmg.run_drive import drive as drive_as
-from mrmg.run_folder import RunFolder, Step
-from mrmg.steps import Run, RunArguments
+from mrmg.runs.drive import drive as drive_as
+from mrmg.runs.folder import RunFolder, Step
+from mrmg.runs.steps import Run, RunArguments
+from mrmg.studies.outcomes import Study, Trial, wilson_interval
+from mrmg.studies.robustness import study_robustness
 from physics.figures import Figure, verdict
 
 SCENES = ("scene1", "scene4")

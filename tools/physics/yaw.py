@@ -9,11 +9,11 @@ import numpy as np
 from protocol import Row
 
 from mrmg import shipped
-from mrmg.calibration.manoeuvres import CRUISE_S, STEP_S, circle
-from mrmg.calibration.measurement import drive, yaw_rate
-from mrmg.execution.log import ExecutionLog
 from mrmg.scene.loading.models import load_model
 from mrmg.scene.robot_model import Limits, RobotModel
+from mrmg.simulation.log import ExecutionLog
+from mrmg.studies.calibration.manoeuvres import CRUISE_S, STEP_S, circle
+from mrmg.studies.calibration.measurement import drive, yaw_rate
 from physics.figures import Figure, verdict
 
 YAW_ERROR_PCT = 0.5

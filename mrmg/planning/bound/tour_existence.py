@@ -28,7 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import shapely
 
-from mrmg.accounting import SHORTEST_ON_SLOPES_S
+from mrmg.energy.metering import SHORTEST_ON_SLOPES_S
 from mrmg.planning.bound import _bound_kernels
 from mrmg.planning.bound.bound import Relaxation
 from mrmg.planning.bound.exact_tours import MOST_GOALS

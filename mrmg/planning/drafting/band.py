@@ -12,12 +12,12 @@ from math import cos, sin
 
 import numpy as np
 
-from mrmg.mission import Trajectory
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.drafting import _relax_kernels, _tracking_kernels
 from mrmg.planning.drafting._band_kernels import Stops, Surface
 from mrmg.planning.tree._mission_kernels import Targets
 from mrmg.planning.tree.motion_tree import Problem
+from mrmg.plans import Trajectory
 
 SPACINGS_M = (2.4, 0.8)
 """Distance of a path's nodes, at first and in the end.

@@ -14,7 +14,6 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 
-from mrmg.mission import Plan
 from mrmg.motion._kernels import CAR, UNICYCLE
 from mrmg.planning.assembly import make_plan, why_refused
 from mrmg.planning.drafting._band_kernels import Surface
@@ -25,6 +24,7 @@ from mrmg.planning.drafting.refine import OnFailure, run_errands, surfaces_of
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.routing.routing import Routing
 from mrmg.planning.tree.motion_tree import Problem
+from mrmg.plans import Plan
 
 SHARP = radians(110.0)
 """Turn at a target from which on a car goes on in its other gear [rad]."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from mrmg.mission import Trajectory
 from mrmg.planning.drafting._band_kernels import Surface
 from mrmg.planning.drafting.band import SPACINGS_M, Path, tightened
 from mrmg.planning.drafting.tracking import SlowPlace
 from mrmg.planning.tree.motion_tree import Problem
+from mrmg.plans import Trajectory
 
 WALL = 0.5
 """Share of the room it needs that a path lacks only where it leads through a wall."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrmg.energy import CONSUMERS_W
+from mrmg.energy.model import CONSUMERS_W
 from mrmg.planning.drafting.band import Path
 from mrmg.planning.tree.motion_tree import Problem
 

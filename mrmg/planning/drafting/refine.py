@@ -18,7 +18,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrmg.mission import Plan, Trajectory
 from mrmg.motion._kernels import UNICYCLE, USER
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.drafting._band_kernels import Surface
@@ -41,6 +40,7 @@ from mrmg.planning.tree._steering_kernels import wrap
 from mrmg.planning.tree.haste import energy_share
 from mrmg.planning.tree.motion_tree import Problem
 from mrmg.planning.tree.targets import TARGET_MARGIN_M
+from mrmg.plans import Plan, Trajectory
 
 TRIES = 14
 """Times that driving is repeated with what went wrong put right."""

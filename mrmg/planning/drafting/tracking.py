@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrmg.energy import EFFECTIVE_MASS_KG, ROLLING_N
-from mrmg.mission import Trajectory
+from mrmg.energy.model import EFFECTIVE_MASS_KG, ROLLING_N
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.drafting import _tracking_kernels
 from mrmg.planning.drafting._tracking_kernels import Courses, Waits
@@ -16,6 +15,7 @@ from mrmg.planning.drafting.band import Path, nimble_share, path_curvature
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.tree.haste import brakes_hard
 from mrmg.planning.tree.motion_tree import Problem
+from mrmg.plans import Trajectory
 
 SLOWEST = 4
 """Driving may take so many times as long as the longest path does at full speed."""

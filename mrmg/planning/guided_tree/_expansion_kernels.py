@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from mrmg.compilation import kernel, leaf_kernel
-from mrmg.energy import battery_power
+from mrmg.energy.model import battery_power
 from mrmg.motion._kernels import CAR, copy_numbers, step, turn_speed
 from mrmg.planning.guided_tree._regions_kernels import point_on_path, region_of
 from mrmg.planning.guided_tree._setting_kernels import (

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from mrmg.mission import Trajectory
 from mrmg.motion._kernels import step as motion_step
 from mrmg.planning.guided_tree._expansion_kernels import BRAKING_STEPS
 from mrmg.planning.guided_tree._growth_kernels import grow
@@ -27,6 +26,7 @@ from mrmg.planning.guided_tree._tree_kernels import (
 )
 from mrmg.planning.parameters import BETA_SHARE, GuidedTreeParams, PlannerParams
 from mrmg.planning.tree.motion_tree import Problem
+from mrmg.plans import Trajectory
 from mrmg.scene.types import Scene
 
 

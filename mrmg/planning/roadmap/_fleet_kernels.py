@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import by_pointer, view
-from mrmg.energy import N_COEFFICIENTS
+from mrmg.energy.model import N_COEFFICIENTS
 from mrmg.world._kernels import FreeSpace
 
 MOST_CORNERS = 12

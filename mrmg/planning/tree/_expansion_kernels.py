@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from mrmg.compilation import kernel, leaf_kernel
-from mrmg.energy import battery_power
+from mrmg.energy.model import battery_power
 from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, turn_speed
 from mrmg.planning.roadmap._fleet_kernels import space_of
 from mrmg.planning.routing._random_kernels import random_unit

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import by_pointer, kernel, leaf_kernel
-from mrmg.energy import CONSUMERS_W
+from mrmg.energy.model import CONSUMERS_W
 from mrmg.planning.roadmap._fleet_kernels import Spaces, space_of
 from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays, find_waypoint
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from mrmg.compilation import leaf_kernel
-from mrmg.energy import CONSUMERS_W
+from mrmg.energy.model import CONSUMERS_W
 from mrmg.planning.tree._mission_kernels import in_target
 
 FULL = 1.0 - 1e-9

@@ -12,8 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrmg import seeding
-from mrmg.energy import CONSUMERS_W
-from mrmg.mission import Trajectory
+from mrmg.energy.model import CONSUMERS_W
 from mrmg.motion._kernels import step as motion_step
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
@@ -32,6 +31,7 @@ from mrmg.planning.tree.targets import (
     target_arrays,
 )
 from mrmg.planning.tree.timing import routing_times
+from mrmg.plans import Trajectory
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
 

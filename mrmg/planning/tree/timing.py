@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.energy import CONSUMERS_W
+from mrmg.energy.model import CONSUMERS_W
 from mrmg.planning.preference import Preference
 from mrmg.planning.roadmap.roadmap import Roadmap
 from mrmg.planning.tree.haste import way_lengths_m

@@ -19,7 +19,7 @@ import shapely
 from pydantic import Field, ValidationError
 
 from mrmg import shipped, storage
-from mrmg.energy import EnergyPreset
+from mrmg.energy.model import EnergyPreset
 from mrmg.errors import Fault, SceneError, nearest
 from mrmg.scene.loading.consistency import mjcf_faults
 from mrmg.scene.loading.faults import faults_of

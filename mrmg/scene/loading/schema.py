@@ -85,7 +85,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from mrmg import shipped
-from mrmg.energy import EnergyPreset
+from mrmg.energy.model import EnergyPreset
 from mrmg.scene.loading.shape_schema import (
     DISC,
     ID,

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mrmg.energy import GRAVITY_M_S2
+from mrmg.energy.model import GRAVITY_M_S2
 from mrmg.errors import Fault
 from mrmg.scene.driven_parts import DrivenParts
 from mrmg.scene.loading.mjcf import CompiledRobot

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import mrmg
-from mrmg.accounting import battery_profile
-from mrmg.mission import Plan
+from mrmg.energy.metering import battery_profile
 from mrmg.motion._kernels import USER
 from mrmg.planning import PlannerParams
 from mrmg.planning.drafting.drafting import (
@@ -22,6 +21,7 @@ from mrmg.planning.drafting.drafting import (
 )
 from mrmg.planning.planner import state_mission
 from mrmg.planning.routers import route
+from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 
 PARAMS = PlannerParams(samples=600)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import mrmg
-from mrmg.mission import Plan
 from mrmg.planning import PlannerParams
 from mrmg.planning.drafting.drafting import draftable, drafts, tour_path, whole_tour
 from mrmg.planning.drafting.encounters import MOST, Encounters, in_the_way, waits_at
@@ -20,6 +19,7 @@ from mrmg.planning.drafting.tracking import Drive
 from mrmg.planning.planner import state_mission
 from mrmg.planning.routing.routing import Routing
 from mrmg.planning.tree.motion_tree import Problem
+from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 
 PARAMS = PlannerParams(samples=400)

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import mrmg
-from mrmg.accounting import battery_profile
-from mrmg.mission import Plan
+from mrmg.energy.metering import battery_profile
 from mrmg.planning import PlannerParams
 from mrmg.planning.drafting.drafting import LEAST_SPARE, drafts, tour_path
 from mrmg.planning.drafting.pauses import with_pauses
 from mrmg.planning.planner import state_mission
 from mrmg.planning.routers import route
+from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 
 SCENES = Path(__file__).parents[2] / "scenes"

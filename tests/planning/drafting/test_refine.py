@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import mrmg
-from mrmg.mission import Plan
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.drafting.band import visit_steps
 from mrmg.planning.drafting.refine import refine, tour_numbers
 from mrmg.planning.planner import state_mission
 from mrmg.planning.tree.motion_tree import Problem
 from mrmg.planning.tree.targets import TARGET_MARGIN_M
+from mrmg.plans import Plan
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 

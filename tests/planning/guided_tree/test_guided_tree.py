@@ -15,9 +15,9 @@ import pytest
 import mrmg
 from mrmg.cli import main
 from mrmg.errors import UsageError
-from mrmg.mission import PlanStatus
 from mrmg.planning import guided_tree, plan_mission, profile_params
 from mrmg.planning.parameters import GuidedTreeParams
+from mrmg.plans import PlanStatus
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.types import Scene
 

@@ -8,8 +8,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mrmg.accounting import LoggedMotion, step_energy_parts
-from mrmg.energy import PARTS
+from mrmg.energy.metering import LoggedMotion, step_energy_parts
+from mrmg.energy.model import PARTS
 from mrmg.planning.tree._expansion_kernels import (
     attempt_control,
     choose_modes,

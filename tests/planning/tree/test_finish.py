@@ -12,8 +12,8 @@ import pytest
 
 import mrmg
 from mrmg.errors import SceneError
-from mrmg.mission import PlanStatus
 from mrmg.planning import PlannerParams, plan_mission
+from mrmg.plans import PlanStatus
 from mrmg.scene.types import Scene
 
 MakeScene = Callable[..., Scene]

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import shapely
 
-from mrmg.accounting import LoggedMotion, battery_profile, find_visits
-from mrmg.accounting import step_energy_parts as energy_parts
+from mrmg.energy.metering import LoggedMotion, battery_profile, find_visits
+from mrmg.energy.metering import step_energy_parts as energy_parts
 from mrmg.motion._kernels import step
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.routing.routing import Routing, solve_routing

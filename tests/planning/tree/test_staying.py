@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mrmg.accounting import battery_profile
-from mrmg.mission import Plan
+from mrmg.energy.metering import battery_profile
+from mrmg.energy.visits import crowded_stations, first_stay
 from mrmg.planning import PlannerParams, plan_mission
-from mrmg.results.verify import verify
+from mrmg.plans import Plan
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.types import Scene
-from mrmg.visiting import crowded_stations, first_stay
+from mrmg.verification.verify import verify
 
 SCENES = Path(__file__).parents[2] / "scenes"
 PLANS = {"path following": True, "tree": False}

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from mrmg import shipped
-from mrmg.energy import GRAVITY_M_S2
+from mrmg.energy.model import GRAVITY_M_S2
 from mrmg.errors import SceneError
 from mrmg.scene.loading.models import load_model, model_folder
 

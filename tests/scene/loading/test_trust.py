@@ -14,12 +14,12 @@ import yaml
 
 import mrmg
 from mrmg import shipped
-from mrmg.capsule import Capsule, Failure
 from mrmg.cli import main
 from mrmg.cli.parser import make_parser
 from mrmg.errors import ExitCode, SceneError
 from mrmg.motion.user_motion import user_motion
-from mrmg.run_arguments import RunArguments
+from mrmg.runs.arguments import RunArguments
+from mrmg.runs.capsule import Capsule, Failure
 from mrmg.scene.loading import load_scene
 from mrmg.scene.loading.models import load_model
 

@@ -1,0 +1,152 @@
+"""What the audit says of a simulated mission: three meters, visits, tracking."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from mrmg import storage
+from mrmg.energy.ledger import EnergyLedger
+from mrmg.errors import Fault, RunFolderError
+
+AUDIT_FORMAT = 1
+
+MODEL_MISMATCH = "model mismatch"
+"""Cause of a mission that failed in nothing but the energy its models predict."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SimulatedVisit:
+    """A robot's entering of a goal or station in the simulation.
+
+    Attributes:
+        robot: id of the robot.
+        target: id of the goal or station.
+        kind: "goal" or "station".
+        time_s: simulated time of the first tick inside the region.
+        energy_J: measured battery content on arrival, before any recharge.
+    """
+
+    robot: str
+    target: str
+    kind: str
+    time_s: float
+    energy_J: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RobotAudit:
+    """The account of one robot.
+
+    Attributes:
+        robot: its id.
+        planned_J: energy model over the plan.
+        metered_J: energy model over the simulated motion.
+        measured_J: from the work of the simulated drives.
+        metered_error_pct, measured_error_pct: difference from planned, in percent of
+            planned (or of one metre of plain ground where less was planned).
+        min_charge_fraction: least measured battery content over the capacity.
+        tracking_rms_m, tracking_max_m: distance of the reference point from the plan at
+            the fleet's shared clock.
+    """
+
+    robot: str
+    planned_J: float
+    metered_J: float
+    measured_J: float
+    metered_error_pct: float
+    measured_error_pct: float
+    min_charge_fraction: float
+    tracking_rms_m: float
+    tracking_max_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnergyAudit:
+    """The account of a simulated mission.
+
+    Attributes:
+        mission_ok: all goals visited, no contact, no battery below its reserve,
+            the simulation ran to the end, and robots took the energy planned.
+        reasons: why not, one sentence each.
+        causes: the kinds of these reasons: why the simulation was given up
+            (`ExecutionLog.gave_up`), "ended" by mission control, "goal missed",
+            "contact", "station shared", "late", "below reserve", "battery empty",
+            `MODEL_MISMATCH`.
+        robots: one account per robot, in the scene's order.
+        visits: of tours' targets in the simulation, in order of time.
+        goals_visited: ids of the goals some robot visited, in the scene's order.
+        planned, metered, measured: ledgers by robot, leg and part; the legs of the
+            last two end where the simulation visits the target.
+    """
+
+    mission_ok: bool
+    reasons: tuple[str, ...]
+    robots: tuple[RobotAudit, ...]
+    visits: tuple[SimulatedVisit, ...]
+    goals_visited: tuple[str, ...]
+    planned: EnergyLedger
+    metered: EnergyLedger
+    measured: EnergyLedger
+    causes: tuple[str, ...] = ()
+
+    @property
+    def recharges(self) -> tuple[SimulatedVisit, ...]:
+        """The visits of stations."""
+        return tuple(visit for visit in self.visits if visit.kind == "station")
+
+    def robot(self, robot_id: str) -> RobotAudit:
+        """Return the account of one robot."""
+        return next(item for item in self.robots if item.robot == robot_id)
+
+    def save(self, folder: Path) -> None:
+        """Write `audit.json`."""
+        ledgers = {name: getattr(self, name).to_rows() for name in _LEDGERS}
+        storage.write_json(
+            folder / "audit.json",
+            {
+                "format": AUDIT_FORMAT,
+                "mission_ok": self.mission_ok,
+                "causes": list(self.causes),
+                "reasons": list(self.reasons),
+                "robots": [asdict(item) for item in self.robots],
+                "visits": [asdict(item) for item in self.visits],
+                "goals_visited": list(self.goals_visited),
+                **ledgers,
+            },
+        )
+
+    @staticmethod
+    def load(folder: Path) -> EnergyAudit:
+        """Read an audit that `save` wrote.
+
+        Raises:
+            RunFolderError: if the file is missing or not an audit of this format.
+        """
+        try:
+            return _audit_from(storage.read_json(folder / "audit.json"))
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            fault = Fault(
+                "audit.json", f"no readable audit ({error}); run 'mrmg audit'"
+            )
+            raise RunFolderError(str(folder), [fault]) from error
+
+
+_LEDGERS = ("planned", "metered", "measured")
+
+
+def _audit_from(content: Mapping[str, Any]) -> EnergyAudit:
+    if content["format"] != AUDIT_FORMAT:
+        raise ValueError(f"this version reads format {AUDIT_FORMAT} only")
+    ledgers = {name: EnergyLedger.from_rows(content[name]) for name in _LEDGERS}
+    return EnergyAudit(
+        mission_ok=content["mission_ok"],
+        causes=tuple(content.get("causes", ())),
+        reasons=tuple(content["reasons"]),
+        robots=tuple(RobotAudit(**row) for row in content["robots"]),
+        visits=tuple(SimulatedVisit(**row) for row in content["visits"]),
+        goals_visited=tuple(content["goals_visited"]),
+        **ledgers,
+    )

@@ -1,0 +1,191 @@
+"""What counts as a visit, and what it does to the battery: one rule for everybody.
+
+A robot is at a goal or station while its reference point lies in the region. A visit is
+the first stay, after the visit before it is over, that lasts the target's dwell time
+without a break; it begins with the stay and is over when that time is. A station fills
+the battery at once as the visit begins, or with its charging power for as long as the
+robot is at the station, up to the beginning of its next visit. A station for one robot
+at a time holds one reference point at any time.
+
+Planner, verifier, mission control and audit all judge by these functions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from types import MappingProxyType
+
+import numpy as np
+
+from mrmg.plans import Visit
+from mrmg.scene.types import Battery, Goal, Scene, Station
+
+ROUNDING_S = 1e-6
+"""Rounding of times that is forgiven in how long a robot stays."""
+
+_NOTHING: Mapping[int, float] = MappingProxyType({})
+
+
+@dataclass(frozen=True, slots=True)
+class Stay:
+    """A stay that is long enough for a visit.
+
+    Attributes:
+        first: index of its first state.
+        over: index of the first state at which the dwell time is over.
+    """
+
+    first: int
+    over: int
+
+
+def first_stay(
+    target: Goal | Station, time_s: np.ndarray, points: np.ndarray, start: int
+) -> Stay | None:
+    """Return the first stay from state `start` on that is a visit, None without one.
+
+    Args:
+        target: where to stay.
+        time_s: of the states, shape (n,).
+        points: positions of the reference point [m], shape (n, 2).
+        start: index of the first state that counts.
+    """
+    inside = target.region.depth(points[start:]) >= 0.0
+    for first, end in runs(inside):
+        spent_s = time_s[start + first : start + end] - time_s[start + first]
+        long_enough = spent_s >= target.dwell_s - ROUNDING_S
+        if long_enough.any():
+            return Stay(start + first, start + first + int(long_enough.argmax()))
+    return None
+
+
+def longest_stay_s(
+    target: Goal | Station, time_s: np.ndarray, points: np.ndarray
+) -> float:
+    """Return how long the longest stay lasts, which may be 0; -inf without any."""
+    inside = target.region.depth(points) >= 0.0
+    return max(
+        (float(time_s[end - 1] - time_s[first]) for first, end in runs(inside)),
+        default=-np.inf,
+    )
+
+
+def runs(flags: np.ndarray) -> list[tuple[int, int]]:
+    """Return (start, end) of each run of true flags, the end excluded."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]
+
+
+@dataclass(frozen=True, slots=True)
+class Crowding:
+    """Two robots at a station for one at a time.
+
+    Attributes:
+        station: its id.
+        robots: their ids.
+        first, end: states at which both are there, the end excluded.
+    """
+
+    station: str
+    robots: tuple[str, str]
+    first: int
+    end: int
+
+
+def crowded_stations(
+    scene: Scene, points: Mapping[str, np.ndarray]
+) -> Iterator[Crowding]:
+    """Yield where two robots are at a station for one at a time.
+
+    Args:
+        scene: gives the stations.
+        points: positions of the reference points [m] by robot, at the same times,
+            shape (n, 2) each.
+    """
+    for station in scene.stations:
+        if not station.one_at_a_time:
+            continue
+        there = {name: station.region.depth(way) >= 0.0 for name, way in points.items()}
+        for one, other in combinations(there, 2):
+            for first, end in runs(there[one] & there[other]):
+                yield Crowding(station.id, (one, other), first, end)
+
+
+@dataclass(frozen=True, slots=True)
+class Recharging:
+    """What stations give one battery.
+
+    Attributes:
+        full_at: states at which it is filled at once.
+        offered_J: what it is offered over each interval, shape (n,).
+    """
+
+    full_at: frozenset[int]
+    offered_J: np.ndarray
+
+
+def recharging(
+    scene: Scene,
+    robot: str,
+    time_s: np.ndarray,
+    points: np.ndarray,
+    visits: Sequence[Visit],
+) -> Recharging:
+    """Return what the stations of its tour give a robot.
+
+    Args:
+        scene: gives stations and battery.
+        robot: id of the robot.
+        time_s: of its states, shape (n + 1,).
+        points: positions of its reference point [m], shape (n + 1, 2).
+        visits: of this robot, in order of steps.
+    """
+    battery = scene.robot(robot).battery
+    offered_J = np.zeros(len(time_s) - 1)
+    at_stations = [visit for visit in visits if visit.kind == "station"]
+    if not battery.takes_time_to_fill:
+        return Recharging(frozenset(visit.step for visit in at_stations), offered_J)
+    regions = {station.id: station.region for station in scene.stations}
+    ends = [visit.step for visit in visits[1:]] + [len(offered_J)]
+    for visit, end in zip(visits, ends, strict=False):
+        if visit.kind == "station":
+            span = slice(visit.step, end + 1)
+            inside = regions[visit.target].depth(points[span]) >= 0.0
+            there_s = np.diff(time_s[span]) * (inside[:-1] & inside[1:])
+            offered_J[visit.step : end] += battery.charging_power_W * there_s
+    return Recharging(frozenset(), offered_J)
+
+
+def battery_contents(
+    battery: Battery,
+    draw_J: np.ndarray,
+    given: Recharging,
+    reckoned_J: Mapping[int, float] = _NOTHING,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the battery content on arrival at each state, and after a recharge there.
+
+    Energy fed back or offered beyond a full battery is lost.
+
+    Args:
+        battery: gives the capacity and the content at the start.
+        draw_J: energy drawn over each interval, shape (n,).
+        given: by stations.
+        reckoned_J: contents from which the battery is reckoned on, by state.
+
+    Returns:
+        Both [J], shape (n + 1,).
+    """
+    before, after = np.zeros(len(draw_J) + 1), np.zeros(len(draw_J) + 1)
+    content_J = battery.start_J
+    for step in range(len(draw_J) + 1):
+        content_J = reckoned_J.get(step, content_J)
+        before[step] = content_J
+        if step in given.full_at:
+            content_J = battery.capacity_J
+        after[step] = content_J
+        if step < len(draw_J):
+            rest_J = content_J - float(draw_J[step]) + float(given.offered_J[step])
+            content_J = min(rest_J, battery.capacity_J)
+    return before, after

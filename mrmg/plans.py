@@ -1,0 +1,307 @@
+"""What the planner produces: trajectories, tours, visits and a status."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrmg import storage
+from mrmg.columns import control_columns, data_frame, named, state_columns
+from mrmg.energy.ledger import EnergyLedger
+from mrmg.errors import ExitCode, Fault, RunFolderError
+
+PLAN_FORMAT = 1
+
+DRIVEN_PLAN = "driven_plan"
+"""Name of the files of a plan that was joined on the way."""
+
+_CONTENT = ".content"
+_FACTOR = ".rolling_factor"
+
+
+class PlanStatus(Enum):
+    """How planning ended.
+
+    INFEASIBLE is a proof, TIMEOUT a budget that was set and is over, NO_PLAN_FOUND a
+    search that ended without a plan, a proof or a budget. Older versions wrote TIMEOUT
+    for NO_PLAN_FOUND, too.
+    """
+
+    SOLVED = "solved"
+    INFEASIBLE = "infeasible"
+    TIMEOUT = "timeout"
+    NO_PLAN_FOUND = "no_plan_found"
+    INVALID_SCENE = "invalid_scene"
+    CANCELLED = "cancelled"
+
+    @property
+    def exit_code(self) -> ExitCode:
+        """The exit code of a command that ends with this status."""
+        return {
+            PlanStatus.SOLVED: ExitCode.OK,
+            PlanStatus.INFEASIBLE: ExitCode.INFEASIBLE,
+            PlanStatus.TIMEOUT: ExitCode.OUT_OF_BUDGET,
+            PlanStatus.NO_PLAN_FOUND: ExitCode.OUT_OF_BUDGET,
+            PlanStatus.INVALID_SCENE: ExitCode.INVALID_FILE,
+            PlanStatus.CANCELLED: ExitCode.OUT_OF_BUDGET,
+        }[self]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Trajectory:
+    """The motion of one robot under piecewise constant controls.
+
+    Attributes:
+        robot: id of the robot.
+        dt_s: length of one step; state i holds at time i * dt_s.
+        state: x, y, theta, v and a fifth number, shape (n + 1, 5); `columns` names it.
+        control: u1, u2 held over each step, shape (n, 2).
+        motion: motion model, which decides the columns; "" where it is not recorded.
+    """
+
+    robot: str
+    dt_s: float
+    state: np.ndarray
+    control: np.ndarray
+    motion: str = ""
+
+    def __post_init__(self) -> None:
+        self.state.setflags(write=False)
+        self.control.setflags(write=False)
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """Unit of each column of `to_arrays` by its name."""
+        names = {**state_columns(self.motion), **control_columns(self.motion)}
+        return {"time_s": "s", **names}
+
+    def to_arrays(self) -> dict[str, np.ndarray]:
+        """Return time, states and controls by name, each of shape (n + 1,).
+
+        A control stands in the row in which it begins; the last row has NaN.
+        """
+        rows = len(self.state)
+        return {
+            "time_s": self.time_s,
+            **named(state_columns(self.motion), self.state, rows),
+            **named(control_columns(self.motion), self.control, rows),
+        }
+
+    def to_dataframe(self) -> Any:
+        """Return `to_arrays` as a pandas DataFrame; raises MachineError without it."""
+        return data_frame(self.to_arrays())
+
+    @property
+    def time_s(self) -> np.ndarray:
+        """Time of each state, shape (n + 1,)."""
+        return np.arange(len(self.state)) * self.dt_s
+
+    @property
+    def duration_s(self) -> float:
+        """Time of the last state."""
+        return (len(self.state) - 1) * self.dt_s
+
+
+@dataclass(frozen=True, slots=True)
+class Visit:
+    """A robot's entering of a goal or station.
+
+    Attributes:
+        robot: id of the robot.
+        target: id of the goal or station.
+        kind: "goal" or "station".
+        step: index of the first trajectory state inside the region.
+        time_s: its time.
+        energy_J: battery content on arrival, before any recharge.
+    """
+
+    robot: str
+    target: str
+    kind: str
+    step: int
+    time_s: float
+    energy_J: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan:
+    """A solved mission; all trajectories have the same number of steps.
+
+    Attributes:
+        scene_name, scene_digest: the scene it was made for.
+        seed, profile, parameters_digest, versions: how it was made.
+        dt_s: step length of all trajectories.
+        trajectories: one per robot, in the scene's order.
+        tours: targets of each robot in the order of its visits.
+        visits: in order of time.
+        ledger: predicted energy.
+        content_J: planned battery content at each state by robot, shape (n + 1,), where
+            it is not what the scene's energy models say: in plans that were joined on
+            the way, after more was known.
+        rolling_factor: by which the rolling resistance was believed to differ from the
+            model's over each step, by robot, shape (n,), in such plans.
+    """
+
+    scene_name: str
+    scene_digest: str
+    seed: int
+    profile: str
+    parameters_digest: str
+    versions: Mapping[str, str]
+    dt_s: float
+    trajectories: tuple[Trajectory, ...]
+    tours: Mapping[str, tuple[str, ...]]
+    visits: tuple[Visit, ...]
+    ledger: EnergyLedger
+    content_J: Mapping[str, np.ndarray] = field(default_factory=dict)
+    rolling_factor: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+    @property
+    def cost_J(self) -> float:
+        """Energy of the whole fleet."""
+        return self.ledger.total_J()
+
+    @property
+    def makespan_s(self) -> float:
+        """Time at which the last robot has come to rest."""
+        return max(trajectory.duration_s for trajectory in self.trajectories)
+
+    @property
+    def digest(self) -> str:
+        """Fingerprint of the header, all states and all controls."""
+        arrays = [
+            array.tobytes().hex()
+            for trajectory in self.trajectories
+            for array in (trajectory.state, trajectory.control)
+        ]
+        header = storage.canonical_json(self._header())
+        return storage.digest("".join([header, *arrays]))
+
+    def trajectory(self, robot_id: str) -> Trajectory:
+        """Return one robot's trajectory."""
+        return next(item for item in self.trajectories if item.robot == robot_id)
+
+    def save(self, folder: Path, name: str = "plan") -> None:
+        """Write `<name>.npz`, then `<name>.json`; equal plans give equal bytes."""
+        arrays = {
+            f"{robot}{_CONTENT}": value for robot, value in self.content_J.items()
+        }
+        for robot, value in self.rolling_factor.items():
+            arrays[f"{robot}{_FACTOR}"] = value
+        for trajectory in self.trajectories:
+            arrays[f"{trajectory.robot}.state"] = trajectory.state
+            arrays[f"{trajectory.robot}.control"] = trajectory.control
+        storage.write_arrays(folder / f"{name}.npz", arrays)
+        # Not part of the digest: the scene decides it, and older plans lack it.
+        motions = {each.robot: each.motion for each in self.trajectories}
+        header = {**self._header(), "motions": motions}
+        storage.write_json(folder / f"{name}.json", header)
+
+    def _header(self) -> dict[str, Any]:
+        return {
+            "format": PLAN_FORMAT,
+            "scene_name": self.scene_name,
+            "scene_digest": self.scene_digest,
+            "seed": self.seed,
+            "profile": self.profile,
+            "parameters_digest": self.parameters_digest,
+            "versions": dict(self.versions),
+            "dt_s": self.dt_s,
+            "robots": [trajectory.robot for trajectory in self.trajectories],
+            "tours": {robot: list(tour) for robot, tour in self.tours.items()},
+            "visits": [
+                {name: getattr(visit, name) for name in Visit.__slots__}
+                for visit in self.visits
+            ],
+            "ledger": self.ledger.to_rows(),
+        }
+
+    @staticmethod
+    def load(folder: Path, name: str = "plan") -> Plan:
+        """Read a plan that `save` wrote.
+
+        Raises:
+            RunFolderError: if a file is missing or not a plan of this format.
+        """
+        try:
+            header = storage.read_json(folder / f"{name}.json")
+            arrays = storage.read_arrays(folder / f"{name}.npz")
+            if header["format"] != PLAN_FORMAT:
+                raise ValueError(
+                    f"format is {header['format']}, this version reads {PLAN_FORMAT}"
+                )
+            return _plan_from(header, arrays)
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            fault = Fault(
+                f"{name}.json", f"no readable plan ({error}); run 'mrmg plan'"
+            )
+            raise RunFolderError(str(folder), [fault]) from error
+
+
+def plan_in_force(folder: Path) -> Plan:
+    """Return the plan that was driven: the first one, or what became of it on the way.
+
+    Raises:
+        RunFolderError: if a file is missing or not a plan of this format.
+    """
+    joined = (folder / f"{DRIVEN_PLAN}.json").exists()
+    return Plan.load(folder, DRIVEN_PLAN if joined else "plan")
+
+
+def _plan_from(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Plan:
+    return Plan(
+        scene_name=header["scene_name"],
+        scene_digest=header["scene_digest"],
+        seed=header["seed"],
+        profile=header["profile"],
+        parameters_digest=header["parameters_digest"],
+        versions=header["versions"],
+        dt_s=header["dt_s"],
+        trajectories=tuple(
+            Trajectory(
+                robot=robot,
+                dt_s=header["dt_s"],
+                state=arrays[f"{robot}.state"],
+                control=arrays[f"{robot}.control"],
+                motion=header.get("motions", {}).get(robot, ""),
+            )
+            for robot in header["robots"]
+        ),
+        tours={robot: tuple(tour) for robot, tour in header["tours"].items()},
+        visits=tuple(Visit(**visit) for visit in header["visits"]),
+        ledger=EnergyLedger.from_rows(header["ledger"]),
+        content_J=_by_robot(arrays, _CONTENT),
+        rolling_factor=_by_robot(arrays, _FACTOR),
+    )
+
+
+def _by_robot(arrays: Mapping[str, np.ndarray], suffix: str) -> dict[str, np.ndarray]:
+    return {
+        name.removesuffix(suffix): value
+        for name, value in arrays.items()
+        if name.endswith(suffix)
+    }
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanResult:
+    """The answer of the planner: a status, and a plan exactly when it is SOLVED.
+
+    Attributes:
+        status: how planning ended.
+        plan: the plan, or None.
+        reason: one sentence for a status other than SOLVED; names the proof.
+        statistics: counts and times (`vertices`, `groups`, `router_calls`, `time_s`).
+        hints: sentences on the plan, such as which robots it leaves unused.
+    """
+
+    status: PlanStatus
+    plan: Plan | None
+    reason: str
+    statistics: Mapping[str, Any]
+    hints: tuple[str, ...] = ()

@@ -1,0 +1,166 @@
+"""The numbers behind the report's charts, as JSON that the page's script draws.
+
+All series share one grid of times, so that one cursor reads them all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from mrmg.energy.metering import Motion
+from mrmg.plans import Plan
+from mrmg.report.chart_spec import chart, line, rounded
+from mrmg.scene.types import Battery, Scene
+from mrmg.simulation.log import ExecutionLog
+from mrmg.verification import mission_series as series
+from mrmg.viz.energy_plot import (
+    BatteryCurve,
+    measured_curves,
+    planned_curves,
+    with_recharge_jumps,
+)
+
+_MOST_SAMPLES = 1200
+_FINEST_S = 0.1
+
+
+def chart_data(scene: Scene, plan: Plan, log: ExecutionLog | None) -> dict[str, Any]:
+    """Return everything the report's script needs.
+
+    Returns:
+        `time_s`; `robots` with their poses on the map; `visits`; and `charts` as of
+        `chart_spec`.
+    """
+    time_s = _grid(plan, log)
+    motions = series.shown_motions(plan, log)
+    poses = [_poses(motion, time_s) for motion in motions]
+    return {
+        "time_s": rounded(time_s, 3),
+        "robots": [
+            {
+                "id": motion.robot,
+                "x": rounded(pose[:, 0] - scene.bounds[0], 2),
+                "y": rounded(scene.bounds[3] - pose[:, 1], 2),
+                "turn": rounded(-np.degrees(pose[:, 2]), 1),
+                "speed": rounded(pose[:, 3], 2),
+            }
+            for motion, pose in zip(motions, poses, strict=True)
+        ],
+        "visits": [
+            {
+                "target": visit.target,
+                "robot": visit.robot,
+                "kind": visit.kind,
+                "time_s": round(visit.time_s, 2),
+            }
+            for motion in motions
+            for visit in series.shown_visits(scene, plan, motion)
+        ],
+        "charts": [
+            *_charge_charts(scene, plan, log, time_s),
+            *_tracking_chart(log, time_s),
+            *_distance_charts(scene, poses),
+        ],
+    }
+
+
+def _grid(plan: Plan, log: ExecutionLog | None) -> np.ndarray:
+    end_s = max(plan.makespan_s, _FINEST_S)
+    if log is not None:
+        end_s = max(end_s, float(log.time_s[-1]))
+    samples = min(int(np.ceil(end_s / _FINEST_S)) + 1, _MOST_SAMPLES)
+    return np.linspace(0.0, end_s, max(samples, 2))
+
+
+def _poses(motion: Motion, time_s: np.ndarray) -> np.ndarray:
+    """Return (x, y, theta, v) at the grid's times; the ends are held."""
+    return np.stack(
+        [np.interp(time_s, motion.time_s, motion.state[:, at]) for at in range(4)],
+        axis=1,
+    )
+
+
+def _charge_charts(
+    scene: Scene, plan: Plan, log: ExecutionLog | None, time_s: np.ndarray
+) -> list[dict[str, Any]]:
+    driven = measured_curves(scene, plan, log) if log is not None else ()
+    charts = []
+    for at, planned in enumerate(planned_curves(scene, plan)):
+        owner, battery = (at, planned.robot), scene.robot(planned.robot).battery
+        reserve = np.full(len(time_s), 100.0 * battery.reserve_fraction)
+        lines = [
+            line(label, label, owner, _percent(curve, battery, time_s), digits=2)
+            for label, curve in zip(
+                ("planned", "simulated"), (planned, *driven[at : at + 1]), strict=False
+            )
+        ]
+        lines.append(line("reserve", "limit", owner, reserve))
+        limits = _percent_limits(line["values"] for line in lines)
+        title = f"{planned.robot}, battery of {battery.capacity_J / 1000:.1f} kJ"
+        name = f"charge-{planned.robot}"
+        charts.append(
+            chart(name, title, "%", lines, group="charge", digits=1, limits=limits)
+        )
+    return charts
+
+
+def _percent_limits(values: Iterable[list[float | None]]) -> tuple[float, float]:
+    """Return the limits of an axis of charge, which batteries in debt go below."""
+    low = min(value for line in values for value in line if value is not None)
+    return (0.0 if low >= 0.0 else 1.05 * low), 105.0
+
+
+def _percent(curve: BatteryCurve, battery: Battery, time_s: np.ndarray) -> np.ndarray:
+    at_s, content_J = with_recharge_jumps(curve)
+    content_J = np.interp(time_s, at_s, content_J, right=np.nan)
+    return np.asarray(100.0 * content_J / battery.capacity_J)
+
+
+def _tracking_chart(
+    log: ExecutionLog | None, time_s: np.ndarray
+) -> list[dict[str, Any]]:
+    if log is None:
+        return []
+    errors_cm = [
+        100.0 * _largest(log.time_s, error_m, time_s)
+        for error_m in series.tracking_error(log)
+    ]
+    lines = _own_lines(log.robots, errors_cm)
+    title = "Distance from the planned place"
+    return [chart("tracking", title, "cm", lines, group="tracking")]
+
+
+def _largest(at_s: np.ndarray, values: np.ndarray, time_s: np.ndarray) -> np.ndarray:
+    """Return the largest value around each of the grid's times; NaN where none is."""
+    middles = 0.5 * (time_s[:-1] + time_s[1:])
+    largest = np.full(len(time_s), np.nan)
+    np.fmax.at(largest, np.searchsorted(middles, at_s), values)
+    return largest
+
+
+def _distance_charts(scene: Scene, poses: list[np.ndarray]) -> list[dict[str, Any]]:
+    ids = [robot.id for robot in scene.robots]
+    to_obstacles = [
+        series.obstacle_distance(scene, robot, pose)
+        for robot, pose in zip(scene.robots, poses, strict=True)
+    ]
+    lines = _own_lines(ids, to_obstacles)
+    title = "To the nearest obstacle or the bounds"
+    charts = [chart("obstacles", title, "m", lines, group="distance")]
+    if len(ids) > 1:
+        lines = _own_lines(ids, series.robot_distance(scene.robots, poses))
+        title = "To the nearest other robot"
+        charts.append(chart("robots", title, "m", lines, group="distance"))
+    return charts
+
+
+def _own_lines(
+    ids: Sequence[str], values: Iterable[np.ndarray]
+) -> list[dict[str, Any]]:
+    return [
+        line(name, "own", (at, name), own)
+        for at, (name, own) in enumerate(zip(ids, values, strict=True))
+    ]

@@ -1,0 +1,191 @@
+"""The page of a comparison: table, courses over one another, maps side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrmg import storage
+from mrmg.report import chart_spec
+from mrmg.report import page as html
+from mrmg.report.compare import Comparison
+from mrmg.report.map import mission_map
+from mrmg.runs.record import RunRecord
+from mrmg.verification.mission_series import shown_motions, shown_visits
+from mrmg.viz import style
+from mrmg.viz.energy_plot import BatteryCurve, measured_curves, planned_curves
+
+_SAMPLES = 800
+_SHORTEST_S = 0.1
+
+
+def write_comparison(comparison: Comparison, path: Path) -> None:
+    """Write the comparison as a page that stands alone.
+
+    Args:
+        comparison: what to show.
+        path: HTML file to write.
+    """
+    storage.write_text(path, comparison_html(comparison))
+
+
+def comparison_html(comparison: Comparison) -> str:
+    """Return the comparison as HTML."""
+    names, records = comparison.names, comparison.records
+    # Courses have a colour for each run; maps have one for each robot.
+    colored = range(max(len(names), *(len(item.scene.robots) for item in records)))
+    numbers = [str(at) for at in colored]
+    light, dark = style.robot_colors(numbers), style.robot_colors_on_dark(numbers)
+    solved = [number for number, item in enumerate(records) if item.plan is not None]
+    charts = _charts(comparison, solved) if solved else None
+    places = (
+        [(item["id"], item["title"]) for item in charts["charts"]] if charts else []
+    )
+    toggles = [
+        html.toggle("owner", _owner(number), html.robot_dot(number, names[number]))
+        for number in solved
+    ]
+    return html.page(
+        "Comparison of runs",
+        [
+            html.heading(f"Comparison of {len(names)} runs"),
+            html.section("Differences", *_differences(comparison)),
+            html.section(
+                "Figures",
+                html.table(
+                    ["", *names],
+                    [
+                        [html.text(row.name), *map(html.text, row.cells())]
+                        for row in comparison.rows
+                    ],
+                ),
+                html.note(
+                    "In brackets: the difference from the first run, where it is one "
+                    "of the same scene, whatever the objective."
+                ),
+            ),
+            html.section("Courses", html.controls(*toggles), html.charts(places))
+            if places
+            else "",
+            html.section("Maps", _maps(comparison)),
+        ],
+        colors=[(light[at], dark[at]) for at in numbers],
+        data=charts,
+    )
+
+
+def _differences(comparison: Comparison) -> list[str]:
+    if not comparison.differences:
+        return [html.note("These runs were made with the same scene and parameters.")]
+    head, *rows = comparison.difference_table()
+    return [html.table(head, [[html.text(cell) for cell in row] for row in rows])]
+
+
+def _owner(number: int) -> str:
+    # A name of its own kind: runs may be called like robots, which maps have, too.
+    return f"run {number}"
+
+
+def _maps(comparison: Comparison) -> str:
+    boxes = "".join(
+        f'<div class="chart"><h3>{html.text(name)}</h3>'
+        f"{mission_map(record.scene, record.plan, record.log)}</div>"
+        for name, record in zip(comparison.names, comparison.records, strict=True)
+    )
+    return f'<div class="charts two">{boxes}</div>'
+
+
+def _charts(comparison: Comparison, solved: Sequence[int]) -> dict[str, Any]:
+    curves = {number: _curves(comparison.records[number]) for number in solved}
+    ends_s = [float(curve.time_s[-1]) for run in curves.values() for curve in run]
+    end_s = max(_SHORTEST_S, *ends_s)
+    time_s = np.linspace(0.0, end_s, _SAMPLES)
+
+    def drawn(
+        name: str, title: str, unit: str, of: Callable[[int], Any], digits: int = 1
+    ) -> Any:
+        lines = [
+            chart_spec.line(comparison.names[at], "own", (at, _owner(at)), of(at))
+            for at in solved
+        ]
+        return chart_spec.chart(name, title, unit, lines, digits=digits)
+
+    return {
+        "time_s": chart_spec.rounded(time_s, 3),
+        "charts": [
+            drawn(
+                "used",
+                "Energy drawn by the fleet",
+                "kJ",
+                lambda at: _used_kJ(curves[at], time_s),
+            ),
+            drawn(
+                "goals",
+                "Goals visited",
+                "",
+                lambda at: _goals_visited(comparison.records[at], time_s),
+                digits=0,
+            ),
+            drawn(
+                "lowest",
+                "Lowest charge in the fleet",
+                "%",
+                lambda at: _lowest_percent(comparison.records[at], curves[at], time_s),
+            ),
+        ],
+    }
+
+
+def _curves(record: RunRecord) -> tuple[BatteryCurve, ...]:
+    assert record.plan is not None
+    if record.log is None:
+        return planned_curves(record.scene, record.plan)
+    return measured_curves(record.scene, record.plan, record.log)
+
+
+def _used_kJ(curves: Sequence[BatteryCurve], time_s: np.ndarray) -> np.ndarray:
+    """Return the energy drawn since the start; recharges add nothing."""
+    used = np.zeros(len(time_s))
+    for curve in curves:
+        drop_J = -np.diff(curve.energy_J)
+        for visit in curve.visits:
+            if visit.kind == "station" and visit.step > 0:
+                drop_J[visit.step - 1] = curve.energy_J[visit.step - 1] - visit.energy_J
+        drawn_J = np.concatenate([[0.0], np.cumsum(drop_J)])
+        used += np.interp(time_s, curve.time_s, drawn_J)
+    return _until_end(used / 1000.0, curves, time_s)
+
+
+def _goals_visited(record: RunRecord, time_s: np.ndarray) -> np.ndarray:
+    assert record.plan is not None
+    motions = shown_motions(record.plan, record.log)
+    at_s = [
+        visit.time_s
+        for motion in motions
+        for visit in shown_visits(record.scene, record.plan, motion)
+        if visit.kind == "goal"
+    ]
+    count = np.searchsorted(np.sort(at_s), time_s, side="right").astype(float)
+    count[time_s > float(motions[0].time_s[-1])] = np.nan
+    return np.asarray(count)
+
+
+def _lowest_percent(
+    record: RunRecord, curves: Sequence[BatteryCurve], time_s: np.ndarray
+) -> np.ndarray:
+    shares = [
+        np.interp(time_s, curve.time_s, curve.energy_J)
+        / record.scene.robot(curve.robot).battery.capacity_J
+        for curve in curves
+    ]
+    return _until_end(100.0 * np.min(shares, axis=0), curves, time_s)
+
+
+def _until_end(
+    values: np.ndarray, curves: Sequence[BatteryCurve], time_s: np.ndarray
+) -> np.ndarray:
+    end_s = max(float(curve.time_s[-1]) for curve in curves)
+    return np.where(time_s > end_s, np.nan, values)

@@ -1,0 +1,157 @@
+"""The report's timeline: what each robot does when, one row per robot."""
+
+from __future__ import annotations
+
+import math
+from html import escape
+
+from mrmg.plans import Plan
+from mrmg.scene.types import Scene
+from mrmg.simulation.log import ExecutionLog
+from mrmg.simulation.supervision import Event
+from mrmg.verification import mission_series as series
+from mrmg.viz.tags import text_width_em
+from mrmg.viz.timeline_rows import HIDDEN, NamedVisit, TimelineRow, timeline_rows
+
+_MOST_TICKS = 10
+_WIDE_EM, _NARROW_EM = 45.0, 22.0
+"""Widths of the time axis in letters of its names: windows of 900 and 400 pixels."""
+_SHORT_EM = 4.0
+"""Width of robots' names that have room beside the axis in small windows."""
+_BROKEN_KEY = '<i class="act broken"></i>broken down '
+_EVENT_KEY = ' <i class="event"></i>the fleet is stopped, or planned for anew'
+_DONE = {"stop": "; the fleet stops", "end": "; the mission ends"}
+_SAID = {
+    series.DRIVING: "drives",
+    series.WAITING: "waits",
+    series.CHARGING: "charges",
+    series.FINISHED: "has finished",
+    series.BROKEN: "has broken down",
+}
+
+
+def timeline(scene: Scene, plan: Plan, log: ExecutionLog | None) -> str:
+    """Return the timeline of the driven mission (planned, where none was driven)."""
+    shown, end_s = timeline_rows(scene, plan, log, (_WIDE_EM, _NARROW_EM))
+    marks = "".join(_event(event, end_s) for event in log.events) if log else ""
+    rows = []
+    for at, row in enumerate(shown):
+        parts = [_span(row, span, end_s) for span in row.spans]
+        parts += [_visit(named, end_s) for named in row.visits]
+        counts = f"--wide:{row.line_count(0)};--narrow:{row.line_count(1)}"
+        rows.append(
+            f'<div class="row" data-robot="{escape(row.robot)}" '
+            f'style="--c:var(--r{at})">'
+            f'<b class="who" data-tip="{escape(row.robot)}">{escape(row.robot)}</b>'
+            f'<div class="track" style="{counts}">{"".join(parts)}{marks}'
+            f"{_standing(row, end_s)}</div>"
+            f'<span class="sum">{_shares(row)}</span></div>'
+        )
+    who_em = max(text_width_em(row.robot, bold=True) for row in shown)
+    broken = any(row.standing == "broken down" for row in shown)
+    return (
+        f'<div class="timeline{" long" if who_em > _SHORT_EM else ""}" '
+        f'data-end="{end_s:.3f}" style="--who:{who_em:.2f}em">'
+        f'{"".join(rows)}<div class="row scale"><b class="who"></b><div class="track">'
+        f"{_ticks(end_s)}"
+        '<i class="now" hidden></i></div><span class="sum"></span></div></div>'
+        '<p class="soft key"><i class="act driving"></i>driving '
+        '<i class="act waiting"></i>waiting <i class="act charging"></i>'
+        'at a station ⚡ <i class="act finished"></i>finished '
+        f"{_BROKEN_KEY if broken else ''}│ entering a goal"
+        f"{_EVENT_KEY if log and log.events else ''}</p>"
+    )
+
+
+def _span(row: TimelineRow, span: series.Activity, end_s: float) -> str:
+    unused = row.standing == "not used" and span.kind == series.FINISHED
+    tip = f"{row.robot} {'is not used' if unused else _SAID[span.kind]}"
+    tip += f" at {span.target}" if span.target else ""
+    tip += f" from {span.start_s:.1f} to {span.end_s:.1f} s"
+    left, width = 100 * span.start_s / end_s, 100 * (span.end_s - span.start_s) / end_s
+    return (
+        f'<i class="act {span.kind}" style="left:{left:.3f}%;width:{width:.3f}%" '
+        f'data-tip="{escape(tip)}"></i>'
+    )
+
+
+def _visit(named: NamedVisit, end_s: float) -> str:
+    visit = named.visit
+    tip = f"{visit.robot} enters {visit.kind} {visit.target} at {visit.time_s:.1f} s"
+    lines = dict(zip(("wide", "narrow"), named.lines, strict=True))
+    style = "".join(f"--{name}:{max(line, 0)};" for name, line in lines.items())
+    hidden = "".join(f" no-{name}" for name, line in lines.items() if line == HIDDEN)
+    left = 100 * visit.time_s / end_s
+    return (
+        f'<i class="visit {visit.kind}{hidden}" style="{style}left:{left:.3f}%" '
+        f'data-tip="{escape(tip)}"></i>'
+        f'<s class="{visit.kind}{hidden}" '
+        f'style="{style}left:{_inside(left, named.width_em)}">{escape(named.text)}</s>'
+    )
+
+
+def _inside(left_percent: float, width_em: float) -> str:
+    """Return where the middle of a text lies, moved inwards at the ends of the axis."""
+    half = f"{0.5 * width_em:.2f}em"
+    return f"clamp({half},{left_percent:.3f}%,calc(100% - {half}))"
+
+
+def _standing(row: TimelineRow, end_s: float) -> str:
+    if not row.standing:
+        return ""
+    broken = [span.start_s for span in row.spans if span.kind == series.BROKEN]
+    text = f"✖ {row.standing}" if broken else row.standing
+    from_percent = 100 * broken[0] / end_s if broken else 0.0
+    left = f"min({from_percent:.3f}%,calc(100% - {text_width_em(text) + 1.0:.2f}em))"
+    return f'<em class="{"bad" if broken else ""}" style="left:{left}">{text}</em>'
+
+
+def _event(event: Event, end_s: float) -> str:
+    tip = f"{event.time_s:.1f} s: {event.message}"
+    return (
+        f'<i class="event" style="left:{100 * event.time_s / end_s:.3f}%" '
+        f'data-tip="{escape(tip)}"></i>'
+    )
+
+
+def events(log: ExecutionLog | None) -> list[str]:
+    """Return what mission control saw and did, one sentence an event."""
+    return [
+        f"{event.time_s:.1f} s: {event.message}" + _DONE.get(event.action, "")
+        for event in (log.events if log else ())
+    ]
+
+
+def _shares(row: TimelineRow) -> str:
+    duration_s = {
+        kind: sum(span.end_s - span.start_s for span in row.spans if span.kind == kind)
+        for kind in _SAID
+    }
+    moving = any(duration_s[kind] for kind in (series.DRIVING, series.WAITING))
+    words = [f"{duration_s[series.DRIVING]:.0f} s driving"] if moving else []
+    if duration_s[series.WAITING] > 0.0:
+        words.append(f"{duration_s[series.WAITING]:.0f} s waiting")
+    if duration_s[series.CHARGING] > 0.0:
+        words.append(f"{duration_s[series.CHARGING]:.0f} s at stations")
+    words += [row.standing] if row.standing else []
+    return ", ".join(words) or "stays where it is"
+
+
+def _ticks(end_s: float) -> str:
+    step_s = _step(end_s)
+    ticks = []
+    for number in range(int(end_s / step_s) + 1):
+        text = f"{number * step_s:g} s"
+        left = _inside(100 * number * step_s / end_s, text_width_em(text))
+        ticks.append(f'<i class="tick" style="left:{left}">{text}</i>')
+    return "".join(ticks)
+
+
+def _step(end_s: float) -> float:
+    """Return the least of 1, 2, 5, 10, ... that divides the axis into a few pieces."""
+    power = 10.0 ** math.floor(math.log10(end_s / _MOST_TICKS))
+    return next(
+        factor * power
+        for factor in (1.0, 2.0, 5.0, 10.0)
+        if end_s / (factor * power) <= _MOST_TICKS
+    )

@@ -1,1 +1,0 @@
-"""Judging and showing: verification, audit, summary, pictures, report."""

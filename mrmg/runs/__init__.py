@@ -1,0 +1,1 @@
+"""A run from arguments to results: pipeline, steps, run folder, capsule, summary."""

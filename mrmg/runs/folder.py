@@ -1,0 +1,254 @@
+"""The run folder: names of its files, and which steps of a run are done.
+
+`run.json` keeps a fingerprint for every finished step: a digest of all that decides
+the step's outcome, the fingerprints of the steps it needs included. A step whose
+outputs exist under the present fingerprint need not be done again; any difference makes
+it, and all steps that need it, stale. The mark is written after the outputs, and every
+file is put in place by renaming, so a killed run can be taken up at any moment.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import shutil
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any
+
+from mrmg import storage
+from mrmg.errors import Fault, RunFolderError, UsageError
+from mrmg.interruption import cleaned_up_by
+from mrmg.runs.paths import why_no_run
+from mrmg.scene.model_files import MODELS_FOLDER
+
+RUN_FORMAT = 1
+
+TRIALS_FOLDER = "trials"
+"""Where trials under disturbances lie, by plan and by what decides the drive."""
+
+_UNFINISHED = ".part-"
+
+
+class Step(StrEnum):
+    """The steps of a run, in their order."""
+
+    PLAN = "plan"
+    VERIFY = "verify"
+    EXECUTE = "execute"
+    AUDIT = "audit"
+    DRAW = "draw"
+    RENDER = "render"
+    REPORT = "report"
+
+
+OUTPUTS: dict[Step, tuple[str, ...]] = {
+    Step.PLAN: ("scene.yaml", "plan.npz", "plan.json", "planning.json"),
+    Step.VERIFY: ("verdict.json",),
+    Step.EXECUTE: ("log.npz", "timing.json", "log.json"),
+    Step.AUDIT: ("audit.json",),
+    Step.DRAW: ("overview.png", "energy.png"),
+    Step.RENDER: ("mission.mp4",),
+    Step.REPORT: ("summary.json", "report.html"),
+}
+"""Files each step leaves; the last one is written last."""
+
+ON_REQUEST: dict[Step, tuple[str, ...]] = {
+    Step.EXECUTE: (
+        "driven_plan.npz",
+        "driven_plan.json",
+        "replans.json",
+        "capsule.zip",
+    ),
+    Step.RENDER: ("mission.gif",),
+}
+"""Files a step leaves besides, when asked to or when there is reason to."""
+
+NEEDS: dict[Step, tuple[Step, ...]] = {
+    Step.PLAN: (),
+    Step.VERIFY: (Step.PLAN,),
+    Step.EXECUTE: (Step.PLAN,),
+    Step.AUDIT: (Step.EXECUTE,),
+    Step.DRAW: (Step.AUDIT,),
+    Step.RENDER: (Step.EXECUTE,),
+    Step.REPORT: (Step.VERIFY, Step.DRAW),
+}
+"""Steps whose outcome a step is made from."""
+
+
+CLOCK_FILES = ("timing.json",)
+"""Outputs that differ between equal executions: they hold readings of the clock."""
+
+
+def stale_after(step: Step) -> list[Step]:
+    """Return `step` and every step that is made from it, in order."""
+    stale = [step]
+    for later in Step:
+        if any(need in stale for need in NEEDS[later]):
+            stale.append(later)
+    return stale
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """One folder on disk that holds one run."""
+
+    path: Path
+
+    def file(self, name: str) -> Path:
+        """Return the path of one of the folder's files."""
+        return self.path / name
+
+    def unfinished(self, name: str) -> Path:
+        """Return where a large file may grow before it is put in its place."""
+        return self.path / f"{_UNFINISHED}{name}"
+
+    @contextmanager
+    def opened_for_writing(self) -> Iterator[RunFolder]:
+        """Create the folder, keep other runs out of it, and clear what a kill left.
+
+        Raises:
+            UsageError: if the folder holds something other than a run.
+            RunFolderError: if another process is working in it.
+        """
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+        except (FileExistsError, NotADirectoryError) as error:
+            raise UsageError(f"{error.filename} is a file; choose a folder") from error
+        with _exclusive(self.path):
+            if any(self.path.iterdir()) and not self.file("run.json").exists():
+                self._refuse_foreign_files()
+            self._remove_unfinished()
+            try:
+                with cleaned_up_by(self._remove_unfinished):
+                    yield self
+            finally:
+                self._remove_unfinished()
+
+    def _remove_unfinished(self) -> None:
+        for place in (".", f"{TRIALS_FOLDER}/*/*"):
+            for leftover in self.path.glob(f"{place}/{_UNFINISHED}*"):
+                leftover.unlink(missing_ok=True)
+
+    def arguments(self) -> dict[str, Any]:
+        """Return the arguments its files were last made with; empty if none."""
+        return dict(self._record().get("arguments", {}))
+
+    def marks(self) -> dict[str, str]:
+        """Return the fingerprints of the finished steps."""
+        return dict(self._record().get("finished", {}))
+
+    def is_done(self, step: Step, fingerprint: str) -> bool:
+        """Tell whether the outcome of `step` under `fingerprint` is there."""
+        done = self.marks().get(step) == fingerprint
+        return done and self.file(OUTPUTS[step][-1]).exists()
+
+    def holds(self, step: Step) -> bool:
+        """Return whether an outcome of `step` is there, whatever it was made with."""
+        return step in self.marks() and self.file(OUTPUTS[step][-1]).exists()
+
+    def content(self, step: Step) -> dict[str, str]:
+        """Return a digest of each file that `step` left, those of the clock apart."""
+        names = {*OUTPUTS[step], *ON_REQUEST.get(step, ())} - {*CLOCK_FILES}
+        paths = [self.file(name) for name in sorted(names)]
+        return {
+            path.name: storage.bytes_digest(path.read_bytes())
+            for path in paths
+            if path.exists()
+        }
+
+    def begin(
+        self, step: Step, arguments: dict[str, Any], *, keep: Collection[Step] = ()
+    ) -> None:
+        """Make room for a new outcome of `step`, made with `arguments`.
+
+        Removes the marks and files of `step` and of all steps made from it, except
+        those in `keep`.
+        """
+        stale = [each for each in stale_after(step) if each not in keep]
+        self._remove(stale, arguments)
+
+    def drop(self, steps: Collection[Step]) -> None:
+        """Remove the marks and files of `steps`."""
+        self._remove([step for step in Step if step in steps], self.arguments())
+
+    def _remove(self, steps: list[Step], arguments: dict[str, Any]) -> None:
+        marks = {name: mark for name, mark in self.marks().items() if name not in steps}
+        self._write(arguments, marks)
+        for step in reversed(steps):
+            for name in reversed((*ON_REQUEST.get(step, ()), *OUTPUTS[step])):
+                self.file(name).unlink(missing_ok=True)
+        if Step.PLAN in steps:
+            shutil.rmtree(self.file(MODELS_FOLDER), ignore_errors=True)
+
+    def finish(self, step: Step, fingerprint: str) -> None:
+        """Mark `step` as finished under `fingerprint`."""
+        self._write(self.arguments(), {**self.marks(), str(step): fingerprint})
+
+    def read_json(self, name: str, *, cure: str) -> Any:
+        """Read one of the folder's JSON files.
+
+        Raises:
+            RunFolderError: if it is missing or unreadable; names `cure`.
+        """
+        try:
+            return storage.read_json(self.file(name))
+        except (OSError, ValueError) as error:
+            fault = Fault(name, f"not readable ({error}); run '{cure}'")
+            raise RunFolderError(str(self.path), [fault]) from error
+
+    def _record(self) -> dict[str, Any]:
+        if not self.file("run.json").exists():
+            return {}
+        record = self.read_json("run.json", cure="mrmg run")
+        if not isinstance(record, dict) or record.get("format") != RUN_FORMAT:
+            fault = Fault("run.json", f"this version reads format {RUN_FORMAT} only")
+            raise RunFolderError(str(self.path), [fault])
+        return record
+
+    def _write(self, arguments: dict[str, Any], marks: dict[str, str]) -> None:
+        storage.write_json(
+            self.file("run.json"),
+            {"format": RUN_FORMAT, "arguments": arguments, "finished": marks},
+        )
+
+    def _refuse_foreign_files(self) -> None:
+        foreign = [
+            item.name
+            for item in sorted(self.path.iterdir())
+            if not item.name.startswith(_UNFINISHED)
+        ]
+        if foreign:
+            raise UsageError(
+                f"{self.path} is not a run folder (it holds {foreign[0]!r} and no "
+                "run.json); choose an empty or a new folder with --out"
+            )
+
+
+def existing(path: Path) -> RunFolder:
+    """Return the run folder at `path`.
+
+    Raises:
+        RunFolderError: if there is none.
+    """
+    folder = RunFolder(path)
+    if not folder.file("run.json").exists():
+        raise RunFolderError(str(path), [Fault("", why_no_run(path))])
+    return folder
+
+
+@contextmanager
+def _exclusive(path: Path) -> Iterator[None]:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            fault = Fault("", "another mrmg process is working in this folder")
+            raise RunFolderError(str(path), [fault]) from error
+        yield
+    finally:
+        os.close(handle)

@@ -1,0 +1,184 @@
+"""The whole mission: plan, verify, execute, audit, show."""
+
+from __future__ import annotations
+
+import inspect
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from mrmg.errors import ExitCode, UsageError
+from mrmg.plans import PlanStatus
+from mrmg.runs.arguments import (
+    DEFAULT_VIDEO,
+    RunArguments,
+    VideoArguments,
+    keyword,
+    options_of,
+)
+from mrmg.runs.drive import checked_drive
+from mrmg.runs.folder import RunFolder, Step
+from mrmg.runs.replacing import recorded, require_room
+from mrmg.runs.steps import OnImprovement, Run, StepProgress
+from mrmg.scene.driven_parts import require_drivable
+from mrmg.scene.loading import load_scene
+from mrmg.scene.loading.reading import require_faithful
+from mrmg.scene.types import Scene
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunResult:
+    """How a run ended.
+
+    Attributes:
+        folder: where everything lies.
+        summary: content of `summary.json`.
+        reason: why there is no plan, or why the mission failed; "" if it did not.
+        exit_code: what the command line would end with.
+    """
+
+    folder: Path
+    summary: dict[str, Any]
+    reason: str
+    exit_code: ExitCode
+
+
+def run(
+    source: str | Path | Scene,
+    *,
+    out: str | Path | None = None,
+    overwrite: bool = False,
+    video: VideoArguments | None = DEFAULT_VIDEO,
+    trust_code: bool = False,
+    on_progress: StepProgress | None = None,
+    on_improvement: OnImprovement | None = None,
+    **arguments: Any,
+) -> RunResult:
+    """Do the whole mission and leave a run folder; take up a run that was stopped.
+
+    Args:
+        source: a scene, the path of a scene file, or the name of a shipped scene.
+        out: the run folder; `default_folder` if None.
+        overwrite: replace results that the folder holds of another scene, of other
+            arguments or of another version; refused if not.
+        video: how the video is made; None for no video.
+        trust_code: whether robot models may bring Python code (`scene.loading.trust`).
+        on_progress: told (step, fraction, text).
+        on_improvement: told of every plan that is cheaper than all before it.
+        **arguments: fields of `RunArguments`, which are the options of `mrmg run`:
+
+    Raises:
+        MrmgError: for everything that keeps the run from starting. A mission that
+            cannot be planned, or fails, is a result and not an error.
+    """
+    from mrmg.viz.gl_backend import choose_backend
+
+    loaded = (
+        source
+        if isinstance(source, Scene)
+        else load_scene(source, trust_code=trust_code)
+    )
+    require_drivable(loaded.robots)
+    asked = _arguments(loaded, {**arguments, "video": video or DEFAULT_VIDEO})
+    scene = asked.scene(loaded)
+    require_faithful(scene, scene.document)  # before there is a folder
+    folder = RunFolder(Path(out or default_folder(scene, asked.seed)))
+    with folder.opened_for_writing():
+        work = Run(
+            scene=scene,
+            arguments=asked,
+            folder=folder,
+            on_progress=on_progress,
+            on_improvement=on_improvement,
+        )
+        if not overwrite:
+            require_room(work)
+        if video == DEFAULT_VIDEO and folder.holds(Step.RENDER):
+            kept = replace(asked, video=recorded(folder).video)
+            if replace(work, arguments=kept).is_done(Step.RENDER):
+                work = replace(work, arguments=kept)  # `mrmg render` made it
+        if video is not None and not work.is_done(Step.RENDER):
+            choose_backend()  # better told now than after minutes of driving
+        work.ensure(Step.PLAN)
+        if work.status() is PlanStatus.SOLVED:
+            work.ensure(Step.VERIFY)
+            work.ensure(Step.EXECUTE)
+            work.ensure(Step.AUDIT)
+            if video is not None:
+                work.ensure(Step.RENDER)
+        work.ensure(Step.DRAW)
+        work.make(Step.REPORT)
+        return RunResult(
+            folder=folder.path,
+            summary=work.summary(),
+            reason=work.reason(),
+            exit_code=work.exit_code(),
+        )
+
+
+def _arguments(scene: Scene, given: dict[str, Any]) -> RunArguments:
+    """Return the arguments of a run, refused before any work if they are wrong."""
+    named = {keyword(name): value for name, value in given.items()}
+    known = [each.name for each in fields(RunArguments)]
+    for name in named:
+        if name not in known:
+            allowed = ", ".join(known)
+            raise TypeError(f"run() takes no argument {name!r}; allowed: {allowed}")
+    return checked_drive(scene, RunArguments(**named))
+
+
+def _document_arguments() -> None:
+    """Give `run` the signature and the documentation of its keyword arguments."""
+    options = options_of(RunArguments)
+    own = inspect.signature(run)
+    keywords = [
+        inspect.Parameter(
+            option.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=option.default,
+            annotation=option.type,
+        )
+        for option in options
+    ]
+    every = [each for each in own.parameters.values() if each.name != "arguments"]
+    run.__signature__ = own.replace(parameters=[*every, *keywords])  # type: ignore[attr-defined]
+    lines = "".join(f"            {each.name}: {each.help}.\n" for each in options)
+    mark = "`mrmg run`:\n"
+    run.__doc__ = (run.__doc__ or "").replace(mark, mark + lines)
+
+
+_document_arguments()
+
+
+def rehearse(scene: Scene) -> list[str]:
+    """Refuse, before any planning, what `run` would refuse of a scene that was loaded.
+
+    Returns:
+        Why robots of it can be planned for, but not driven.
+
+    Raises:
+        FileError: if it has no robots, its robots' own motions cannot be used, or
+            MuJoCo cannot hold it.
+    """
+    from mrmg.motion.user_motion import user_motion
+    from mrmg.planning.feasibility import require_robots
+
+    require_robots(scene)
+    models = {robot.model.name: robot.model for robot in scene.robots}
+    for model in models.values():
+        if model.has_custom_motion:
+            limits = model.limits.scaled(model.planning_share)
+            user_motion(model.motion_model).compiled(limits.as_tuple())
+    try:
+        require_drivable(scene.robots)
+    except UsageError as error:
+        return [str(error)]
+    from mrmg.simulation import build_world
+
+    build_world(scene)
+    return []
+
+
+def default_folder(scene: Scene, seed: int) -> Path:
+    """Return the run folder used when none is named."""
+    return Path("runs") / f"{scene.name}-s{seed}"

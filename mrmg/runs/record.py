@@ -1,0 +1,107 @@
+"""What a run folder holds, read back for its report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mrmg import storage
+from mrmg.energy.audit_record import EnergyAudit
+from mrmg.errors import Fault, RunFolderError
+from mrmg.plans import Plan, PlanStatus, plan_in_force
+from mrmg.runs.paths import why_no_run
+from mrmg.runs.summary import summarize
+from mrmg.scene.loading import load_scene
+from mrmg.scene.types import Scene
+from mrmg.simulation.log import ExecutionLog, log_in_force, require_same_mission
+from mrmg.studies.outcomes import ROBUSTNESS_FILE, Study, load_studies
+from mrmg.verification.verdict import Verdict
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunRecord:
+    """Everything a run folder holds; what was not reached is None.
+
+    Attributes:
+        folder: where the run lies.
+        scene: what was to be solved.
+        summary: content of `summary.json`, worked out anew where it is missing.
+        planning: content of `planning.json`.
+        arguments: what the run was started with.
+        plan: the first one, or the one in force where the mission was replanned.
+        verdict, log, audit: outcomes of the other steps.
+        studies: trials of the first plan under disturbances.
+    """
+
+    folder: Path
+    scene: Scene
+    summary: Mapping[str, Any]
+    planning: Mapping[str, Any]
+    arguments: Mapping[str, Any]
+    plan: Plan | None
+    verdict: Verdict | None
+    log: ExecutionLog | None
+    audit: EnergyAudit | None
+    studies: tuple[Study, ...] = ()
+
+
+def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
+    """Read a run folder.
+
+    Args:
+        run_folder: the run; at least planned.
+        trust_code: whether robot models may bring Python code (`loading.trust`).
+
+    Raises:
+        RunFolderError: if a file is missing, cannot be read, or is of another scene.
+    """
+    if not (run_folder / "planning.json").exists():
+        raise RunFolderError(str(run_folder), [_why_no_record(run_folder)])
+    planning = _read(run_folder, "planning.json", "mrmg plan")
+    solved = planning["status"] == PlanStatus.SOLVED.value
+
+    def left(name: str) -> bool:
+        return solved and (run_folder / name).exists()
+
+    has_run = (run_folder / "run.json").exists()
+    run = _read(run_folder, "run.json", "mrmg run") if has_run else {}
+    scene = load_scene(run_folder / "scene.yaml", trust_code=trust_code)
+    plan = plan_in_force(run_folder) if left("plan.json") else None
+    require_same_mission(scene, plan)
+    log = log_in_force(run_folder, scene) if solved else None
+    summed_up = (run_folder / "summary.json").exists()
+    return RunRecord(
+        folder=run_folder,
+        scene=scene,
+        summary=_read(run_folder, "summary.json", "mrmg report")
+        if summed_up
+        else summarize(scene, run_folder),
+        planning=planning,
+        arguments=run.get("arguments", {}),
+        plan=plan,
+        verdict=Verdict.load(run_folder) if left("verdict.json") else None,
+        log=log,
+        audit=EnergyAudit.load(run_folder) if log and left("audit.json") else None,
+        studies=load_studies(run_folder, Plan.load(run_folder))
+        if left(ROBUSTNESS_FILE)
+        else (),
+    )
+
+
+def _why_no_record(folder: Path) -> Fault:
+    if not folder.is_dir():
+        return Fault("", why_no_run(folder))
+    if not (folder / "run.json").exists():
+        return Fault("planning.json", "missing: this is not a run folder")
+    cure = f"'mrmg run SCENE --out {folder}' goes on with it"
+    return Fault("planning.json", f"missing: the run was stopped early; {cure}")
+
+
+def _read(folder: Path, name: str, cure: str) -> dict[str, Any]:
+    try:
+        return dict(storage.read_json(folder / name))
+    except (OSError, ValueError) as error:
+        fault = Fault(name, f"cannot be read ({error}); run '{cure}'")
+        raise RunFolderError(str(folder), [fault]) from error

@@ -1,0 +1,350 @@
+"""The steps of a run, from files to files: none takes results from memory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import mrmg
+from mrmg import storage
+from mrmg.errors import ExitCode, MrmgError, RunFolderError
+from mrmg.plans import Plan, PlanStatus, plan_in_force
+from mrmg.runs.arguments import RunArguments
+from mrmg.runs.drive import drive
+from mrmg.runs.folder import NEEDS, RunFolder, Step, stale_after
+from mrmg.scene.loading import load_scene
+from mrmg.scene.loading.carrying import carried_files
+from mrmg.scene.types import Scene
+
+if TYPE_CHECKING:
+    from mrmg.energy.audit_record import EnergyAudit
+    from mrmg.planning import Improvement
+    from mrmg.runs.capsule import Failure
+    from mrmg.simulation.log import ExecutionLog
+
+StepProgress = Callable[[Step, float, str], None]
+"""Told (step, fraction 0..1, text) while a step is under way."""
+
+OnImprovement = Callable[["Improvement"], None]
+"""Told of every plan that is cheaper than all before it."""
+
+Write = Callable[[], None]
+"""Puts the outcome of a step that has been worked out into the run folder."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """A run being made: the scene, the arguments, and the folder they fill."""
+
+    scene: Scene
+    arguments: RunArguments
+    folder: RunFolder
+    on_progress: StepProgress | None = None
+    on_improvement: OnImprovement | None = None
+
+    def ensure(self, step: Step) -> None:
+        """Make `step` unless the folder already holds its outcome."""
+        if not self.is_done(step):
+            self.make(step)
+
+    def is_done(self, step: Step) -> bool:
+        """Tell whether the folder holds the outcome of `step`."""
+        return self.folder.is_done(step, self.fingerprint(step))
+
+    def is_readable(self, step: Step) -> bool:
+        """Return whether the outcome of planning or driving is there and whole."""
+        if not self.is_done(step):
+            return False
+        try:
+            if step is Step.EXECUTE:
+                self.log()
+            elif self.status() is PlanStatus.SOLVED:
+                self.plan()
+        except RunFolderError:
+            return False
+        return True
+
+    def make(self, step: Step) -> None:
+        """Make `step`, and remove what came of another outcome of it.
+
+        The folder changes only once the work is done: arguments that turn out to be
+        wrong, and a process that is stopped, leave what was there before. What was made
+        from an equal outcome stays.
+        """
+        self._told(step, 0.0)
+        write = _WORK[step](self)
+        later = stale_after(step)[1:]
+        current = [each for each in later if self.is_done(each)]
+        before = self.folder.content(step)
+        self.folder.begin(step, self.arguments.to_json(), keep=current)
+        write()
+        after = self.folder.content(step)
+        if any(after.get(name) != digest for name, digest in before.items()):
+            self.folder.drop(current)
+        if step is not Step.PLAN or self.status() in _FINAL:
+            self.folder.finish(step, self.fingerprint(step))
+        self._told(step, 1.0)
+
+    def fingerprint(self, step: Step) -> str:
+        """Return the digest of all that decides the outcome of `step`."""
+        deciding: dict[Step, Any] = {
+            Step.PLAN: [self.scene.digest, self.arguments.deciding("plan")],
+            Step.EXECUTE: self.arguments.deciding("drive"),
+            Step.AUDIT: self.arguments.deciding("audit"),
+            Step.RENDER: asdict(self.arguments.video),
+        }
+        needs = [self.fingerprint(need) for need in NEEDS[step]]
+        own = [str(step), deciding.get(step), needs, _code_digest()]
+        return storage.digest(storage.canonical_json(own))
+
+    def planning(self) -> dict[str, Any]:
+        """Return how planning ended: status, reason, statistics."""
+        return dict(
+            self.folder.read_json("planning.json", cure="mrmg plan --overwrite")
+        )
+
+    def status(self) -> PlanStatus:
+        """Return the status planning ended with."""
+        return PlanStatus(self.planning()["status"])
+
+    def plan(self) -> Plan:
+        """Return the plan."""
+        return Plan.load(self.folder.path)
+
+    def plan_in_force(self) -> Plan:
+        """Return the plan that was driven, joined where the mission was replanned."""
+        return plan_in_force(self.folder.path)
+
+    def log(self) -> ExecutionLog:
+        """Return the log of the simulation."""
+        from mrmg.simulation.log import ExecutionLog
+
+        return ExecutionLog.load(self.folder.path)
+
+    def account(self, plan: Plan, log: ExecutionLog) -> EnergyAudit:
+        """Return the audit of a drive of `plan`, the plan in force."""
+        from mrmg.energy.audit import audit
+
+        decided = self.arguments.deciding("audit")
+        return audit(self.scene, plan, log, **decided)
+
+    def reason(self) -> str:
+        """Return why there is no plan, or why the mission failed; "" if it did not."""
+        if self.status() is not PlanStatus.SOLVED or not self.folder.holds(Step.AUDIT):
+            return str(self.planning()["reason"])
+        account = self.folder.read_json("audit.json", cure="mrmg audit")
+        return "; ".join(account["reasons"])
+
+    def summary(self) -> dict[str, Any]:
+        """Return the content of `summary.json`."""
+        return dict(self.folder.read_json("summary.json", cure="mrmg report"))
+
+    def exit_code(self) -> ExitCode:
+        """Return the exit code the whole run ends with."""
+        status = self.status()
+        if status is not PlanStatus.SOLVED:
+            return status.exit_code
+        return ExitCode.OK if self.summary()["mission_ok"] else ExitCode.MISSION_FAILED
+
+    def progress_of(self, step: Step) -> Callable[[float, str], None]:
+        """Return the callback that tells the progress of one step."""
+        return lambda fraction, text: self._told(step, fraction, text)
+
+    def _told(self, step: Step, fraction: float, text: str = "") -> None:
+        if self.on_progress is not None:
+            self.on_progress(step, fraction, text)
+
+
+def taken_up(
+    folder: RunFolder, on_progress: StepProgress | None = None, trust_code: bool = False
+) -> Run:
+    """Return the run that `folder` holds, with the arguments it was started with."""
+    return Run(
+        scene=load_scene(folder.file("scene.yaml"), trust_code=trust_code),
+        arguments=RunArguments.from_json(folder.arguments()),
+        folder=folder,
+        on_progress=on_progress,
+    )
+
+
+@cache
+def _code_digest() -> str:
+    # The version alone would keep results of code that has been edited since.
+    package = Path(mrmg.__file__).parent
+    sources = sorted(package.rglob("*.py"))
+    code = [storage.digest(path.read_text()) for path in sources]
+    return storage.digest("".join([mrmg.__version__, version("mujoco"), *code]))
+
+
+def _plan(run: Run) -> Write:
+    from mrmg.planning import plan_mission, profile_params
+
+    arguments, files = run.arguments, carried_files(run.scene)
+    result = plan_mission(
+        run.scene,
+        seed=arguments.seed,
+        params=profile_params(
+            arguments.profile,
+            planner=arguments.planner,
+            router=arguments.router,
+            budget_s=arguments.budget_s,
+            trees=arguments.trees,
+            spare=arguments.spare,
+        ),
+        workers=arguments.workers,
+        with_bound=True,
+        on_progress=run.progress_of(Step.PLAN),
+        on_improvement=run.on_improvement,
+    )
+    outcome = {
+        "status": result.status.value,
+        "reason": result.reason,
+        "hints": list(result.hints),
+        "statistics": dict(result.statistics),
+    }
+
+    return lambda: write_planning(run.folder, files, result.plan, outcome)
+
+
+def write_planning(
+    folder: RunFolder,
+    files: Mapping[str, bytes],
+    plan: Plan | None,
+    outcome: dict[str, Any],
+) -> None:
+    """Write the files of the scene, the plan, and how planning ended."""
+    for name, data in files.items():
+        storage.write_bytes(folder.file(name), data)
+    if plan is not None:
+        plan.save(folder.path)
+    storage.write_json(folder.file("planning.json"), outcome)
+
+
+def _verify(run: Run) -> Write:
+    from mrmg.verification.verify import verify
+
+    verdict = verify(run.scene, run.plan())
+    return lambda: verdict.save(run.folder.path)
+
+
+def _execute(run: Run) -> Write:
+    from mrmg.runs.capsule import Failure
+
+    progress = run.progress_of(Step.EXECUTE)
+    try:
+        driven = drive(run.scene, run.plan(), run.arguments, progress)
+    except MrmgError:
+        raise
+    except Exception as error:
+        path = _keep(run, Failure.of_crash(error))
+        error.add_note(f"{path} keeps all that is needed to make this happen again")
+        raise
+
+    def write() -> None:
+        from mrmg.energy.audit_record import MODEL_MISMATCH
+
+        driven.save(run.folder.path)
+        account = run.account(driven.plan, driven.log)
+        # A drive that only took another energy has nothing to be repeated for.
+        if {*account.causes} - {MODEL_MISMATCH}:
+            _keep(run, Failure.of(driven.log, account.causes, account.reasons))
+
+    return write
+
+
+def _keep(run: Run, failure: Failure) -> Path:
+    """Leave a capsule of an execution that failed."""
+    from mrmg.runs.capsule import CAPSULE_FILE, Capsule
+
+    path = run.folder.file(CAPSULE_FILE)
+    arguments, carried = run.arguments.to_json(), carried_files(run.scene)
+    Capsule.of_run(run.folder.path, arguments, failure, carried).save(path)
+    return path
+
+
+def _audit(run: Run) -> Write:
+    account = run.account(run.plan_in_force(), run.log())
+    return lambda: account.save(run.folder.path)
+
+
+def _draw(run: Run) -> Write:
+    from mrmg.viz.energy_plot import draw_energy
+    from mrmg.viz.overview import draw_overview
+
+    overview = run.folder.file("overview.png")
+    if run.status() is not PlanStatus.SOLVED:
+        return lambda: draw_overview(run.scene, path=overview)
+    plan, log = run.plan_in_force(), run.log()
+
+    def write() -> None:
+        draw_overview(run.scene, plan, log, path=overview)
+        draw_energy(run.scene, plan, log, path=run.folder.file("energy.png"))
+
+    return write
+
+
+def _render(run: Run) -> Write:
+    from mrmg.viz.gif import render_gif
+    from mrmg.viz.video import render_video
+
+    video = run.arguments.video
+    plan, log = run.plan_in_force(), run.log()
+    part: dict[str, Any] = {
+        "view": video.view,
+        "robot": video.robot,
+        "speed": video.speed,
+        "from_s": video.from_s,
+        "to_s": video.to_s,
+        "on_progress": run.progress_of(Step.RENDER),
+    }
+    made = {}
+    if video.gif:
+        made["mission.gif"] = run.folder.unfinished("mission.gif")
+        render_gif(run.scene, plan, log, made["mission.gif"], **part)
+    made["mission.mp4"] = run.folder.unfinished("mission.mp4")
+    render_video(
+        run.scene,
+        plan,
+        log,
+        made["mission.mp4"],
+        size=video.size,
+        fps=video.fps,
+        **part,
+    )
+
+    def write() -> None:
+        for name, path in made.items():
+            path.replace(run.folder.file(name))
+
+    return write
+
+
+def _report(run: Run) -> Write:
+    from mrmg.report.report import write_report
+    from mrmg.runs.summary import summarize
+
+    summary = summarize(run.scene, run.folder.path)
+
+    def write() -> None:
+        storage.write_json(run.folder.file("summary.json"), summary)
+        write_report(run.folder.path, trust_code=run.scene.has_custom_motion)
+
+    return write
+
+
+_FINAL = (PlanStatus.SOLVED, PlanStatus.INFEASIBLE)
+"""Statuses that the same arguments would lead to again."""
+
+_WORK: dict[Step, Callable[[Run], Write]] = {
+    Step.PLAN: _plan,
+    Step.VERIFY: _verify,
+    Step.EXECUTE: _execute,
+    Step.AUDIT: _audit,
+    Step.DRAW: _draw,
+    Step.RENDER: _render,
+    Step.REPORT: _report,
+}

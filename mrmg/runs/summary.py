@@ -1,0 +1,183 @@
+"""The figures of a run on one page, for people and machines.
+
+`summary.schema.json` beside this module documents every key; a test holds them equal.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import mrmg
+from mrmg import storage
+from mrmg.energy.audit_record import MODEL_MISMATCH, EnergyAudit
+from mrmg.errors import Fault, RunFolderError
+from mrmg.plans import Plan, PlanStatus
+from mrmg.scene.types import Scene
+from mrmg.simulation.log import ExecutionLog, log_in_force, require_same_mission
+from mrmg.verification.verdict import Verdict
+
+
+def summary_schema() -> dict[str, Any]:
+    """Return the JSON Schema of `summary.json`."""
+    return dict(
+        storage.read_json(Path(str(files(__package__) / "summary.schema.json")))
+    )
+
+
+def summarize(scene: Scene, folder: Path) -> dict[str, Any]:
+    """Return the summary of a run folder, as far as the run came.
+
+    Args:
+        scene: of the run.
+        folder: holds `planning.json`, and what later steps have left.
+
+    Raises:
+        RunFolderError: if nothing was planned, a file cannot be read, or plan or log
+            are of another scene.
+    """
+    planning = _read(folder, "planning.json")
+    solved = planning["status"] == PlanStatus.SOLVED.value
+    plan = Plan.load(folder) if solved else None
+
+    def left(name: str) -> bool:
+        return solved and (folder / name).exists()
+
+    require_same_mission(scene, plan)
+    log = log_in_force(folder, scene) if solved else None
+    return summary_of(
+        scene,
+        planning,
+        seed=plan.seed if plan else _read(folder, "run.json")["arguments"]["seed"],
+        plan=plan,
+        verdict=Verdict.load(folder) if left("verdict.json") else None,
+        log=log,
+        audit=EnergyAudit.load(folder) if log and left("audit.json") else None,
+    )
+
+
+def summary_of(
+    scene: Scene,
+    planning: Mapping[str, Any],
+    *,
+    seed: int,
+    plan: Plan | None = None,
+    verdict: Verdict | None = None,
+    log: ExecutionLog | None = None,
+    audit: EnergyAudit | None = None,
+) -> dict[str, Any]:
+    """Return the summary of a mission; what was not reached is None.
+
+    Args:
+        scene: the problem.
+        planning: how planning ended: `status` and `statistics` of the PlanResult.
+        seed: of the planner.
+        plan: None if none was found.
+        verdict: None if the plan was not verified.
+        log: None if the plan was not executed.
+        audit: None if the execution was not audited.
+    """
+    mismatch = audit is not None and MODEL_MISMATCH in audit.causes
+    return {
+        "status": "model_mismatch" if mismatch else planning["status"],
+        "mission_ok": bool(verdict and verdict.ok and audit and audit.mission_ok),
+        "scene": scene.name,
+        "seed": seed,
+        "robots": len(scene.robots),
+        "goals": len(scene.goals),
+        "stations": len(scene.stations),
+        "hints": list(planning.get("hints", ())),
+        "plan": _plan_figures(scene, plan, planning["statistics"]) if plan else None,
+        "verdict": _verdict_figures(verdict) if verdict else None,
+        "execution": _execution_figures(log, audit) if log and audit else None,
+        "energy": _energy_figures(audit) if audit else None,
+        "versions": {
+            "mrmg": mrmg.__version__,
+            **(plan.versions if plan else {}),
+            **(log.versions if log else {}),
+        },
+    }
+
+
+def _plan_figures(
+    scene: Scene, plan: Plan, statistics: Mapping[str, Any]
+) -> dict[str, Any]:
+    limit_s = scene.time_limit_s
+    times = ("init", "routing", "first_solution", "total")
+    capped = ("iterations", "iteration_cap")
+    return {
+        "cost_J": plan.cost_J,
+        "bound_J": statistics.get("bound_J"),
+        "gap": statistics.get("gap"),
+        "makespan_s": plan.makespan_s,
+        "bound_s": statistics.get("bound_s"),
+        "time_limit_s": limit_s if math.isfinite(limit_s) else None,
+        "objective": {
+            "name": scene.objective.name,
+            "unit": scene.objective.unit,
+            "energy_weight": scene.objective.energy_weight,
+            "makespan_weight": scene.objective.makespan_weight,
+            "value": scene.objective.value(plan.cost_J, plan.makespan_s),
+            "bound": statistics.get("bound"),
+        },
+        "improvements": list(statistics.get("improvements", [])),
+        "drafts": statistics.get("drafts", 0),
+        "vertices": statistics["vertices"],
+        "groups": statistics["groups"],
+        "router_calls": statistics["router_calls"],
+        "time_s": {name: statistics["time_s"][name] for name in times},
+        **{name: statistics[name] for name in capped if name in statistics},
+    }
+
+
+def _verdict_figures(verdict: Verdict) -> dict[str, Any]:
+    return {
+        "ok": verdict.ok,
+        "min_obstacle_clearance_m": verdict.min_obstacle_clearance_m,
+        "min_robot_distance_m": verdict.min_robot_distance_m,
+        "violations": len(verdict.violations),
+    }
+
+
+def _execution_figures(log: ExecutionLog, audit: EnergyAudit) -> dict[str, Any]:
+    controller_ms = log.timing["controller_ms"]
+    squares = [robot.tracking_rms_m**2 for robot in audit.robots]
+    return {
+        "goals_visited": len(audit.goals_visited),
+        "contacts": len(log.contacts),
+        "gave_up": log.gave_up,
+        "disturbance": log.disturbance.to_json() if log.disturbance else None,
+        "realtime_factor": log.timing["realtime_factor"],
+        "controller_ms": {name: controller_ms[name] for name in ("median", "p99")},
+        "tracking": {
+            "rms_m": (sum(squares) / len(squares)) ** 0.5,
+            "max_m": max(robot.tracking_max_m for robot in audit.robots),
+        },
+        "events": [event.to_json() for event in log.events],
+        "replans": sum(event.action == "replan" for event in log.events),
+    }
+
+
+def _energy_figures(audit: EnergyAudit) -> dict[str, Any]:
+    metered = [robot.metered_error_pct for robot in audit.robots]
+    measured = [robot.measured_error_pct for robot in audit.robots]
+    return {
+        "planned_J": audit.planned.total_J(),
+        "metered_J": audit.metered.total_J(),
+        "measured_J": audit.measured.total_J(),
+        "metered_error_pct": max(metered, key=abs),
+        "measured_error_pct": max(measured, key=abs),
+        "min_charge_fraction": min(robot.min_charge_fraction for robot in audit.robots),
+        "recharges": len(audit.recharges),
+    }
+
+
+def _read(folder: Path, name: str) -> dict[str, Any]:
+    try:
+        return dict(storage.read_json(folder / name))
+    except (OSError, ValueError) as error:
+        fault = Fault(name, f"cannot be read ({error}); run 'mrmg plan'")
+        raise RunFolderError(str(folder), [fault]) from error

@@ -1,0 +1,214 @@
+"""Missions on bare maps: where robots, goals and stations go, and how much energy.
+
+Everything is placed on roads a car can really drive: points of one connected area of
+the free ground shrunk by a margin, near places wide enough to turn round.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from mrmg import shipped
+from mrmg.errors import UsageError
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.loading.models import load_model
+from mrmg.scene.populating.ground import Ground
+from mrmg.scene.populating.placement import RESERVE, Placement, place_mission
+from mrmg.scene.robot_model import RobotModel
+from mrmg.scene.types import Scene
+from mrmg.seeding import stream
+
+GOAL_RADIUS_M = 1.5
+STATION_RADIUS_M = 2.0
+
+_MARGINS_M = (1.3, 0.9, 0.6, 0.4)
+"""Added to half the robot's width: the widest roads that span the map are used."""
+
+_LEAST_SHARE = 0.4
+"""Share of the free ground that must hang together, or the map is too narrow."""
+
+_LEAST_CANDIDATES = 150
+_CANDIDATES_PER_PLACE = 1.5
+"""More candidates than are wanted leave a choice."""
+
+
+def populate(
+    document: dict[str, Any],
+    *,
+    robots: int = 2,
+    goals: int = 14,
+    stations: int = 5,
+    seed: int = 3,
+    model: str = "car",
+) -> dict[str, Any]:
+    """Place a mission on a map; an earlier one in the document is replaced.
+
+    Args:
+        document: a scene document; bounds, obstacles, terrain, objective and time limit
+            are used.
+        robots: how many, at least one.
+        goals: how many, at least one.
+        stations: how many, at least one.
+        seed: equal seeds place equally.
+        model: name of the shipped model all robots are of.
+
+    Returns:
+        A scene document with the mission.
+
+    Raises:
+        UsageError: if a count is below one or the map has no room for the mission.
+        SceneError: if the document is no valid scene.
+    """
+    for name, count in (("robots", robots), ("goals", goals), ("stations", stations)):
+        if count < 1:
+            raise UsageError(f"cannot place {count} {name}; ask for at least 1")
+    if model not in shipped.model_names():
+        allowed = ", ".join(shipped.model_names())
+        raise UsageError(f"unknown model '{model}'; shipped models: {allowed}")
+    wishes = ("objective", "time_limit")
+    kept = ("format", "name", "bounds", "obstacles", "terrain", *wishes)
+    bare = {key: document[key] for key in kept if key in document}
+    for obstacle in bare.get("obstacles", []):
+        if isinstance(obstacle, dict) and "blocks" in obstacle:
+            message = (
+                "an obstacle with 'blocks' names robots that populate replaces; "
+                "remove 'blocks' from the map first"
+            )
+            raise UsageError(message)
+    scene = scene_from_document(bare, source=str(document.get("name", "the map")))
+    robot_model, _ = load_model(shipped.models_folder() / model)
+    rng = stream(seed, "populate")
+    ground = _drivable(scene, robot_model)
+    wanted = robots + goals + stations
+    count = max(_LEAST_CANDIDATES, math.ceil(_CANDIDATES_PER_PLACE * wanted))
+    places = _candidates(ground, robot_model, count, rng)
+    if len(places) < wanted:
+        message = (
+            f"the map has room for {len(places)} places at most, {wanted} are wanted; "
+            "ask for fewer, or scale the map up"
+        )
+        raise UsageError(message)
+    road_m = ground.distances(places)[:, places]
+    placement = place_mission(
+        road_m, ground.points_m[places], robots, goals, stations, rng
+    )
+    return _document(bare, ground, places, placement, model, robot_model)
+
+
+def _drivable(scene: Scene, model: RobotModel) -> Ground:
+    """Return the ground with the widest margin that keeps most of the map together."""
+    bare = Ground.over(
+        scene.bounds,
+        [obstacle.shape for obstacle in scene.barriers],
+        [(area.shape, area.multiplier) for area in scene.terrain],
+        margin_m=0.0,
+    )
+    grounds = [
+        replace(bare, margin_m=model.half_width_m + margin_m) for margin_m in _MARGINS_M
+    ]
+    sizes = [_largest(ground).sum() for ground in grounds]
+    share = max(sizes) / max(1, (bare.clearance_m > 0.0).sum())
+    if share < _LEAST_SHARE:
+        message = (
+            f"roads wide enough for this robot join only {100 * share:.0f} % of the "
+            "map's free ground; scale the map up"
+        )
+        raise UsageError(message)
+    # Wide margins lose a seam along every wall; lost rooms lose much more.
+    return next(
+        ground
+        for ground, size in zip(grounds, sizes, strict=True)
+        if size >= 0.6 * max(sizes)
+    )
+
+
+def _largest(ground: Ground) -> np.ndarray:
+    """Return the mask of the largest connected free area."""
+    labels = ground.component[ground.free]
+    if not len(labels):
+        return np.zeros(len(ground.free), dtype=bool)
+    return np.asarray(ground.component == np.bincount(labels).argmax())
+
+
+def _candidates(
+    ground: Ground, model: RobotModel, count: int, rng: np.random.Generator
+) -> list[int]:
+    """Return up to `count` grid points, spread over the ground and good to stop at.
+
+    Wanted is room about the point, and a wide place to turn round not far away by road.
+    """
+    connected = _largest(ground)
+    turning_m = model.turning_radius_m + model.half_width_m
+    wide = np.flatnonzero(connected & (ground.clearance_m >= turning_m))
+    near_wide = connected & (
+        ground.road_to_nearest(wide) <= 4.0 * model.turning_radius_m
+    )
+    turnable = near_wide if near_wide.sum() >= 0.5 * connected.sum() else connected
+    for clearance_m in (3.2, 2.6, 2.0, 1.5, ground.margin_m):
+        good = np.flatnonzero(turnable & (ground.clearance_m >= clearance_m))
+        if len(good) >= 0.25 * connected.sum():
+            break
+    # Many places must not crowd until goals overlap, nor be sparser than few are.
+    spacing_m, sparse_m = (
+        math.sqrt(len(good) * ground.cell_m**2 / number) * 0.8
+        for number in (count, _LEAST_CANDIDATES)
+    )
+    spacing_m = max(spacing_m, min(sparse_m, 2.0 * GOAL_RADIUS_M))
+    chosen: list[int] = []
+    for index in rng.permutation(good):
+        gap = ground.points_m[chosen] - ground.points_m[index]
+        if not chosen or (np.hypot(gap[:, 0], gap[:, 1]) >= spacing_m).all():
+            chosen.append(int(index))
+        if len(chosen) == count:
+            break
+    return chosen
+
+
+def _document(
+    bare: dict[str, Any],
+    ground: Ground,
+    places: list[int],
+    placement: Placement,
+    model: str,
+    robot_model: RobotModel,
+) -> dict[str, Any]:
+    def at(place: int) -> list[float]:
+        return [round(float(value), 3) for value in ground.points_m[places[place]]]
+
+    def regions(name: str, chosen: list[int], radius_m: float) -> list[dict[str, Any]]:
+        return [
+            {"id": f"{name}{k + 1}", "circle": {"center": at(p), "radius": radius_m}}
+            for k, p in enumerate(chosen)
+        ]
+
+    return {
+        **bare,
+        "goals": regions("g", placement.goals, GOAL_RADIUS_M),
+        "stations": regions("s", placement.stations, STATION_RADIUS_M),
+        "battery": {"capacity_m": float(placement.capacity_m), "reserve": RESERVE},
+        "robots": [
+            {
+                "id": f"r{k + 1}",
+                "model": model,
+                "pose": [*at(p), _open_heading(ground, places[p], robot_model)],
+            }
+            for k, p in enumerate(placement.robots)
+        ],
+    }
+
+
+def _open_heading(ground: Ground, index: int, model: RobotModel) -> float:
+    """Return the heading [rad] with the most clearance along the robot and ahead."""
+    start = ground.points_m[index]
+    ahead_m = np.arange(
+        model.footprint_m[:, 0].min(), 3.0 * model.footprint_m[:, 0].max(), 0.5
+    )
+    headings = np.round(np.arange(16) * math.pi / 8, 4)
+    along = np.stack([np.cos(headings), np.sin(headings)], axis=1)
+    points = start + ahead_m[None, :, None] * along[:, None, :]
+    clearance = [min(ground.clearance_at(row)) for row in points]
+    return float(headings[int(np.argmax(clearance))])

@@ -1,0 +1,116 @@
+"""The chassis of a differential drive: two driven wheels, and casters without drag.
+
+The MJCF names its parts as `scene.driven_parts` has them: the joints of the wheels,
+motors whose controls are the traction forces of the wheels, and tendons as long as the
+way rolled by the middle of the axle, and as the way rolled by the right wheel less that
+of the left. The tendons carry dry friction: rolling resistance on the first, what
+turning takes on the second, so that both losses add up as in the energy model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from mrmg.scene.driven_parts import CHASSIS, PARTS, ROOT
+from mrmg.scene.types import Robot
+from mrmg.simulation.chassis import part_ids
+from mrmg.simulation.drive import DriveParams, axle_grip_N
+from mrmg.simulation.driven_wheels import DrivenWheels
+from mrmg.simulation.drives import ForceDrives
+from mrmg.simulation.speed_loop import SpeedLoop
+
+
+class DifferentialChassis:
+    """All differential drives of a running simulation; a `Chassis`."""
+
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[Robot]
+    ) -> None:
+        """Find the parts of `robots`.
+
+        Raises:
+            FileError: if an MJCF lacks one.
+        """
+        self._model, self._data, parts = model, data, PARTS["unicycle"]
+        models = [robot.model for robot in robots]
+        self._track_m = np.array([item.track_m for item in models])
+        self._wheels = DrivenWheels(model, data, robots, parts.spin)
+        joint, actuator = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_ACTUATOR
+        root = part_ids(model, joint, robots, (ROOT,))[:, 0]
+        self._yaw_v = model.jnt_dofadr[root] + 5
+        motors = part_ids(model, actuator, robots, parts.motors)
+        each = [robot for robot in robots for _ in range(2)]
+        self._drives = ForceDrives(model, data, each, motors.ravel())
+        tendon = mujoco.mjtObj.mjOBJ_TENDON
+        self._tendon = part_ids(model, tendon, robots, parts.tendons)
+        turning_N = np.array([item.energy_model.turning_force_N for item in models])
+        self._turning_Nm = turning_N * self._track_m
+        params = DriveParams()
+        grip_N = params.grip_share * np.array([axle_grip_N(item) for item in models])
+        spin = np.array([item.wheel_inertia_kg_m2 for item in models])
+        wheels_kg_m2 = 0.5 * spin * (self._track_m / self._wheels.radius_m) ** 2
+        yaw_kg_m2, self._lead_kg_m = self._inertia_about_axle(robots)
+        self._loop = SpeedLoop(
+            inertia=yaw_kg_m2 + wheels_kg_m2,
+            limit=grip_N * self._track_m / 2,
+            params=params.loop,
+        )
+
+    def fifth_state(self) -> np.ndarray:
+        """Return the true omega, shape (K,)."""
+        return np.asarray(self._data.qvel[self._yaw_v])
+
+    def axle_speed_m_s(self) -> np.ndarray:
+        """Return the speed the axle rolls at, shape (K,)."""
+        return np.asarray(self._wheel_speed_m_s().mean(axis=1))
+
+    def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
+        """Set the dry friction of both tendons, each of shape (K,)."""
+        friction = np.stack([resistance_N, swing_N], axis=1)
+        self._model.tendon_frictionloss[self._tendon] = friction
+
+    def command(
+        self, force_N: np.ndarray, w_from: np.ndarray, w_to: np.ndarray, steps: int
+    ) -> None:
+        """Hold the traction force, and the moment that follows the ramp of omega."""
+        speed = self._wheel_speed_m_s()
+        moment_Nm = self._loop.force(
+            (speed[:, 1] - speed[:, 0]) / self._track_m,
+            w_from,
+            w_to,
+            self._turning_Nm,
+            steps * self._model.opt.timestep,
+        )
+        # A mass ahead of the axle wants to go straight on.
+        moment_Nm += self._lead_kg_m * speed.mean(axis=1) * 0.5 * (w_from + w_to)
+        swing_N = moment_Nm / self._track_m
+        wheels_N = 0.5 * force_N[:, None] + np.stack([-swing_N, swing_N], axis=1)
+        self._drives.command(wheels_N.ravel())
+
+    def apply(self, step: int) -> None:
+        """Do nothing: the motors hold their forces."""
+
+    def _wheel_speed_m_s(self) -> np.ndarray:
+        """Return the speed each wheel rolls at, left and right, shape (K, 2)."""
+        return np.asarray(self._wheels.rate_rad_s() * self._wheels.radius_m[:, None])
+
+    def _inertia_about_axle(
+        self, robots: Sequence[Robot]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return yaw inertias about the axles' middles, and masses times their leads.
+
+        Returns:
+            Inertia of each robot as a rigid body [kg m^2], shape (K,), and mass times
+            the distance by which its centre is ahead of the axle [kg m], shape (K,).
+        """
+        model, still = self._model, mujoco.MjData(self._model)
+        mujoco.mj_forward(model, still)
+        inertia = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, still, inertia)
+        body = part_ids(model, mujoco.mjtObj.mjOBJ_BODY, robots, (CHASSIS,))[:, 0]
+        forward = still.xmat[body].reshape(-1, 3, 3)[:, :, 0]
+        lead_m = ((still.subtree_com[body] - still.xpos[body]) * forward).sum(axis=1)
+        return inertia[self._yaw_v, self._yaw_v], model.body_subtreemass[body] * lead_m

@@ -1,0 +1,47 @@
+"""Making a compiled world differ from the models of its robots."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from mrmg.scene.driven_parts import ROOT
+from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
+from mrmg.simulation.incline import standing_pose
+from mrmg.simulation.world_model import MujocoWorld
+
+
+def disturb_world(world: MujocoWorld, disturbance: Disturbance) -> None:
+    """Change masses and grip of every robot in `world.model`, in place."""
+    for body, item in zip(world.chassis, disturbance.robots, strict=True):
+        _disturb_robot(world.model, int(body), item)
+    mujoco.mj_setConst(world.model, mujoco.MjData(world.model))
+
+
+def _disturb_robot(
+    model: mujoco.MjModel, chassis: int, disturbance: RobotDisturbance
+) -> None:
+    bodies = np.flatnonzero(model.body_rootid == model.body_rootid[chassis])
+    model.body_mass[bodies] *= 1.0 + disturbance.mass
+    model.body_inertia[bodies] *= 1.0 + disturbance.mass
+    geoms = np.isin(model.geom_bodyid, bodies)
+    model.geom_friction[geoms, 0] *= 1.0 + disturbance.friction
+
+
+def move_starts(
+    world: MujocoWorld, data: mujoco.MjData, disturbance: Disturbance
+) -> None:
+    """Shift and turn every robot from where the scene has it start, in place."""
+    for robot, item in zip(world.scene.robots, disturbance.robots, strict=True):
+        if not (item.start_x_m or item.start_y_m or item.start_heading_rad):
+            continue
+        root = world.model.joint(f"{robot.id}/{ROOT}")
+        x, y, yaw = robot.pose
+        position, orientation = standing_pose(
+            world.scene,
+            x + item.start_x_m,
+            y + item.start_y_m,
+            yaw + item.start_heading_rad,
+        )
+        pose = data.qpos[int(root.qposadr[0]) :][:7]
+        pose[:3], pose[3:] = position, orientation

@@ -1,0 +1,127 @@
+"""The robots inside the simulation: reading their states, steering and driving them.
+
+All robots are handled as arrays in the scene's order; what differs between their kinds
+is left to a chassis for each motion model. What an MJCF must name stands in
+`scene.driven_parts`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from mrmg.scene.driven_parts import ROOT
+from mrmg.scene.types import Scene
+from mrmg.simulation.chassis import Chassis, chassis_maker, part_ids
+from mrmg.simulation.drives import WorkMeter
+from mrmg.simulation.world_model import MujocoWorld
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """The robots of one motion model: their places in the scene, and their chassis."""
+
+    index: np.ndarray
+    chassis: Chassis
+
+
+class Fleet:
+    """All robots of a running simulation."""
+
+    def __init__(self, world: MujocoWorld, data: mujoco.MjData) -> None:
+        """Find the parts of every robot of `world`.
+
+        Raises:
+            UsageError: if a robot is of a kind that cannot be executed.
+            FileError: if a robot's MJCF lacks a part.
+        """
+        model, robots = world.model, world.scene.robots
+        self._model, self._data = model, data
+        self._groups = _grouped(model, data, world.scene)
+        self._work = WorkMeter(model, data, robots)
+        root = part_ids(model, mujoco.mjtObj.mjOBJ_JOINT, robots, (ROOT,))
+        root_q, root_v = model.jnt_qposadr[root], model.jnt_dofadr[root]
+        self._pose = root_q + np.arange(7)
+        self._velocity = root_v + np.arange(2)
+        self._yaw = [robot.pose[2] for robot in robots]
+
+    def state(self) -> np.ndarray:
+        """Return the true (x, y, theta, v, psi or omega), shape (R, 5).
+
+        theta is unwrapped.
+        """
+        fifth = self._gather([group.chassis.fifth_state() for group in self._groups])
+        pose = self._data.qpos[self._pose].tolist()
+        velocity = self._data.qvel[self._velocity].tolist()
+        states = []
+        for index, (x, y, _, qw, qx, qy, qz) in enumerate(pose):
+            yaw = math.atan2(2.0 * (qw * qz + qx * qy), 1.0 - 2.0 * (qy * qy + qz * qz))
+            v_x, v_y = velocity[index]
+            speed = v_x * math.cos(yaw) + v_y * math.sin(yaw)
+            self._yaw[index] += math.remainder(yaw - self._yaw[index], math.tau)
+            states.append((x, y, self._yaw[index], speed, fifth[index]))
+        return np.array(states)
+
+    def axle_speed_m_s(self) -> np.ndarray:
+        """Return the speed the driven axle rolls at, shape (R,)."""
+        return self._gather([group.chassis.axle_speed_m_s() for group in self._groups])
+
+    def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
+        """Set the dry friction of the driven axles.
+
+        Args:
+            resistance_N: against the way of the axle's middle, shape (R,).
+            swing_N: against the way its wheels roll differently, shape (R,).
+        """
+        for group in self._groups:
+            own = group.index
+            group.chassis.set_resistance(resistance_N[own], swing_N[own])
+
+    def drive(
+        self, force_N: np.ndarray, w_from: np.ndarray, w_to: np.ndarray, steps: int
+    ) -> np.ndarray:
+        """Run `steps` physics steps under held force and a ramp of steering.
+
+        Args:
+            force_N: traction force at the driven axle, shape (R,).
+            w_from: psi [rad] or omega [rad/s] at the start, shape (R,).
+            w_to: psi or omega at the end, shape (R,).
+            steps: number of physics steps.
+
+        Returns:
+            Work of the drives, driving (>= 0) and braking (<= 0) [J], shape (R, 2).
+        """
+        for group in self._groups:
+            own = group.index
+            group.chassis.command(force_N[own], w_from[own], w_to[own], steps)
+        self._work.start(steps)
+        for step in range(steps):
+            for group in self._groups:
+                group.chassis.apply(step)
+            mujoco.mj_step(self._model, self._data)
+            self._work.look(step)
+        return self._work.work_J()
+
+    def _gather(self, parts: list[np.ndarray]) -> np.ndarray:
+        """Return the groups' values in the scene's order, shape (R, ...)."""
+        if len(parts) == 1:
+            return parts[0]
+        whole = np.empty((len(self._yaw), *parts[0].shape[1:]))
+        for group, part in zip(self._groups, parts, strict=True):
+            whole[group.index] = part
+        return whole
+
+
+def _grouped(
+    model: mujoco.MjModel, data: mujoco.MjData, scene: Scene
+) -> tuple[_Group, ...]:
+    kinds = [robot.model.motion_model for robot in scene.robots]
+    groups = []
+    for kind in dict.fromkeys(kinds):
+        index = np.array([place for place, own in enumerate(kinds) if own == kind])
+        robots = [scene.robots[place] for place in index]
+        groups.append(_Group(index, chassis_maker(robots[0])(model, data, robots)))
+    return tuple(groups)

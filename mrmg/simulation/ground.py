@@ -1,0 +1,132 @@
+"""What the ground takes from the robots: as it is, and as their models think it is.
+
+The MJCF of a robot states what its tyres lose, as the numerics `rolling_coefficient`
+and `turning_coefficient`: that is the truth of the simulation. The coefficients of the
+same names in `robot.yaml` are what planner and drive control believe; calibration makes
+both meet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import shapely
+
+from mrmg.energy.model import GRAVITY_M_S2
+from mrmg.errors import Fault, FileError
+from mrmg.scene.types import Robot, Scene
+from mrmg.simulation.disturbance import Disturbance
+from mrmg.simulation.world_model import MujocoWorld
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GroundResistance:
+    """The force the ground takes from each robot of a fleet.
+
+    Attributes:
+        rolling_N: on plain ground, straight on, shape (R,).
+        turning_N: more of it per |tan psi| of a car, shape (R,); 0 for other robots.
+        swing_N: against the way that a differential drive's wheels roll differently,
+            shape (R,); 0 for other robots.
+    """
+
+    rolling_N: np.ndarray
+    turning_N: np.ndarray
+    swing_N: np.ndarray
+
+    @staticmethod
+    def of(
+        robots: Sequence[Robot], rolling_N: np.ndarray, turning_N: np.ndarray
+    ) -> GroundResistance:
+        """Return the resistance of robots whose turning is lost as their kind does."""
+        steers = np.array([robot.model.motion_model == "car" for robot in robots])
+        return GroundResistance(
+            rolling_N=rolling_N,
+            turning_N=np.where(steers, turning_N, 0.0),
+            swing_N=np.where(steers, 0.0, turning_N),
+        )
+
+    def force_N(self, multiplier: np.ndarray, steer: np.ndarray) -> np.ndarray:
+        """Return the force along the way by the energy model's law, shape (R,).
+
+        Args:
+            multiplier: terrain under each robot, shape (R,).
+            steer: psi [rad] of the cars, shape (R,).
+        """
+        turning = self.turning_N * np.abs(np.tan(steer))
+        return np.asarray(self.rolling_N * multiplier + turning)
+
+
+class TerrainUnderfoot:
+    """The terrain under a few robots, asked for at every tick."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Prepare the terrain of `scene`."""
+        self._areas = [
+            (area.shape, area.shape.bounds, area.multiplier)
+            for area in reversed(scene.terrain)
+        ]
+        for shape, _, _ in self._areas:
+            shapely.prepare(shape)
+
+    def under(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
+        """Return the multipliers at some places, equal to `multiplier_at`'s, (n,)."""
+        places = zip(x_m.tolist(), y_m.tolist(), strict=True)
+        return np.array([self._at(x, y) for x, y in places])
+
+    def _at(self, x: float, y: float) -> float:
+        for shape, (x_min, y_min, x_max, y_max), multiplier in self._areas:
+            near = x_min <= x <= x_max and y_min <= y <= y_max
+            if near and shapely.contains_xy(shape, x, y):
+                return multiplier
+        return 1.0
+
+
+def believed_resistance(scene: Scene) -> GroundResistance:
+    """Return the resistance by the energy models of the robots."""
+    energy = [robot.model.energy_model for robot in scene.robots]
+    return GroundResistance.of(
+        scene.robots,
+        rolling_N=np.array([model.rolling_force_N for model in energy]),
+        turning_N=np.array([model.turning_force_N for model in energy]),
+    )
+
+
+def true_resistance(
+    world: MujocoWorld, disturbance: Disturbance | None = None
+) -> GroundResistance:
+    """Return the resistance by the MJCF of the robots, and what disturbs it.
+
+    Raises:
+        FileError: if an MJCF does not state a coefficient.
+    """
+    robots = world.scene.robots
+    weight_N = world.model.body_subtreemass[world.chassis] * GRAVITY_M_S2
+    coefficients = np.array(
+        [
+            [
+                _numeric(world.model, robot, f"{kind}_coefficient")
+                for kind in ("rolling", "turning")
+            ]
+            for robot in robots
+        ]
+    )
+    rolling_N, turning_N = coefficients.T * weight_N
+    if disturbance is not None:
+        change = np.array([item.rolling for item in disturbance.robots])
+        rolling_N = rolling_N * (1.0 + change)
+    return GroundResistance.of(robots, rolling_N, turning_N)
+
+
+def _numeric(model: mujoco.MjModel, robot: Robot, name: str) -> float:
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, f"{robot.id}/{name}")
+    if index < 0:
+        message = (
+            f'states no {name}; add <custom><numeric name="{name}" data="..."/>'
+            "</custom>: the force over the weight that the simulated tyres lose"
+        )
+        raise FileError(str(robot.model.mjcf), [Fault("custom", message)])
+    return float(model.numeric_data[model.numeric_adr[index]])

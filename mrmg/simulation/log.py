@@ -1,0 +1,259 @@
+"""What was recorded while a plan was driven in MuJoCo."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrmg import storage
+from mrmg.columns import data_frame, named, state_columns
+from mrmg.errors import Fault, IdentityError, RunFolderError, UsageError
+from mrmg.plans import Plan, plan_in_force
+from mrmg.scene.types import Scene
+from mrmg.simulation.disturbance import Disturbance
+from mrmg.simulation.supervision import Event
+
+LOG_FORMAT = 1
+
+_NOT_PLAIN = ("contacts", "disturbance", "events", "timing")
+
+
+_DECIDING = ("mujoco", "casadi", "numpy", "scipy", "shapely")
+
+
+def package_versions() -> dict[str, str]:
+    """Return the versions of the packages that decide what a simulation gives."""
+    return {name: version(name) for name in _DECIDING}
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """The beginning of a touch that should not have happened.
+
+    Attributes:
+        time_s: when it began.
+        robot: id of the robot.
+        other: id of the robot or obstacle it touched, or "bounds".
+        x_m, y_m: where.
+    """
+
+    time_s: float
+    robot: str
+    other: str
+    x_m: float
+    y_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ExecutionLog:
+    """Everything recorded at the control rate; n ticks, R robots.
+
+    Attributes:
+        scene_digest, plan_digest, model_digest: what was driven, in which MJCF world.
+        controller: name of the tracking controller.
+        control_period_s: time between ticks.
+        completed: False where the simulation was ended early.
+        gave_up: why it was: "lost", too far from the plan; "diverged", physics out of
+            hand; "stalled", the fleet did not get on; "restless", it did not come to
+            rest; "" where completed.
+        disturbance: how the simulated robots differed from their models; None if not.
+        robots: ids in the scene's order.
+        versions: of the packages that decide the result.
+        time_s: simulated time, shape (n,).
+        clock_s: plan time the fleet's shared clock had reached, shape (n,).
+        state: true x, y, theta, v and a fifth number, shape (R, n, 5); `columns` names
+            it.
+        reference: the plan at clock_s, shape (R, n, 5).
+        command: set-points of v and of the fifth number of the state, given at each
+            tick, shape (R, n, 2).
+        multiplier: terrain under the rear axle, shape (R, n).
+        force_N: drive force commanded over the tick, shape (R, n - 1).
+        work_J: work of the drives over the tick, driving (>= 0) and braking (<= 0),
+            shape (R, n - 1, 2).
+        qpos: MuJoCo's positions, shape (n, nq); what a video is drawn from.
+        contacts: every contact other than wheel and floor.
+        events: what a supervisor saw and did, in order of time.
+        motions: motion models of the robots, which decide the columns; empty where they
+            are not recorded.
+        timing: wall_s and realtime_factor by the clock, controller_ms {median, p99} a
+            robot and call by the processor. Kept apart: all else is equal between
+            equal runs.
+    """
+
+    scene_digest: str
+    plan_digest: str
+    model_digest: str
+    controller: str
+    control_period_s: float
+    completed: bool
+    robots: tuple[str, ...]
+    versions: Mapping[str, str]
+    time_s: np.ndarray
+    clock_s: np.ndarray
+    state: np.ndarray
+    reference: np.ndarray
+    command: np.ndarray
+    multiplier: np.ndarray
+    force_N: np.ndarray
+    work_J: np.ndarray
+    qpos: np.ndarray
+    contacts: tuple[Contact, ...]
+    timing: Mapping[str, Any]
+    events: tuple[Event, ...] = ()
+    gave_up: str = ""
+    disturbance: Disturbance | None = None
+    motions: tuple[str, ...] = ()
+
+    def columns(self, robot: str) -> dict[str, str]:
+        """Return the unit of each column of `to_arrays(robot)` by its name."""
+        return {name: unit for names, _ in self._tables(robot) for name, unit in names}
+
+    def to_arrays(self, robot: str) -> dict[str, np.ndarray]:
+        """Return what was recorded of a robot by name, each of shape (n,).
+
+        What holds over a tick stands in the row in which the tick begins; the last row
+        has NaN there.
+        """
+        rows = len(self.time_s)
+        return {
+            name: column
+            for names, values in self._tables(robot)
+            for name, column in named(dict(names), values, rows).items()
+        }
+
+    def to_dataframe(self, robot: str) -> Any:
+        """Return `to_arrays` as a pandas DataFrame; raises MachineError without it."""
+        return data_frame(self.to_arrays(robot))
+
+    def _tables(
+        self, robot: str
+    ) -> Iterator[tuple[Iterable[tuple[str, str]], np.ndarray]]:
+        """Yield names with units, and the values of their columns."""
+        if robot not in self.robots:
+            known = ", ".join(self.robots)
+            raise UsageError(f"the log knows no robot {robot!r}; allowed: {known}")
+        number = self.robots.index(robot)
+        names = state_columns(self.motions[number] if self.motions else "")
+        set_points = list(names.items())[3:]
+        yield [("time_s", "s")], self.time_s
+        yield [("clock_s", "s")], self.clock_s
+        yield names.items(), self.state[number]
+        yield _prefixed("reference", names.items()), self.reference[number]
+        yield _prefixed("command", set_points), self.command[number]
+        yield [("multiplier", "1")], self.multiplier[number]
+        yield [("force_N", "N")], self.force_N[number]
+        yield [("work_driving_J", "J"), ("work_braking_J", "J")], self.work_J[number]
+
+    @property
+    def digest(self) -> str:
+        """Fingerprint of all arrays: equal for runs that are equal to the last bit."""
+        digest = hashlib.sha256()
+        for name, values in sorted(self._arrays().items()):
+            digest.update(name.encode())
+            digest.update(np.ascontiguousarray(values).tobytes())
+        return digest.hexdigest()[:16]
+
+    def save(self, folder: Path) -> None:
+        """Write `log.npz`, `timing.json`, then `log.json`, whose presence says done."""
+        storage.write_arrays(folder / "log.npz", self._arrays())
+        storage.write_json(folder / "timing.json", dict(self.timing))
+        header = {
+            field.name: getattr(self, field.name)
+            for field in fields(self)
+            if field.name not in {*self._arrays(), *_NOT_PLAIN}
+        }
+        header["robots"] = list(self.robots)
+        header["versions"] = dict(self.versions)
+        header["contacts"] = [
+            {name: getattr(contact, name) for name in Contact.__slots__}
+            for contact in self.contacts
+        ]
+        header["events"] = [event.to_json() for event in self.events]
+        if self.disturbance is not None:
+            header["disturbance"] = self.disturbance.to_json()
+        storage.write_json(folder / "log.json", {"format": LOG_FORMAT, **header})
+
+    def _arrays(self) -> dict[str, np.ndarray]:
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {
+            name: value
+            for name, value in values.items()
+            if isinstance(value, np.ndarray)
+        }
+
+    @staticmethod
+    def load(folder: Path) -> ExecutionLog:
+        """Read a log that `save` wrote.
+
+        Raises:
+            RunFolderError: if a file is missing or not a log of this format.
+        """
+        try:
+            header = storage.read_json(folder / "log.json")
+            if header.pop("format") != LOG_FORMAT:
+                raise ValueError(f"this version reads format {LOG_FORMAT} only")
+            header["robots"] = tuple(header["robots"])
+            header["motions"] = tuple(header.get("motions", ()))
+            header["contacts"] = tuple(Contact(**row) for row in header["contacts"])
+            header["events"] = tuple(Event(**row) for row in header.get("events", ()))
+            if "disturbance" in header:
+                header["disturbance"] = Disturbance.from_json(header["disturbance"])
+            arrays: dict[str, Any] = storage.read_arrays(folder / "log.npz")
+            timing = storage.read_json(folder / "timing.json")
+            return ExecutionLog(**header, **arrays, timing=timing)
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            fault = Fault("log.json", f"no readable log ({error}); run 'mrmg execute'")
+            raise RunFolderError(str(folder), [fault]) from error
+
+
+def log_in_force(folder: Path, scene: Scene) -> ExecutionLog | None:
+    """Return the log of the drive of a run folder's plan; None if it was not driven.
+
+    A log of a plan that the folder does not hold any more is none of its plan.
+
+    Raises:
+        RunFolderError: if a file cannot be read, or is of another scene.
+    """
+    if not (folder / "log.json").exists():
+        return None
+    log = ExecutionLog.load(folder)
+    require_same_mission(scene, None, log)
+    return log if log.plan_digest == plan_in_force(folder).digest else None
+
+
+def _prefixed(word: str, names: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
+    return [(f"{word}_{name}", unit) for name, unit in names]
+
+
+def require_same_mission(
+    scene: Scene, plan: Plan | None, log: ExecutionLog | None = None
+) -> None:
+    """Refuse a plan or log that was made for something else.
+
+    Raises:
+        IdentityError: naming what belongs to what.
+    """
+    faults = []
+    this = f"this is {scene.name} ({scene.digest})"
+    if plan is not None and not scene.is_named(plan.scene_digest):
+        made_for = f"{plan.scene_name} ({plan.scene_digest})"
+        message = f"plan of another scene, {made_for}; {this}; plan this scene anew"
+        faults.append(Fault("plan.json", message))
+    if log is not None and not scene.is_named(log.scene_digest):
+        message = f"log of another scene ({log.scene_digest}); {this}; drive it anew"
+        faults.append(Fault("log.json", message))
+    if plan is not None and log is not None and log.plan_digest != plan.digest:
+        message = f"log of another plan ({log.plan_digest}); this is {plan.digest}"
+        faults.append(Fault("log.json", f"{message}; run 'mrmg execute'"))
+    expected = tuple(robot.id for robot in scene.robots)
+    if log is not None and log.robots != expected:
+        message = f"log of robots {list(log.robots)}, the scene has {list(expected)}"
+        faults.append(Fault("log.json", f"{message}; run 'mrmg execute'"))
+    if faults:
+        raise IdentityError(scene.name, faults)

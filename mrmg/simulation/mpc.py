@@ -1,0 +1,200 @@
+"""Tracking model predictive control: one Gauss-Newton QP a call (real-time iteration).
+
+    min  sum_k |x_k - r_k|^2_Q + |u_k - w_k|^2_R + |x_N - r_N|^2_(q_N Q)
+    s.t. x_{k+1} = f(x_k, u_k) linearised about the previous solution,
+         v, psi, u1, u2 within the robot's limits,
+
+with r the reference and w its mean controls (Diehl et al. 2005; Gros et al. 2020). v
+and psi are pure integrals of u, so that u = 0 is feasible and no slack is needed.
+
+Most often no bound is active. The problem is therefore solved without them first, by a
+Riccati recursion; only a solution that breaks a bound is found anew with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import casadi as ca
+import numpy as np
+
+from mrmg.motion.dynamics import DERIVATIVES, NU, NX, rk4_step
+from mrmg.scene.robot_model import Limits, RobotModel
+from mrmg.simulation.controller import HORIZON, HORIZON_STEP_S
+from mrmg.simulation.native_code import compiled
+from mrmg.simulation.riccati import unbounded_solver
+
+_STAGE = NX + NU
+_SIZE = HORIZON * _STAGE + NX
+
+
+@dataclass(frozen=True, slots=True)
+class MpcParams:
+    """Weights of the tracking cost.
+
+    Attributes:
+        state: per (x, y [1/m^2], theta [1/rad^2], v [s^2/m^2], psi [1/rad^2]).
+        control: per (u1 [s^4/m^2], u2 [s^2/rad^2]).
+        terminal_factor: weight of the last state over the others.
+    """
+
+    state: tuple[float, ...] = (10.0, 10.0, 4.0, 0.5, 0.5)
+    control: tuple[float, ...] = (0.2, 0.2)
+    terminal_factor: float = 3.0
+
+
+class TrackingMpc:
+    """Model predictive tracking of one robot."""
+
+    def __init__(self, model: RobotModel, params: MpcParams | None = None) -> None:
+        """Set up the problem for a robot of `model`."""
+        kind = (model.motion_model, model.wheelbase_m, params or MpcParams())
+        self._lower, self._upper = _bounds(model.limits)
+        self._limits = model.limits
+        self._deviation = np.zeros(_SIZE)
+        self._guess = np.zeros(_SIZE)
+        self._target = np.zeros(_SIZE)
+        self._solution = np.zeros(_SIZE)
+        question = (self._guess, self._target)
+        bounds = (self._lower, self._upper)
+        self._solve_unbounded = _BufferedCall(
+            _unbounded_solver(*kind), question, self._solution
+        )
+        self._solve_bounded = _BufferedCall(
+            _solver(*kind), (*question, *bounds), self._solution
+        )
+
+    def correct(self, state: np.ndarray, reference: np.ndarray) -> np.ndarray:
+        """Return the first control of the optimum less the reference's."""
+        stages = self._target[:-NX].reshape(HORIZON, _STAGE)
+        stages[:, :NX] = reference[:-1]
+        stages[:, NX:] = (reference[1:, 3:] - reference[:-1, 3:]) / HORIZON_STEP_S
+        self._target[-NX:] = reference[-1]
+        np.add(self._target, self._deviation, out=self._guess)
+        self._fix_first_state(state)
+        if not self._solve():
+            self._deviation[:] = 0.0
+            return np.zeros(NU)
+        np.subtract(self._solution, self._target, out=self._deviation)
+        return self._deviation[NX:_STAGE].copy()
+
+    def _solve(self) -> bool:
+        """Solve the QP; tell whether question and answer are all numbers."""
+        if not np.isfinite(self._guess).all():
+            return False
+        self._solve_unbounded()
+        if self._keeps_bounds():
+            return True
+        self._solve_bounded()
+        return bool(np.isfinite(self._solution).all())
+
+    def _keeps_bounds(self) -> bool:
+        """Tell whether the solution keeps all bounds, which nan does not."""
+        above, below = self._solution >= self._lower, self._solution <= self._upper
+        return bool((above & below).all())
+
+    def _fix_first_state(self, state: np.ndarray) -> None:
+        limits = self._limits
+        self._lower[:NX] = state
+        self._lower[3] = min(max(state[3], limits.v_min_m_s), limits.v_max_m_s)
+        self._lower[4] = min(max(state[4], -limits.w_max), limits.w_max)
+        self._upper[:NX] = self._lower[:NX]
+        self._guess[:NX] = self._lower[:NX]
+
+
+class _BufferedCall:
+    """A CasADi function that works on arrays in place."""
+
+    def __init__(
+        self,
+        function: ca.Function,
+        arguments: Sequence[np.ndarray],
+        result: np.ndarray,
+    ) -> None:
+        """Bind the function's arguments and its only result."""
+        # The buffer must outlive the call that works on it.
+        self._buffer, self._call = function.buffer()
+        for index, array in enumerate(arguments):
+            self._buffer.set_arg(index, memoryview(array))  # type: ignore
+        self._buffer.set_res(0, memoryview(result))  # type: ignore
+
+    def __call__(self) -> None:
+        """Work out the result."""
+        self._call()
+
+
+def _bounds(limits: Limits) -> tuple[np.ndarray, np.ndarray]:
+    """Return bounds of the decision (x_0, u_0, x_1, ..., x_N), each of shape (n,)."""
+    upper = [np.inf, np.inf, np.inf, limits.v_max_m_s, limits.w_max]
+    lower = [-np.inf, -np.inf, -np.inf, limits.v_min_m_s, -limits.w_max]
+    control = [limits.u1_max_m_s2, limits.u2_max]
+    return (
+        np.array([*lower, *(-bound for bound in control)] * HORIZON + lower),
+        np.array([*upper, *control] * HORIZON + upper),
+    )
+
+
+@cache
+def _unbounded_solver(
+    motion_model: str, wheelbase_m: float, params: MpcParams
+) -> ca.Function:
+    """Return (guess, target) -> solution where no bound is active."""
+    return compiled(unbounded_solver(motion_model, wheelbase_m, _weights(params)))
+
+
+@cache
+def _solver(motion_model: str, wheelbase_m: float, params: MpcParams) -> ca.Function:
+    """Return (guess, target, lower, upper) -> solution of the linearised problem."""
+    guess = ca.MX.sym("guess", _SIZE)
+    target = ca.MX.sym("target", _SIZE)
+    lower = ca.MX.sym("lower", _SIZE)
+    upper = ca.MX.sym("upper", _SIZE)
+    weight = _weights(params)
+    linearise = compiled(_linearised_gaps(motion_model, wheelbase_m))
+    jacobian, gap = linearise(guess)
+    # J z = J z_guess - gap(z_guess): the gaps close to first order.
+    right_side = jacobian @ guess - gap
+    qp = ca.conic(
+        "tracking",
+        "piqp",
+        {"h": ca.Sparsity.diag(_SIZE), "a": linearise.sparsity_out(0)},
+        {"error_on_fail": False},
+    )
+    solution = qp(
+        h=ca.diag(ca.DM(weight)),
+        g=-weight * target,
+        a=jacobian,
+        lba=right_side,
+        uba=right_side,
+        lbx=lower,
+        ubx=upper,
+        x0=guess,
+    )["x"]
+    return ca.Function("mpc_step", [guess, target, lower, upper], [solution])
+
+
+def _weights(params: MpcParams) -> np.ndarray:
+    stage = [*params.state, *params.control]
+    last = [params.terminal_factor * value for value in params.state]
+    return np.array(stage * HORIZON + last)
+
+
+def _linearised_gaps(motion_model: str, wheelbase_m: float) -> ca.Function:
+    """Return z -> (Jacobian, value) of the gaps x_{k+1} - f(x_k, u_k)."""
+    step = rk4_step(DERIVATIVES[motion_model](ca.sin, ca.cos, ca.tan))
+    now = ca.SX.sym("now", _STAGE)
+    reached = ca.vertcat(*step(*ca.vertsplit(now), wheelbase_m, HORIZON_STEP_S))
+    stage = ca.Function("stage", [now], [reached, ca.jacobian(reached, now)])
+    z = ca.MX.sym("z", _SIZE)
+    stages = ca.reshape(z[:-NX], _STAGE, HORIZON)
+    after, slopes = stage.map(HORIZON)(stages)
+    following = ca.horzcat(stages[:NX, 1:], z[-NX:])
+    last = ca.MX(NX * HORIZON, NX)
+    slope = ca.horzcat(ca.diagcat(*ca.horzsplit(slopes, _STAGE)), last)
+    selected = [ca.horzcat(ca.DM.eye(NX), ca.DM(NX, NU))] * (HORIZON - 1)
+    first = ca.DM(NX * HORIZON, _STAGE)
+    identity = ca.horzcat(first, ca.diagcat(*selected, ca.DM.eye(NX)))
+    name = f"gaps_{motion_model}"
+    return ca.Function(name, [z], [identity - slope, ca.vec(following - after)])

@@ -1,0 +1,274 @@
+"""The world around the robots: floor, obstacles, walls, goals and stations.
+
+Collision bits: floor 1, hull of a robot 2, obstacle and wall 4. A tyre takes bit 1
+only, a hull bits 2 and 4, everything here takes none, so that static things never test
+each other. Groups: 1 drawn, 3 hidden solids.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import shapely
+from shapely.geometry import Polygon
+
+from mrmg.scene.driven_parts import FLOOR_BIT, OBSTACLE_BIT
+from mrmg.scene.types import Obstacle, Region, Scene
+from mrmg.simulation import palette
+from mrmg.simulation.convex import convex_pieces, triangles
+from mrmg.simulation.ground_shape import (
+    FOUNDATION_M,
+    add_height_field,
+    draped_mark,
+    height_span,
+)
+from mrmg.world.terrain import multiplier_at
+
+_DRAWN_GROUP, _SOLID_GROUP = 1, 3
+
+FLOOR = "floor"
+BOUNDS = "bounds"
+_FLOOR_MARGIN_M = 4.0
+_TEXTURE_PIXELS = 1536
+_GRID_M = 10.0
+_GRID_SHADE = 0.94
+_WALL_HEIGHT_M = 0.5
+_WALL_THICKNESS_M = 0.4
+_TARGET_THICKNESS_M = 0.03
+
+
+def add_floor(spec: mujoco.MjSpec, scene: Scene) -> None:
+    """Add the ground, coloured by the terrain: a plane, or a field of heights."""
+    x_min, y_min, x_max, y_max = scene.bounds
+    half = np.array([x_max - x_min, y_max - y_min]) / 2 + _FLOOR_MARGIN_M
+    center = np.array([x_min + x_max, y_min + y_max]) / 2
+    image = _floor_image(scene, center, half)
+    texture = spec.add_texture(
+        name=FLOOR,
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        colorspace=mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR,
+        height=image.shape[0],
+        width=image.shape[1],
+        nchannel=3,
+    )
+    texture.data = image.tobytes()
+    material = spec.add_material(name=FLOOR, specular=0.0, shininess=0.0)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = FLOOR
+    options = {
+        "name": FLOOR,
+        "material": FLOOR,
+        "contype": FLOOR_BIT,
+        "conaffinity": 0,
+        "castshadow": False,
+    }
+    if scene.elevation is None:
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_PLANE,
+            pos=[*center, 0.0],
+            size=[*half, 1.0],
+            **options,
+        )
+        return
+    foot_m = add_height_field(spec, FLOOR, scene, center, half)
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_HFIELD,
+        hfieldname=FLOOR,
+        pos=[*center, foot_m],
+        **options,
+    )
+
+
+def _floor_image(scene: Scene, center: np.ndarray, half: np.ndarray) -> np.ndarray:
+    """Return the ground seen from above, north up, shape (h, w, 3) of bytes."""
+    pixel_m = 2.0 * half.max() / _TEXTURE_PIXELS
+    columns, rows = np.maximum(np.round(2.0 * half / pixel_m), 1).astype(int)
+    x = center[0] - half[0] + (np.arange(columns) + 0.5) * 2.0 * half[0] / columns
+    y = center[1] + half[1] - (np.arange(rows) + 0.5) * 2.0 * half[1] / rows
+    grid_x, grid_y = np.meshgrid(x, y)
+    points = np.stack([grid_x.ravel(), grid_y.ravel()], axis=1)
+    classes = np.unique([1.0, *(area.multiplier for area in scene.terrain)])
+    colours = np.array([palette.terrain_colour(multiplier) for multiplier in classes])
+    of_pixel = np.searchsorted(classes, multiplier_at(scene, points))
+    on_grid = _on_grid(y, pixel_m)[:, None] | _on_grid(x, pixel_m)[None]
+    tints = _bytes(np.concatenate([colours, _GRID_SHADE * colours]))
+    tint = of_pixel.reshape(rows, columns) + len(classes) * on_grid
+    return np.asarray(tints[tint])
+
+
+def _on_grid(at_m: np.ndarray, width_m: float) -> np.ndarray:
+    return np.abs((at_m + _GRID_M / 2) % _GRID_M - _GRID_M / 2) < width_m
+
+
+def _bytes(colours: np.ndarray) -> np.ndarray:
+    return np.asarray(np.round(255.0 * colours), dtype=np.uint8)
+
+
+def add_obstacle(
+    spec: mujoco.MjSpec, scene: Scene, obstacle: Obstacle
+) -> mujoco.MjsBody:
+    """Add one obstacle as a body: hidden convex solids and one drawn mesh.
+
+    On a slope it is founded in its lowest ground and rises its height above the
+    highest.
+
+    Obstacles stay bodies of their own, even where they overlap, so that a contact can
+    name what was touched and so that an exclusion can let single robots through.
+    """
+    low, high = height_span(scene, obstacle.shape)
+    foot_m = 0.0 if scene.elevation is None else low - FOUNDATION_M
+    height_m = high - foot_m + obstacle.height_m
+    body = spec.worldbody.add_body(
+        name=f"obstacle:{obstacle.id}", pos=[0.0, 0.0, foot_m]
+    )
+    for number, ring in enumerate(convex_pieces(obstacle.shape)):
+        name = f"solid:{obstacle.id}:{number}"
+        spec.add_mesh(name=name, uservert=_prism(ring, height_m).ravel())
+        body.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=name,
+            contype=OBSTACLE_BIT,
+            conaffinity=0,
+            group=_SOLID_GROUP,
+        )
+    colour = palette.OBSTACLE if obstacle.blocks is None else palette.PARTIAL_OBSTACLE
+    name = f"obstacle:{obstacle.id}"
+    _add_drawn_mesh(spec, name, obstacle.shape, height_m)
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname=name,
+        contype=0,
+        conaffinity=0,
+        group=_DRAWN_GROUP,
+        rgba=[*colour, 1.0],
+    )
+    return body
+
+
+def add_bounds(spec: mujoco.MjSpec, scene: Scene) -> None:
+    """Add four low walls whose inner faces are the scene's bounds."""
+    x_min, y_min, x_max, y_max = scene.bounds
+    center = np.array([x_min + x_max, y_min + y_max]) / 2
+    half = np.array([x_max - x_min, y_max - y_min]) / 2
+    thick = _WALL_THICKNESS_M / 2
+    low, high = height_span(scene, shapely.box(*scene.bounds))
+    foot_m = 0.0 if scene.elevation is None else low - FOUNDATION_M
+    tall = (high - foot_m + _WALL_HEIGHT_M) / 2
+    body = spec.worldbody.add_body(name=BOUNDS)
+    for axis in (0, 1):
+        for side in (-1.0, 1.0):
+            at, size = center.copy(), half + 2 * thick
+            at[axis] += side * (half[axis] + thick)
+            size[axis] = thick
+            body.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_BOX,
+                pos=[*at, foot_m + tall],
+                size=[*size, tall],
+                contype=OBSTACLE_BIT,
+                conaffinity=0,
+                group=_DRAWN_GROUP,
+                rgba=[*palette.WALL, 1.0],
+            )
+
+
+def add_targets(spec: mujoco.MjSpec, scene: Scene) -> None:
+    """Add goals and stations as flat marks named `goal:<id>` and `station:<id>`."""
+    for station in scene.stations:
+        name = f"station:{station.id}"
+        _add_mark(spec, scene, name, station.region, palette.STATION)
+    for goal in scene.goals:
+        _add_mark(spec, scene, f"goal:{goal.id}", goal.region, palette.GOAL)
+
+
+def _add_mark(
+    spec: mujoco.MjSpec, scene: Scene, name: str, region: Region, colour: palette.Rgb
+) -> None:
+    options = {
+        "name": name,
+        "contype": 0,
+        "conaffinity": 0,
+        "group": _DRAWN_GROUP,
+        "rgba": [*colour, 0.8],
+        "castshadow": False,
+    }
+    if scene.elevation is not None:
+        _add_mesh(spec, name, *draped_mark(scene, region))
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **options
+        )
+        return
+    if len(region.corners):
+        _add_drawn_mesh(spec, name, region.shape, _TARGET_THICKNESS_M)
+        spec.worldbody.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **options
+        )
+        return
+    half = _TARGET_THICKNESS_M / 2
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        pos=[*region.center, half],
+        size=[region.radius_m, half, 0.0],
+        **options,
+    )
+
+
+def _prism(ring: np.ndarray, height_m: float) -> np.ndarray:
+    """Return the corners of the upright prism over a convex ring, shape (2 k, 3)."""
+    return np.concatenate(
+        [np.insert(ring, 2, level, axis=1) for level in (0.0, height_m)]
+    )
+
+
+def _add_drawn_mesh(
+    spec: mujoco.MjSpec, name: str, polygon: Polygon, height_m: float
+) -> None:
+    """Add the polygon's extrusion as a mesh with flat faces."""
+    corners = np.concatenate(
+        [
+            shapely.get_coordinates(shapely.orient_polygons(part).exterior)[:3]
+            for part in triangles(polygon)
+        ]
+    )
+    vertices, faces = np.unique(corners, axis=0, return_inverse=True)
+    sides = _extruded(vertices, faces.reshape(-1, 3), height_m)
+    # Shared corners would make MuJoCo smooth the edges away.
+    _add_mesh(spec, name, sides.reshape(-1, 3), np.arange(3 * len(sides)))
+
+
+def _extruded(points: np.ndarray, faces: np.ndarray, height_m: float) -> np.ndarray:
+    """Return the corners of the outward triangles round an upright solid, (n, 3, 3).
+
+    Args:
+        points: on the ground [m], shape (k, 2).
+        faces: triangles of its base, counter-clockwise, whole side to whole side,
+            shape (m, 3).
+        height_m: of the solid.
+    """
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    _, place, uses = np.unique(
+        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    # An edge of a single triangle is one of the outline.
+    start, end = edges[place[uses == 1]].T
+    low = np.insert(points, 2, 0.0, axis=1)
+    high = np.insert(points, 2, height_m, axis=1)
+    return np.concatenate(
+        [
+            low[faces[:, ::-1]],
+            high[faces],
+            np.stack([low[start], low[end], high[end]], axis=1),
+            np.stack([low[start], high[end], high[start]], axis=1),
+        ]
+    )
+
+
+def _add_mesh(
+    spec: mujoco.MjSpec, name: str, corners: np.ndarray, faces: np.ndarray
+) -> None:
+    spec.add_mesh(
+        name=name,
+        uservert=corners.ravel(),
+        userface=faces.ravel(),
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+    )

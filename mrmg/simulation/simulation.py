@@ -1,0 +1,361 @@
+"""Driving a plan in MuJoCo: the loop of clock, controllers, drive and physics."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+
+from mrmg.plans import Plan
+from mrmg.scene.driven_parts import require_drivable
+from mrmg.scene.loading.mjcf import no_warning_file
+from mrmg.scene.types import Scene
+from mrmg.simulation.actuation import actuation_of
+from mrmg.simulation.chassis import chassis_maker
+from mrmg.simulation.contacts import ContactWatch
+from mrmg.simulation.controller import Controller, controller_maker
+from mrmg.simulation.disturbance import Disturbance, DisturbanceRanges
+from mrmg.simulation.disturbed_world import disturb_world, move_starts
+from mrmg.simulation.drive import DriveControl
+from mrmg.simulation.fleet import Fleet
+from mrmg.simulation.fleet_clock import FleetClock
+from mrmg.simulation.ground import (
+    TerrainUnderfoot,
+    believed_resistance,
+    true_resistance,
+)
+from mrmg.simulation.incline import Incline
+from mrmg.simulation.log import ExecutionLog, package_versions, require_same_mission
+from mrmg.simulation.recording import Recording
+from mrmg.simulation.reference import FleetReference, speed_states
+from mrmg.simulation.sensing import sensing_of
+from mrmg.simulation.set_points import SetPoints
+from mrmg.simulation.supervision import Event, Observation, Orders, Supervisor
+from mrmg.simulation.world_model import MujocoWorld, build_world
+from mrmg.world.terrain import multiplier_at
+
+STEPS_PER_TICK = 5
+"""Physics steps for which a drive force is held: 20 ms, a fifth of a plan's step."""
+
+TICKS_PER_CORRECTION = 2
+"""Ticks between two calls of the tracking controllers: 25 Hz."""
+
+_LOST_M = 2.0
+_SETTLING_STEPS = 50
+_REST_S = 1.0
+_LONGEST_REST_S = 5.0
+_AT_REST = 0.005
+_STALLED_RATE = 0.1
+_LONGEST_STALL_S = 5.0
+_PROGRESS_TICKS = 50
+_DIVERGED = [
+    int(mujoco.mjtWarning.mjWARN_BADQPOS),
+    int(mujoco.mjtWarning.mjWARN_BADQVEL),
+    int(mujoco.mjtWarning.mjWARN_BADQACC),
+    int(mujoco.mjtWarning.mjWARN_BADCTRL),
+]
+
+Progress = Callable[[float, str], None]
+
+
+def simulate(
+    scene: Scene,
+    plan: Plan,
+    *,
+    controller: str = "mpc",
+    disturbance: Disturbance | None = None,
+    supervisor: Supervisor | None = None,
+    on_progress: Progress | None = None,
+) -> ExecutionLog:
+    """Drive `plan` in the MuJoCo world of `scene` until the fleet is at rest.
+
+    Equal arguments give equal logs, timing apart. The run ends early, with `completed`
+    False, when a robot is more than 2 m from its reference, when the physics diverge,
+    or when the fleet does not get on.
+
+    Args:
+        scene: the scene the plan was made for.
+        plan: what to drive.
+        controller: name of the tracking controller.
+        disturbance: how the robots differ from their models; None if they do not.
+        supervisor: watches every tick and may give the fleet another plan; the log is
+            then of the plan in force at the end, which begins with those before.
+        on_progress: called with the fraction done and a text.
+
+    Raises:
+        UsageError: if the controller is unknown, or a robot is of a kind that cannot
+            be executed.
+        IdentityError: if the plan is of another scene.
+    """
+    maker = controller_maker(controller)
+    require_same_mission(scene, plan)
+    require_drivable(scene.robots)
+    for robot in scene.robots:
+        chassis_maker(robot)
+    controllers = [maker(robot.model) for robot in scene.robots]
+    run = _Run(build_world(scene), plan, controllers, disturbance)
+    started, watched_s = time.perf_counter(), 0.0
+    with no_warning_file():
+        while not run.ended():
+            run.tick()
+            if supervisor is not None:
+                watching = time.perf_counter()
+                orders = supervisor.watch(run.observation())
+                watched_s += time.perf_counter() - watching
+                if orders is not None:
+                    run.obey(orders)
+            if on_progress is not None and run.ticks % _PROGRESS_TICKS == 0:
+                on_progress(run.fraction(), f"driven {run.data.time:.0f} s")
+    events = () if supervisor is None else supervisor.events
+    # What a supervisor thinks about, new plans above all, is no part of driving.
+    return run.log(controller, events, time.perf_counter() - started - watched_s)
+
+
+class _Run:
+    """One simulation in progress."""
+
+    def __init__(
+        self,
+        world: MujocoWorld,
+        plan: Plan,
+        controllers: list[Controller],
+        disturbance: Disturbance | None,
+    ) -> None:
+        self.ticks = 0
+        self._disturbance = disturbance
+        if disturbance is None:
+            robots = [robot.id for robot in world.scene.robots]
+            disturbance = DisturbanceRanges().draw(0, robots)
+        else:
+            disturb_world(world, disturbance)
+        self.data = mujoco.MjData(world.model)
+        move_starts(world, self.data, disturbance)
+        self._world, self._plan = world, plan
+        self._period_s = STEPS_PER_TICK * world.model.opt.timestep
+        self._reference = FleetReference(world.scene, plan)
+        self._is_speed = speed_states(world.scene)
+        self._clock = FleetClock(self._is_speed[:, 4])
+        self._set_points = SetPoints(world.scene, self._reference, controllers)
+        self._drive = DriveControl(world.scene)
+        self._believed = believed_resistance(world.scene)
+        self._true = true_resistance(world, disturbance)
+        self._contacts = ContactWatch(world)
+        self._recording = Recording()
+        self._work_J = np.zeros((len(world.scene.robots), 2))
+        self._call_s: list[float] = []
+        self._got_on_s, self._finished_s = 0.0, np.inf
+        self._fleet = Fleet(world, self.data)
+        self._incline = Incline(world.scene)
+        self._terrain = TerrainUnderfoot(world.scene)
+        self._sensing = sensing_of(world.scene, disturbance, self._period_s)
+        self._actuation = actuation_of(disturbance, self._set_points.following[:, 1])
+        self._coming = self._reference.at_once(0.0)
+        self._settle()
+        self._observe()
+        self._record()
+
+    def tick(self) -> None:
+        """Advance the simulation by one control period."""
+        self._command()
+        now, following = self._set_points.now, self._set_points.following
+        steer, period_s = following[:, 1], self._period_s
+        seen, true = self._sensing.state, self._state
+        level, slope = self._slopes
+        if seen is not true:
+            level, slope = self._incline.under(seen)
+        ground = self._ground(seen, steer)
+        believed = self._believed.force_N(*ground)
+        wanted = self._drive.force_N(
+            self._sensing.axle_speed_m_s,
+            now[:, 0],
+            following[:, 0],
+            level * believed,
+            period_s,
+            slope,
+        )
+        force = self._actuation.force_N(wanted, period_s)
+        steer_from, steer_to = self._actuation.steer(now[:, 1], steer, period_s)
+        if self._disturbance is not None:
+            ground = self._ground(true, steer_to)
+            level, _ = self._slopes
+        # The slope carries a part of the weight that the tyres then need not.
+        resistance = level * self._true.force_N(*ground)
+        self._fleet.set_resistance(resistance, self._true.swing_N)
+        work = self._fleet.drive(force, steer_from, steer_to, STEPS_PER_TICK)
+        self._clock.advance(self._period_s)
+        self.ticks += 1
+        self._work_J = work
+        self._observe()
+        # A state that is no number ends the run; the log keeps what came before it.
+        if self._sound:
+            self._recording.add(force_N=force, work_J=work)
+            self._contacts.look(self.data)
+            self._record()
+
+    def ended(self) -> bool:
+        """Tell whether the fleet is at rest after its plan, or is past helping."""
+        return self._completed() or bool(self._trouble())
+
+    def observation(self) -> Observation:
+        """Return what a supervisor sees."""
+        return Observation(
+            time_s=float(self.data.time),
+            clock_s=self._clock_s(),
+            rate=self._clock.rate,
+            state=self._sensing.state,
+            planned=self._planned,
+            work_J=self._work_J,
+            ended=self._completed(),
+        )
+
+    def obey(self, orders: Orders) -> None:
+        """Go on by another plan."""
+        self._plan = orders.plan
+        self._reference = FleetReference(self._world.scene, orders.plan)
+        self._set_points.follow(self._reference)
+        self._clock.time_s = orders.clock_s
+        self._got_on_s, self._finished_s = float(self.data.time), np.inf
+        self._planned = self._reference.at_once(orders.clock_s)
+
+    def fraction(self) -> float:
+        """Return the share of the plan's time that is done."""
+        duration_s = max(self._reference.duration_s, self._period_s)
+        return float(min(self._clock.time_s / duration_s, 1.0))
+
+    def log(
+        self, controller: str, events: tuple[Event, ...], wall_s: float
+    ) -> ExecutionLog:
+        """Return everything recorded."""
+        scene, recording = self._world.scene, self._recording
+        robots = len(scene.robots)
+        state = recording.by_robot("state", robots)
+        call_ms = 1e3 * np.array(self._call_s or [0.0])
+        return ExecutionLog(
+            scene_digest=scene.digest,
+            plan_digest=self._plan.digest,
+            model_digest=self._world.digest,
+            controller=controller,
+            control_period_s=self._period_s,
+            completed=self._completed(),
+            gave_up="" if self._completed() else self._trouble(),
+            disturbance=self._disturbance,
+            robots=tuple(robot.id for robot in scene.robots),
+            motions=tuple(robot.model.motion_name for robot in scene.robots),
+            versions=package_versions(),
+            time_s=recording.in_time("time_s"),
+            clock_s=recording.in_time("clock_s"),
+            state=state,
+            reference=recording.by_robot("reference", robots),
+            command=recording.by_robot("command", robots),
+            multiplier=np.stack([multiplier_at(scene, way) for way in state[..., :2]]),
+            force_N=recording.by_robot("force_N", robots),
+            work_J=recording.by_robot("work_J", robots),
+            qpos=recording.in_time("qpos"),
+            contacts=tuple(self._contacts.contacts),
+            events=events,
+            timing={
+                "wall_s": wall_s,
+                "realtime_factor": self.data.time / wall_s,
+                "controller_ms": {
+                    "median": float(np.median(call_ms)),
+                    "p99": float(np.percentile(call_ms, 99)),
+                },
+            },
+        )
+
+    def _settle(self) -> None:
+        """Let the tyres take the weight, then start the time."""
+        still = np.zeros(len(self._world.scene.robots))
+        _, slope = self._incline.under(self._fleet.state())
+        parked = self._drive.force_N(still, still, still, still, self._period_s, slope)
+        force = self._true.force_N(still + 1.0, still)
+        self._fleet.set_resistance(force, self._true.swing_N)
+        self._fleet.drive(parked, still, still, _SETTLING_STEPS)
+        self.data.time = 0.0
+
+    def _command(self) -> None:
+        """Set the clock's pace and the ramps of the coming tick."""
+        if self._finished_s < np.inf:
+            self._set_points.brake(self._period_s)
+            return
+        clock = self._clock
+        clock.pace(self._sensing.state, self._planned, self._period_s)
+        if self.ticks % TICKS_PER_CORRECTION == 0:
+            # Of this thread: what other processes do on its processor does not count.
+            started = time.thread_time()
+            calls = self._set_points.correct(
+                self._sensing.state, clock.time_s, clock.rate
+            )
+            if calls:
+                self._call_s.append((time.thread_time() - started) / calls)
+        self._coming = self._reference.at_once(
+            clock.time_s + clock.rate * self._period_s
+        )
+        self._set_points.advance(
+            self._sensing.axle_speed_m_s,
+            self._planned,
+            self._coming,
+            clock.rate,
+            self._period_s,
+        )
+
+    def _ground(
+        self, state: np.ndarray, steer: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return terrain and steering in the middle of the coming tick, each (R,).
+
+        Args:
+            state: true or seen, shape (R, 5).
+            steer: at the end of the tick, shape (R,).
+        """
+        x, y, heading, speed, steer_now = state.T
+        way_m = 0.5 * self._period_s * speed
+        x_m, y_m = x + way_m * np.cos(heading), y + way_m * np.sin(heading)
+        return self._terrain.under(x_m, y_m), 0.5 * (steer_now + steer)
+
+    def _observe(self) -> None:
+        self._state = self._fleet.state()
+        self._slopes = self._incline.under(self._state)
+        over_map = self._slopes[0] * self._fleet.axle_speed_m_s()
+        self._sensing.look(self._state, over_map, self._set_points.following[:, 0])
+        self._planned = self._coming
+        self._sound = bool(np.isfinite(self._state.sum() + self._planned.sum()))
+        finished = self._clock.time_s >= self._reference.duration_s - 1e-9
+        if finished:
+            self._finished_s = min(self._finished_s, self.data.time)
+        if finished or self._clock.rate > _STALLED_RATE:
+            self._got_on_s = self.data.time
+
+    def _record(self) -> None:
+        self._recording.add(
+            time_s=self.data.time,
+            clock_s=self._clock_s(),
+            state=self._state,
+            reference=self._planned,
+            command=self._set_points.following,
+            qpos=self.data.qpos,
+        )
+
+    def _clock_s(self) -> float:
+        return min(self._clock.time_s, self._reference.duration_s)
+
+    def _completed(self) -> bool:
+        if self.data.time - self._finished_s < _REST_S:
+            return False
+        return bool(np.abs(self._state[self._is_speed]).max() < _AT_REST)
+
+    def _trouble(self) -> str:
+        """Return why the fleet is past helping, in the log's words; "" if it is not."""
+        if not self._sound or self.data.warning.number[_DIVERGED].any():
+            return "diverged"
+        pairs = zip(self._state.tolist(), self._planned.tolist(), strict=True)
+        if any(math.dist(now[:2], meant[:2]) > _LOST_M for now, meant in pairs):
+            return "lost"
+        if self.data.time - self._got_on_s > _LONGEST_STALL_S:
+            return "stalled"
+        if self.data.time - self._finished_s > _LONGEST_REST_S:
+            return "restless"
+        return ""

@@ -1,0 +1,188 @@
+"""From a scene to a compiled MuJoCo model: scenery plus one attached car per robot."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from mrmg.errors import Fault, FileError
+from mrmg.scene.driven_parts import CHASSIS, HULL, require_drivable
+from mrmg.scene.loading.mjcf import no_warning_file
+from mrmg.scene.types import Robot, Scene
+from mrmg.simulation import palette, scenery
+from mrmg.simulation.incline import standing_pose
+
+PHYSICS_STEP_S = 0.004
+"""Short enough for the stiff tyres; contact softness scales with it."""
+
+_SPARSE_FROM_ROBOTS = 4
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MujocoWorld:
+    """A scene compiled for simulation and drawing.
+
+    Attributes:
+        scene: what it was built from.
+        spec: the editable description.
+        model: the compiled model.
+        digest: fingerprint of the compiled model.
+        hull_owner: index of the robot whose hull a geom is, else -1, shape (ngeom,).
+        geom_label: what a contact calls each geom: the id of a robot or obstacle,
+            "bounds" or "floor".
+        target_geom: geom of each goal and station, by its id, for recolouring.
+        chassis: body of each robot, in the scene's order, shape (R,).
+    """
+
+    scene: Scene
+    spec: mujoco.MjSpec
+    model: mujoco.MjModel
+    digest: str
+    hull_owner: np.ndarray
+    geom_label: tuple[str, ...]
+    target_geom: dict[str, int]
+    chassis: np.ndarray
+
+
+def build_world(scene: Scene) -> MujocoWorld:
+    """Build and compile the MuJoCo world of a scene.
+
+    Raises:
+        FileError: if a robot's MJCF cannot be used, or MuJoCo cannot hold the scene.
+        UsageError: if a robot can only be planned for.
+    """
+    try:
+        with no_warning_file():
+            return _built(scene)
+    except ValueError as error:
+        reason = " ".join(str(error).split())
+        fault = Fault("", f"MuJoCo cannot build its world: {reason}")
+        raise FileError(scene.name, [fault]) from error
+
+
+def _built(scene: Scene) -> MujocoWorld:
+    spec = mujoco.MjSpec()
+    spec.modelname = "mrmg"
+    _set_options(spec, len(scene.robots))
+    _set_appearance(spec, scene)
+    scenery.add_floor(spec, scene)
+    scenery.add_bounds(spec, scene)
+    scenery.add_targets(spec, scene)
+    for index, robot in enumerate(scene.robots):
+        _attach(spec, scene, robot, palette.robot_colour(index))
+    for obstacle in scene.obstacles:
+        body = scenery.add_obstacle(spec, scene, obstacle)
+        for robot in scene.robots:
+            if not obstacle.stops(robot.id):
+                spec.add_exclude(bodyname1=body.name, bodyname2=f"{robot.id}/{CHASSIS}")
+    model = spec.compile()
+    return MujocoWorld(
+        scene=scene,
+        spec=spec,
+        model=model,
+        digest=_digest(model),
+        hull_owner=_hull_owner(scene, model),
+        geom_label=tuple(_label(model, geom) for geom in range(model.ngeom)),
+        target_geom={
+            target.id: model.geom(f"{kind}:{target.id}").id
+            for kind, targets in (("goal", scene.goals), ("station", scene.stations))
+            for target in targets
+        },
+        chassis=np.array(
+            [model.body(f"{robot.id}/{CHASSIS}").id for robot in scene.robots]
+        ),
+    )
+
+
+def _set_options(spec: mujoco.MjSpec, robots: int) -> None:
+    option = spec.option
+    option.timestep = PHYSICS_STEP_S
+    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    option.impratio = 10.0
+    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    # A diverged state must be seen by the caller, not silently set back; finding
+    # islands costs more than it saves for cars that touch nothing but the floor.
+    option.disableflags = (
+        mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_ISLAND
+    )
+    if robots >= _SPARSE_FROM_ROBOTS:
+        option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
+
+
+def _set_appearance(spec: mujoco.MjSpec, scene: Scene) -> None:
+    x_min, y_min, x_max, y_max = scene.bounds
+    center = [(x_min + x_max) / 2, (y_min + y_max) / 2, 0.0]
+    extent = max(x_max - x_min, y_max - y_min)
+    spec.stat.center = center
+    spec.stat.extent = extent
+    visual = spec.visual
+    visual.quality.numslices, visual.quality.numstacks = 12, 6
+    visual.quality.numquads = 1
+    visual.global_.offwidth, visual.global_.offheight = 1920, 1080
+    visual.map.znear = 0.2 / extent
+    visual.headlight.ambient = [0.35, 0.35, 0.35]
+    visual.headlight.diffuse = [0.30, 0.30, 0.30]
+    visual.headlight.specular = [0.0, 0.0, 0.0]
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.80, 0.87, 0.94],
+        rgb2=[0.97, 0.98, 0.99],
+        width=64,
+        height=384,
+    )
+    spec.worldbody.add_light(
+        name="sun",
+        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
+        pos=[center[0], center[1], extent],
+        dir=[0.35, 0.25, -1.0],
+        diffuse=[0.45, 0.45, 0.45],
+        specular=[0.1, 0.1, 0.1],
+    )
+
+
+def _attach(
+    spec: mujoco.MjSpec, scene: Scene, robot: Robot, colour: palette.Rgb
+) -> None:
+    """Attach the robot's MJCF at its start pose, its names prefixed with `<id>/`."""
+    require_drivable([robot])
+    path = robot.model.mjcf
+    robot.model.require_unchanged_files()
+    try:
+        car = mujoco.MjSpec.from_file(str(path))
+    except (ValueError, OSError) as error:
+        fault = Fault("", f"no usable MJCF for model '{robot.model.name}' ({error})")
+        raise FileError(str(path), [fault]) from error
+    position, orientation = standing_pose(scene, *robot.pose)
+    frame = spec.worldbody.add_frame(pos=position, quat=orientation)
+    spec.attach(car, prefix=f"{robot.id}/", frame=frame)
+    paint = spec.material(f"{robot.id}/paint")
+    if paint is not None:
+        paint.rgba = [*colour, 1.0]
+
+
+def _digest(model: mujoco.MjModel) -> str:
+    buffer = np.empty(mujoco.mj_sizeModel(model), dtype=np.uint8)
+    mujoco.mj_saveModel(model, None, buffer)
+    return hashlib.sha256(buffer.tobytes()).hexdigest()[:16]
+
+
+def _hull_owner(scene: Scene, model: mujoco.MjModel) -> np.ndarray:
+    owner = np.full(model.ngeom, -1)
+    for index, robot in enumerate(scene.robots):
+        owner[model.geom(f"{robot.id}/{HULL}").id] = index
+    return owner
+
+
+def _label(model: mujoco.MjModel, geom: int) -> str:
+    body = model.body(model.body_rootid[model.geom_bodyid[geom]]).name
+    if body == "world":
+        return scenery.FLOOR
+    if body == scenery.BOUNDS:
+        return scenery.BOUNDS
+    return str(body.removeprefix("obstacle:").removesuffix(f"/{CHASSIS}"))

@@ -1,0 +1,1 @@
+"""Studies over many simulated drives: calibration of models, robustness of plans."""

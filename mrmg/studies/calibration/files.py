@@ -1,0 +1,57 @@
+"""What a calibration leaves: a calibrated copy of the model, and the figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from mrmg import storage
+from mrmg.errors import UsageError
+from mrmg.scene.loading.editing import with_values
+from mrmg.studies.calibration.calibrate import Calibration
+
+MODEL_FILE = "robot.yaml"
+RESULT_FILE = "calibration.json"
+
+
+def write_calibration(
+    calibration: Calibration, model_folder: Path, folder: Path, *, in_place: bool
+) -> None:
+    """Write the calibrated model and the result of the fit.
+
+    Args:
+        calibration: what was found.
+        model_folder: the model as it was; changed only if `in_place`.
+        folder: receives a copy of the model folder with the calibrated `robot.yaml`,
+            and `calibration.json`.
+        in_place: write the calibrated `robot.yaml` into `model_folder`, too.
+
+    Raises:
+        UsageError: if both folders are the same.
+        SceneError: if `robot.yaml` cannot be changed.
+    """
+    require_other_folder(model_folder, folder)
+    source = model_folder / MODEL_FILE
+    text = with_values(
+        source.read_text(encoding="utf-8"), calibration.changes(), source=str(source)
+    )
+    for path in sorted(model_folder.rglob("*")):
+        if path.is_file() and path != source:
+            copy = folder / path.relative_to(model_folder)
+            storage.write_bytes(copy, path.read_bytes())
+    storage.write_text(folder / MODEL_FILE, text)
+    storage.write_json(folder / RESULT_FILE, calibration.to_json())
+    if in_place:
+        storage.write_text(source, text)
+
+
+def require_other_folder(model_folder: Path, folder: Path) -> None:
+    """Refuse to write the calibrated copy over the model.
+
+    Raises:
+        UsageError: if both folders are the same.
+    """
+    if folder.resolve() == model_folder.resolve():
+        raise UsageError(
+            f"{folder} is the model itself; name another folder, and use --in-place "
+            "to change the model"
+        )

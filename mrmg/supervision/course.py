@@ -1,0 +1,224 @@
+"""The course of a mission: the plans it went by, one after another, as one plan.
+
+A course begins as the mission's plan. When the fleet is stopped, what was planned after
+the next step is replaced by braking and standing; a new plan is then joined to that.
+The clock of the simulation runs through all of it, so that log, audit and pictures need
+to know of a single plan only: the one that was in force at each time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence, Set
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mrmg.energy.ledger import EnergyLedger, LedgerEntry
+from mrmg.energy.metering import find_visits, leg_entries, step_energy_parts
+from mrmg.energy.model import PARTS
+from mrmg.energy.visits import battery_contents, recharging
+from mrmg.plans import Plan, Visit
+from mrmg.scene.types import Scene
+from mrmg.supervision.stopping import Departing
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Course:
+    """Plans in force, joined.
+
+    Attributes:
+        scene: the mission as it began.
+        plan: the joined plan, of all robots of the scene.
+        parts_J: planned energy of each step by robot, shape (n, len(PARTS)) each; under
+            the energy model that was believed when the step was planned.
+        rolling_factor: the believed rolling resistance over that of the scene's models,
+            by robot and step, shape (n,) each.
+        charge_J: (step, battery contents by robot) from which the batteries were
+            reckoned on, in order.
+    """
+
+    scene: Scene
+    plan: Plan
+    parts_J: Mapping[str, np.ndarray]
+    rolling_factor: Mapping[str, np.ndarray]
+    charge_J: tuple[tuple[int, Mapping[str, float]], ...]
+
+    @staticmethod
+    def of(scene: Scene, plan: Plan) -> Course:
+        """Return the course that is a single plan."""
+        return Course(
+            scene=scene,
+            plan=plan,
+            parts_J={
+                item.robot: step_energy_parts(scene, item) for item in plan.trajectories
+            },
+            rolling_factor={
+                item.robot: np.ones(len(item.control)) for item in plan.trajectories
+            },
+            charge_J=(
+                (0, {robot.id: robot.battery.start_J for robot in scene.robots}),
+            ),
+        )
+
+    @property
+    def steps(self) -> int:
+        """Number of steps."""
+        return len(self.plan.trajectories[0].control)
+
+    def stopped(
+        self,
+        step: int,
+        states: Mapping[str, np.ndarray],
+        broken: Set[str],
+        pause_s: float,
+    ) -> Course:
+        """Return the course that is left at a step to come to rest.
+
+        Args:
+            step: after which the fleet brakes.
+            states: of all robots at that step, shape (5,) each.
+            broken: ids of robots that can but brake in full.
+            pause_s: how long the fleet stands at least.
+        """
+        departing = Departing(
+            scene=self.scene,
+            trajectories=self.plan.trajectories,
+            step=step,
+            states=states,
+            broken=broken,
+        )
+        ways = departing.ways_to_rest()
+        longest = max(len(control) for _, control in ways.values())
+        length = longest + round(pause_s / self.plan.dt_s)
+        ways = {name: _held(*way, length) for name, way in ways.items()}
+        return self._continued(step, ways, self.scene).with_tours(self.plan.tours)
+
+    def resumed(
+        self,
+        rest: Scene,
+        plan: Plan,
+        charge_J: Mapping[str, float],
+        tours: Mapping[str, Sequence[str]],
+    ) -> Course:
+        """Return the course that goes on by a new plan from its end.
+
+        Args:
+            rest: the remaining scene the plan was made for; robots that it does not
+                have stay where they are.
+            plan: from where the fleet stands.
+            charge_J: battery contents the plan starts from, by robot.
+            tours: of the whole course.
+        """
+        planned = {item.robot: item for item in plan.trajectories}
+        length = max(len(item.control) for item in plan.trajectories)
+        ways = {}
+        for item in self.plan.trajectories:
+            if item.robot in planned:
+                new = planned[item.robot]
+                ways[item.robot] = (new.state, new.control)
+            else:
+                ways[item.robot] = _held(item.state[-1:], np.zeros((0, 2)), length)
+        joined = self._continued(self.steps, ways, rest)
+        anew = (*self.charge_J, (self.steps, dict(charge_J)))
+        return replace(joined, charge_J=anew).with_tours(tours)
+
+    def with_tours(self, tours: Mapping[str, Sequence[str]]) -> Course:
+        """Return the course with the given tours, and all that follows from them."""
+        visits: list[Visit] = []
+        entries: list[LedgerEntry] = []
+        content_J = {}
+        for item in self.plan.trajectories:
+            own = find_visits(self.scene, item, tours[item.robot])
+            before_J, content_J[item.robot] = self._content_J(item.robot, own)
+            arrival_J = [float(before_J[visit.step]) for visit in own]
+            visits += [
+                replace(visit, energy_J=energy_J)
+                for visit, energy_J in zip(own, arrival_J, strict=True)
+            ]
+            entries += leg_entries(item.robot, self.parts_J[item.robot], PARTS, own)
+        visits.sort(key=lambda visit: (visit.step, visit.robot))
+        plan = replace(
+            self.plan,
+            tours={name: tuple(tour) for name, tour in tours.items()},
+            visits=tuple(visits),
+            ledger=EnergyLedger(tuple(entries)),
+            content_J=content_J,
+            rolling_factor=self.rolling_factor,
+        )
+        return replace(self, plan=plan)
+
+    def _content_J(
+        self, robot: str, visits: Sequence[Visit]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the planned battery content at each state, before and after recharges.
+
+        Args:
+            robot: id of the robot.
+            visits: of this robot.
+        """
+        battery = self.scene.robot(robot).battery
+        motion = self.plan.trajectory(robot)
+        points = motion.state[:, :2]
+        given = recharging(self.scene, robot, motion.time_s, points, visits)
+        anew = {step: charge_J[robot] for step, charge_J in self.charge_J}
+        draw_J = self.parts_J[robot].sum(axis=1)
+        return battery_contents(battery, draw_J, given, anew)
+
+    def _continued(
+        self,
+        step: int,
+        ways: Mapping[str, tuple[np.ndarray, np.ndarray]],
+        believed: Scene,
+    ) -> Course:
+        """Return the course up to `step`, then the given states and controls.
+
+        Args:
+            step: whose state is replaced by the first of the new ones.
+            ways: states, shape (n + 1, 5), and controls, shape (n, 2), by robot.
+            believed: whose energy models the new steps are reckoned with.
+        """
+        known = {robot.id for robot in believed.robots}
+        trajectories, parts_J, factors = [], {}, {}
+        for item in self.plan.trajectories:
+            state, control = ways[item.robot]
+            new = replace(item, state=state.copy(), control=control.copy())
+            scene = believed if item.robot in known else self.scene
+            parts_J[item.robot] = np.concatenate(
+                [self.parts_J[item.robot][:step], step_energy_parts(scene, new)]
+            )
+            factor = np.full(
+                len(control), _rolling_factor(self.scene, scene, item.robot)
+            )
+            factors[item.robot] = np.concatenate(
+                [self.rolling_factor[item.robot][:step], factor]
+            )
+            trajectories.append(
+                replace(
+                    item,
+                    state=np.concatenate([item.state[:step], state]),
+                    control=np.concatenate([item.control[:step], control]),
+                )
+            )
+        plan = replace(self.plan, trajectories=tuple(trajectories))
+        return replace(self, plan=plan, parts_J=parts_J, rolling_factor=factors)
+
+
+def _rolling_factor(scene: Scene, believed: Scene, robot: str) -> float:
+    """Return a robot's rolling resistance as it is believed over that of its model."""
+    modelled, known = (
+        of.robot(robot).model.energy_model.rolling_force_N for of in (scene, believed)
+    )
+    return known / modelled
+
+
+def _held(
+    state: np.ndarray, control: np.ndarray, length: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return a motion lengthened to `length` steps by standing at its end."""
+    rest = state[-1].copy()
+    rest[3:] = 0.0
+    missing = length - len(control)
+    return (
+        np.concatenate([state, np.repeat(rest[None], missing, axis=0)]),
+        np.concatenate([control, np.zeros((missing, 2))]),
+    )

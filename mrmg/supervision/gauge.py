@@ -1,0 +1,106 @@
+"""Following a robot's battery on the way, by the rule that all visits are judged by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mrmg.energy.visits import Stay, battery_contents, first_stay, recharging
+from mrmg.plans import Visit
+from mrmg.scene.types import Robot, Scene, Station
+
+
+class BatteryGauge:
+    """The battery content of one robot, from its draws and the visits of its tour.
+
+    Attributes:
+        charge_J: battery content now.
+    """
+
+    def __init__(self, scene: Scene, robot: Robot) -> None:
+        """Start with the robot's start energy."""
+        self.charge_J = robot.battery.start_J
+        self._scene, self._robot = scene, robot
+        self._targets = {target.id: target for target in scene.targets()}
+        self._tour: list[str] = []
+        self._begun_J = self.charge_J
+        self._time_s = np.zeros(0)
+        self._points, self._draw_J = np.zeros((0, 2)), np.zeros(0)
+
+    def follow(self, tour: Sequence[str]) -> None:
+        """Expect the visits of a tour from now on."""
+        self._tour = list(tour)
+        self._begun_J = self.charge_J
+        self._time_s = np.zeros(0)
+        self._points, self._draw_J = np.zeros((0, 2)), np.zeros(0)
+
+    def add(self, time_s: np.ndarray, points: np.ndarray, draw_J: np.ndarray) -> None:
+        """Take in some ticks.
+
+        Args:
+            time_s: of the state before the first tick and after each, shape (n + 1,).
+            points: of the reference point at these times [m], shape (n + 1, 2).
+            draw_J: energy drawn over each tick, shape (n,).
+        """
+        if not len(self._time_s):
+            self._time_s, self._points = time_s[:1], points[:1]
+        self._time_s = np.concatenate([self._time_s, time_s[1:]])
+        self._points = np.concatenate([self._points, points[1:]])
+        self._draw_J = np.concatenate([self._draw_J, draw_J])
+        stays = self._stays()
+        visits = [
+            self._visit(name, stay.first)
+            for name, stay in zip(self._tour, stays, strict=False)
+        ]
+        given = recharging(
+            self._scene, self._robot.id, self._time_s, self._points, visits
+        )
+        before_J, after_J = battery_contents(
+            self._robot.battery, self._draw_J, given, {0: self._begun_J}
+        )
+        self.charge_J = float(after_J[-1])
+        if visits and visits[-1].kind == "station" and not given.full_at:
+            # It goes on giving: what comes next depends on when this began.
+            self._tour = self._tour[len(stays) - 1 :]
+            self._keep(visits[-1].step, before_J)
+        else:
+            self._tour = self._tour[len(stays) :]
+            over = stays[-1].over if stays else 0
+            self._keep(max(over, self._since_when_at_target()), after_J)
+
+    def _keep(self, first: int, content_J: np.ndarray) -> None:
+        """Forget what was before a state."""
+        self._begun_J = float(content_J[first])
+        self._time_s, self._points = self._time_s[first:], self._points[first:]
+        self._draw_J = self._draw_J[first:]
+
+    def _stays(self) -> list[Stay]:
+        """Return the visits of the tour that are complete, in order."""
+        stays: list[Stay] = []
+        for name in self._tour:
+            start = stays[-1].over if stays else 0
+            stay = first_stay(self._targets[name], self._time_s, self._points, start)
+            if stay is None:
+                break
+            stays.append(stay)
+        return stays
+
+    def _visit(self, name: str, step: int) -> Visit:
+        is_station = isinstance(self._targets[name], Station)
+        return Visit(
+            robot=self._robot.id,
+            target=name,
+            kind="station" if is_station else "goal",
+            step=step,
+            time_s=float(self._time_s[step]),
+            energy_J=0.0,
+        )
+
+    def _since_when_at_target(self) -> int:
+        """Return the state since which the robot is at its next target, else now."""
+        last = len(self._time_s) - 1
+        if not self._tour:
+            return last
+        outside = self._targets[self._tour[0]].region.depth(self._points) < 0.0
+        return min(last, int(np.flatnonzero(np.append(True, outside))[-1]))

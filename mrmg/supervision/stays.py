@@ -1,0 +1,66 @@
+"""Stays at goals that a stop of the fleet falls into: what was stayed already counts.
+
+A stay must not be broken, so that only the robot that is there can bring it to its end,
+and only if it does not leave before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrmg.energy.visits import runs
+from mrmg.plans import Visit
+from mrmg.scene.types import Goal
+
+VISITED_DEPTH_M = 0.05
+"""How deep in a goal a robot must have been seen, as places are seen with noise."""
+
+
+@dataclass(frozen=True, slots=True)
+class StayUnderWay:
+    """A stay at a goal that is not long enough yet.
+
+    Attributes:
+        robot: id of the robot that is there.
+        stayed_s: how long it has been.
+    """
+
+    robot: str
+    stayed_s: float
+
+
+def stays_under_way(
+    goals: Iterable[Goal], time_s: np.ndarray, ways: Mapping[str, np.ndarray]
+) -> dict[str, StayUnderWay]:
+    """Return the longest stay under way at each goal, by its id.
+
+    Args:
+        goals: that still miss their visit.
+        time_s: of what was seen, shape (n,).
+        ways: positions of robots in service at these times [m], shape (n, 2) each.
+    """
+    found: dict[str, StayUnderWay] = {}
+    for goal in goals:
+        for robot, way in ways.items():
+            stays = runs(goal.region.depth(way) >= VISITED_DEPTH_M)
+            if not stays or stays[-1][1] < len(way):
+                continue
+            stayed_s = float(time_s[-1] - time_s[stays[-1][0]])
+            known_s = found[goal.id].stayed_s if goal.id in found else 0.0
+            if stayed_s > known_s:
+                found[goal.id] = StayUnderWay(robot, stayed_s)
+    return found
+
+
+def keeps_stays(visits: Iterable[Visit], stays: Mapping[str, StayUnderWay]) -> bool:
+    """Tell whether all stays end where, and by whom, they were begun.
+
+    Args:
+        visits: of a plan that begins with the stays under way.
+        stays: by goal.
+    """
+    begun = {(item.robot, item.target) for item in visits if item.step == 0}
+    return all((stay.robot, goal) in begun for goal, stay in stays.items())

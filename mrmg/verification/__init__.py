@@ -1,0 +1,1 @@
+"""Verification of plans from the scene alone: rules, clearances and the verdict."""

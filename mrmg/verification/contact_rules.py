@@ -1,0 +1,193 @@
+"""Rules of space: no footprint meets an obstacle, the bounds or another footprint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+
+import numpy as np
+import shapely
+
+from mrmg.plans import Trajectory
+from mrmg.scene.types import Obstacle, Robot, Scene
+from mrmg.verification.clearance import (
+    BoundsGap,
+    GapMinimum,
+    ObstacleGap,
+    PairGap,
+    bounded_minimum,
+)
+from mrmg.verification.motion_rules import worst_of_runs
+from mrmg.verification.swept_footprint import SweptFootprint
+from mrmg.verification.verdict import Violation, ViolationKind
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Contacts:
+    """What one check of space found.
+
+    Attributes:
+        clearance_m: certified smallest distance, 0 on contact; inf if there is nothing
+            to keep clear of.
+        violations: contacts, consecutive ones merged.
+    """
+
+    clearance_m: float = np.inf
+    violations: list[Violation] = field(default_factory=list)
+
+
+def check_obstacles(
+    scene: Scene, robot: Robot, trajectory: Trajectory
+) -> list[Contacts]:
+    """Return the robot's contacts with obstacles, then with the bounds."""
+    footprint = SweptFootprint.of(robot.model, trajectory)
+    steps = np.arange(len(trajectory.control))
+    outside = bounded_minimum(
+        BoundsGap(footprint, scene.bounds), steps, trajectory.dt_s
+    )
+    contacts = [_bounds_contacts(robot.id, footprint, outside, scene.bounds)]
+    obstacles = [item for item in scene.barriers if item.stops(robot.id)]
+    if obstacles:
+        touched = bounded_minimum(
+            ObstacleGap(footprint, obstacles), steps, trajectory.dt_s
+        )
+        contacts.append(_obstacle_contacts(robot.id, footprint, touched, obstacles))
+    return contacts
+
+
+def check_robots(scene: Scene, trajectories: Sequence[Trajectory]) -> list[Contacts]:
+    """Return the contacts of every pair of robots.
+
+    Args:
+        scene: gives the footprints.
+        trajectories: of equal length, one per robot.
+    """
+    footprints = [
+        (item.robot, SweptFootprint.of(scene.robot(item.robot).model, item))
+        for item in trajectories
+    ]
+    contacts = []
+    for (robot, one), (other, another) in combinations(footprints, 2):
+        gap = PairGap(one, another)
+        touched = bounded_minimum(gap, gap.close_steps(), one.dt_s)
+        contacts.append(_pair_contacts((robot, other), (one, another), touched))
+    return contacts
+
+
+def _obstacle_contacts(
+    robot: str,
+    footprint: SweptFootprint,
+    touched: GapMinimum,
+    obstacles: Sequence[Obstacle],
+) -> Contacts:
+    shapes = _footprints_on_contact(footprint, touched)
+    tree = shapely.STRtree([obstacle.shape for obstacle in obstacles])
+    # Contacts that lie below the resolution do not intersect; their nearest counts.
+    nearest = tree.query_nearest(shapes, all_matches=False)
+    crossing = tree.query(shapes, predicate="intersects")
+    pairs = np.unique(np.concatenate([nearest, crossing], axis=1), axis=1)
+    violations = []
+    for index in np.unique(pairs[1]):
+        obstacle = obstacles[index]
+        contacts = pairs[0, pairs[1] == index]
+        overlap_m2 = shapely.area(
+            shapely.intersection(shapes[contacts], obstacle.shape)
+        )
+        violations += _violations(
+            robot,
+            footprint,
+            touched,
+            contacts,
+            ViolationKind.OBSTACLE,
+            obstacle.id,
+            overlap_m2,
+        )
+    return Contacts(clearance_m=max(touched.lower_bound_m, 0.0), violations=violations)
+
+
+def _bounds_contacts(
+    robot: str,
+    footprint: SweptFootprint,
+    touched: GapMinimum,
+    bounds: tuple[float, float, float, float],
+) -> Contacts:
+    gap = BoundsGap(footprint, bounds)
+    protruding_m = -gap.at(touched.contact_step, touched.contact_time_s)
+    violations = _violations(
+        robot,
+        footprint,
+        touched,
+        np.arange(len(touched.contact_step)),
+        ViolationKind.BOUNDS,
+        "bounds",
+        np.maximum(protruding_m, 0.0),
+    )
+    return Contacts(clearance_m=max(touched.lower_bound_m, 0.0), violations=violations)
+
+
+def _pair_contacts(
+    robots: tuple[str, str],
+    footprints: tuple[SweptFootprint, SweptFootprint],
+    touched: GapMinimum,
+) -> Contacts:
+    one, other = (_footprints_on_contact(item, touched) for item in footprints)
+    overlap_m2 = shapely.area(shapely.intersection(one, other))
+    violations = _violations(
+        robots[0],
+        footprints[0],
+        touched,
+        np.arange(len(touched.contact_step)),
+        ViolationKind.ROBOT,
+        robots[1],
+        overlap_m2,
+    )
+    return Contacts(clearance_m=max(touched.lower_bound_m, 0.0), violations=violations)
+
+
+def _message(robot: str, kind: ViolationKind, other: str, amount: float) -> str:
+    if kind is ViolationKind.BOUNDS:
+        return f"{robot}: reaches {amount:.3g} m beyond the bounds"
+    overlap = f", overlapping by {amount:.3g} m^2" if amount > 0.0 else ""
+    return f"{robot}: touches {kind.value} {other}{overlap}"
+
+
+def _footprints_on_contact(
+    footprint: SweptFootprint, touched: GapMinimum
+) -> np.ndarray:
+    corners = footprint.corners_at(touched.contact_step, touched.contact_time_s)
+    shapes: np.ndarray = shapely.polygons(corners)
+    return shapes
+
+
+def _violations(
+    robot: str,
+    footprint: SweptFootprint,
+    touched: GapMinimum,
+    contacts: np.ndarray,
+    kind: ViolationKind,
+    other: str,
+    amount: np.ndarray,
+) -> list[Violation]:
+    """Return the worst contact of each run of consecutive steps."""
+    step = touched.contact_step[contacts]
+    by_step = np.full(len(footprint.state), -np.inf)
+    np.maximum.at(by_step, step, amount)
+    violations = []
+    for worst_step in worst_of_runs(by_step, by_step > -np.inf):
+        worst = int(np.flatnonzero((step == worst_step) & (amount == by_step[step]))[0])
+        within_s = touched.contact_time_s[contacts[worst] : contacts[worst] + 1]
+        state = footprint.states_at(step[worst : worst + 1], within_s)[0]
+        violations.append(
+            Violation(
+                kind=kind,
+                robot=robot,
+                other=other,
+                time_s=float(worst_step * footprint.dt_s + within_s[0]),
+                x_m=float(state[0]),
+                y_m=float(state[1]),
+                amount=float(amount[worst]),
+                message=_message(robot, kind, other, float(amount[worst])),
+            )
+        )
+    return violations

@@ -1,0 +1,296 @@
+"""Rules of the mission: goals, tours, visits, recharges, energy, time and ledger."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+
+from mrmg.compared import compared
+from mrmg.energy.ledger import EnergyLedger
+from mrmg.energy.metering import battery_profile, find_visits, plan_ledger
+from mrmg.energy.visits import ROUNDING_S, crowded_stations, longest_stay_s
+from mrmg.plans import Plan, Trajectory, Visit
+from mrmg.scene.objective import overtime_s
+from mrmg.scene.types import Goal, Scene
+from mrmg.verification.motion_rules import violation_at, worst_of_runs
+from mrmg.verification.verdict import Violation, ViolationKind
+
+ENERGY_TOLERANCE_J = 1e-6
+"""Rounding that is forgiven in energies: a billionth of a metre's drive."""
+
+
+def check_mission(scene: Scene, plan: Plan) -> list[Violation]:
+    """Return every broken rule of the mission as a whole."""
+    violations = [
+        *_check_goals(scene, plan),
+        *_check_recharges(scene, plan),
+        *_check_stations(scene, plan),
+        *_check_time(scene, plan),
+    ]
+    known = {target.id for target in scene.targets()}
+    visits: list[Visit] = []
+    for trajectory in plan.trajectories:
+        tour = [name for name in plan.tours[trajectory.robot] if name in known]
+        own = find_visits(scene, trajectory, tour)
+        violations += _check_tour(scene, plan, trajectory, own)
+        violations += _check_visits(plan, trajectory, own)
+        violations += _check_energy(scene, trajectory, own)
+        visits += own
+    return violations + _check_ledger(scene, plan, visits)
+
+
+def _check_goals(scene: Scene, plan: Plan) -> list[Violation]:
+    violations = []
+    for goal in scene.goals:
+        depths = [
+            (goal.region.depth(item.state[:, :2]), item) for item in plan.trajectories
+        ]
+        depth, trajectory = max(depths, key=lambda pair: float(pair[0].max()))
+        step = int(depth.argmax())
+        missed_m = -float(depth[step])
+        if missed_m > 0.0:
+            violations.append(
+                violation_at(
+                    trajectory,
+                    step,
+                    ViolationKind.GOAL_MISSED,
+                    f"goal {goal.id} is visited by no robot; this one comes nearest, "
+                    f"{missed_m:.3g} m off",
+                    amount=missed_m,
+                    other=goal.id,
+                )
+            )
+        elif goal.dwell_s > 0.0:
+            violations += _check_dwell(plan, goal)
+    return violations
+
+
+def _check_dwell(plan: Plan, goal: Goal) -> list[Violation]:
+    """Check that some robot stays at a goal for its dwell time."""
+    stays_s = [
+        (longest_stay_s(goal, item.time_s, item.state[:, :2]), item)
+        for item in plan.trajectories
+    ]
+    stay_s, trajectory = max(stays_s, key=lambda pair: pair[0])
+    if stay_s >= goal.dwell_s - ROUNDING_S:
+        return []
+    step = int(goal.region.depth(trajectory.state[:, :2]).argmax())
+    stay, dwell = compared(stay_s, goal.dwell_s, 1)
+    message = (
+        f"stays at goal {goal.id} for {stay} s without a break, longer than others; it "
+        f"takes {dwell} s"
+    )
+    amount = goal.dwell_s - stay_s
+    kind = ViolationKind.DWELL
+    return [violation_at(trajectory, step, kind, message, amount=amount, other=goal.id)]
+
+
+def _check_tour(
+    scene: Scene, plan: Plan, trajectory: Trajectory, visits: Sequence[Visit]
+) -> list[Violation]:
+    """Check that the trajectory enters all targets of its tour in their order."""
+    regions = {target.id: target.region for target in scene.targets()}
+    left = [visit.target for visit in visits]
+    violations = []
+    for name in plan.tours[trajectory.robot]:
+        if left and left[0] == name:
+            left.pop(0)
+            continue
+        if name in regions:
+            depth = regions[name].depth(trajectory.state[:, :2])
+            step, amount = int(depth.argmax()), max(-float(depth.max()), 0.0)
+            message = f"{name} is not visited at its place in the tour"
+        else:
+            step, amount = 0, 0.0
+            message = f"the tour names {name}, which the scene does not have"
+        violations.append(
+            violation_at(
+                trajectory,
+                step,
+                ViolationKind.TOUR,
+                message,
+                amount=amount,
+                other=name,
+            )
+        )
+    return violations
+
+
+def _check_visits(
+    plan: Plan, trajectory: Trajectory, visits: Sequence[Visit]
+) -> list[Violation]:
+    """Check that the plan states the visits that the motion makes, and no others."""
+    stated = [visit for visit in plan.visits if visit.robot == trajectory.robot]
+    violations = []
+    for index in range(max(len(stated), len(visits))):
+        claim = stated[index] if index < len(stated) else None
+        truth = visits[index] if index < len(visits) else None
+        if _agree(claim, truth):
+            continue
+        visit = claim or truth
+        assert visit is not None
+        last = len(trajectory.state) - 1
+        violations.append(
+            violation_at(
+                trajectory,
+                min(max(visit.step, 0), last),
+                ViolationKind.VISIT,
+                f"visit {index} is stated as {_described(claim)}, "
+                f"the motion makes it {_described(truth)}",
+                amount=abs(claim.time_s - truth.time_s) if claim and truth else 0.0,
+                other=visit.target,
+            )
+        )
+    return violations
+
+
+def _agree(claim: Visit | None, truth: Visit | None) -> bool:
+    return (
+        claim is not None
+        and truth is not None
+        and (claim.target, claim.kind, claim.step)
+        == (truth.target, truth.kind, truth.step)
+        and abs(claim.time_s - truth.time_s) < 1e-9
+        and abs(claim.energy_J - truth.energy_J) <= ENERGY_TOLERANCE_J
+    )
+
+
+def _described(visit: Visit | None) -> str:
+    if visit is None:
+        return "none"
+    return (
+        f"{visit.kind} {visit.target} in step {visit.step} "
+        f"at {visit.time_s:.6g} s with {visit.energy_J:.6g} J"
+    )
+
+
+def _check_recharges(scene: Scene, plan: Plan) -> list[Violation]:
+    """Check that batteries are filled inside stations only."""
+    stations = {station.id: station.region for station in scene.stations}
+    violations = []
+    for visit in plan.visits:
+        if visit.kind != "station":
+            continue
+        trajectory = plan.trajectory(visit.robot)
+        step = min(max(visit.step, 0), len(trajectory.state) - 1)
+        if visit.target in stations:
+            region = stations[visit.target]
+            off_m = -float(region.depth(trajectory.state[step, :2])[0])
+            message = f"recharges {off_m:.3g} m outside station {visit.target}"
+        else:
+            off_m = np.inf
+            message = f"recharges at {visit.target}, which is no station"
+        if off_m > 0.0:
+            violations.append(
+                violation_at(
+                    trajectory,
+                    step,
+                    ViolationKind.RECHARGE,
+                    message,
+                    amount=off_m if np.isfinite(off_m) else 0.0,
+                    other=visit.target,
+                )
+            )
+    return violations
+
+
+def _check_stations(scene: Scene, plan: Plan) -> list[Violation]:
+    """Check that stations for one robot at a time hold one at any time."""
+    ways = {item.robot: item.state[:, :2] for item in plan.trajectories}
+    violations = []
+    for found in crowded_stations(scene, ways):
+        one, other = found.robots
+        shared_s = (found.end - found.first) * plan.dt_s
+        message = (
+            f"is at {found.station} for {shared_s:.3g} s together with {other}; it is "
+            "for one robot at a time"
+        )
+        violations.append(
+            violation_at(
+                plan.trajectory(one),
+                found.first,
+                ViolationKind.OCCUPIED,
+                message,
+                amount=shared_s,
+                other=found.station,
+            )
+        )
+    return violations
+
+
+def _check_time(scene: Scene, plan: Plan) -> list[Violation]:
+    """Check that all robots are at rest when the time limit is over."""
+    late_s = overtime_s(scene.time_limit_s, plan.makespan_s)
+    if not late_s:
+        return []
+    taken, limit = compared(plan.makespan_s, scene.time_limit_s, 1)
+    message = (
+        f"the plan takes {taken} s, {late_s:.3g} s more than the limit of {limit} s"
+    )
+    return [
+        Violation(
+            kind=ViolationKind.LATE,
+            time_s=plan.makespan_s,
+            amount=late_s,
+            message=message,
+        )
+    ]
+
+
+def _check_energy(
+    scene: Scene, trajectory: Trajectory, visits: Sequence[Visit]
+) -> list[Violation]:
+    """Check that the battery never holds less than the reserve."""
+    battery = scene.robot(trajectory.robot).battery
+    content_J = battery_profile(scene, trajectory, visits)
+    for visit in visits:
+        content_J[visit.step] = min(content_J[visit.step], visit.energy_J)
+    lack_J = battery.reserve_J - content_J
+    return [
+        violation_at(
+            trajectory,
+            step,
+            ViolationKind.ENERGY,
+            "the battery holds {} J, the reserve is {} J".format(
+                *compared(content_J[step], battery.reserve_J, 1)
+            ),
+            amount=float(lack_J[step]),
+        )
+        for step in worst_of_runs(lack_J, lack_J > ENERGY_TOLERANCE_J)
+    ]
+
+
+def _check_ledger(scene: Scene, plan: Plan, visits: Sequence[Visit]) -> list[Violation]:
+    """Check the predicted ledger entry by entry."""
+    stated = _by_key(plan.ledger)
+    recomputed = _by_key(plan_ledger(scene, plan.trajectories, visits))
+    keys = sorted({*stated, *recomputed})
+    off_J = np.array([abs(stated[key] - recomputed[key]) for key in keys])
+    if not keys or off_J.max() <= ENERGY_TOLERANCE_J:
+        return []
+    worst = int(off_J.argmax())
+    robot, leg, target, part = keys[worst]
+    said, takes = compared(stated[keys[worst]], recomputed[keys[worst]], 1)
+    message = (
+        f"{robot or 'plan'}: the ledger says {said} J for {part} on leg {leg} to "
+        f"{target or 'the end'}, the motion takes {takes} J"
+    )
+    return [
+        Violation(
+            kind=ViolationKind.LEDGER,
+            robot=robot,
+            other=target,
+            amount=float(off_J[worst]),
+            message=message,
+        )
+    ]
+
+
+def _by_key(ledger: EnergyLedger) -> dict[tuple[str, int, str, str], float]:
+    sums_J: dict[tuple[str, int, str, str], float] = defaultdict(float)
+    for entry in ledger.entries:
+        key = (entry.robot, entry.leg, entry.target, entry.part)
+        sums_J[key] += entry.energy_J
+    return sums_J

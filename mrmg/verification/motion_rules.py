@@ -1,0 +1,217 @@
+"""Rules of one robot's motion: where it starts, how it moves, within which limits."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from mrmg.compared import compared
+from mrmg.motion.dynamics import DERIVATIVES, Derivative, rk4_step
+from mrmg.motion.user_motion import motion_of
+from mrmg.plans import Trajectory
+from mrmg.scene.robot_model import RobotModel
+from mrmg.scene.types import Robot
+from mrmg.verification.verdict import Violation, ViolationKind
+
+REST_TOLERANCE = 1e-6
+"""Largest speed [m/s] or yaw rate [rad/s] of a robot that counts as resting."""
+
+LIMIT_TOLERANCE = 1e-9
+"""Rounding that is forgiven at a limit, in the unit of the component."""
+
+_COMPONENTS = {
+    "car": ("x", "y", "theta", "v", "psi"),
+    "unicycle": ("x", "y", "theta", "v", "omega"),
+}
+_USER_COMPONENTS = ("x", "y", "theta", "v", "w")
+
+USER_TOLERANCE = 1e-9
+"""By how much a user's compiled motion may differ from its plain Python form."""
+
+
+def check_motion(robot: Robot, trajectory: Trajectory) -> list[Violation]:
+    """Return every broken rule of start, end, dynamics and limits."""
+    return [
+        *_check_start(robot, trajectory),
+        *_check_final_rest(robot, trajectory),
+        *_check_finish(robot, trajectory),
+        *_check_dynamics(robot.model, trajectory),
+        *_check_state_limits(robot.model, trajectory),
+        *_check_control_limits(robot.model, trajectory),
+    ]
+
+
+def worst_of_runs(amount: np.ndarray, broken: np.ndarray) -> list[int]:
+    """Return the index of the largest amount in each run of consecutive broken ones."""
+    indices = np.flatnonzero(broken)
+    runs = np.split(indices, np.flatnonzero(np.diff(indices) > 1) + 1)
+    return [int(run[amount[run].argmax()]) for run in runs if len(run)]
+
+
+def violation_at(
+    trajectory: Trajectory,
+    step: int,
+    kind: ViolationKind,
+    message: str,
+    *,
+    amount: float,
+    other: str = "",
+) -> Violation:
+    """Return a violation at one state of a trajectory."""
+    x_m, y_m = trajectory.state[step, :2].tolist()
+    return Violation(
+        kind=kind,
+        robot=trajectory.robot,
+        other=other,
+        time_s=step * trajectory.dt_s,
+        x_m=x_m,
+        y_m=y_m,
+        amount=amount,
+        message=f"{trajectory.robot}: {message}",
+    )
+
+
+def _check_start(robot: Robot, trajectory: Trajectory) -> list[Violation]:
+    expected = np.array([*robot.pose, 0.0, 0.0])
+    error = np.abs(trajectory.state[0] - expected)
+    worst = int(error.argmax())
+    if error[worst] == 0.0:
+        return []
+    names = _COMPONENTS.get(robot.model.motion_model, _USER_COMPONENTS)
+    name = names[worst]
+    found, wanted = compared(trajectory.state[0, worst], expected[worst], 3)
+    message = f"the plan starts with {name} = {found}, the scene with {wanted}"
+    amount = float(error[worst])
+    return [violation_at(trajectory, 0, ViolationKind.START, message, amount=amount)]
+
+
+def _check_final_rest(robot: Robot, trajectory: Trajectory) -> list[Violation]:
+    rates = {"v": 3}
+    if robot.model.motion_model != "car":
+        rates["omega" if _is_unicycle(robot.model) else "w"] = 4
+    last = len(trajectory.state) - 1
+    return [
+        violation_at(
+            trajectory,
+            last,
+            ViolationKind.FINAL_REST,
+            f"the plan ends in motion, {name} = {trajectory.state[last, column]:.3g}",
+            amount=abs(float(trajectory.state[last, column])),
+        )
+        for name, column in rates.items()
+        if abs(trajectory.state[last, column]) > REST_TOLERANCE
+    ]
+
+
+def _check_finish(robot: Robot, trajectory: Trajectory) -> list[Violation]:
+    """Check that the robot ends in its finish, with the heading asked for."""
+    if robot.finish is None:
+        return []
+    violations = []
+    last = len(trajectory.state) - 1
+    x, y, yaw = trajectory.state[-1, :3]
+    missed_m = -float(robot.finish.region.depth(np.array([[x, y]]))[0])
+    if missed_m > 0.0:
+        message = f"ends {missed_m:.3g} m outside its finish"
+        violations.append((ViolationKind.FINISH, message, missed_m))
+    if robot.finish.heading_rad is not None:
+        off = abs(math.remainder(yaw - robot.finish.heading_rad, math.tau))
+        excess = off - robot.finish.heading_tolerance_rad
+        if excess > 0.0:
+            found, most = compared(off, robot.finish.heading_tolerance_rad, 2)
+            message = f"ends {found} rad off its finish's heading, {most} are allowed"
+            violations.append((ViolationKind.FINISH, message, excess))
+    return [
+        violation_at(trajectory, last, kind, message, amount=amount)
+        for kind, message, amount in violations
+    ]
+
+
+def _is_unicycle(model: RobotModel) -> bool:
+    return model.motion_model == "unicycle"
+
+
+def replay(model: RobotModel, trajectory: Trajectory) -> np.ndarray:
+    """Return the state after each step, from the state before it, shape (n, 5).
+
+    Runs the plain Python form of the motion model, one step at a time, so that a valid
+    plan is met bit for bit and a defect stays in its own step.
+    """
+    step = plain_step(model)
+    length_m, dt_s = float(model.wheelbase_m), float(trajectory.dt_s)
+    states, controls = trajectory.state[:-1].tolist(), trajectory.control.tolist()
+    return np.array(
+        [
+            step(*state, *control, length_m, dt_s)
+            for state, control in zip(states, controls, strict=True)
+        ]
+    ).reshape(len(states), 5)
+
+
+def plain_step(model: RobotModel) -> Derivative:
+    """Return step(x, y, theta, v, w, u1, u2, L, dt) of a model in plain Python."""
+    if model.motion_model in DERIVATIVES:
+        return rk4_step(DERIVATIVES[model.motion_model](math.sin, math.cos, math.tan))
+    motion = motion_of(model)
+
+    def step(*arguments: float) -> tuple[float, ...]:
+        return motion.step(arguments[:5], arguments[5:7], *arguments[7:])
+
+    return step
+
+
+def _check_dynamics(model: RobotModel, trajectory: Trajectory) -> list[Violation]:
+    defect = np.abs(replay(model, trajectory) - trajectory.state[1:]).max(axis=1)
+    tolerance = 0.0 if model.motion_model in DERIVATIVES else USER_TOLERANCE
+    return [
+        violation_at(
+            trajectory,
+            step + 1,
+            ViolationKind.DYNAMICS,
+            f"the controls of step {step} do not lead to the next state, "
+            f"which is {defect[step]:.3g} off",
+            amount=float(defect[step]),
+        )
+        for step in worst_of_runs(defect, defect > tolerance)
+    ]
+
+
+def _check_state_limits(model: RobotModel, trajectory: Trajectory) -> list[Violation]:
+    limits = model.limits
+    v, w = trajectory.state[:, 3], trajectory.state[:, 4]
+    name = _COMPONENTS.get(model.motion_model, _USER_COMPONENTS)[4]
+    rules = (
+        ("v", v, v - limits.v_max_m_s, limits.v_max_m_s),
+        ("v", v, limits.v_min_m_s - v, limits.v_min_m_s),
+        (f"|{name}|", np.abs(w), np.abs(w) - limits.w_max, limits.w_max),
+    )
+    return _limit_violations(trajectory, ViolationKind.STATE_LIMIT, rules)
+
+
+def _check_control_limits(model: RobotModel, trajectory: Trajectory) -> list[Violation]:
+    limits = model.limits
+    u1, u2 = np.abs(trajectory.control).T
+    rules = (
+        ("|u1|", u1, u1 - limits.u1_max_m_s2, limits.u1_max_m_s2),
+        ("|u2|", u2, u2 - limits.u2_max, limits.u2_max),
+    )
+    return _limit_violations(trajectory, ViolationKind.CONTROL_LIMIT, rules)
+
+
+def _limit_violations(
+    trajectory: Trajectory,
+    kind: ViolationKind,
+    rules: tuple[tuple[str, np.ndarray, np.ndarray, float], ...],
+) -> list[Violation]:
+    return [
+        violation_at(
+            trajectory,
+            step,
+            kind,
+            "{} is {}, the limit is {}".format(name, *compared(value[step], limit, 3)),
+            amount=float(excess[step]),
+        )
+        for name, value, excess, limit in rules
+        for step in worst_of_runs(excess, excess > LIMIT_TOLERANCE)
+    ]

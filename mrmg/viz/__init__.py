@@ -1,0 +1,1 @@
+"""Pictures, videos and viewers of scenes, plans and simulated drives."""

@@ -1,0 +1,53 @@
+"""Contour lines of a scene's relief."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from mrmg.scene.types import Scene
+from mrmg.viz import style
+
+_WIDTH_POINTS = 0.7
+_MOST_LEVELS = 12
+
+
+def contour_lines(scene: Scene) -> Iterator[tuple[float, np.ndarray]]:
+    """Yield (height [m], points [m] of shape (n, 2)) of lines of round heights."""
+    from contourpy import contour_generator
+
+    elevation = scene.elevation
+    if elevation is None:
+        return
+    x_min, y_min, x_max, y_max = scene.bounds
+    rows, columns = elevation.height_m.shape
+    lines = contour_generator(
+        np.linspace(x_min, x_max, columns),
+        np.linspace(y_min, y_max, rows),
+        elevation.height_m,
+    )
+    for level in levels_m(
+        float(elevation.height_m.min()), float(elevation.height_m.max())
+    ):
+        # A hair above: flat ground at a round height has no line of its own.
+        for line in lines.lines(level + 1e-3):
+            yield level, np.asarray(line)
+
+
+def levels_m(low: float, high: float) -> np.ndarray:
+    """Return round heights between two, 1, 2 or 5 times a power of ten apart [m]."""
+    if high - low < 1e-6:
+        return np.zeros(0)
+    least = (high - low) / _MOST_LEVELS
+    power = 10.0 ** np.floor(np.log10(least))
+    step = next(power * n for n in (1, 2, 5, 10) if power * n >= least)
+    first, last = np.floor(low / step) + 1.0, np.ceil(high / step) - 1.0
+    return np.asarray(np.round(np.arange(first, last + 0.5) * step, 6))
+
+
+def draw_contours(axes: Axes, scene: Scene) -> None:
+    """Draw the lines on axes in metres."""
+    for _, line in contour_lines(scene):
+        axes.plot(*line.T, color=style.CONTOUR, linewidth=_WIDTH_POINTS, zorder=2)

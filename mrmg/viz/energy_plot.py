@@ -1,0 +1,228 @@
+"""Battery content over time: planned against simulated, one panel per robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from mrmg.energy.audit import measured_step_energy
+from mrmg.energy.metering import (
+    LoggedMotion,
+    battery_content,
+    battery_profile,
+    find_visits,
+)
+from mrmg.plans import Plan, Visit
+from mrmg.scene.types import Robot, Scene
+from mrmg.simulation.log import ExecutionLog, require_same_mission
+from mrmg.viz import scene_drawing, style
+from mrmg.viz.timeline_rows import HIDDEN, named_visits
+
+_PANEL_INCHES = (9.5, 2.5)
+_NAME_POINTS, _NAMES_EM = 8.5, 7.8 * 72.0 / 8.5
+"""Size of the visits' names, and width of the time axis, at least, in such letters."""
+_LINE_SHARE = 0.082
+"""Height of a line of names, in heights of the panel."""
+_FULL_SHARE = 1.04
+"""Upper end of the curves' room, in full batteries."""
+_SHORTEST_S = 0.1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BatteryCurve:
+    """Battery content of one robot over time.
+
+    Attributes:
+        robot: id of the robot.
+        time_s: shape (n,).
+        energy_J: content at each time, after a recharge, shape (n,).
+        visits: of this robot; their `energy_J` is the content on arrival.
+    """
+
+    robot: str
+    time_s: np.ndarray
+    energy_J: np.ndarray
+    visits: tuple[Visit, ...]
+
+
+def planned_curves(scene: Scene, plan: Plan) -> tuple[BatteryCurve, ...]:
+    """Return the battery content the plan predicts, one curve per robot."""
+    return tuple(
+        BatteryCurve(
+            robot=trajectory.robot,
+            time_s=trajectory.time_s,
+            energy_J=plan.content_J[trajectory.robot]
+            if plan.content_J
+            else battery_profile(scene, trajectory, plan.visits),
+            visits=tuple(v for v in plan.visits if v.robot == trajectory.robot),
+        )
+        for trajectory in plan.trajectories
+    )
+
+
+def measured_curves(
+    scene: Scene, plan: Plan, log: ExecutionLog
+) -> tuple[BatteryCurve, ...]:
+    """Return the battery content by the work of the simulated drives."""
+    if log.disturbance is not None:
+        scene = log.disturbance.actual_scene(scene)
+    curves = []
+    for index, (robot, state) in enumerate(zip(log.robots, log.state, strict=True)):
+        motion = LoggedMotion(robot=robot, time_s=log.time_s, state=state)
+        visits = find_visits(scene, motion, plan.tours.get(robot, ()))
+        draw_J = measured_step_energy(scene.robot(robot), log, index).sum(axis=1)
+        content_J, arrival_J = battery_content(scene, motion, draw_J, visits)
+        curves.append(
+            BatteryCurve(
+                robot=robot,
+                time_s=log.time_s,
+                energy_J=content_J,
+                visits=tuple(
+                    replace(visit, energy_J=energy_J)
+                    for visit, energy_J in zip(visits, arrival_J, strict=True)
+                ),
+            )
+        )
+    return tuple(curves)
+
+
+def draw_energy(
+    scene: Scene, plan: Plan, log: ExecutionLog | None = None, *, path: Path
+) -> None:
+    """Draw battery content over time, one panel per robot, to a picture file.
+
+    Args:
+        scene: gives capacity and reserve.
+        plan: what was predicted.
+        log: adds the content by the work of the simulated drives.
+        path: picture to write (PNG, SVG or PDF by its suffix).
+
+    Raises:
+        IdentityError: if scene, plan and log do not belong together.
+    """
+    require_same_mission(scene, plan, log)
+    planned = {curve.robot: curve for curve in planned_curves(scene, plan)}
+    simulated = {
+        curve.robot: curve
+        for curve in (measured_curves(scene, plan, log) if log is not None else ())
+    }
+    width_in, panel_in = _PANEL_INCHES
+    figure = Figure(
+        figsize=(width_in, panel_in * len(planned) + 0.7),
+        dpi=scene_drawing.DPI,
+        layout="constrained",
+        facecolor="white",
+    )
+    FigureCanvasAgg(figure)
+    panels = figure.subplots(len(planned), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, robot_id in zip(panels, planned, strict=True):
+        robot = scene.robot(robot_id)
+        draw_battery(axes, scene, robot, planned[robot_id], simulated.get(robot_id))
+    panels[-1].set_xlabel("time [s]")
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(
+        handles,
+        labels,
+        loc="outside upper right",
+        ncols=len(handles),
+        frameon=False,
+        fontsize=9.5,
+    )
+    scene_drawing.write_figure(figure, path)
+
+
+def draw_battery(
+    axes: Axes,
+    scene: Scene,
+    robot: Robot,
+    planned: BatteryCurve,
+    simulated: BatteryCurve | None,
+) -> None:
+    """Draw one robot's battery content, its reserve, recharges and goals."""
+    color = style.scene_robot_colors(scene)[robot.id]
+    capacity_kJ = robot.battery.capacity_J / 1000.0
+    reserve_kJ = robot.battery.reserve_J / 1000.0
+    curves = {
+        "planned": (planned, style.PLANNED),
+        "simulated": (simulated, style.DRIVEN),
+    }
+    for label, (curve, look) in curves.items():
+        if curve is not None:
+            width = look.width_em * scene_drawing.LETTER_POINTS
+            alpha = look.opacity
+            _plot(axes, curve, color=color, linewidth=width, alpha=alpha, label=label)
+    axes.axhline(
+        reserve_kJ, color=style.RESERVE, linewidth=1.2, linestyle="--", label="reserve"
+    )
+    axes.axhspan(0.0, reserve_kJ, color=style.RESERVE, alpha=0.08, linewidth=0)
+    shown = [curve for curve in (planned, simulated) if curve is not None]
+    axes.set_xlim(0.0, max(_SHORTEST_S, *(float(curve.time_s[-1]) for curve in shown)))
+    room = _mark_visits(axes, scene, (simulated or planned).visits)
+    least = min(float(with_recharge_jumps(curve)[1].min()) for curve in shown)
+    low = min(0.0, 1.05 * least / robot.battery.capacity_J)
+    high = low + (_FULL_SHARE - low) / (1.0 - room)
+    axes.set_ylim(low * capacity_kJ, high * capacity_kJ)
+    axes.set_ylabel("battery [kJ]")
+    axes.set_title(robot.id, loc="left", fontsize=11, fontweight="bold", color=color)
+    axes.grid(color="#E4E6EA", linewidth=0.7)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    percent = axes.twinx()
+    percent.set_ylim(100.0 * low, 100.0 * high)
+    percent.set_yticks([0, 25, 50, 75, 100])
+    percent.set_ylabel("charge [%]")
+    percent.spines["top"].set_visible(False)
+
+
+def with_recharge_jumps(curve: BatteryCurve) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and contents [J], with the content on arrival at each station."""
+    stations = [visit for visit in curve.visits if visit.kind == "station"]
+    steps = np.array([visit.step for visit in stations], dtype=int)
+    time_s = np.insert(curve.time_s, steps, curve.time_s[steps])
+    arrival_J = np.array([visit.energy_J for visit in stations])
+    return time_s, np.insert(curve.energy_J, steps, arrival_J)
+
+
+def _plot(axes: Axes, curve: BatteryCurve, **look: Any) -> None:
+    time_s, energy_J = with_recharge_jumps(curve)
+    axes.plot(time_s, energy_J / 1000.0, solid_joinstyle="round", **look)
+
+
+def _mark_visits(axes: Axes, scene: Scene, visits: tuple[Visit, ...]) -> float:
+    """Mark and name visits; return the share of the height that the names take."""
+    end_s = float(axes.get_xlim()[1])
+    named = named_visits(scene, visits, end_s, (_NAMES_EM,))
+    rows = max([1, *(item.lines[0] + 1 for item in named)])
+    for item in named:
+        station, line = item.visit.kind == "station", item.lines[0]
+        bottom = 1.0 - _LINE_SHARE * (rows - max(line, 0))
+        axes.axvline(
+            item.visit.time_s,
+            ymax=bottom,
+            color=style.STATION_EDGE if station else "#B9BEC7",
+            linewidth=1.0 if station else 0.7,
+            linestyle="-" if station else ":",
+            zorder=0.5,
+        )
+        if line != HIDDEN:
+            half_s = 0.5 * item.width_em / _NAMES_EM * end_s
+            axes.text(
+                min(max(item.visit.time_s, half_s), end_s - half_s),
+                bottom,
+                item.text,
+                transform=axes.get_xaxis_transform(),
+                fontsize=_NAME_POINTS,
+                fontweight="bold" if station else "normal",
+                color=style.STATION_EDGE if station else style.MUTED,
+                ha="center",
+                va="bottom",
+                bbox={"fc": "white", "ec": "none", "pad": 0.3},
+            )
+    return rows * _LINE_SHARE

@@ -1,0 +1,313 @@
+"""What each frame of the video shows: panes, cameras, readings, trails, tags."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from mrmg.energy.audit import measured_step_energy
+from mrmg.plans import Plan
+from mrmg.scene.types import Scene
+from mrmg.simulation.log import ExecutionLog, require_same_mission
+from mrmg.simulation.world_model import build_world
+from mrmg.verification.mission_series import breakdowns, standing_of
+from mrmg.viz import style
+from mrmg.viz.energy_plot import BatteryCurve, measured_curves
+from mrmg.viz.ground_image import TrailPainter, video_labels
+from mrmg.viz.map_shapes import enclosing_circle
+from mrmg.viz.overlay import Panel, Reading, RobotReading
+from mrmg.viz.tags import Label, Tag, letter_px, place_tags
+from mrmg.viz.top_view import TopView
+from mrmg.viz.video_options import VideoOptions
+from mrmg.viz.world_view import CHASE_FOVY_DEG, WorldView, chase_camera, floor_frame
+from mrmg.world.relief import height_at, lifted
+
+_TRAIL_AHEAD_M = 1.2
+_YAW_SMOOTHING_S = 0.8
+_MAP_MARGIN = 1.03
+_CHASE_SHARE = 0.35
+_TAG_LIFT_M = 0.5
+_NAMED_WITHIN_M = 40.0
+_OPEN = (1.0, 1.0, 1.0, 0.9)
+
+
+class Film:
+    """All that is computed once per video: panes, curves, cameras, readings."""
+
+    def __init__(
+        self, scene: Scene, plan: Plan, log: ExecutionLog, options: VideoOptions
+    ) -> None:
+        """Compute everything that no frame changes.
+
+        Raises:
+            IdentityError: if scene, plan and log do not belong together.
+        """
+        require_same_mission(scene, plan, log)
+        self.scene, self.plan, self.log, self.options = scene, plan, log, options
+        self.world = build_world(scene)
+        self.frame = floor_frame(self.world)
+        self.colors = style.scene_robot_colors(scene)
+        self.curves = measured_curves(scene, plan, log)
+        self.capacity_J = [robot.battery.capacity_J for robot in scene.robots]
+        self.used_J = _used_J(scene, log)
+        self.followed = self._followed()
+        self.yaw = self._smooth_yaw()
+        self._place_panes()
+
+    def _followed(self) -> int:
+        ids = [robot.id for robot in self.scene.robots]
+        return 0 if self.options.robot is None else ids.index(self.options.robot)
+
+    def _smooth_yaw(self) -> np.ndarray:
+        yaw = np.unwrap(self.log.state[self.followed, :, 2])
+        sigma = _YAW_SMOOTHING_S * self.options.speed**0.5 / self.log.control_period_s
+        return np.asarray(gaussian_filter1d(yaw, sigma, mode="nearest"))
+
+    def _place_panes(self) -> None:
+        """Divide the picture: map or chase on the left, panel on the right."""
+        width, height = self.options.size
+        x_min, y_min, x_max, y_max = self.scene.bounds
+        ratio = (x_max - x_min) / (y_max - y_min)
+        share = 0.26 if self.options.view == "chase" else 1.0 - height * ratio / width
+        panel_width = round(min(max(share, 0.26), 0.42) * width)
+        main = width - panel_width
+        cut = round(_CHASE_SHARE * height) if self.options.view == "split" else 0
+        self.main_pane = (slice(0, height), slice(0, main))
+        self.chase_pane = (slice(0, cut), slice(main, width))
+        self.panel_pane = (slice(cut, height), slice(main, width))
+        self.panel_size = (panel_width, height - cut)
+        pane_ratio = main / height
+        self.map_height_m = _MAP_MARGIN * max(
+            y_max - y_min, (x_max - x_min) / pane_ratio
+        )
+        self.em_m = letter_px(height) * self.map_height_m / height
+        self.map_center = np.array([(x_min + x_max) / 2, (y_min + y_max) / 2])
+
+    def reading(self, tick: int) -> Reading:
+        """Return what the panel says at a tick."""
+        goals = {goal.id for goal in self.scene.goals}
+        now_s = self.log.time_s[tick]
+        broken_down = {
+            robot for robot, at_s in breakdowns(self.log).items() if at_s <= now_s
+        }
+        return Reading(
+            time_s=float(self.log.time_s[tick]),
+            used_J=float(self.used_J[tick]),
+            visited={
+                visit.target: visit.robot
+                for curve in self.curves
+                for visit in curve.visits
+                if visit.step <= tick and visit.target in goals
+            },
+            robots=tuple(
+                RobotReading(
+                    robot=curve.robot,
+                    charge=float(curve.energy_J[tick]) / capacity_J,
+                    speed_m_s=round(float(state[tick, 3]), 1) + 0.0,
+                    heading_for=self._heading_for(curve, tick),
+                    broken_down=curve.robot in broken_down,
+                    used=standing_of(curve.robot, self.plan, self.log) != "not used",
+                )
+                for curve, state, capacity_J in zip(
+                    self.curves, self.log.state, self.capacity_J, strict=True
+                )
+            ),
+        )
+
+    def _heading_for(self, curve: BatteryCurve, tick: int) -> str:
+        done = sum(visit.step <= tick for visit in curve.visits)
+        tour = self.plan.tours.get(curve.robot, ())
+        if done < len(tour):
+            return tour[done]
+        # The plan in force does not know where one was going that broke down.
+        return "…" if curve.robot in breakdowns(self.log) else ""
+
+
+def _used_J(scene: Scene, log: ExecutionLog) -> np.ndarray:
+    """Return the energy the fleet has drawn at each tick, shape (n,)."""
+    used_J = np.zeros(len(log.time_s))
+    for index, robot in enumerate(log.robots):
+        draw_J = measured_step_energy(scene.robot(robot), log, index)
+        used_J[1:] += np.cumsum(draw_J.sum(axis=1))
+    return used_J
+
+
+class Stage:
+    """The changing side of a video: trails on the ground, marks, tags."""
+
+    def __init__(self, film: Film, view: WorldView, ground: np.ndarray) -> None:
+        """Set the stage for the first frame.
+
+        Args:
+            film: what is shown.
+            view: the renderer.
+            ground: image the renderer's floor was painted with.
+        """
+        self._film, self._view = film, view
+        self._panel = Panel(
+            film.scene, film.panel_size, film.options.speed, film.options.size[1]
+        )
+        height = film.options.size[1]
+        self._tags = [
+            Tag(robot, film.colors[robot.id], height) for robot in film.scene.robots
+        ]
+        self._target_labels = _labels(film, height, ("goal", "station"))
+        self._labels = self._target_labels + _labels(film, height, ("obstacle",))
+        self._cross = Label("✖", style.RESERVE, height, size_em=1.6)
+        self._painter = TrailPainter(ground, film.frame)
+        self._painted = 0
+        self._trailed = 0
+        self._top = self._make_top_view()
+        places = np.array([at for _, at in self._labels]).reshape(-1, 2)
+        self._named = [
+            (spot, label.half)
+            for (label, _), spot in zip(
+                self._labels, self._top.to_pixels(places), strict=True
+            )
+        ]
+        self._marked: set[str] = set()
+        for goal in film.scene.goals:
+            view.color_target(goal.id, _OPEN)
+        for station in film.scene.stations:
+            view.color_target(station.id, _rgba(style.STATION))
+
+    def draw(self, tick: int) -> np.ndarray:
+        """Return the picture at a tick of the log; ticks must not decrease."""
+        film = self._film
+        width, height = film.options.size
+        picture = np.empty((height, width, 3), dtype=np.uint8)
+        reading = film.reading(tick)
+        marked = self._mark_goals(reading)
+        if film.options.view != "top":
+            self._extend_ground_trails(tick)
+        if film.options.view == "chase":
+            self._draw_chase(picture[film.main_pane], tick, reading)
+        else:
+            self._draw_top(picture[film.main_pane], tick, reading, anew=marked)
+        if film.options.view == "split":
+            self._draw_chase(picture[film.chase_pane], tick, reading)
+        picture[film.panel_pane] = self._panel.draw(reading)
+        return picture
+
+    def _make_top_view(self) -> TopView:
+        film = self._film
+        rows, columns = film.main_pane
+        return TopView(
+            self._view,
+            center_m=film.map_center,
+            height_m=film.map_height_m,
+            size=(columns.stop - columns.start, rows.stop - rows.start),
+            radius_m=max(r.model.circumscribed_radius_m for r in film.scene.robots),
+        )
+
+    def _draw_top(
+        self, pane: np.ndarray, tick: int, reading: Reading, *, anew: bool
+    ) -> None:
+        log, colors = self._film.log, self._film.colors
+        trails = {
+            colors[robot]: state[: tick + 1, :2]
+            for robot, state in zip(log.robots, log.state, strict=True)
+        }
+        if anew or self._trailed == 0:
+            self._top.draw_background(log.qpos[tick], trails, self._labels)
+        else:
+            for color, points in trails.items():
+                self._top.extend_trail(points[self._trailed - 1 :], color)
+        self._trailed = tick + 1
+        at_m = log.state[:, tick, :2]
+        self._top.draw(log.qpos[tick], list(at_m), pane)
+        circles = [
+            enclosing_circle(robot, tuple(state[tick, :3]))
+            for robot, state in zip(self._film.scene.robots, log.state, strict=True)
+        ]
+        spots = self._top.to_pixels(np.array([middle for middle, _ in circles]))
+        reaches = [radius_m / self._top.pixel_m for _, radius_m in circles]
+        size = (pane.shape[1], pane.shape[0])
+        beside = place_tags(self._tags, spots, reaches, self._named, size)
+        self._lay_tags(pane, spots, beside, reading)
+
+    def _draw_chase(self, pane: np.ndarray, tick: int, reading: Reading) -> None:
+        film = self._film
+        self._view.place(film.log.qpos[tick])
+        x_m, y_m = film.log.state[film.followed, tick, :2]
+        z_m = height_at(film.scene, np.array([[x_m, y_m]]))[0]
+        camera = chase_camera(float(x_m), float(y_m), float(z_m), float(film.yaw[tick]))
+        self._view.draw(camera, fovy=CHASE_FOVY_DEG, shadows=True, out=pane)
+        near_m = np.array([x_m, y_m])
+        for label, spot in self._target_labels:
+            if np.hypot(*(spot - near_m)) < _NAMED_WITHIN_M:
+                label.blit_about(
+                    pane, self._view.project(lifted(film.scene, spot, 0.0))[0]
+                )
+        tops = [
+            lifted(film.scene, state[tick, :2], robot.model.height_m + _TAG_LIFT_M)
+            for robot, state in zip(film.scene.robots, film.log.state, strict=True)
+        ]
+        spots = self._view.project(np.concatenate(tops))
+        self._lay_tags(pane, spots, spots, reading)
+
+    def _lay_tags(
+        self,
+        pane: np.ndarray,
+        spots: Iterable[np.ndarray],
+        beside: Iterable[np.ndarray],
+        reading: Reading,
+    ) -> None:
+        for tag, spot, at, robot in zip(
+            self._tags, spots, beside, reading.robots, strict=True
+        ):
+            if robot.broken_down:
+                self._cross.blit_about(pane, spot)
+            tag.blit(pane, at, robot.charge, broken=robot.broken_down)
+
+    def _extend_ground_trails(self, tick: int) -> None:
+        # Painting ahead, by less than a car's length, makes uploads rare.
+        if self._painted > tick:
+            return
+        log = self._film.log
+        way_m = np.cumsum(np.abs(log.state[:, tick:, 3]).max(axis=0))
+        way_m *= log.control_period_s
+        end = tick + 1 + int(np.searchsorted(way_m, _TRAIL_AHEAD_M))
+        for robot, state in zip(log.robots, log.state, strict=True):
+            start = max(self._painted - 1, 0)
+            points = state[start:end, :2]
+            self._painter.paint(points, self._film.colors[robot], self._view.ground)
+        self._painted = end
+        self._view.update_ground()
+
+    def _mark_goals(self, reading: Reading) -> bool:
+        """Give visited goals their robot's colour; tell whether any is new."""
+        before = len(self._marked)
+        for goal, robot in reading.visited.items():
+            if goal not in self._marked:
+                self._view.color_target(goal, _rgba(self._film.colors[robot]))
+                self._marked.add(goal)
+        return len(self._marked) > before
+
+
+def _rgba(color: str) -> tuple[float, float, float, float]:
+    red, green, blue = style.rgb(color)
+    return red / 255.0, green / 255.0, blue / 255.0, 0.9
+
+
+def _labels(
+    film: Film, height: int, kinds: Collection[str]
+) -> list[tuple[Label, np.ndarray]]:
+    """Return the names laid over the map, each with its place [m]."""
+    colors = {"goal": style.INK, "station": style.STATION_EDGE}
+    colors["obstacle"] = style.ON_OBSTACLE
+    return [
+        (
+            Label(
+                label.text,
+                colors[label.kind],
+                height,
+                size_em=label.size_em,
+            ),
+            np.array([label.x_m, label.y_m]),
+        )
+        for label in video_labels(film.scene, film.plan, film.em_m)
+        if label.kind in kinds
+    ]

@@ -1,0 +1,226 @@
+"""The ground of the video: terrain and planned paths painted on one image.
+
+All that lies flat is a texture of the floor, which costs nothing to draw, and driven
+trails are painted into it as the mission goes on.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from PIL import Image, ImageDraw
+
+from mrmg.plans import Plan
+from mrmg.scene.types import Scene
+from mrmg.viz import scene_drawing, style
+from mrmg.viz.map_labels import MapLabel, map_labels
+from mrmg.world.relief import lifted
+
+PIXELS = 2048
+"""Longer side of the image."""
+
+_DPI = 100
+_SPACING_M = 0.3
+_SUPERSAMPLING = 4
+_LETTER_PIXELS = 40.0
+_PAINTED = ("terrain", "height")
+_RELIEF_CELL_M = 0.25
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GroundFrame:
+    """The rectangle of ground an image covers.
+
+    Attributes:
+        center_m: of the rectangle, shape (2,).
+        half_m: half its extents, shape (2,).
+    """
+
+    center_m: np.ndarray
+    half_m: np.ndarray
+
+    @property
+    def pixels_per_m(self) -> float:
+        """Resolution of the image."""
+        return float(PIXELS / (2.0 * self.half_m.max()))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the image [pixels]."""
+        width, height = np.round(2.0 * self.half_m * self.pixels_per_m).astype(int)
+        return int(width), int(height)
+
+    def to_pixels(self, points: np.ndarray) -> np.ndarray:
+        """Return image coordinates (column, row) of points [m], shape (n, 2)."""
+        corner = self.center_m + self.half_m * (-1.0, 1.0)
+        return np.asarray((points - corner) * (1.0, -1.0) * self.pixels_per_m)
+
+
+def paint_ground(
+    scene: Scene, plan: Plan | None, frame: GroundFrame, em_m: float | None = None
+) -> np.ndarray:
+    """Return the ground from above, north up, shape (height, width, 3) of bytes.
+
+    Args:
+        scene: the map.
+        plan: adds planned paths.
+        frame: what the picture covers.
+        em_m: size of the letters on the ground; None for one that suits the map.
+    """
+    if em_m is None:
+        em_m = _LETTER_PIXELS / frame.pixels_per_m
+    width, height = frame.size
+    figure = Figure(figsize=(width / _DPI, height / _DPI), dpi=_DPI)
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    low, high = frame.center_m - frame.half_m, frame.center_m + frame.half_m
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    figure.set_facecolor("#DADCD6")
+    scene_drawing.draw_ground(axes, scene, hatched=False)
+    letter_points = _points(em_m * frame.pixels_per_m)
+    if plan is not None:
+        _paint_paths(axes, scene, plan, letter_points)
+    _paint_rims(axes, scene)
+    painted = [
+        label for label in video_labels(scene, plan, em_m) if label.kind in _PAINTED
+    ]
+    scene_drawing.draw_labels(axes, scene, painted, letter_points)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    pixels = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
+    return np.array(pixels[:, :, :3])
+
+
+def video_labels(scene: Scene, plan: Plan | None, em_m: float) -> tuple[MapLabel, ...]:
+    """Return the names on the map of a video; those of robots go with the robots."""
+    kinds = ("goal", "station", "obstacle", *_PAINTED)
+    return map_labels(scene, plan, em_m=em_m, kinds=kinds)
+
+
+def painted_relief(
+    scene: Scene, plan: Plan | None, frame: GroundFrame
+) -> trimesh.Trimesh:
+    """Return the ground as a mesh whose corners have the colours of its image."""
+    image = paint_ground(scene, plan, frame)
+    columns, rows = np.ceil(2.0 * frame.half_m / _RELIEF_CELL_M).astype(int) + 1
+    low, high = frame.center_m - frame.half_m, frame.center_m + frame.half_m
+    x, y = np.meshgrid(
+        np.linspace(low[0], high[0], columns), np.linspace(low[1], high[1], rows)
+    )
+    points = np.stack([x.ravel(), y.ravel()], axis=1)
+    pixel = np.floor(frame.to_pixels(points)).astype(int)
+    limit = np.array([image.shape[1], image.shape[0]]) - 1
+    column, row = np.clip(pixel, 0, limit).T
+    corner = np.arange(rows * columns).reshape(rows, columns)
+    a, b = corner[:-1, :-1].ravel(), corner[:-1, 1:].ravel()
+    c, d = corner[1:, :-1].ravel(), corner[1:, 1:].ravel()
+    return trimesh.Trimesh(
+        vertices=lifted(scene, points, 0.0),
+        faces=np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)]),
+        vertex_colors=image[row, column],
+        process=False,
+    )
+
+
+class TrailPainter:
+    """Paints driven trails onto a ground image, piece by piece."""
+
+    def __init__(self, ground: np.ndarray, frame: GroundFrame) -> None:
+        """Start on a ground image, which is copied."""
+        self._image = ground.copy()
+        self._frame = frame
+        self._width = style.DRIVEN.width_em * _LETTER_PIXELS
+
+    def paint(self, points: np.ndarray, color: str, target: np.ndarray) -> None:
+        """Paint a line through `points` [m] and copy what changed to `target`.
+
+        Args:
+            points: shape (n, 2); fewer than two leave the image as it is.
+            color: `#RRGGBB`.
+            target: pixels of the image's shape, changed in place.
+        """
+        if len(points) < 2:
+            return
+        pixels = self._frame.to_pixels(_spaced(points, _SPACING_M))
+        changed = paint_line(self._image, pixels, self._width, color)
+        target[changed] = self._image[changed]
+
+
+def paint_line(
+    image: np.ndarray, pixels: np.ndarray, width: float, color: str
+) -> tuple[slice, slice]:
+    """Paint a line with smooth edges into an image; return the part that changed.
+
+    Args:
+        image: shape (height, width, 3) of bytes, changed in place.
+        pixels: corners of the line as (column, row), shape (n, 2).
+        width: of the line [pixels].
+        color: `#RRGGBB`.
+    """
+    size, reach = (image.shape[1], image.shape[0]), math.ceil(width)
+    low = np.floor(pixels.min(axis=0)).astype(int) - reach
+    high = np.ceil(pixels.max(axis=0)).astype(int) + reach
+    left, top = np.clip(low, 0, size)
+    right, bottom = np.clip(high, 0, size)
+    changed = slice(top, bottom), slice(left, right)
+    if left < right and top < bottom:
+        patch = image[changed]
+        cover = _line_cover(pixels - (left, top), (right - left, bottom - top), width)
+        paint = np.array(style.rgb(color)) - patch.astype(float)
+        patch[:] = np.round(patch + cover[:, :, None] * paint)
+    return changed
+
+
+def _line_cover(pixels: np.ndarray, size: tuple[int, int], width: float) -> np.ndarray:
+    """Return how much of each pixel a line covers, 0..1, shape (height, width)."""
+    fine = _SUPERSAMPLING
+    image = Image.new("L", (int(size[0]) * fine, int(size[1]) * fine))
+    pen = ImageDraw.Draw(image)
+    corners = [(float(x), float(y)) for x, y in pixels * fine]
+    pen.line(corners, fill=255, width=round(width * fine), joint="curve")
+    radius = 0.5 * width * fine
+    for x, y in (corners[0], corners[-1]):
+        pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=255)
+    return np.asarray(image.reduce(fine)) / 255.0
+
+
+def _spaced(points: np.ndarray, spacing_m: float) -> np.ndarray:
+    """Return points about `spacing_m` apart, ends included."""
+    # Pieces shorter than the line is wide would leave ragged edges.
+    steps_m = np.hypot(*np.diff(points, axis=0).T)
+    marks = np.floor(np.cumsum(steps_m) / spacing_m)
+    keep = np.concatenate([[True], np.diff(marks, prepend=0.0) > 0.0])
+    keep[-1] = True
+    return np.asarray(points[keep])
+
+
+def _paint_paths(axes: Axes, scene: Scene, plan: Plan, letter_points: float) -> None:
+    colors = style.scene_robot_colors(scene)
+    for trajectory in plan.trajectories:
+        axes.plot(
+            trajectory.state[:, 0],
+            trajectory.state[:, 1],
+            color=colors[trajectory.robot],
+            linewidth=style.PLANNED.width_em * letter_points,
+            alpha=style.PLANNED.opacity,
+            solid_capstyle="round",
+            zorder=4,
+        )
+
+
+def _paint_rims(axes: Axes, scene: Scene) -> None:
+    stations = {station.id for station in scene.stations}
+    for target in scene.targets():
+        color = style.STATION_EDGE if target.id in stations else style.GOAL_EDGE
+        scene_drawing.draw_region(axes, target.region, "none", color, _points(5.0))
+
+
+def _points(pixels: float) -> float:
+    return pixels * 72.0 / _DPI

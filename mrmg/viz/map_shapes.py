@@ -1,0 +1,117 @@
+"""What covers a map, for pictures of it: obstacles, regions, robots and paths."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from shapely import box
+from shapely.geometry import LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from mrmg.plans import Plan
+from mrmg.scene.types import Region, Robot, Scene
+from mrmg.simulation.log import ExecutionLog
+from mrmg.viz.label_placement import Occupied
+
+_SIMPLIFIED_EM = 0.1
+_BEYOND_WEIGHT = 10.0
+"""What leaving the map costs a label, against overlapping something on it."""
+_MARK_EM = 0.55
+_END_RING_EM, _END_GAP_EM = 0.7, 0.25
+
+
+def end_poses(
+    plan: Plan | None, log: ExecutionLog | None
+) -> dict[str, tuple[float, float, float]]:
+    """Return where each robot comes to rest (x [m], y [m], yaw [rad])."""
+    ends = {item.robot: item.state[-1] for item in plan.trajectories} if plan else {}
+    if log is not None:
+        ends = dict(zip(log.robots, log.state[:, -1], strict=True))
+    return {
+        robot: (float(at[0]), float(at[1]), float(at[2])) for robot, at in ends.items()
+    }
+
+
+def enclosing_circle(
+    robot: Robot, pose: tuple[float, float, float]
+) -> tuple[np.ndarray, float]:
+    """Return centre [m], shape (2,), and radius [m] of a circle about a robot."""
+    outline = robot.model.footprint_m
+    middle = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
+    radius_m = float(np.hypot(*(outline - middle).T).max())
+    return moved(middle, pose), radius_m
+
+
+def end_ring(
+    robot: Robot, pose: tuple[float, float, float], em_m: float
+) -> tuple[np.ndarray, float]:
+    """Return centre and radius [m] of the mark about a robot that has come to rest.
+
+    It goes around the robot, so that it hides nothing of it.
+    """
+    middle, radius_m = enclosing_circle(robot, pose)
+    return middle, max(radius_m + _END_GAP_EM * em_m, _END_RING_EM * em_m)
+
+
+def occupied(
+    scene: Scene, plan: Plan | None, log: ExecutionLog | None, em_m: float
+) -> tuple[list[Occupied], list[Occupied]]:
+    """Return the shapes that labels keep off, and the lines they rather do not cross.
+
+    Args:
+        scene: the map.
+        plan: adds paths and ends.
+        log: moves the ends to where they were driven.
+        em_m: size of the picture's letters on the ground.
+    """
+    x_min, y_min, x_max, y_max = scene.bounds
+    beyond = x_max - x_min + y_max - y_min
+    bounds = box(*scene.bounds)
+    around = bounds.buffer(beyond, join_style="mitre") - bounds
+    shapes = [Occupied(around, "", weight=_BEYOND_WEIGHT)]
+    shapes += [Occupied(item.shape, item.id) for item in scene.barriers]
+    shapes += [
+        Occupied(drawn_region(item.region, em_m), item.id) for item in scene.targets()
+    ]
+    shapes += [Occupied(drawn_start(robot, em_m), robot.id) for robot in scene.robots]
+    for robot_id, pose in end_poses(plan, log).items():
+        middle, radius_m = end_ring(scene.robot(robot_id), pose, em_m)
+        shapes.append(Occupied(Point(middle).buffer(radius_m), robot_id))
+    paths = [(item.robot, item.state) for item in plan.trajectories] if plan else []
+    lines = [
+        Occupied(
+            LineString(state[:, :2]).simplify(_SIMPLIFIED_EM * em_m), path_of(robot)
+        )
+        for robot, state in paths
+        if len(state) > 1
+    ]
+    return shapes, lines
+
+
+def path_of(robot: str) -> str:
+    """Return what a robot's path is called among the things on a map."""
+    return f"path of {robot}"
+
+
+def drawn_region(region: Region, em_m: float) -> BaseGeometry:
+    """Return a region together with the mark in its middle, which has a least size."""
+    return region.shape.union(Point(region.center).buffer(_MARK_EM * em_m))
+
+
+def drawn_start(robot: Robot, em_m: float) -> BaseGeometry:
+    """Return a robot's outline at its start, together with a mark of a least size."""
+    mark = Point(robot.pose[:2]).buffer(_MARK_EM * em_m)
+    return Polygon(footprint_at(robot, robot.pose)).union(mark)
+
+
+def footprint_at(robot: Robot, pose: tuple[float, float, float]) -> np.ndarray:
+    """Return a robot's outline at a pose, in the world's frame [m], shape (m, 2)."""
+    return moved(robot.model.footprint_m, pose)
+
+
+def moved(points: np.ndarray, pose: tuple[float, float, float]) -> np.ndarray:
+    """Return points of a robot's frame in the world's [m], shape (..., 2)."""
+    x_m, y_m, yaw = pose
+    turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
+    return np.asarray(points @ turn.T + (x_m, y_m))

@@ -1,0 +1,258 @@
+"""The overview picture: map, planned and driven paths, and the order of visits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Patch
+from matplotlib.patheffects import withStroke
+
+from mrmg.plans import Plan
+from mrmg.scene.types import Scene
+from mrmg.simulation.log import ExecutionLog, require_same_mission
+from mrmg.verification.mission_series import (
+    breakdowns,
+    standing_of,
+    visit_ranks,
+    way_to,
+)
+from mrmg.viz import scene_drawing, style
+from mrmg.viz.map_labels import map_labels
+from mrmg.viz.map_shapes import end_poses, end_ring
+
+_ARROWS_PER_MAP = 5.5
+_STILL = 0.01
+_CROSS: Any = {
+    "marker": "X",
+    "markersize": 11,
+    "markerfacecolor": style.RESERVE,
+    "markeredgecolor": "white",
+}
+
+
+def draw_overview(
+    scene: Scene,
+    plan: Plan | None = None,
+    log: ExecutionLog | None = None,
+    *,
+    path: Path,
+) -> None:
+    """Draw the mission on its map to a picture file.
+
+    Goals carry the robot's colour and the rank of the visit in that robot's tour.
+
+    Args:
+        scene: the map.
+        plan: adds planned paths, their ends and the order of visits.
+        log: adds driven paths and contacts.
+        path: picture to write (PNG, SVG or PDF by its suffix).
+
+    Raises:
+        IdentityError: if scene, plan and log do not belong together.
+    """
+    require_same_mission(scene, plan, log)
+    figure, axes = scene_drawing.new_map_figure(scene)
+    axes.set_title(_title(scene, plan), loc="left", fontsize=12, color=style.INK)
+    draw_mission(axes, scene, plan, log)
+    scene_drawing.write_figure(figure, path)
+
+
+def draw_mission(
+    axes: Axes, scene: Scene, plan: Plan | None, log: ExecutionLog | None
+) -> list[Patch | Line2D]:
+    """Draw map, paths, visits and legend on `axes`; return the legend's handles."""
+    scene_drawing.draw_ground(axes, scene)
+    colors = style.scene_robot_colors(scene)
+    if plan is not None:
+        for trajectory in plan.trajectories:
+            color = colors[trajectory.robot]
+            _draw_path(axes, trajectory.state, color, style.PLANNED, 4.2)
+            _draw_arrows(axes, trajectory.state, color)
+    if log is not None:
+        for robot, state in zip(log.robots, log.state, strict=True):
+            _draw_path(axes, state, colors[robot], style.DRIVEN, 4.4)
+        _draw_contacts(axes, log)
+    _draw_targets(axes, scene, plan)
+    scene_drawing.draw_robots(axes, scene)
+    handles = _legend(scene, plan, log)
+    scene_drawing.add_legend(axes, handles)
+    em_m = scene_drawing.letter_m(axes)
+    _draw_ends(axes, scene, plan, log, em_m)
+    labels = map_labels(scene, plan, log, em_m=em_m)
+    scene_drawing.draw_labels(axes, scene, labels)
+    return handles
+
+
+def _draw_path(
+    axes: Axes, state: np.ndarray, color: str, look: style.LineLook, zorder: float
+) -> None:
+    axes.plot(
+        state[:, 0],
+        state[:, 1],
+        color=color,
+        linewidth=look.width_em * scene_drawing.LETTER_POINTS,
+        alpha=look.opacity,
+        solid_capstyle="round",
+        zorder=zorder,
+    )
+
+
+def _draw_arrows(axes: Axes, state: np.ndarray, color: str) -> None:
+    way_m = way_to(state)
+    spacing_m = abs(axes.get_xlim()[1] - axes.get_xlim()[0]) / _ARROWS_PER_MAP
+    marks_m = np.arange(spacing_m / 2, way_m[-1], spacing_m)
+    for index in np.searchsorted(way_m, marks_m):
+        step = state[index, :2] - state[index - 1, :2]
+        length_m = float(np.hypot(*step))
+        if length_m > 0.0:
+            axes.annotate(
+                "",
+                xy=tuple(state[index, :2] + 0.01 * step / length_m),
+                xytext=tuple(state[index, :2]),
+                arrowprops={
+                    "arrowstyle": "-|>,head_length=0.55,head_width=0.3",
+                    "color": color,
+                    "shrinkA": 0,
+                    "shrinkB": 0,
+                },
+                zorder=4.6,
+            )
+
+
+def _draw_contacts(axes: Axes, log: ExecutionLog) -> None:
+    for contact in log.contacts:
+        _draw_cross(axes, contact.x_m, contact.y_m)
+
+
+def _draw_cross(axes: Axes, x_m: float, y_m: float) -> None:
+    axes.plot(x_m, y_m, zorder=10, **_CROSS)
+
+
+def _draw_targets(axes: Axes, scene: Scene, plan: Plan | None) -> None:
+    ranks = visit_ranks(plan) if plan is not None else {}
+    colors = style.scene_robot_colors(scene)
+    for goal in scene.goals:
+        visits = ranks.get(goal.id, [])
+        face = colors[visits[0][0]] if visits else style.GOAL_OPEN
+        scene_drawing.draw_goal(axes, goal, color=face)
+        if visits:
+            _draw_rank(axes, goal.region.center, str(visits[0][1]))
+    for station in scene.stations:
+        scene_drawing.draw_station(axes, station)
+
+
+def _draw_rank(axes: Axes, center: np.ndarray, text: str) -> None:
+    axes.text(
+        float(center[0]),
+        float(center[1]),
+        text,
+        fontsize=9,
+        fontweight="bold",
+        color="white",
+        ha="center",
+        va="center_baseline",
+        path_effects=[withStroke(linewidth=1.6, foreground=style.INK)],
+        zorder=8.5,
+    )
+
+
+def _draw_ends(
+    axes: Axes,
+    scene: Scene,
+    plan: Plan | None,
+    log: ExecutionLog | None,
+    em_m: float,
+) -> None:
+    """Draw each robot where it came to rest, with a ring around it."""
+    colors, broken = style.scene_robot_colors(scene), breakdowns(log)
+    for robot_id, pose in end_poses(plan, log).items():
+        robot = scene.robot(robot_id)
+        if np.allclose(pose, robot.pose, atol=_STILL) and robot_id not in broken:
+            continue
+        scene_drawing.draw_footprint(
+            axes, robot, pose, facecolor=colors[robot_id], alpha=1.0
+        )
+        middle, radius_m = end_ring(robot, pose, em_m)
+        ring = Circle(
+            (float(middle[0]), float(middle[1])),
+            radius_m,
+            facecolor="none",
+            edgecolor=style.RESERVE if robot_id in broken else colors[robot_id],
+            linewidth=1.4,
+            path_effects=[withStroke(linewidth=2.6, foreground="white")],
+            zorder=6.9,
+        )
+        axes.add_patch(ring)
+        if robot_id in broken:
+            _draw_cross(axes, *middle)
+
+
+def _legend(
+    scene: Scene, plan: Plan | None, log: ExecutionLog | None
+) -> list[Patch | Line2D]:
+    colors = style.scene_robot_colors(scene)
+    handles: list[Patch | Line2D] = []
+    for robot in scene.robots:
+        text = (
+            robot.id
+            if plan is None
+            else f"{robot.id}: {_work(scene, plan, log, robot.id)}"
+        )
+        handles.append(Patch(facecolor=colors[robot.id], label=text))
+    looks = {"planned path": (style.PLANNED, plan), "driven path": (style.DRIVEN, log)}
+    handles += [
+        Line2D(
+            [],
+            [],
+            color=style.MUTED,
+            linewidth=look.width_em * scene_drawing.LETTER_POINTS,
+            alpha=look.opacity,
+            label=label,
+        )
+        for label, (look, shown) in looks.items()
+        if shown is not None
+    ]
+    if plan is not None:
+        handles.append(_ring("end of the drive"))
+        handles.append(_ring("n: nth stop of the tour", text="$n$"))
+    crosses = {"contact": log.contacts if log else (), "broken down": breakdowns(log)}
+    handles += [
+        Line2D([], [], linestyle="none", label=label, **_CROSS)
+        for label, shown in crosses.items()
+        if shown
+    ]
+    return handles + scene_drawing.map_legend(scene)
+
+
+def _work(scene: Scene, plan: Plan, log: ExecutionLog | None, robot: str) -> str:
+    """Return what a robot's tour amounts to, and what became of the robot."""
+    tour = plan.tours.get(robot, ())
+    goals = sum(target in {goal.id for goal in scene.goals} for target in tour)
+    words = [f"{goals} goal{'' if goals == 1 else 's'}"] if tour else []
+    return ", ".join([*words, *filter(None, [standing_of(robot, plan, log)])])
+
+
+def _ring(label: str, text: str = "o") -> Line2D:
+    return Line2D(
+        [],
+        [],
+        linestyle="none",
+        marker=text,
+        markersize=10 if text == "o" else 8,
+        markerfacecolor="none" if text == "o" else style.INK,
+        markeredgecolor=style.INK,
+        label=label,
+    )
+
+
+def _title(scene: Scene, plan: Plan | None) -> str:
+    if plan is None:
+        return scene.name
+    return (
+        f"{scene.name}: {len(scene.goals)} goals, "
+        f"{plan.cost_J / 1000:.1f} kJ, {plan.makespan_s:.0f} s"
+    )

@@ -1,0 +1,70 @@
+"""Sizes and settings of figures made for print."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from mrmg.errors import UsageError
+from mrmg.viz import scene_drawing
+
+COLUMN_IN, PAGE_IN = 3.45, 7.16
+"""Widths of one and of two columns of an IEEE paper [inch]."""
+TEXT_PT, SMALL_PT = 7.5, 6.0
+"""Sizes of text, and of the labels within maps."""
+FORMATS = (".pdf", ".svg", ".png")
+"""What figures can be written as."""
+
+FOR_PRINT: Any = {
+    # Journals want text as text, in embedded TrueType fonts.
+    "pdf.fonttype": 42,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "mrmg",
+    "savefig.dpi": 300,
+}
+_SMALL: Any = {
+    "font.size": TEXT_PT,
+    "axes.titlesize": TEXT_PT,
+    "axes.labelsize": TEXT_PT,
+    "xtick.labelsize": TEXT_PT,
+    "ytick.labelsize": TEXT_PT,
+    "legend.fontsize": TEXT_PT,
+    "axes.linewidth": 0.6,
+    "hatch.linewidth": 0.4,
+    "patch.linewidth": 0.5,
+}
+
+
+def require_format(path: Path) -> None:
+    """Refuse files of another format than `FORMATS`.
+
+    Raises:
+        UsageError: if the suffix is none of them.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise UsageError(f"{path} must end in one of {', '.join(FORMATS)}")
+
+
+@contextmanager
+def print_figure(size_in: tuple[float, float], path: Path) -> Iterator[Figure]:
+    """Yield an empty figure with small text; write it to `path` afterwards.
+
+    Args:
+        size_in: width and height [inch].
+        path: file to write, atomically (one of `FORMATS` by its suffix).
+
+    Raises:
+        UsageError: if the suffix is none of them.
+    """
+    require_format(path)
+    with rc_context({**FOR_PRINT, **_SMALL}):
+        figure = Figure(figsize=size_in, layout="constrained", facecolor="white")
+        FigureCanvasAgg(figure)
+        yield figure
+        scene_drawing.write_figure(figure, path)

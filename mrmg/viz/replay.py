@@ -1,0 +1,108 @@
+"""A mission to be watched: where everything is at any time, and the clock that runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from mrmg.errors import Fault, RunFolderError
+from mrmg.plans import Plan, plan_in_force
+from mrmg.scene.loading import load_scene
+from mrmg.scene.types import Scene
+from mrmg.simulation.log import ExecutionLog
+from mrmg.viz.film import Film
+from mrmg.viz.overlay import Reading
+from mrmg.viz.video_options import VideoOptions
+
+SPEEDS = (1, 2, 4, 8, 16, 32)
+"""Mission seconds per second that a viewer offers."""
+
+
+class Replay:
+    """A driven mission, with a time that is set or runs on."""
+
+    def __init__(self, scene: Scene, plan: Plan, log: ExecutionLog) -> None:
+        """Start at the beginning, paused."""
+        self.film = Film(scene, plan, log, _options(log))
+        self.time_s = 0.0
+        self.speed = 4.0
+        self.playing = False
+
+    @property
+    def end_s(self) -> float:
+        """Time of the log's end."""
+        return float(self.film.log.time_s[-1])
+
+    @property
+    def tick(self) -> int:
+        """The log's last tick that is not after the time."""
+        after = np.searchsorted(self.film.log.time_s, self.time_s + 1e-9, "right")
+        return max(int(after) - 1, 0)
+
+    def reading(self) -> Reading:
+        """Return what is to be said at the time."""
+        return self.film.reading(self.tick)
+
+    def seek(self, time_s: float) -> None:
+        """Set the time, held within the mission."""
+        self.time_s = min(max(time_s, 0.0), self.end_s)
+
+    def advance(self, passed_s: float) -> None:
+        """Let real time pass; at the end the replay stops."""
+        if self.playing:
+            self.seek(self.time_s + self.speed * passed_s)
+            self.playing = self.time_s < self.end_s
+
+    def toggle(self) -> None:
+        """Play or pause; at the end, play from the beginning."""
+        if not self.playing and self.time_s >= self.end_s:
+            self.time_s = 0.0
+        self.playing = not self.playing
+
+
+def replay_of(run_folder: Path, *, trust_code: bool = False) -> Replay:
+    """Return the replay of a run.
+
+    Args:
+        run_folder: the run, driven.
+        trust_code: whether robot models may bring Python code (`loading.trust`).
+
+    Raises:
+        RunFolderError: if the run was not driven yet, or cannot be read.
+    """
+    scene = load_scene(run_folder / "scene.yaml", trust_code=trust_code)
+    if not (run_folder / "plan.json").exists():
+        fault = Fault("plan.json", "missing: there is no plan; view the scene instead")
+        raise RunFolderError(str(run_folder), [fault])
+    if not (run_folder / "log.json").exists():
+        fault = Fault("log.json", "missing: nothing was driven; run 'mrmg execute'")
+        raise RunFolderError(str(run_folder), [fault])
+    return Replay(scene, plan_in_force(run_folder), ExecutionLog.load(run_folder))
+
+
+def spoken(scene: Scene, reading: Reading) -> tuple[str, list[tuple[str, str]]]:
+    """Return a reading in words: the mission's line, and (robot, line) for each."""
+    minutes, seconds = divmod(reading.time_s, 60.0)
+    mission = (
+        f"{int(minutes):02d}:{seconds:04.1f}, {len(reading.visited)} of "
+        f"{len(scene.goals)} goals, {reading.used_J / 1000.0:.1f} kJ used"
+    )
+    lines = []
+    for robot in reading.robots:
+        going = f"{robot.speed_m_s:.1f} m/s, {robot.way('to')}"
+        words = f"{100.0 * robot.charge:.0f} %, {going}"
+        lines.append((robot.robot, words))
+    return mission, lines
+
+
+def _options(log: ExecutionLog) -> VideoOptions:
+    return VideoOptions(
+        view="top",
+        robot=None,
+        speed=1.0,
+        size=(1280, 720),
+        fps=30,
+        from_s=0.0,
+        to_s=float(log.time_s[-1]),
+    )

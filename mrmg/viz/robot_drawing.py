@@ -1,0 +1,132 @@
+"""A picture of one robot: as the simulation draws it, with its footprint outlined."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from mrmg.scene.driven_parts import why_not_driven
+from mrmg.scene.robot_figures import figure_lines
+from mrmg.scene.robot_model import RobotModel
+from mrmg.scene.types import Battery, Robot, Scene
+from mrmg.simulation.world_model import build_world
+from mrmg.viz import style
+from mrmg.viz.print_style import require_format
+from mrmg.viz.scene_drawing import DPI, HALO, write_figure
+from mrmg.viz.world_view import open_view, top_camera
+
+_PIXELS = (1100, 800)
+_GROUND = np.array([228, 232, 224], dtype=np.uint8)
+_FOVY_DEG = 32.0
+_OUTLINE = "#d62728"
+
+
+def draw_robot(model: RobotModel, path: Path) -> None:
+    """Draw a robot from its front left and from above, beside its figures.
+
+    A model that is only planned for is drawn as its footprint.
+
+    Args:
+        model: of the robot.
+        path: file to write; its suffix, one of `print_style.FORMATS`, gives the format.
+
+    Raises:
+        UsageError: if the suffix is unknown.
+        MachineError: if the robot has an MJCF and this machine cannot draw it.
+    """
+    require_format(path)
+    figure = Figure(figsize=(11.0, 6.6), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    figure.suptitle(model.name, fontsize=15, fontweight="bold")
+    shown, table = figure.subplots(2, 1, height_ratios=(4.2, 2.0))
+    seen, above = _halves(figure, shown)
+    outline = np.vstack([model.footprint_m, model.footprint_m[:1]])
+    if why_not_driven(model) is None:
+        _draw_rendered(model, outline, seen, above)
+    else:
+        seen.text(0.5, 0.5, "has no MJCF to be drawn by", ha="center", va="center")
+        above.plot(outline[:, 0], outline[:, 1], color=_OUTLINE)
+        above.plot(0.0, 0.0, "+", color=_OUTLINE, markersize=12)
+        above.set_aspect("equal")
+        above.set_axis_on()
+        above.set_xlabel("x [m]")
+        above.set_ylabel("y [m]")
+    seen.set_title("red: the footprint on the ground", fontsize=9, color=style.MUTED)
+    above.set_title("from above; +: the reference point", fontsize=9, color=style.MUTED)
+    table.axis("off")
+    table.text(
+        0.02, 1.0, "\n".join(figure_lines(model)), family="monospace", fontsize=10,
+        va="top", linespacing=1.35, transform=table.transAxes,
+    )  # fmt: skip
+    write_figure(figure, path)
+
+
+def _halves(figure: Figure, shown: Axes) -> tuple[Axes, Axes]:
+    """Return axes for both pictures in place of one."""
+    grid = shown.get_subplotspec()
+    assert grid is not None
+    shown.remove()
+    halves = grid.subgridspec(1, 2)
+    pair = (figure.add_subplot(halves[0]), figure.add_subplot(halves[1]))
+    for axes in pair:
+        axes.axis("off")
+    return pair
+
+
+def _draw_rendered(
+    model: RobotModel, outline: np.ndarray, seen: Axes, above: Axes
+) -> None:
+    """Draw the simulated robot with its outline on both axes."""
+    size_m = 2.0 * model.circumscribed_radius_m
+    world = build_world(_alone(model, size_m))
+    ground = np.broadcast_to(_GROUND, (16, 16, 3)).copy()
+    middle = 0.5 * (model.footprint_m.min(axis=0) + model.footprint_m.max(axis=0))
+    corner = mujoco.MjvCamera()
+    corner.type = mujoco.mjtCamera.mjCAMERA_FREE
+    corner.lookat[:] = [*middle, 0.4 * model.height_m]
+    corner.azimuth, corner.elevation = 215.0, -22.0
+    corner.distance = (
+        0.7 * (size_m + model.height_m) / math.tan(math.radians(_FOVY_DEG))
+    )
+    top = top_camera(middle)
+    extent = np.ptp(model.footprint_m, axis=0)
+    width, height = _PIXELS
+    seen_m = 1.25 * max(extent[1], extent[0] * height / width)
+    points = np.column_stack([outline, np.full(len(outline), 0.01)])
+    with open_view(world, ground, _PIXELS) as view:
+        data = mujoco.MjData(world.model)
+        for axes, camera, fovy in ((seen, corner, _FOVY_DEG), (above, top, seen_m)):
+            picture = np.empty((height, width, 3), dtype=np.uint8)
+            view.place(data.qpos)
+            view.draw(camera, fovy=fovy, shadows=True, out=picture)
+            axes.imshow(picture)
+            axes.plot(*view.project(points).T, color=_OUTLINE, path_effects=HALO)
+            if camera is top:
+                reference = view.project(np.zeros((1, 3)))
+                axes.plot(
+                    *reference.T, "+", color=_OUTLINE, markersize=12, path_effects=HALO
+                )
+            axes.set_xlim(0, width)
+            axes.set_ylim(height, 0)
+
+
+def _alone(model: RobotModel, size_m: float) -> Scene:
+    """Return a scene with nothing but one robot."""
+    half_m = 20.0 * size_m
+    capacity_J = model.battery_capacity_J
+    battery = Battery(capacity_J=capacity_J, start_J=capacity_J, reserve_fraction=0.0)
+    return Scene(
+        name=model.name,
+        bounds=(-half_m, -half_m, half_m, half_m),
+        obstacles=(),
+        terrain=(),
+        goals=(),
+        stations=(),
+        robots=(Robot(id="r1", model=model, pose=(0.0, 0.0, 0.0), battery=battery),),
+    )

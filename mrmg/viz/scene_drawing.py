@@ -1,0 +1,338 @@
+"""The map of a scene, drawn with matplotlib on given axes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path as Outline
+from matplotlib.patheffects import withStroke
+from shapely import MultiPolygon, Polygon, box
+from shapely.geometry.base import BaseGeometry
+
+from mrmg import storage
+from mrmg.scene.types import Goal, Region, Robot, Scene, Station
+from mrmg.viz import style
+from mrmg.viz.contours import draw_contours
+from mrmg.viz.map_labels import BOLD, MapLabel, map_labels
+from mrmg.viz.map_shapes import footprint_at
+
+DPI = 110
+_MAP_INCHES = 8.6
+_LEGEND_INCHES = 2.6
+LETTER_POINTS = 10.0
+"""Size of the names on maps: one em."""
+_TIMELESS: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None},
+    "svg": {"Date": None},
+}
+"""Metadata by format, such that equal figures give equal files."""
+HALO = [withStroke(linewidth=2.5, foreground="white")]
+"""What keeps text readable on anything."""
+_MARKERS = {"goal": "o", "station": "s"}
+_LABEL_COLORS = {
+    "goal": style.INK,
+    "station": style.STATION_EDGE,
+    "breakdown": style.RESERVE,
+    "terrain": style.INK,
+    "obstacle": style.ON_OBSTACLE,
+    "height": style.CONTOUR,
+}
+"""Of all kinds but those of robots, which have their robot's."""
+
+
+def new_map_figure(scene: Scene) -> tuple[Figure, Axes]:
+    """Return a figure shaped like the scene, with room for a legend on the right.
+
+    Args:
+        scene: gives the bounds; the axes show them with equal scales, in metres.
+    """
+    x_min, y_min, x_max, y_max = scene.bounds
+    ratio = (y_max - y_min) / (x_max - x_min)
+    width_in = _MAP_INCHES / max(1.0, ratio)
+    height_in = min(max(width_in * ratio, 2.4), _MAP_INCHES)
+    figure = Figure(
+        figsize=(width_in + _LEGEND_INCHES + 0.9, height_in + 0.9),
+        dpi=DPI,
+        layout="constrained",
+        facecolor="white",
+    )
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.set_aspect("equal")
+    margin = 0.01 * max(x_max - x_min, y_max - y_min)
+    axes.set_xlim(x_min - margin, x_max + margin)
+    axes.set_ylim(y_min - margin, y_max + margin)
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    axes.tick_params(colors=style.MUTED, labelsize=9)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    return figure, axes
+
+
+def write_figure(figure: Figure, path: Path) -> None:
+    """Write a figure to `path` atomically, in the format of its suffix."""
+    form = path.suffix.removeprefix(".").lower() or "png"
+    with storage.atomic_path(path) as temporary:
+        figure.savefig(temporary, format=form, metadata=_TIMELESS.get(form))
+
+
+def draw_scene(scene: Scene, path: Path) -> None:
+    """Draw the map of a scene, with its legend, to a picture file.
+
+    Args:
+        scene: what to draw.
+        path: picture to write (PNG, SVG or PDF by its suffix).
+    """
+    figure, axes = new_map_figure(scene)
+    draw_ground(axes, scene)
+    for goal in scene.goals:
+        draw_goal(axes, goal)
+    for station in scene.stations:
+        draw_station(axes, station)
+    draw_robots(axes, scene)
+    axes.set_title(_title(scene), loc="left", fontsize=12, color=style.INK)
+    add_legend(axes, map_legend(scene))
+    draw_labels(axes, scene, map_labels(scene, em_m=letter_m(axes)))
+    write_figure(figure, path)
+
+
+def letter_m(axes: Axes, points: float = LETTER_POINTS) -> float:
+    """Return the size of letters on the ground [m].
+
+    Args:
+        axes: in metres; all that decides their place in the figure is there.
+        points: size of the letters.
+    """
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    figure.draw_without_rendering()
+    pixels_per_m = axes.transData.get_matrix()[0, 0]
+    return float(points / 72.0 * figure.dpi / pixels_per_m)
+
+
+def draw_labels(
+    axes: Axes,
+    scene: Scene,
+    labels: Iterable[MapLabel],
+    points: float = LETTER_POINTS,
+) -> None:
+    """Write the names on a map.
+
+    Args:
+        axes: where to draw, in metres.
+        scene: gives the robots' colours.
+        labels: with their places.
+        points: size of one em.
+    """
+    robots = style.scene_robot_colors(scene)
+    for label in labels:
+        color = _LABEL_COLORS.get(label.kind) or robots[label.of]
+        look: dict[str, Any] = {"color": color, "path_effects": HALO}
+        if label.kind == "stop":
+            bbox = {"boxstyle": "round,pad=0.12", "fc": color, "ec": "white"}
+            look = {"color": "white", "bbox": bbox}
+        elif label.kind == "obstacle":
+            look = {"color": color}
+        axes.text(
+            label.x_m,
+            label.y_m,
+            label.text,
+            fontsize=points * label.size_em,
+            fontweight="bold" if label.kind in BOLD else "normal",
+            ha="center",
+            va="center",
+            zorder=9,
+            **look,
+        ).set_in_layout(False)
+
+
+def draw_ground(axes: Axes, scene: Scene, *, hatched: bool = True) -> None:
+    """Draw bounds, terrain classes, contour lines and obstacles.
+
+    Args:
+        axes: where to draw, in metres.
+        scene: what to draw.
+        hatched: hatch the terrain classes.
+    """
+    bounds = box(*scene.bounds)
+    _add_shape(
+        axes, bounds, facecolor=style.GROUND, edgecolor=style.OBSTACLE_EDGE, zorder=0
+    )
+    classes = style.terrain_classes(scene)
+    for rank, area in enumerate(scene.terrain):
+        look = classes[area.multiplier]
+        _add_shape(
+            axes,
+            area.shape.intersection(bounds),
+            facecolor=look.color,
+            edgecolor="#00000030",
+            linewidth=0.4,
+            hatch=look.hatch if hatched else None,
+            zorder=1 + 0.001 * rank,
+        )
+    for obstacle in scene.barriers:
+        partial = obstacle.blocks is not None
+        _add_shape(
+            axes,
+            obstacle.shape,
+            facecolor=style.obstacle_color(obstacle),
+            edgecolor=style.OBSTACLE_EDGE,
+            linewidth=0.7,
+            linestyle="--" if partial else "-",
+            zorder=3,
+        )
+    draw_contours(axes, scene)
+
+
+def draw_goal(
+    axes: Axes,
+    goal: Goal,
+    *,
+    color: str = style.GOAL_OPEN,
+    points: float = LETTER_POINTS,
+) -> None:
+    """Draw a goal region; a colour other than white means visited."""
+    draw_region(axes, goal.region, color, style.GOAL_EDGE, 0.13 * points)
+
+
+def draw_station(
+    axes: Axes, station: Station, *, points: float = LETTER_POINTS
+) -> None:
+    """Draw a recharging station: its region with a square."""
+    width = 0.13 * points
+    draw_region(axes, station.region, style.STATION, style.STATION_EDGE, width)
+    axes.plot(
+        *station.region.center,
+        marker="s",
+        markersize=0.6 * points,
+        markerfacecolor=style.STATION,
+        markeredgecolor=style.STATION_EDGE,
+        markeredgewidth=0.1 * points,
+        zorder=6,
+    )
+
+
+def draw_region(
+    axes: Axes, region: Region, color: str, edge: str, linewidth: float
+) -> None:
+    """Draw a goal's or station's region."""
+    _add_shape(
+        axes,
+        region.shape,
+        facecolor=color,
+        edgecolor=edge,
+        linewidth=linewidth,
+        zorder=5,
+    )
+
+
+def draw_robots(axes: Axes, scene: Scene) -> None:
+    """Draw every robot's footprint at its start."""
+    colors = style.scene_robot_colors(scene)
+    for robot in scene.robots:
+        draw_footprint(axes, robot, robot.pose, facecolor=colors[robot.id], alpha=1.0)
+
+
+def draw_footprint(
+    axes: Axes,
+    robot: Robot,
+    pose: tuple[float, float, float],
+    *,
+    facecolor: str,
+    alpha: float,
+) -> None:
+    """Draw a robot's outline at a pose (x [m], y [m], yaw [rad])."""
+    _add_shape(
+        axes,
+        Polygon(footprint_at(robot, pose)),
+        facecolor=facecolor,
+        edgecolor="white",
+        linewidth=0.9,
+        alpha=alpha,
+        zorder=7,
+    )
+
+
+def map_legend(scene: Scene) -> list[Patch | Line2D]:
+    """Return legend handles for all kinds of things the scene holds."""
+    return [_handle(entry) for entry in style.map_key(scene)]
+
+
+def _handle(entry: style.KeyEntry) -> Patch | Line2D:
+    if entry.look == "line":
+        return Line2D([], [], color=entry.color, label=entry.label)
+    if entry.look == "area":
+        return Patch(
+            facecolor=entry.color,
+            edgecolor=entry.edge,
+            hatch=entry.hatch or None,
+            linestyle="--" if entry.dashed else "-",
+            label=entry.label,
+        )
+    return _marker(_MARKERS[entry.look], entry.color, entry.edge, entry.label)
+
+
+def add_legend(axes: Axes, handles: list[Patch | Line2D]) -> None:
+    """Put a legend to the right of the axes."""
+    axes.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(1.01, 1.0),
+        borderaxespad=0.0,
+        frameon=False,
+        fontsize=10,
+        handlelength=1.6,
+        labelspacing=0.65,
+    )
+
+
+def _title(scene: Scene) -> str:
+    counts = [
+        (len(scene.robots), "robot"),
+        (len(scene.goals), "goal"),
+        (len(scene.stations), "station"),
+        (len(scene.terrain), "terrain area"),
+    ]
+    words = [f"{count} {noun}{'' if count == 1 else 's'}" for count, noun in counts]
+    return f"{scene.name}: " + ", ".join(words)
+
+
+def _marker(shape: str, face: str, edge: str, label: str) -> Line2D:
+    return Line2D(
+        [],
+        [],
+        linestyle="none",
+        marker=shape,
+        markersize=9,
+        markerfacecolor=face,
+        markeredgecolor=edge,
+        label=label,
+    )
+
+
+def _add_shape(axes: Axes, shape: BaseGeometry, **look: object) -> None:
+    for polygon in polygons_of(shape):
+        rings = [polygon.exterior, *polygon.interiors]
+        outline = Outline.make_compound_path(
+            *(Outline(np.asarray(ring.coords), closed=True) for ring in rings)
+        )
+        axes.add_patch(PathPatch(outline, **look))
+
+
+def polygons_of(shape: BaseGeometry) -> list[Polygon]:
+    """Return the polygons a geometry is made of; lines and points are left out."""
+    if isinstance(shape, Polygon):
+        return [shape] if not shape.is_empty else []
+    if isinstance(shape, MultiPolygon) or hasattr(shape, "geoms"):
+        return [part for item in shape.geoms for part in polygons_of(item)]
+    return []

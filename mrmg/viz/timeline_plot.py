@@ -1,0 +1,147 @@
+"""The timeline of a mission as a figure: what each robot does when."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from mrmg.plans import Plan
+from mrmg.scene.types import Scene
+from mrmg.simulation.log import ExecutionLog, require_same_mission
+from mrmg.verification import mission_series as series
+from mrmg.viz import scene_drawing, style
+from mrmg.viz.timeline_rows import HIDDEN, TimelineRow, timeline_rows
+
+_WIDTH_INCHES, _BAR_INCHES, _LINE_INCHES = 9.5, 0.24, 0.16
+_NAME_POINTS = 8.5
+_NAMES_EM = 8.0 * 72.0 / _NAME_POINTS
+"""Width of the time axis, at least, in letters of the names."""
+_WAITING: dict[str, Any] = {
+    "facecolor": "white",
+    "edgecolor": style.MUTED,
+    "hatch": "////",
+}
+_EVENT: dict[str, Any] = {
+    "color": style.RESERVE,
+    "linewidth": 1.2,
+    "linestyle": ":",
+}
+_BROKEN: dict[str, Any] = {
+    "facecolor": "white",
+    "edgecolor": style.RESERVE,
+    "hatch": "xxx",
+}
+_CHARGING: dict[str, Any] = {
+    "facecolor": style.STATION,
+    "edgecolor": style.STATION_EDGE,
+}
+
+
+def draw_timeline(
+    scene: Scene, plan: Plan, log: ExecutionLog | None = None, *, path: Path
+) -> None:
+    """Draw what each robot does when, one row per robot, to a picture file.
+
+    Args:
+        scene: gives names, stations and colours.
+        plan: what was to be driven; shown where there is no log.
+        log: what was driven.
+        path: picture to write (PNG, SVG or PDF by its suffix).
+
+    Raises:
+        IdentityError: if scene, plan and log do not belong together.
+    """
+    require_same_mission(scene, plan, log)
+    rows, end_s = timeline_rows(scene, plan, log, (_NAMES_EM,))
+    tops_in = np.cumsum([_row_inches(row) for row in rows])
+    figure = Figure(
+        figsize=(_WIDTH_INCHES, 1.0 + tops_in[-1]),
+        dpi=scene_drawing.DPI,
+        layout="constrained",
+        facecolor="white",
+    )
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.set_xlim(0.0, end_s)
+    for bottom_in, row in zip(tops_in, rows, strict=True):
+        _draw_row(axes, scene, row, float(bottom_in) - _BAR_INCHES, end_s)
+    for event in log.events if log else ():
+        axes.axvline(event.time_s, **_EVENT)
+    axes.set_ylim(tops_in[-1], 0.0)
+    axes.set_yticks(tops_in - _BAR_INCHES, [row.robot for row in rows])
+    axes.set_xlabel("time [s]")
+    for side in ("top", "right", "left"):
+        axes.spines[side].set_visible(False)
+    axes.tick_params(axis="y", length=0)
+    handles: list[Patch | Line2D] = [
+        Patch(facecolor=style.MUTED, label="driving"),
+        Patch(**_WAITING, label="waiting"),
+        Patch(**_CHARGING, label="at a station"),
+    ]
+    if any(row.standing == "broken down" for row in rows):
+        handles.append(Patch(**_BROKEN, label="broken down"))
+    if log and log.events:
+        handles.append(Line2D([], [], **_EVENT, label="stop or new plan"))
+    figure.legend(
+        handles=handles,
+        loc="outside upper right",
+        ncols=len(handles),
+        frameon=False,
+        fontsize=9.5,
+    )
+    scene_drawing.write_figure(figure, path)
+
+
+def _row_inches(row: TimelineRow) -> float:
+    return 2.0 * _BAR_INCHES + _LINE_INCHES * row.line_count(0)
+
+
+def _draw_row(
+    axes: Axes, scene: Scene, row: TimelineRow, middle_in: float, end_s: float
+) -> None:
+    """Draw a robot's bar about `middle_in` below the top, and names above it."""
+    looks: dict[str, dict[str, Any]] = {
+        series.DRIVING: {"facecolor": style.scene_robot_colors(scene)[row.robot]},
+        series.WAITING: _WAITING,
+        series.CHARGING: _CHARGING,
+        series.BROKEN: _BROKEN,
+    }
+    for span in row.spans:
+        if span.kind in looks:
+            axes.broken_barh(
+                [(span.start_s, span.end_s - span.start_s)],
+                (middle_in - 0.5 * _BAR_INCHES, _BAR_INCHES),
+                **looks[span.kind],
+            )
+    if row.standing == "not used":
+        spot = 0.01 * end_s, middle_in
+        axes.text(
+            *spot, row.standing, fontsize=_NAME_POINTS, color=style.MUTED, va="center"
+        )
+    for named in row.visits:
+        line, time_s = named.lines[0], named.visit.time_s
+        station = named.visit.kind == "station"
+        color = style.STATION_EDGE if station else style.INK
+        top_in = middle_in - 0.65 * _BAR_INCHES - _LINE_INCHES * max(line, 0)
+        bottom_in = middle_in + 0.5 * _BAR_INCHES
+        axes.plot([time_s] * 2, [top_in, bottom_in], color=color, linewidth=0.9)
+        if line != HIDDEN:
+            half_s = 0.5 * named.width_em / _NAMES_EM * end_s
+            axes.text(
+                min(max(time_s, half_s), end_s - half_s),
+                top_in,
+                named.text,
+                fontsize=_NAME_POINTS,
+                ha="center",
+                va="bottom",
+                color=color,
+                bbox={"fc": "white", "ec": "none", "pad": 0.4},
+                zorder=4,
+            )

@@ -1,0 +1,125 @@
+"""The map from above, drawn fast: a still background and small pictures of the robots.
+
+Seen straight from above nothing but the robots moves, so that the background is drawn
+once, and again when a goal is visited; per frame only a few pixels around each robot
+are drawn anew, on the same pixel grid, and those that differ from the background are
+laid over it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from mrmg.viz import style
+from mrmg.viz.ground_image import paint_line
+from mrmg.viz.tags import Label, letter_px
+from mrmg.viz.world_view import WorldView, top_camera
+
+_LEAST_TRAIL_PIXELS = 2.0
+_MARGIN_M = 0.3
+_DIFFERENCE = 10
+
+
+class TopView:
+    """Draws an orthographic view of the whole map."""
+
+    def __init__(
+        self,
+        view: WorldView,
+        *,
+        center_m: np.ndarray,
+        height_m: float,
+        size: tuple[int, int],
+        radius_m: float,
+    ) -> None:
+        """Set the window on the map.
+
+        Args:
+            view: the renderer.
+            center_m: middle of the window, shape (2,).
+            height_m: of the window.
+            size: width and height of the picture [pixels].
+            radius_m: of a circle about a robot's reference point that holds the robot.
+        """
+        self._view = view
+        self._center_m = center_m
+        self._size = size
+        self.pixel_m = height_m / size[1]
+        self._half = math.ceil((radius_m + _MARGIN_M) / self.pixel_m)
+        width = style.DRIVEN.width_em * letter_px(size[1])
+        self._trail_width = max(width, _LEAST_TRAIL_PIXELS)
+        self._still = np.empty((size[1], size[0], 3), dtype=np.uint8)
+        self._background = self._still.copy()
+
+    def to_pixels(self, points: np.ndarray) -> np.ndarray:
+        """Return (column, row) of points [m], shape (n, 2)."""
+        middle = np.array(self._size) / 2.0
+        offset = (points[:, :2] - self._center_m) * (1.0, -1.0) / self.pixel_m
+        return np.asarray(offset + middle)
+
+    def draw_background(
+        self,
+        qpos: np.ndarray,
+        trails: Mapping[str, np.ndarray],
+        labels: Sequence[tuple[Label, np.ndarray]],
+    ) -> None:
+        """Draw everything but the robots.
+
+        Args:
+            qpos: any positions of the model.
+            trails: what was driven so far [m], shape (n, 2) each, by colour.
+            labels: names and where they belong [m], shape (2,).
+        """
+        self._view.place_robots_away(qpos)
+        camera = top_camera(self._center_m)
+        height_m = self.pixel_m * self._size[1]
+        self._view.draw(camera, fovy=height_m, shadows=False, out=self._still)
+        self._background = self._still.copy()
+        for color, points in trails.items():
+            self.extend_trail(points, color)
+        for label, spot in labels:
+            label.blit_about(self._background, self.to_pixels(spot[None])[0])
+
+    def extend_trail(self, points: np.ndarray, color: str) -> None:
+        """Paint a driven way through points [m], shape (n, 2), onto the background."""
+        paint_line(self._background, self.to_pixels(points), self._trail_width, color)
+
+    def draw(
+        self, qpos: np.ndarray, points: Sequence[np.ndarray], out: np.ndarray
+    ) -> None:
+        """Draw the map with its robots into `out`.
+
+        Args:
+            qpos: positions of the model.
+            points: reference point of each robot [m], shape (2,) each.
+            out: picture, shape (height, width, 3) of bytes.
+        """
+        out[:] = self._background
+        self._view.place(qpos)
+        for column, row in np.round(self.to_pixels(np.array(points))).astype(int):
+            self._draw_patch(int(column), int(row), out)
+
+    def _draw_patch(self, column: int, row: int, out: np.ndarray) -> None:
+        half = self._half
+        patch = np.empty((2 * half, 2 * half, 3), dtype=np.uint8)
+        middle = np.array(self._size) / 2.0
+        at = self._center_m + ((column, row) - middle) * (1.0, -1.0) * self.pixel_m
+        fovy = 2 * half * self.pixel_m
+        self._view.draw(top_camera(at), fovy=fovy, shadows=False, out=patch)
+        top, left = max(row - half, 0), max(column - half, 0)
+        bottom, right = (
+            min(row + half, self._size[1]),
+            min(column + half, self._size[0]),
+        )
+        if top >= bottom or left >= right:
+            return
+        inner = patch[
+            top - row + half : bottom - row + half,
+            left - column + half : right - column + half,
+        ]
+        still = self._still[top:bottom, left:right]
+        moved = np.abs(inner.astype(np.int16) - still).max(axis=2) > _DIFFERENCE
+        out[top:bottom, left:right][moved] = inner[moved]

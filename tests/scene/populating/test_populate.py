@@ -1,0 +1,169 @@
+"""Populated maps hold missions that are feasible, and only with recharging."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mrmg.errors import UsageError
+from mrmg.scene.importing import import_map
+from mrmg.scene.loading import load_scene, scene_from_document
+from mrmg.scene.populating import populate
+from mrmg.scene.populating.ground import Ground
+from mrmg.scene.types import Scene
+
+MAPS = Path(__file__).parents[4] / "shared" / "maps"
+FLEET_MAPS = ("complex3-big.txt", "warehouse.txt", "gaps.txt", "triangles.tri")
+PAIR_MAPS = (
+    "potholes.txt",
+    "complex2.txt",
+    "geometry-reduced.txt",
+    "warehouse2.txt",
+    "dense.tri",
+)
+
+FIELD: dict[str, Any] = {
+    "format": 1,
+    "name": "field",
+    "bounds": [0, 0, 60, 40],
+    "obstacles": [{"id": "barn", "box": {"center": [30, 20], "size": [12, 6]}}],
+    "terrain": [{"circle": {"center": [45, 10], "radius": 6}, "multiplier": 2}],
+}
+
+
+def check_mission(document: dict[str, Any], robots: int, goals: int) -> Scene:
+    """What every populated scene must keep."""
+    scene = scene_from_document(document, source="test")
+    assert (len(scene.robots), len(scene.goals)) == (robots, goals)
+    model = scene.robots[0].model
+    ground = Ground.over(
+        scene.bounds,
+        [wall.shape for wall in scene.obstacles],
+        [(area.shape, area.multiplier) for area in scene.terrain],
+        margin_m=model.half_width_m + 0.2,
+    )
+    places = [robot.pose[:2] for robot in scene.robots]
+    places += [tuple(target.region.center) for target in scene.targets()]
+    road = ground.distances([ground.nearest(p) for p in places])[
+        :, [ground.nearest(p) for p in places]
+    ]
+    battery = scene.robots[0].battery
+    usable_J = battery.capacity_J - battery.reserve_J
+    usable_m = usable_J / model.energy_model.plain_ground_J_per_m()
+    start, sites, posts = np.split(np.arange(len(places)), [robots, robots + goals])
+
+    # Every place can be reached, every goal is within half a battery of a station, and
+    # the stations form a chain.
+    assert np.isfinite(road).all()
+    assert road[np.ix_(sites, posts)].min(axis=1).max() <= 0.45 * usable_m
+    assert road[np.ix_(start, posts)].min(axis=1).max() <= 0.7 * usable_m
+    assert _chained(road[np.ix_(posts, posts)] <= 0.9 * usable_m)
+    # No plan does without recharging.
+    farthest_m = road[np.ix_(start, sites)].min(axis=0).max()
+    assert farthest_m > usable_m or _forest_m(road, robots, goals) > robots * usable_m
+    # Places are apart from each other.
+    gaps = [np.hypot(*np.subtract(a, b)) for a, b in combinations(places, 2)]
+    assert min(gaps) > 1.0
+    return scene
+
+
+def _chained(near: np.ndarray) -> bool:
+    reached = near[0]
+    for _ in near:
+        reached = near[reached].any(axis=0) | reached
+    return bool(reached.all())
+
+
+def _forest_m(road: np.ndarray, robots: int, goals: int) -> float:
+    """Return the least spanning forest of the goals, rooted at the robots (Prim)."""
+    inside, outside = list(range(robots)), list(range(robots, robots + goals))
+    total = 0.0
+    while outside:
+        legs = road[np.ix_(inside, outside)]
+        total += legs.min()
+        inside.append(outside.pop(int(legs.min(axis=0).argmin())))
+    return total
+
+
+@pytest.mark.quick("potholes.txt")
+@pytest.mark.parametrize("name", PAIR_MAPS)
+def test_two_robots_on_shared_map(name: str) -> None:
+    path = MAPS / name
+    if not path.exists():
+        pytest.skip(f"{name} is not here")
+    check_mission(populate(import_map(path)), 2, 14)
+
+
+@pytest.mark.quick("gaps.txt")
+@pytest.mark.parametrize("name", FLEET_MAPS)
+def test_fleet_on_shared_map(name: str) -> None:
+    path = MAPS / name
+    if not path.exists():
+        pytest.skip(f"{name} is not here")
+    check_mission(populate(import_map(path), robots=4, goals=20), 4, 20)
+
+
+@pytest.mark.slow
+def test_map_too_narrow_for_the_robot() -> None:
+    path = MAPS / "jf-pb2.txt"
+    if not path.exists():
+        pytest.skip("jf-pb2.txt is not here")
+    with pytest.raises(UsageError, match=r"join only \d+ % .* scale the map up"):
+        populate(import_map(path))
+    check_mission(populate(import_map(path, 300.0)), 2, 14)
+
+
+@pytest.mark.quick("0", "1")
+@pytest.mark.parametrize("seed", range(4))
+def test_seeds(seed: int) -> None:
+    document = populate(FIELD, goals=6, stations=3, seed=seed)
+    check_mission(document, 2, 6)
+    assert document == populate(FIELD, goals=6, stations=3, seed=seed)
+
+
+def test_large_fleet() -> None:
+    check_mission(populate(FIELD, robots=8, goals=120, stations=30), 8, 120)
+
+
+def test_seeds_differ() -> None:
+    documents = [populate(FIELD, goals=6, stations=3, seed=seed) for seed in range(3)]
+    assert len({str(document["goals"]) for document in documents}) == 3
+
+
+def test_map_is_kept_and_mission_replaced() -> None:
+    before = load_scene("quickstart").document
+    after = populate(before, robots=1, goals=3, stations=2)
+    for part in ("name", "bounds", "obstacles", "terrain"):
+        assert after[part] == before[part]
+    check_mission(after, 1, 3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"robots": 0}, "cannot place 0 robots; ask for at least 1"),
+        ({"goals": -1}, "cannot place -1 goals"),
+        ({"stations": 0}, "cannot place 0 stations"),
+        ({"model": "cra"}, "unknown model 'cra'; shipped models: car"),
+        ({"goals": 500}, "506 are wanted; ask for fewer, or scale the map up"),
+        ({"stations": 1, "robots": 30}, "found no mission of 30 robots"),
+    ],
+)
+def test_what_cannot_be_placed(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        populate(FIELD, **{"robots": 1, "stations": 5, **changes})
+
+
+def test_robot_bound_obstacles_are_refused() -> None:
+    wall = {"box": {"center": [10, 10], "size": [2, 2]}, "blocks": ["r1"]}
+    with pytest.raises(UsageError, match="remove 'blocks'"):
+        populate({**FIELD, "obstacles": [wall]})
+
+
+def test_no_room_at_all() -> None:
+    with pytest.raises(UsageError, match="scale the map up"):
+        populate({"format": 1, "name": "box", "bounds": [0, 0, 1, 1]})

@@ -1,0 +1,105 @@
+"""The shared clock: at full rate on time, and waiting for the last robot if late."""
+
+import numpy as np
+import pytest
+
+from mrmg.simulation.fleet_clock import ClockParams, FleetClock, lag_s, turning_lag_s
+
+TICK_S = 0.02
+
+
+def moving(x: float, v: float, heading: float = 0.0) -> list[float]:
+    return [x * np.cos(heading), x * np.sin(heading), heading, v, 0.0]
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.0, -2.5])
+@pytest.mark.parametrize(
+    ("v", "behind_m", "late_s"),
+    [
+        (2.0, 1.0, 0.5),  # forwards
+        (-1.0, -0.4, 0.4),  # backwards, behind means ahead of the nose
+        (2.0, -1.0, -0.5),  # early
+        (0.1, 0.1, 0.2),  # slow: as if at 0.5 m/s
+        (0.0, 0.3, 0.0),  # standing still is never late
+    ],
+)
+def test_lag_is_measured_along_the_way(
+    heading: float, v: float, behind_m: float, late_s: float
+) -> None:
+    state = np.array([moving(0.0, v, heading)])
+    reference = np.array([moving(behind_m, v, heading)])
+    assert lag_s(state[0], reference[0], 0.5) == pytest.approx(late_s)
+
+
+def test_sideways_error_is_no_lag() -> None:
+    state, reference = np.array([moving(0.0, 1.0)]), np.array([moving(0.0, 1.0)])
+    state[0, 1] = 0.5
+    assert lag_s(state[0], reference[0], 0.5) == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(
+    ("omega", "behind_rad", "late_s"),
+    [
+        (1.0, 0.3, 0.3),  # to the left
+        (-0.8, -0.4, 0.5),  # to the right, behind means to the left
+        (1.0, -0.2, -0.2),  # early
+        (0.1, 0.1, 0.2),  # slow: as if at 0.5 rad/s
+        (0.0, 0.3, 0.0),  # not turning is never late
+    ],
+)
+def test_lag_of_a_turn(omega: float, behind_rad: float, late_s: float) -> None:
+    state = np.array([[0.0, 0.0, 2.0, 0.0, omega]])
+    reference = state + [0.0, 0.0, behind_rad, 0.0, 0.0]
+    assert turning_lag_s(state[0], reference[0], 0.5) == pytest.approx(late_s)
+
+
+def test_waits_for_robots_that_turn_and_not_for_wheels_that_are_turned() -> None:
+    """The fifth state is a yaw rate of some robots, a steering angle of others."""
+    planned = np.array([[0.0, 0.0, 0.0, 0.0, 0.5], [0.0, 0.0, 0.0, 0.0, 0.5]])
+    behind = planned - [0.0, 0.0, 1.0, 0.0, 0.0]
+    waiting = FleetClock(np.array([False, True]))
+    going = FleetClock(np.array([False, False]))
+    for _ in range(40):
+        waiting.pace(behind, planned, TICK_S)
+        going.pace(behind, planned, TICK_S)
+    assert waiting.rate == 0.0
+    assert going.rate == 1.0
+
+
+def test_runs_at_full_rate_on_time() -> None:
+    clock = FleetClock()
+    on_time = np.array([moving(1.0, 1.0), moving(3.0, 2.0)])
+    for _ in range(100):
+        clock.pace(on_time, on_time, TICK_S)
+        clock.advance(TICK_S)
+    assert clock.time_s == pytest.approx(100 * TICK_S)
+
+
+def test_waits_for_the_last_robot_and_recovers() -> None:
+    """One late robot stops the clock of all; the rate changes within its slew."""
+    params = ClockParams()
+    clock = FleetClock(params=params)
+    on_time = np.array([moving(1.0, 1.0), moving(3.0, 1.0)])
+    late = on_time.copy()
+    late[1, 0] -= 2.0
+    rates = [clock.rate]
+    for _ in range(40):
+        clock.pace(late, on_time, TICK_S)
+        rates.append(clock.rate)
+    assert rates[-1] == 0.0
+    for _ in range(60):
+        clock.pace(on_time, on_time, TICK_S)
+        rates.append(clock.rate)
+    assert rates[-1] == 1.0
+    change = np.diff(rates)
+    assert change.min() >= -params.slowing_per_s * TICK_S - 1e-12
+    assert change.max() <= params.recovery_per_s * TICK_S + 1e-12
+
+
+def test_never_runs_ahead_of_an_early_fleet() -> None:
+    clock = FleetClock()
+    planned = np.array([moving(1.0, 1.0)])
+    early = np.array([moving(2.0, 1.0)])
+    for _ in range(20):
+        clock.pace(early, planned, TICK_S)
+    assert clock.rate == 1.0

@@ -1,0 +1,373 @@
+"""Every rule is broken once by a minimal plan; a valid plan breaks none.
+
+Oracle: shapely on densely sampled footprints, which sees what the verifier must see.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from mrmg.energy.ledger import EnergyLedger
+from mrmg.plans import Plan, Trajectory
+from mrmg.scene.types import Battery, Finish, Region, Scene
+from mrmg.verification.swept_footprint import footprint_corners
+from mrmg.verification.verdict import Verdict, Violation, ViolationKind
+from mrmg.verification.verify import verify
+
+Kind = ViolationKind
+Case = tuple[Scene, Plan]
+
+TWO_ROBOTS = [
+    {"id": "r1", "model": "car", "pose": [5, 10, 0]},
+    {"id": "r2", "model": "car", "pose": [5, 14, 0]},
+]
+STATION = {"id": "s", "circle": {"center": [10, 10], "radius": 1}}
+WALL = {"id": "wall", "box": {"center": [13.5, 10], "size": [1, 4]}, "height": 1}
+
+
+def with_trajectory(plan: Plan, trajectory: Trajectory) -> Plan:
+    return replace(plan, trajectories=(trajectory, *plan.trajectories[1:]))
+
+
+def with_controls(case: Case, drive: Any, edit: Callable[[list], Any]) -> Case:
+    """Drive r1 with edited controls; keep the stated visits and ledger."""
+    scene, plan = case
+    controls = plan.trajectories[0].control.tolist()
+    edit(controls)
+    return scene, with_trajectory(plan, drive(scene.robots[0], controls))
+
+
+def kinds(verdict: Verdict) -> set[ViolationKind]:
+    return {violation.kind for violation in verdict.violations}
+
+
+def only(verdict: Verdict, kind: ViolationKind) -> Violation:
+    """Return the single violation of a kind."""
+    (violation,) = [item for item in verdict.violations if item.kind is kind]
+    return violation
+
+
+def asked(scene: Scene, plan: Plan, **changes: Any) -> Case:
+    """Return a changed scene, and the plan as if it had been made for that."""
+    changed = replace(scene, **changes)
+    return changed, replace(plan, scene_digest=changed.digest)
+
+
+def broken_scene_mismatch(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    return scene, replace(plan, scene_digest="another")
+
+
+def broken_malformed(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    state = plan.trajectories[0].state.copy()
+    state[4, 2] = np.nan
+    return scene, with_trajectory(plan, replace(plan.trajectories[0], state=state))
+
+
+def broken_start(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    robot = replace(scene.robots[0], pose=(5.25, 10.0, 0.0))
+    return asked(scene, plan, robots=(robot,))
+
+
+def broken_final_rest(case: Any, drive: Any) -> Case:
+    return with_controls(case(), drive, lambda controls: controls.pop())
+
+
+def broken_finish(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    ring = np.zeros((0, 2))
+    region = Region(center=np.array([1.0, 1.0]), radius_m=0.1, corners=ring)
+    finish = Finish(region=region, heading_rad=None, heading_tolerance_rad=0.1)
+    return asked(scene, plan, robots=(replace(scene.robots[0], finish=finish),))
+
+
+def broken_dynamics(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    state = plan.trajectories[0].state.copy()
+    state[40, 0] = np.nextafter(state[40, 0], np.inf)
+    return scene, with_trajectory(plan, replace(plan.trajectories[0], state=state))
+
+
+def broken_state_limit(case: Any, drive: Any) -> Case:
+    def speed_up(controls: list) -> None:
+        controls[20:31] = [[1.0, 0.0]] * 11
+        controls[31:42] = [[-1.0, 0.0]] * 11
+
+    return with_controls(case(), drive, speed_up)
+
+
+def broken_control_limit(case: Any, drive: Any) -> Case:
+    def jerk(controls: list) -> None:
+        controls[20], controls[21] = [1.625, 0.0], [-1.625, 0.0]
+
+    return with_controls(case(), drive, jerk)
+
+
+def broken_obstacle(case: Any, drive: Any) -> Case:
+    return case(obstacles=[WALL])
+
+
+def broken_bounds(case: Any, drive: Any) -> Case:
+    return case(bounds=[0, 0, 18, 20])
+
+
+def broken_robot(case: Any, drive: Any) -> Case:
+    other = {"id": "r2", "model": "car", "pose": [30, 10, 3.141592653589793]}
+    return case(robots=[TWO_ROBOTS[0], other])
+
+
+def broken_goal_missed(case: Any, drive: Any) -> Case:
+    return case(goals=[{"id": "g", "circle": {"center": [15, 14], "radius": 1}}])
+
+
+def broken_dwell(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    return asked(scene, plan, goals=(replace(scene.goals[0], dwell_s=900.0),))
+
+
+def broken_occupied(case: Any, drive: Any) -> Case:
+    station = {"id": "s", "circle": {"center": [5, 12], "radius": 3}}
+    scene, plan = case(robots=TWO_ROBOTS, stations=[station])
+    lone = replace(scene.stations[0], one_at_a_time=True)
+    return asked(scene, plan, stations=(lone,))
+
+
+def broken_tour(case: Any, drive: Any) -> Case:
+    scene, plan = case(stations=[STATION], tour=("s", "g"))
+    return scene, replace(plan, tours={"r1": ("g", "s")})
+
+
+def broken_visit(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    late = replace(plan.visits[0], step=plan.visits[0].step + 2)
+    return scene, replace(plan, visits=(late,))
+
+
+def broken_recharge(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    claim = replace(plan.visits[0], kind="station")
+    return scene, replace(plan, visits=(claim,))
+
+
+def broken_energy(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    battery = Battery(capacity_J=20000.0, start_J=2000.0, reserve_fraction=0.05)
+    robot = replace(scene.robots[0], battery=battery)
+    return asked(scene, plan, robots=(robot,))
+
+
+def broken_late(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    return asked(scene, plan, time_limit_s=plan.makespan_s - 0.5)
+
+
+def broken_ledger(case: Any, drive: Any) -> Case:
+    scene, plan = case()
+    first, *rest = plan.ledger.entries
+    richer = replace(first, energy_J=first.energy_J + 1.0)
+    return scene, replace(plan, ledger=EnergyLedger((richer, *rest)))
+
+
+BROKEN = {kind: globals()[f"broken_{kind.value}"] for kind in Kind}
+
+# Who moves or recharges otherwise than stated also breaks what was stated of it.
+FOLLOWING = {
+    Kind.FINAL_REST: {Kind.LEDGER},
+    Kind.STATE_LIMIT: {Kind.VISIT, Kind.LEDGER},
+    Kind.CONTROL_LIMIT: {Kind.VISIT, Kind.LEDGER},
+    Kind.TOUR: {Kind.VISIT, Kind.LEDGER},
+    Kind.GOAL_MISSED: {Kind.TOUR},
+    Kind.DWELL: {Kind.TOUR, Kind.VISIT, Kind.LEDGER},
+    Kind.RECHARGE: {Kind.VISIT},
+    Kind.ENERGY: {Kind.VISIT},
+}
+
+
+def test_valid_plan_has_no_violation(case: Any) -> None:
+    verdict = verify(*case(stations=[STATION], tour=("s", "g"), robots=TWO_ROBOTS))
+    assert verdict.ok
+    assert verdict.violations == ()
+
+
+@pytest.mark.parametrize("kind", Kind)
+def test_broken_rule_is_found_alone(kind: Kind, case: Any, drive: Any) -> None:
+    verdict = verify(*BROKEN[kind](case, drive))
+    assert not verdict.ok
+    found = kinds(verdict)
+    assert kind in found
+    assert found - {kind} <= FOLLOWING.get(kind, set())
+
+
+@pytest.mark.parametrize("kind", Kind)
+def test_message_names_what_is_broken(kind: Kind, case: Any, drive: Any) -> None:
+    for violation in verify(*BROKEN[kind](case, drive)).violations:
+        assert violation.message.startswith(violation.robot)
+        assert len(violation.message) > 15
+
+
+def test_start_tells_how_far_off(case: Any, drive: Any) -> None:
+    violation = only(verify(*broken_start(case, drive)), Kind.START)
+    assert violation.amount == 0.25
+    assert violation.time_s == 0.0
+
+
+def test_one_ulp_off_the_dynamics_is_found_once(case: Any, drive: Any) -> None:
+    violation = only(verify(*broken_dynamics(case, drive)), Kind.DYNAMICS)
+    assert 4.0 <= violation.time_s <= 4.1
+    assert 0.0 < violation.amount < 1e-14
+
+
+def test_state_limit_reports_the_fastest_moment(case: Any, drive: Any) -> None:
+    violation = only(verify(*broken_state_limit(case, drive)), Kind.STATE_LIMIT)
+    assert violation.amount == pytest.approx(0.1)
+    assert violation.time_s == pytest.approx(3.1)
+
+
+def test_obstacle_contact_is_one_violation_with_its_worst_overlap(
+    case: Any, drive: Any
+) -> None:
+    scene, plan = broken_obstacle(case, drive)
+    violation = only(verify(scene, plan), Kind.OBSTACLE)
+    state = plan.trajectories[0].state
+    shapes = shapely.polygons(footprint_corners(scene.robots[0].model, state))
+    overlap = shapely.area(shapely.intersection(shapes, scene.obstacles[0].shape))
+    assert violation.other == "wall"
+    assert violation.amount == pytest.approx(overlap.max())
+    x_m = np.interp(violation.time_s, np.arange(len(state)) * 0.1, state[:, 0])
+    assert violation.x_m == pytest.approx(x_m, abs=0.01)
+
+
+def test_bounds_violation_is_measured_in_metres(case: Any, drive: Any) -> None:
+    violation = only(verify(*broken_bounds(case, drive)), Kind.BOUNDS)
+    assert violation.amount == pytest.approx(5 + 12 + 1.5 - 18)
+
+
+def test_robots_in_conflict_are_both_named(case: Any, drive: Any) -> None:
+    violation = only(verify(*broken_robot(case, drive)), Kind.ROBOT)
+    assert (violation.robot, violation.other) == ("r1", "r2")
+
+
+def test_energy_violation_tells_the_lack(case: Any, drive: Any) -> None:
+    scene, plan = broken_energy(case, drive)
+    violation = only(verify(scene, plan), Kind.ENERGY)
+    assert violation.amount == pytest.approx(1000.0 - (2000.0 - plan.cost_J))
+
+
+def test_lateness_is_measured_from_the_limit(case: Any, drive: Any) -> None:
+    scene, plan = broken_late(case, drive)
+    violation = only(verify(scene, plan), Kind.LATE)
+    assert violation.amount == pytest.approx(0.5)
+    assert violation.time_s == plan.makespan_s
+    assert verify(*asked(scene, plan, time_limit_s=plan.makespan_s)).ok
+
+
+def test_recharge_keeps_the_battery_above_the_reserve(case: Any) -> None:
+    scene, plan = case(
+        stations=[STATION],
+        tour=("s", "g"),
+        battery={"capacity_J": 1200, "reserve": 0.05},
+    )
+    without = replace(plan, tours={"r1": ("g",)})
+    assert verify(scene, plan).ok
+    assert Kind.ENERGY in kinds(verify(scene, without))
+
+
+def test_malformed_plan_names_every_fault(case: Any) -> None:
+    scene, plan = case(robots=TWO_ROBOTS)
+    short = replace(
+        plan.trajectories[1],
+        state=plan.trajectories[1].state[:-1],
+        control=plan.trajectories[1].control[:-1],
+    )
+    broken = replace(plan, trajectories=(plan.trajectories[0], short), tours={})
+    verdict = verify(scene, broken)
+    assert kinds(verdict) == {Kind.MALFORMED}
+    messages = " ".join(item.message for item in verdict.violations)
+    assert "steps" in messages
+    assert "r2: the plan has no tour" in messages
+    assert verdict.min_obstacle_clearance_m is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "control", "amount"),
+    [
+        (Kind.STATE_LIMIT, (-1.3, 0.0), 0.1),  # faster backwards than v_min
+        (Kind.STATE_LIMIT, (0.0, 0.65), 0.05),  # steered beyond w_max to the left
+        (Kind.STATE_LIMIT, (0.0, -0.65), 0.05),  # and to the right
+        (Kind.CONTROL_LIMIT, (0.0, 1.25), 0.25),  # steered too fast
+    ],
+)
+def test_every_limit_is_watched(
+    kind: Kind,
+    control: tuple[float, float],
+    amount: float,
+    make_scene: Any,
+    make_plan: Any,
+) -> None:
+    there = 10 if kind is Kind.STATE_LIMIT else 1
+    controls = [control] * there + [(-control[0], -control[1])] * there
+    scene = make_scene(goals=[], robots=[{**TWO_ROBOTS[0], "pose": [20, 10, 0]}])
+    plan = make_plan(scene, {"r1": controls}, {"r1": ()})
+    found = [item for item in verify(scene, plan).violations if item.kind is kind]
+    assert max(item.amount for item in found) == pytest.approx(amount)
+
+
+def test_battery_must_hold_the_reserve_on_arrival_at_a_station(case: Any) -> None:
+    scene, plan = case(stations=[STATION], tour=("s", "g"))
+    spent_J = 20000.0 - plan.visits[0].energy_J
+    battery = replace(scene.robots[0].battery, start_J=1000.0 + spent_J - 10.0)
+    robot = replace(scene.robots[0], battery=battery)
+    violation = only(verify(*asked(scene, plan, robots=(robot,))), Kind.ENERGY)
+    assert violation.amount == pytest.approx(10.0)
+    assert violation.time_s == pytest.approx(plan.visits[0].time_s)
+
+
+def test_recharge_before_the_station_is_told_with_its_distance(case: Any) -> None:
+    scene, plan = case(stations=[STATION], tour=("s", "g"))
+    early = replace(plan.visits[0], step=0, time_s=0.0)
+    verdict = verify(scene, replace(plan, visits=(early, *plan.visits[1:])))
+    assert only(verdict, Kind.RECHARGE).amount == pytest.approx(4.0)
+
+
+def test_stated_battery_content_must_be_the_recomputed_one(case: Any) -> None:
+    scene, plan = case()
+    rich = replace(plan.visits[0], energy_J=plan.visits[0].energy_J + 1.0)
+    assert kinds(verify(scene, replace(plan, visits=(rich,)))) == {Kind.VISIT}
+
+
+@settings(
+    max_examples=150,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(
+    st.lists(
+        st.lists(
+            st.floats(allow_nan=True) | st.floats(-20, 20), min_size=7, max_size=7
+        ),
+        min_size=2,
+        max_size=5,
+    )
+)
+def test_nonsense_is_judged_and_never_raises(case: Any, rows: list) -> None:
+    scene, plan = case(obstacles=[WALL])
+    table = np.array(rows)
+    nonsense = replace(
+        plan.trajectories[0], state=table[:, :5], control=table[:-1, 5:].copy()
+    )
+    verdict = verify(scene, with_trajectory(plan, nonsense))
+    assert not verdict.ok
+    with TemporaryDirectory() as folder:
+        verdict.save(Path(folder))
+        assert Verdict.load(Path(folder)) == verdict
