@@ -28,7 +28,7 @@ LONG_MODULES = {
     "_refuel_kernels": 371,
     "_tree_kernels": 369,
     "motion_tree": 353,
-    "run_arguments": 370,
+    "arguments": 370,
     "assembly": 361,
     "schema": 358,
     "types": 353,

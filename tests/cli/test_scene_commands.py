@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from mrmg import shipped
 from mrmg.cli import main
 from mrmg.errors import ExitCode
-from mrmg.scene.new_scene import new_scene
 from mrmg.scene.loading import heading_hints, load_scene, scene_from_document
 from mrmg.scene.loading.schema import SECTIONS, BatteryEntry, SceneDocument
 from mrmg.scene.loading.yaml_text import dump_yaml, parse_yaml
+from mrmg.scene.new_scene import new_scene
 
 SQUARE_MAP = """\
 [SCALE]
