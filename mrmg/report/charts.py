@@ -10,18 +10,18 @@ from typing import Any
 
 import numpy as np
 
+from mrmg.energy.battery_curves import (
+    BatteryCurve,
+    measured_curves,
+    planned_curves,
+    with_recharge_jumps,
+)
 from mrmg.energy.metering import Motion
 from mrmg.plans import Plan
 from mrmg.report.chart_spec import chart, line, rounded
 from mrmg.scene.types import Battery, Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.verification import mission_series as series
-from mrmg.viz.energy_plot import (
-    BatteryCurve,
-    measured_curves,
-    planned_curves,
-    with_recharge_jumps,
-)
 
 _MOST_SAMPLES = 1200
 _FINEST_S = 0.1

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from mrmg import storage
+from mrmg.energy.battery_curves import BatteryCurve, measured_curves, planned_curves
 from mrmg.report import chart_spec
 from mrmg.report import page as html
 from mrmg.report.compare import Comparison
@@ -16,7 +17,6 @@ from mrmg.report.map import mission_map
 from mrmg.runs.record import RunRecord
 from mrmg.verification.mission_series import shown_motions, shown_visits
 from mrmg.viz import style
-from mrmg.viz.energy_plot import BatteryCurve, measured_curves, planned_curves
 
 _SAMPLES = 800
 _SHORTEST_S = 0.1

@@ -8,13 +8,13 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from mrmg.energy.audit import measured_step_energy
+from mrmg.energy.battery_curves import BatteryCurve, measured_curves
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
 from mrmg.simulation.world_model import build_world
 from mrmg.verification.mission_series import breakdowns, standing_of
 from mrmg.viz import style
-from mrmg.viz.energy_plot import BatteryCurve, measured_curves
 from mrmg.viz.ground_image import TrailPainter, video_labels
 from mrmg.viz.map_shapes import enclosing_circle
 from mrmg.viz.overlay import Panel, Reading, RobotReading

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from mrmg.energy.audit import audit
+from mrmg.energy.battery_curves import measured_curves
 from mrmg.report.charts import chart_data
 from mrmg.report.map import mission_map
-from mrmg.viz.energy_plot import measured_curves
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mrmg.energy.audit import audit
+from mrmg.energy.battery_curves import measured_curves
 from mrmg.energy.metering import battery_profile
 from mrmg.errors import UsageError
 from mrmg.planning import plan_mission
@@ -21,7 +22,6 @@ from mrmg.simulation.log import ExecutionLog
 from mrmg.supervision import Drive, drive_mission
 from mrmg.verification.mission_series import energy_by_terrain
 from mrmg.verification.verify import verify
-from mrmg.viz.energy_plot import measured_curves
 
 
 def assert_equal_logs(first: ExecutionLog, second: ExecutionLog) -> None:
