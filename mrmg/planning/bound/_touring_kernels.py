@@ -1,205 +1,264 @@
-"""Compiled part of the touring bound: cheapest tours by where goals are first touched.
+"""Compiled label setting: the cheapest tours of a fleet, in order of goals visited.
 
 A fleet's tours are one chain: robots drive one after the other, each from its own start
 with the goals visited that those before it left behind. States are (robot, goals
-visited, place, arc of the place's border).
+visited, node, arc of the node's border); nodes are targets and, last, the start. A
+label of a state is a cost and the energy left, and is dropped where another one costs
+no more and leaves no less (resource-constrained shortest paths, Desrochers 1988).
+
+What a leg drains a battery by and what it costs are two things: the cost may be energy,
+time or nothing, and it may depend on the arcs where regions are touched.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import by_pointer, kernel, leaf_kernel
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 
 NOTHING = -1
 """Parent of the first label."""
 
 
+@by_pointer
+class Completions(NamedTuple):
+    """What the rest of a mission costs at least, were batteries to last for ever.
+
+    Attributes:
+        from_station: least cost from station to goal over any stations, (R, S, G).
+        to_finish: least cost from node to finish over any stations, (R, T + 1).
+        after: with a robot at a goal and goals visited, shape (R, 2^G, G).
+        before: with a robot that has not set out, shape (R + 1, 2^G).
+    """
+
+    from_station: np.ndarray
+    to_finish: np.ndarray
+    after: np.ndarray
+    before: np.ndarray
+
+
+@by_pointer
+class TourSearch(NamedTuple):
+    """What cheapest tours are sought among.
+
+    Attributes:
+        routing: the problem, whose costs drain batteries.
+        goal_list: the open goals, shape (G,).
+        leg: what legs cost from arc to arc, shape (R, T + 1, K, T, K); row T is the
+            start, in whose arc 0 robots are.
+        finish: what the last leg costs from each node, shape (R, T + 1).
+        rest: bounds of what is still to come, by which labels are dropped.
+        most: cost of tours of interest; others may be missed.
+    """
+
+    routing: RoutingArrays
+    goal_list: np.ndarray
+    leg: np.ndarray
+    finish: np.ndarray
+    rest: Completions
+    most: float
+
+
+@by_pointer
+class Labels(NamedTuple):
+    """Labels in the order in which they were set, and room for candidates.
+
+    Memory that is not written is not used.
+
+    Attributes:
+        value: cost and energy left, shape (N, 2).
+        trace: robot, node, arc and parent, shape (N, 4).
+        first: number of the first label of the present robot with each set of goals
+            visited, and of the end, shape (2^G + 1,).
+        offer, origin: candidates' values and parents, shape (N, 2) and (N,).
+    """
+
+    value: np.ndarray
+    trace: np.ndarray
+    first: np.ndarray
+    offer: np.ndarray
+    origin: np.ndarray
+
+
 @kernel
-def least_completions(way, start):
-    """Return bounds of what visiting the rest of the goals costs.
+def completions(between, from_start, from_station, to_finish, goal_list):
+    """Return the bounds of what visiting the rest of the goals costs.
 
     Args:
-        way: from goal to goal by any stations, shape (R, G, G).
-        start: from start to goal, shape (R, G).
-
-    Returns:
-        (after, before): with a robot at a goal, shape (R, 2^G, G), and with a robot
-        that has not set out, shape (R + 1, 2^G).
+        between: least cost from goal to goal over any stations, shape (R, G, G).
+        from_start: from start to goal, shape (R, G).
+        from_station, to_finish: as in `Completions`.
+        goal_list: the open goals, shape (G,).
     """
-    robots, n = start.shape
+    robots, n = from_start.shape
     full = (1 << n) - 1
     after = np.full((robots, full + 1, n), np.inf)
     before = np.full((robots + 1, full + 1), np.inf)
     before[robots, full] = 0.0
     for r in range(robots - 1, -1, -1):
         for mask in range(full, -1, -1):
+            done = before[r + 1, mask]
             for g in range(n):
                 if not mask >> g & 1:
                     continue
-                least = before[r + 1, mask]
+                least = to_finish[r, goal_list[g]] + done
                 for u in range(n):
                     if not mask >> u & 1:
-                        least = min(least, way[r, g, u] + after[r, mask | 1 << u, u])
+                        on = between[r, g, u] + after[r, mask | 1 << u, u]
+                        least = min(least, on)
                 after[r, mask, g] = least
-            least = before[r + 1, mask]
+            least = to_finish[r, -1] + done
             for u in range(n):
                 if not mask >> u & 1:
-                    least = min(least, start[r, u] + after[r, mask | 1 << u, u])
+                    least = min(least, from_start[r, u] + after[r, mask | 1 << u, u])
             before[r, mask] = least
-    return after, before
+    return Completions(from_station, to_finish, after, before)
 
 
 @kernel
-def touring_labels(problem, goal_list, leg, from_station, after, before, most, room):
-    """Return the cheapest tours of a fleet that cost at most `most`.
+def cheapest_tours(search, room):
+    """Return the least cost of visiting each set of goals, and its tours' labels.
 
     Args:
-        problem: the routing problem of least legs, which drain batteries.
-        goal_list: the open goals, shape (G,).
-        leg: what legs cost from arc to arc, shape (R, T + 1, K, T, K); row T is the
-            start, in whose arc 0 robots are.
-        from_station: least cost from station to goal, shape (R, S, G).
-        after, before: as `least_completions` returns them.
-        most: cost of tours of interest; others may be missed.
+        search: `TourSearch`.
         room: labels at most.
 
     Returns:
-        (cost, last, trace): of the cheapest tours, inf if none costs at most `most`;
-        their last label; and robot, place, arc and parent of each label, shape (n, 4).
-        No labels if there are more than there is room for.
+        (cost, last, trace): of each set of goals, inf where no tours visit it that cost
+        at most `search.most`, shape (2^G,); the last label of its tours; and `trace` as
+        in `Labels`, which is empty if there are more labels than there is room for.
     """
-    n = len(goal_list)
-    targets, arcs = leg.shape[3], leg.shape[4]
-    goals = problem.goals
-    stations = targets - goals
-    masks = 1 << n
+    problem = search.routing
+    n, start = len(search.goal_list), search.leg.shape[3]
+    sets = 1 << n
+    labels = Labels(
+        np.empty((room, 2)),
+        np.empty((room, 4), np.int32),
+        np.zeros(sets + 1, np.int64),
+        np.empty((room, 2)),
+        np.empty(room, np.int32),
+    )
+    cost = np.full(sets, np.inf)
+    last = np.full(sets, NOTHING, np.int32)
+    cost[0] = 0.0
     count = 0
-    label = np.empty((1024, 2))
-    trace = np.empty((1024, 4), np.int32)
-    base = np.full(masks, np.inf)
-    base_from = np.full(masks, NOTHING, np.int32)
-    base[0] = 0.0
-    offer = np.empty((64, 2))
-    origin = np.empty(64, np.int32)
     for r in range(len(problem.energy)):
-        first_of = np.zeros(masks + 1, np.int64)
-        for mask in range(masks):
-            first_of[mask] = count
-            label, trace = _with_room(label, trace, count + 1 + stations * arcs)
-            if base[mask] + before[r, mask] <= most:
-                label[count, 0], label[count, 1] = base[mask], problem.energy[r]
-                trace[count, 0], trace[count, 1] = r, targets
-                trace[count, 2], trace[count, 3] = 0, base_from[mask]
+        labels.first[0] = count
+        for mask in range(sets):
+            if cost[mask] < np.inf and (
+                cost[mask] + search.rest.before[r, mask] <= search.most
+            ):
+                if count < room:
+                    _set(labels, count, cost[mask], problem.energy[r])
+                    _trace(labels, count, r, start, 0, last[mask])
                 count += 1
             for g in range(n):
-                rest = mask ^ (1 << g)
-                ahead = after[r, mask, g]
-                if not mask >> g & 1 or first_of[rest] == first_of[rest + 1]:
-                    continue
-                goal = goal_list[g]
-                low, high = first_of[rest], first_of[rest + 1]
-                if high - low > len(origin):
-                    offer = np.empty((2 * (high - low), 2))
-                    origin = np.empty(2 * (high - low), np.int32)
-                for arc in range(arcs):
-                    offers = 0
-                    for k in range(low, high):
-                        place = trace[k, 1]
-                        left = label[k, 1] - problem.cost[r, place, goal]
-                        if left < problem.reserve[r]:
-                            continue
-                        cost = label[k, 0] + leg[r, place, trace[k, 2], goal, arc]
-                        if cost + ahead <= most:
-                            offer[offers, 0], offer[offers, 1] = cost, left
-                            origin[offers] = k
-                            offers += 1
-                    label, trace = _with_room(
-                        label, trace, count + offers + 1 + stations * arcs
-                    )
-                    most_left = -np.inf
-                    for k in np.argsort(offer[:offers, 0], kind="mergesort"):
-                        if offer[k, 1] <= most_left:
-                            continue
-                        most_left = offer[k, 1]
-                        label[count, 0], label[count, 1] = offer[k, 0], offer[k, 1]
-                        trace[count, 0], trace[count, 1] = r, goal
-                        trace[count, 2], trace[count, 3] = arc, origin[k]
-                        count += 1
-                if count > room:
-                    return np.inf, -1, trace[:0]
-            count = _append_stations(
-                problem,
-                r,
-                goal_list,
-                leg,
-                from_station,
-                after,
-                most,
-                mask,
-                label,
-                trace,
-                first_of[mask],
-                count,
-            )
-            first_of[mask + 1] = count
-        for mask in range(masks):
-            for k in range(first_of[mask], first_of[mask + 1]):
-                if trace[k, 1] < goals and label[k, 0] < base[mask]:
-                    base[mask] = label[k, 0]
-                    base_from[mask] = k
-    return base[masks - 1], base_from[masks - 1], trace[:count]
+                if mask >> g & 1 and count <= room:
+                    count = _visit_goal(search, labels, r, mask, g, count)
+            if count <= room:
+                count = _visit_stations(search, labels, r, mask, count)
+            if count > room:
+                return cost, last, labels.trace[:0]
+            labels.first[mask + 1] = count
+        _end_tours(search, labels, r, cost, last)
+    return cost, last, labels.trace[:count]
+
+
+@leaf_kernel
+def _set(labels, k, cost, left):
+    """Write the value of label k."""
+    labels.value[k, 0], labels.value[k, 1] = cost, left
+
+
+@leaf_kernel
+def _trace(labels, k, r, node, arc, parent):
+    """Write where label k is, and the label that it continues."""
+    labels.trace[k, 0], labels.trace[k, 1] = r, node
+    labels.trace[k, 2], labels.trace[k, 3] = arc, parent
 
 
 @kernel
-def _with_room(label, trace, count):
-    """Return the arrays, or copies of more than twice the length that hold `count`."""
-    if count <= len(label):
-        return label, trace
-    longer = np.empty((2 * count, 2))
-    longer[: len(label)] = label
-    further = np.empty((2 * count, 4), np.int32)
-    further[: len(trace)] = trace
-    return longer, further
+def _visit_goal(search, labels, r, mask, g, count):
+    """Set the labels of robot r at the g-th goal, with a mask's goals visited.
 
-
-@kernel
-def _append_stations(
-    problem,
-    r,
-    goal_list,
-    leg,
-    from_station,
-    after,
-    most,
-    mask,
-    label,
-    trace,
-    low,
-    count,
-):
-    """Write the labels of a robot at the stations with a mask's goals visited."""
-    goals, targets, arcs = problem.goals, leg.shape[3], leg.shape[4]
-    stations = targets - goals
-    cost = np.full((stations, arcs), np.inf)
-    origin = np.full((stations, arcs), -1, np.int32)
-    ahead = np.full(stations, np.inf)
-    for s in range(stations):
-        for u in range(len(goal_list)):
-            if not mask >> u & 1:
-                further = from_station[r, s, u] + after[r, mask | 1 << u, u]
-                ahead[s] = min(ahead[s], further)
-        for k in range(low, count):
-            place = trace[k, 1]
-            left = label[k, 1] - problem.cost[r, place, goals + s]
-            if left < problem.reserve[r]:
+    Returns:
+        The number of labels; more than there is room for if they do not fit.
+    """
+    goal, rest = search.goal_list[g], mask ^ (1 << g)
+    for arc in range(search.leg.shape[4]):
+        offers = _offers(search, labels, r, rest, g, arc)
+        if count + offers > len(labels.value):
+            return len(labels.value) + 1
+        first = count
+        most_left = -np.inf
+        for k in np.argsort(labels.offer[:offers, 0], kind="mergesort"):
+            cost, left = labels.offer[k, 0], labels.offer[k, 1]
+            if left <= most_left:
                 continue
-            for arc in range(arcs):
-                value = label[k, 0] + leg[r, place, trace[k, 2], goals + s, arc]
-                if value < cost[s, arc] and value + ahead[s] <= most:
-                    cost[s, arc] = value
-                    origin[s, arc] = k
-    usable = problem.capacity[r] - problem.reserve[r]
+            if count > first and labels.value[count - 1, 0] == cost:
+                count -= 1  # as costly, and less energy left
+            most_left = left
+            _set(labels, count, cost, left)
+            _trace(labels, count, r, goal, arc, labels.origin[k])
+            count += 1
+    return count
+
+
+@leaf_kernel
+def _offers(search, labels, r, rest, g, arc):
+    """Write what comes of all labels that the g-th goal may follow; return the number.
+
+    Args:
+        search, labels: `TourSearch`, `Labels`.
+        r: robot.
+        rest: goals visited before this one, as bits.
+        g: number of the goal in the list.
+        arc: of its border.
+    """
+    problem = search.routing
+    goal = search.goal_list[g]
+    ahead = search.rest.after[r, rest | 1 << g, g]
+    offers = 0
+    for k in range(labels.first[rest], labels.first[rest + 1]):
+        node = labels.trace[k, 1]
+        left = labels.value[k, 1] - problem.cost[r, node, goal]
+        if left < problem.reserve[r]:
+            continue
+        leg = search.leg[r, node, labels.trace[k, 2], goal, arc]
+        cost = labels.value[k, 0] + leg
+        if leg < np.inf and cost + ahead <= search.most:
+            labels.offer[offers, 0] = cost
+            labels.offer[offers, 1] = min(left, problem.capacity[r])
+            labels.origin[offers] = k
+            offers += 1
+    return offers
+
+
+@kernel
+def _visit_stations(search, labels, r, mask, count):
+    """Set the labels of robot r at the stations with a mask's goals visited.
+
+    A full battery is the same whatever came before, so that costs decide: Dijkstra over
+    the stations' arcs, from the labels of this mask.
+
+    Returns:
+        The number of labels; more than there is room for if they do not fit.
+    """
+    problem, goals = search.routing, search.routing.goals
+    stations, arcs = search.leg.shape[3] - goals, search.leg.shape[4]
+    if count + stations * arcs > len(labels.value):
+        return len(labels.value) + 1
+    cost = np.full((stations, arcs), np.inf)
+    origin = np.full((stations, arcs), NOTHING, np.int32)
+    ahead = np.empty(stations)
+    for s in range(stations):
+        ahead[s] = _after_station(search, r, mask, s)
+    for k in range(labels.first[mask], count):
+        usable = labels.value[k, 1] - problem.reserve[r]
+        _lead_on(search, labels, r, k, usable, ahead, cost, origin)
     done = np.zeros((stations, arcs), np.bool_)
     while True:
         s, arc, least = -1, -1, np.inf
@@ -210,15 +269,63 @@ def _append_stations(
         if s < 0:
             return count
         done[s, arc] = True
-        label[count, 0], label[count, 1] = least, problem.capacity[r]
-        trace[count, 0], trace[count, 1] = r, goals + s
-        trace[count, 2], trace[count, 3] = arc, origin[s, arc]
-        for other in range(stations):
-            if problem.cost[r, goals + s, goals + other] > usable or other == s:
-                continue
-            for j in range(arcs):
-                value = least + leg[r, goals + s, arc, goals + other, j]
-                if value < cost[other, j] and value + ahead[other] <= most:
-                    cost[other, j] = value
-                    origin[other, j] = count
+        _set(labels, count, least, problem.capacity[r])
+        _trace(labels, count, r, goals + s, arc, origin[s, arc])
+        usable = problem.capacity[r] - problem.reserve[r]
+        _lead_on(search, labels, r, count, usable, ahead, cost, origin)
         count += 1
+
+
+@leaf_kernel
+def _lead_on(search, labels, r, k, usable, ahead, cost, origin):
+    """Lower the costs of all stations' arcs to what they are by way of label k.
+
+    Args:
+        search, labels: `TourSearch`, `Labels`.
+        r: robot.
+        k: the label.
+        usable: its energy above the reserve.
+        ahead: bounds of what is still to come after each station, shape (S,).
+        cost, origin: of each station's arcs, and the label before, shape (S, K).
+    """
+    node, from_arc = labels.trace[k, 1], labels.trace[k, 2]
+    goals = search.routing.goals
+    for s in range(len(cost)):
+        if search.routing.cost[r, node, goals + s] > usable or node == goals + s:
+            continue
+        for arc in range(cost.shape[1]):
+            value = labels.value[k, 0] + search.leg[r, node, from_arc, goals + s, arc]
+            if value < cost[s, arc] and value + ahead[s] <= search.most:
+                cost[s, arc] = value
+                origin[s, arc] = k
+
+
+@leaf_kernel
+def _after_station(search, r, mask, s):
+    """Return a bound of what is still to come with robot r at a station."""
+    rest = search.rest
+    least = rest.to_finish[r, search.routing.goals + s] + rest.before[r + 1, mask]
+    for u in range(len(search.goal_list)):
+        if not mask >> u & 1:
+            on = rest.from_station[r, s, u] + rest.after[r, mask | 1 << u, u]
+            least = min(least, on)
+    return least
+
+
+@leaf_kernel
+def _end_tours(search, labels, r, cost, last):
+    """Write the cost of each set of goals once robot r has ended, and its last label.
+
+    A robot that may end where it starts need not have any energy for that.
+    """
+    problem = search.routing
+    for mask in range(len(cost)):
+        cost[mask] = np.inf
+        for k in range(labels.first[mask], labels.first[mask + 1]):
+            node = labels.trace[k, 1]
+            drain = problem.finish[r, node]
+            total = labels.value[k, 0] + search.finish[r, node]
+            enough = drain == 0.0 or labels.value[k, 1] - drain >= problem.reserve[r]
+            if enough and total < cost[mask]:
+                cost[mask] = total
+                last[mask] = k

@@ -35,9 +35,14 @@ from shapely.geometry import Point
 
 from mrmg.planning.bound import _bound_kernels
 from mrmg.planning.bound.arcs import ArcWays
-from mrmg.planning.bound.exact_tours import MOST_GOALS, exact_routing, station_closure
+from mrmg.planning.bound.exact_tours import (
+    MOST_GOALS,
+    completions,
+    exact_routing,
+    over_stations,
+)
 from mrmg.planning.bound.geodesic import Ground, Ways
-from mrmg.planning.bound.touring import Completions, near_routing, touring_bound_J
+from mrmg.planning.bound.touring import touring_bound_J
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
@@ -100,15 +105,15 @@ def lower_bound_J(
     if len(scene.goals) > MOST_GOALS:
         bound = relaxed_routing_J(problem)
     else:
-        completions = Completions.of(problem)
-        routing = near_routing(problem, completions) or exact_routing(problem)
+        rest = completions(problem)
+        routing = exact_routing(problem, rest)
         if routing is None:
             bound = relaxed_routing_J(problem)
         elif routing.feasible and rounds and not halt[0]:
             ways = relaxed.arc_ways(finer)
             bound = touring_bound_J(
                 problem,
-                completions,
+                rest,
                 routing.tours,
                 ways,
                 relaxed.price,
@@ -267,34 +272,16 @@ def relaxed_routing_J(problem: RoutingArrays) -> float:
     Robots are exchangeable but for their starts, and batteries only limit single legs;
     the bound is that of spanning trees with prices (`_bound_kernels.spanning_bound`).
     """
+    goals, start = problem.goals, problem.cost.shape[2]
     goal_list = np.flatnonzero(problem.open_goal)
     if not len(goal_list):
         return 0.0
-    between, start = [], []
-    for r in range(len(problem.energy)):
-        hop, _ = station_closure(problem, r)
-        cost = problem.cost[r]
-        usable = problem.capacity[r] - problem.reserve[r]
-        first = problem.energy[r] - problem.reserve[r]
-        here = cost[-1].copy()
-        here[here > first] = np.inf
-        legs = cost[:-1].copy()
-        legs[legs > usable] = np.inf
-        goals = problem.goals
-        way, own = legs[:goals, :goals], here[:goals]
-        if len(hop):
-            to_goal = _over(hop, legs[goals:, :goals])
-            way = np.minimum(way, _over(legs[:goals, goals:], to_goal))
-            own = np.minimum(own, _over(here[None, goals:], to_goal)[0])
-        between.append(way[np.ix_(goal_list, goal_list)])
-        start.append(own[goal_list])
-    cheapest = np.min(between, axis=0)
-    symmetric = np.ascontiguousarray(np.minimum(cheapest, cheapest.T))
-    return float(
-        _bound_kernels.spanning_bound(symmetric, np.array(start), SPANNING_ROUNDS)
-    )
-
-
-def _over(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return the least sums of legs over the places between, (A, S) + (S, B)."""
-    return np.asarray((first[:, :, None] + second[None]).min(axis=1))
+    usable = np.array([problem.capacity, problem.energy]) - problem.reserve
+    most = np.broadcast_to(usable[0, :, None, None], problem.cost.shape).copy()
+    most[:, start] = usable[1, :, None]
+    legs = np.where(problem.cost <= most, problem.cost, np.inf)
+    legs = over_stations(legs, range(goals, start))[..., goal_list]
+    between = np.min(legs[:, goal_list], axis=0)
+    symmetric = np.ascontiguousarray(np.minimum(between, between.T))
+    first = np.ascontiguousarray(legs[:, start])
+    return float(_bound_kernels.spanning_bound(symmetric, first, SPANNING_ROUNDS))

@@ -1,117 +1,151 @@
 """Exact tours of small missions: who visits what, in which order and where to charge.
 
-Label setting over (goals visited, node) per robot, where a label is (cost, energy left)
-and one that costs no less and leaves no more energy is dropped; then the best division
-of the goals among the robots.
+Label setting over (goals visited, node), robot after robot (`_touring_kernels`), first
+among tours that cost little more than if batteries lasted for ever.
 """
 
 from __future__ import annotations
 
 import math
-import os
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from mrmg.planning.bound import _bound_kernels
+from mrmg.planning.bound import _touring_kernels
+from mrmg.planning.bound._touring_kernels import Completions, TourSearch
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import Routing
 
 MOST_GOALS = 14
 """Goals up to which tours are exact."""
 
-MOST_LABELS = 3_000_000
-"""Labels per robot up to which tours are exact."""
+MOST_LABELS = 4_000_000
+"""Labels up to which tours are exact."""
+
+SHARES = (0.02, 0.08, math.inf)
+"""What the cheapest tours may cost more than if batteries lasted for ever, as a share
+of that: they are sought within the first share, then within the next."""
 
 
-def exact_routing(problem: RoutingArrays) -> Routing | None:
+def exact_routing(
+    problem: RoutingArrays, rest: Completions | None = None
+) -> Routing | None:
     """Return the cheapest tours there are, stations in any number and order.
 
-    Label setting over (goals visited, place) per robot, where a label is (cost, energy
-    left) and one that costs no less and leaves no more energy is dropped; then the best
-    division of the goals among the robots. Costs need not be a metric.
+    Costs need not be a metric.
+
+    Args:
+        problem: the mission.
+        rest: its completions; worked out if None.
 
     Returns:
         The tours, with infinite cost if there are none; None if the mission is too
         large (more than MOST_GOALS open goals or MOST_LABELS labels), or if time
         matters in it.
     """
-    goal_list = np.flatnonzero(problem.open_goal)
     timed = problem.makespan_weight > 0.0 or bool((problem.limit < np.inf).any())
-    if timed or len(goal_list) > MOST_GOALS:
+    if timed or problem.open_goal.sum() > MOST_GOALS:
         return None
-    fleet = np.full(1 << len(goal_list), np.inf)
-    fleet[0] = 0.0
-    ways, shares = [], []
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as threads:
-        found = [
-            threads.submit(RobotWays, problem, r, goal_list)
-            for r in range(len(problem.energy))
-        ]
-        for future in found:
-            way = future.result()
-            if not way.complete:
-                threads.shutdown(cancel_futures=True)
-                return None
-            fleet, share = _bound_kernels.join_robot(fleet, way.cost)
-            ways.append(way)
-            shares.append(share)
-    mask = len(fleet) - 1
-    if not np.isfinite(fleet[mask]):
-        return Routing(tuple(() for _ in ways), math.inf)
-    tours: list[tuple[int, ...]] = []
-    for way, share in zip(reversed(ways), reversed(shares), strict=True):
-        tours.append(way.tour(int(share[mask])))
-        mask ^= int(share[mask])
-    return Routing(tuple(reversed(tours)), float(fleet[-1]))
+    rest = rest or completions(problem)
+    least_J = float(rest.before[0, 0])
+    leg = np.ascontiguousarray(problem.cost[:, :, None, :, None])
+    for share in SHARES if math.isfinite(least_J) else ():
+        most_J = math.inf if math.isinf(share) else (1.0 + share) * least_J
+        found = cheapest_tours(problem, leg, rest, most_J)
+        if found is None or found.feasible:
+            return found
+    return Routing(tuple(() for _ in problem.energy), math.inf)
 
 
-class RobotWays:
-    """The undominated ways of one robot to visit each subset of the goals."""
+def cheapest_tours(
+    problem: RoutingArrays, leg: np.ndarray, rest: Completions, most: float
+) -> Routing | None:
+    """Return the cheapest tours if they cost `most` or less.
 
-    def __init__(self, problem: RoutingArrays, r: int, goal_list: np.ndarray) -> None:
-        self.goal_list = goal_list
-        self.goals = problem.goals
-        self.hop, self.next_station = station_closure(problem, r)
-        self.label, self.parent, self.start_of, station, self.came = (
-            _bound_kernels.subset_labels(problem, r, self.hop, goal_list, MOST_LABELS)
-        )
-        self.cost, self.last = _bound_kernels.cheapest_labels(
-            problem, r, goal_list, self.label, self.start_of, station
-        )
-        self.complete = int(self.start_of[-1]) == len(self.label)
+    Args:
+        problem: the mission, whose costs drain batteries.
+        leg: what legs cost from arc to arc, shape (R, T + 1, K, T, K).
+        rest: completions of the mission.
+        most: cost of tours of interest.
 
-    def tour(self, mask: int) -> tuple[int, ...]:
-        """Return the cheapest tour through a subset of the goals."""
-        backwards: list[int] = []
-        label = int(self.last[mask])
-        while label != -1:
-            if label <= -2:
-                station = -2 - label
-                label, first = (int(i) for i in self.came[mask, station])
-                chain = [first]
-                while chain[-1] != station:
-                    chain.append(int(self.next_station[chain[-1], station]))
-                backwards += [self.goals + s for s in reversed(chain)]
-                continue
-            state = int(np.searchsorted(self.start_of, label, side="right")) - 1
-            goal = state % len(self.goal_list)
-            mask = state // len(self.goal_list) ^ (1 << goal)
-            backwards.append(int(self.goal_list[goal]))
-            label = int(self.parent[label])
-        return tuple(reversed(backwards))
+    Returns:
+        Tours, of infinite cost if all cost more; None if that takes too many labels to
+        tell.
+    """
+    goal_list = np.flatnonzero(problem.open_goal)
+    search = TourSearch(problem, goal_list, leg, problem.finish, rest, most)
+    cost, last, trace = _touring_kernels.cheapest_tours(search, MOST_LABELS)
+    if not len(trace):
+        return None
+    tours: list[list[int]] = [[] for _ in problem.energy]
+    label = int(last[-1]) if np.isfinite(cost[-1]) else -1
+    while label >= 0:
+        robot, node, _, label = trace[label].tolist()
+        if node < leg.shape[3]:
+            tours[robot].insert(0, node)
+    return Routing(tuple(tuple(tour) for tour in tours), float(cost[-1]))
 
 
-def station_closure(problem: RoutingArrays, r: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return (least cost, next station) from station to station over any others."""
-    goals = problem.goals
-    hop = problem.cost[r, goals:-1, goals:].copy()
-    hop[hop > problem.capacity[r] - problem.reserve[r]] = np.inf
-    np.fill_diagonal(hop, 0.0)
-    follower = np.tile(np.arange(len(hop)), (len(hop), 1))
-    for k in range(len(hop)):
-        over = hop[:, k : k + 1] + hop[k : k + 1]
-        shorter = over < hop
-        hop = np.where(shorter, over, hop)
-        follower = np.where(shorter, follower[:, k : k + 1], follower)
-    return np.ascontiguousarray(hop), follower
+def least_costs(
+    problem: RoutingArrays, goals: np.ndarray, *, free: bool = False
+) -> np.ndarray | None:
+    """Return the least cost of visiting each set of goals, inf where it is impossible.
+
+    Args:
+        problem: a mission, whose costs drain batteries.
+        goals: numbers of n goals, the only ones to be visited.
+        free: count nothing for legs that can be driven: only batteries matter.
+
+    Returns:
+        Shape (2^n,); None if that takes too many labels.
+    """
+    robots, nodes, targets = problem.cost.shape
+    cost, finish = problem.cost, problem.finish
+    if free:
+        cost, finish = (np.where(np.isfinite(one), 0.0, one) for one in (cost, finish))
+    sets = 1 << len(goals)
+    nothing = Completions(
+        np.zeros((robots, targets - problem.goals, len(goals))),
+        np.zeros((robots, nodes)),
+        np.zeros((robots, sets, len(goals))),
+        np.zeros((robots + 1, sets)),
+    )
+    leg = np.ascontiguousarray(cost[:, :, None, :, None])
+    search = TourSearch(problem, goals, leg, finish, nothing, math.inf)
+    least, _, trace = _touring_kernels.cheapest_tours(search, MOST_LABELS)
+    return np.asarray(least) if len(trace) else None
+
+
+def completions(problem: RoutingArrays) -> Completions:
+    """Return what the rest of a mission costs at least, for all that may be done."""
+    goals, start = problem.goals, problem.cost.shape[2]
+    cost = np.concatenate([problem.cost, problem.finish[:, :, None]], axis=2)
+    cost = over_stations(cost, range(goals, start))
+    goal_list = np.flatnonzero(problem.open_goal)
+    found: Completions = _touring_kernels.completions(
+        np.ascontiguousarray(cost[:, goal_list][:, :, goal_list]),
+        np.ascontiguousarray(cost[:, start, goal_list]),
+        np.ascontiguousarray(cost[:, goals:start, goal_list]),
+        np.ascontiguousarray(cost[:, :, start]),
+        goal_list,
+    )
+    return found
+
+
+def over_stations(cost: np.ndarray, stations: range) -> np.ndarray:
+    """Return the least costs over any stations (Floyd 1962, Warshall 1962).
+
+    Args:
+        cost: from node to node, shape (R, N, M), where the first nodes are the same.
+        stations: numbers of the nodes that may lie on the way.
+    """
+    for k in stations:
+        cost = np.minimum(cost, cost[:, :, k, None] + cost[:, None, k])
+    return cost
+
+
+def of_robot(problem: RoutingArrays, r: int) -> RoutingArrays:
+    """Return the mission of one robot of a fleet alone."""
+    names = ("cost", "energy", "capacity", "reserve", "escape", "finish")
+    timed = ("time", "finish_time", "limit", "charge_power")
+    own = {name: getattr(problem, name)[r : r + 1] for name in names + timed}
+    return problem._replace(**own)

@@ -19,7 +19,7 @@ import numpy as np
 
 from mrmg.planning.bound import _bound_kernels
 from mrmg.planning.bound.bound import CELLS, ROUNDING_SHARE, Relaxation, most_descent_J
-from mrmg.planning.bound.exact_tours import MOST_GOALS, RobotWays
+from mrmg.planning.bound.exact_tours import MOST_GOALS, least_costs, of_robot
 from mrmg.planning.bound.makespan_bound import least_times_s
 from mrmg.planning.halting import NEVER
 from mrmg.scene.objective import Objective
@@ -60,11 +60,14 @@ class Divisions:
             return None
         problem = Relaxation.of(scene, step_s=step_s, cells=cells, halt=halt).problem
         goals = np.arange(len(scene.goals))
-        ways = [RobotWays(problem, r, goals) for r in range(len(scene.robots))]
-        if not all(way.complete for way in ways):
-            return None
+        energy_J = []
+        for r in range(len(scene.robots)):
+            own_J = least_costs(of_robot(problem, r), goals)
+            if own_J is None:
+                return None
+            energy_J.append(own_J)
         return Divisions(
-            energy_J=np.array([way.cost for way in ways]),
+            energy_J=np.array(energy_J),
             time_s=least_times_s(scene, step_s=step_s, cells=cells, halt=halt),
             descent_J=sum(most_descent_J(scene, robot) for robot in scene.robots),
         )

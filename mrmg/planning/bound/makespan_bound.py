@@ -23,7 +23,7 @@ from mrmg.planning.bound.bound import (
     Relaxation,
     relaxed_routing_J,
 )
-from mrmg.planning.bound.exact_tours import MOST_GOALS, RobotWays
+from mrmg.planning.bound.exact_tours import MOST_GOALS, least_costs, of_robot
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import routing_arrays
@@ -77,7 +77,8 @@ def least_times_s(
     times_s = []
     for r, robot in enumerate(scene.robots):
         check(halt)
-        way_m = RobotWays(metres, r, goals).cost
+        way_m = least_costs(of_robot(metres, r), goals)
+        assert way_m is not None, "without batteries a state has one label"
         times_s.append(_times_s(robot, way_m, _stays_s(scene)))
     return np.array(times_s)
 

@@ -22,25 +22,22 @@ goals are tried by their most remote ones together and by all others one by one.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
 from mrmg.energy.metering import SHORTEST_ON_SLOPES_S
-from mrmg.planning.bound import _bound_kernels
 from mrmg.planning.bound.bound import Relaxation
-from mrmg.planning.bound.exact_tours import MOST_GOALS
+from mrmg.planning.bound.exact_tours import MOST_GOALS, least_costs, of_robot
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.path_bounds import outer_polygon
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing.shortfall import least_share
+from mrmg.planning.routing.shortfall import least_share, with_batteries
 from mrmg.scene.types import Scene
-
-ENDLESS_J = 1e15
-"""Stands for a battery that never runs out, finite so that differences are."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,94 +137,39 @@ class RelaxedFleet:
     goals: np.ndarray
 
     def visits(self, share: float = 0.0) -> np.ndarray:
-        """Return which subsets the fleet can visit, shape (2^n,).
+        """Return which subsets the fleet can visit and then end, shape (2^n,).
 
         Args:
             share: by which the usable energy of all batteries is larger than it is.
         """
-        fleet = np.full(1 << len(self.goals), np.inf)
-        fleet[0] = 0.0
-        for r in range(len(self.problem.energy)):
-            own = self.robot_visits(r, *(1.0 + share) * self._usable_J(r))
-            fleet, _ = _bound_kernels.join_robot(fleet, np.where(own, 0.0, np.inf))
-        return np.asarray(np.isfinite(fleet))
+        larger = with_batteries(self.problem, share)
+        least = least_costs(larger, self.goals, free=True)
+        assert least is not None, "without costs a state has one label"
+        return np.asarray(np.isfinite(least))
 
     def proof(self) -> NoTours:
         """Return the proof that the fleet cannot visit all goals."""
-        robots = range(len(self.problem.energy))
         subsets = np.flatnonzero(self.visits())
         most = max((int(one) for one in subsets), key=int.bit_count, default=0)
-        nowhere = replace(self, goals=self.goals[:0])
-        singles = {
-            int(goal): replace(self, goals=np.array([goal])) for goal in self.goals
-        }
-        endless = (ENDLESS_J, ENDLESS_J)
+        without_end = np.full_like(self.problem.energy, math.inf)
+        endless = self.problem._replace(energy=without_end, capacity=without_end)
+        goals = [int(goal) for goal in self.goals]
         return NoTours(
-            goals=tuple(singles),
-            left_out=tuple(g for i, g in enumerate(singles) if not most >> i & 1),
-            unreachable=tuple(
-                goal
-                for goal, alone in singles.items()
-                if not any(alone.robot_visits(r, *endless)[1] for r in robots)
-            ),
-            cut_off=tuple(
-                r for r in robots if not nowhere.robot_visits(r, *endless)[0]
-            ),
-            homeless=tuple(
-                r for r in robots if not nowhere.robot_visits(r, *self._usable_J(r))[0]
-            ),
+            goals=tuple(goals),
+            left_out=tuple(g for i, g in enumerate(goals) if not most >> i & 1),
+            unreachable=tuple(g for g in goals if not any(_each_visits(endless, g))),
+            cut_off=_impossible(_each_visits(endless)),
+            homeless=_impossible(_each_visits(self.problem)),
             share=least_share(lambda share: bool(self.visits(share)[-1]))[0],
         )
 
-    def _usable_J(self, r: int) -> np.ndarray:
-        """Return what is above the reserve at the start and in a full battery, (2,)."""
-        problem = self.problem
-        whole = (problem.energy[r], problem.capacity[r])
-        return np.array(whole) - float(problem.reserve[r])
 
-    def robot_visits(self, r: int, start_J: float, full_J: float) -> np.ndarray:
-        """Return which subsets one robot can visit and then end, shape (2^n,).
-
-        Args:
-            r: robot.
-            start_J: energy above the reserve at the start.
-            full_J: energy above the reserve of a full battery.
-        """
-        n, first = len(self.goals), self.problem.goals
-        cost, finish = self.problem.cost[r], self.problem.finish[r]
-        start = cost.shape[1]
-        hops = _closure(cost[first:start, first:] <= full_J)
-        subset = np.arange(1 << n)
-        size = np.array([int(one).bit_count() for one in subset])
-        left = np.full((1 << n, n), -np.inf)
-        ends = np.zeros(1 << n, bool)
-        place, energy = np.array([start]), np.array([[start_J]])
-        for k in range(n + 1):
-            now = subset[size == k]
-            if k:
-                place, energy = self.goals, left[now]
-            arrives = (energy[:, :, None] >= cost[place, first:]).any(axis=1)
-            at_station = (arrives[:, :, None] & hops).any(axis=1)
-            ends[now] = (energy >= finish[place]).any(axis=1)
-            ends[now] |= (at_station & (full_J >= finish[first:start])).any(axis=1)
-            for g, goal in enumerate(self.goals):
-                ahead = (now >> g & 1) == 0
-                most = (energy[ahead] - cost[place, goal]).max(axis=1)
-                over = np.where(
-                    at_station[ahead], full_J - cost[first:start, goal], -np.inf
-                )
-                most = np.maximum(most, over.max(axis=1, initial=-np.inf))
-                most = np.where(most >= 0.0, np.minimum(most, full_J), -np.inf)
-                left[now[ahead] | 1 << g, g] = most
-        for g in range(n):  # whoever can visit more can visit less
-            without = subset[(subset >> g & 1) == 0]
-            ends[without] |= ends[without | 1 << g]
-        return ends
+def _each_visits(problem: RoutingArrays, *goals: int) -> list[bool]:
+    """Return which robots of a fleet can each visit goals and then end."""
+    wanted = np.array(goals, np.int64)
+    alone = [of_robot(problem, r) for r in range(len(problem.energy))]
+    return [bool(RelaxedFleet(own, wanted).visits()[-1]) for own in alone]
 
 
-def _closure(hops: np.ndarray) -> np.ndarray:
-    """Return from which station which others can be got to over any others."""
-    joined = np.asarray(hops | np.eye(len(hops), dtype=bool))
-    for k in range(len(joined)):
-        joined |= joined[:, k : k + 1] & joined[k : k + 1]
-    return joined
+def _impossible(possible: list[bool]) -> tuple[int, ...]:
+    return tuple(r for r, can in enumerate(possible) if not can)

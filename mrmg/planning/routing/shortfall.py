@@ -41,13 +41,10 @@ def shortfall(problem: RoutingArrays, params: RouterParams, seed: int) -> Shortf
     """Return what a routing problem without tours is short of."""
 
     def tours(battery_share: float, time_share: float) -> Routing:
-        larger = 1.0 + battery_share
-        reserve, limit = problem.reserve, problem.limit
-        endless = np.full_like(limit, math.inf)  # also where the limit is 0
-        eased = problem._replace(
-            energy=reserve + larger * (problem.energy - reserve),
-            capacity=reserve + larger * (problem.capacity - reserve),
-            limit=endless if math.isinf(time_share) else limit * (1.0 + time_share),
+        endless = np.full_like(problem.limit, math.inf)  # also where the limit is 0
+        limit = problem.limit * (1.0 + time_share)
+        eased = with_batteries(problem, battery_share)._replace(
+            limit=endless if math.isinf(time_share) else limit
         )
         return solve_routing(eased, params, seed)
 
@@ -60,6 +57,15 @@ def shortfall(problem: RoutingArrays, params: RouterParams, seed: int) -> Shortf
         battery_share = least_share(lambda share: tours(share, math.inf).feasible)[1]
     return Shortfall(
         left_out=tuple(left_out), battery_share=battery_share, time_share=time_share
+    )
+
+
+def with_batteries(problem: RoutingArrays, share: float) -> RoutingArrays:
+    """Return a problem whose batteries have more usable energy by a share."""
+    reserve = problem.reserve
+    return problem._replace(
+        energy=reserve + (1.0 + share) * (problem.energy - reserve),
+        capacity=reserve + (1.0 + share) * (problem.capacity - reserve),
     )
 
 

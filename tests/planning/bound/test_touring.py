@@ -9,12 +9,11 @@ from itertools import combinations, permutations, product
 import numpy as np
 import pytest
 
-from mrmg.planning.bound._touring_kernels import least_completions, touring_labels
+from mrmg.planning.bound._touring_kernels import Completions
 from mrmg.planning.bound.arcs import ArcWays
 from mrmg.planning.bound.bound import lower_bound_J
-from mrmg.planning.bound.exact_tours import exact_routing
+from mrmg.planning.bound.exact_tours import cheapest_tours, exact_routing
 from mrmg.planning.bound.geodesic import Ground, Ways
-from mrmg.planning.bound.touring import Completions, near_routing
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import routing_arrays
 from mrmg.scene.loading import scene_from_document
@@ -110,55 +109,26 @@ def test_tours_by_arcs_are_the_cheapest(
             capacity=np.full(robots, range_m),
             reserve=np.zeros(robots),
         )
-        free = np.zeros((robots, goals, goals))
-        after, before = least_completions(free, np.zeros((robots, goals)))
-        to_goal = np.zeros((robots, stations, goals))
+        nothing = Completions(
+            np.zeros((robots, stations, goals)),
+            np.zeros((robots, goals + stations + 1)),
+            np.zeros((robots, 1 << goals, goals)),
+            np.zeros((robots + 1, 1 << goals)),
+        )
         exact = least_cost(leg, goals, range_m)
-        goal_list = np.arange(goals)
         most = 1e4
-        found, _, trace = touring_labels(
-            problem, goal_list, leg, to_goal, after, before, most, 1_000_000
-        )
-        assert len(trace)
+        found = cheapest_tours(problem, leg, nothing, most)
+        assert found is not None
         if exact <= most:
-            assert found == pytest.approx(exact)
+            assert found.cost_J == pytest.approx(exact)
         else:
-            assert found == math.inf
-        below, _, _ = touring_labels(
-            problem, goal_list, leg, to_goal, after, before, 0.99 * exact, 1_000_000
-        )
-        assert below == math.inf, "nothing is cheaper than the cheapest"
+            assert found.cost_J == math.inf
+        below = cheapest_tours(problem, leg, nothing, 0.99 * exact)
+        assert below is not None
+        assert not below.feasible, "nothing is cheaper than the cheapest"
 
 
-@pytest.mark.parametrize(
-    ("goals", "stations", "robots", "range_m"),
-    [(7, 2, 1, (150.0, 300.0)), (7, 2, 2, (120.0, 300.0)), (6, 0, 3, (300.0, 600.0))],
-)
-def test_tours_sought_among_near_ones_are_the_cheapest_of_all(
-    mission: Mission,
-    goals: int,
-    stations: int,
-    robots: int,
-    range_m: tuple[float, float],
-) -> None:
-    found = 0
-    for seed in range(25):
-        problem = mission(
-            seed, goals=goals, stations=stations, robots=robots, range_m=range_m
-        )
-        near = near_routing(problem, Completions.of(problem))
-        if near is None:
-            continue  # not near: `exact_routing` is asked
-        exact = exact_routing(problem)
-        assert exact is not None
-        assert near.cost_J == pytest.approx(exact.cost_J, rel=1e-12)
-        visited = [t for tour in near.tours for t in tour if t < goals]
-        assert sorted(visited) == list(range(goals))
-        found += 1
-    assert found >= 10, "too few tours are near to say anything"
-
-
-def test_a_goal_that_no_robot_reaches_makes_the_near_tours_infinite() -> None:
+def test_a_goal_that_no_robot_reaches_makes_the_tours_infinite() -> None:
     problem = routing_arrays(
         goals=1,
         distance=np.zeros((1, 1, 1)),
@@ -168,9 +138,9 @@ def test_a_goal_that_no_robot_reaches_makes_the_near_tours_infinite() -> None:
         capacity=np.ones(1),
         reserve=np.zeros(1),
     )
-    near = near_routing(problem, Completions.of(problem))
-    assert near is not None
-    assert not near.feasible
+    routing = exact_routing(problem)
+    assert routing is not None
+    assert not routing.feasible
 
 
 def field(**parts: object) -> Scene:
