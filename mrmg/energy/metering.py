@@ -24,7 +24,7 @@ from mrmg.motion.dynamics import TURN_SPEEDS
 from mrmg.plans import Visit
 from mrmg.scene.types import Robot, Scene, Station
 from mrmg.world.relief import height_at, load_points
-from mrmg.world.terrain import multiplier_at
+from mrmg.world.terrain import multiplier_at, turning_multiplier_at
 
 MEASURED_PARTS = ("drive", "idle", "device")
 """The parts that the work of the drives can be split into."""
@@ -118,7 +118,7 @@ def _power_parts(
     return robot.model.energy_model.power_parts(
         speed_m_s=middle[:, 3],
         acceleration_m_s2=acceleration_m_s2,
-        turn_speed_m_s=turn_speed_m_s,
+        turn_speed_m_s=turn_speed_m_s * turning_multiplier_at(scene, middle[:, :2]),
         multiplier=rolling_factor * multiplier_at(scene, middle[:, :2]),
         climb_m_s=np.diff(height_m) / duration_s,
     )

@@ -1,11 +1,11 @@
 """The energy model: motion over terrain gives the power drawn from the battery.
 
 Mechanical power at the drive, with v the speed over the map, a its change, k the
-terrain's multiplier, L theta' the speed at which tyres scrub in a turn and h' the rate
-of climb:
+terrain's multiplier, k_turn that of turning, L theta' the speed at which tyres scrub in
+a turn and h' the rate of climb:
 
     P_rolling = k C_rr m g |v|
-    P_turning = C_turn m g |L theta'|
+    P_turning = k_turn C_turn m g |L theta'|
     P_inertia = m_eff a v
     P_grade   = m g h'
 
@@ -123,7 +123,8 @@ class EnergyModel:
         Args:
             speed_m_s: speed over the map, negative backwards, shape (n,).
             acceleration_m_s2: its change, shape (n,).
-            turn_speed_m_s: L |theta'|, see `motion.dynamics.TURN_SPEEDS`, shape (n,).
+            turn_speed_m_s: k_turn L |theta'|, see `motion.dynamics.TURN_SPEEDS`, shape
+                (n,).
             multiplier: of the terrain, shape (n,).
             climb_m_s: rate of climb, 0 on flat ground, shape (n,).
         """
@@ -159,7 +160,7 @@ def battery_power(v, a, turn_speed, k, climb, c):  # type: ignore[no-untyped-def
     Args:
         v: speed [m/s].
         a: acceleration [m/s^2].
-        turn_speed: L |theta'| [m/s].
+        turn_speed: k_turn L |theta'| [m/s].
         k: terrain multiplier.
         climb: rate of climb [m/s].
         c: `EnergyModel.coefficients()`.

@@ -128,7 +128,12 @@ def obstacle_entry(obstacle: Obstacle) -> _Entry:
 def terrain_entry(area: TerrainArea) -> _Entry:
     """Return the entry of a terrain area."""
     entry = {"id": area.id, **_polygon(area.shape)}
-    return {**entry, "multiplier": float(area.multiplier)}
+    entry["multiplier"] = float(area.multiplier)
+    if area.turning_multiplier != 1.0:
+        entry["turning_multiplier"] = float(area.turning_multiplier)
+    if area.energy_spread:
+        entry["energy_spread"] = float(area.energy_spread)
+    return entry
 
 
 def goal_entry(goal: Goal) -> _Entry:

@@ -49,11 +49,23 @@ class Obstacle:
 
 @dataclass(frozen=True, kw_only=True)
 class TerrainArea:
-    """Ground on which driving costs `multiplier` times as much as on plain ground."""
+    """Ground that resists rolling and turning more than plain ground, or less.
+
+    Attributes:
+        id: unique name.
+        shape: where it is [m].
+        multiplier: rolling resistance over that of plain ground.
+        turning_multiplier: turning resistance over that of plain ground; measured
+            terrains need it, as the two are not in proportion.
+        energy_spread: standard deviation of what different runs of equal motion take
+            on it, relative to their mean; 0 where nobody measured it.
+    """
 
     id: str
     shape: Polygon
     multiplier: float
+    turning_multiplier: float = 1.0
+    energy_spread: float = 0.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

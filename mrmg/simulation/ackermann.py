@@ -59,12 +59,18 @@ class AckermannChassis:
         """Return the speed the rear axle rolls at, shape (K,)."""
         return self._mean_over_axle(self._wheels.rate_rad_s())
 
-    def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
+    def set_resistance(
+        self,
+        resistance_N: np.ndarray,
+        swing_N: np.ndarray,
+        believed_swing_N: np.ndarray | None = None,
+    ) -> None:
         """Set the dry friction of the rear axle, shape (K,); its differential is free.
 
         Args:
             resistance_N: against the way of its middle.
             swing_N: zero.
+            believed_swing_N: zero.
         """
         torque = 0.5 * self._wheels.radius_m * resistance_N
         self._model.dof_frictionloss[self._wheels.dof] = torque[:, None]

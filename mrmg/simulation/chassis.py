@@ -26,12 +26,19 @@ class Chassis(Protocol):
     def axle_speed_m_s(self) -> np.ndarray:
         """Return the speed the driven axle rolls at, shape (K,)."""
 
-    def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
+    def set_resistance(
+        self,
+        resistance_N: np.ndarray,
+        swing_N: np.ndarray,
+        believed_swing_N: np.ndarray | None = None,
+    ) -> None:
         """Set the dry friction of the driven axle.
 
         Args:
             resistance_N: against the way of its middle, shape (K,).
             swing_N: against the way its wheels roll differently, shape (K,).
+            believed_swing_N: what the drive control believes of it; None leaves what it
+                believes.
         """
 
     def command(

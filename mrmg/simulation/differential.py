@@ -67,8 +67,15 @@ class DifferentialChassis:
         """Return the speed the axle rolls at, shape (K,)."""
         return np.asarray(self._wheel_speed_m_s().mean(axis=1))
 
-    def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
+    def set_resistance(
+        self,
+        resistance_N: np.ndarray,
+        swing_N: np.ndarray,
+        believed_swing_N: np.ndarray | None = None,
+    ) -> None:
         """Set the dry friction of both tendons, each of shape (K,)."""
+        if believed_swing_N is not None:
+            self._turning_Nm = believed_swing_N * self._track_m
         friction = np.stack([resistance_N, swing_N], axis=1)
         self._model.tendon_frictionloss[self._tendon] = friction
 

@@ -69,16 +69,24 @@ class Fleet:
         """Return the speed the driven axle rolls at, shape (R,)."""
         return self._gather([group.chassis.axle_speed_m_s() for group in self._groups])
 
-    def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
+    def set_resistance(
+        self,
+        resistance_N: np.ndarray,
+        swing_N: np.ndarray,
+        believed_swing_N: np.ndarray | None = None,
+    ) -> None:
         """Set the dry friction of the driven axles.
 
         Args:
             resistance_N: against the way of the axle's middle, shape (R,).
             swing_N: against the way its wheels roll differently, shape (R,).
+            believed_swing_N: what the drive control believes of it; None leaves what it
+                believes.
         """
         for group in self._groups:
             own = group.index
-            group.chassis.set_resistance(resistance_N[own], swing_N[own])
+            believed_N = None if believed_swing_N is None else believed_swing_N[own]
+            group.chassis.set_resistance(resistance_N[own], swing_N[own], believed_N)
 
     def drive(
         self, force_N: np.ndarray, w_from: np.ndarray, w_to: np.ndarray, steps: int

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -49,15 +50,29 @@ class GroundResistance:
             swing_N=np.where(steers, 0.0, turning_N),
         )
 
-    def force_N(self, multiplier: np.ndarray, steer: np.ndarray) -> np.ndarray:
+    def force_N(
+        self,
+        multiplier: np.ndarray,
+        steer: np.ndarray,
+        turning_multiplier: np.ndarray | float = 1.0,
+    ) -> np.ndarray:
         """Return the force along the way by the energy model's law, shape (R,).
 
         Args:
-            multiplier: terrain under each robot, shape (R,).
+            multiplier: of rolling on the terrain under each robot, shape (R,).
             steer: psi [rad] of the cars, shape (R,).
+            turning_multiplier: of turning on that terrain, shape (R,).
         """
-        turning = self.turning_N * np.abs(np.tan(steer))
+        turning = turning_multiplier * self.turning_N * np.abs(np.tan(steer))
         return np.asarray(self.rolling_N * multiplier + turning)
+
+
+class Ground(NamedTuple):
+    """What resists the robots of a fleet: the arguments of `force_N`, each (R,)."""
+
+    multiplier: np.ndarray
+    steer: np.ndarray
+    turning_multiplier: np.ndarray
 
 
 class TerrainUnderfoot:
@@ -66,23 +81,26 @@ class TerrainUnderfoot:
     def __init__(self, scene: Scene) -> None:
         """Prepare the terrain of `scene`."""
         self._areas = [
-            (area.shape, area.shape.bounds, area.multiplier)
+            (area.shape, area.shape.bounds, (area.multiplier, area.turning_multiplier))
             for area in reversed(scene.terrain)
         ]
         for shape, _, _ in self._areas:
             shapely.prepare(shape)
 
     def under(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
-        """Return the multipliers at some places, equal to `multiplier_at`'s, (n,)."""
-        places = zip(x_m.tolist(), y_m.tolist(), strict=True)
-        return np.array([self._at(x, y) for x, y in places])
+        """Return the multipliers of rolling and turning at some places, shape (2, n).
 
-    def _at(self, x: float, y: float) -> float:
-        for shape, (x_min, y_min, x_max, y_max), multiplier in self._areas:
+        They are equal to those of `multiplier_at` and `turning_multiplier_at`.
+        """
+        places = zip(x_m.tolist(), y_m.tolist(), strict=True)
+        return np.array([self._at(x, y) for x, y in places]).reshape(-1, 2).T
+
+    def _at(self, x: float, y: float) -> tuple[float, float]:
+        for shape, (x_min, y_min, x_max, y_max), multipliers in self._areas:
             near = x_min <= x <= x_max and y_min <= y <= y_max
             if near and shapely.contains_xy(shape, x, y):
-                return multiplier
-        return 1.0
+                return multipliers
+        return 1.0, 1.0
 
 
 def believed_resistance(scene: Scene) -> GroundResistance:

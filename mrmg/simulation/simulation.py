@@ -23,6 +23,7 @@ from mrmg.simulation.drive import DriveControl
 from mrmg.simulation.fleet import Fleet
 from mrmg.simulation.fleet_clock import FleetClock
 from mrmg.simulation.ground import (
+    Ground,
     TerrainUnderfoot,
     believed_resistance,
     true_resistance,
@@ -168,6 +169,7 @@ class _Run:
             level, slope = self._incline.under(seen)
         ground = self._ground(seen, steer)
         believed = self._believed.force_N(*ground)
+        believed_swing_N = ground.turning_multiplier * self._believed.swing_N
         wanted = self._drive.force_N(
             self._sensing.axle_speed_m_s,
             now[:, 0],
@@ -183,7 +185,11 @@ class _Run:
             level, _ = self._slopes
         # The slope carries a part of the weight that the tyres then need not.
         resistance = level * self._true.force_N(*ground)
-        self._fleet.set_resistance(resistance, self._true.swing_N)
+        self._fleet.set_resistance(
+            resistance,
+            ground.turning_multiplier * self._true.swing_N,
+            believed_swing_N,
+        )
         work = self._fleet.drive(force, steer_from, steer_to, STEPS_PER_TICK)
         self._clock.advance(self._period_s)
         self.ticks += 1
@@ -302,10 +308,8 @@ class _Run:
             self._period_s,
         )
 
-    def _ground(
-        self, state: np.ndarray, steer: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return terrain and steering in the middle of the coming tick, each (R,).
+    def _ground(self, state: np.ndarray, steer: np.ndarray) -> Ground:
+        """Return terrain and steering in the middle of the coming tick.
 
         Args:
             state: true or seen, shape (R, 5).
@@ -314,7 +318,8 @@ class _Run:
         x, y, heading, speed, steer_now = state.T
         way_m = 0.5 * self._period_s * speed
         x_m, y_m = x + way_m * np.cos(heading), y + way_m * np.sin(heading)
-        return self._terrain.under(x_m, y_m), 0.5 * (steer_now + steer)
+        multiplier, turning_multiplier = self._terrain.under(x_m, y_m)
+        return Ground(multiplier, 0.5 * (steer_now + steer), turning_multiplier)
 
     def _observe(self) -> None:
         self._state = self._fleet.state()

@@ -49,6 +49,9 @@ class FreeSpace(NamedTuple):
 NO_RELIEF = np.zeros((0, 0))
 """The heights of flat ground."""
 
+UNIFORM_TURNING = np.ones((1, 1))
+"""The multipliers of turning where all terrain resists it alike."""
+
 
 @by_pointer
 class TerrainGrid(NamedTuple):
@@ -60,6 +63,8 @@ class TerrainGrid(NamedTuple):
         multiplier: energy multiplier at cell centres, shape (ny, nx).
         height: heights at the nodes of a grid of its own [m]; `NO_RELIEF` if flat.
         height_dx, height_dy: extent of a cell of that grid [m].
+        turning: multiplier of turning resistance in the cells of `multiplier`;
+            `UNIFORM_TURNING` if it is 1 everywhere.
     """
 
     x_min: float
@@ -69,6 +74,7 @@ class TerrainGrid(NamedTuple):
     height: np.ndarray = NO_RELIEF
     height_dx: float = 1.0
     height_dy: float = 1.0
+    turning: np.ndarray = UNIFORM_TURNING
 
 
 @leaf_kernel
@@ -228,14 +234,26 @@ def footprint_is_clear(space, placed, cx, cy, radius, margin):
 
 
 @leaf_kernel
-def multiplier_in(terrain, x, y):
-    """Return the terrain's energy multiplier of the cell that holds a point."""
-    rows, columns = terrain.multiplier.shape
+def cell_value(values, terrain, x, y):
+    """Return the value of the cell of a terrain's grid that holds a point."""
+    rows, columns = values.shape
     column = int(floor((x - terrain.x_min) / terrain.cell))
     row = int(floor((y - terrain.y_min) / terrain.cell))
     column = min(max(column, 0), columns - 1)
     row = min(max(row, 0), rows - 1)
-    return terrain.multiplier[row, column]
+    return values[row, column]
+
+
+@leaf_kernel
+def multiplier_in(terrain, x, y):
+    """Return the terrain's energy multiplier of the cell that holds a point."""
+    return cell_value(terrain.multiplier, terrain, x, y)
+
+
+@leaf_kernel
+def turning_multiplier_in(terrain, x, y):
+    """Return the terrain's multiplier of turning in the cell that holds a point."""
+    return cell_value(terrain.turning, terrain, x, y)
 
 
 @leaf_kernel

@@ -10,7 +10,7 @@ from shapely.geometry import Polygon
 
 from mrmg.scene.types import Scene
 from mrmg.world import _raster_kernels
-from mrmg.world._kernels import FreeSpace, TerrainGrid
+from mrmg.world._kernels import UNIFORM_TURNING, FreeSpace, TerrainGrid
 
 CELL_M = 0.25
 """Side of a cell of the distance field and of the terrain grid."""
@@ -27,7 +27,7 @@ class World:
         spaces: one free space per distinct set of obstacles.
         space_of_robot: index into `spaces` for each robot of the scene, shape (R,).
         obstacles: union of the obstacles of each space.
-        terrain: energy multiplier and relief.
+        terrain: multipliers of rolling and turning, and relief.
     """
 
     spaces: tuple[FreeSpace, ...]
@@ -140,6 +140,7 @@ def _terrain_grid(scene: Scene) -> TerrainGrid:
     columns = max(1, int(np.ceil((x_max - x_min) / CELL_M)))
     rows = max(1, int(np.ceil((y_max - y_min) / CELL_M)))
     multiplier = np.ones((rows, columns))
+    turning = np.ones((rows, columns))
     for area in scene.terrain:
         points = np.asarray(area.shape.exterior.coords)[:-1]
         rings = [points, *(np.asarray(r.coords)[:-1] for r in area.shape.interiors)]
@@ -153,14 +154,18 @@ def _terrain_grid(scene: Scene) -> TerrainGrid:
             columns,
         )
         multiplier[inside] = area.multiplier
-    if scene.elevation is None:
-        return TerrainGrid(float(x_min), float(y_min), CELL_M, multiplier)
-    dx, dy = scene.elevation.cell_m
-    return TerrainGrid(
+        turning[inside] = area.turning_multiplier
+    flat = TerrainGrid(
         x_min=float(x_min),
         y_min=float(y_min),
         cell=CELL_M,
         multiplier=multiplier,
+        turning=UNIFORM_TURNING if np.all(turning == 1.0) else turning,
+    )
+    if scene.elevation is None:
+        return flat
+    dx, dy = scene.elevation.cell_m
+    return flat._replace(
         # A read-only array would be another type, and compiled for on its own.
         height=scene.elevation.height_m.copy(),
         height_dx=dx,

@@ -20,7 +20,7 @@ from mrmg.simulation.ground import (
 )
 from mrmg.simulation.simulation import simulate
 from mrmg.simulation.world_model import build_world
-from mrmg.world.terrain import multiplier_at
+from mrmg.world.terrain import multiplier_at, turning_multiplier_at
 
 
 @pytest.fixture(scope="module")
@@ -39,8 +39,9 @@ def believing(scene: Scene, **values: float) -> Scene:
 def test_resistance_is_the_energy_models_power_over_the_speed(scene: Scene) -> None:
     model = scene.robots[0].model.energy_model
     multiplier, steer = np.array([3.0, 1.0]), np.array([-0.4, 0.2])
-    force = believed_resistance(scene).force_N(multiplier, steer)
-    turn_speed = np.abs(np.tan(steer))
+    turning_multiplier = np.array([1.0, 2.5])
+    force = believed_resistance(scene).force_N(multiplier, steer, turning_multiplier)
+    turn_speed = turning_multiplier * np.abs(np.tan(steer))
     parts = model.power_parts(
         np.ones(2), np.zeros(2), turn_speed, multiplier, np.zeros(2)
     )
@@ -79,13 +80,20 @@ def test_an_mjcf_that_does_not_state_its_losses_is_refused(
 def test_terrain_underfoot_is_the_scenes(name: str) -> None:
     """Inside, outside and on the borders of areas."""
     scene = load_scene(name)
+    terrain = tuple(
+        replace(area, turning_multiplier=1.5 + number)
+        for number, area in enumerate(scene.terrain)
+    )
+    scene = replace(scene, terrain=terrain)
     x_min, y_min, x_max, y_max = scene.bounds
     rng = np.random.default_rng(3)
     places = rng.uniform((x_min - 5, y_min - 5), (x_max + 5, y_max + 5), (2000, 2))
     borders = [np.array(area.shape.exterior.coords) for area in scene.terrain]
     points = np.concatenate([places, *borders])
     expected = multiplier_at(scene, points)
+    turning = turning_multiplier_at(scene, points)
     np.testing.assert_array_equal(
-        TerrainUnderfoot(scene).under(*points.T), expected, strict=True
+        TerrainUnderfoot(scene).under(*points.T), [expected, turning]
     )
     assert len(np.unique(expected)) > 1
+    assert len(np.unique(turning)) > 1

@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 from mrmg.energy.metering import LoggedMotion, step_energy_parts
 from mrmg.errors import RunFolderError, UsageError
 from mrmg.plans import Plan
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Scene, TerrainArea
 from mrmg.shipped import model_names
 from mrmg.simulation import simulate
 from mrmg.simulation.controller import controller_names
@@ -186,26 +187,45 @@ def test_work_across_terrains_in_closed_form(driving: SimpleNamespace) -> None:
     assert log.work_J.sum() == pytest.approx(lost_J, rel=0.01)
 
 
+def resisting_turns(scene: Scene, factor: float) -> Scene:
+    """The scene all on ground whose resistance to turning differs by `factor`."""
+    ground = TerrainArea(
+        id="ground",
+        shape=shapely.box(*scene.bounds),
+        multiplier=1.0,
+        turning_multiplier=factor,
+    )
+    return replace(scene, terrain=(ground,))
+
+
+@pytest.mark.parametrize("factor", [1.0, 2.5])
 @pytest.mark.parametrize("model", model_names())
 def test_turning_costs_what_the_model_says(
-    driving: SimpleNamespace, model: str
+    driving: SimpleNamespace, model: str, factor: float
 ) -> None:
     """A long steady circle: rolling plus scrub by |v tan psi|, or by T |omega|."""
-    scene = driving.open_ground([(0.0, 0.0, 0.0)], models=[model])
+    plain = driving.open_ground([(0.0, 0.0, 0.0)], models=[model])
+    scene = resisting_turns(plain, factor)
     control = np.zeros((300, 2))
     control[:10], control[-10:] = (1.0, 0.4), (-1.0, -0.4)
     plan = driving.plan_of(scene, [control])
     log = simulate(scene, plan)
     assert off_m(log).max() < 0.05
     planned = driving.planned_J(scene, plan, "r1")
-    turning = step_energy_parts(scene, plan.trajectories[0])[:, 1].sum()
+    turning, on_plain = (
+        step_energy_parts(ground, plan.trajectories[0])[:, 1].sum()
+        for ground in (scene, plain)
+    )
     assert turning > 0.05 * planned
+    assert turning == pytest.approx(factor * on_plain)
     assert measured_J(scene, log, 0) == pytest.approx(planned, rel=0.02)
 
 
-def test_turning_on_the_spot(driving: SimpleNamespace) -> None:
+@pytest.mark.parametrize("factor", [1.0, 2.5])
+def test_turning_on_the_spot(driving: SimpleNamespace, factor: float) -> None:
     """There and back: no way along, and nothing but what turning takes."""
-    scene = driving.open_ground([(0.0, 0.0, 0.0)], models=["diffdrive"])
+    plain = driving.open_ground([(0.0, 0.0, 0.0)], models=["diffdrive"])
+    scene = resisting_turns(plain, factor)
     turn = np.repeat([1.0, 0.0, -1.0], [8, 40, 8])
     control = np.zeros((112, 2))
     control[:, 1] = np.concatenate([turn, -turn])
@@ -222,7 +242,7 @@ def test_turning_on_the_spot(driving: SimpleNamespace) -> None:
     turned = np.abs(np.diff(plan.trajectories[0].state[:, 2])).sum()
     way_m = model.track_m * turned
     assert planned == pytest.approx(
-        model.energy_model.turning_force_N * way_m / model.drive_efficiency
+        factor * model.energy_model.turning_force_N * way_m / model.drive_efficiency
     )
     # The model leaves out what it takes to set the robot turning: 1 J each time.
     assert measured_J(scene, log, 0) == pytest.approx(planned, abs=2.5)

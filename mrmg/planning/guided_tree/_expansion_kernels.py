@@ -29,7 +29,7 @@ from mrmg.planning.guided_tree._tree_kernels import (
 )
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.planning.routing._random_kernels import random_unit
-from mrmg.world._kernels import multiplier_in
+from mrmg.world._kernels import multiplier_in, turning_multiplier_in
 
 _battery_power = numba.njit(battery_power)
 
@@ -134,10 +134,11 @@ def step_energy(setting, r, before, after, u1, dt):
     """Return the battery energy of one step on flat ground [J], by its midpoint."""
     robot = setting.fleet[r]
     v = 0.5 * (before[3] + after[3])
-    k = multiplier_in(
-        setting.terrain, 0.5 * (before[0] + after[0]), 0.5 * (before[1] + after[1])
-    )
+    x = 0.5 * (before[0] + after[0])
+    y = 0.5 * (before[1] + after[1])
+    k = multiplier_in(setting.terrain, x, y)
     turn = turn_speed(robot.model, v, 0.5 * (before[4] + after[4]), robot.track)
+    turn *= turning_multiplier_in(setting.terrain, x, y)
     return dt * _battery_power(v, u1, turn, k, 0.0, robot.energy)
 
 

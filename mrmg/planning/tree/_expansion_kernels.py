@@ -35,7 +35,7 @@ from mrmg.planning.tree._steering_kernels import (
     sidestep,
     wrap,
 )
-from mrmg.world._kernels import multiplier_in
+from mrmg.world._kernels import multiplier_in, turning_multiplier_in
 
 _battery_power = numba.njit(battery_power)
 
@@ -200,9 +200,9 @@ def step_energy(mission, r, before, after, u1):
     """Return the battery energy of one step [J], charged at its midpoint."""
     robot = mission.fleet[r]
     v = 0.5 * (before[3] + after[3])
-    k = multiplier_in(
-        mission.terrain, 0.5 * (before[0] + after[0]), 0.5 * (before[1] + after[1])
-    )
+    x = 0.5 * (before[0] + after[0])
+    y = 0.5 * (before[1] + after[1])
+    k = multiplier_in(mission.terrain, x, y)
     acceleration = u1
     if robot.model == USER:
         acceleration = (after[3] - before[3]) / mission.params.dt
@@ -216,7 +216,7 @@ def step_energy(mission, r, before, after, u1):
     return mission.params.dt * _battery_power(
         v,
         acceleration,
-        turn,
+        turning_multiplier_in(mission.terrain, x, y) * turn,
         k,
         climb,
         robot.energy,

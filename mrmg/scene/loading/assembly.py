@@ -274,6 +274,8 @@ class Assembly:
                     id=entry.id or _default_id("terrain", index),
                     shape=shape,
                     multiplier=entry.multiplier,
+                    turning_multiplier=entry.turning_multiplier,
+                    energy_spread=entry.energy_spread,
                 )
 
     def _elevation(self) -> Elevation | None:

@@ -10,7 +10,8 @@ A scene is one YAML file (scalars as in YAML 1.2; metres, radians, joules):
       - {box: {center: [50, 50], size: [8, 4], yaw: 0.3}, blocks: [r1]}
       - {circle: {center: [70, 30], radius: 3}}
     terrain:                          # where areas overlap, the later entry counts
-      - {id: mud, polygon: [[0, 0], [20, 0], [20, 20]], multiplier: 2.5}
+      - {id: mud, polygon: [[0, 0], [20, 0], [20, 20]], multiplier: 2.5,
+         turning_multiplier: 1.5}  # of turning resistance; 1 where it is left out
     elevation: {hills: [{center: [60, 60], height: 4, radius: 25}]}   # default: flat
     goals:                            # convex: circle or polygon; each visited once
       - {id: g1, circle: {center: [20, 30], radius: 1.5}}
@@ -120,6 +121,13 @@ class TerrainEntry(ShapedEntry):
 
     id: Identifier | None = Field(default=None, description=ID)
     multiplier: Positive = Field(description="energy relative to plain ground")
+    turning_multiplier: Positive = Field(
+        default=1.0, description="resistance to turning relative to plain ground"
+    )
+    energy_spread: NotNegative = Field(
+        default=0.0,
+        description="standard deviation of a run's energy from run to run, as a share",
+    )
 
 
 class RegionEntry(Strict):

@@ -24,7 +24,7 @@ from mrmg.planning.tree._steering_kernels import BACK_OFF, RANDOM, STEER, WAIT
 from mrmg.planning.tree.motion_tree import Problem
 from mrmg.planning.tree.targets import TARGET_MARGIN_M
 from mrmg.scene.types import Scene
-from mrmg.world.terrain import multiplier_at
+from mrmg.world.terrain import multiplier_at, turning_multiplier_at
 
 DT_S = 0.1
 SCENE = {
@@ -34,7 +34,12 @@ SCENE = {
     ],
     "stations": [{"id": "s", "circle": {"center": [12, 4], "radius": 1.5}}],
     "terrain": [
-        {"id": "m", "box": {"center": [15, 10], "size": [10, 4]}, "multiplier": 2.5}
+        {
+            "id": "m",
+            "box": {"center": [15, 10], "size": [10, 4]},
+            "multiplier": 2.5,
+            "turning_multiplier": 3.0,
+        }
     ],
     "robots": [
         {"id": "r1", "model": "car", "pose": [4, 10, 0], "start_energy": 0.5},
@@ -165,6 +170,7 @@ def test_a_step_costs_what_the_energy_model_says_of_its_midpoint(
             continue
         u1 = rng.uniform(-1.2, 1.2)
         turn = np.abs(middle[3:4] * np.tan(middle[4:5]))
+        turn *= turning_multiplier_at(problem.scene, middle[None, :2])
         watts = model.power_parts(
             middle[3:4], np.array([u1]), turn, k, np.zeros(1)
         ).sum()
