@@ -31,6 +31,7 @@ _DYNAMICS = (
 )
 _BIASES = (int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE))
 _STEERING = [name for parts in PARTS.values() for name in parts.servos]
+_WHEEL_MOTORS = [name for parts in PARTS.values() for name in parts.motors]
 
 
 class ForceDrives:
@@ -89,6 +90,8 @@ class WorkMeter:
         """Find the drives of `robots`."""
         self._moment = transmission(model)
         owner = _owners(model, robots, self._moment)
+        bus = _buses(model, owner)
+        self._buses = (bus[:, None] == np.arange(len(owner))).astype(float)
         is_own = owner == np.arange(len(robots))[:, None]
         self._sums = 0.5 * model.opt.timestep * is_own
         self._force, self._velocity = data.actuator_force, data.actuator_velocity
@@ -108,10 +111,15 @@ class WorkMeter:
         self._velocities[step] = self._velocity
 
     def work_J(self) -> np.ndarray:
-        """Return driving (>= 0) and braking (<= 0) work since the start, (R, 2)."""
+        """Return driving (>= 0) and braking (<= 0) work since the start, (R, 2).
+
+        The motors of a robot's driven wheels share a bus, as in the energy model: in a
+        turn the outer one uses what the inner one gains by braking. All other drives
+        count by themselves.
+        """
         velocity = self._velocities
         np.dot(self._moment, self._qvel, out=velocity[-1])
-        work_J = self._forces * (velocity[:-1] + velocity[1:])
+        work_J = (self._forces * (velocity[:-1] + velocity[1:])) @ self._buses
         driving, braking = np.maximum(work_J, 0.0), np.minimum(work_J, 0.0)
         both = np.array([driving.sum(axis=0), braking.sum(axis=0)])
         return np.asarray(np.dot(self._sums, both.T))
@@ -150,6 +158,17 @@ def _owners(
         roots = model.body_rootid[model.dof_bodyid[dofs]]
         owner[output] = place.get(int(roots[0]), -1) if len(roots) else -1
     return owner
+
+
+def _buses(model: mujoco.MjModel, owner: np.ndarray) -> np.ndarray:
+    """Return the first actuator output on each one's bus, shape (nout,)."""
+    bus = np.arange(len(owner))
+    first: dict[int, int] = {}
+    for index in range(model.nactuator):
+        output = int(model.actuator_outadr[index])
+        if model.actuator(index).name.rpartition("/")[2] in _WHEEL_MOTORS:
+            bus[output] = first.setdefault(int(owner[output]), output)
+    return bus
 
 
 def _drive_fault(model: mujoco.MjModel, index: int, moment: np.ndarray) -> str:
