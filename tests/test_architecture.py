@@ -26,7 +26,7 @@ LONG_MODULES = {
     "band": 356,
     "tracking": 353,
     "_refuel_kernels": 371,
-    "_tree_kernels": 369,
+    "_tree_kernels": 370,
     "motion_tree": 353,
     "arguments": 370,
     "assembly": 361,

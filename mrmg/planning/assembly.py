@@ -10,7 +10,7 @@ from mrmg.energy.metering import battery_profile, find_visits, plan_ledger
 from mrmg.energy.visits import crowded_stations
 from mrmg.planning.feasibility import energy_and_metres
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.tree.motion_tree import Problem
+from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Plan, Trajectory, Visit
 
 
@@ -39,7 +39,7 @@ def make_plan(
         if len(own) < len(tours[trajectory.robot]):
             return None
         battery = scene.robot(trajectory.robot).battery
-        least_J = battery.reserve_J + problem.spare * battery.capacity_J
+        least_J = battery.reserve_J + problem.soc_margin * battery.capacity_J
         if battery_profile(scene, trajectory, own).min() < least_J:
             return None
         visits += own
@@ -81,7 +81,7 @@ def why_refused(
         if len(own) < len(tour):
             return f"{robot.id} misses {tour[len(own)]}"
         battery = robot.battery
-        least_J = battery.reserve_J + problem.spare * battery.capacity_J
+        least_J = battery.reserve_J + problem.soc_margin * battery.capacity_J
         missing_J = least_J - battery_profile(problem.scene, trajectory, own).min()
         if missing_J > 0.0:
             missing = energy_and_metres(missing_J, robot)

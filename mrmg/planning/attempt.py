@@ -17,9 +17,10 @@ from mrmg.planning.drafting.drafting import LEAST_SPARE, draftable, drafts, path
 from mrmg.planning.drafting.refine import refine
 from mrmg.planning.guided_tree.planner import grow_guided_tree
 from mrmg.planning.parameters import GUIDED_TREE, PlannerParams
+from mrmg.planning.problem.problem import Problem
 from mrmg.planning.routers import route
 from mrmg.planning.routing.routing import Routing
-from mrmg.planning.tree.motion_tree import Problem, grow_tree
+from mrmg.planning.tree.motion_tree import grow_tree
 from mrmg.plans import Plan
 
 MARGINS = (1.0, 0.0, 2.0)
@@ -80,8 +81,8 @@ def router_problem(problem: Problem, params: PlannerParams) -> Problem:
     A plan may be found along tours that it has, though not with every draw of tours.
     """
     if params.drafts and draftable(problem):
-        return problem.with_margin(0.0).with_spare(LEAST_SPARE)
-    return problem.with_margin(params.route_margin).with_spare(0.0)
+        return problem.with_margin(0.0).with_soc_margin(LEAST_SPARE)
+    return problem.with_margin(params.route_margin).with_soc_margin(0.0)
 
 
 def attempt_plan(
@@ -111,7 +112,7 @@ def attempt_plan(
     # The first attempt draws but once: where that fails, other tours may not.
     again = product((LEAST_SPARE,), UNLIKE if number == 0 else ())
     for spare, drawn in [*product(spares, (0,)), *again] if drafting else []:
-        spared = problem.with_spare(spare)
+        spared = problem.with_soc_margin(spare)
         drafted = draft_plans(spared, seed, params, number, halt, drawn=drawn)
         routing_s += drafted.routing_s
         counts.update(drafted.counts)
@@ -121,7 +122,7 @@ def attempt_plan(
             break
     found = drafted
     for spare in () if found.plans or halt[0] else SPARES[number % len(SPARES)]:
-        spared = problem.with_spare(spare * params.spare)
+        spared = problem.with_soc_margin(spare * params.spare)
         found = tree_plans(spared, seed, params, number, halt)
         routing_s += found.routing_s
         counts.update(found.counts)
@@ -135,7 +136,7 @@ def guided_plans(
     problem: Problem, seed: int, params: PlannerParams, number: int, halt: np.ndarray
 ) -> Attempt:
     """Grow the paper's motion tree, and return the plan that it leads to."""
-    problem = problem.with_spare(params.spare)
+    problem = problem.with_soc_margin(params.spare)
     draw = seeding.stream_seed(seed, "guided tree", number)
     growth = grow_guided_tree(problem, params, draw, halt)
     plan = None
@@ -179,7 +180,7 @@ def tree_plans(
     left = params.refinements
     while plan is not None:
         plans.append((time.perf_counter(), plan))
-        hurried = replace(problem, hurried=problem.preference.late_s(plan) > 0.0)
+        hurried = replace(problem, minimum_time=problem.preference.late_s(plan) > 0.0)
         better = refine(hurried, params, plan, halt) if left > 0 else plan
         enough = not problem.preference.gains(better, plan, LEAST_GAIN)
         plan = better if better is not plan else None
@@ -225,7 +226,7 @@ def draft_plans(
         if hurried and not plans:
             continue
         driven += 1
-        pressed = replace(problem, hurried=hurried)
+        pressed = replace(problem, minimum_time=hurried)
         made = drafts(
             pressed,
             params,

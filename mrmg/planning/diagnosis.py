@@ -24,12 +24,12 @@ from mrmg.planning.feasibility import energy_and_metres, proof_of_infeasibility
 from mrmg.planning.halting import NEVER, Halted
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import TIME_MARGIN_S
+from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.targets import finish_of
 from mrmg.planning.roadmap.roadmap import Roadmap
 from mrmg.planning.routing.shortfall import shortfall
 from mrmg.planning.search import Search
 from mrmg.planning.statistics import Statistics
-from mrmg.planning.tree.motion_tree import Problem
-from mrmg.planning.tree.targets import finish_of
 from mrmg.plans import PlanStatus
 from mrmg.scene.objective import overtime_s
 from mrmg.scene.types import Robot, Scene

@@ -21,7 +21,7 @@ from mrmg.planning.assembly import make_plan
 from mrmg.planning.attempt import Attempt
 from mrmg.planning.drafting import _tracking_kernels
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.tree.motion_tree import Problem
+from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Plan
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.types import Finish, Region, Robot, Scene

@@ -12,11 +12,12 @@ from mrmg.errors import UsageError
 from mrmg.planning.guided_tree.planner import Growth as GuidedGrowth
 from mrmg.planning.guided_tree.planner import grow_guided_tree
 from mrmg.planning.parameters import GUIDED_TREE, PlannerParams
+from mrmg.planning.problem.problem import Problem, state_problem
 from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
 from mrmg.planning.routers import route
 from mrmg.planning.routing.routing import Routing
 from mrmg.planning.tree.motion_tree import Growth as TreeGrowth
-from mrmg.planning.tree.motion_tree import Problem, grow_tree, state_problem
+from mrmg.planning.tree.motion_tree import grow_tree
 from mrmg.plans import Trajectory
 from mrmg.scene.types import Scene
 from mrmg.world.world import World

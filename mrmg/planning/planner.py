@@ -48,12 +48,13 @@ from mrmg.planning.parameters import (
     paper_params,
 )
 from mrmg.planning.preference import Preference
+from mrmg.planning.problem.problem import Problem, state_problem
+from mrmg.planning.problem.time_weighting import priced_world, with_energies
 from mrmg.planning.roadmap.roadmap import build_roadmap
 from mrmg.planning.routing.routing import Routing
 from mrmg.planning.search import GRACE_S, OnImprovement, Progress, Search
 from mrmg.planning.statistics import UNKNOWN, Statistics
-from mrmg.planning.tree.haste import priced_world, with_energies
-from mrmg.planning.tree.motion_tree import Problem, grow_tree, state_problem
+from mrmg.planning.tree.motion_tree import grow_tree
 from mrmg.plans import PlanResult, PlanStatus
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.objective import Objective

@@ -14,10 +14,10 @@ from bench_routing import uneven_mission
 
 from mrmg import seeding
 from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.problem.problem import Problem, state_problem
 from mrmg.planning.roadmap.roadmap import build_roadmap
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import routing_arrays
-from mrmg.planning.tree.motion_tree import Problem, state_problem
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.world.world import World

@@ -20,7 +20,7 @@ from mrmg.energy.metering import battery_profile
 from mrmg.planning import PlannerParams, attempt
 from mrmg.planning.attempt import Attempt, attempt_plan, draft_plans, tree_plans
 from mrmg.planning.planner import state_mission
-from mrmg.planning.tree.motion_tree import Problem
+from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 
@@ -135,7 +135,7 @@ def test_who_cannot_spare_charge_is_planned_for_all_the_same() -> None:
     params = replace(PARAMS, spare=0.9)
     assert attempt_plan(problem, 7, params, 0, np.zeros(1, np.bool_)).plans
     for way in (draft_plans, tree_plans):
-        spared = problem.with_spare(0.9)
+        spared = problem.with_soc_margin(0.9)
         assert not way(spared, 7, params, 0, np.zeros(1, np.bool_)).plans
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mrmg.planning.problem._safety_kernels import new_commitment, write_braking
+from mrmg.planning.problem.targets import gate_arrays
 from mrmg.planning.roadmap.fleet import fleet_array
-from mrmg.planning.tree._safety_kernels import new_commitment, write_braking
-from mrmg.planning.tree.targets import gate_arrays
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.supervision.braking import brake_to_rest

@@ -9,8 +9,8 @@ import numpy as np
 
 from mrmg.compilation import by_pointer, kernel, leaf_kernel
 from mrmg.motion._kernels import UNICYCLE, step
-from mrmg.planning.tree._mission_kernels import in_target
-from mrmg.planning.tree._safety_kernels import (
+from mrmg.planning.problem._control_kernels import control_towards, wrap
+from mrmg.planning.problem._safety_kernels import (
     braking_control,
     follow_braking,
     new_commitment,
@@ -19,7 +19,7 @@ from mrmg.planning.tree._safety_kernels import (
     try_control,
     write_braking,
 )
-from mrmg.planning.tree._steering_kernels import control_towards, wrap
+from mrmg.planning.problem._target_kernels import in_target
 
 PREVIEW_S = 0.2
 """How far ahead the path's curvature is read."""

@@ -15,8 +15,8 @@ import numpy as np
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.drafting import _relax_kernels, _tracking_kernels
 from mrmg.planning.drafting._band_kernels import Stops, Surface
-from mrmg.planning.tree._mission_kernels import Targets
-from mrmg.planning.tree.motion_tree import Problem
+from mrmg.planning.problem._target_kernels import Targets
+from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Trajectory
 
 SPACINGS_M = (2.4, 0.8)

@@ -21,7 +21,7 @@ from mrmg.planning.drafting.lanes import (
     spacing_m,
 )
 from mrmg.planning.drafting.tracking import Drive
-from mrmg.planning.tree.motion_tree import Problem
+from mrmg.planning.problem.problem import Problem
 
 LACK_M = 0.25
 """Clearance that a detour may lack: discs cover more than footprints ..."""

@@ -22,8 +22,8 @@ from mrmg.planning.drafting.errand import Errand
 from mrmg.planning.drafting.gears import with_best_gears
 from mrmg.planning.drafting.refine import OnFailure, run_errands, surfaces_of
 from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.problem.problem import Problem
 from mrmg.planning.routing.routing import Routing
-from mrmg.planning.tree.motion_tree import Problem
 from mrmg.plans import Plan
 
 SHARP = radians(110.0)
@@ -97,7 +97,7 @@ def drafts(
     }
     limit = problem.mission.fleet["limit"]
     slower = -limit[:, 0] < NEARLY * limit[:, 1]  # backwards than forwards
-    timed = problem.hurried or problem.preference.objective.makespan_weight > 0.0
+    timed = problem.minimum_time or problem.preference.objective.makespan_weight > 0.0
     deeper_m = SURELY_M if hasty else TRACKING_M
     tried: list[list[Path]] = []
     for sharp in (*ROOMY, SHARP) if timed and slower.any() else (SHARP, *ROOMY):

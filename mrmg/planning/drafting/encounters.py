@@ -25,7 +25,7 @@ from mrmg.planning.drafting.lanes import (
     standing_lane,
 )
 from mrmg.planning.drafting.tracking import Drive, PathPlace, Wait
-from mrmg.planning.tree.motion_tree import Problem
+from mrmg.planning.problem.problem import Problem
 
 MOST = 4
 """Encounters that are resolved at most, for each robot of the fleet."""
@@ -154,7 +154,7 @@ def ways_out(
     waits = waits_at(problem, errands, outcome, r, other)
     # Round a robot that stands it is the same way, however much of a path is avoided.
     first, *more = PASSING if np.isfinite(outcome.driven[other]) else PASSING[:1]
-    if problem.hurried or problem.preference.objective.makespan_weight > 0.0:
+    if problem.minimum_time or problem.preference.objective.makespan_weight > 0.0:
         detours = passing_detours(problem, errands, outcome, r, other, first)
         options: list[tuple[float, Wait | list[Detour]]] = [*waits]
         options += [(_longer_m(errands, led), led) for led in detours[:MOST_TRIED]]

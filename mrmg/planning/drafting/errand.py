@@ -10,7 +10,7 @@ import numpy as np
 from mrmg.planning.drafting._band_kernels import Surface
 from mrmg.planning.drafting.band import SPACINGS_M, Path, tightened
 from mrmg.planning.drafting.tracking import SlowPlace
-from mrmg.planning.tree.motion_tree import Problem
+from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Trajectory
 
 WALL = 0.5

@@ -14,7 +14,7 @@ import numpy as np
 
 from mrmg.planning.drafting._band_kernels import Surface
 from mrmg.planning.drafting.band import SPACINGS_M, Path, tightened
-from mrmg.planning.tree.motion_tree import Problem
+from mrmg.planning.problem.problem import Problem
 
 DOUBTFUL = (radians(60.0), radians(165.0))
 """Turns at targets between which either may be cheaper [rad]."""

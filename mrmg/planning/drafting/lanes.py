@@ -11,7 +11,7 @@ from mrmg.planning.drafting._band_kernels import Surface
 from mrmg.planning.drafting.band import SPARE_M
 from mrmg.planning.drafting.errand import Errand
 from mrmg.planning.drafting.tracking import Drive
-from mrmg.planning.tree.motion_tree import Problem
+from mrmg.planning.problem.problem import Problem
 
 STEP_M = 0.25
 """Distance of the places at which paths are compared."""

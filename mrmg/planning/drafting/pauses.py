@@ -8,7 +8,7 @@ import numpy as np
 
 from mrmg.energy.model import CONSUMERS_W
 from mrmg.planning.drafting.band import Path
-from mrmg.planning.tree.motion_tree import Problem
+from mrmg.planning.problem.problem import Problem
 
 MORE = 1.05
 """Multiple of what its path takes from which it follows how long a battery is filled:

@@ -34,12 +34,12 @@ from mrmg.planning.drafting.errand import Errand
 from mrmg.planning.drafting.pauses import with_pauses
 from mrmg.planning.drafting.tracking import Drive, braking_places, redriven
 from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.problem._control_kernels import wrap
+from mrmg.planning.problem._target_kernels import in_target
+from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.targets import TARGET_MARGIN_M
+from mrmg.planning.problem.time_weighting import energy_share
 from mrmg.planning.roadmap.roadmap import planned_regions
-from mrmg.planning.tree._mission_kernels import in_target
-from mrmg.planning.tree._steering_kernels import wrap
-from mrmg.planning.tree.haste import energy_share
-from mrmg.planning.tree.motion_tree import Problem
-from mrmg.planning.tree.targets import TARGET_MARGIN_M
 from mrmg.plans import Plan, Trajectory
 
 TRIES = 14

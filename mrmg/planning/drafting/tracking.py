@@ -13,8 +13,8 @@ from mrmg.planning.drafting import _tracking_kernels
 from mrmg.planning.drafting._tracking_kernels import Courses, Waits
 from mrmg.planning.drafting.band import Path, nimble_share, path_curvature
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.tree.haste import brakes_hard
-from mrmg.planning.tree.motion_tree import Problem
+from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.time_weighting import brakes_hard
 from mrmg.plans import Trajectory
 
 SLOWEST = 4
@@ -231,7 +231,7 @@ def courses_of(
             end[r, a:b] = b
             bend[r, a : b + 1] = _bends(chord[a:b], size[a:b])
         tight = steerable_speeds(problem, r, bend[r, :n], way[r, :n], end[r, : n - 1])
-        steps = np.ceil(path.pause_s / problem.mission.params.dt).astype(int)
+        steps = np.ceil(path.pause_s / problem.dt_s).astype(int)
         np.add.at(pause[r], path.stop, steps)
         fastest[r, :n] = _speed_limits(path, slow[r], tight, float(ease[r]))
     return Courses(
@@ -350,4 +350,4 @@ def _decelerations(problem: Problem) -> np.ndarray:
     hardest = fleet["limit"][:, 3]
     braking = HARD_SHARE * hardest
     eased = np.clip(rolling, 0.1 * hardest, braking)
-    return np.where(brakes_hard(problem.scene, problem.hurried), braking, eased)
+    return np.where(brakes_hard(problem.scene, problem.minimum_time), braking, eased)

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import by_pointer, leaf_kernel
+from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.roadmap._fleet_kernels import Spaces, space_of
 from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.tree._mission_kernels import Targets
 from mrmg.world._kernels import (
     TerrainGrid,
     convex_convex_distance,

@@ -25,7 +25,7 @@ from mrmg.planning.guided_tree._tree_kernels import (
     Vertices,
 )
 from mrmg.planning.parameters import BETA_SHARE, GuidedTreeParams, PlannerParams
-from mrmg.planning.tree.motion_tree import Problem
+from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Trajectory
 from mrmg.scene.types import Scene
 
@@ -151,7 +151,7 @@ def rules_of(problem: Problem, params: PlannerParams) -> Rules:
         dt_s=params.dt_s,
         beta_share=BETA_SHARE,
         ahead_m=0.5 * (method["ahead_least_m"] + method["ahead_most_m"]),
-        route_margin=problem.mission.params.route_margin,
+        route_margin=problem.route_margin,
         levels=params.router.levels,
         nrpa_iterations=params.router.iterations,
         nrpa_alpha=params.router.alpha,

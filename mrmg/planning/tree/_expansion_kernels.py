@@ -10,12 +10,8 @@ import numpy as np
 from mrmg.compilation import kernel, leaf_kernel
 from mrmg.energy.model import battery_power
 from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, turn_speed
-from mrmg.planning.roadmap._fleet_kernels import space_of
-from mrmg.planning.routing._random_kernels import random_unit
-from mrmg.planning.tree._finish_kernels import may_stop, turn_at_finish
-from mrmg.planning.tree._maneuver_kernels import best_maneuver
-from mrmg.planning.tree._mission_kernels import load_height, look_ahead
-from mrmg.planning.tree._safety_kernels import (
+from mrmg.planning.problem._control_kernels import control_towards, wrap
+from mrmg.planning.problem._safety_kernels import (
     braking_control,
     follow_braking,
     gate_is_taken,
@@ -24,16 +20,19 @@ from mrmg.planning.tree._safety_kernels import (
     try_control,
     write_braking,
 )
+from mrmg.planning.roadmap._fleet_kernels import space_of
+from mrmg.planning.routing._random_kernels import random_unit
+from mrmg.planning.tree._finish_kernels import may_stop, turn_at_finish
+from mrmg.planning.tree._maneuver_kernels import best_maneuver
+from mrmg.planning.tree._mission_kernels import load_height, look_ahead
 from mrmg.planning.tree._staying_kernels import note_arrivals
 from mrmg.planning.tree._steering_kernels import (
     BACK_OFF,
     RANDOM,
     STEER,
     WAIT,
-    control_towards,
     pursue,
     sidestep,
-    wrap,
 )
 from mrmg.world._kernels import multiplier_in, turning_multiplier_in
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from mrmg.compilation import kernel
 from mrmg.motion._kernels import UNICYCLE, copy_numbers, step
-from mrmg.planning.tree._mission_kernels import in_target
-from mrmg.planning.tree._safety_kernels import braking_control, stands
+from mrmg.planning.problem._control_kernels import wrap
+from mrmg.planning.problem._safety_kernels import braking_control, stands
+from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.tree._staying_kernels import must_stay
-from mrmg.planning.tree._steering_kernels import wrap
 
 MOST_BRAKING_STEPS = 200
 """Steps after which a robot that still moves is taken to be at rest."""

@@ -14,11 +14,11 @@ import numpy as np
 
 from mrmg.compilation import kernel, leaf_kernel
 from mrmg.motion._kernels import copy_numbers, step
+from mrmg.planning.problem._control_kernels import control_towards, wrap
+from mrmg.planning.problem._safety_kernels import toward_zero
 from mrmg.planning.roadmap._fleet_kernels import space_of
 from mrmg.planning.routing._random_kernels import random_unit
 from mrmg.planning.tree._mission_kernels import look_ahead
-from mrmg.planning.tree._safety_kernels import toward_zero
-from mrmg.planning.tree._steering_kernels import control_towards, wrap
 from mrmg.world._kernels import (
     clearance_at_least,
     clearance_estimate,

@@ -1,50 +1,20 @@
-"""The planning problem as one value for the kernels, and its simplest questions."""
+"""The planning problem as one value for the kernels of the tree."""
 
 from __future__ import annotations
 
-from math import cos, hypot, sin
+from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
 
 from mrmg.compilation import by_pointer, kernel, leaf_kernel
 from mrmg.energy.model import CONSUMERS_W
+from mrmg.planning.problem._safety_kernels import Gates
+from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.roadmap._fleet_kernels import Spaces, space_of
 from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays, find_waypoint
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.tree._safety_kernels import Gates
-from mrmg.world._kernels import TerrainGrid, height_in, point_in_convex
-
-
-@by_pointer
-class Targets(NamedTuple):
-    """Goals, stations and finishes: convex regions; T targets, in that order.
-
-    Attributes:
-        goals: number of goals.
-        places: number of goals and stations.
-        finish: target in which each robot must end, -1 for anywhere, shape (R,).
-        heading: heading with which it must end there [rad], shape (R,).
-        tolerance: allowed deviation from that [rad]; at least pi for any, shape (R,).
-        center: shape (T, 2).
-        reach: radius of the circle about the centre that holds the region, shape (T,).
-        corner: padded corners of polygons, shape (T, M, 2).
-        corners: number of corners; 0 for a circle, shape (T,).
-        dwell: how long a visit takes [s], shape (T,).
-        gate: number among the gates of the safety kernels, -1 for none, shape (T,).
-    """
-
-    goals: int
-    places: int
-    finish: np.ndarray
-    heading: np.ndarray
-    tolerance: np.ndarray
-    center: np.ndarray
-    reach: np.ndarray
-    corner: np.ndarray
-    corners: np.ndarray
-    dwell: np.ndarray
-    gate: np.ndarray
+from mrmg.world._kernels import TerrainGrid, height_in
 
 
 @by_pointer
@@ -71,37 +41,18 @@ class TreeParams(NamedTuple):
 
 
 @by_pointer
-class Mission(NamedTuple):
-    """A planning problem.
-
-    Attributes:
-        fleet, spaces, terrain, roadmap, targets: robots, world and where to go.
-        gates: stations that one robot at a time may be at.
-        routing: the routing problem at the start; costs include the route margin.
-        last_leg: energy from each place (the start last) to each robot's finish [J],
-            shape (R, G + S + 1); zero where a robot may end anywhere.
-        params: numbers the tree is grown by.
-    """
+class TreeMission(NamedTuple):
+    """A `problem.Mission` with the numbers the tree is grown by."""
 
     fleet: np.ndarray
     spaces: Spaces
     terrain: TerrainGrid
     roadmap: RoadmapArrays
     targets: Targets
+    gates: Gates
     routing: RoutingArrays
     last_leg: np.ndarray
     params: TreeParams
-    gates: Gates
-
-
-@leaf_kernel
-def in_target(targets, t, x, y):
-    """Tell whether a point lies in a target's region."""
-    far = hypot(x - targets.center[t, 0], y - targets.center[t, 1])
-    if far > targets.reach[t]:
-        return False
-    n = targets.corners[t]
-    return n == 0 or point_in_convex(x, y, targets.corner[t, :n])
 
 
 @kernel

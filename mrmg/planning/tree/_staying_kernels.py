@@ -10,7 +10,7 @@ import numpy as np
 
 from mrmg.compilation import leaf_kernel
 from mrmg.energy.model import CONSUMERS_W
-from mrmg.planning.tree._mission_kernels import in_target
+from mrmg.planning.problem._target_kernels import in_target
 
 FULL = 1.0 - 1e-9
 """Share of the capacity from which a battery counts as full."""

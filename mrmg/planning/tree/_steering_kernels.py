@@ -11,6 +11,7 @@ from math import atan, atan2, cos, hypot, pi, sin
 
 from mrmg.compilation import leaf_kernel
 from mrmg.motion._kernels import UNICYCLE
+from mrmg.planning.problem._control_kernels import wrap
 from mrmg.world._kernels import segment_is_clear
 
 STEER, RANDOM, BACK_OFF, WAIT = range(4)
@@ -24,16 +25,6 @@ SIGHT_M = 9.0
 
 NARROWER = 10
 """Smaller offsets tried in passing a robot where there is no room for the full one."""
-
-
-@leaf_kernel
-def wrap(angle):
-    """Return the angle in (-pi, pi]."""
-    while angle > pi:
-        angle -= 2.0 * pi
-    while angle <= -pi:
-        angle += 2.0 * pi
-    return angle
 
 
 @leaf_kernel
@@ -114,13 +105,3 @@ def sidestep(fleet, r, state, space, others, wx, wy, out):
                 out[0], out[1] = px, py
                 break
             side = -side
-
-
-@leaf_kernel
-def control_towards(fleet, r, state, v, w, dt):
-    """Return the control (u1, u2) that brings speed and steering to (v, w)."""
-    v = max(fleet[r].limit[0], min(fleet[r].limit[1], v))
-    w = max(-fleet[r].limit[2], min(fleet[r].limit[2], w))
-    u1 = max(-fleet[r].limit[3], min(fleet[r].limit[3], (v - state[3]) / dt))
-    u2 = max(-fleet[r].limit[4], min(fleet[r].limit[4], (w - state[4]) / dt))
-    return u1, u2

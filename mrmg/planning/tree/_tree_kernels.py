@@ -9,19 +9,20 @@ import numpy as np
 
 from mrmg.compilation import by_pointer, kernel, leaf_kernel, now_ns
 from mrmg.motion._kernels import copy_numbers
+from mrmg.planning.problem._safety_kernels import (
+    braking_control,
+    new_commitment,
+    write_braking,
+)
+from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.routing._random_kernels import random_below, random_unit
 from mrmg.planning.routing._routes_kernels import IMPOSSIBLE
 from mrmg.planning.tree._expansion_kernels import choose_modes, expand
 from mrmg.planning.tree._finish_kernels import all_finished, at_finish
 from mrmg.planning.tree._groups_kernels import add_to_group, new_groups, select_vertex
 from mrmg.planning.tree._maneuver_kernels import way_left
-from mrmg.planning.tree._mission_kernels import in_target, leg_energy
+from mrmg.planning.tree._mission_kernels import leg_energy
 from mrmg.planning.tree._rerouting_kernels import route_from
-from mrmg.planning.tree._safety_kernels import (
-    braking_control,
-    new_commitment,
-    write_braking,
-)
 from mrmg.planning.tree._staying_kernels import (
     has_visited_station,
     is_queuing,

@@ -7,157 +7,34 @@ solved tree back into trajectories and tours.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from mrmg import seeding
-from mrmg.energy.model import CONSUMERS_W
 from mrmg.motion._kernels import step as motion_step
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.preference import Preference
-from mrmg.planning.roadmap.fleet import fleet_array, stack_spaces
-from mrmg.planning.roadmap.roadmap import Roadmap
-from mrmg.planning.routing.routing import Routing, routing_arrays, tour_room
+from mrmg.planning.problem._target_kernels import in_target
+from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.targets import has_options
+from mrmg.planning.routing.routing import Routing, tour_room
 from mrmg.planning.tree import _groups_kernels, _tree_kernels
 from mrmg.planning.tree._groups_kernels import Tree
-from mrmg.planning.tree._mission_kernels import Mission, TreeParams, in_target
+from mrmg.planning.tree._mission_kernels import TreeMission, TreeParams
 from mrmg.planning.tree._staying_kernels import has_visited_station
 from mrmg.planning.tree._tree_kernels import Tours
-from mrmg.planning.tree.targets import (
-    finish_of,
-    gate_arrays,
-    has_options,
-    target_arrays,
-)
-from mrmg.planning.tree.timing import routing_times
 from mrmg.plans import Trajectory
-from mrmg.scene.types import Scene
-from mrmg.world.world import World
 
 TOUR_ROWS = 2000
 """Most tours one tree may hold."""
 
 
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """A scene and its arrays.
-
-    Attributes:
-        scene: the scene.
-        roadmap: its roadmap.
-        mission: what the kernels work on.
-        start: composite state at the start, shape (R, 5).
-        start_energy: battery contents at the start [J], shape (R,).
-        hurried: whether plans must be sooner over at any cost.
-        spare: share of every battery's capacity that plans leave above the reserve.
-    """
-
-    scene: Scene
-    roadmap: Roadmap
-    mission: Mission
-    start: np.ndarray
-    start_energy: np.ndarray
-    hurried: bool = False
-    spare: float = 0.0
-
-    @property
-    def preference(self) -> Preference:
-        """What plans are compared by."""
-        return Preference.of(self.scene)
-
-    def with_margin(self, margin: float) -> Problem:
-        """Return the problem with another surcharge on the roadmap's energies."""
-        routing = self.mission.routing
-        share = (1.0 + margin) / (1.0 + self.mission.params.route_margin)
-        return replace(
-            self,
-            mission=self.mission._replace(
-                routing=routing._replace(
-                    cost=routing.cost * share,
-                    escape=routing.escape * share,
-                    finish=routing.finish * share,
-                    time=routing.time * share,
-                    finish_time=routing.finish_time * share,
-                ),
-                params=self.mission.params._replace(route_margin=margin),
-            ),
-        )
-
-    def with_spare(self, share: float) -> Problem:
-        """Return the problem whose plans leave more in batteries than the reserve.
-
-        Args:
-            share: of their capacities, for all of them.
-        """
-        fleet = self.mission.fleet.copy()
-        fleet["reserve"] += (share - self.spare) * fleet["capacity"]
-        routing = self.mission.routing._replace(reserve=fleet["reserve"].copy())
-        mission = self.mission._replace(fleet=fleet, routing=routing)
-        return replace(self, mission=mission, spare=share)
-
-    def with_limit(self, share: float) -> Problem:
-        """Return the problem with routes that take a share of the time limit."""
-        routing = self.mission.routing
-        shorter = routing._replace(limit=share * routing.limit)
-        return replace(self, mission=self.mission._replace(routing=shorter))
-
-
-def state_problem(
-    scene: Scene, world: World, roadmap: Roadmap, params: PlannerParams
-) -> Problem:
-    """Return the scene's problem; routing costs include the route margin."""
-    fleet = fleet_array(
-        scene,
-        world,
-        obstacle_margin_m=params.obstacle_margin_m,
-        robot_margin_m=params.robot_margin_m,
+def tree_mission(problem: Problem, params: PlannerParams) -> TreeMission:
+    """Return a planning problem for the tree's kernels."""
+    numbers = tree_params(params)._replace(
+        route_margin=problem.route_margin, optioned=has_options(problem.scene)
     )
-    places = len(scene.targets())
-    targets = target_arrays(scene)
-    # What robots draw while they stay counts as way.
-    idle_m = fleet["energy"][:, CONSUMERS_W] / fleet["plain"]
-    stay_m = idle_m[:, None] * targets.dwell[:places]
-    last_leg = _last_legs(scene, roadmap, fleet)
-    energy = np.array([robot.battery.start_J for robot in scene.robots])
-    times = routing_times(scene, roadmap, fleet, targets.dwell, params.route_margin)
-    start = np.zeros((len(scene.robots), 5))
-    start[:, :3] = [robot.pose for robot in scene.robots]
-    mission = Mission(
-        fleet=fleet,
-        spaces=stack_spaces(world),
-        terrain=world.terrain,
-        roadmap=roadmap.arrays,
-        targets=targets,
-        routing=routing_arrays(
-            goals=len(scene.goals),
-            distance=roadmap.distance[fleet["field"], :places, :places]
-            + stay_m[:, None],
-            start_distance=roadmap.start_distance[:, :places] + stay_m,
-            plain=fleet["plain"] * (1.0 + params.route_margin),
-            energy=energy,
-            capacity=fleet["capacity"],
-            reserve=fleet["reserve"],
-            finish_distance=last_leg / fleet["plain"][:, None],
-            **({} if times is None else times._asdict()),
-        ),
-        last_leg=last_leg,
-        params=tree_params(params)._replace(optioned=has_options(scene)),
-        gates=gate_arrays(scene),
-    )
-    return Problem(scene, roadmap, mission, start, energy)
-
-
-def _last_legs(scene: Scene, roadmap: Roadmap, fleet: np.ndarray) -> np.ndarray:
-    """Return the energy from each place to each robot's finish [J], (R, G + S + 1)."""
-    places = len(scene.targets())
-    legs = np.zeros((len(fleet), places + 1))
-    for r, finish in enumerate(finish_of(scene)):
-        if finish >= 0:
-            legs[r, :places] = roadmap.distance[fleet[r]["field"], :places, finish]
-            legs[r, places] = roadmap.start_distance[r, finish]
-            legs[r] *= fleet[r]["plain"]
-    return legs
+    return TreeMission(**problem.mission._asdict(), params=numbers)
 
 
 def tree_params(params: PlannerParams) -> TreeParams:
@@ -226,7 +103,7 @@ def grow_tree(
         seed: of the tree's random choices.
         halt: shape (1,); growing ends, without a solution, once it has turned true.
     """
-    mission = problem.mission
+    mission = tree_mission(problem, params)
     robots = len(problem.scene.robots)
     width = tour_room(mission.targets.goals, mission.targets.places)
     tree = _groups_kernels.new_tree(
@@ -261,7 +138,7 @@ def grow_tree(
     control = _controls(problem, params, tree, branch)
     return Growth(
         _replay(problem, params, control),
-        _visited_tours(problem, tree, tours, branch),
+        _visited_tours(problem, mission, tree, tours, branch),
         statistics,
         routing_s,
         place,
@@ -315,11 +192,10 @@ def _replay(
 
 
 def _visited_tours(
-    problem: Problem, tree: Tree, tours: Tours, branch: list[int]
+    problem: Problem, mission: TreeMission, tree: Tree, tours: Tours, branch: list[int]
 ) -> dict[str, tuple[str, ...]]:
     """Return what each robot visited: goals it was first at, stations it drove to."""
-    mission, targets = problem.mission, problem.mission.targets
-    robots = problem.scene.robots
+    robots, targets = problem.scene.robots, mission.targets
     found: list[list[int]] = [[] for _ in robots]
     seen = np.zeros(targets.goals, bool)
     for v in branch:

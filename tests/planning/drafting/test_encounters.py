@@ -17,8 +17,8 @@ from mrmg.planning.drafting.errand import Errand
 from mrmg.planning.drafting.refine import surfaces_of
 from mrmg.planning.drafting.tracking import Drive
 from mrmg.planning.planner import state_mission
+from mrmg.planning.problem.problem import Problem
 from mrmg.planning.routing.routing import Routing
-from mrmg.planning.tree.motion_tree import Problem
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 

@@ -22,7 +22,7 @@ PARAMS = PlannerParams(samples=600)
 
 
 def drafted(scene: Scene) -> Plan:
-    problem = state_mission(scene, 0, PARAMS).with_spare(LEAST_SPARE)
+    problem = state_mission(scene, 0, PARAMS).with_soc_margin(LEAST_SPARE)
     tours = route(problem.mission.routing, PARAMS.router, 0)
     return list(drafts(problem, PARAMS, tours, 0, np.zeros(1, np.bool_)))[-1]
 

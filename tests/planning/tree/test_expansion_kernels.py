@@ -10,6 +10,10 @@ import pytest
 
 from mrmg.energy.metering import LoggedMotion, step_energy_parts
 from mrmg.energy.model import PARTS
+from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.problem._target_kernels import in_target
+from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.targets import TARGET_MARGIN_M
 from mrmg.planning.tree._expansion_kernels import (
     attempt_control,
     choose_modes,
@@ -18,15 +22,14 @@ from mrmg.planning.tree._expansion_kernels import (
     step_energy,
 )
 from mrmg.planning.tree._groups_kernels import Tree, new_tree
-from mrmg.planning.tree._mission_kernels import in_target
 from mrmg.planning.tree._staying_kernels import note_arrivals
 from mrmg.planning.tree._steering_kernels import BACK_OFF, RANDOM, STEER, WAIT
-from mrmg.planning.tree.motion_tree import Problem
-from mrmg.planning.tree.targets import TARGET_MARGIN_M
+from mrmg.planning.tree.motion_tree import tree_mission
 from mrmg.scene.types import Scene
 from mrmg.world.terrain import multiplier_at, turning_multiplier_at
 
 DT_S = 0.1
+PARAMS = PlannerParams()
 SCENE = {
     "goals": [
         {"id": "a", "circle": {"center": [24, 10], "radius": 1.5}},
@@ -80,7 +83,7 @@ def modes(
             tree,
             np.int64(0),
             np.array(target),
-            problem.mission.params,
+            tree_mission(problem, PARAMS).params,
             steer,
             random,
             stuck,
@@ -174,7 +177,7 @@ def test_a_step_costs_what_the_energy_model_says_of_its_midpoint(
         watts = model.power_parts(
             middle[3:4], np.array([u1]), turn, k, np.zeros(1)
         ).sum()
-        joules = step_energy(problem.mission, 0, before, after, u1)
+        joules = step_energy(tree_mission(problem, PARAMS), 0, before, after, u1)
         assert joules == pytest.approx(DT_S * watts, abs=1e-9)
         compared.add(float(k[0]))
     assert compared == {1.0, 2.5}
@@ -197,7 +200,7 @@ def test_a_step_on_a_slope_is_charged_as_the_accounts_charge_it(
         )
         expected = step_energy_parts(problem.scene, motion)
         u1 = (after[3] - before[3]) / DT_S
-        joules = step_energy(problem.mission, 0, before, after, u1)
+        joules = step_energy(tree_mission(problem, PARAMS), 0, before, after, u1)
         assert joules == pytest.approx(expected.sum(), abs=1e-9)
         climbed += abs(expected[0, PARTS.index("grade")]) > 0.1
     assert climbed > 150
@@ -214,7 +217,7 @@ def arrive(
     state[:, :2] = points
     energy, visited = problem.start_energy.copy(), np.zeros(2, bool)
     event = note_arrivals(
-        problem.mission,
+        tree_mission(problem, PARAMS),
         state,
         energy,
         visited,
@@ -263,7 +266,7 @@ def run(
     state, energy = start.copy(), problem.start_energy.copy()
     control = np.full((15, 2, 2), np.nan)
     steps, event, alive = expand(
-        problem.mission,
+        tree_mission(problem, PARAMS),
         state,
         energy,
         np.zeros(2, bool),

@@ -12,6 +12,7 @@ import shapely
 
 from mrmg.motion.dynamics import car_derivative, rk4_step
 from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.problem.problem import Problem
 from mrmg.planning.tree._maneuver_kernels import (
     MANEUVER_STEPS,
     SWITCH_M,
@@ -19,12 +20,13 @@ from mrmg.planning.tree._maneuver_kernels import (
     hold_motion,
     way_left,
 )
-from mrmg.planning.tree.motion_tree import Problem
+from mrmg.planning.tree.motion_tree import tree_mission
 from mrmg.scene.types import Scene
 
 PLANNING_MARGIN_M = PlannerParams().obstacle_margin_m
 
 DT_S = 0.1
+PARAMS = PlannerParams()
 DEAD_END = [  # 3 m wide, open to the west, its end at x = 20
     {"id": "south", "box": {"center": [16, 7.5], "size": [8, 2]}, "height": 1},
     {"id": "north", "box": {"center": [16, 12.5], "size": [8, 2]}, "height": 1},
@@ -79,7 +81,9 @@ def choose(
 ) -> tuple[bool, np.ndarray]:
     out = np.full(2, np.nan)
     random = np.array([seed], np.uint64)
-    found = best_maneuver(problem.mission, 0, 0, state, stuck, random, out)
+    found = best_maneuver(
+        tree_mission(problem, PARAMS), 0, 0, state, stuck, random, out
+    )
     return bool(found), out
 
 
@@ -110,7 +114,7 @@ def assert_it_gets_there(problem: Problem, state: np.ndarray, turns: int) -> Non
         found, motion = choose(problem, state, seed=turn)
         assert found
         end = np.empty(5)
-        hold_motion(problem.mission, 0, state, motion[0], motion[1], end)
+        hold_motion(tree_mission(problem, PARAMS), 0, state, motion[0], motion[1], end)
         assert clearance(problem, end) >= PLANNING_MARGIN_M - 1e-9
         state = end
         if hypot(state[0] - 3.0, state[1] - 10.0) < 1.5:
@@ -120,7 +124,7 @@ def assert_it_gets_there(problem: Problem, state: np.ndarray, turns: int) -> Non
 
 def test_motions_are_held_up_to_the_first_state_too_near(dead_end: Problem) -> None:
     """Against the plain Python form of the motion model and exact distances."""
-    mission = dead_end.mission
+    mission = tree_mission(dead_end, PARAMS)
     low, high, side, u1_max, u2_max = mission.fleet[0]["limit"]
     wheelbase = mission.fleet[0]["wheelbase"]
     rng = np.random.default_rng(6)
@@ -151,7 +155,7 @@ def test_motions_are_held_up_to_the_first_state_too_near(dead_end: Problem) -> N
 
 def best_by_recursion(problem: Problem, start: np.ndarray) -> tuple[float, list[Any]]:
     """Return the best rating of two motions, and the first motions that attain it."""
-    mission = problem.mission
+    mission = tree_mission(problem, PARAMS)
     low, high, side = mission.fleet[0]["limit"][:3]
     motions = [
         (v, w) for v in (0.7 * high, low) for w in np.linspace(-1.0, 1.0, 5) * side

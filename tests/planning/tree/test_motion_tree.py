@@ -15,13 +15,14 @@ from mrmg.energy.metering import LoggedMotion, battery_profile, find_visits
 from mrmg.energy.metering import step_energy_parts as energy_parts
 from mrmg.motion._kernels import step
 from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.problem._target_kernels import in_target
+from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.targets import TARGET_MARGIN_M
 from mrmg.planning.routing.routing import Routing, solve_routing
 from mrmg.planning.tree import _groups_kernels, _tree_kernels
 from mrmg.planning.tree._groups_kernels import Tree
-from mrmg.planning.tree._mission_kernels import in_target
 from mrmg.planning.tree._tree_kernels import Tours
-from mrmg.planning.tree.motion_tree import Problem, grow_tree
-from mrmg.planning.tree.targets import TARGET_MARGIN_M
+from mrmg.planning.tree.motion_tree import grow_tree, tree_mission
 from mrmg.scene.types import Scene
 
 MakeScene = Callable[..., Scene]
@@ -85,7 +86,11 @@ class Grown:
         """Return each robot's next target at a vertex."""
         target = np.zeros(len(self.problem.start), np.int64)
         _tree_kernels.next_targets(
-            self.problem.mission, self.tree, self.tours, np.int64(v), target
+            tree_mission(self.problem, self.params),
+            self.tree,
+            self.tours,
+            np.int64(v),
+            target,
         )
         return target
 
@@ -105,7 +110,7 @@ def grow(problem: Problem, params: PlannerParams, seed: int = 1) -> Grown:
         tours.length[0, r] = len(tour)
     counts = np.zeros(6, np.int64)
     leaf = _tree_kernels.grow(
-        problem.mission,
+        tree_mission(problem, params),
         problem.start,
         problem.start_energy,
         np.array([seed], np.uint64),
@@ -315,13 +320,13 @@ def test_the_margin_scales_the_roadmaps_energies_alone(
     double = problem.with_margin(0.16).mission
     assert double.routing.cost == pytest.approx(1.16 * plain.routing.cost)
     assert double.routing.escape == pytest.approx(1.16 * plain.routing.escape)
-    assert double.params.route_margin == 0.16
+    assert problem.with_margin(0.16).route_margin == 0.16
     field = problem.mission.fleet["field"]
     joules = problem.mission.fleet["plain"][:, None, None]
     assert plain.routing.cost[:, :-1] == pytest.approx(
         problem.roadmap.distance[field] * joules
     )
-    back = problem.with_margin(0.5).with_margin(problem.mission.params.route_margin)
+    back = problem.with_margin(0.5).with_margin(problem.route_margin)
     assert back.mission.routing.cost == pytest.approx(problem.mission.routing.cost)
 
 
@@ -329,13 +334,14 @@ def test_the_margin_scales_the_roadmaps_energies_alone(
 def test_variants_of_a_problem_need_no_other_kernels(
     yard: MakeScene, state: MakeProblem
 ) -> None:
-    problem = state(yard())
+    problem, params = state(yard()), PlannerParams()
+    own = numba.typeof(tree_mission(problem, params))
     for variant in (
-        problem.with_spare(0.1),
+        problem.with_soc_margin(0.1),
         problem.with_limit(0.5),
         problem.with_margin(0.2),
     ):
-        assert numba.typeof(variant.mission) == numba.typeof(problem.mission)
+        assert numba.typeof(tree_mission(variant, params)) == own
 
 
 def test_a_halted_tree_ends_without_a_solution(

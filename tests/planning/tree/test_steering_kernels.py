@@ -9,14 +9,10 @@ import numpy as np
 import pytest
 
 from mrmg.motion._kernels import CAR, UNICYCLE, step
+from mrmg.planning.problem._control_kernels import control_towards, wrap
+from mrmg.planning.problem.problem import Problem
 from mrmg.planning.roadmap._fleet_kernels import space_of
-from mrmg.planning.tree._steering_kernels import (
-    control_towards,
-    pursue,
-    sidestep,
-    wrap,
-)
-from mrmg.planning.tree.motion_tree import Problem
+from mrmg.planning.tree._steering_kernels import pursue, sidestep
 from mrmg.scene.types import Scene
 
 DT_S = 0.1

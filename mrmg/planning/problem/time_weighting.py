@@ -31,17 +31,17 @@ def energy_share(objective: Objective, robot: Robot) -> float:
     return energy / (energy + objective.makespan_weight)
 
 
-def brakes_hard(scene: Scene, hurried: bool) -> np.ndarray:
+def brakes_hard(scene: Scene, minimum_time: bool) -> np.ndarray:
     """Tell which robots brake instead of rolling to a stop, shape (R,).
 
     Rolling saves the power of driving for as long as it takes longer.
 
     Args:
         scene: gives robots and objective.
-        hurried: whether plans must be sooner over at any cost.
+        minimum_time: whether plans must take less time at any cost.
     """
     shares = [energy_share(scene.objective, robot) for robot in scene.robots]
-    return np.asarray(hurried | (np.array(shares) < 0.5))
+    return np.asarray(minimum_time | (np.array(shares) < 0.5))
 
 
 def priced_world(scene: Scene, world: World) -> World:

@@ -14,7 +14,8 @@ import shapely
 
 from mrmg.motion._kernels import CAR, UNICYCLE, step
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.tree._safety_kernels import (
+from mrmg.planning.problem._control_kernels import control_towards
+from mrmg.planning.problem._safety_kernels import (
     Commitment,
     braking_control,
     follow_braking,
@@ -25,9 +26,8 @@ from mrmg.planning.tree._safety_kernels import (
     try_control,
     write_braking,
 )
-from mrmg.planning.tree._steering_kernels import control_towards
+from mrmg.planning.problem.problem import Problem
 from mrmg.planning.tree._tree_kernels import stop_all
-from mrmg.planning.tree.motion_tree import Problem
 from mrmg.scene.types import Scene
 
 PLANNING_MARGIN_M = PlannerParams().obstacle_margin_m

@@ -8,9 +8,9 @@ import numpy as np
 
 from mrmg.energy.model import CONSUMERS_W
 from mrmg.planning.preference import Preference
+from mrmg.planning.problem.targets import finish_of
+from mrmg.planning.problem.time_weighting import way_lengths_m
 from mrmg.planning.roadmap.roadmap import Roadmap
-from mrmg.planning.tree.haste import way_lengths_m
-from mrmg.planning.tree.targets import finish_of
 from mrmg.scene.types import Scene
 
 TIE_SHARE = 0.01

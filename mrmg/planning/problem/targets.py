@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from mrmg.planning.problem._safety_kernels import Gates
+from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.roadmap.roadmap import planned_regions
-from mrmg.planning.tree._mission_kernels import Targets
-from mrmg.planning.tree._safety_kernels import Gates
 from mrmg.scene.types import Scene, Station
 
 TARGET_MARGIN_M = 0.12

@@ -11,7 +11,7 @@ import pytest
 from mrmg.planning.drafting.tracking import HARD_SHARE, courses_of
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.planner import state_mission
-from mrmg.planning.tree.haste import (
+from mrmg.planning.problem.time_weighting import (
     along_ways,
     brakes_hard,
     energy_share,
@@ -37,9 +37,9 @@ def test_the_share_falls_as_seconds_get_worth_more(yard: Any) -> None:
 
 def test_robots_brake_hard_where_time_is_worth_more_than_driving(yard: Any) -> None:
     scene = yard()
-    assert not brakes_hard(replace(scene, objective=ENERGY), hurried=False).any()
-    assert brakes_hard(replace(scene, objective=ENERGY), hurried=True).all()
-    assert brakes_hard(replace(scene, objective=MAKESPAN), hurried=False).all()
+    assert not brakes_hard(replace(scene, objective=ENERGY), minimum_time=False).any()
+    assert brakes_hard(replace(scene, objective=ENERGY), minimum_time=True).all()
+    assert brakes_hard(replace(scene, objective=MAKESPAN), minimum_time=False).all()
 
 
 def test_decelerations_follow_from_the_objective(yard: Any) -> None:

@@ -10,9 +10,9 @@ import pytest
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.planner import state_mission
 from mrmg.planning.preference import TIME_MARGIN_S
+from mrmg.planning.problem.leg_times import TIE_SHARE
+from mrmg.planning.problem.targets import LONGER_S
 from mrmg.planning.routing.routing import RouterParams, solve_routing
-from mrmg.planning.tree.targets import LONGER_S
-from mrmg.planning.tree.timing import TIE_SHARE
 
 PARAMS = PlannerParams(samples=300, route_margin=0.0)
 GOALS = [

@@ -1,0 +1,179 @@
+"""The planning problem: a scene with the arrays that every planner works on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.energy.model import CONSUMERS_W
+from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.preference import Preference
+from mrmg.planning.problem._safety_kernels import Gates
+from mrmg.planning.problem._target_kernels import Targets
+from mrmg.planning.problem.leg_times import routing_times
+from mrmg.planning.problem.targets import finish_of, gate_arrays, target_arrays
+from mrmg.planning.roadmap._fleet_kernels import Spaces
+from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
+from mrmg.planning.roadmap.fleet import fleet_array, stack_spaces
+from mrmg.planning.roadmap.roadmap import Roadmap
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.planning.routing.routing import routing_arrays
+from mrmg.scene.types import Scene
+from mrmg.world._kernels import TerrainGrid
+from mrmg.world.world import World
+
+
+class Mission(NamedTuple):
+    """A planning problem as arrays.
+
+    Attributes:
+        fleet, spaces, terrain, roadmap, targets: robots, world and where to go.
+        gates: stations that one robot at a time may be at.
+        routing: the routing problem at the start; costs include the route margin.
+        last_leg: energy from each place (the start last) to each robot's finish [J],
+            shape (R, G + S + 1); zero where a robot may end anywhere.
+    """
+
+    fleet: np.ndarray
+    spaces: Spaces
+    terrain: TerrainGrid
+    roadmap: RoadmapArrays
+    targets: Targets
+    gates: Gates
+    routing: RoutingArrays
+    last_leg: np.ndarray
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """A scene and its arrays.
+
+    Attributes:
+        scene: the scene.
+        roadmap: its roadmap.
+        mission: the arrays that kernels work on.
+        start: composite state at the start, shape (R, 5).
+        start_energy: battery contents at the start [J], shape (R,).
+        dt_s: time step of plans [s].
+        route_margin: surcharge on the roadmap's energies in `mission.routing`.
+        minimum_time: whether plans must take less time at any cost.
+        soc_margin: share of every battery's capacity that plans leave above the
+            reserve.
+    """
+
+    scene: Scene
+    roadmap: Roadmap
+    mission: Mission
+    start: np.ndarray
+    start_energy: np.ndarray
+    dt_s: float
+    route_margin: float
+    minimum_time: bool = False
+    soc_margin: float = 0.0
+
+    @property
+    def preference(self) -> Preference:
+        """What plans are compared by."""
+        return Preference.of(self.scene)
+
+    def with_margin(self, margin: float) -> Problem:
+        """Return the problem with another surcharge on the roadmap's energies."""
+        routing = self.mission.routing
+        share = (1.0 + margin) / (1.0 + self.route_margin)
+        return replace(
+            self,
+            mission=self.mission._replace(
+                routing=routing._replace(
+                    cost=routing.cost * share,
+                    escape=routing.escape * share,
+                    finish=routing.finish * share,
+                    time=routing.time * share,
+                    finish_time=routing.finish_time * share,
+                ),
+            ),
+            route_margin=margin,
+        )
+
+    def with_soc_margin(self, share: float) -> Problem:
+        """Return the problem whose plans leave more in batteries than the reserve.
+
+        Args:
+            share: of their capacities, for all of them.
+        """
+        fleet = self.mission.fleet.copy()
+        fleet["reserve"] += (share - self.soc_margin) * fleet["capacity"]
+        routing = self.mission.routing._replace(reserve=fleet["reserve"].copy())
+        mission = self.mission._replace(fleet=fleet, routing=routing)
+        return replace(self, mission=mission, soc_margin=share)
+
+    def with_limit(self, share: float) -> Problem:
+        """Return the problem with routes that take a share of the time limit."""
+        routing = self.mission.routing
+        shorter = routing._replace(limit=share * routing.limit)
+        return replace(self, mission=self.mission._replace(routing=shorter))
+
+
+def state_problem(
+    scene: Scene, world: World, roadmap: Roadmap, params: PlannerParams
+) -> Problem:
+    """Return the scene's problem; routing costs include the route margin."""
+    fleet = fleet_array(
+        scene,
+        world,
+        obstacle_margin_m=params.obstacle_margin_m,
+        robot_margin_m=params.robot_margin_m,
+    )
+    places = len(scene.targets())
+    targets = target_arrays(scene)
+    # What robots draw while they stay counts as way.
+    idle_m = fleet["energy"][:, CONSUMERS_W] / fleet["plain"]
+    stay_m = idle_m[:, None] * targets.dwell[:places]
+    last_leg = _last_legs(scene, roadmap, fleet)
+    energy = np.array([robot.battery.start_J for robot in scene.robots])
+    times = routing_times(scene, roadmap, fleet, targets.dwell, params.route_margin)
+    start = np.zeros((len(scene.robots), 5))
+    start[:, :3] = [robot.pose for robot in scene.robots]
+    mission = Mission(
+        fleet=fleet,
+        spaces=stack_spaces(world),
+        terrain=world.terrain,
+        roadmap=roadmap.arrays,
+        targets=targets,
+        gates=gate_arrays(scene),
+        routing=routing_arrays(
+            goals=len(scene.goals),
+            distance=roadmap.distance[fleet["field"], :places, :places]
+            + stay_m[:, None],
+            start_distance=roadmap.start_distance[:, :places] + stay_m,
+            plain=fleet["plain"] * (1.0 + params.route_margin),
+            energy=energy,
+            capacity=fleet["capacity"],
+            reserve=fleet["reserve"],
+            finish_distance=last_leg / fleet["plain"][:, None],
+            **({} if times is None else times._asdict()),
+        ),
+        last_leg=last_leg,
+    )
+    return Problem(
+        scene=scene,
+        roadmap=roadmap,
+        mission=mission,
+        start=start,
+        start_energy=energy,
+        dt_s=params.dt_s,
+        route_margin=params.route_margin,
+    )
+
+
+def _last_legs(scene: Scene, roadmap: Roadmap, fleet: np.ndarray) -> np.ndarray:
+    """Return the energy from each place to each robot's finish [J], (R, G + S + 1)."""
+    places = len(scene.targets())
+    legs = np.zeros((len(fleet), places + 1))
+    for r, finish in enumerate(finish_of(scene)):
+        if finish >= 0:
+            legs[r, :places] = roadmap.distance[fleet[r]["field"], :places, finish]
+            legs[r, places] = roadmap.start_distance[r, finish]
+            legs[r] *= fleet[r]["plain"]
+    return legs
