@@ -144,7 +144,7 @@ def audit(
 
 def _measure(scene: Scene, plan: Plan, log: ExecutionLog, index: int) -> _Measured:
     robot = scene.robots[index]
-    motion = LoggedMotion(robot=robot.id, time_s=log.time_s, state=log.state[index])
+    motion = log.driven_motions()[index]
     visits = find_visits(scene, motion, plan.tours[robot.id])
     energy_J = measured_step_energy(robot, log, index)
     content_J, arrival_J = battery_content(scene, motion, energy_J.sum(axis=1), visits)

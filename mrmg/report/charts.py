@@ -21,7 +21,8 @@ from mrmg.plans import Plan
 from mrmg.report.chart_spec import chart, line, rounded
 from mrmg.scene.types import Battery, Scene
 from mrmg.simulation.log import ExecutionLog
-from mrmg.verification import mission_series as series
+from mrmg.verification.distances import obstacle_distance, robot_distance
+from mrmg.viz.activities import shown_motions, shown_visits
 
 _MOST_SAMPLES = 1200
 _FINEST_S = 0.1
@@ -35,7 +36,7 @@ def chart_data(scene: Scene, plan: Plan, log: ExecutionLog | None) -> dict[str, 
         `chart_spec`.
     """
     time_s = _grid(plan, log)
-    motions = series.shown_motions(plan, log)
+    motions = shown_motions(plan, log)
     poses = [_poses(motion, time_s) for motion in motions]
     return {
         "time_s": rounded(time_s, 3),
@@ -57,7 +58,7 @@ def chart_data(scene: Scene, plan: Plan, log: ExecutionLog | None) -> dict[str, 
                 "time_s": round(visit.time_s, 2),
             }
             for motion in motions
-            for visit in series.shown_visits(scene, plan, motion)
+            for visit in shown_visits(scene, plan, motion)
         ],
         "charts": [
             *_charge_charts(scene, plan, log, time_s),
@@ -126,7 +127,7 @@ def _tracking_chart(
         return []
     errors_cm = [
         100.0 * _largest(log.time_s, error_m, time_s)
-        for error_m in series.tracking_error(log)
+        for error_m in log.tracking_error_m()
     ]
     lines = _own_lines(log.robots, errors_cm)
     title = "Distance from the planned place"
@@ -144,14 +145,14 @@ def _largest(at_s: np.ndarray, values: np.ndarray, time_s: np.ndarray) -> np.nda
 def _distance_charts(scene: Scene, poses: list[np.ndarray]) -> list[dict[str, Any]]:
     ids = [robot.id for robot in scene.robots]
     to_obstacles = [
-        series.obstacle_distance(scene, robot, pose)
+        obstacle_distance(scene, robot, pose)
         for robot, pose in zip(scene.robots, poses, strict=True)
     ]
     lines = _own_lines(ids, to_obstacles)
     title = "To the nearest obstacle or the bounds"
     charts = [chart("obstacles", title, "m", lines, group="distance")]
     if len(ids) > 1:
-        lines = _own_lines(ids, series.robot_distance(scene.robots, poses))
+        lines = _own_lines(ids, robot_distance(scene.robots, poses))
         title = "To the nearest other robot"
         charts.append(chart("robots", title, "m", lines, group="distance"))
     return charts

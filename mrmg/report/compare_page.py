@@ -15,8 +15,8 @@ from mrmg.report import page as html
 from mrmg.report.compare import Comparison
 from mrmg.report.map import mission_map
 from mrmg.runs.record import RunRecord
-from mrmg.verification.mission_series import shown_motions, shown_visits
 from mrmg.viz import style
+from mrmg.viz.activities import shown_motions, shown_visits
 
 _SAMPLES = 800
 _SHORTEST_S = 0.1

@@ -12,8 +12,8 @@ from shapely.geometry import Polygon
 from mrmg.plans import Plan
 from mrmg.scene.types import Goal, Robot, Scene, Station
 from mrmg.simulation.log import ExecutionLog
-from mrmg.verification.mission_series import breakdowns, visit_ranks, way_to
 from mrmg.viz import style
+from mrmg.viz.activities import breakdowns, visit_ranks, way_to
 from mrmg.viz.contours import contour_lines
 from mrmg.viz.map_labels import KINDS, MapLabel, map_labels
 from mrmg.viz.map_shapes import enclosing_circle, end_poses

@@ -22,8 +22,8 @@ from mrmg.runs.arguments import RunArguments
 from mrmg.runs.record import RunRecord, read_record
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
-from mrmg.verification.mission_series import breakdowns, standing_of
 from mrmg.viz import style
+from mrmg.viz.activities import breakdowns, standing_of
 
 
 def write_report(run_folder: Path, *, trust_code: bool = False) -> None:

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from mrmg.energy.audit_record import EnergyAudit
+from mrmg.energy.by_terrain import energy_by_terrain
 from mrmg.energy.ledger import EnergyLedger
 from mrmg.energy.model import PARTS
 from mrmg.plans import Plan
 from mrmg.report import page as html
 from mrmg.runs.record import RunRecord
-from mrmg.verification.mission_series import (
-    energy_by_terrain,
-    shown_motions,
-    standing_of,
-    way_to,
-)
+from mrmg.viz.activities import shown_motions, standing_of, way_to
 from mrmg.viz.style import terrain_classes
 
 _PART_COLORS = {

@@ -9,7 +9,7 @@ from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.simulation.supervision import Event
-from mrmg.verification import mission_series as series
+from mrmg.viz.activities import BROKEN, CHARGING, DRIVING, FINISHED, WAITING, Activity
 from mrmg.viz.tags import text_width_em
 from mrmg.viz.timeline_rows import HIDDEN, NamedVisit, TimelineRow, timeline_rows
 
@@ -22,11 +22,11 @@ _BROKEN_KEY = '<i class="act broken"></i>broken down '
 _EVENT_KEY = ' <i class="event"></i>the fleet is stopped, or planned for anew'
 _DONE = {"stop": "; the fleet stops", "end": "; the mission ends"}
 _SAID = {
-    series.DRIVING: "drives",
-    series.WAITING: "waits",
-    series.CHARGING: "charges",
-    series.FINISHED: "has finished",
-    series.BROKEN: "has broken down",
+    DRIVING: "drives",
+    WAITING: "waits",
+    CHARGING: "charges",
+    FINISHED: "has finished",
+    BROKEN: "has broken down",
 }
 
 
@@ -63,8 +63,8 @@ def timeline(scene: Scene, plan: Plan, log: ExecutionLog | None) -> str:
     )
 
 
-def _span(row: TimelineRow, span: series.Activity, end_s: float) -> str:
-    unused = row.standing == "not used" and span.kind == series.FINISHED
+def _span(row: TimelineRow, span: Activity, end_s: float) -> str:
+    unused = row.standing == "not used" and span.kind == FINISHED
     tip = f"{row.robot} {'is not used' if unused else _SAID[span.kind]}"
     tip += f" at {span.target}" if span.target else ""
     tip += f" from {span.start_s:.1f} to {span.end_s:.1f} s"
@@ -99,7 +99,7 @@ def _inside(left_percent: float, width_em: float) -> str:
 def _standing(row: TimelineRow, end_s: float) -> str:
     if not row.standing:
         return ""
-    broken = [span.start_s for span in row.spans if span.kind == series.BROKEN]
+    broken = [span.start_s for span in row.spans if span.kind == BROKEN]
     text = f"✖ {row.standing}" if broken else row.standing
     from_percent = 100 * broken[0] / end_s if broken else 0.0
     left = f"min({from_percent:.3f}%,calc(100% - {text_width_em(text) + 1.0:.2f}em))"
@@ -127,12 +127,12 @@ def _shares(row: TimelineRow) -> str:
         kind: sum(span.end_s - span.start_s for span in row.spans if span.kind == kind)
         for kind in _SAID
     }
-    moving = any(duration_s[kind] for kind in (series.DRIVING, series.WAITING))
-    words = [f"{duration_s[series.DRIVING]:.0f} s driving"] if moving else []
-    if duration_s[series.WAITING] > 0.0:
-        words.append(f"{duration_s[series.WAITING]:.0f} s waiting")
-    if duration_s[series.CHARGING] > 0.0:
-        words.append(f"{duration_s[series.CHARGING]:.0f} s at stations")
+    moving = any(duration_s[kind] for kind in (DRIVING, WAITING))
+    words = [f"{duration_s[DRIVING]:.0f} s driving"] if moving else []
+    if duration_s[WAITING] > 0.0:
+        words.append(f"{duration_s[WAITING]:.0f} s waiting")
+    if duration_s[CHARGING] > 0.0:
+        words.append(f"{duration_s[CHARGING]:.0f} s at stations")
     words += [row.standing] if row.standing else []
     return ", ".join(words) or "stays where it is"
 

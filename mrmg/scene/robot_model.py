@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+from numpy.typing import ArrayLike
 
 from mrmg.energy.model import GRAVITY_M_S2, EnergyModel, EnergyPreset
 from mrmg.errors import Fault, SceneError
@@ -220,6 +221,14 @@ class RobotModel(ByContent):
         """Force the driven axle may transmit, as a share of the weight."""
         return GRIP_SHARE * DRIVEN_LOAD_SHARE * self.friction_coefficient
 
+    def footprint_at(self, poses: ArrayLike) -> np.ndarray:
+        """Return the footprint's corners in the world's frame [m], shape (..., m, 2).
+
+        Args:
+            poses: (x [m], y [m], yaw [rad], ...), shape (..., 3 or more).
+        """
+        return placed(self.footprint_m, poses)
+
     @property
     def inscribed_radius_m(self) -> float:
         """Radius of the largest circle about the reference point in the footprint."""
@@ -246,3 +255,19 @@ class RobotModel(ByContent):
         if self.motion_model != "car":
             return 0.0
         return self.wheelbase_m / math.tan(self.planning_share * self.limits.w_max)
+
+
+def placed(points: np.ndarray, poses: ArrayLike) -> np.ndarray:
+    """Return points of a body's frame in the world's frame: p + R(yaw) b [m].
+
+    Args:
+        points: in the body's frame [m], shape (m, 2).
+        poses: (x [m], y [m], yaw [rad], ...), shape (..., 3 or more).
+
+    Returns:
+        Shape (..., m, 2).
+    """
+    poses = np.asarray(poses)
+    cos, sin = np.cos(poses[..., 2]), np.sin(poses[..., 2])
+    turn = np.stack([np.stack([cos, sin], -1), np.stack([-sin, cos], -1)], axis=-2)
+    return np.asarray(points @ turn + poses[..., None, :2])

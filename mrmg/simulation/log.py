@@ -13,6 +13,7 @@ import numpy as np
 
 from mrmg import storage
 from mrmg.columns import data_frame, named, state_columns
+from mrmg.energy.metering import LoggedMotion
 from mrmg.errors import Fault, IdentityError, RunFolderError, UsageError
 from mrmg.plans import Plan, plan_in_force
 from mrmg.scene.types import Scene
@@ -109,6 +110,18 @@ class ExecutionLog:
     gave_up: str = ""
     disturbance: Disturbance | None = None
     motions: tuple[str, ...] = ()
+
+    def driven_motions(self) -> tuple[LoggedMotion, ...]:
+        """Return the motion of each robot in the simulation."""
+        return tuple(
+            LoggedMotion(robot=robot, time_s=self.time_s, state=state)
+            for robot, state in zip(self.robots, self.state, strict=True)
+        )
+
+    def tracking_error_m(self) -> np.ndarray:
+        """Return each robot's distance from the plan at each tick [m], shape (R, n)."""
+        offset_m = self.state[:, :, :2] - self.reference[:, :, :2]
+        return np.asarray(np.hypot(offset_m[..., 0], offset_m[..., 1]))
 
     def columns(self, robot: str) -> dict[str, str]:
         """Return the unit of each column of `to_arrays(robot)` by its name."""

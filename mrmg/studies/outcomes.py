@@ -25,7 +25,7 @@ from mrmg.errors import Fault, RunFolderError
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
-from mrmg.verification.mission_series import obstacle_distance, robot_distance
+from mrmg.verification.distances import obstacle_distance, robot_distance
 
 ROBUSTNESS_FORMAT = 1
 ROBUSTNESS_FILE = "robustness.json"

@@ -116,12 +116,9 @@ def _obstacles_for_others(
 
 def _wreck(robot: Robot, pose: tuple[float, float, float]) -> dict[str, Any]:
     """Return the obstacle that a standing robot is."""
-    x, y, yaw = pose
-    turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
-    corners = robot.model.footprint_m @ turn.T + (x, y)
     return {
         "id": robot.id,
-        "polygon": corners.tolist(),
+        "polygon": robot.model.footprint_at(pose).tolist(),
         "height": float(robot.model.height_m),
     }
 

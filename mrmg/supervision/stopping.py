@@ -17,7 +17,7 @@ from mrmg.plans import Trajectory
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
 from mrmg.supervision.braking import brake_to_rest
-from mrmg.verification.mission_series import obstacle_distance, robot_distance
+from mrmg.verification.distances import obstacle_distance, robot_distance
 
 ENOUGH_M = 0.1
 """Clearance with which committed braking needs no alternative."""

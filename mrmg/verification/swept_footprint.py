@@ -62,20 +62,12 @@ class SweptFootprint:
 
     def corners_at(self, step: np.ndarray, time_s: np.ndarray) -> np.ndarray:
         """Return the footprint's corners at those instants [m], shape (k, m, 2)."""
-        return footprint_corners(self.model, self.states_at(step, time_s))
+        return self.model.footprint_at(self.states_at(step, time_s))
 
     def sagitta(self, step: np.ndarray, duration_s: np.ndarray) -> np.ndarray:
         """Return how far any point strays from its chord [m], shape (k,)."""
         straying = self.acceleration_m_s2[step] * duration_s**2 / 8.0
         return np.asarray(_SAGITTA_FACTOR * straying + _SAGITTA_SLACK_M)
-
-
-def footprint_corners(model: RobotModel, state: np.ndarray) -> np.ndarray:
-    """Return the footprint's corners in each state [m], shape (k, m, 2)."""
-    cos, sin = np.cos(state[:, 2]), np.sin(state[:, 2])
-    rotation = np.stack([np.stack([cos, sin], -1), np.stack([-sin, cos], -1)], axis=1)
-    corners = model.footprint_m @ rotation
-    return np.asarray(corners + state[:, None, :2])
 
 
 def _states_after(
@@ -127,11 +119,10 @@ def _sampled_acceleration(model: RobotModel, trajectory: Trajectory) -> np.ndarr
     interval_s = trajectory.dt_s / SAMPLES
     corners = np.stack(
         [
-            footprint_corners(
-                model,
+            model.footprint_at(
                 _states_after(
                     model, state, control, np.full(len(state), i * interval_s)
-                ),
+                )
             )
             for i in range(SAMPLES + 1)
         ]

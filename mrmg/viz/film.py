@@ -13,8 +13,8 @@ from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
 from mrmg.simulation.world_model import build_world
-from mrmg.verification.mission_series import breakdowns, standing_of
 from mrmg.viz import style
+from mrmg.viz.activities import breakdowns, standing_of
 from mrmg.viz.ground_image import TrailPainter, video_labels
 from mrmg.viz.map_shapes import enclosing_circle
 from mrmg.viz.overlay import Panel, Reading, RobotReading

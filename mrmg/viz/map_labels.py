@@ -19,8 +19,8 @@ from shapely.geometry.base import BaseGeometry
 from mrmg.plans import Plan
 from mrmg.scene.types import Obstacle, Scene
 from mrmg.simulation.log import ExecutionLog
-from mrmg.verification.mission_series import breakdowns, visit_ranks, way_to
 from mrmg.viz import style
+from mrmg.viz.activities import breakdowns, visit_ranks, way_to
 from mrmg.viz.contours import contour_lines
 from mrmg.viz.label_placement import LabelBox, place, spots_around
 from mrmg.viz.map_shapes import (

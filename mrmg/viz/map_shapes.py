@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from shapely import box
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.plans import Plan
+from mrmg.scene.robot_model import placed
 from mrmg.scene.types import Region, Robot, Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.viz.label_placement import Occupied
@@ -40,7 +39,7 @@ def enclosing_circle(
     outline = robot.model.footprint_m
     middle = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
     radius_m = float(np.hypot(*(outline - middle).T).max())
-    return moved(middle, pose), radius_m
+    return placed(middle[None], pose)[0], radius_m
 
 
 def end_ring(
@@ -102,16 +101,4 @@ def drawn_region(region: Region, em_m: float) -> BaseGeometry:
 def drawn_start(robot: Robot, em_m: float) -> BaseGeometry:
     """Return a robot's outline at its start, together with a mark of a least size."""
     mark = Point(robot.pose[:2]).buffer(_MARK_EM * em_m)
-    return Polygon(footprint_at(robot, robot.pose)).union(mark)
-
-
-def footprint_at(robot: Robot, pose: tuple[float, float, float]) -> np.ndarray:
-    """Return a robot's outline at a pose, in the world's frame [m], shape (m, 2)."""
-    return moved(robot.model.footprint_m, pose)
-
-
-def moved(points: np.ndarray, pose: tuple[float, float, float]) -> np.ndarray:
-    """Return points of a robot's frame in the world's [m], shape (..., 2)."""
-    x_m, y_m, yaw = pose
-    turn = np.array([[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]])
-    return np.asarray(points @ turn.T + (x_m, y_m))
+    return Polygon(robot.model.footprint_at(robot.pose)).union(mark)

@@ -14,13 +14,8 @@ from matplotlib.patheffects import withStroke
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
-from mrmg.verification.mission_series import (
-    breakdowns,
-    standing_of,
-    visit_ranks,
-    way_to,
-)
 from mrmg.viz import scene_drawing, style
+from mrmg.viz.activities import breakdowns, standing_of, visit_ranks, way_to
 from mrmg.viz.map_labels import map_labels
 from mrmg.viz.map_shapes import end_poses, end_ring
 

@@ -22,7 +22,6 @@ from mrmg.scene.types import Goal, Region, Robot, Scene, Station
 from mrmg.viz import style
 from mrmg.viz.contours import draw_contours
 from mrmg.viz.map_labels import BOLD, MapLabel, map_labels
-from mrmg.viz.map_shapes import footprint_at
 
 DPI = 110
 _MAP_INCHES = 8.6
@@ -254,7 +253,7 @@ def draw_footprint(
     """Draw a robot's outline at a pose (x [m], y [m], yaw [rad])."""
     _add_shape(
         axes,
-        Polygon(footprint_at(robot, pose)),
+        Polygon(robot.model.footprint_at(pose)),
         facecolor=facecolor,
         edgecolor="white",
         linewidth=0.9,

@@ -15,8 +15,8 @@ from matplotlib.patches import Patch
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
-from mrmg.verification import mission_series as series
 from mrmg.viz import scene_drawing, style
+from mrmg.viz.activities import BROKEN, CHARGING, DRIVING, WAITING
 from mrmg.viz.timeline_rows import HIDDEN, TimelineRow, timeline_rows
 
 _WIDTH_INCHES, _BAR_INCHES, _LINE_INCHES = 9.5, 0.24, 0.16
@@ -108,10 +108,10 @@ def _draw_row(
 ) -> None:
     """Draw a robot's bar about `middle_in` below the top, and names above it."""
     looks: dict[str, dict[str, Any]] = {
-        series.DRIVING: {"facecolor": style.scene_robot_colors(scene)[row.robot]},
-        series.WAITING: _WAITING,
-        series.CHARGING: _CHARGING,
-        series.BROKEN: _BROKEN,
+        DRIVING: {"facecolor": style.scene_robot_colors(scene)[row.robot]},
+        WAITING: _WAITING,
+        CHARGING: _CHARGING,
+        BROKEN: _BROKEN,
     }
     for span in row.spans:
         if span.kind in looks:

@@ -8,8 +8,15 @@ from dataclasses import dataclass
 from mrmg.plans import Plan, Visit
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
-from mrmg.verification import mission_series as series
 from mrmg.viz import style
+from mrmg.viz.activities import (
+    Activity,
+    activities,
+    breakdowns,
+    shown_motions,
+    shown_visits,
+    standing_of,
+)
 from mrmg.viz.tags import text_width_em
 
 _SHORTEST_S = 0.1
@@ -50,7 +57,7 @@ class TimelineRow:
 
     robot: str
     standing: str
-    spans: tuple[series.Activity, ...]
+    spans: tuple[Activity, ...]
     visits: tuple[NamedVisit, ...]
 
     def line_count(self, layout: int) -> int:
@@ -69,17 +76,17 @@ def timeline_rows(
         log: what was driven.
         widths_em: of the time axis in each layout, in sizes of the names' letters.
     """
-    motions = series.shown_motions(plan, log)
+    motions = shown_motions(plan, log)
     end_s = max(_SHORTEST_S, *(float(motion.time_s[-1]) for motion in motions))
-    broken_s = series.breakdowns(log)
+    broken_s = breakdowns(log)
     rows = []
     for motion in motions:
-        visits = series.shown_visits(scene, plan, motion)
-        spans = series.activities(scene, motion, visits, broken_s.get(motion.robot))
+        visits = shown_visits(scene, plan, motion)
+        spans = activities(scene, motion, visits, broken_s.get(motion.robot))
         rows.append(
             TimelineRow(
                 robot=motion.robot,
-                standing=series.standing_of(motion.robot, plan, log),
+                standing=standing_of(motion.robot, plan, log),
                 spans=spans,
                 visits=named_visits(scene, visits, end_s, widths_em),
             )

@@ -12,7 +12,7 @@ from mrmg.report.map import mission_map
 from mrmg.report.timeline import timeline
 from mrmg.simulation.log import Contact
 from mrmg.simulation.supervision import Event
-from mrmg.verification.mission_series import activities, logged_motions, shown_visits
+from mrmg.viz.activities import activities, shown_visits
 from mrmg.viz.map_labels import KINDS, map_labels
 
 
@@ -163,7 +163,7 @@ def test_the_timeline_s_spans_are_the_activities(mission) -> None:
     assert told[1].startswith("r1 charges at s from 4.")
     assert told[-2:] == [
         f"r1 enters {visit.kind} {visit.target} at {visit.time_s:.1f} s"
-        for visit in shown_visits(scene, plan, logged_motions(log)[0])
+        for visit in shown_visits(scene, plan, log.driven_motions()[0])
     ]
     assert "stays where it is" not in page
     spans = activities(scene, plan.trajectories[1], ())

@@ -10,6 +10,7 @@ import pytest
 
 from mrmg.energy.audit import audit
 from mrmg.energy.battery_curves import measured_curves
+from mrmg.energy.by_terrain import energy_by_terrain
 from mrmg.energy.metering import battery_profile
 from mrmg.errors import UsageError
 from mrmg.planning import plan_mission
@@ -20,7 +21,6 @@ from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
 from mrmg.simulation.disturbance_spec import parse_disturbance
 from mrmg.simulation.log import ExecutionLog
 from mrmg.supervision import Drive, drive_mission
-from mrmg.verification.mission_series import energy_by_terrain
 from mrmg.verification.verify import verify
 
 

@@ -10,7 +10,7 @@ import pytest
 import shapely
 
 from mrmg.verification.clearance import MINIMUM_ACCURACY_M
-from mrmg.verification.swept_footprint import SweptFootprint, footprint_corners
+from mrmg.verification.swept_footprint import SweptFootprint
 from mrmg.verification.verdict import Verdict, ViolationKind
 from mrmg.verification.verify import verify
 
@@ -71,7 +71,7 @@ def test_corner_that_cuts_a_post_between_two_samples_is_caught(
     scene = make_scene(goals=[], obstacles=[{"id": "post", "box": box, "height": 1}])
 
     state = plan.trajectories[0].state
-    sampled = shapely.polygons(footprint_corners(scene.robots[0].model, state))
+    sampled = shapely.polygons(scene.robots[0].model.footprint_at(state))
     assert shapely.distance(sampled, scene.obstacles[0].shape).min() > 0.0
     verdict = verify(scene, replace(plan, scene_digest=scene.digest))
     (violation,) = verdict.violations

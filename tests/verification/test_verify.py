@@ -20,7 +20,6 @@ from hypothesis import strategies as st
 from mrmg.energy.ledger import EnergyLedger
 from mrmg.plans import Plan, Trajectory
 from mrmg.scene.types import Battery, Finish, Region, Scene
-from mrmg.verification.swept_footprint import footprint_corners
 from mrmg.verification.verdict import Verdict, Violation, ViolationKind
 from mrmg.verification.verify import verify
 
@@ -241,7 +240,7 @@ def test_obstacle_contact_is_one_violation_with_its_worst_overlap(
     scene, plan = broken_obstacle(case, drive)
     violation = only(verify(scene, plan), Kind.OBSTACLE)
     state = plan.trajectories[0].state
-    shapes = shapely.polygons(footprint_corners(scene.robots[0].model, state))
+    shapes = shapely.polygons(scene.robots[0].model.footprint_at(state))
     overlap = shapely.area(shapely.intersection(shapes, scene.obstacles[0].shape))
     assert violation.other == "wall"
     assert violation.amount == pytest.approx(overlap.max())

@@ -17,8 +17,8 @@ from mrmg.report.sections import percent
 from mrmg.report.timeline import timeline
 from mrmg.scene.loading import load_scene
 from mrmg.simulation.supervision import Event
-from mrmg.verification.mission_series import BROKEN, activities
 from mrmg.viz import energy_plot, overview, scene_drawing, style
+from mrmg.viz.activities import BROKEN, activities
 from mrmg.viz.energy_plot import draw_energy
 from mrmg.viz.film import Film
 from mrmg.viz.map_shapes import enclosing_circle
@@ -143,7 +143,7 @@ def test_marks_of_ends_go_around_the_parked_robots(mission) -> None:
     rings = [patch for patch in axes.patches if isinstance(patch, Circle)]
     assert len(rings) == 2  # r3 has not moved
     for ring, robot, state in zip(rings, scene.robots, log.state, strict=False):
-        outline = scene_drawing.footprint_at(robot, tuple(state[-1, :3]))
+        outline = robot.model.footprint_at(tuple(state[-1, :3]))
         assert np.hypot(*(outline - ring.center).T).max() < ring.radius
         assert ring.get_facecolor()[3] == 0.0
         assert ring.get_zorder() < 7  # robots lie above

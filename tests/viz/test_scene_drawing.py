@@ -57,7 +57,7 @@ def test_terrain_reaching_beyond_the_bounds_is_cut_off(make_scene: MakeScene) ->
 
 def test_footprint_follows_the_pose(make_scene: MakeScene) -> None:
     robot = make_scene().robots[0]
-    outline = scene_drawing.footprint_at(robot, (3.0, 4.0, np.pi / 2))
+    outline = robot.model.footprint_at((3.0, 4.0, np.pi / 2))
     assert outline.min(axis=0) == pytest.approx((3 - 0.55, 4 - 0.3))
     assert outline.max(axis=0) == pytest.approx((3 + 0.55, 4 + 1.5))
 

@@ -24,7 +24,7 @@ from mrmg.scene.elevation import Elevation
 from mrmg.scene.loading.batteries import battery_of
 from mrmg.scene.loading.elevation import elevation_of
 from mrmg.scene.loading.faults import parsed
-from mrmg.scene.loading.geometry import footprint_at, region_of, shape_of
+from mrmg.scene.loading.geometry import region_of, shape_of
 from mrmg.scene.loading.models import load_model, model_folder
 from mrmg.scene.loading.schema import (
     SECTIONS,
@@ -332,7 +332,7 @@ class Assembly:
 
     def _check_starts(self) -> None:
         """Every robot must stand inside the bounds, clear of obstacles and others."""
-        shapes = {robot.id: footprint_at(robot) for robot in self.robots}
+        shapes = {r.id: Polygon(r.model.footprint_at(r.pose)) for r in self.robots}
         for robot in self.robots:
             where = f"{self.ids[robot.id]}.pose"
             shape = shapes[robot.id]

@@ -11,7 +11,7 @@ from shapely.geometry import Polygon
 from mrmg.errors import Fault
 from mrmg.scene.loading.schema import FinishEntry, RegionEntry
 from mrmg.scene.loading.shape_schema import ShapedEntry
-from mrmg.scene.types import Region, Robot
+from mrmg.scene.types import Region
 
 CIRCLE_SIDES = 32
 
@@ -76,13 +76,6 @@ def region_of(entry: RegionEntry | FinishEntry, path: str) -> Region | list[Faul
     hull = shapely.orient_polygons(shape.convex_hull)
     corners = np.array(hull.exterior.coords[:-1])
     return _region(np.array(shape.centroid.coords[0]), 0.0, corners)
-
-
-def footprint_at(robot: Robot) -> Polygon:
-    """Return the ground a robot covers at its start."""
-    x, y, yaw = robot.pose
-    c, s = math.cos(yaw), math.sin(yaw)
-    return Polygon(robot.model.footprint_m @ np.array([[c, s], [-s, c]]) + [x, y])
 
 
 def _dent_m2(shape: Polygon) -> float:

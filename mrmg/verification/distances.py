@@ -1,0 +1,57 @@
+"""Distances of given poses: robots to obstacles and bounds, and to one another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from mrmg.scene.types import Robot, Scene
+
+
+def obstacle_distance(scene: Scene, robot: Robot, poses: np.ndarray) -> np.ndarray:
+    """Return the distance to the nearest obstacle that stops a robot, or to the bounds.
+
+    Args:
+        scene: gives obstacles and bounds.
+        robot: whose footprint it is.
+        poses: (x, y, theta, ...), shape (n, k).
+
+    Returns:
+        Distance [m], 0 on contact, shape (n,).
+    """
+    shapes = shapely.polygons(robot.model.footprint_at(poses))
+    blocking = [item.shape for item in scene.barriers if item.stops(robot.id)]
+    distance = np.asarray(
+        shapely.distance(shapes, shapely.boundary(shapely.box(*scene.bounds)))
+    )
+    if not blocking:
+        return distance
+    tree = shapely.STRtree(blocking)
+    found, nearest = tree.query_nearest(shapes, return_distance=True, all_matches=False)
+    distance[found[0]] = np.minimum(distance[found[0]], nearest)
+    return distance
+
+
+def robot_distance(robots: Sequence[Robot], poses: Sequence[np.ndarray]) -> np.ndarray:
+    """Return each robot's distance to the nearest other one.
+
+    Args:
+        robots: at least two.
+        poses: of each robot (x, y, theta, ...), shape (n, k) each.
+
+    Returns:
+        Distance [m], shape (R, n).
+    """
+    shapes = [
+        shapely.polygons(robot.model.footprint_at(at))
+        for robot, at in zip(robots, poses, strict=True)
+    ]
+    nearest = np.full((len(shapes), len(shapes[0])), np.inf)
+    for one in range(len(shapes)):
+        for other in range(one):
+            apart = shapely.distance(shapes[one], shapes[other])
+            nearest[one] = np.minimum(nearest[one], apart)
+            nearest[other] = np.minimum(nearest[other], apart)
+    return nearest

@@ -1,0 +1,123 @@
+"""What each robot does when, and what of plan or log a picture shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrmg.energy.metering import Motion, find_visits
+from mrmg.energy.visits import runs
+from mrmg.plans import Plan, Visit
+from mrmg.scene.types import Scene
+from mrmg.simulation.log import ExecutionLog
+
+DRIVING, WAITING, CHARGING, FINISHED = "driving", "waiting", "charging", "finished"
+BROKEN = "broken"
+"""What a robot can be doing."""
+
+_STANDING_M_S = 0.02
+_SHORTEST_WAIT_S = 0.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Activity:
+    """A span of time in which a robot does one thing.
+
+    Attributes:
+        kind: `DRIVING`; `WAITING`, standing for half a second or more; `CHARGING`, from
+            entering a station of its tour to leaving the region; `FINISHED`, standing
+            to the end; or `BROKEN`, from when it broke down.
+        start_s, end_s: when.
+        target: id of the station where charging, else "".
+    """
+
+    kind: str
+    start_s: float
+    end_s: float
+    target: str = ""
+
+
+def shown_motions(plan: Plan, log: ExecutionLog | None) -> tuple[Motion, ...]:
+    """Return what was driven, or what was planned where nothing was driven yet."""
+    return plan.trajectories if log is None else log.driven_motions()
+
+
+def shown_visits(scene: Scene, plan: Plan, motion: Motion) -> tuple[Visit, ...]:
+    """Return the visits of a planned or driven motion."""
+    return find_visits(scene, motion, plan.tours.get(motion.robot, ()))
+
+
+def activities(
+    scene: Scene,
+    motion: Motion,
+    visits: Iterable[Visit],
+    broken_s: float | None = None,
+) -> tuple[Activity, ...]:
+    """Return what a robot does, span by span, without gaps.
+
+    Args:
+        scene: gives the stations' regions.
+        motion: planned or driven.
+        visits: of this robot; those of stations begin spans of charging.
+        broken_s: when it broke down; None if it did not.
+    """
+    kinds = np.full(len(motion.time_s), DRIVING, dtype=object)
+    standing = np.abs(motion.state[:, 3]) < _STANDING_M_S
+    for start, end in runs(standing):
+        if end == len(standing):
+            kinds[start:] = FINISHED
+        elif motion.time_s[end] - motion.time_s[start] >= _SHORTEST_WAIT_S:
+            kinds[start:end] = WAITING
+    names = np.full(len(kinds), "", dtype=object)
+    regions = {station.id: station.region for station in scene.stations}
+    for visit in visits:
+        if visit.kind == "station":
+            inside = regions[visit.target].depth(motion.state[visit.step :, :2]) >= 0.0
+            left = visit.step + (len(inside) if inside.all() else int(inside.argmin()))
+            kinds[visit.step : left] = CHARGING
+            names[visit.step : left] = visit.target
+    if broken_s is not None:
+        kinds[motion.time_s >= broken_s] = BROKEN
+        names[motion.time_s >= broken_s] = ""
+    changes = (kinds[1:] != kinds[:-1]) | (names[1:] != names[:-1])
+    edges = [0, *(np.flatnonzero(changes) + 1).tolist(), len(kinds) - 1]
+    return tuple(
+        Activity(
+            kind=kinds[start],
+            start_s=float(motion.time_s[start]),
+            end_s=float(motion.time_s[end]),
+            target=names[start],
+        )
+        for start, end in zip(edges, edges[1:], strict=False)
+        if end > start
+    )
+
+
+def visit_ranks(plan: Plan) -> dict[str, list[tuple[str, int]]]:
+    """Return the visits of each target as (robot, rank in its tour from 1)."""
+    ranks: dict[str, list[tuple[str, int]]] = {}
+    for robot, tour in plan.tours.items():
+        for rank, target in enumerate(tour, start=1):
+            ranks.setdefault(target, []).append((robot, rank))
+    return ranks
+
+
+def way_to(states: np.ndarray) -> np.ndarray:
+    """Return the way driven up to each state [m], shape (n,)."""
+    steps_m = np.hypot(*np.diff(states[:, :2], axis=0).T)
+    return np.concatenate([[0.0], np.cumsum(steps_m)])
+
+
+def breakdowns(log: ExecutionLog | None) -> dict[str, float]:
+    """Return when each robot that broke down did so [s], by robot."""
+    events = log.events if log is not None else ()
+    return {event.robot: event.time_s for event in events if event.cause == "fault"}
+
+
+def standing_of(robot: str, plan: Plan, log: ExecutionLog | None) -> str:
+    """Return "broken down", "not used" of a robot without a tour, or ""."""
+    if robot in breakdowns(log):
+        return "broken down"
+    return "" if plan.tours.get(robot) else "not used"
