@@ -153,13 +153,43 @@ def schema(options: argparse.Namespace) -> int:
 
 
 def import_(options: argparse.Namespace) -> int:
-    """Read a map drawn elsewhere into a scene without robots and goals."""
-    from mrmg.scene.importing import import_map
+    """Read maps, layouts and features of other tools as a scene."""
+    from mrmg.scene.importing import import_files
+    from mrmg.scene.importing.layers import ImportOptions
 
     _require_absent(options)
-    document = import_map(options.map, longest_side_m=options.longest_side)
-    _write(document, options.out)
+    found = import_files(
+        options.files,
+        ImportOptions(
+            unknown=options.unknown,
+            tolerance=options.tolerance,
+            crs=options.crs,
+            crop=options.crop and _box(options.crop),
+            longest_side_m=options.longest_side,
+            classes=options.classes,
+            lane_width_m=options.lanes,
+        ),
+        kind=options.kind,
+        keepout=options.keepout,
+        terrain_mask=options.terrain_mask,
+        land_cover=options.land_cover,
+    )
+    for note in found.notes:
+        print(f"mrmg: {note}", file=sys.stderr)
+    _write(found.document, options.out, found.notes)
     return ExitCode.OK
+
+
+def _box(words: Sequence[str]) -> tuple[float, float, float, float]:
+    try:
+        numbers = [float(word) for word in ",".join(words).split(",")]
+        x_min, y_min, x_max, y_max = numbers
+    except ValueError:
+        x_min = x_max = y_min = y_max = 0.0
+    if not (x_min < x_max and y_min < y_max):
+        message = f"--crop: got '{' '.join(words)}'; expected X_MIN Y_MIN X_MAX Y_MAX"
+        raise UsageError(message)
+    return x_min, y_min, x_max, y_max
 
 
 def populate(options: argparse.Namespace) -> int:
@@ -186,10 +216,13 @@ def _require_absent(options: argparse.Namespace) -> None:
         require_absent(options.out, overwrite=options.overwrite)
 
 
-def _write(document: dict[str, Any], out: Path | None) -> None:
+def _write(
+    document: dict[str, Any], out: Path | None, notes: Sequence[str] = ()
+) -> None:
     from mrmg.scene.loading import dump_scene, scene_from_document
 
-    text = dump_scene(scene_from_document(document, source=document["name"]))
+    text = "".join(f"# {note}\n" for note in notes)
+    text += dump_scene(scene_from_document(document, source=document["name"]))
     if out is None:
         sys.stdout.write(text)
     else:

@@ -1,5 +1,5 @@
-"""Import of maps from other sources as scene documents."""
+"""Import of maps, layouts and robots from other sources as scene documents."""
 
-from mrmg.scene.importing.importing import import_map
+from mrmg.scene.importing.importing import import_files, import_map
 
-__all__ = ["import_map"]
+__all__ = ["import_files", "import_map"]

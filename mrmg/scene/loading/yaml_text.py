@@ -20,6 +20,7 @@ class _CoreLoader(yaml.SafeLoader):  # type: ignore[misc]
     """A safe loader with the scalars of YAML 1.2's core schema."""
 
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}
+    keys_as_text = False
 
     def construct_mapping(
         self, node: yaml.MappingNode, deep: bool = False
@@ -27,6 +28,8 @@ class _CoreLoader(yaml.SafeLoader):  # type: ignore[misc]
         mapping: dict[Any, Any] = {}
         for key_node, value_node in node.value:
             key = self.construct_object(key_node, deep=True)
+            if self.keys_as_text and isinstance(key_node, yaml.ScalarNode):
+                key = key_node.value
             if not isinstance(key, str):
                 raise yaml.constructor.ConstructorError(
                     None, None, f"the key {key!r} is not text", key_node.start_mark
@@ -98,14 +101,26 @@ def read_text(path: Path, *, source: str) -> str:
         raise SceneError(source, [Fault("", message)]) from error
 
 
-def parse_yaml(text: str, *, source: str) -> Any:
+class _TextKeyLoader(_CoreLoader):
+    """Takes keys as they are written: `10: x` has the key "10"."""
+
+    keys_as_text = True
+
+
+def parse_yaml(text: str, *, source: str, keys_as_text: bool = False) -> Any:
     """Turn YAML text into plain data.
+
+    Args:
+        text: the YAML.
+        source: what error messages call it.
+        keys_as_text: whether keys that are numbers are allowed, as text.
 
     Raises:
         SceneError: if it is no YAML; names the line and column.
     """
     try:
-        return yaml.load(text, Loader=_CoreLoader)  # noqa: S506 (a safe loader)
+        loader = _TextKeyLoader if keys_as_text else _CoreLoader
+        return yaml.load(text, Loader=loader)  # noqa: S506 (a safe loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = f"line {mark.line + 1}, column {mark.column + 1}" if mark else ""

@@ -189,9 +189,9 @@ def test_frame_of_triangles_becomes_the_bounds(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "map.txt: 1 fault\n  empty; expected a sectioned map or rows"),
+        ("", "map.txt: 1 fault\n  empty; expected a map"),
         ("1 2\n1 2 3\n", "line 2: has 3 numbers; expected 6, 4 or 2"),
-        ("# A text\n\nof words\n", "1 fault\n  no map, begins with '# A text'"),
+        ("# A text\n\nof words\n", "1 fault\n  no map of a known kind; --kind forces"),
         ("1 2\nx y\n", "line 2: got 'x y'; expected numbers"),
         ("1 2\n1 nan\n", "line 2: got '1 nan'; expected finite numbers"),
         ("1 2\n1 3\n", "the map has no area"),

@@ -1,0 +1,181 @@
+"""Elevation models: GeoTIFF, or what else GDAL reads.
+
+Heights become nodes in the middle of the cells. A raster in degrees, or turned, is
+resampled to metres; a coordinate system that is metric already keeps its cells.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from mrmg.errors import Fault, SceneError
+from mrmg.extras import import_extra
+from mrmg.scene.importing.frames import Frame, frame_of
+from mrmg.scene.importing.layers import Area, Heights, ImportOptions, Layer
+from mrmg.scene.importing.raster_shapes import enclosing_polygons
+from mrmg.scene.importing.rasters import read_raster
+from mrmg.scene.importing.registry import Format, Head
+from mrmg.scene.loading.elevation import MOST_NODES
+
+_EDGE_POINTS = 21
+"""Points of each side of a raster that decide what ground it covers elsewhere."""
+
+_TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+
+
+def read_elevation(path: Path, options: ImportOptions) -> Layer:
+    """Read an elevation model; cells without data become obstacles, or free ground."""
+    raster = read_raster(path, options)
+    crs, heights, transform, notes = raster
+    frame = options.frame or frame_of(crs, raster.corners)
+    upright = transform.b == transform.d == 0.0 and transform.e < 0.0 < transform.a
+    if upright and crs in (None, frame.crs):
+        factor = int(np.ceil(np.sqrt(heights.size / MOST_NODES)))
+        heights, transform = (
+            heights[::factor, ::factor],
+            transform * transform.scale(factor),
+        )
+        if factor > 1:
+            notes.append(f"every {factor}th row and column was kept: it is too large")
+        rows, columns = heights.shape
+        x, y = transform * (0.5, 0.5)
+        right, bottom = x + transform.a * (columns - 1), y + transform.e * (rows - 1)
+        ends = np.array([x, bottom, right, y])
+        low = frame.metres([ends[:2]], crs)[0]
+        bounds = np.array([*low, *(low + ends[2:] - ends[:2])])
+    elif crs is None:
+        message = "is turned and states no coordinate system; resample it north up"
+        raise SceneError(str(path), [Fault("transform", message)])
+    else:
+        heights, bounds = _resampled(heights, transform, crs, frame)
+        notes.append(f"resampled from {crs} to {frame.crs}")
+    if min(heights.shape) < 2:
+        message = f"{heights.shape[0]} x {heights.shape[1]} heights; expected 2 x 2"
+        raise SceneError(str(path), [Fault("", message)])
+    return _layer(frame, _box(bounds), heights, options, notes, str(path))
+
+
+def _layer(
+    frame: Frame,
+    bounds: tuple[float, float, float, float],
+    heights: np.ndarray,
+    options: ImportOptions,
+    notes: list[str],
+    source: str,
+) -> Layer:
+    empty = np.isnan(heights)
+    if empty.all():
+        raise SceneError(source, [Fault("", "holds no height in this area")])
+    obstacles: list[Area] = []
+    if empty.any():
+        from scipy.ndimage import distance_transform_edt
+
+        nearest = distance_transform_edt(
+            empty, return_distances=False, return_indices=True
+        )
+        heights = heights[tuple(nearest)]
+        notes.append(
+            f"{int(empty.sum())} cells without data were taken as {options.unknown}, "
+            "at the height of the nearest cell"
+        )
+    if empty.any() and options.unknown == "obstacle":
+        obstacles = [
+            Area(_placed(shape, bounds, heights.shape), {"id": "no_data"})
+            for shape in enclosing_polygons(empty, options.tolerance)
+        ]
+    rows, columns = heights.shape
+    notes.append(
+        f"{rows} x {columns} heights of {heights.min():.1f} to {heights.max():.1f} m; "
+        "ground too steep for a robot is an obstacle for it (slope: avoid)"
+    )
+    return Layer(
+        frame=frame,
+        bounds=bounds,
+        heights=Heights(bounds=bounds, metres=heights),
+        obstacles=obstacles,
+        notes=notes,
+    )
+
+
+def _resampled(
+    heights: np.ndarray, transform: Any, crs: str, frame: Frame
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return heights at nodes of `frame`, and the bounds of the nodes.
+
+    The box is the largest one about the middle of the raster that has data all over.
+    """
+    warp = import_extra("rasterio.warp", extra="geo", purpose="reads GeoTIFF")
+    affine = import_extra("affine", extra="geo", purpose="reads GeoTIFF")
+    rows, columns = heights.shape
+    ring = [
+        frame.metres(_edge(transform, ends), crs)
+        for ends in (
+            ((0.5, 0.5), (0.5, rows - 0.5)),
+            ((0.5, rows - 0.5), (columns - 0.5, rows - 0.5)),
+            ((columns - 0.5, 0.5), (columns - 0.5, rows - 0.5)),
+            ((0.5, 0.5), (columns - 0.5, 0.5)),
+        )
+    ]
+    middle = np.concatenate(ring).mean(axis=0)
+    low, high = np.full(2, -np.inf), np.full(2, np.inf)
+    for side in ring:
+        axis = int(np.abs(side.mean(axis=0) - middle).argmax())
+        if side[:, axis].mean() < middle[axis]:
+            low[axis] = max(low[axis], side[:, axis].max())
+        else:
+            high[axis] = min(high[axis], side[:, axis].min())
+    area = np.prod(high - low)
+    cell = max(np.sqrt(area / heights.size), np.sqrt(area / MOST_NODES) * 1.01)
+    counts = np.maximum(2, np.floor((high - low) / cell).astype(int) + 1)
+    high = low + (counts - 1) * cell
+    origin = np.asarray(frame.origin_m)
+    left, top = low[0] + origin[0] - cell / 2, high[1] + origin[1] + cell / 2
+    found = np.full((counts[1], counts[0]), np.nan)
+    warp.reproject(
+        heights,
+        found,
+        src_transform=transform,
+        src_crs=crs,
+        src_nodata=np.nan,
+        dst_transform=affine.Affine(cell, 0.0, left, 0.0, -cell, top),
+        dst_crs=frame.crs,
+        dst_nodata=np.nan,
+        resampling=warp.Resampling.bilinear,
+    )
+    return found, np.concatenate([low, high])
+
+
+def _edge(transform: Any, ends: Any) -> np.ndarray:
+    start, end = np.asarray(ends)
+    along = np.linspace(start, end, _EDGE_POINTS)
+    return np.stack(transform * along.T, axis=1)
+
+
+def _placed(shape: Any, bounds: Any, grid: tuple[int, ...]) -> Any:
+    """Return a shape of cells in metres; a cell's middle is a node."""
+    x_min, y_min, x_max, y_max = bounds
+    steps = np.array([x_max - x_min, y_min - y_max]) / np.array(
+        [grid[1] - 1, grid[0] - 1]
+    )
+    return shapely.transform(shape, lambda p: (p - 0.5) * steps + [x_min, y_max])
+
+
+def _box(bounds: Any) -> tuple[float, float, float, float]:
+    x_min, y_min, x_max, y_max = (float(value) for value in bounds)
+    return x_min, y_min, x_max, y_max
+
+
+def _recognises(head: Head) -> bool:
+    return head.start.startswith(_TIFF)
+
+
+FORMAT = Format(
+    kind="elevation",
+    title="elevation model (GeoTIFF)",
+    recognises=_recognises,
+    read=read_elevation,
+)

@@ -1,0 +1,272 @@
+"""Occupancy maps of ROS and Nav2: a YAML file, and the picture that it names.
+
+Grey values become occupancy as in Nav2's map server: `trinary`, `scale` and `raw`.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import shapely
+from pydantic import Field, ValidationError
+from shapely import affinity
+
+from mrmg.errors import Fault, SceneError
+from mrmg.scene.importing.frames import Frame
+from mrmg.scene.importing.layers import Area, ImportOptions, Layer
+from mrmg.scene.importing.raster_shapes import enclosing_polygons, polygons_of_cells
+from mrmg.scene.importing.registry import Format, Head
+from mrmg.scene.loading.faults import faults_of
+from mrmg.scene.loading.places import lines_of
+from mrmg.scene.loading.shape_schema import Number, Positive, Strict
+from mrmg.scene.loading.yaml_text import read_yaml
+
+LETHAL, UNKNOWN = 100, -1
+"""Occupancy of obstacles, and of cells that were never seen."""
+
+MOST_CLASSES = 12
+"""Multipliers that a mask of many values is rounded to, at most."""
+
+_MOST_PIXELS = 100_000_000
+_ASSUMED = ("mode", "negate", "occupied_thresh", "free_thresh")
+
+
+class MapDocument(Strict):
+    """The content of a map's YAML file."""
+
+    model_config = {**Strict.model_config, "extra": "ignore"}
+
+    image: Annotated[str, Field(min_length=1)] = Field(description="PGM or PNG file")
+    resolution: Positive = Field(description="side of a cell in m")
+    origin: Annotated[list[Number], Field(min_length=2, max_length=3)] = Field(
+        description="[x, y, yaw] of the lower left corner in m and rad"
+    )
+    mode: Literal["trinary", "scale", "raw"] = "trinary"
+    negate: bool | Literal[0, 1] = Field(default=0, description="0 or 1")
+    occupied_thresh: Annotated[float, Field(ge=0, le=1)] = 0.65
+    free_thresh: Annotated[float, Field(ge=0, le=1)] = 0.25
+
+
+@dataclass(frozen=True, kw_only=True)
+class OccupancyGrid:
+    """A map as Nav2 takes it.
+
+    Attributes:
+        document: the YAML file.
+        occupancy: 0 to 100, or `UNKNOWN`, rows from north to south.
+        occupied: which cells are obstacles.
+    """
+
+    document: MapDocument
+    occupancy: np.ndarray
+    occupied: np.ndarray
+
+    @property
+    def place(self) -> tuple[Any, ...]:
+        """What grids have in common whose cells lie on each other."""
+        stated = self.document
+        return (*stated.origin[:2], stated.origin[2:], stated.resolution)
+
+    def placed(self, shape: Any) -> Any:
+        """Return a shape of cells (column, row from the top) in metres of the map."""
+        x, y, yaw = (*self.document.origin, 0.0)[:3]
+        cell = self.document.resolution
+        rows = self.occupancy.shape[0]
+        upright = affinity.affine_transform(shape, [cell, 0, 0, -cell, 0, rows * cell])
+        turned = affinity.rotate(upright, yaw, origin=(0.0, 0.0), use_radians=True)
+        return affinity.translate(turned, x, y)
+
+
+def read_map(path: Path, options: ImportOptions) -> Layer:
+    """Read an occupancy map: its occupied cells, and unknown ones, become obstacles."""
+    grid = read_grid(path)
+    unknown = grid.occupancy == UNKNOWN
+    solid = grid.occupied | unknown if options.unknown == "obstacle" else grid.occupied
+    shapes = [grid.placed(s) for s in enclosing_polygons(solid, options.tolerance)]
+    rows, columns = solid.shape
+    extent = grid.placed(shapely.box(0, 0, columns, rows))
+    bounds = extent.bounds
+    beside = shapely.box(*bounds) - extent
+    if beside.area > 1e-6 * extent.area:  # turned: nothing is known beside it
+        shapes += list(shapely.get_parts(beside))
+    tolerance_m = options.tolerance * grid.document.resolution
+    notes = [
+        f"{int(grid.occupied.sum())} occupied cells and {int(unknown.sum())} unknown "
+        f"ones (taken as {options.unknown}) became {len(shapes)} polygons, which reach "
+        f"at most {tolerance_m:.3g} m beyond their cells",
+        *_notes(path, grid),
+    ]
+    between = (grid.occupancy > 0) & ~grid.occupied
+    if between.any():
+        notes.append(
+            f"{int(between.sum())} cells of occupancy between free and occupied were "
+            "taken as free"
+        )
+    return Layer(
+        frame=options.frame or Frame(),
+        bounds=bounds,
+        obstacles=[Area(shape) for shape in shapes],
+        cells=(grid.place, solid),
+        notes=notes,
+    )
+
+
+def read_keepout(path: Path, options: ImportOptions, known: Sequence[Layer]) -> Layer:
+    """Read a keep-out mask: its occupied cells become obstacles.
+
+    Cells that are obstacles of `known` layers on the same grid already stay out.
+    """
+    grid = read_grid(path)
+    closed = grid.occupied & ~_covered(grid, known)
+    shapes = [grid.placed(s) for s in enclosing_polygons(closed, options.tolerance)]
+    note = f"{int(closed.sum())} cells became {len(shapes)} obstacles"
+    return Layer(
+        frame=options.frame or Frame(),
+        obstacles=[Area(shape, {"id": "keepout"}) for shape in shapes],
+        notes=[note, *_notes(path, grid)],
+    )
+
+
+def _covered(grid: OccupancyGrid, known: Sequence[Layer]) -> np.ndarray:
+    covered = np.zeros(grid.occupied.shape, dtype=bool)
+    for place, mask in (layer.cells for layer in known if layer.cells is not None):
+        if place == grid.place and mask.shape == covered.shape:
+            covered |= mask
+    return covered
+
+
+def read_mask(path: Path, options: ImportOptions, known: Sequence[Layer]) -> Layer:
+    """Read a speed or cost mask: its values become multipliers of terrain.
+
+    A value v of 1 to 99 leaves 100 - v % of the speed, and multiplies by
+    100 / (100 - v); ground of value 100 is closed. Cells that are obstacles of `known`
+    layers on the same grid stay out.
+    """
+    grid = read_grid(path)
+    covered = _covered(grid, known)
+    value = np.where(covered | grid.occupied, 0, np.maximum(grid.occupancy, 0))
+    values = np.unique(value[value > 0])
+    if len(values) > MOST_CLASSES:
+        steps = np.linspace(0, LETHAL, MOST_CLASSES + 1)
+        middle = 0.5 * (steps[1:] + steps[:-1])
+        value = np.where(value > 0, middle[np.digitize(value, steps[1:-1])], 0.0)
+    terrain = [
+        Area(grid.placed(shape), {"multiplier": round(100.0 / (100.0 - float(v)), 3)})
+        for v in np.unique(value[value > 0])
+        for shape in polygons_of_cells(value == v)
+    ]
+    closed = enclosing_polygons(grid.occupied & ~covered, options.tolerance)
+    notes = [
+        f"{len(values)} values of 1 to 99 became {len(terrain)} terrain areas of "
+        f"multiplier 100 / (100 - value); {len(closed)} areas of value 100 obstacles"
+    ]
+    if len(values) > MOST_CLASSES:
+        notes.append(f"its {len(values)} values were rounded to {MOST_CLASSES}")
+    return Layer(
+        frame=options.frame or Frame(),
+        obstacles=[Area(grid.placed(s), {"id": "closed"}) for s in closed],
+        terrain=terrain,
+        notes=[*notes, *_notes(path, grid)],
+    )
+
+
+def _notes(path: Path, grid: OccupancyGrid) -> list[str]:
+    document = grid.document
+    lacking = [key for key in _ASSUMED if key not in document.model_fields_set]
+    assumed = ", ".join(f"{key} {getattr(document, key)}" for key in lacking)
+    return [f"{path.name} leaves out {assumed}: assumed"] if lacking else []
+
+
+def read_grid(path: Path) -> OccupancyGrid:
+    """Read a map's YAML file and its picture.
+
+    Raises:
+        SceneError: naming every fault.
+    """
+    with lines_of(path):
+        try:
+            document = MapDocument.model_validate(read_yaml(path, source=str(path)))
+        except ValidationError as error:
+            raise SceneError(str(path), faults_of(error, MapDocument)) from error
+        if document.mode != "raw" and document.free_thresh > document.occupied_thresh:
+            message = f"got {document.free_thresh}; must not exceed occupied_thresh"
+            raise SceneError(str(path), [Fault("free_thresh", message)])
+        shade, opaque = _picture(path, document)
+    occupancy, occupied = _occupancy(document, shade, opaque)
+    return OccupancyGrid(document=document, occupancy=occupancy, occupied=occupied)
+
+
+def _picture(path: Path, document: MapDocument) -> tuple[np.ndarray, np.ndarray]:
+    """Return brightness in [0, 1] and where the picture is opaque, as (h, w)."""
+    from PIL import Image, UnidentifiedImageError
+
+    file = path.parent / document.image
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            with Image.open(file) as picture:
+                if picture.width * picture.height > _MOST_PIXELS:
+                    raise ValueError(f"more than {_MOST_PIXELS} pixels")
+                if picture.mode in ("P", "PA", "1"):
+                    clear = "transparency" in picture.info
+                    data = np.asarray(picture.convert("RGBA" if clear else "RGB"))
+                else:
+                    data = np.asarray(picture)
+                white = 65535.0 if picture.mode.startswith("I") else 255.0
+    except (
+        OSError,
+        SyntaxError,
+        ValueError,
+        UnidentifiedImageError,
+        Image.DecompressionBombError,
+    ) as error:
+        reason = (
+            "no such file" if not file.exists() else f"no readable picture: {error}"
+        )
+        message = f"'{document.image}': {reason}; expected a PGM or PNG beside the YAML"
+        raise SceneError(str(path), [Fault("image", message)]) from error
+    data = data.astype(float) / white
+    if data.ndim == 2:
+        return data, np.ones(data.shape, dtype=bool)
+    alpha = data[..., -1] if data.shape[2] in (2, 4) else np.ones(data.shape[:2])
+    colours = data[..., :-1] if data.shape[2] in (2, 4) else data
+    if document.mode == "trinary" and data.shape[2] in (2, 4):
+        colours = data  # as the map server has it
+    return colours.mean(axis=2), alpha >= 1.0
+
+
+def _occupancy(
+    document: MapDocument, shade: np.ndarray, opaque: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    if document.mode == "raw":
+        value = np.rint(255.0 * shade)
+        occupancy = np.where(value <= LETHAL, value, UNKNOWN).astype(int)
+        return occupancy, occupancy >= 100.0 * document.occupied_thresh
+    low, high = document.free_thresh, document.occupied_thresh
+    # Rounded: 1 - 254 / 255 must not pass a threshold of 0.004 by a bit.
+    share = np.round(shade if document.negate else 1.0 - shade, 12)
+    occupied, free = share > high, share < low
+    between = np.full(shade.shape, UNKNOWN, dtype=float)
+    if document.mode == "scale" and high > low:
+        between = np.where(opaque, np.rint((share - low) / (high - low) * 100), UNKNOWN)
+        occupied, free = occupied & opaque, free & opaque
+    occupancy = np.where(occupied, LETHAL, np.where(free, 0, between)).astype(int)
+    return occupancy, occupancy == LETHAL
+
+
+def _recognises(head: Head) -> bool:
+    keys = head.mapping if head.kind == "yaml" else {}
+    return "image" in keys or ("resolution" in keys and "origin" in keys)
+
+
+FORMAT = Format(
+    kind="nav2-map",
+    title="ROS or Nav2 occupancy map (YAML with PGM or PNG)",
+    recognises=_recognises,
+    read=read_map,
+)

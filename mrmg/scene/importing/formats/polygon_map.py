@@ -1,0 +1,112 @@
+"""Polygon and triangle maps of path-planning papers: cleaned and scaled."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import shapely
+from shapely import affinity
+from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
+
+from mrmg.errors import Fault, SceneError, UsageError
+from mrmg.scene.importing.frames import Frame
+from mrmg.scene.importing.layers import Area, ImportOptions, Layer
+from mrmg.scene.importing.map_text import RawMap, read_map
+from mrmg.scene.importing.registry import Format, Head
+
+GRID_M = 0.001
+"""Coordinates are rounded to this; smaller gaps between obstacles are closed."""
+
+THIN_M = 0.05
+"""Half the thickness that segments and points are given, to become obstacles."""
+
+SLIVER_M2 = 1e-3
+"""Obstacles of less area are left out: rounding leaves such behind."""
+
+
+def read_polygon_map(path: Path, options: ImportOptions) -> Layer:
+    """Read a polygon map: scaled, its shapes joined, its lower left corner at (0, 0).
+
+    Raises:
+        SceneError: if the file cannot be read; names every bad line.
+        UsageError: if the longest side is not positive.
+    """
+    longest_m = options.longest_side_m
+    if longest_m is not None and not 0.0 < longest_m < float("inf"):
+        message = f"the longest side is {longest_m} m; it must be positive"
+        raise UsageError(message)
+    raw = read_map(path)
+    border, solid = _in_metres(raw, longest_m, str(path))
+    shapes = list(_polygons(solid))
+    x_min, y_min, x_max, y_max = (round(value, 3) for value in border.bounds)
+    notes = [f"{len(raw.obstacles)} shapes became {len(shapes)} polygons"]
+    if longest_m is not None:
+        notes.append(f"scaled to a longest side of {longest_m:g} m (--longest-side)")
+    return Layer(
+        frame=options.frame or Frame(),
+        bounds=(x_min, y_min, x_max, y_max),
+        # Corners on a straight side come from unions of touching shapes.
+        obstacles=[Area(shape.simplify(0.1 * GRID_M)) for shape in shapes],
+        notes=notes,
+    )
+
+
+def _in_metres(
+    raw: RawMap, longest_side_m: float | None, source: str
+) -> tuple[Polygon, BaseGeometry]:
+    """Return the border and the blocked ground inside its box, lower left at (0, 0)."""
+    extent = (
+        shapely.box(*raw.border.bounds)
+        if raw.border is not None
+        else shapely.box(*shapely.total_bounds(list(raw.obstacles)))
+    )
+    x_min, y_min, x_max, y_max = extent.bounds
+    longest = max(x_max - x_min, y_max - y_min)
+    if min(x_max - x_min, y_max - y_min) <= 0.0:
+        raise SceneError(source, [Fault("", "the map has no area")])
+    scale = raw.unit_m if longest_side_m is None else longest_side_m / longest
+
+    def placed(shape: BaseGeometry) -> BaseGeometry:
+        moved = affinity.translate(shape, -x_min, -y_min)
+        return affinity.scale(moved, scale, scale, origin=(0.0, 0.0))
+
+    box = placed(extent)
+    blocked = [_solid(placed(shape)) for shape in raw.obstacles]
+    if raw.border is not None:
+        blocked.append(box.difference(_solid(placed(raw.border))))
+    solid = shapely.set_precision(shapely.union_all(blocked), GRID_M)
+    return box, solid.intersection(shapely.set_precision(box, GRID_M))
+
+
+def _solid(shape: BaseGeometry) -> BaseGeometry:
+    """Return a valid shape with area: thin things get a thickness."""
+    # A polygon that crosses itself may count zero until it is repaired.
+    valid = shapely.make_valid(shape, method="structure", keep_collapsed=True)
+    if valid.area == 0.0:
+        return valid.buffer(THIN_M, cap_style="square", join_style="mitre")
+    return valid
+
+
+def _polygons(shape: BaseGeometry) -> Iterator[Polygon]:
+    """Yield the polygons of a shape from lower left to upper right, without slivers."""
+    parts = [
+        part
+        for part in shapely.get_parts(shape)
+        if isinstance(part, Polygon) and part.area > SLIVER_M2
+    ]
+    yield from sorted(parts, key=lambda part: (part.bounds[1], part.bounds[0]))
+
+
+def _recognises(head: Head) -> bool:
+    first = head.start.split(maxsplit=1)[:1]
+    return head.kind == "text" and bool(first) and first[0][:1] in b"[-+.0123456789"
+
+
+FORMAT = Format(
+    kind="polygon-map",
+    title="polygon or triangle map (text)",
+    recognises=_recognises,
+    read=read_polygon_map,
+)

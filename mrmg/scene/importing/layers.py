@@ -1,0 +1,249 @@
+"""What an importer reads of one file, and how several become one scene."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import shapely
+from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from mrmg.errors import Fault, SceneError
+from mrmg.scene.document import PACKED_M, packed_heights
+from mrmg.scene.importing.frames import Frame
+
+Entry = dict[str, Any]
+Box = tuple[float, float, float, float]
+
+PLACE_MARGIN_M = 2.0
+"""Ground around goals, stations and robots where no file states bounds."""
+
+_DECIMALS = 6
+"""Coordinates are rounded to micrometres: obstacles lose nothing that counts."""
+
+_SLIVER_M2 = 1e-6
+_NOT_IN_IDS = re.compile(r"[^A-Za-z0-9_.\-]+")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ImportOptions:
+    """What the user asks of an import.
+
+    Attributes:
+        frame: coordinates of the scene so far; None before the first file.
+        unknown: what cells that were never seen become.
+        tolerance: how far polygons may reach beyond the cells of a raster [cells].
+        crs: coordinate reference system that replaces what files state; "local" for
+            metres.
+        crop: box to keep, in the coordinates of the first file.
+        longest_side_m: what a polygon map's longer side is scaled to.
+        classes: table of land-cover classes.
+        lane_width_m: width of the lanes that robots must keep to; None for none.
+    """
+
+    frame: Frame | None = None
+    unknown: Literal["obstacle", "free"] = "obstacle"
+    tolerance: float = 0.5
+    crs: str | None = None
+    crop: Box | None = None
+    longest_side_m: float | None = 100.0
+    classes: Path | None = None
+    lane_width_m: float | None = None
+
+
+@dataclass(frozen=True)
+class Area:
+    """An obstacle or terrain area: its shape [m], and the other keys of its entry."""
+
+    shape: BaseGeometry
+    entry: Entry = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Heights:
+    """Heights [m] of nodes, rows from north to south, over `bounds`."""
+
+    bounds: Box
+    metres: np.ndarray
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layer:
+    """The content of one file in the coordinates of the scene.
+
+    Attributes:
+        frame: the coordinates.
+        crs: coordinate system of the file itself; None for local metres.
+        bounds: extent of the ground that the file describes; None if it states none.
+        obstacles: ground that robots must keep off.
+        terrain: ground that costs more or less.
+        heights: of the ground.
+        goals, stations, robots: entries of a scene file.
+        lanes: lines that robots may drive along.
+        cells: placement and mask of the raster cells that obstacles cover.
+        notes: what was dropped, changed or assumed.
+    """
+
+    frame: Frame
+    crs: str | None = None
+    bounds: Box | None = None
+    obstacles: Sequence[Area] = ()
+    terrain: Sequence[Area] = ()
+    heights: Heights | None = None
+    goals: Sequence[Entry] = ()
+    stations: Sequence[Entry] = ()
+    robots: Sequence[Entry] = ()
+    lanes: Sequence[BaseGeometry] = ()
+    cells: tuple[Any, np.ndarray] | None = None
+    notes: Sequence[str] = ()
+
+
+def scene_of_layers(
+    name: str, layers: Sequence[Layer], options: ImportOptions
+) -> tuple[Entry, list[str]]:
+    """Return the scene document of some layers, and notes on what did not fit in.
+
+    Raises:
+        SceneError: if no layer states bounds or holds anything.
+    """
+    bounds = _bounds(name, layers, options)
+    notes: list[str]
+    box, notes = shapely.box(*bounds), []
+    obstacles = [area for layer in layers for area in layer.obstacles]
+    obstacles += _beside_lanes(layers, box, options.lane_width_m)
+    heights = next((layer.heights for layer in layers if layer.heights), None)
+    document: Entry = {
+        "format": 1,
+        "name": _NOT_IN_IDS.sub("_", name),
+        "bounds": [round(value, _DECIMALS) + 0.0 for value in bounds],
+        "obstacles": list(_entries(obstacles, box)),
+        "terrain": list(
+            _entries([area for layer in layers for area in layer.terrain], box)
+        ),
+    }
+    if heights is not None:
+        document["elevation"] = _elevation(heights)
+    used: set[str] = {str(entry.get("id")) for entry in document["obstacles"]}
+    used |= {str(entry.get("id")) for entry in document["terrain"]}
+    solid = shapely.union_all([area.shape for area in obstacles])
+    for section in ("goals", "stations", "robots"):
+        entries = [entry for layer in layers for entry in getattr(layer, section)]
+        fitting = [
+            entry
+            for entry in entries
+            if box.covers(_point(entry)) and not solid.covers(_region(entry))
+        ]
+        if len(fitting) < len(entries):
+            lost = [str(entry["id"]) for entry in entries if entry not in fitting]
+            notes.append(
+                f"left out {section} that lie out of bounds or wholly on obstacles: "
+                f"{', '.join(lost)}"
+            )
+        document[section] = [_with_own_id(entry, used, notes) for entry in fitting]
+    return {key: value for key, value in document.items() if value != []}, notes
+
+
+def _bounds(name: str, layers: Sequence[Layer], options: ImportOptions) -> Box:
+    heights = next((layer.heights for layer in layers if layer.heights), None)
+    if heights is not None:
+        return heights.bounds
+    if options.crop is not None:
+        return layers[0].frame.box(options.crop, layers[0].crs)
+    stated = [layer.bounds for layer in layers if layer.bounds]
+    if stated:
+        low, high = np.array(stated)[:, :2], np.array(stated)[:, 2:]
+        return (*low.min(axis=0).tolist(), *high.max(axis=0).tolist())
+    shapes = [area.shape for layer in layers for area in layer.obstacles]
+    shapes += [area.shape for layer in layers for area in layer.terrain]
+    places = [
+        _point(entry).buffer(PLACE_MARGIN_M)
+        for layer in layers
+        for entry in (*layer.goals, *layer.stations, *layer.robots)
+    ]
+    if not shapes and not places:
+        raise SceneError(name, [Fault("", "holds nothing that a scene could show")])
+    x_min, y_min, x_max, y_max = shapely.total_bounds([*shapes, *places]).tolist()
+    return x_min, y_min, x_max, y_max
+
+
+def _beside_lanes(
+    layers: Sequence[Layer], box: Polygon, width_m: float | None
+) -> list[Area]:
+    lanes = [line for layer in layers for line in layer.lanes]
+    if width_m is None or not lanes:
+        return []
+    allowed = shapely.union_all(lanes).buffer(0.5 * width_m)
+    return [Area(box.difference(allowed), {"id": "off_lane"})]
+
+
+def _entries(areas: Iterable[Area], box: Polygon) -> Iterable[Entry]:
+    """Yield the entries of areas inside `box`, one a polygon."""
+    used: set[str] = set()
+    for area in areas:
+        inside = area.shape if box.covers(area.shape) else area.shape & box
+        for part in shapely.get_parts(inside):
+            if isinstance(part, Polygon) and part.area > _SLIVER_M2:
+                entry = {**_polygon(shapely.orient_polygons(part)), **area.entry}
+                if "id" in entry:
+                    entry["id"] = _unused(_as_id(entry["id"]), used)
+                    entry = {"id": entry.pop("id"), **entry}
+                yield entry
+
+
+def _polygon(shape: Polygon) -> Entry:
+    rings = [_corners(ring) for ring in (shape.exterior, *shape.interiors)]
+    return {"polygon": rings[0], **({"holes": rings[1:]} if rings[1:] else {})}
+
+
+def _corners(ring: Any) -> list[list[float]]:
+    corners = np.round(np.array(ring.coords[:-1])[:, :2], _DECIMALS) + 0.0
+    return list(corners.tolist())
+
+
+def _elevation(heights: Heights) -> Entry:
+    steps = np.round(heights.metres / PACKED_M).astype("<i4")
+    return {**packed_heights(steps), "slope": "avoid"}
+
+
+def _point(entry: Entry) -> shapely.Point:
+    if "polygon" in entry:
+        return shapely.Polygon(entry["polygon"]).centroid
+    return shapely.Point(entry.get("pose") or entry["circle"]["center"])
+
+
+def _region(entry: Entry) -> BaseGeometry:
+    if "polygon" in entry:
+        return Polygon(entry["polygon"])
+    return _point(entry).buffer(entry["circle"]["radius"] if "circle" in entry else 0.0)
+
+
+def _with_own_id(entry: Entry, used: set[str], notes: list[str]) -> Entry:
+    given = str(entry["id"])
+    own = _unused(_as_id(given), used)
+    if own != given:
+        notes.append(f"'{given}' is called '{own}': ids are unique, of A-Za-z0-9_.-")
+    return {**entry, "id": own}
+
+
+def _as_id(given: Any) -> str:
+    text = _NOT_IN_IDS.sub("_", str(given))[:60]
+    return text if re.match(r"[A-Za-z0-9_]", text) else f"_{text}"
+
+
+def _unused(wanted: str, used: set[str]) -> str:
+    names = (wanted, *(f"{wanted}_{number}" for number in range(2, len(used) + 3)))
+    name = next(name for name in names if name not in used)
+    used.add(name)
+    return name
+
+
+def polygons(shape: BaseGeometry) -> MultiPolygon:
+    """Return the valid polygons of a shape, without lines and points."""
+    valid = shapely.make_valid(shape, method="structure", keep_collapsed=False)
+    parts = [part for part in shapely.get_parts(valid) if isinstance(part, Polygon)]
+    return MultiPolygon(parts)
