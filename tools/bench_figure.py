@@ -40,7 +40,7 @@ HEAD = (
     "first plan [s]",
     "total [s]",
     "solver [%]",
-    "drafts",
+    "path-following plans",
     "iterations",
     "timeouts",
 )
@@ -106,7 +106,7 @@ def _line(rows: Sequence[BenchRow]) -> tuple[str, ...]:
         _median(solved, lambda row: row.first_s or 0.0),
         _median(rows, lambda row: row.total_s),
         _median(rows, lambda row: 100.0 * row.routing_s / row.total_s, 0),
-        _count(rows, lambda row: row.drafts),
+        _count(rows, lambda row: row.path_following_plans),
         _count(rows, lambda row: row.iterations),
         str(len(rows) - len(solved)),
     )

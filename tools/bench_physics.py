@@ -11,8 +11,8 @@ same log. Every circle of the second table is driven alone on plain ground.
 
 With --disturb, scenes 1 and 4 are planned with ten seeds, and the trials are spread
 evenly over these plans: under the default disturbances, and, with replanning, with the
-rolling resistance raised by 30 % besides. As plans leave charge to spare that carries
-even that, the same is asked of plans that use all they may (`--spare 0`), and for these
+rolling resistance raised by 30 % besides. As plans leave a margin of charge that
+carries even that, the same is asked of plans without it (`--soc-margin 0`), and there
 what replanning gains, over both scenes together. A trial is feasible when all goals are
 visited without contact and no battery falls below its reserve. One trial is driven
 again in this process, and must give the same log.

@@ -26,7 +26,7 @@ class BenchRow:
         capacity_m: of the first robot's battery, as metres of plain ground.
         init_s, routing_s, first_s, total_s: times of planning; `first_s` is None
             without a plan.
-        drafts: how often the fleet was driven along tours without a motion tree;
+        path_following_plans: how often the fleet followed paths, without a motion tree;
             files of earlier versions do not say it.
         iterations: expansions of motion trees.
         conditions: machine, versions, budget.
@@ -47,7 +47,7 @@ class BenchRow:
     routing_s: float
     first_s: float | None
     total_s: float
-    drafts: int
+    path_following_plans: int
     iterations: int
     conditions: str
 
@@ -108,7 +108,9 @@ def _row(data: dict[str, Any]) -> BenchRow:
         routing_s=times["routing"],
         first_s=times["first_solution"] if solved else None,
         total_s=times["total"],
-        drafts=statistics.get("drafts", 0),
+        path_following_plans=statistics.get(
+            "path_following_plans", statistics.get("drafts", 0)
+        ),
         iterations=statistics["expansions"],
         conditions=data["conditions"],
     )

@@ -31,6 +31,14 @@ def add_options(
             help=option.help.replace("%", "%%"),
             **_details(option),
         )
+        for retired in option.formerly:
+            place.add_argument(
+                "--" + retired.replace("_", "-"),
+                dest=option.name,
+                default=argparse.SUPPRESS,
+                help=argparse.SUPPRESS,
+                **_details(option),
+            )
 
 
 def add_trust(verb: argparse.ArgumentParser) -> None:

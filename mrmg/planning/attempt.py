@@ -239,7 +239,7 @@ def draft_plans(
         for plan in made:
             if not plans or preference.rank(plan) < preference.rank(plans[-1][1]):
                 plans.append((time.perf_counter(), plan))
-    counts = {"drafts": driven, "router_calls": len(draws)}
+    counts = {"path_following_plans": driven, "router_calls": len(draws)}
     return Attempt(plans, routing_s, counts, bool(choice), failures[-1])
 
 

@@ -151,7 +151,14 @@ class Statistics:
         """Return counts, times and improvements; the total time is the time so far."""
         first = self.time_s.get("first_solution", 0.0)
         times = {"init": 0.0, "routing": 0.0, **self.time_s, "first_solution": first}
-        names = ("drafts", "trees", "vertices", "groups", "router_calls", "expansions")
+        names = (
+            "path_following_plans",
+            "trees",
+            "vertices",
+            "groups",
+            "router_calls",
+            "expansions",
+        )
         counts = dict.fromkeys(names, 0)
         judged = self._judged()
         return {

@@ -157,7 +157,7 @@ _FIGURES: tuple[tuple[str, str, int, float, tuple[str, ...]], ...] = (
     ("above the bound", "%", 1, 100.0, ("plan", "gap")),
     ("planning time", "s", 2, 1.0, ("plan", "time_s", "total")),
     ("first plan after", "s", 2, 1.0, ("plan", "time_s", "first_solution")),
-    ("drafts driven", "", 0, 1.0, ("plan", "drafts")),
+    ("path-following plans", "", 0, 1.0, ("plan", "path_following_plans")),
     ("tree vertices", "", 0, 1.0, ("plan", "vertices")),
     (
         "least distance to obstacles",

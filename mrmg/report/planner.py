@@ -22,7 +22,7 @@ _NAMES = {
     "time_s.total": "Time of planning in all",
     "router_calls": "Calls of the discrete solver",
     "trees": "Motion trees",
-    "drafts": "Times the fleet was driven along tours without a tree",
+    "path_following_plans": "Times the fleet followed paths along its tours",
     "expansions": "Expansions of motion trees",
     "iterations": "Iterations of the guided tree",
     "iteration_cap": "Most iterations it may make",

@@ -51,6 +51,7 @@ class Option:
         choices: allowed values, where they are few.
         bare: value of the flag alone, where its value may be left out.
         group: name of a set of options that exclude each other.
+        formerly: retired names of the field, still read everywhere and shown nowhere.
         default: of the field.
     """
 
@@ -65,6 +66,7 @@ class Option:
     choices: tuple[str, ...] | None
     bare: str | None
     group: str | None
+    formerly: tuple[str, ...]
     default: Any
 
     def words(self, value: Any) -> list[str]:
@@ -116,6 +118,7 @@ def _option_of(each: Field[Any]) -> Option:
         "choices": None,
         "bare": None,
         "group": None,
+        "formerly": (),
         **details,
     }
     return Option(name=each.name, type=str(each.type), **complete)
@@ -261,13 +264,14 @@ class RunArguments(_Checked):
         metavar="N",
         group="limit",
     )
-    spare: float | None = _option(
+    soc_margin: float | None = _option(
         None,
-        "of every battery's capacity, left above the reserve where that can be; "
-        "default 0.1",
+        "state-of-charge margin: share of every battery's capacity that plans leave "
+        "above the reserve where that can be; default 0.1",
         decides="plan",
         read=values.share,
         metavar="SHARE",
+        formerly=("spare",),
     )
     workers: int = _option(
         1,
@@ -356,15 +360,15 @@ class RunArguments(_Checked):
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> RunArguments:
         """Rebuild arguments from `to_json`, also of versions that knew fewer."""
-        return RunArguments(
-            **{**data, "video": VideoArguments(**data.get("video", {}))}
-        )
+        named = {keyword(name): value for name, value in data.items()}
+        video = VideoArguments(**named.pop("video", {}))
+        return RunArguments(**named, video=video)
 
 
 def keyword(name: str) -> str:
-    """Return the field of a keyword, which may also be spelled as its flag is."""
-    spelled = {
-        option.flag.removeprefix("--").replace("-", "_"): option.name
-        for option in options_of(RunArguments)
-    }
-    return spelled.get(name, name)
+    """Return the field of a keyword; it may be spelled as its flag is, or was once."""
+    for option in options_of(RunArguments):
+        flag = option.flag.removeprefix("--").replace("-", "_")
+        if name in (flag, *option.formerly):
+            return option.name
+    return name

@@ -124,7 +124,10 @@ def _plan_figures(
             "bound": statistics.get("bound"),
         },
         "improvements": list(statistics.get("improvements", [])),
-        "drafts": statistics.get("drafts", 0),
+        "path_following_plans": statistics.get(
+            "path_following_plans",
+            statistics.get("drafts", 0),  # runs of 0.1.0
+        ),
         "vertices": statistics["vertices"],
         "groups": statistics["groups"],
         "router_calls": statistics["router_calls"],

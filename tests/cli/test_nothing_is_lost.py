@@ -118,7 +118,7 @@ def test_the_same_drive_is_kept_and_driven_again_on_request(
         ("quickstart", [], "scene 'one_goal' (now 'quickstart')"),
         (str(SCENE), ["--seed", "1"], "--seed 0 (now 1)"),
         (str(SCENE), ["--objective", "makespan"], "--objective not given"),
-        (str(SCENE), ["--spare", "0.3"], "--spare not given (now 0.3)"),
+        (str(SCENE), ["--soc-margin", "0.3"], "--soc-margin not given (now 0.3)"),
     ],
 )
 def test_results_of_something_else_are_not_replaced(

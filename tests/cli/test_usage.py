@@ -51,7 +51,7 @@ def run(*arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess
         (["plan", "quickstart", "--objective", "0:0"], "two weights such as 1:50"),
         (["plan", "quickstart", "--objective", "1:-2"], "two weights such as 1:50"),
         (["plan", "quickstart", "--time-limit", "0"], "--time-limit"),
-        (["plan", "quickstart", "--spare", "1"], "--spare"),
+        (["plan", "quickstart", "--soc-margin", "1"], "--soc-margin"),
         (["run", "quickstart", "--profile", "fast"], "paper"),
         (["render", "runs/x", "--size", "huge"], "1280x720"),
         (["render", "runs/x", "--size", "0x10"], "1280x720"),

@@ -16,7 +16,7 @@ from mrmg.cli.parser import make_parser
 from mrmg.cli.run_options import given
 from mrmg.errors import ExitCode, UsageError
 from mrmg.report.report import command
-from mrmg.runs.arguments import RunArguments, VideoArguments, options_of
+from mrmg.runs.arguments import RunArguments, VideoArguments, keyword, options_of
 from mrmg.runs.folder import RunFolder, Step
 from mrmg.runs.record import read_record
 from mrmg.runs.steps import Run
@@ -29,7 +29,7 @@ OTHER: dict[str, Any] = {
     "time_limit_s": 300.0,
     "budget_s": 2.5,
     "trees": 3,
-    "spare": 0.25,
+    "soc_margin": 0.25,
     "workers": 2,
     "profile": "paper",
     "planner": "guided_tree",
@@ -91,7 +91,7 @@ def test_the_keywords_of_run_are_its_options() -> None:
         ({"trees": True}, "trees: True"),
         ({"budget_s": 0}, "budget_s: 0 is not a positive number"),
         ({"time_limit": "soon"}, "time_limit_s: 'soon'"),
-        ({"spare": 1.0}, "spare: 1.0 is not a share"),
+        ({"soc_margin": 1.0}, "soc_margin: 1.0 is not a share"),
         ({"profile": "fast"}, "profile: 'fast'; allowed: default, paper"),
         ({"objective": {"time": 1.0}}, "objective: .*1:50"),
         ({"faults": "r1@3s"}, "faults: 'r1@3s' is not a sequence"),
@@ -136,7 +136,7 @@ def test_run_takes_objective_time_limit_and_controller_and_reports_them(
         video=None,
         objective="makespan",
         time_limit=250,
-        spare=0.05,
+        soc_margin=0.05,
         controller="tvlqr",
     )
     assert result.exit_code == ExitCode.OK
@@ -148,7 +148,7 @@ def test_run_takes_objective_time_limit_and_controller_and_reports_them(
     line = command(read_record(out))
     assert line == (
         "mrmg run quickstart --seed 0 --objective makespan --time-limit 250 "
-        "--spare 0.05 --controller tvlqr"
+        "--soc-margin 0.05 --controller tvlqr"
     )
     assert line in (out / "report.html").read_text()
     # The line of the report continues the same run: nothing is planned or driven again.
@@ -164,3 +164,14 @@ def test_the_video_is_checked_alike() -> None:
     with pytest.raises(UsageError, match="view: 'side'; allowed: top, chase, split"):
         VideoArguments(view="side")
     assert VideoArguments(size=[640, 480]).size == (640, 480)  # type: ignore[arg-type]
+
+
+def test_retired_names_are_read_everywhere_and_shown_nowhere() -> None:
+    """The state-of-charge margin was called spare charge in 0.1.0."""
+    wanted = RunArguments(soc_margin=0.3)
+    parsed = make_parser().parse_args(["run", "yard", "--spare", "0.3"])
+    assert RunArguments(**given(parsed)) == wanted
+    assert RunArguments.from_json({"spare": 0.3}) == wanted
+    assert keyword("spare") == "soc_margin"
+    assert "--spare" not in make_parser().format_help()
+    assert wanted.words() == ["--soc-margin", "0.3"]

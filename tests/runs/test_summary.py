@@ -28,7 +28,7 @@ SECTIONS = {
         "time_limit_s",
         "objective",
         "improvements",
-        "drafts",
+        "path_following_plans",
         "vertices",
         "groups",
         "router_calls",
@@ -63,7 +63,7 @@ SECTIONS = {
 }
 TOP = {"hints", "status", "mission_ok", "scene", "seed", "robots", "goals", "stations"}
 STATISTICS = {
-    "drafts": 2,
+    "path_following_plans": 2,
     "vertices": 100,
     "groups": 7,
     "router_calls": 3,

@@ -33,7 +33,7 @@ def row(scene: str = "scene1", **changes: Any) -> dict[str, Any]:
             "terrain_areas": 4,
             "capacity_m": 240.0,
         },
-        "statistics": {"drafts": 0, "expansions": 300, "time_s": times},
+        "statistics": {"path_following_plans": 0, "expansions": 300, "time_s": times},
     }
     for name, value in changes.items():
         parts = (times, data["problem"], data["statistics"], data)
@@ -68,7 +68,7 @@ def test_the_table_has_medians_shares_and_timeouts(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("drafts", "expansions", "cells"),
+    ("plans", "expansions", "cells"),
     [
         ((3, 1, 2), (0, 0, 0), ("2", "–")),
         ((3, 1, 2), (0, 0, 80), ("2", "80 in 1")),
@@ -77,16 +77,19 @@ def test_the_table_has_medians_shares_and_timeouts(tmp_path: Path) -> None:
 )
 def test_counts_are_of_the_runs_that_did_such_a_thing(
     tmp_path: Path,
-    drafts: tuple[int, ...],
+    plans: tuple[int, ...],
     expansions: tuple[int, ...],
     cells: tuple[str, str],
 ) -> None:
     rows = [
-        row(seed=seed, drafts=drafts[seed], expansions=expansions[seed])
+        row(seed=seed, path_following_plans=plans[seed], expansions=expansions[seed])
         for seed in range(3)
     ]
     (line,) = table_rows(read_rows([written(tmp_path / "b.jsonl", rows)]))
-    assert (line[HEAD.index("drafts")], line[HEAD.index("iterations")]) == cells
+    assert (
+        line[HEAD.index("path-following plans")],
+        line[HEAD.index("iterations")],
+    ) == cells
 
 
 def test_profiles_have_lines_of_their_own(tmp_path: Path) -> None:

@@ -29,29 +29,29 @@ class Kind:
 
     Attributes:
         disturb: disturbances over the default ones.
-        spare: spare charge of the plans; None for the default.
+        soc_margin: state-of-charge margin of the plans; None for the default.
         replan: whether the rest is planned anew where a mission leaves its plan.
         least: share of the trials that must be feasible; 0 for rows that are not judged
             by themselves.
     """
 
     disturb: str = ""
-    spare: float | None = None
+    soc_margin: float | None = None
     replan: bool = False
     least: float = 0.0
 
     @property
     def plans(self) -> str:
         """What kind of plans are driven."""
-        return "default" if self.spare is None else f"spare {self.spare:g}"
+        return "default" if self.soc_margin is None else f"margin {self.soc_margin:g}"
 
 
 DEFAULT = Kind(least=0.95)
 ROLLING = Kind(disturb="rolling=+30%")
-"""Not judged: what the default spare charge carries without replanning."""
+"""Not judged: what the default state-of-charge margin carries without replanning."""
 REPLANNED = replace(ROLLING, replan=True, least=0.9)
-TIGHT = replace(ROLLING, spare=0.0)
-"""Plans that use all they may show what replanning gains: those with the default spare
+TIGHT = replace(ROLLING, soc_margin=0.0)
+"""Plans that use all they may show what replanning gains: those with the default margin
 carry more resistance by themselves."""
 SAVED = replace(TIGHT, replan=True, least=0.9)
 KINDS = (DEFAULT, ROLLING, REPLANNED, TIGHT, SAVED)
@@ -105,7 +105,7 @@ def disturbance_figures(options: TrialOptions) -> tuple[list[Figure], list[Row]]
 def figure_of(source: str, kind: Kind, study: Study) -> Figure:
     """Return how many trials of one row are feasible, and how many must be."""
     under = f"default and {kind.disturb}" if kind.disturb else "default disturbances"
-    plans = "" if kind.spare is None else f", plans with {kind.plans}"
+    plans = "" if kind.soc_margin is None else f", plans with {kind.plans}"
     how = ", replanning" if kind.replan else ""
     total = len(study.trials)
     needed = math.ceil(kind.least * total - 1e-9)
@@ -178,7 +178,7 @@ def study_of(source: str, kind: Kind, options: TrialOptions) -> Study:
     per_plan = options.trials // len(options.plan_seeds)
     trials: list[Trial] = []
     for number, seed in enumerate(options.plan_seeds):
-        with planned_run(source, seed, kind.spare, options) as run:
+        with planned_run(source, seed, kind.soc_margin, options) as run:
             arguments = replace(run.arguments, replan=kind.replan)
             driven = replace(run, arguments=arguments)
             study = study_robustness(
@@ -194,12 +194,12 @@ def study_of(source: str, kind: Kind, options: TrialOptions) -> Study:
 
 @contextmanager
 def planned_run(
-    source: str, seed: int, spare: float | None, options: TrialOptions
+    source: str, seed: int, soc_margin: float | None, options: TrialOptions
 ) -> Iterator[Run]:
     """Open the run folder of one plan, made if it is missing."""
     scene = mrmg.load_scene(source)
-    arguments = RunArguments(seed=seed, spare=spare)
-    plans = "" if spare is None else f"-spare{spare:g}"
+    arguments = RunArguments(seed=seed, soc_margin=soc_margin)
+    plans = "" if soc_margin is None else f"-margin{soc_margin:g}"
     folder = RunFolder(options.runs / state() / f"{source}-s{seed}{plans}")
     with folder.opened_for_writing():
         run = Run(scene=scene, arguments=arguments, folder=folder)
