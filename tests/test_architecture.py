@@ -29,7 +29,6 @@ LONG_MODULES = {
     "_refuel_kernels": 371,
     "_tree_kernels": 370,
     "motion_tree": 353,
-    "arguments": 370,
     "assembly": 363,
     "schema": 366,
     "types": 365,

@@ -6,7 +6,8 @@ import argparse
 from collections.abc import Callable
 from typing import Any
 
-from mrmg.runs.arguments import Option, RunArguments, VideoArguments, options_of
+from mrmg.runs.arguments import RunArguments, VideoArguments
+from mrmg.runs.options import Option, options_of
 
 _Arguments = type[RunArguments] | type[VideoArguments]
 

@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from mrmg.runs.arguments import RunArguments, options_of
+from mrmg.runs.arguments import RunArguments
+from mrmg.runs.options import options_of
 from mrmg.runs.record import RunRecord
 from mrmg.scene.objective import ENERGY
 

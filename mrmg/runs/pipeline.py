@@ -9,15 +9,10 @@ from typing import Any
 
 from mrmg.errors import ExitCode, UsageError
 from mrmg.plans import PlanStatus
-from mrmg.runs.arguments import (
-    DEFAULT_VIDEO,
-    RunArguments,
-    VideoArguments,
-    keyword,
-    options_of,
-)
+from mrmg.runs.arguments import DEFAULT_VIDEO, RunArguments, VideoArguments, keyword
 from mrmg.runs.drive import checked_drive
 from mrmg.runs.folder import RunFolder, Step
+from mrmg.runs.options import options_of
 from mrmg.runs.replacing import recorded, require_room
 from mrmg.runs.steps import OnImprovement, Run, StepProgress
 from mrmg.scene.driven_parts import require_drivable

@@ -10,8 +10,9 @@ from pathlib import Path
 
 from mrmg.errors import FileError, UsageError
 from mrmg.plans import Plan, PlanStatus
-from mrmg.runs.arguments import RunArguments, options_of
+from mrmg.runs.arguments import RunArguments
 from mrmg.runs.folder import RunFolder, Step, stale_after
+from mrmg.runs.options import options_of
 from mrmg.runs.steps import Run
 from mrmg.studies.outcomes import ROBUSTNESS_FILE
 

@@ -16,8 +16,9 @@ from mrmg.cli.parser import make_parser
 from mrmg.cli.run_options import given
 from mrmg.errors import ExitCode, UsageError
 from mrmg.report.report import command
-from mrmg.runs.arguments import RunArguments, VideoArguments, keyword, options_of
+from mrmg.runs.arguments import RunArguments, VideoArguments, keyword
 from mrmg.runs.folder import RunFolder, Step
+from mrmg.runs.options import options_of
 from mrmg.runs.record import read_record
 from mrmg.runs.steps import Run
 from mrmg.scene.loading import load_scene

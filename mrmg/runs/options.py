@@ -1,0 +1,137 @@
+"""Options: what one argument of a command is called, reads, decides and shows.
+
+A class of arguments states each of its options once, as a field made by `option`. The
+command line, the keywords of the Python API and the records of runs are made from them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import Field, dataclass, field, fields
+from typing import Any
+
+from mrmg.errors import UsageError
+from mrmg.runs import argument_values as values
+
+_OPTION = "option"
+_VERBS = {
+    "plan": ("run", "plan"),
+    "drive": ("run", "execute"),
+    "audit": ("run", "execute", "audit"),
+    "": (),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Option:
+    """How one argument is spelled, read and used.
+
+    Attributes:
+        name: of the field and of the keyword of `mrmg.run`.
+        type: of its values, as annotated.
+        flag: of the command line.
+        help: what it does.
+        read: returns the value of a text or of a value, or raises ValueError.
+        decides: "plan", "drive" or "audit", what its value decides; "" for none.
+        verbs: of the command line that take it.
+        metavar: name of its value in the help; None for a switch or with `choices`.
+        choices: allowed values, where they are few.
+        bare: value of the flag alone, where its value may be left out.
+        group: name of a set of options that exclude each other.
+        formerly: retired names of the field, still read everywhere and shown nowhere.
+        default: of the field.
+    """
+
+    name: str
+    type: str
+    flag: str
+    help: str
+    read: Callable[[Any], Any]
+    decides: str
+    verbs: tuple[str, ...]
+    metavar: str | None
+    choices: tuple[str, ...] | None
+    bare: str | None
+    group: str | None
+    formerly: tuple[str, ...]
+    default: Any
+
+    def words(self, value: Any) -> list[str]:
+        """Return the words of a command line that give `value`."""
+        if value == self.default:
+            return []
+        if value == self.bare or value is True:
+            return [self.flag]
+        if value is False:
+            return [self.flag.replace("--", "--no-", 1)]
+        if isinstance(self.default, tuple) and self.read is values.words:
+            return [word for each in value for word in (self.flag, each)]
+        return [self.flag, _text(value)]
+
+
+def _text(value: Any) -> str:
+    if isinstance(value, Mapping):  # the weights of an objective
+        return f"{_text(value['energy'])}:{_text(value['makespan'])}"
+    if isinstance(value, tuple):
+        return "x".join(str(each) for each in value)
+    if isinstance(value, float):
+        short = f"{value:g}"
+        return short if float(short) == value else repr(value)
+    return str(value)
+
+
+def option(default: Any, help: str, **details: Any) -> Any:
+    """Return a dataclass field that is an option; `details` as in `Option`."""
+    metadata = {_OPTION: {"help": help, "default": default, **details}}
+    return field(default=default, metadata=metadata)
+
+
+def options_of(arguments: type[Checked]) -> list[Option]:
+    """Return the options of a class of arguments, in the order of their fields."""
+    return [
+        _option_of(each)
+        for each in fields(arguments)  # type: ignore[arg-type]
+        if each.metadata.get(_OPTION)
+    ]
+
+
+def _option_of(each: Field[Any]) -> Option:
+    details = dict(each.metadata[_OPTION])
+    decides = details.pop("decides", "")
+    complete = {
+        "flag": "--" + each.name.removesuffix("_s").replace("_", "-"),
+        "read": str,
+        "decides": decides,
+        "verbs": _VERBS[decides],
+        "metavar": None,
+        "choices": None,
+        "bare": None,
+        "group": None,
+        "formerly": (),
+        **details,
+    }
+    return Option(name=each.name, type=str(each.type), **complete)
+
+
+class Checked:
+    """Arguments whose values are read by their options' readers."""
+
+    __slots__ = ()
+
+    def __post_init__(self) -> None:
+        groups: dict[str, str] = {}
+        for option in options_of(type(self)):
+            value = getattr(self, option.name)
+            if value == option.default:
+                continue
+            try:
+                value = option.read(value)
+            except ValueError as error:
+                raise UsageError(f"{option.name}: {error}") from error
+            if option.choices and value not in option.choices:
+                allowed = ", ".join(option.choices)
+                raise UsageError(f"{option.name}: {value!r}; allowed: {allowed}")
+            object.__setattr__(self, option.name, value)
+            other = groups.setdefault(option.group or option.name, option.name)
+            if other != option.name:
+                raise UsageError(f"{option.name} is not allowed with {other}")
