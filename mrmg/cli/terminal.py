@@ -199,6 +199,12 @@ def _summary_lines(summary: dict[str, Any]) -> Iterator[str]:
             f"below {energy['min_charge_fraction']:.0%}, "
             f"{energy['recharges']} recharges"
         )
+        residual_pct = energy["balance_residual_pct"]
+        if residual_pct is not None:
+            yield (
+                f"balance    motion, friction and contacts account for all but "
+                f"{abs(residual_pct):.2f} % of the drives' work"
+            )
 
 
 def _metres(value: float | None) -> str:

@@ -16,7 +16,9 @@ and every visit over.
 
 Where a robot was driven as planned, and yet measured differs from planned by more than
 a tolerance, its model does not describe it, and the mission has failed, too
-(`model_mismatch`).
+(`model_mismatch`). Where the work of its drives, motion, friction and contacts do not
+balance, what was measured is worth nothing, and that has failed, too
+(`energy_balance`).
 """
 
 from __future__ import annotations
@@ -26,11 +28,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrmg.energy.audit_record import (
+    ENERGY_IMBALANCE,
     MODEL_MISMATCH,
     EnergyAudit,
     RobotAudit,
     SimulatedVisit,
 )
+from mrmg.energy.balance import balance_of, imbalances
 from mrmg.energy.ledger import EnergyLedger, LedgerEntry
 from mrmg.energy.metering import (
     MEASURED_PARTS,
@@ -127,6 +131,7 @@ def audit(
         MODEL_MISMATCH: model_mismatches(
             scene, plan, log, robots, energy_tolerance_pct
         ),
+        ENERGY_IMBALANCE: imbalances(robots),
     }
     reasons = tuple(reason for found in failures.values() for reason in found)
     return EnergyAudit(
@@ -215,6 +220,7 @@ def _robot_audit(
         min_charge_fraction=item.least_J / robot.battery.capacity_J,
         tracking_rms_m=float(np.sqrt(np.mean(error_m**2))),
         tracking_max_m=float(error_m.max()),
+        balance=balance_of(robot, log),
     )
 
 

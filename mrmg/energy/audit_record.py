@@ -16,6 +16,9 @@ AUDIT_FORMAT = 1
 MODEL_MISMATCH = "model mismatch"
 """Cause of a mission that failed in nothing but the energy its models predict."""
 
+ENERGY_IMBALANCE = "energy imbalance"
+"""Cause of a mission whose measured energies cannot be trusted."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulatedVisit:
@@ -37,6 +40,33 @@ class SimulatedVisit:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class EnergyBalance:
+    """What became of the work of one robot's actuators in the simulation.
+
+    work_J + steering_J = kinetic_J + potential_J + joints_J + contacts_J + residual_J.
+
+    Attributes:
+        work_J: of the drives, braking counted as negative: what measured is made from.
+        steering_J: of the steering servos.
+        kinetic_J, potential_J: change of both over the drive.
+        joints_J: lost to joint friction and damping.
+        contacts_J: lost in contacts: tyres that creep, collisions.
+        residual_J: work that none of these account for.
+        residual_pct: in percent of the drives' work (or of that for one metre of plain
+            ground where it is less).
+    """
+
+    work_J: float
+    steering_J: float
+    kinetic_J: float
+    potential_J: float
+    joints_J: float
+    contacts_J: float
+    residual_J: float
+    residual_pct: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RobotAudit:
     """The account of one robot.
 
@@ -50,6 +80,7 @@ class RobotAudit:
         min_charge_fraction: least measured battery content over the capacity.
         tracking_rms_m, tracking_max_m: distance of the reference point from the plan at
             the fleet's shared clock.
+        balance: of its energy in the simulation; None where the log has none.
     """
 
     robot: str
@@ -61,6 +92,7 @@ class RobotAudit:
     min_charge_fraction: float
     tracking_rms_m: float
     tracking_max_m: float
+    balance: EnergyBalance | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,7 +106,7 @@ class EnergyAudit:
         causes: the kinds of these reasons: why the simulation was given up
             (`ExecutionLog.gave_up`), "ended" by mission control, "goal missed",
             "contact", "station shared", "late", "below reserve", "battery empty",
-            `MODEL_MISMATCH`.
+            `MODEL_MISMATCH`, `ENERGY_IMBALANCE`.
         robots: one account per robot, in the scene's order.
         visits: of tours' targets in the simulation, in order of time.
         goals_visited: ids of the goals some robot visited, in the scene's order.
@@ -145,8 +177,14 @@ def _audit_from(content: Mapping[str, Any]) -> EnergyAudit:
         mission_ok=content["mission_ok"],
         causes=tuple(content.get("causes", ())),
         reasons=tuple(content["reasons"]),
-        robots=tuple(RobotAudit(**row) for row in content["robots"]),
+        robots=tuple(_robot_from(row) for row in content["robots"]),
         visits=tuple(SimulatedVisit(**row) for row in content["visits"]),
         goals_visited=tuple(content["goals_visited"]),
         **ledgers,
     )
+
+
+def _robot_from(row: Mapping[str, Any]) -> RobotAudit:
+    balance = row.get("balance")
+    found = None if balance is None else EnergyBalance(**balance)
+    return RobotAudit(**{**row, "balance": found})

@@ -213,8 +213,8 @@ def _outcome(record: RunRecord) -> str:
         return str(record.planning["status"]).replace("_", " ")
     if record.audit is None:
         return "planned"
-    if record.summary["status"] == "model_mismatch":
-        return "model mismatch"
+    if record.summary["status"] in ("model_mismatch", "energy_imbalance"):
+        return str(record.summary["status"]).replace("_", " ")
     return "accomplished" if record.summary["mission_ok"] else "failed"
 
 

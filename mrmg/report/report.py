@@ -25,6 +25,11 @@ from mrmg.scene.types import Scene
 from mrmg.viz import style
 from mrmg.viz.activities import breakdowns, standing_of
 
+_STATUS_WORDS = {
+    "model_mismatch": "Model mismatch",
+    "energy_imbalance": "Energy imbalance",
+}
+
 
 def write_report(run_folder: Path, *, trust_code: bool = False) -> None:
     """Write `report.html` into a run folder, from the files that are there.
@@ -135,8 +140,7 @@ def _verdict_line(record: RunRecord) -> str:
         reasons += record.audit.reasons
         more = f" (and {len(reasons) - 1} more, see Checks)" if len(reasons) > 1 else ""
         first = reasons[0] if reasons else "see Checks"
-        mismatch = summary["status"] == "model_mismatch"
-        word = "Model mismatch: " if mismatch else "Mission failed: "
+        word = f"{_STATUS_WORDS.get(summary['status'], 'Mission failed')}: "
         return html.verdict_line(False, word, first + more + broken)
     energy = summary["energy"]
     fleet = _fleet(record.plan, len(scene.robots))

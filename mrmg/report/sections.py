@@ -214,7 +214,37 @@ def checks(record: RunRecord) -> list[str]:
             for robot in audit.robots
         ]
         parts += ["<h3>Execution</h3>", html.table(head, rows)]
+        parts += _balances(audit)
     return parts
+
+
+def _balances(audit: EnergyAudit) -> list[str]:
+    """Return what became of the work of every robot's actuators."""
+    rows = [
+        [
+            html.text(robot.robot),
+            kJ(balance.work_J),
+            kJ(balance.steering_J),
+            kJ(balance.kinetic_J + balance.potential_J),
+            kJ(balance.joints_J),
+            kJ(balance.contacts_J),
+            f"{signed(balance.residual_J, 1)} J",
+            f"{signed(balance.residual_pct, 3)} %",
+        ]
+        for robot in audit.robots
+        for balance in [robot.balance]
+        if balance is not None
+    ]
+    head = ["Robot", "Drives", "Steering", "Motion and height", "Joint friction"]
+    head += ["Contacts", "Residual", "of the drives' work"]
+    explained = (
+        "Work of the actuators, by MuJoCo's forces over its velocities, against what "
+        "became of it: kinetic and potential energy, friction and damping of joints, "
+        "what contacts took. The residual is what none of them accounts for."
+    )
+    if not rows:
+        return []
+    return ["<h3>Energy balance</h3>", html.table(head, rows), html.note(explained)]
 
 
 def _shortened(items: list[str]) -> list[str]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import mrmg
 from mrmg import storage
-from mrmg.energy.audit_record import MODEL_MISMATCH, EnergyAudit
+from mrmg.energy.audit_record import ENERGY_IMBALANCE, MODEL_MISMATCH, EnergyAudit
 from mrmg.errors import Fault, RunFolderError
 from mrmg.plans import Plan, PlanStatus
 from mrmg.scene.types import Scene
@@ -80,9 +80,8 @@ def summary_of(
         log: None if the plan was not executed.
         audit: None if the execution was not audited.
     """
-    mismatch = audit is not None and MODEL_MISMATCH in audit.causes
     return {
-        "status": "model_mismatch" if mismatch else planning["status"],
+        "status": _status(audit) or planning["status"],
         "mission_ok": bool(verdict and verdict.ok and audit and audit.mission_ok),
         "scene": scene.name,
         "seed": seed,
@@ -100,6 +99,13 @@ def summary_of(
             **(log.versions if log else {}),
         },
     }
+
+
+def _status(audit: EnergyAudit | None) -> str:
+    """Return what an audit found of the energy, which goes before all else; or ""."""
+    causes = audit.causes if audit else ()
+    found = {ENERGY_IMBALANCE: "energy_imbalance", MODEL_MISMATCH: "model_mismatch"}
+    return next((status for cause, status in found.items() if cause in causes), "")
 
 
 def _plan_figures(
@@ -167,12 +173,14 @@ def _execution_figures(log: ExecutionLog, audit: EnergyAudit) -> dict[str, Any]:
 def _energy_figures(audit: EnergyAudit) -> dict[str, Any]:
     metered = [robot.metered_error_pct for robot in audit.robots]
     measured = [robot.measured_error_pct for robot in audit.robots]
+    residuals = [robot.balance.residual_pct for robot in audit.robots if robot.balance]
     return {
         "planned_J": audit.planned.total_J(),
         "metered_J": audit.metered.total_J(),
         "measured_J": audit.measured.total_J(),
         "metered_error_pct": max(metered, key=abs),
         "measured_error_pct": max(measured, key=abs),
+        "balance_residual_pct": max(residuals, key=abs, default=None),
         "min_charge_fraction": min(robot.min_charge_fraction for robot in audit.robots),
         "recharges": len(audit.recharges),
     }

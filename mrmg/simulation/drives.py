@@ -1,13 +1,4 @@
-"""The drives of robots in MuJoCo: commanded as forces, metered by what they did.
-
-The mechanical work of a physics step is that of the actuator's force f over the mean of
-its velocities u = J qvel before and after the step (midpoint rule),
-
-    W = f (u_before + u_after) / 2 dt,
-
-which is what the integrator adds to the kinetic energy. It is right for any gear, gain,
-control range, force range and activation, because f is what MuJoCo applied.
-"""
+"""The drives of robots in MuJoCo, commanded as forces."""
 
 from __future__ import annotations
 
@@ -17,7 +8,6 @@ import mujoco
 import numpy as np
 
 from mrmg.errors import Fault, FileError
-from mrmg.scene.driven_parts import CHASSIS, PARTS
 from mrmg.scene.types import Robot
 
 _ON_JOINT = (
@@ -30,8 +20,6 @@ _DYNAMICS = (
     int(mujoco.mjtDyn.mjDYN_FILTEREXACT),
 )
 _BIASES = (int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE))
-_STEERING = [name for parts in PARTS.values() for name in parts.servos]
-_WHEEL_MOTORS = [name for parts in PARTS.values() for name in parts.motors]
 
 
 class ForceDrives:
@@ -78,53 +66,6 @@ class ForceDrives:
         self._control[self._ctrl] = (force_N / self._traction - bias) / self._gain
 
 
-class WorkMeter:
-    """Meters the work of all drives of a fleet at every physics step.
-
-    Drives are all actuators on joints and fixed tendons but the steering servos.
-    """
-
-    def __init__(
-        self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[Robot]
-    ) -> None:
-        """Find the drives of `robots`."""
-        self._moment = transmission(model)
-        owner = _owners(model, robots, self._moment)
-        bus = _buses(model, owner)
-        self._buses = (bus[:, None] == np.arange(len(owner))).astype(float)
-        is_own = owner == np.arange(len(robots))[:, None]
-        self._sums = 0.5 * model.opt.timestep * is_own
-        self._force, self._velocity = data.actuator_force, data.actuator_velocity
-        self._qvel = data.qvel
-        self._forces = self._velocities = np.empty((0, 0))
-
-    def start(self, steps: int) -> None:
-        """Make room for `steps` physics steps."""
-        if len(self._forces) != steps:
-            self._forces = np.empty((steps, len(self._force)))
-            self._velocities = np.empty((steps + 1, len(self._force)))
-
-    def look(self, step: int) -> None:
-        """Note what was done in physics step `step`, which has just been made."""
-        # MuJoCo leaves the velocities that the step began with.
-        self._forces[step] = self._force
-        self._velocities[step] = self._velocity
-
-    def work_J(self) -> np.ndarray:
-        """Return driving (>= 0) and braking (<= 0) work since the start, (R, 2).
-
-        The motors of a robot's driven wheels share a bus, as in the energy model: in a
-        turn the outer one uses what the inner one gains by braking. All other drives
-        count by themselves.
-        """
-        velocity = self._velocities
-        np.dot(self._moment, self._qvel, out=velocity[-1])
-        work_J = (self._forces * (velocity[:-1] + velocity[1:])) @ self._buses
-        driving, braking = np.maximum(work_J, 0.0), np.minimum(work_J, 0.0)
-        both = np.array([driving.sum(axis=0), braking.sum(axis=0)])
-        return np.asarray(np.dot(self._sums, both.T))
-
-
 def transmission(model: mujoco.MjModel) -> np.ndarray:
     """Return what joint velocities make of actuators' velocities, shape (nout, nv)."""
     still = mujoco.MjData(model)
@@ -140,24 +81,9 @@ def transmission(model: mujoco.MjModel) -> np.ndarray:
     return moment
 
 
-def _owners(
-    model: mujoco.MjModel, robots: Sequence[Robot], moment: np.ndarray
-) -> np.ndarray:
-    """Return the place of the robot that each actuator drives, or -1, shape (nout,)."""
-    place = {
-        model.body(f"{robot.id}/{CHASSIS}").id: index
-        for index, robot in enumerate(robots)
-    }
-    owner = np.full(model.nout, -1)
-    for index in range(model.nactuator):
-        steers = model.actuator(index).name.rpartition("/")[2] in _STEERING
-        if steers or _transmission_fault(model, index):
-            continue
-        output = model.actuator_outadr[index]
-        dofs = np.flatnonzero(moment[output])
-        roots = model.body_rootid[model.dof_bodyid[dofs]]
-        owner[output] = place.get(int(roots[0]), -1) if len(roots) else -1
-    return owner
+def is_metered(model: mujoco.MjModel, index: int) -> bool:
+    """Return whether an actuator acts on a joint or a fixed tendon."""
+    return not _transmission_fault(model, index)
 
 
 def _buses(model: mujoco.MjModel, owner: np.ndarray) -> np.ndarray:

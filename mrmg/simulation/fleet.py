@@ -16,7 +16,7 @@ import numpy as np
 from mrmg.scene.driven_parts import ROOT
 from mrmg.scene.types import Scene
 from mrmg.simulation.chassis import Chassis, chassis_maker, part_ids
-from mrmg.simulation.drives import WorkMeter
+from mrmg.simulation.work import WorkMeter
 from mrmg.simulation.world_model import MujocoWorld
 
 
@@ -29,7 +29,11 @@ class _Group:
 
 
 class Fleet:
-    """All robots of a running simulation."""
+    """All robots of a running simulation.
+
+    Attributes:
+        work: meters the drives.
+    """
 
     def __init__(self, world: MujocoWorld, data: mujoco.MjData) -> None:
         """Find the parts of every robot of `world`.
@@ -41,7 +45,7 @@ class Fleet:
         model, robots = world.model, world.scene.robots
         self._model, self._data = model, data
         self._groups = _grouped(model, data, world.scene)
-        self._work = WorkMeter(model, data, robots)
+        self.work = WorkMeter(model, data, robots)
         root = part_ids(model, mujoco.mjtObj.mjOBJ_JOINT, robots, (ROOT,))
         root_q, root_v = model.jnt_qposadr[root], model.jnt_dofadr[root]
         self._pose = root_q + np.arange(7)
@@ -105,13 +109,13 @@ class Fleet:
         for group in self._groups:
             own = group.index
             group.chassis.command(force_N[own], w_from[own], w_to[own], steps)
-        self._work.start(steps)
+        self.work.start(steps)
         for step in range(steps):
             for group in self._groups:
                 group.chassis.apply(step)
             mujoco.mj_step(self._model, self._data)
-            self._work.look(step)
-        return self._work.work_J()
+            self.work.look()
+        return self.work.work_J()
 
     def _gather(self, parts: list[np.ndarray]) -> np.ndarray:
         """Return the groups' values in the scene's order, shape (R, ...)."""

@@ -80,6 +80,9 @@ class ExecutionLog:
         qpos: MuJoCo's positions, shape (n, nq); what a video is drawn from.
         contacts: every contact other than wheel and floor.
         events: what a supervisor saw and did, in order of time.
+        balance_J: what became of the drives' work over the whole drive, by the terms of
+            `work.BALANCE_TERMS`, shape (R, 5); None where it was not recorded, or a
+            state is no number.
         motions: motion models of the robots, which decide the columns; empty where they
             are not recorded.
         timing: wall_s and realtime_factor by the clock, controller_ms {median, p99} a
@@ -110,6 +113,7 @@ class ExecutionLog:
     gave_up: str = ""
     disturbance: Disturbance | None = None
     motions: tuple[str, ...] = ()
+    balance_J: np.ndarray | None = None
 
     def driven_motions(self) -> tuple[LoggedMotion, ...]:
         """Return the motion of each robot in the simulation."""

@@ -37,30 +37,20 @@ _WALL_THICKNESS_M = 0.4
 _TARGET_THICKNESS_M = 0.03
 
 
-def add_floor(spec: mujoco.MjSpec, scene: Scene) -> None:
-    """Add the ground, coloured by the terrain: a plane, or a field of heights."""
+def add_floor(spec: mujoco.MjSpec, scene: Scene, *, painted: bool) -> None:
+    """Add the ground, a plane or a field of heights, painted by its terrain or not."""
     x_min, y_min, x_max, y_max = scene.bounds
     half = np.array([x_max - x_min, y_max - y_min]) / 2 + _FLOOR_MARGIN_M
     center = np.array([x_min + x_max, y_min + y_max]) / 2
-    image = _floor_image(scene, center, half)
-    texture = spec.add_texture(
-        name=FLOOR,
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        colorspace=mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR,
-        height=image.shape[0],
-        width=image.shape[1],
-        nchannel=3,
-    )
-    texture.data = image.tobytes()
-    material = spec.add_material(name=FLOOR, specular=0.0, shininess=0.0)
-    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = FLOOR
     options = {
         "name": FLOOR,
-        "material": FLOOR,
         "contype": FLOOR_BIT,
         "conaffinity": 0,
         "castshadow": False,
     }
+    if painted:
+        _add_paint(spec, _floor_image(scene, center, half))
+        options["material"] = FLOOR
     if scene.elevation is None:
         spec.worldbody.add_geom(
             type=mujoco.mjtGeom.mjGEOM_PLANE,
@@ -76,6 +66,21 @@ def add_floor(spec: mujoco.MjSpec, scene: Scene) -> None:
         pos=[*center, foot_m],
         **options,
     )
+
+
+def _add_paint(spec: mujoco.MjSpec, image: np.ndarray) -> None:
+    """Add the material of the ground, with an image of shape (h, w, 3)."""
+    texture = spec.add_texture(
+        name=FLOOR,
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        colorspace=mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR,
+        height=image.shape[0],
+        width=image.shape[1],
+        nchannel=3,
+    )
+    texture.data = image.tobytes()
+    material = spec.add_material(name=FLOOR, specular=0.0, shininess=0.0)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = FLOOR
 
 
 def _floor_image(scene: Scene, center: np.ndarray, half: np.ndarray) -> np.ndarray:

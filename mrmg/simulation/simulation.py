@@ -97,7 +97,7 @@ def simulate(
     for robot in scene.robots:
         chassis_maker(robot)
     controllers = [maker(robot.model) for robot in scene.robots]
-    run = _Run(build_world(scene), plan, controllers, disturbance)
+    run = _Run(build_world(scene, drawn=False), plan, controllers, disturbance)
     started, watched_s = time.perf_counter(), 0.0
     with no_warning_file():
         while not run.ended():
@@ -259,6 +259,7 @@ class _Run:
             multiplier=np.stack([multiplier_at(scene, way) for way in state[..., :2]]),
             force_N=recording.by_robot("force_N", robots),
             work_J=recording.by_robot("work_J", robots),
+            balance_J=self._fleet.work.balance_J() if self._sound else None,
             qpos=recording.in_time("qpos"),
             contacts=tuple(self._contacts.contacts),
             events=events,
@@ -281,6 +282,7 @@ class _Run:
         self._fleet.set_resistance(force, self._true.swing_N)
         self._fleet.drive(parked, still, still, _SETTLING_STEPS)
         self.data.time = 0.0
+        self._fleet.work.restart()
 
     def _command(self) -> None:
         """Set the clock's pace and the ramps of the coming tick."""

@@ -56,7 +56,7 @@ SECTIONS = {
         "metered_J",
         "measured_J",
         "metered_error_pct",
-        "measured_error_pct",
+        "measured_error_pct", "balance_residual_pct",
         "min_charge_fraction",
         "recharges",
     },
