@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -61,3 +62,24 @@ def test_a_mismatch_is_no_mission_done(
     assert ExecutionLog.load(run).digest == digest
     assert json.loads((run / "summary.json").read_text())["status"] == "solved"
     assert main(["execute", str(run), "--disturb"]) == ExitCode.OK
+
+
+def test_work_that_goes_nowhere_is_no_mission_done(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run = tmp_path / "run"
+    assert main(["run", str(SCENE), "--no-video", "--out", str(run)]) == ExitCode.OK
+    assert "account for all but 0.00 % of the drives' work" in capsys.readouterr().out
+    assert "Energy balance" in (run / "report.html").read_text()
+    log = ExecutionLog.load(run)
+    replace(log, work_J=1.03 * log.work_J).save(run)
+    assert main(["audit", str(run)]) == ExitCode.MISSION_FAILED
+    assert "the energy of r1 does not balance" in capsys.readouterr().out
+    main(["report", str(run)])
+    summary = json.loads((run / "summary.json").read_text())
+    assert summary["status"] == "energy_imbalance"
+    assert summary["mission_ok"] is False
+    assert "Energy imbalance" in (run / "report.html").read_text()
+    balance = json.loads((run / "audit.json").read_text())["robots"][0]["balance"]
+    assert balance["residual_pct"] == pytest.approx(3.0 / 1.03, rel=0.01)
+    assert balance["residual_J"] == pytest.approx(0.03 / 1.03 * balance["work_J"], 0.01)

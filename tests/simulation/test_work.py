@@ -22,13 +22,8 @@ THRUST = (
     '<general name="jet" site="nose" gear="1 0 0 0 0 0" biastype="affine" '
     'biasprm="{} 0 0"/>'
 )
-HILL = {
-    "grid": {
-        "x": [-60, -20, 0, 20, 60],
-        "y": [-60, 60],
-        "height": [[0, 0, 2, 0, 0], [0, 0, 2, 0, 0]],
-    }
-}
+HILL = {"grid": [[0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0]] * 2}
+"""A ridge across the way, 2 m high at x = 0, down to 0 within 20 m."""
 Change = Callable[[str], str]
 
 
@@ -133,7 +128,7 @@ def audited(driving: SimpleNamespace, folder: Path, push_N: float) -> EnergyAudi
         lambda text: text.replace(DRIVE, jet).replace('<geom name="floor_pan"', SITE),
     )
     plan = driving.plan_of(scene, [driving.straight(20.0, 1.5, 0.5)])
-    return audit(scene, plan, simulate(scene, plan), energy_tolerance_pct=500.0)
+    return audit(scene, plan, simulate(scene, plan), energy_tolerance_pct=1e6)
 
 
 def test_an_actuator_that_is_not_metered_fails_the_balance(

@@ -19,8 +19,13 @@ from mrmg.shipped import scene_names
 from mrmg.simulation.log import ExecutionLog
 from mrmg.verification.verdict import Verdict
 
-METERED_PCT = 3.0
-MEASURED_PCT = 5.0
+METERED_PCT = {"hills": 2.0}
+MEASURED_PCT = {"hills": 2.0}
+"""Largest errors on scenes with slopes; on flat ground they are the next two."""
+
+FLAT_METERED_PCT = 0.5
+FLAT_MEASURED_PCT = 1.0
+BALANCE_PCT = 0.5
 TRACKING_RMS_M = 0.05
 TRACKING_MAX_M = 0.25
 
@@ -81,23 +86,33 @@ def test_the_charge_never_falls_below_the_reserve(drive: Drive) -> None:
 
 
 def test_simulated_energy_is_near_the_plan_per_robot(drive: Drive) -> None:
-    _, plan, _, _, account = drive
+    scene, plan, _, _, account = drive
+    metered_pct = METERED_PCT.get(scene.name, FLAT_METERED_PCT)
+    measured_pct = MEASURED_PCT.get(scene.name, FLAT_MEASURED_PCT)
     for robot in plan.tours:
         planned = plan.ledger.total_J(robot=robot)
         assert account.metered.total_J(robot=robot) == pytest.approx(
-            planned, rel=METERED_PCT / 100.0
+            planned, rel=metered_pct / 100.0
         )
         assert account.measured.total_J(robot=robot) == pytest.approx(
-            planned, rel=MEASURED_PCT / 100.0
+            planned, rel=measured_pct / 100.0
         )
+
+
+def test_the_work_of_every_robot_is_accounted_for(drive: Drive) -> None:
+    _, _, _, _, account = drive
+    for robot in account.robots:
+        assert robot.balance is not None
+        assert abs(robot.balance.residual_pct) <= BALANCE_PCT
 
 
 def test_simulated_energy_is_near_the_plan_per_part(drive: Drive) -> None:
     """Each part is held to the same share of the robot's whole energy."""
-    _, plan, _, _, account = drive
+    scene, plan, _, _, account = drive
+    metered_pct = METERED_PCT.get(scene.name, FLAT_METERED_PCT)
     for robot in plan.tours:
         whole = plan.ledger.total_J(robot=robot)
         for part in PARTS:
             planned = plan.ledger.total_J(robot=robot, part=part)
             metered = account.metered.total_J(robot=robot, part=part)
-            assert abs(metered - planned) <= METERED_PCT / 100.0 * whole, part
+            assert abs(metered - planned) <= metered_pct / 100.0 * whole, part
