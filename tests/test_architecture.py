@@ -20,7 +20,6 @@ DRAWERS = {"utils", "util", "common", "helpers", "helper", "misc", "tools"}
 HEAVY = {"av", "casadi", "matplotlib", "mujoco", "numba", "pydantic", "rich", "scipy"}
 
 LONG_MODULES = {
-    "simulation": 366,
     "_kernels": 357,
     "geodesic": 377,
     "_tracking_kernels": 352,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable
 
@@ -20,6 +19,7 @@ from mrmg.simulation.controller import Controller, controller_maker
 from mrmg.simulation.disturbance import Disturbance, DisturbanceRanges
 from mrmg.simulation.disturbed_world import disturb_world, move_starts
 from mrmg.simulation.drive import DriveControl
+from mrmg.simulation.ending import Ending
 from mrmg.simulation.fleet import Fleet
 from mrmg.simulation.fleet_clock import FleetClock
 from mrmg.simulation.ground import (
@@ -44,20 +44,8 @@ STEPS_PER_TICK = 5
 TICKS_PER_CORRECTION = 2
 """Ticks between two calls of the tracking controllers: 25 Hz."""
 
-_LOST_M = 2.0
 _SETTLING_STEPS = 50
-_REST_S = 1.0
-_LONGEST_REST_S = 5.0
-_AT_REST = 0.005
-_STALLED_RATE = 0.1
-_LONGEST_STALL_S = 5.0
 _PROGRESS_TICKS = 50
-_DIVERGED = [
-    int(mujoco.mjtWarning.mjWARN_BADQPOS),
-    int(mujoco.mjtWarning.mjWARN_BADQVEL),
-    int(mujoco.mjtWarning.mjWARN_BADQACC),
-    int(mujoco.mjtWarning.mjWARN_BADCTRL),
-]
 
 Progress = Callable[[float, str], None]
 
@@ -147,7 +135,7 @@ class _Run:
         self._recording = Recording()
         self._work_J = np.zeros((len(world.scene.robots), 2))
         self._call_s: list[float] = []
-        self._got_on_s, self._finished_s = 0.0, np.inf
+        self._ending = Ending(self.data, self._is_speed)
         self._fleet = Fleet(world, self.data)
         self._incline = Incline(world.scene)
         self._terrain = TerrainUnderfoot(world.scene)
@@ -223,7 +211,7 @@ class _Run:
         self._reference = FleetReference(self._world.scene, orders.plan)
         self._set_points.follow(self._reference)
         self._clock.time_s = orders.clock_s
-        self._got_on_s, self._finished_s = float(self.data.time), np.inf
+        self._ending.restart()
         self._planned = self._reference.at_once(orders.clock_s)
 
     def fraction(self) -> float:
@@ -286,7 +274,7 @@ class _Run:
 
     def _command(self) -> None:
         """Set the clock's pace and the ramps of the coming tick."""
-        if self._finished_s < np.inf:
+        if self._ending.finished_s < np.inf:
             self._set_points.brake(self._period_s)
             return
         clock = self._clock
@@ -330,11 +318,8 @@ class _Run:
         self._sensing.look(self._state, over_map, self._set_points.following[:, 0])
         self._planned = self._coming
         self._sound = bool(np.isfinite(self._state.sum() + self._planned.sum()))
-        finished = self._clock.time_s >= self._reference.duration_s - 1e-9
-        if finished:
-            self._finished_s = min(self._finished_s, self.data.time)
-        if finished or self._clock.rate > _STALLED_RATE:
-            self._got_on_s = self.data.time
+        over = self._clock.time_s >= self._reference.duration_s - 1e-9
+        self._ending.look(plan_is_over=over, rate=self._clock.rate)
 
     def _record(self) -> None:
         self._recording.add(
@@ -350,19 +335,7 @@ class _Run:
         return min(self._clock.time_s, self._reference.duration_s)
 
     def _completed(self) -> bool:
-        if self.data.time - self._finished_s < _REST_S:
-            return False
-        return bool(np.abs(self._state[self._is_speed]).max() < _AT_REST)
+        return self._ending.is_done(self._state)
 
     def _trouble(self) -> str:
-        """Return why the fleet is past helping, in the log's words; "" if it is not."""
-        if not self._sound or self.data.warning.number[_DIVERGED].any():
-            return "diverged"
-        pairs = zip(self._state.tolist(), self._planned.tolist(), strict=True)
-        if any(math.dist(now[:2], meant[:2]) > _LOST_M for now, meant in pairs):
-            return "lost"
-        if self.data.time - self._got_on_s > _LONGEST_STALL_S:
-            return "stalled"
-        if self.data.time - self._finished_s > _LONGEST_REST_S:
-            return "restless"
-        return ""
+        return self._ending.trouble(self._state, self._planned, sound=self._sound)
