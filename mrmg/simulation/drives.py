@@ -86,17 +86,6 @@ def is_metered(model: mujoco.MjModel, index: int) -> bool:
     return not _transmission_fault(model, index)
 
 
-def _buses(model: mujoco.MjModel, owner: np.ndarray) -> np.ndarray:
-    """Return the first actuator output on each one's bus, shape (nout,)."""
-    bus = np.arange(len(owner))
-    first: dict[int, int] = {}
-    for index in range(model.nactuator):
-        output = int(model.actuator_outadr[index])
-        if model.actuator(index).name.rpartition("/")[2] in _WHEEL_MOTORS:
-            bus[output] = first.setdefault(int(owner[output]), output)
-    return bus
-
-
 def _drive_fault(model: mujoco.MjModel, index: int, moment: np.ndarray) -> str:
     """Return why an actuator cannot be commanded as a force; "" if it can."""
     elsewhere = _transmission_fault(model, index)

@@ -35,6 +35,7 @@ _BATCH_STEPS = 100
 """Physics steps whose losses are summed at once: small arrays cost calls, not sums."""
 
 _STEERING = [name for parts in PARTS.values() for name in parts.servos]
+_WHEEL_MOTORS = [name for parts in PARTS.values() for name in parts.motors]
 
 
 class WorkMeter:
@@ -89,12 +90,17 @@ class WorkMeter:
         self._velocity.take(step + 1)
 
     def work_J(self) -> np.ndarray:
-        """Return driving (>= 0) and braking (<= 0) work since `start`, (R, 2)."""
+        """Return driving (>= 0) and braking (<= 0) work since `start`, (R, 2).
+
+        The motors of a robot's driven wheels share a bus, as in the energy model: in a
+        turn the outer one uses what the inner one gains by braking. All other drives
+        count by themselves.
+        """
         rows = slice(self._begun, self._used)
         velocity = self._velocity.rows[self._begun : self._used + 1]
         speeds = np.dot(velocity, self._moment)
         ways = (0.5 * self._step_s) * (speeds[1:] + speeds[:-1])
-        work_J = self._forces.rows[rows] * ways
+        work_J = np.dot(self._forces.rows[rows] * ways, self._buses)
         both_J = np.empty((2, work_J.shape[1]))
         np.add.reduce(np.maximum(work_J, 0.0), out=both_J[0])
         np.add.reduce(np.minimum(work_J, 0.0), out=both_J[1])
@@ -148,16 +154,21 @@ class WorkMeter:
         model = self._model
         moment = transmission(model)
         place = {robot.id: index for index, robot in enumerate(robots)}
+        shared: dict[str, int] = {}
+        self._buses = np.zeros((model.nout, model.nout))
         self._drives = np.zeros((len(robots), model.nout))
         self._steers = np.zeros((len(robots), model.nout))
         for index in range(model.nactuator):
             own, _, part = model.actuator(index).name.partition("/")
-            output = model.actuator_outadr[index]
+            output = int(model.actuator_outadr[index])
             if own not in place or not is_metered(model, index):
                 moment[output] = 0.0
                 continue
             kind = self._steers if part in _STEERING else self._drives
-            kind[place[own], output] = 1.0
+            bus = output
+            if part in _WHEEL_MOTORS:
+                bus = shared.setdefault(own, output)
+            self._buses[output, bus] = kind[place[own], bus] = 1.0
         self._moment = np.ascontiguousarray(moment.T)
 
 
