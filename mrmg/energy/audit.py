@@ -104,7 +104,6 @@ def audit(
     if log.disturbance is not None:
         scene = log.disturbance.actual_scene(scene)
     measured = [_measure(scene, plan, log, index) for index in range(len(log.robots))]
-    planned_ledger = plan.ledger
     metered_ledger = plan_ledger(
         scene,
         [item.motion for item in measured],
@@ -120,7 +119,7 @@ def audit(
             scene,
             log,
             item,
-            planned_J=planned_ledger.total_J(robot=item.motion.robot),
+            planned_J=plan.ledger.total_J(robot=item.motion.robot),
             metered_J=metered_ledger.total_J(robot=item.motion.robot),
         )
         for item in measured
@@ -128,10 +127,7 @@ def audit(
     least_J = {item.motion.robot: item.least_J for item in measured}
     failures = {
         **mission_failures(scene, log, goals_visited, least_J),
-        MODEL_MISMATCH: model_mismatches(
-            scene, plan, log, robots, energy_tolerance_pct
-        ),
-        ENERGY_IMBALANCE: imbalances(robots),
+        **_energy_failures(scene, plan, log, robots, energy_tolerance_pct),
     }
     reasons = tuple(reason for found in failures.values() for reason in found)
     return EnergyAudit(
@@ -141,10 +137,22 @@ def audit(
         robots=robots,
         visits=_simulated_visits(measured),
         goals_visited=goals_visited,
-        planned=planned_ledger,
+        planned=plan.ledger,
         metered=metered_ledger,
         measured=measured_ledger,
     )
+
+
+def _energy_failures(
+    scene: Scene,
+    plan: Plan,
+    log: ExecutionLog,
+    robots: tuple[RobotAudit, ...],
+    tolerance_pct: float,
+) -> dict[str, list[str]]:
+    """Return what speaks against the energies themselves, by its cause."""
+    mismatches = model_mismatches(scene, plan, log, robots, tolerance_pct)
+    return {MODEL_MISMATCH: mismatches, ENERGY_IMBALANCE: imbalances(robots)}
 
 
 def _measure(scene: Scene, plan: Plan, log: ExecutionLog, index: int) -> _Measured:

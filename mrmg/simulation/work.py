@@ -31,8 +31,11 @@ from mrmg.simulation.drives import is_metered, transmission
 BALANCE_TERMS = ("steering", "kinetic", "potential", "joints", "contacts")
 """Columns of `WorkMeter.balance_J`: one more work, two gains, and two losses."""
 
-_BATCH_STEPS = 100
+_BATCH_STEPS = 50
 """Physics steps whose losses are summed at once: small arrays cost calls, not sums."""
+
+_DENSE_SIZE = 4096
+"""Entries of a matrix up to which a dense product is quicker than picking columns."""
 
 _STEERING = [name for parts in PARTS.values() for name in parts.servos]
 _WHEEL_MOTORS = [name for parts in PARTS.values() for name in parts.motors]
@@ -55,17 +58,20 @@ class WorkMeter:
         self._passive = _Buffer(_BATCH_STEPS, data.qfrc_passive)
         self._velocity = _Buffer(_BATCH_STEPS + 1, data.qvel)
         self._friction_N = np.zeros((_BATCH_STEPS, model.nv + model.ntendon))
-        self._find_actuators(robots)
-        self._tendon = _tendon_moment(model)
         roots = [model.body(f"{robot.id}/{CHASSIS}").rootid[0] for robot in robots]
-        self._roots = np.array(roots)
-        self._of_dof = model.body_rootid[model.dof_bodyid] == self._roots[:, None]
-        self._used, self._begun = 0, 0
+        self._roots = np.array(roots)[:, None]
+        own = (model.body_rootid[model.dof_bodyid] == self._roots).astype(float)
+        tendon = _tendon_moment(model)
+        self._by_robot, self._tendons = _Sums(own), _Sums(tendon)
+        self._rubbed_by_robot = _Sums(
+            np.concatenate([own, own @ (tendon != 0.0).T], axis=1)
+        )
+        self._find_actuators(robots)
         self.restart()
 
     def restart(self) -> None:
         """Begin the balance anew, with the present state."""
-        self._done_J = np.zeros(self._model.nout)  # by every actuator
+        self._done_J = np.zeros(self._buses.rows)
         self._lost_J = np.zeros((2, len(self._roots)))  # in joints, in contacts
         self._stored_J = self._energy_J()
         self._used = self._begun = 0
@@ -97,44 +103,40 @@ class WorkMeter:
         count by themselves.
         """
         rows = slice(self._begun, self._used)
-        velocity = self._velocity.rows[self._begun : self._used + 1]
-        speeds = np.dot(velocity, self._moment)
+        speeds = self._speeds(self._velocity.rows[self._begun : self._used + 1])
         ways = (0.5 * self._step_s) * (speeds[1:] + speeds[:-1])
-        work_J = np.dot(self._forces.rows[rows] * ways, self._buses)
+        forces = self._forces.rows[rows].take(self._outputs, axis=1)
+        work_J = self._buses(forces * ways)
         both_J = np.empty((2, work_J.shape[1]))
         np.add.reduce(np.maximum(work_J, 0.0), out=both_J[0])
         np.add.reduce(np.minimum(work_J, 0.0), out=both_J[1])
         self._done_J += both_J[0]
         self._done_J += both_J[1]
-        return np.asarray(np.dot(self._drives, both_J.T))
+        return self._drives(both_J).T
 
     def balance_J(self) -> np.ndarray:
         """Return the terms of the balance since `restart`, (R, len(BALANCE_TERMS))."""
         self._sum_losses()
         gained_J = self._energy_J() - self._stored_J
-        steering_J = self._steers @ self._done_J
+        steering_J = self._steers(self._done_J[None])[0]
         return np.stack([steering_J, *gained_J, *self._lost_J], axis=1)
 
     def _sum_losses(self) -> None:
         """Add up the losses of the steps noted, and make room for others."""
         used, velocity = self._used, self._velocity.rows
         ways = 0.5 * self._step_s * (velocity[1 : used + 1] + velocity[:used])
-        constraint_J = -(self._constraint.rows[:used] * ways).sum(axis=0)
-        damped_J = -(self._passive.rows[:used] * ways).sum(axis=0)
         # Friction slides, or does no work: its force is the loss, against the way.
-        all_ways = np.concatenate([ways, ways @ self._tendon.T], axis=1)
+        all_ways = np.concatenate([ways, self._tendons(ways)], axis=1)
         rubbed_J = (self._friction_N[:used] * np.abs(all_ways)).sum(axis=0)
-        nv = self._model.nv
-        in_joints_J = rubbed_J[:nv] @ self._of_dof.T
-        in_joints_J += rubbed_J[nv:] @ self._of_tendon()
-        self._lost_J[0] += in_joints_J + damped_J @ self._of_dof.T
-        self._lost_J[1] += constraint_J @ self._of_dof.T - in_joints_J
+        taken_J = [
+            -(forces.rows[:used] * ways).sum(axis=0)
+            for forces in (self._passive, self._constraint)
+        ]
+        damped_J, constrained_J = self._by_robot(np.array(taken_J))
+        (in_joints_J,) = self._rubbed_by_robot(rubbed_J[None])
+        self._lost_J += damped_J + in_joints_J, constrained_J - in_joints_J
         velocity[0] = velocity[used]
         self._used = self._begun = 0
-
-    def _of_tendon(self) -> np.ndarray:
-        """Return which tendon is which robot's, shape (ntendon, R)."""
-        return np.asarray((self._tendon != 0.0) @ self._of_dof.T)
 
     def _energy_J(self) -> np.ndarray:
         """Return kinetic and potential energy of each robot now, shape (2, R)."""
@@ -143,33 +145,38 @@ class WorkMeter:
         mujoco.mj_fwdPosition(model, data)
         momentum = np.zeros(model.nv)
         mujoco.mj_mulM(model, data, momentum, data.qvel)
-        of_body = model.body_rootid == self._roots[:, None]
+        (kinetic_J,) = self._by_robot(0.5 * momentum[None] * data.qvel)
+        own = model.body_rootid == self._roots
         lifted_J = -model.body_mass * (data.xipos @ model.opt.gravity)
-        return np.stack(
-            [self._of_dof @ (0.5 * momentum * data.qvel), of_body @ lifted_J]
-        )
+        return np.stack([kinetic_J, (own * lifted_J).sum(axis=1)])
 
     def _find_actuators(self, robots: Sequence[Robot]) -> None:
-        """Find what moves each actuator on a joint or fixed tendon, and whose it is."""
-        model = self._model
-        moment = transmission(model)
-        place = {robot.id: index for index, robot in enumerate(robots)}
+        """Find the actuators on joints and fixed tendons: drives and steering servos.
+
+        The motors of a robot's driven wheels share a bus, any other has one of its own.
+        """
+        model, place = self._model, {robot.id: at for at, robot in enumerate(robots)}
+        outputs, buses = [], []
         shared: dict[str, int] = {}
-        self._buses = np.zeros((model.nout, model.nout))
-        self._drives = np.zeros((len(robots), model.nout))
-        self._steers = np.zeros((len(robots), model.nout))
+        drives: list[tuple[int, int]] = []
+        steers: list[tuple[int, int]] = []
         for index in range(model.nactuator):
             own, _, part = model.actuator(index).name.partition("/")
-            output = int(model.actuator_outadr[index])
             if own not in place or not is_metered(model, index):
-                moment[output] = 0.0
                 continue
-            kind = self._steers if part in _STEERING else self._drives
-            bus = output
+            bus = len(drives) + len(steers)
             if part in _WHEEL_MOTORS:
-                bus = shared.setdefault(own, output)
-            self._buses[output, bus] = kind[place[own], bus] = 1.0
-        self._moment = np.ascontiguousarray(moment.T)
+                bus = shared.setdefault(own, bus)
+            outputs.append(int(model.actuator_outadr[index]))
+            buses.append(bus)
+            if bus == len(drives) + len(steers):
+                (steers if part in _STEERING else drives).append((place[own], bus))
+        self._outputs = np.array(outputs, dtype=int)
+        number, fleet = len(drives) + len(steers), len(robots)
+        self._speeds = _Sums(transmission(model)[self._outputs])
+        self._buses = _Sums(_marked(number, [(b, at) for at, b in enumerate(buses)]))
+        self._drives = _Sums(_marked(fleet, drives, number))
+        self._steers = _Sums(_marked(fleet, steers, number))
 
 
 class _Buffer:
@@ -182,6 +189,39 @@ class _Buffer:
 
     def take(self, row: int) -> None:
         self.rows[row] = self._source
+
+
+class _Sums:
+    """Weighted sums of columns: products with the transpose of a sparse matrix."""
+
+    def __init__(self, matrix: np.ndarray) -> None:
+        """Sum columns by the rows of `matrix`, shape (rows, columns)."""
+        self.rows = len(matrix)
+        self._matrix = np.ascontiguousarray(matrix.T)
+        entries = [np.flatnonzero(row) for row in matrix]
+        # A sum of nothing is that of one column by nought.
+        entries = [found if len(found) else np.zeros(1, int) for found in entries]
+        counts = [len(found) for found in entries]
+        self._columns = np.concatenate([*entries, np.zeros(0, int)])
+        self._weights = matrix[np.repeat(np.arange(self.rows), counts), self._columns]
+        self._first = np.cumsum([0, *counts[:-1]])
+
+    def __call__(self, values: np.ndarray) -> np.ndarray:
+        """Return the sums of `values`, shape (n, columns) -> (n, rows)."""
+        if self._matrix.size <= _DENSE_SIZE:
+            return np.asarray(np.dot(values, self._matrix))
+        weighted = values.take(self._columns, axis=1) * self._weights
+        return np.asarray(np.add.reduceat(weighted, self._first, axis=1))
+
+
+def _marked(
+    rows: int, places: Sequence[tuple[int, int]], columns: int | None = None
+) -> np.ndarray:
+    """Return a matrix of ones at some places, nought elsewhere."""
+    matrix = np.zeros((rows, len(places) if columns is None else columns))
+    for place in places:
+        matrix[place] = 1.0
+    return matrix
 
 
 def _tendon_moment(model: mujoco.MjModel) -> np.ndarray:
