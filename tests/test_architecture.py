@@ -38,8 +38,6 @@ LONG_FUNCTIONS = {
     "populate.populate": 61,
     "parser._add_scene": 71,
     "pipeline.run": 71,
-    "_bound_kernels.subset_labels": 82,
-    "_touring_kernels.touring_labels": 98,
     "bound.Relaxation.of": 64,
     "_tracking_kernels.drive": 104,
     "planner._planned": 66,
@@ -48,7 +46,6 @@ LONG_FUNCTIONS = {
     "_expansion_kernels.expand": 72,
     "_rerouting_kernels.route_from": 62,
     "audit.audit": 63,
-    "world.free_space": 66,
 }
 """Functions that are still too long, with their lines; the list may only shrink."""
 
@@ -57,14 +54,10 @@ WIDE_FUNCTIONS = {
     "_pointer_kernels.call_steer": 12,
     "_pointer_kernels.call_step": 11,
     "dynamics.rk4_step.step": 9,
-    "_bound_kernels._station_values": 9,
-    "_touring_kernels._append_stations": 12,
     "_band_kernels.band_cost": 9,
     "_tracking_kernels.drive": 12,
     "_roadmap_kernels.best_vertex": 9,
     "_roadmap_kernels.find_waypoint": 10,
-    "_refuel_kernels.add_label": 9,
-    "_refuel_kernels.value_with": 10,
     "routing.routing_arrays": 15,
     "_expansion_kernels.choose_motion": 9,
     "_expansion_kernels.expand": 13,
@@ -72,8 +65,6 @@ WIDE_FUNCTIONS = {
     "gif.render_gif": 10,
     "video.render_video": 12,
     "video_options.video_options": 10,
-    "_raster_kernels._offer": 9,
-    "_raster_kernels.correct_near": 9,
 }
 """Functions of too many parameters, with their number; the list may only shrink."""
 

@@ -180,17 +180,27 @@ def clearance_at_least(space, x, y):
 @leaf_kernel
 def clearance_estimate(space, x, y):
     """Return the signed distance from obstacles [m], bilinear in the field."""
-    rows, columns = space.distance.shape
     fx = (x - space.x_min) / space.cell - 0.5
     fy = (y - space.y_min) / space.cell - 0.5
-    column = min(max(int(floor(fx)), 0), columns - 2)
-    row = min(max(int(floor(fy)), 0), rows - 2)
-    fx = min(1.0, max(0.0, fx - column))
-    fy = min(1.0, max(0.0, fy - row))
-    d = space.distance
-    low = d[row, column] * (1.0 - fx) + d[row, column + 1] * fx
-    high = d[row + 1, column] * (1.0 - fx) + d[row + 1, column + 1] * fx
-    return low * (1.0 - fy) + high * fy
+    return bilinear(space.distance, fx, fy)
+
+
+@leaf_kernel
+def bilinear(value, column, row):
+    """Return a grid's value between its nodes; beyond them, that of the nearest edge.
+
+    Args:
+        value: at the nodes, at least two each way, shape (ny, nx).
+        column, row: place in units of their distances.
+    """
+    rows, columns = value.shape
+    i = min(max(int(floor(column)), 0), columns - 2)
+    j = min(max(int(floor(row)), 0), rows - 2)
+    u = min(1.0, max(0.0, column - i))
+    v = min(1.0, max(0.0, row - j))
+    low = value[j, i] * (1.0 - u) + value[j, i + 1] * u
+    high = value[j + 1, i] * (1.0 - u) + value[j + 1, i + 1] * u
+    return low * (1.0 - v) + high * v
 
 
 @leaf_kernel
@@ -259,19 +269,11 @@ def turning_multiplier_in(terrain, x, y):
 @leaf_kernel
 def height_in(terrain, x, y):
     """Return the height of the ground [m], bilinear; 0 on flat ground."""
-    rows, columns = terrain.height.shape
-    if rows == 0:
+    if terrain.height.shape[0] == 0:
         return 0.0
-    fx = min(max((x - terrain.x_min) / terrain.height_dx, 0.0), columns - 1.0)
-    fy = min(max((y - terrain.y_min) / terrain.height_dy, 0.0), rows - 1.0)
-    column = min(int(fx), columns - 2)
-    row = min(int(fy), rows - 2)
-    u = fx - column
-    v = fy - row
-    h = terrain.height
-    low = h[row, column] * (1.0 - u) + h[row, column + 1] * u
-    high = h[row + 1, column] * (1.0 - u) + h[row + 1, column + 1] * u
-    return low * (1.0 - v) + high * v
+    fx = (x - terrain.x_min) / terrain.height_dx
+    fy = (y - terrain.y_min) / terrain.height_dy
+    return bilinear(terrain.height, fx, fy)
 
 
 @leaf_kernel

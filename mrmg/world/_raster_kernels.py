@@ -5,7 +5,7 @@ What `_kernels` asks, this module lays out.
 
 from __future__ import annotations
 
-from math import ceil, floor, hypot, sqrt
+from math import ceil, floor, log2, sqrt
 
 import numpy as np
 
@@ -94,93 +94,44 @@ def _sort(values):
 def edge_distance_field(edge, x_min, y_min, cell, rows, columns):
     """Return the distance of each cell centre from the nearest edge [m].
 
-    Cells crossed by an edge know it exactly; one sweep up and one down (rows there and
-    back; Danielsson 1980) hand the index of the nearest edge on to the neighbours,
-    which measure their own distance from it.
-    Where many edges crowd, the nearest one may not get through: centimetres too far.
+    Squares are quartered down to cells, depth first. An edge farther from a square's
+    centre than the nearest one by more than its diagonal is nearest nowhere in it.
     """
-    grid = (x_min, y_min, cell)
-    nearest = np.full((rows, columns), -1, np.int64)
-    distance = np.full((rows, columns), np.inf)
-    for e in range(len(edge)):
-        length = hypot(edge[e, 2] - edge[e, 0], edge[e, 3] - edge[e, 1])
-        n = int(ceil(length / (0.5 * cell))) + 1
-        for i in range(n + 1):
-            t = i / n
-            x = edge[e, 0] + t * (edge[e, 2] - edge[e, 0])
-            y = edge[e, 1] + t * (edge[e, 3] - edge[e, 1])
-            c0 = int(floor((x - x_min) / cell))
-            r0 = int(floor((y - y_min) / cell))
-            for r in range(max(0, r0 - 1), min(rows, r0 + 2)):
-                for c in range(max(0, c0 - 1), min(columns, c0 + 2)):
-                    _offer(edge, e, r, c, x_min, y_min, cell, nearest, distance)
-    for sweep in range(2):
-        ahead = 1 if sweep == 0 else -1
-        for i in range(rows):
-            r = i if sweep == 0 else rows - 1 - i
-            for j in range(columns):
-                c = j if sweep == 0 else columns - 1 - j
-                for dc in range(-1, 2):
-                    _hand_on(edge, r - ahead, c + dc, r, c, grid, nearest, distance)
-                _hand_on(edge, r, c - ahead, r, c, grid, nearest, distance)
-            for j in range(columns):
-                c = columns - 1 - j if sweep == 0 else j
-                _hand_on(edge, r, c + ahead, r, c, grid, nearest, distance)
+    levels = 1 + int(ceil(log2(max(rows, columns))))
+    distance = np.empty((rows, columns))
+    near = np.empty((levels + 1, len(edge)), np.int64)  # by level, of the last square
+    count = np.zeros(levels + 1, np.int64)
+    away = np.empty(len(edge))
+    near[0] = np.arange(len(edge))
+    count[0] = len(edge)
+    square = np.zeros((3 * levels + 1, 3), np.int64)  # level, row, column
+    waiting = 1
+    while waiting > 0:
+        waiting -= 1
+        level, row, column = square[waiting]
+        size = 1 << (levels - 1 - level)
+        if row * size >= rows or column * size >= columns:
+            continue
+        x = x_min + (column + 0.5) * size * cell
+        y = y_min + (row + 0.5) * size * cell
+        least = np.inf
+        for i in range(count[level]):
+            e = near[level, i]
+            away[i] = point_segment_distance(
+                x, y, edge[e, 0], edge[e, 1], edge[e, 2], edge[e, 3]
+            )
+            least = min(least, away[i])
+        if size == 1:
+            distance[row, column] = least
+            continue
+        count[level + 1] = 0
+        for i in range(count[level]):
+            if away[i] <= least + sqrt(2.0) * size * cell:
+                near[level + 1, count[level + 1]] = near[level, i]
+                count[level + 1] += 1
+        for quarter in range(4):
+            square[waiting, 0] = level + 1
+            square[waiting, 1] = 2 * row + quarter // 2
+            square[waiting, 2] = 2 * column + quarter % 2
+            waiting += 1
     return distance
-
-
-@leaf_kernel
-def _hand_on(edge, from_row, from_column, r, c, grid, nearest, distance):
-    """Offer a cell the edge its neighbour is nearest to."""
-    rows, columns = distance.shape
-    if 0 <= from_row < rows and 0 <= from_column < columns:
-        e = nearest[from_row, from_column]
-        if e >= 0 and e != nearest[r, c]:
-            x_min, y_min, cell = grid
-            _offer(edge, e, r, c, x_min, y_min, cell, nearest, distance)
-
-
-@leaf_kernel
-def _offer(edge, e, r, c, x_min, y_min, cell, nearest, distance):
-    d = point_segment_distance(
-        x_min + (c + 0.5) * cell,
-        y_min + (r + 0.5) * cell,
-        edge[e, 0],
-        edge[e, 1],
-        edge[e, 2],
-        edge[e, 3],
-    )
-    if d < distance[r, c]:
-        distance[r, c] = d
-        nearest[r, c] = e
-
-
-@leaf_kernel
-def correct_near(
-    distance, edge, bucket_start, bucket_edge, x_min, y_min, cell, bucket, columns
-):
-    """Make the distances of cells within reach of their bucket's edges exact.
-
-    Args:
-        distance: distance of each cell centre from the nearest edge [m], changed in
-            place, shape (ny, nx).
-        edge: (x0, y0, x1, y1) [m], shape (n, 4).
-        bucket_start: first edge of each bucket.
-        bucket_edge: indices of the edges within reach of each bucket.
-        x_min: left side of all grids [m].
-        y_min: lower side of them [m].
-        cell: side of a cell [m].
-        bucket: side of a bucket, a multiple of the cell's [m].
-        columns: number of buckets in a row.
-    """
-    for row in range(distance.shape[0]):
-        y = y_min + (row + 0.5) * cell
-        for column in range(distance.shape[1]):
-            x = x_min + (column + 0.5) * cell
-            b = int((y - y_min) / bucket) * columns + int((x - x_min) / bucket)
-            for i in range(bucket_start[b], bucket_start[b + 1]):
-                e = bucket_edge[i]
-                d = point_segment_distance(
-                    x, y, edge[e, 0], edge[e, 1], edge[e, 2], edge[e, 3]
-                )
-                distance[row, column] = min(distance[row, column], d)

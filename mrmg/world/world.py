@@ -74,47 +74,24 @@ def free_space(
         reach: largest radius plus margin a footprint test will ask for [m].
     """
     x_min, y_min, x_max, y_max = bounds
-    rings = [
-        np.asarray(ring.coords)[:-1]
-        for polygon in _polygons(obstacles)
-        for ring in (polygon.exterior, *polygon.interiors)
-    ]
+    ring_start, points = _rings(obstacles)
     frame = np.array([(x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max)])
+    rings = [frame, *np.split(points, ring_start[1:-1])]
     edge = np.concatenate(
-        [np.hstack([ring, np.roll(ring, -1, axis=0)]) for ring in (frame, *rings)]
+        [np.hstack([ring, np.roll(ring, -1, axis=0)]) for ring in rings]
     )
-    columns, rows = (
-        int(np.ceil((high - low) / CELL_M))
-        for low, high in ((x_min, x_max), (y_min, y_max))
-    )
+    columns, rows = _cells(bounds, CELL_M)
     distance = _raster_kernels.edge_distance_field(
         edge, x_min, y_min, CELL_M, rows, columns
     )
-    ring_start = np.cumsum([0, *(len(ring) for ring in rings)])
-    points = np.concatenate(rings) if rings else np.zeros((0, 2))
     inside = _raster_kernels.fill_rings(
         ring_start, points, x_min, y_min, CELL_M, rows, columns
     )
-    center_x = x_min + (np.arange(columns) + 0.5) * CELL_M
-    center_y = y_min + (np.arange(rows) + 0.5) * CELL_M
-    inside |= (center_x > x_max)[None, :] | (center_y > y_max)[:, None]
-    bucket_columns, bucket_rows = (
-        int(np.ceil((high - low) / BUCKET_M))
-        for low, high in ((x_min, x_max), (y_min, y_max))
-    )
+    inside[:, x_min + (np.arange(columns) + 0.5) * CELL_M > x_max] = True
+    inside[y_min + (np.arange(rows) + 0.5) * CELL_M > y_max] = True
+    bucket_columns, bucket_rows = _cells(bounds, BUCKET_M)
     bucket_start, bucket_edge = _raster_kernels.bucket_edges(
         edge, x_min, y_min, BUCKET_M, bucket_columns, bucket_rows, reach
-    )
-    _raster_kernels.correct_near(
-        distance,
-        edge,
-        bucket_start,
-        bucket_edge,
-        x_min,
-        y_min,
-        CELL_M,
-        BUCKET_M,
-        bucket_columns,
     )
     return FreeSpace(
         x_min=float(x_min),
@@ -131,27 +108,34 @@ def free_space(
     )
 
 
-def _polygons(geometry: shapely.Geometry) -> list[Polygon]:
-    return [part for part in shapely.get_parts(geometry) if isinstance(part, Polygon)]
+def _cells(bounds: tuple[float, float, float, float], side_m: float) -> tuple[int, int]:
+    """Return how many cells cover bounds along x and y."""
+    x_min, y_min, x_max, y_max = bounds
+    return int(np.ceil((x_max - x_min) / side_m)), int(
+        np.ceil((y_max - y_min) / side_m)
+    )
+
+
+def _rings(geometry: shapely.Geometry) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first point of each ring of polygons and the end, and all points."""
+    rings = [
+        np.asarray(ring.coords)[:-1]
+        for polygon in shapely.get_parts(geometry)
+        if isinstance(polygon, Polygon)
+        for ring in (polygon.exterior, *polygon.interiors)
+    ]
+    points = np.concatenate([np.zeros((0, 2)), *rings])
+    return np.cumsum([0, *(len(ring) for ring in rings)]), points
 
 
 def _terrain_grid(scene: Scene) -> TerrainGrid:
-    x_min, y_min, x_max, y_max = scene.bounds
-    columns = max(1, int(np.ceil((x_max - x_min) / CELL_M)))
-    rows = max(1, int(np.ceil((y_max - y_min) / CELL_M)))
+    x_min, y_min, _, _ = scene.bounds
+    columns, rows = _cells(scene.bounds, CELL_M)
     multiplier = np.ones((rows, columns))
     turning = np.ones((rows, columns))
     for area in scene.terrain:
-        points = np.asarray(area.shape.exterior.coords)[:-1]
-        rings = [points, *(np.asarray(r.coords)[:-1] for r in area.shape.interiors)]
         inside = _raster_kernels.fill_rings(
-            np.cumsum([0, *(len(ring) for ring in rings)]),
-            np.concatenate(rings),
-            float(x_min),
-            float(y_min),
-            CELL_M,
-            rows,
-            columns,
+            *_rings(area.shape), float(x_min), float(y_min), CELL_M, rows, columns
         )
         multiplier[inside] = area.multiplier
         turning[inside] = area.turning_multiplier

@@ -1,42 +1,10 @@
-"""Compiled parts of the lower bound: dividing goals, and a bound of any tours."""
+"""Compiled part of the lower bound: spanning trees, for any number of goals."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from mrmg.compilation import kernel
-
-
-@kernel
-def join_robot(fleet, own):
-    """Return the least cost of each subset with one more robot, and its own share."""
-    joined = np.full(len(fleet), np.inf)
-    share = np.zeros(len(fleet), np.int64)
-    for mask in range(len(fleet)):
-        part = mask
-        while True:
-            value = fleet[mask ^ part] + own[part]
-            if value < joined[mask]:
-                joined[mask] = value
-                share[mask] = part
-            if part == 0:
-                break
-            part = (part - 1) & mask
-    return joined, share
-
-
-@kernel
-def join_longest(fleet, own):
-    """Return each subset's least longest share, shared with one more robot."""
-    joined = np.full(len(fleet), np.inf)
-    for mask in range(len(fleet)):
-        part = mask
-        while True:
-            joined[mask] = min(joined[mask], max(fleet[mask ^ part], own[part]))
-            if part == 0:
-                break
-            part = (part - 1) & mask
-    return joined
 
 
 @kernel

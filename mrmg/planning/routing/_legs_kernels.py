@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, kernel, leaf_kernel
+from mrmg.compilation import by_pointer, kernel
 
 USABLE, MISSING, CHARGE_TIME, LIMIT = range(4)
 """Columns of robots: energy of a full battery above the reserve, how much of it is
@@ -57,16 +57,7 @@ def new_legs(problem):
         problem.energy_weight,
         problem.makespan_weight,
     )
-    fill_legs(problem, legs)
-    return legs
-
-
-@leaf_kernel
-def fill_legs(problem, legs):
-    """Write the legs of a problem."""
-    robots, places, targets = problem.cost.shape
     goals = problem.goals
-    stations = targets - goals
     for r in range(robots):
         for a in range(places):
             for t in range(targets):
@@ -97,3 +88,4 @@ def fill_legs(problem, legs):
                             legs.hop_time[r, s, over] + legs.hop_time[r, over, e]
                         )
                         legs.follower[r, s, e] = legs.follower[r, s, over]
+    return legs

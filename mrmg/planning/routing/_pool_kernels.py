@@ -13,6 +13,7 @@ import numpy as np
 
 from mrmg.compilation import by_pointer, kernel, leaf_kernel
 from mrmg.planning.routing._nrpa_kernels import goals_to_visit
+from mrmg.planning.routing._subset_kernels import join_robot
 
 MOST_POOLED = 10
 """Open goals up to which routes are pooled; subsets of subsets are 3 to that power."""
@@ -81,28 +82,17 @@ def combine(pool, routes):
     robots, sets = pool.cost.shape
     if sets == 1:
         return
-    least = np.full((robots + 1, sets), np.inf)
-    own = np.zeros((robots + 1, sets), np.int64)
-    least[0, 0] = 0.0
+    least = np.full(sets, np.inf)
+    least[0] = 0.0
+    own = np.zeros((robots, sets), np.int64)
     for r in range(robots):
-        for done in range(sets):
-            if r == robots - 1 and done < sets - 1:
-                continue
-            part = done
-            while True:
-                cost = pool.cost[r, part] + least[r, done ^ part]
-                if cost < least[r + 1, done]:
-                    least[r + 1, done] = cost
-                    own[r + 1, done] = part
-                if part == 0:
-                    break
-                part = (part - 1) & done
+        least, own[r] = join_robot(least, pool.cost[r], False)
     done = sets - 1
-    if least[robots, done] == np.inf:
+    if least[done] == np.inf:
         return
     routes.length[robots] = 0
     for r in range(robots - 1, -1, -1):
-        part = own[r + 1, done]
+        part = own[r, done]
         routes.length[r] = pool.length[r, part]
         for i in range(pool.length[r, part]):
             routes.goal[r, i] = pool.goal[r, part, i]

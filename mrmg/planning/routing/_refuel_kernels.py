@@ -18,10 +18,11 @@ import numpy as np
 from mrmg.compilation import by_pointer, kernel, leaf_kernel
 from mrmg.planning.routing._legs_kernels import CHARGE_TIME, LIMIT, MISSING, USABLE
 
-COST, TIME, ORIGIN, STATION, DRAW, RATE = range(6)
-"""Columns of labels: energy [J], time [s], number of the label it continues, station at
-the end of its recharging (-1: none), energy drawn since [J], and time that recharging
-that takes [s/J]. Recharged ways have the first four; STATION is their first station."""
+COST, TIME, DRAW, RATE, ORIGIN, STATION = range(6)
+"""Columns of labels: energy [J], time [s], energy drawn since the last recharge [J],
+time that recharging that takes [s/J], number of the label it continues, and station
+that is next to that one (-1: none). Of two labels of a node, one is of no use if it is
+no better in any of the first four."""
 
 ROUNDING = 1e-12
 """Share by which sums in another order may differ."""
@@ -40,7 +41,7 @@ class Labels(NamedTuple):
     Attributes:
         way: to each step, shape (rows, K, 6).
         ways: their number, shape (rows,).
-        full: to each station next to it, recharged, shape (rows * S, F, 4).
+        full: to each station next to it, recharged, shape (rows * S, F, 6).
         fulls: their number, shape (rows * S,).
     """
 
@@ -62,7 +63,7 @@ def new_labels(legs):
     return Labels(
         np.zeros((rows, stations + MORE_WAYS, 6)),
         np.zeros(rows, np.int64),
-        np.zeros((rows * stations, TIMED_WAYS if timed else 1, 4)),
+        np.zeros((rows * stations, TIMED_WAYS if timed else 1, 6)),
         np.zeros(rows * stations, np.int64),
     )
 
@@ -74,20 +75,17 @@ def row_of(legs, r, end, step):
 
 
 @leaf_kernel
-def add_label(label, row, n, cost, time, origin, station, draw, rate):
+def add_label(label, row, n, new):
     """Add a label to a row of n unless one is as good in all; return their number.
 
-    Recharged ways have no draw and rate. Where there is no room left, the dearest gives
-    way.
+    Where there is no room left, the costliest gives way.
     """
-    whole = label.shape[2] > DRAW
-    m = dearest = 0
+    m = costliest = 0
     for k in range(n):
-        better = label[row, k, COST] <= cost and label[row, k, TIME] <= time
-        worse = label[row, k, COST] >= cost and label[row, k, TIME] >= time
-        if whole:
-            better &= label[row, k, DRAW] <= draw and label[row, k, RATE] <= rate
-            worse &= label[row, k, DRAW] >= draw and label[row, k, RATE] >= rate
+        better = worse = True
+        for column in range(ORIGIN):
+            better &= label[row, k, column] <= new[column]
+            worse &= label[row, k, column] >= new[column]
         if better:
             return n
         if worse:
@@ -95,61 +93,49 @@ def add_label(label, row, n, cost, time, origin, station, draw, rate):
         if m < k:
             for column in range(label.shape[2]):
                 label[row, m, column] = label[row, k, column]
-        if label[row, m, COST] > label[row, dearest, COST]:
-            dearest = m
+        if label[row, m, COST] > label[row, costliest, COST]:
+            costliest = m
         m += 1
     at = m
     if m == label.shape[1]:
-        at = dearest
+        if label[row, costliest, COST] <= new[COST]:
+            return m
+        at = costliest
         m -= 1
-        if label[row, at, COST] <= cost:
-            return m + 1
-    label[row, at, COST] = cost
-    label[row, at, TIME] = time
-    label[row, at, ORIGIN] = origin
-    label[row, at, STATION] = station
-    if whole:
-        label[row, at, DRAW] = draw
-        label[row, at, RATE] = rate
+    for column in range(label.shape[2]):
+        label[row, at, column] = new[column]
     return m + 1
 
 
 @leaf_kernel
-def recharge(legs, labels, r, end, place, row):
-    """Lead the ways of a row, to a place, on to each station by the cheapest hops.
+def towards(table, r, end, a, b):
+    """Return the entry for the leg from a to b, as seen from an end of the route."""
+    return table[r, a, b] if end == 0 else table[r, b, a]
 
-    Where time does not count, only the cheapest way to each station is kept.
-    """
+
+@leaf_kernel
+def recharge(legs, labels, r, end, place, row):
+    """Lead the ways of a row, to a place, on to each station by the cheapest hops."""
     stations = legs.hop.shape[1]
-    timed = labels.full.shape[1] > 1
+    usable, rate = legs.robot[r, USABLE], legs.robot[r, CHARGE_TIME]
     for e in range(stations):
         labels.fulls[row * stations + e] = 0
     for f in range(stations):
-        s = legs.goals + f
-        leg = legs.cost[r, place, s] if end == 0 else legs.cost[r, s, place]
-        time = legs.time[r, place, s] if end == 0 else legs.time[r, s, place]
-        cheapest = np.inf
+        leg = towards(legs.cost, r, end, place, legs.goals + f)
+        time = towards(legs.time, r, end, place, legs.goals + f)
         for k in range(labels.ways[row]):
             drawn = labels.way[row, k, DRAW] + leg
-            if drawn > legs.robot[r, USABLE] * (1.0 + ROUNDING):
+            if drawn > usable * (1.0 + ROUNDING):
                 continue
             cost = labels.way[row, k, COST] + leg
-            if cost >= cheapest and not timed:
-                continue
-            cheapest = cost
             begun = labels.way[row, k, TIME] + time + labels.way[row, k, RATE] * drawn
             for e in range(stations):
-                hop = legs.hop[r, f, e] if end == 0 else legs.hop[r, e, f]
-                at = row * stations + e
-                n = labels.fulls[at]
-                if hop == np.inf:
-                    continue
-                if not timed and n > 0 and labels.full[at, 0, COST] <= cost + hop:
-                    continue
-                late = legs.hop_time[r, f, e] if end == 0 else legs.hop_time[r, e, f]
-                labels.fulls[at] = add_label(
-                    labels.full, at, n, cost + hop, begun + late, k, f, leg, leg
-                )
+                hop = towards(legs.hop, r, end, f, e)
+                if hop < np.inf:
+                    at = row * stations + e
+                    late = begun + towards(legs.hop_time, r, end, f, e)
+                    new = (cost + hop, late, 0.0, rate, 1.0 * k, 1.0 * f)
+                    labels.fulls[at] = add_label(labels.full, at, labels.fulls[at], new)
 
 
 @leaf_kernel
@@ -160,24 +146,16 @@ def extend(legs, labels, r, end, place, follower, row):
     n = 0
     for f in range(-1, stations):
         a = place if f < 0 else legs.goals + f
-        leg = legs.cost[r, a, follower] if end == 0 else legs.cost[r, follower, a]
-        time = legs.time[r, a, follower] if end == 0 else legs.time[r, follower, a]
-        if leg > usable:
-            continue
-        at = row * stations + f
+        leg = towards(legs.cost, r, end, a, follower)
+        time = towards(legs.time, r, end, a, follower)
+        label = labels.way if f < 0 else labels.full
+        at = row if f < 0 else row * stations + f
         for k in range(labels.ways[row] if f < 0 else labels.fulls[at]):
-            if f < 0:
-                cost, late = labels.way[row, k, COST], labels.way[row, k, TIME]
-                drawn = labels.way[row, k, DRAW] + leg
-                rate = labels.way[row, k, RATE]
-            else:
-                cost, late = labels.full[at, k, COST], labels.full[at, k, TIME]
-                drawn = leg
-                rate = legs.robot[r, CHARGE_TIME]
+            drawn = label[at, k, DRAW] + leg
             if drawn <= usable:
-                n = add_label(
-                    labels.way, row + 1, n, cost + leg, late + time, k, f, drawn, rate
-                )
+                cost, late = label[at, k, COST] + leg, label[at, k, TIME] + time
+                new = (cost, late, drawn, label[at, k, RATE], 1.0 * k, 1.0 * f)
+                n = add_label(labels.way, row + 1, n, new)
     labels.ways[row + 1] = n
 
 
@@ -247,77 +225,64 @@ def route_value(legs, cost, time, longest):
 
 
 @leaf_kernel
-def least_rest(legs, labels, r, goal, b, back):
-    """Return the least energy from a goal to the end of a route, by the place behind.
-
-    What the way to the goal has drawn is left out.
-    """
-    stations = legs.hop.shape[1]
-    least = np.inf
-    for s in range(-1, stations):
-        leg = legs.cost[r, goal, b if s < 0 else legs.goals + s]
-        at = back * stations + s
-        for j in range(labels.ways[back] if s < 0 else labels.fulls[at]):
-            rest = labels.way[back, j, COST] if s < 0 else labels.full[at, j, COST]
-            least = min(least, leg + rest)
-    return least
-
-
-@leaf_kernel
-def value_with(legs, labels, r, front, a, goal, b, back, longest, ceiling):
+def value_with(legs, labels, r, before, goal, behind, longest, ceiling):
     """Return the value of a route with one more goal; inf if it cannot be driven.
 
     Args:
         legs, labels, r: the problem, and robot r's labels in it.
-        front, a: row of the place before the goal, and that place.
+        before: row of the place before the goal, and that place.
         goal: the goal.
-        b, back: the place behind it, and its row.
+        behind: row of the place behind it, and that place.
         longest: as of `route_value`.
         ceiling: values that are not below it count as inf.
     """
     stations = legs.hop.shape[1]
-    usable, limit = legs.robot[r, USABLE], legs.robot[r, LIMIT]
-    weight = legs.energy_weight
-    least = least_rest(legs, labels, r, goal, b, back)
-    best, worth = np.inf, ceiling
+    row, place = before
+    best = np.inf
     for f in range(-1, stations):
-        place = a if f < 0 else legs.goals + f
-        leg, time = legs.cost[r, place, goal], legs.time[r, place, goal]
-        if leg > usable:
-            continue
-        at = front * stations + f
-        for k in range(labels.ways[front] if f < 0 else labels.fulls[at]):
-            if f < 0:
-                cost = labels.way[front, k, COST] + leg
-                begun = labels.way[front, k, TIME] + time
-                draw = labels.way[front, k, DRAW] + leg
-            else:
-                cost = labels.full[at, k, COST] + leg
-                begun = labels.full[at, k, TIME] + time
-                draw = leg
-            if draw > usable or weight * (cost + least) >= worth:
+        a = place if f < 0 else legs.goals + f
+        leg, time = legs.cost[r, a, goal], legs.time[r, a, goal]
+        label = labels.way if f < 0 else labels.full
+        at = row if f < 0 else row * stations + f
+        for k in range(labels.ways[row] if f < 0 else labels.fulls[at]):
+            begun = (
+                label[at, k, COST] + leg,
+                label[at, k, TIME] + time,
+                label[at, k, DRAW] + leg,
+            )
+            if begun[2] <= legs.robot[r, USABLE]:
+                worth = min(best, ceiling)
+                value = least_on(legs, labels, r, begun, goal, behind, longest, worth)
+                best = min(best, value)
+    return best
+
+
+@leaf_kernel
+def least_on(legs, labels, r, begun, goal, behind, longest, ceiling):
+    """Return the least value of a route whose beginning ends with a goal.
+
+    Args:
+        begun: energy, time, and energy drawn since the last recharge, at the goal.
+        legs, labels, r, goal, behind, longest, ceiling: as of `value_with`.
+    """
+    stations = legs.hop.shape[1]
+    row, place = behind
+    best, worth = np.inf, ceiling
+    for s in range(-1, stations):
+        b = place if s < 0 else legs.goals + s
+        leg = legs.cost[r, goal, b]
+        label = labels.way if s < 0 else labels.full
+        at = row if s < 0 else row * stations + s
+        for j in range(labels.ways[row] if s < 0 else labels.fulls[at]):
+            cost = begun[0] + leg + label[at, j, COST]
+            drawn = begun[2] + leg + label[at, j, DRAW]
+            if legs.energy_weight * cost >= worth or drawn > legs.robot[r, USABLE]:
                 continue
-            for s in range(-1, stations):
-                place = b if s < 0 else legs.goals + s
-                leg_on, time_on = legs.cost[r, goal, place], legs.time[r, goal, place]
-                on = back * stations + s
-                for j in range(labels.ways[back] if s < 0 else labels.fulls[on]):
-                    drawn = draw + leg_on
-                    if s < 0:
-                        drawn += labels.way[back, j, DRAW]
-                        rate = labels.way[back, j, RATE]
-                        rest = labels.way[back, j, COST]
-                        late = labels.way[back, j, TIME]
-                    else:
-                        rate = legs.robot[r, CHARGE_TIME]
-                        rest = labels.full[on, j, COST]
-                        late = labels.full[on, j, TIME]
-                    if weight * (cost + leg_on + rest) >= worth:
-                        continue
-                    late += begun + time_on + rate * drawn
-                    value = route_value(legs, cost + leg_on + rest, late, longest)
-                    if value < worth and drawn <= usable and late <= limit:
-                        best = worth = value
+            late = begun[1] + legs.time[r, goal, b] + label[at, j, TIME]
+            late += label[at, j, RATE] * drawn
+            value = route_value(legs, cost, late, longest)
+            if value < worth and late <= legs.robot[r, LIMIT]:
+                best = worth = value
     return best
 
 

@@ -161,9 +161,9 @@ def put_goal(legs, routes, labels, goal, random, blink):
                 continue
             if random_unit(random) < blink:
                 continue
-            front, back = row_of(legs, r, 0, i), row_of(legs, r, 1, n - i)
+            ends = (row_of(legs, r, 0, i), a), (row_of(legs, r, 1, n - i), b)
             value = value_with(
-                legs, labels, r, front, a, goal, b, back, longest, best + before
+                legs, labels, r, ends[0], goal, ends[1], longest, best + before
             )
             if value - before < best:
                 best = value - before

@@ -123,7 +123,9 @@ def test_one_more_goal_is_worth_what_the_longer_route_costs(
         back = row_of(legs, 0, 1, len(route) - place)
         cost, _ = refuelled(problem, (*route[:place], 4, *route[place:]))
 
-        def with_goal(ceiling: float, where: tuple = (front, a, 4, b, back)) -> float:
+        def with_goal(
+            ceiling: float, where: tuple = ((front, a), 4, (back, b))
+        ) -> float:
             return value_with(legs, labels, 0, *where, 0.0, ceiling)
 
         assert with_goal(np.inf) == pytest.approx(cost)
