@@ -277,20 +277,19 @@ def height_in(terrain, x, y):
 
 
 @leaf_kernel
-def segment_clearance(space, ax, ay, bx, by, enough):
+def segment_clearance(space, ax, ay, bx, by, needed, enough):
     """Return the smallest clearance [m] along a segment, capped at `enough`.
 
-    Steps by the clearance found (no obstacle can be nearer), at least half a cell.
+    Once it is below `needed`, it is returned at once. Steps by the clearance found, as
+    no obstacle can be nearer, and at least by half a cell.
     """
     length = hypot(bx - ax, by - ay)
     best = min(enough, clearance_estimate(space, bx, by))
     travelled = 0.0
-    while travelled < length:
+    while travelled < length and best >= needed:
         t = travelled / length
         here = clearance_estimate(space, ax + t * (bx - ax), ay + t * (by - ay))
         best = min(best, here)
-        if best <= 0.0:
-            return best
         travelled += max(here - best, 0.5 * space.cell)
     return best
 
@@ -298,29 +297,7 @@ def segment_clearance(space, ax, ay, bx, by, enough):
 @leaf_kernel
 def segment_is_clear(space, ax, ay, bx, by, needed):
     """Tell whether a segment keeps `needed` clearance [m]."""
-    length = hypot(bx - ax, by - ay)
-    travelled = 0.0
-    if clearance_estimate(space, bx, by) < needed:
-        return False
-    while travelled < length:
-        t = travelled / length
-        here = clearance_estimate(space, ax + t * (bx - ax), ay + t * (by - ay))
-        if here < needed:
-            return False
-        travelled += max(here - needed, 0.5 * space.cell)
-    return True
-
-
-@leaf_kernel
-def segment_weighted_length(terrain, ax, ay, bx, by):
-    """Return the integral of the multiplier along a segment [m], by midpoints."""
-    length = hypot(bx - ax, by - ay)
-    n = max(1, int(ceil(length / (2.0 * terrain.cell))))
-    total = 0.0
-    for i in range(n):
-        t = (i + 0.5) / n
-        total += multiplier_in(terrain, ax + t * (bx - ax), ay + t * (by - ay))
-    return total * length / n
+    return segment_clearance(space, ax, ay, bx, by, needed, needed) >= needed
 
 
 @leaf_kernel
@@ -338,13 +315,12 @@ def sloped_length(way, rise, slope_price, floor):
 
 @leaf_kernel
 def segment_cost(terrain, ax, ay, bx, by, slope_price, floor):
-    """Return the cost of driving along a segment [m of plain ground].
+    """Return the cost of driving along a segment [m of plain ground], by midpoints.
 
-    On flat ground that is the weighted length. On slopes it depends on the direction,
-    and pieces that lead down count at least `floor` times their weighted length.
+    On flat ground that is the integral of the multiplier. On slopes it depends on the
+    direction, and pieces that lead down count at least `floor` times their weighted
+    length.
     """
-    if terrain.height.shape[0] == 0:
-        return segment_weighted_length(terrain, ax, ay, bx, by)
     length = hypot(bx - ax, by - ay)
     n = max(1, int(ceil(length / (2.0 * terrain.cell))))
     total = 0.0

@@ -296,7 +296,7 @@ def test_segment_clearance_is_exact_within_half_a_cell(maps: list) -> None:
     for world_map in maps:
         for a, b in world_map.random_points(rng, 60).reshape(-1, 2, 2):
             exact = exact_segment_clearance_m(world_map, a, b)
-            found = _kernels.segment_clearance(world_map.space, *a, *b, 1.5)
+            found = _kernels.segment_clearance(world_map.space, *a, *b, 0.0, 1.5)
             blocked.append(exact <= 0.0)
             if exact <= -0.5 * CELL_M:
                 assert found < 0.5 * CELL_M
@@ -323,7 +323,7 @@ def test_segments_without_length_are_points(make_map: Callable) -> None:
     space = make_map((0.0, 0.0, 20.0, 20.0), shapely.box(8.0, 8.0, 12.0, 12.0)).space
     for x, expected in ((10.0, False), (4.0, True)):
         assert _kernels.segment_is_clear(space, x, 10.0, x, 10.0, 0.5) == expected
-    clearance = _kernels.segment_clearance(space, 4.0, 10.0, 4.0, 10.0, 9.0)
+    clearance = _kernels.segment_clearance(space, 4.0, 10.0, 4.0, 10.0, 0.0, 9.0)
     assert clearance == pytest.approx(4.0, abs=0.5 * CELL_M)
 
 
@@ -335,7 +335,7 @@ def test_segments_are_not_stepped_along_past_their_tightest_place(
     space = make_map((0.0, 0.0, 40.0, 40.0), post).space
     for ahead_m in (0.6, 1.25, 2.0):
         ends = (20.0 - ahead_m, 10.0, 26.0, 10.0)
-        found = _kernels.segment_clearance(space, *ends, 9.0)
+        found = _kernels.segment_clearance(space, *ends, 0.0, 9.0)
         assert found == pytest.approx(2.5, abs=0.2 * CELL_M)
         assert _kernels.segment_is_clear(space, *ends, 2.4)
         assert not _kernels.segment_is_clear(space, *ends, 2.56)

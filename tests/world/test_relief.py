@@ -53,7 +53,7 @@ def test_flat_ground_has_height_zero_and_costs_its_weighted_length() -> None:
     assert not gradient_at(scene, points).any()
     assert _kernels.height_in(grid, 30.0, 12.0) == 0.0
     way = _kernels.segment_cost(grid, 3.0, 4.0, 30.0, 12.0, 17.0, 0.1)
-    assert way == _kernels.segment_weighted_length(grid, 3.0, 4.0, 30.0, 12.0)
+    assert way == _kernels.segment_cost(grid, 3.0, 4.0, 30.0, 12.0, 0.0, 0.0)
 
 
 @given(

@@ -111,7 +111,7 @@ def test_weighted_length_of_segments_against_exact_intersections() -> None:
     for a, b in rng.uniform((1, 1), (39, 19), (400, 2, 2)):
         line = shapely.LineString([a, b])
         exact = sum(k * line.intersection(shape).length for shape, k in patches)
-        found = _kernels.segment_weighted_length(grid, *a, *b)
+        found = _kernels.segment_cost(grid, *a, *b, 0.0, 0.0)
         crossed = shapely.get_num_geometries(line.intersection(borders))
         assert abs(found - exact) <= 2.0 * CELL_M * 3.0 * crossed + 1e-9
         relative.append((found - exact) / exact)
@@ -122,7 +122,7 @@ def test_weighted_length_of_segments_against_exact_intersections() -> None:
 @pytest.mark.parametrize("length_m", [0.0, 0.1, 0.5, 7.3])
 def test_weighted_length_on_one_kind_of_ground_is_exact(length_m: float) -> None:
     grid = World.from_scene(scene(MUD)).terrain
-    plain = _kernels.segment_weighted_length(grid, 1.0, 1.0, 1.0 + length_m, 1.0)
-    muddy = _kernels.segment_weighted_length(grid, 14.0, 9.0, 14.0 + length_m, 9.0)
+    plain = _kernels.segment_cost(grid, 1.0, 1.0, 1.0 + length_m, 1.0, 0.0, 0.0)
+    muddy = _kernels.segment_cost(grid, 14.0, 9.0, 14.0 + length_m, 9.0, 0.0, 0.0)
     assert plain == pytest.approx(length_m)
     assert muddy == pytest.approx(4.0 * length_m)

@@ -39,7 +39,7 @@ from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.problem.targets import TARGET_MARGIN_M
 from mrmg.planning.problem.time_weighting import energy_share
-from mrmg.planning.roadmap.roadmap import planned_regions
+from mrmg.planning.roadmap.vertices import planned_regions
 from mrmg.plans import Plan, Trajectory
 
 TRIES = 14

@@ -6,45 +6,26 @@ from math import hypot
 
 import numpy as np
 
-from mrmg.compilation import leaf_kernel
+from mrmg.compilation import kernel, leaf_kernel
+from mrmg.planning.roadmap._bucket_kernels import nearest_points
 from mrmg.world._kernels import multiplier_in
 
 
-@leaf_kernel
+@kernel
 def region_of(roadmap, joined, x, y):
     """Return a point's region: the nearest vertex of the roadmap that is joined.
-
-    Rings of buckets are searched outwards; what lies beyond ring n is at least n
-    buckets away.
 
     Args:
         roadmap: `RoadmapArrays`.
         joined: which vertices count, shape (V,).
         x, y: the point [m].
+
+    Returns:
+        The vertex, -1 if none is joined.
     """
-    column = min(max(int((x - roadmap.x_min) / roadmap.bucket), 0), roadmap.columns - 1)
-    row = min(max(int((y - roadmap.y_min) / roadmap.bucket), 0), roadmap.rows - 1)
-    nearest = -1
-    best = np.inf
-    for ring in range(max(roadmap.rows, roadmap.columns)):
-        for i in range(max(row - ring, 0), min(row + ring + 1, roadmap.rows)):
-            for j in range(
-                max(column - ring, 0), min(column + ring + 1, roadmap.columns)
-            ):
-                if max(abs(i - row), abs(j - column)) < ring:
-                    continue
-                b = i * roadmap.columns + j
-                for at in range(roadmap.bucket_start[b], roadmap.bucket_start[b + 1]):
-                    v = roadmap.bucket_vertex[at]
-                    if not joined[v]:
-                        continue
-                    far = hypot(roadmap.vertex[v, 0] - x, roadmap.vertex[v, 1] - y)
-                    if far < best:
-                        best = far
-                        nearest = v
-        if best <= ring * roadmap.bucket:
-            break
-    return nearest
+    nearest, square = np.full(1, -1, np.int64), np.empty(1)
+    nearest_points(roadmap.buckets, roadmap.vertex, joined, x, y, nearest, square)
+    return nearest[0]
 
 
 @leaf_kernel

@@ -6,7 +6,7 @@ import numpy as np
 
 from mrmg.planning.problem._safety_kernels import Gates
 from mrmg.planning.problem._target_kernels import Targets
-from mrmg.planning.roadmap.roadmap import planned_regions
+from mrmg.planning.roadmap.vertices import planned_regions
 from mrmg.scene.types import Scene, Station
 
 TARGET_MARGIN_M = 0.12

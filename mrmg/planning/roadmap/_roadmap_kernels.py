@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import by_pointer, kernel
+from mrmg.planning.roadmap._bucket_kernels import Buckets, bucket_of
 from mrmg.world._kernels import (
     clearance_estimate,
     height_in,
@@ -30,8 +31,7 @@ class RoadmapArrays(NamedTuple):
             V).
         slope_price, slope_floor, slope_refund: `slopes.SlopeCost` of each class, shape
             (F,).
-        x_min, y_min, bucket, columns, rows, bucket_start, bucket_vertex: a coarse grid
-            of the vertices.
+        buckets: of the vertices.
     """
 
     vertex: np.ndarray
@@ -40,13 +40,7 @@ class RoadmapArrays(NamedTuple):
     slope_price: np.ndarray
     slope_floor: np.ndarray
     slope_refund: np.ndarray
-    x_min: float
-    y_min: float
-    bucket: float
-    columns: int
-    rows: int
-    bucket_start: np.ndarray
-    bucket_vertex: np.ndarray
+    buckets: Buckets
 
 
 TIGHT_M = 0.7
@@ -70,7 +64,8 @@ def edge_costs(space, terrain, vertex, first, second, passage, price, floor):
     for i in range(len(first)):
         ax, ay = vertex[first[i], 0], vertex[first[i], 1]
         bx, by = vertex[second[i], 0], vertex[second[i], 1]
-        clearance = segment_clearance(space, ax, ay, bx, by, passage + TIGHT_M)
+        enough = passage + TIGHT_M
+        clearance = segment_clearance(space, ax, ay, bx, by, passage, enough)
         if clearance >= passage:
             tight = TIGHT_SHARE * (1.0 - (clearance - passage) / TIGHT_M)
             there = segment_cost(terrain, ax, ay, bx, by, price, floor)
@@ -158,21 +153,21 @@ def best_vertex(space, terrain, roadmap, field, target, x, y, comfortable, neede
     cost_to_go = roadmap.cost_to_go[field, target]
     price, floor = roadmap.slope_price[field], roadmap.slope_floor[field]
     here = height_in(terrain, x, y)
-    column = int((x - roadmap.x_min) / roadmap.bucket)
-    row = int((y - roadmap.y_min) / roadmap.bucket)
+    buckets = roadmap.buckets
+    column, row = bucket_of(buckets, x, y)
     candidate = np.empty(256, np.int64)
     cost = np.empty(256, np.float64)
     for attempt in range(3):
         reach = 1 + (attempt == 2)
         clearance = comfortable if attempt == 0 else needed
         n = 0
-        for r in range(max(0, row - reach), min(roadmap.rows, row + reach + 1)):
+        for r in range(max(0, row - reach), min(buckets.rows, row + reach + 1)):
             for c in range(
-                max(0, column - reach), min(roadmap.columns, column + reach + 1)
+                max(0, column - reach), min(buckets.columns, column + reach + 1)
             ):
-                b = r * roadmap.columns + c
-                for i in range(roadmap.bucket_start[b], roadmap.bucket_start[b + 1]):
-                    v = roadmap.bucket_vertex[i]
+                b = r * buckets.columns + c
+                for i in range(buckets.start[b], buckets.start[b + 1]):
+                    v = buckets.member[i]
                     if n < 256 and cost_to_go[v] < np.inf:
                         candidate[n] = v
                         vx, vy = roadmap.vertex[v, 0], roadmap.vertex[v, 1]

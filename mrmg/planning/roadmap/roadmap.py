@@ -10,19 +10,23 @@ cost-to-go fields the steering descends and the distance matrix the router needs
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import shapely
+from numpy.typing import ArrayLike
 
 from mrmg.planning.roadmap import _graph_kernels, _roadmap_kernels
+from mrmg.planning.roadmap._bucket_kernels import Buckets
 from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
 from mrmg.planning.roadmap.fleet import TravelClass, travel_classes
-from mrmg.planning.roadmap.slopes import SlopeCost
-from mrmg.scene.types import Region, Scene
-from mrmg.world._kernels import FreeSpace
+from mrmg.planning.roadmap.vertices import (
+    ENTRY_DEPTH_M,
+    planned_regions,
+    reach_m,
+    roadmap_vertices,
+)
+from mrmg.scene.types import Scene
 from mrmg.world.relief import height_at
 from mrmg.world.world import World
 
@@ -30,16 +34,10 @@ if TYPE_CHECKING:
     import networkx as nx
 
 BUCKET_M = 4.0
+"""Side of the squares in which vertices near a robot are looked up [m]."""
 
-SPREAD = np.array([0.7548776662466927, 0.5698402909980532])
-"""Steps of the R2 sequence (Roberts 2018): 1/p, 1/p^2 with p^3 = p + 1. From a random
-start it covers the square evenly; scipy's own sequences take 0.6 s to import."""
-
-ENTRY_DEPTH_M = 0.3
-"""How deep inside a region a vertex lies that stands for having entered it [m]."""
-
-NARROW_M = 2.5
-"""Clearance below which the middle of a place gets vertices of its own [m]."""
+BUCKET_CROWD = 3
+"""Vertices in a square of the search for neighbours, about."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,58 +115,97 @@ def build_roadmap(
         rng: source of the samples.
     """
     classes, class_of_robot = travel_classes(scene, world, margin_m)
-    vertex = _vertices(scene, world, classes, samples, rng)
-    first, second = _candidate_edges(vertex, neighbours)
-    n_targets = len(planned_regions(scene))
-    fields, successors, distances, edges, ways_from = [], [], [], [], []
+    vertex = roadmap_vertices(scene, world, classes, samples, rng)
     height_m = None if scene.elevation is None else height_at(scene, vertex)
-    for space, passage, slope in classes:
-        weight = _roadmap_kernels.edge_costs(
-            world.spaces[space],
-            world.terrain,
-            vertex,
-            first,
-            second,
-            passage,
-            slope.price,
-            slope.floor,
-        )
-        usable = np.isfinite(weight[:, 0])
-        low, high, weight = first[usable], second[usable], weight[usable]
-        edges.append((low, high, weight))
-        entries = _entries(scene, vertex, _graph_kernels.parts(len(vertex), low, high))
-        cost, successor = _graph_kernels.cheapest_ways(
-            len(vertex),
-            low,
-            high,
-            weight,
-            np.concatenate([np.zeros(0, np.int64), *entries]),
-            np.cumsum([0, *map(len, entries)]),
-        )
-        fields.append(cost)
-        successors.append(successor)
-        energies = _with_potential(cost, height_m, slope.refund)
-        distances.append([energies[:, sources].min(axis=1) for sources in entries])
-        ways_from.append(energies)
+    ends = _candidate_edges(vertex, neighbours)
+    paths = [
+        _cheapest_paths(scene, world, one, vertex, ends, height_m) for one in classes
+    ]
+    slopes = [one.slope for one in classes]
+    n_targets = len(planned_regions(scene))
     starts = n_targets + np.arange(len(scene.robots))
+    x_min, y_min, x_max, y_max = scene.bounds
     return Roadmap(
-        arrays=_with_buckets(
-            scene,
-            vertex,
-            np.stack(fields),
-            np.stack(successors),
-            [slope for _, _, slope in classes],
+        arrays=RoadmapArrays(
+            vertex=vertex,
+            cost_to_go=np.stack([one.cost for one in paths]),
+            successor=np.stack([one.successor for one in paths]),
+            slope_price=np.array([slope.price for slope in slopes]),
+            slope_floor=np.array([slope.floor for slope in slopes]),
+            slope_refund=np.array([slope.refund for slope in slopes]),
+            buckets=_buckets(vertex, (x_min, y_min), (x_max, y_max), BUCKET_M),
         ),
-        distance=np.array(distances).reshape(len(classes), n_targets, n_targets),
+        distance=np.array([one.distance for one in paths]).reshape(
+            len(classes), n_targets, n_targets
+        ),
         start_distance=np.stack(
-            [ways_from[c][:, v] for c, v in zip(class_of_robot, starts, strict=True)]
+            [paths[c].energy[:, v] for c, v in zip(class_of_robot, starts, strict=True)]
         ),
-        edges=tuple(edges),
+        edges=tuple(one.edges for one in paths),
         targets=(
             *(target.id for target in scene.targets()),
             *(f"finish of {robot.id}" for robot in scene.robots if robot.finish),
         ),
         height_m=height_m,
+    )
+
+
+class _Paths(NamedTuple):
+    """The cheapest paths of a travel class to all targets.
+
+    Attributes:
+        edges: (first, second) vertex and cost there and back.
+        cost, successor: of each vertex's path to each target, shape (T, V).
+        energy: what the paths really take, shape (T, V).
+        distance: that of the paths from target to target, shape (T, T).
+    """
+
+    edges: tuple[np.ndarray, np.ndarray, np.ndarray]
+    cost: np.ndarray
+    successor: np.ndarray
+    energy: np.ndarray
+    distance: list[np.ndarray]
+
+
+def _cheapest_paths(
+    scene: Scene,
+    world: World,
+    travel_class: TravelClass,
+    vertex: np.ndarray,
+    ends: tuple[np.ndarray, np.ndarray],
+    height_m: np.ndarray | None,
+) -> _Paths:
+    """Weigh candidate edges for a travel class, and find its cheapest paths."""
+    space, passage, slope = travel_class
+    weight = _roadmap_kernels.edge_costs(
+        world.spaces[space],
+        world.terrain,
+        vertex,
+        *ends,
+        passage,
+        slope.price,
+        slope.floor,
+    )
+    usable = np.isfinite(weight[:, 0])
+    low, high, weight = ends[0][usable], ends[1][usable], weight[usable]
+    entries = _entries(scene, vertex, _graph_kernels.parts(len(vertex), low, high))
+    start, end = _grouped(np.concatenate([low, high]), len(vertex))
+    cost, successor = _graph_kernels.cheapest_paths(
+        low,
+        high,
+        weight,
+        start,
+        end % max(len(low), 1),
+        np.concatenate([np.zeros(0, np.int64), *entries]),
+        np.cumsum([0, *map(len, entries)]),
+    )
+    energy = _with_potential(cost, height_m, slope.refund)
+    return _Paths(
+        edges=(low, high, weight),
+        cost=cost,
+        successor=successor,
+        energy=energy,
+        distance=[energy[:, sources].min(axis=1) for sources in entries],
     )
 
 
@@ -182,12 +219,6 @@ def _with_potential(
     return np.asarray(np.maximum(cost + refund * rise, 0.0))
 
 
-def planned_regions(scene: Scene) -> list[Region]:
-    """Return the regions the planner numbers: goals, stations, finishes of robots."""
-    finishes = [robot.finish.region for robot in scene.robots if robot.finish]
-    return [*(target.region for target in scene.targets()), *finishes]
-
-
 def _entries(scene: Scene, vertex: np.ndarray, part: np.ndarray) -> list[np.ndarray]:
     """Return the vertices at which each target may be entered.
 
@@ -197,153 +228,45 @@ def _entries(scene: Scene, vertex: np.ndarray, part: np.ndarray) -> list[np.ndar
     entries = []
     for t, region in enumerate(planned_regions(scene)):
         near = np.hypot(*(vertex - region.center).T)
-        inside = np.flatnonzero(near < _reach(region))
+        inside = np.flatnonzero(near < reach_m(region))
         inside = inside[region.depth(vertex[inside]) >= ENTRY_DEPTH_M]
         others = inside[part[inside] != part[t]]
         entries.append(np.concatenate([[t], others[others != t]]))
     return entries
 
 
-def _reach(region: Region) -> float:
-    """Return the radius of a region about its centre."""
-    if len(region.corners):
-        return float(np.hypot(*(region.corners - region.center).T).max())
-    return region.radius_m
-
-
-def _vertices(
-    scene: Scene,
-    world: World,
-    classes: Sequence[TravelClass],
-    samples: int,
-    rng: np.random.Generator,
-) -> np.ndarray:
-    x_min, y_min, x_max, y_max = scene.bounds
-    fixed = [
-        _anchor(scene, world, classes, region) for region in planned_regions(scene)
-    ]
-    fixed += [np.array(robot.pose[:2]) for robot in scene.robots]
-    unit = (rng.random(2) + np.arange(samples)[:, None] * SPREAD) % 1.0
-    spread = unit * (x_max - x_min, y_max - y_min) + (x_min, y_min)
-    passage = min(item.passage for item in classes)
-    rings = [
-        *(
-            union.simplify(0.05).buffer(passage + 0.15, quad_segs=2)
-            for union in world.obstacles
-        ),
-        *(area.shape.buffer(0.3, quad_segs=1) for area in scene.terrain),
-        *(area.shape.buffer(-0.3, quad_segs=1) for area in scene.terrain),
-    ]
-    corners = shapely.get_coordinates(
-        [shapely.segmentize(ring, 8.0) for ring in rings if not ring.is_empty]
-    )
-    ridges = [_ridge(world.spaces[item.space]) for item in classes]
-    inner = [_inner_points(region) for region in planned_regions(scene)]
-    loose = np.concatenate([spread, corners.reshape(-1, 2), *ridges, *inner])
-    inside = (
-        (loose[:, 0] > x_min)
-        & (loose[:, 1] > y_min)
-        & (loose[:, 0] < x_max)
-        & (loose[:, 1] < y_max)
-    )
-    loose = loose[inside]
-    widest = np.max(
-        [_field_at(world.spaces[item.space], loose) for item in classes], axis=0
-    )
-    return np.concatenate([np.array(fixed).reshape(-1, 2), loose[widest >= passage]])
-
-
-def _inner_points(region: Region) -> np.ndarray:
-    """Return points spread over a region, shape (8, 2)."""
-    angle = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
-    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1) * _reach(region)
-    points = region.center + 0.7 * ring
-    return np.asarray(points[region.depth(points) >= ENTRY_DEPTH_M])
-
-
-def _ridge(space: FreeSpace) -> np.ndarray:
-    """Return points in the middle of narrow places, about one a square metre.
-
-    They are the local maxima of the distance field along x or y; free samples seldom
-    hit a corridor's middle.
-    """
-    d = space.distance
-    inner = d[1:-1, 1:-1]
-    across = (inner >= d[1:-1, :-2]) & (inner > d[1:-1, 2:])
-    along = (inner >= d[:-2, 1:-1]) & (inner > d[2:, 1:-1])
-    row, column = np.nonzero((across | along) & (inner > 0.0) & (inner < NARROW_M))
-    points = np.stack([column + 1.5, row + 1.5], axis=1) * space.cell
-    _, first = np.unique(np.floor(points).astype(int), axis=0, return_index=True)
-    return np.asarray(points[np.sort(first)] + (space.x_min, space.y_min))
-
-
-def _anchor(
-    scene: Scene,
-    world: World,
-    classes: Sequence[TravelClass],
-    region: Region,
-) -> np.ndarray:
-    """Return a region's centre, or its clearest point where the centre is tight."""
-    space, passage, _ = classes[0]
-    centre = np.asarray(region.center, dtype=float)
-    if _field_at(world.spaces[space], centre[None])[0] >= passage:
-        return centre
-    x0, y0, x1, y1 = region.shape.bounds
-    grid = np.stack(
-        np.meshgrid(np.linspace(x0, x1, 21), np.linspace(y0, y1, 21)), axis=-1
-    ).reshape(-1, 2)
-    grid = grid[region.depth(grid) >= 0.0]
-    return np.asarray(grid[np.argmax(_field_at(world.spaces[space], grid))])
-
-
-def _field_at(space: FreeSpace, points: np.ndarray) -> np.ndarray:
-    """Return the distance field at the cells of points; -inf outside."""
-    rows, columns = space.distance.shape
-    column = np.floor((points[:, 0] - space.x_min) / space.cell).astype(int)
-    row = np.floor((points[:, 1] - space.y_min) / space.cell).astype(int)
-    valid = (column >= 0) & (row >= 0) & (column < columns) & (row < rows)
-    value = np.full(len(points), -np.inf)
-    value[valid] = space.distance[row[valid], column[valid]]
-    return value
-
-
 def _candidate_edges(
     vertex: np.ndarray, neighbours: int
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ends of edges that join each vertex to its nearest others."""
     count = min(neighbours, len(vertex) - 1)
-    second = _graph_kernels.nearest_vertices(vertex, count).reshape(-1)
-    first = np.repeat(np.arange(len(vertex)), count)
-    low, high = np.minimum(first, second), np.maximum(first, second)
-    pair = np.unique(low * len(vertex) + high)
-    return pair // len(vertex), pair % len(vertex)
+    low, high = vertex.min(axis=0), vertex.max(axis=0)
+    parts = np.ceil(np.sqrt(len(vertex) / BUCKET_CROWD))
+    side_m = float((high - low).max() / parts) or 1.0
+    second = first = np.zeros(0, np.int64)
+    if count:
+        buckets = _buckets(vertex, low, high, side_m)
+        second = _graph_kernels.nearest_vertices(buckets, vertex, count).reshape(-1)
+        first = np.repeat(np.arange(len(vertex)), count)
+    pair = np.minimum(first, second) * len(vertex) + np.maximum(first, second)
+    return np.divmod(np.unique(pair), len(vertex))
 
 
-def _with_buckets(
-    scene: Scene,
-    vertex: np.ndarray,
-    cost_to_go: np.ndarray,
-    successor: np.ndarray,
-    slopes: Sequence[SlopeCost],
-) -> RoadmapArrays:
-    x_min, y_min, x_max, y_max = scene.bounds
-    columns = int(np.ceil((x_max - x_min) / BUCKET_M))
-    rows = int(np.ceil((y_max - y_min) / BUCKET_M))
-    column = np.clip(((vertex[:, 0] - x_min) / BUCKET_M).astype(int), 0, columns - 1)
-    row = np.clip(((vertex[:, 1] - y_min) / BUCKET_M).astype(int), 0, rows - 1)
-    key = row * columns + column
-    count = np.bincount(key, minlength=rows * columns)
-    return RoadmapArrays(
-        vertex=vertex,
-        cost_to_go=cost_to_go,
-        successor=successor,
-        slope_price=np.array([slope.price for slope in slopes]),
-        slope_floor=np.array([slope.floor for slope in slopes]),
-        slope_refund=np.array([slope.refund for slope in slopes]),
-        x_min=float(x_min),
-        y_min=float(y_min),
-        bucket=BUCKET_M,
-        columns=columns,
-        rows=rows,
-        bucket_start=np.concatenate([[0], np.cumsum(count)]),
-        bucket_vertex=np.argsort(key, kind="stable"),
+def _buckets(
+    points: np.ndarray, low: ArrayLike, high: ArrayLike, side_m: float
+) -> Buckets:
+    """Sort points between two corners into squares."""
+    x_min, y_min = low = np.asarray(low, float)
+    columns, rows = 1 + ((high - low) / side_m).astype(int)
+    at = np.clip(((points - low) / side_m).astype(int), 0, (columns - 1, rows - 1))
+    key = at[:, 1] * columns + at[:, 0]
+    start, member = _grouped(key, int(rows * columns))
+    return Buckets(
+        float(x_min), float(y_min), side_m, int(columns), int(rows), start, member
     )
+
+
+def _grouped(key: np.ndarray, groups: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return where each group begins and the last one ends, and the members of all."""
+    start = np.concatenate([[0], np.cumsum(np.bincount(key, minlength=groups))])
+    return start, np.argsort(key, kind="stable")

@@ -7,7 +7,12 @@ import pytest
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from mrmg.planning.roadmap._graph_kernels import cheapest_ways, nearest_vertices, parts
+from mrmg.planning.roadmap._bucket_kernels import Buckets, nearest_points
+from mrmg.planning.roadmap._graph_kernels import (
+    cheapest_paths,
+    nearest_vertices,
+    parts,
+)
 
 SEEDS = range(8)
 
@@ -23,6 +28,18 @@ def points(seed: int, kind: str) -> np.ndarray:
     return vertex
 
 
+def bucketed(vertex: np.ndarray, side: float = 5.0) -> Buckets:
+    """Sort points into squares, one by one."""
+    low, high = vertex.min(axis=0), vertex.max(axis=0)
+    columns, rows = (1 + (high - low) // side).astype(int).tolist()
+    held: list[list[int]] = [[] for _ in range(rows * columns)]
+    for v, (x, y) in enumerate(vertex - low):
+        held[int(y / side) * columns + int(x / side)].append(v)
+    start = np.cumsum([0, *map(len, held)])
+    member = np.array([v for bucket in held for v in bucket])
+    return Buckets(float(low[0]), float(low[1]), side, columns, rows, start, member)
+
+
 @pytest.mark.parametrize("kind", ["scattered", "grid", "line"])
 @pytest.mark.parametrize("count", [1, 7, 149])
 def test_neighbours_are_those_that_brute_force_finds(kind: str, count: int) -> None:
@@ -32,15 +49,26 @@ def test_neighbours_are_those_that_brute_force_finds(kind: str, count: int) -> N
         square = offset[..., 0] ** 2 + offset[..., 1] ** 2
         np.fill_diagonal(square, -1.0)
         expected = np.argsort(square, axis=1, kind="stable")[:, 1 : count + 1]
-        np.testing.assert_array_equal(nearest_vertices(vertex, count), expected)
+        found = nearest_vertices(bucketed(vertex), vertex, count)
+        np.testing.assert_array_equal(found, expected)
 
 
-def test_a_vertex_alone_and_vertices_in_one_place_have_the_neighbours_there_are() -> (
-    None
-):
-    assert nearest_vertices(np.zeros((1, 2)), 0).shape == (1, 0)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_only_usable_points_are_near_to_any_place(seed: int) -> None:
+    """Also to places outside of all squares."""
+    vertex = points(seed, "scattered")
+    usable = np.arange(len(vertex)) % 3 > 0
+    for x, y in np.random.default_rng(seed).uniform(-60.0, 120.0, (40, 2)):
+        nearest, square = np.full(2, -1), np.empty(2)
+        assert nearest_points(bucketed(vertex), vertex, usable, x, y, nearest, square)
+        away = np.where(usable, np.hypot(*(vertex - (x, y)).T), np.inf)
+        assert nearest.tolist() == np.argsort(away)[:2].tolist()
+
+
+def test_vertices_in_one_place_have_the_neighbours_there_are() -> None:
+    vertex = np.ones((3, 2))
     np.testing.assert_array_equal(
-        nearest_vertices(np.ones((3, 2)), 2), [[1, 2], [0, 2], [0, 1]]
+        nearest_vertices(bucketed(vertex), vertex, 2), [[1, 2], [0, 2], [0, 1]]
     )
 
 
@@ -59,8 +87,11 @@ def graph(seed: int) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
 def test_ways_cost_what_scipy_says_and_successors_lead_along_them(seed: int) -> None:
     vertices, low, high, cost = graph(seed)
     entries = [np.array([0]), np.array([5, 17]), np.array([3])]
-    total, successor = cheapest_ways(
-        vertices, low, high, cost, np.concatenate(entries), np.array([0, 1, 3, 4])
+    both = np.concatenate([low, high])
+    start = np.searchsorted(np.sort(both), np.arange(vertices + 1))
+    edge = np.argsort(both, kind="stable") % len(low)
+    total, successor = cheapest_paths(
+        low, high, cost, start, edge, np.concatenate(entries), np.array([0, 1, 3, 4])
     )
     ends = np.concatenate([high, low]), np.concatenate([low, high])  # backwards
     against = csr_array((cost.T.ravel(), ends), shape=(vertices, vertices))

@@ -246,13 +246,14 @@ def test_targets_and_starts_come_first(walled: tuple[Scene, Roadmap]) -> None:
 
 def test_buckets_hold_every_vertex_once(walled: tuple[Scene, Roadmap]) -> None:
     arrays = walled[1].arrays
-    assert sorted(arrays.bucket_vertex.tolist()) == list(range(len(arrays.vertex)))
-    for b in range(arrays.rows * arrays.columns):
-        held = arrays.bucket_vertex[arrays.bucket_start[b] : arrays.bucket_start[b + 1]]
-        row, column = divmod(b, arrays.columns)
-        corner = np.array([column, row]) * arrays.bucket
-        offset = arrays.vertex[held] - corner - (arrays.x_min, arrays.y_min)
-        assert ((offset >= 0.0) & (offset <= arrays.bucket)).all()
+    buckets = arrays.buckets
+    assert sorted(buckets.member.tolist()) == list(range(len(arrays.vertex)))
+    for b in range(buckets.rows * buckets.columns):
+        held = buckets.member[buckets.start[b] : buckets.start[b + 1]]
+        row, column = divmod(b, buckets.columns)
+        corner = np.array([column, row]) * buckets.side
+        offset = arrays.vertex[held] - corner - (buckets.x_min, buckets.y_min)
+        assert ((offset >= 0.0) & (offset <= buckets.side)).all()
 
 
 # --- vertices ----------------------------------------------------------------------
