@@ -1,4 +1,4 @@
-"""What the README says is what the project does."""
+"""What README files and BENCHMARKS.md state is what the project does."""
 
 from __future__ import annotations
 
@@ -18,19 +18,34 @@ from mrmg.runs.summary import summary_schema
 from mrmg.scene.loading import scene_from_document
 
 ROOT = Path(__file__).parents[2]
-README = (ROOT / "README.md").read_text()
+PAGES = {
+    name: (ROOT / name).read_text()
+    for name in (
+        "README.md",
+        "BENCHMARKS.md",
+        "mrmg/README.md",
+        "models/README.md",
+        "scenes/README.md",
+        "tools/README.md",
+    )
+}
+README, TEXT = PAGES["README.md"], "\n".join(PAGES.values())
 VERBS = re.findall(r"^\| `mrmg ([a-z ]+)([^`]*)`", README, re.MULTILINE)
 """Verbs with their arguments."""
-LINES = re.findall(r"^    \$ mrmg (.*)", README, re.MULTILINE)
-TOOLS = re.findall(
-    r"(?:^    |`)tools/(\w+)(?![\w./])((?: [^\s`]+)*)", README, re.MULTILINE
+LINES = re.findall(r"^    \$ mrmg (.*)", TEXT, re.MULTILINE)
+TOOLS = sorted(
+    set(
+        re.findall(
+            r"(?:^    |`)tools/(\w+)(?![\w./])((?: [^\s`]+)*)", TEXT, re.MULTILINE
+        )
+    )
 )
 """Tools with their arguments."""
 OPTION = re.compile(r"(?<![\w-])--[a-z-]+")
 
 
 def block(language: str) -> str:
-    found = re.search(rf"```{language}\n(.*?)```", README, re.DOTALL)
+    found = re.search(rf"```{language}\n(.*?)```", TEXT, re.DOTALL)
     assert found is not None
     return found[1]
 
@@ -42,9 +57,9 @@ def test_every_verb_exists_with_its_options(
     with pytest.raises(SystemExit) as ended:
         make_parser().parse_args([*verb.split(), "--help"])
     assert ended.value.code == 0
-    told = capsys.readouterr().out
-    assert "usage: mrmg" in told
-    assert set(OPTION.findall(arguments)) <= set(OPTION.findall(told))
+    shown = capsys.readouterr().out
+    assert "usage: mrmg" in shown
+    assert set(OPTION.findall(arguments)) <= set(OPTION.findall(shown))
 
 
 @pytest.mark.parametrize("line", LINES)
@@ -55,19 +70,36 @@ def test_every_command_line_is_understood(line: str) -> None:
 @pytest.mark.parametrize(("tool", "arguments"), TOOLS)
 def test_every_tool_exists_with_its_options(tool: str, arguments: str) -> None:
     assert os.access(ROOT / "tools" / tool, os.X_OK)
-    script = ROOT / "tools" / f"{tool}.py"
-    known = OPTION.findall(script.read_text() if script.exists() else "")
+    texts = [
+        path.read_text()
+        for path in (ROOT / "tools" / tool, ROOT / "tools" / f"{tool}.py")
+        if path.exists()
+    ]
+    known = OPTION.findall("\n".join(texts))
     assert set(OPTION.findall(arguments)) <= set(known)
 
 
-def test_every_exit_code_is_told() -> None:
-    told = {int(code) for code in re.findall(r"^\| (\d+) \|", README, re.MULTILINE)}
-    assert told == {*map(int, ExitCode), 130}
+def test_the_first_page_is_short() -> None:
+    assert len(README.splitlines()) <= 200
 
 
-def test_every_file_of_a_run_is_told() -> None:
+def test_every_verb_is_listed() -> None:
+    parser = make_parser()
+    with pytest.raises(SystemExit):
+        parser.parse_args(["--help"])
+    listed = {verb.split()[0] for verb, _ in VERBS}
+    verbs = next(each.choices for each in parser.arguments() if each.choices)
+    assert set(verbs) == listed
+
+
+def test_every_exit_code_is_listed() -> None:
+    codes = re.findall(r"^\| (\d+) \| [a-zA-Z]", README, re.MULTILINE)
+    assert {int(code) for code in codes} == {*map(int, ExitCode), 130}
+
+
+def test_every_file_of_a_run_is_listed() -> None:
     for names in OUTPUTS.values():
-        assert [name for name in names if f"`{name}`" not in README] == []
+        assert [name for name in names if f"`{name}`" not in TEXT] == []
 
 
 def test_the_scene_is_valid() -> None:
@@ -81,7 +113,31 @@ def test_the_summary_has_the_keys_of_the_schema() -> None:
     assert set(shown) <= set(known)
 
 
-def test_every_named_path_exists() -> None:
-    named = re.findall(r"`((?:mrmg|tools|tests|models|scenes)/[\w./]*)`", README)
-    named += re.findall(r"\]\(([\w./]+)\)", README)
+@pytest.mark.parametrize("page", PAGES)
+def test_every_named_path_exists(page: str) -> None:
+    text = PAGES[page]
+    named = re.findall(r"`((?:mrmg|tools|tests|models|scenes)/[\w./]*)`", text)
     assert [path for path in named if not (ROOT / path).exists()] == []
+    linked = re.findall(r"\]\(([\w./]+)(?:#[\w-]+)?\)", text)
+    folder = (ROOT / page).parent
+    assert [path for path in linked if not (folder / path).exists()] == []
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_linked_section_exists(page: str) -> None:
+    folder = (ROOT / page).parent
+    for path, section in re.findall(r"\]\(([\w./]*)#([\w-]+)\)", PAGES[page]):
+        target = (folder / path).read_text() if path else PAGES[page]
+        titles = re.findall(r"^#+ (.*)", target, re.MULTILINE)
+        assert section in [title.lower().replace(" ", "-") for title in titles]
+
+
+def test_the_python_example_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    exec(compile(block("python"), "README.md", "exec"), {})
+    ok, planned_J, measured_J = capsys.readouterr().out.splitlines()[0].split()
+    assert ok == "True"
+    assert float(measured_J) == pytest.approx(float(planned_J), rel=0.02)
+    assert (tmp_path / "runs" / "fast" / "report.html").exists()
