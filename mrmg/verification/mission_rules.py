@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from mrmg.compared import compared
-from mrmg.energy.ledger import EnergyLedger
-from mrmg.energy.metering import battery_profile, find_visits, plan_ledger
-from mrmg.energy.visits import ROUNDING_S, crowded_stations, longest_stay_s
 from mrmg.plans import Plan, Trajectory, Visit
 from mrmg.scene.objective import overtime_s
 from mrmg.scene.types import Goal, Scene
+from mrmg.verification.energy import (
+    TIME_ROUNDING_S,
+    MotionAccount,
+    account_of,
+    longest_stay_s,
+    shared_stays,
+)
 from mrmg.verification.motion_rules import violation_at, worst_of_runs
 from mrmg.verification.verdict import Violation, ViolationKind
 
 ENERGY_TOLERANCE_J = 1e-6
 """Rounding that is forgiven in energies: a billionth of a metre's drive."""
+
+
+_Key = tuple[str, int, str, str]
+"""Robot, leg, target and part of an entry of the ledger."""
 
 
 def check_mission(scene: Scene, plan: Plan) -> list[Violation]:
@@ -30,15 +38,15 @@ def check_mission(scene: Scene, plan: Plan) -> list[Violation]:
         *_check_time(scene, plan),
     ]
     known = {target.id for target in scene.targets()}
-    visits: list[Visit] = []
+    accounts: dict[str, MotionAccount] = {}
     for trajectory in plan.trajectories:
         tour = [name for name in plan.tours[trajectory.robot] if name in known]
-        own = find_visits(scene, trajectory, tour)
-        violations += _check_tour(scene, plan, trajectory, own)
-        violations += _check_visits(plan, trajectory, own)
-        violations += _check_energy(scene, trajectory, own)
-        visits += own
-    return violations + _check_ledger(scene, plan, visits)
+        account = account_of(scene, trajectory, tour)
+        violations += _check_tour(scene, plan, trajectory, account.visits)
+        violations += _check_visits(plan, trajectory, account.visits)
+        violations += _check_energy(scene, trajectory, account)
+        accounts[trajectory.robot] = account
+    return violations + _check_ledger(plan, accounts)
 
 
 def _check_goals(scene: Scene, plan: Plan) -> list[Violation]:
@@ -69,12 +77,9 @@ def _check_goals(scene: Scene, plan: Plan) -> list[Violation]:
 
 def _check_dwell(plan: Plan, goal: Goal) -> list[Violation]:
     """Check that some robot stays at a goal for its dwell time."""
-    stays_s = [
-        (longest_stay_s(goal, item.time_s, item.state[:, :2]), item)
-        for item in plan.trajectories
-    ]
+    stays_s = [(longest_stay_s(goal, item), item) for item in plan.trajectories]
     stay_s, trajectory = max(stays_s, key=lambda pair: pair[0])
-    if stay_s >= goal.dwell_s - ROUNDING_S:
+    if stay_s >= goal.dwell_s - TIME_ROUNDING_S:
         return []
     step = int(goal.region.depth(trajectory.state[:, :2]).argmax())
     stay, dwell = compared(stay_s, goal.dwell_s, 1)
@@ -198,25 +203,26 @@ def _check_recharges(scene: Scene, plan: Plan) -> list[Violation]:
 
 def _check_stations(scene: Scene, plan: Plan) -> list[Violation]:
     """Check that stations for one robot at a time hold one at any time."""
-    ways = {item.robot: item.state[:, :2] for item in plan.trajectories}
     violations = []
-    for found in crowded_stations(scene, ways):
-        one, other = found.robots
-        shared_s = (found.end - found.first) * plan.dt_s
-        message = (
-            f"is at {found.station} for {shared_s:.3g} s together with {other}; it is "
-            "for one robot at a time"
-        )
-        violations.append(
-            violation_at(
-                plan.trajectory(one),
-                found.first,
-                ViolationKind.OCCUPIED,
-                message,
-                amount=shared_s,
-                other=found.station,
+    for station in scene.stations:
+        if not station.one_at_a_time:
+            continue
+        for one, other, (first, last) in shared_stays(station, plan.trajectories):
+            shared_s = (last - first) * plan.dt_s
+            message = (
+                f"is at {station.id} for {shared_s:.3g} s together with {other.robot}; "
+                "it is for one robot at a time"
             )
-        )
+            violations.append(
+                violation_at(
+                    one,
+                    first,
+                    ViolationKind.OCCUPIED,
+                    message,
+                    amount=shared_s,
+                    other=station.id,
+                )
+            )
     return violations
 
 
@@ -240,12 +246,12 @@ def _check_time(scene: Scene, plan: Plan) -> list[Violation]:
 
 
 def _check_energy(
-    scene: Scene, trajectory: Trajectory, visits: Sequence[Visit]
+    scene: Scene, trajectory: Trajectory, account: MotionAccount
 ) -> list[Violation]:
     """Check that the battery never holds less than the reserve."""
     battery = scene.robot(trajectory.robot).battery
-    content_J = battery_profile(scene, trajectory, visits)
-    for visit in visits:
+    content_J = account.content_J.copy()
+    for visit in account.visits:
         content_J[visit.step] = min(content_J[visit.step], visit.energy_J)
     lack_J = battery.reserve_J - content_J
     return [
@@ -262,10 +268,16 @@ def _check_energy(
     ]
 
 
-def _check_ledger(scene: Scene, plan: Plan, visits: Sequence[Visit]) -> list[Violation]:
+def _check_ledger(plan: Plan, accounts: Mapping[str, MotionAccount]) -> list[Violation]:
     """Check the predicted ledger entry by entry."""
-    stated = _by_key(plan.ledger)
-    recomputed = _by_key(plan_ledger(scene, plan.trajectories, visits))
+    stated: dict[_Key, float] = defaultdict(float)
+    for entry in plan.ledger.entries:
+        key = (entry.robot, entry.leg, entry.target, entry.part)
+        stated[key] += entry.energy_J
+    recomputed: dict[_Key, float] = defaultdict(float)
+    for robot, account in accounts.items():
+        for place, energy_J in account.entries():
+            recomputed[(robot, *place)] = energy_J
     keys = sorted({*stated, *recomputed})
     off_J = np.array([abs(stated[key] - recomputed[key]) for key in keys])
     if not keys or off_J.max() <= ENERGY_TOLERANCE_J:
@@ -286,11 +298,3 @@ def _check_ledger(scene: Scene, plan: Plan, visits: Sequence[Visit]) -> list[Vio
             message=message,
         )
     ]
-
-
-def _by_key(ledger: EnergyLedger) -> dict[tuple[str, int, str, str], float]:
-    sums_J: dict[tuple[str, int, str, str], float] = defaultdict(float)
-    for entry in ledger.entries:
-        key = (entry.robot, entry.leg, entry.target, entry.part)
-        sums_J[key] += entry.energy_J
-    return sums_J
