@@ -131,9 +131,7 @@ def test_both_see_the_same_stays(make_scene: Any, seed: int) -> None:
     scene = make_scene(
         **{
             **TARGETS,
-            "stations": [
-                {**item, "one_at_a_time": True} for item in TARGETS["stations"]
-            ],
+            "stations": [{**item, "capacity": 1} for item in TARGETS["stations"]],
             "robots": [
                 {"id": "r0", "model": "car", "pose": [5, 5, 0]},
                 {"id": "r1", "model": "car", "pose": [5, 13, 0]},
