@@ -10,6 +10,7 @@ from mrmg.cli import (
     calibrate_command,
     commands,
     completion,
+    export_command,
     replay_command,
     robot_commands,
     robustness_commands,
@@ -47,6 +48,7 @@ def make_parser() -> Parser:
     robustness_commands.add_robustness(verbs)
     replay_command.add_replay(verbs)
     _add_render(verbs)
+    export_command.add_export(verbs)
     _add_compare(verbs)
     _add_figure(verbs)
     _add_view(verbs)

@@ -30,6 +30,9 @@ RUN_FORMAT = 1
 TRIALS_FOLDER = "trials"
 """Where trials under disturbances lie, by plan and by what decides the drive."""
 
+EXPORT_FOLDER = "export"
+"""Where exports of the mission lie; they go with the drive that they show."""
+
 _UNFINISHED = ".part-"
 
 
@@ -183,6 +186,8 @@ class RunFolder:
                 self.file(name).unlink(missing_ok=True)
         if Step.PLAN in steps:
             shutil.rmtree(self.file(MODELS_FOLDER), ignore_errors=True)
+        if Step.EXECUTE in steps:
+            shutil.rmtree(self.file(EXPORT_FOLDER), ignore_errors=True)
 
     def finish(self, step: Step, fingerprint: str) -> None:
         """Mark `step` as finished under `fingerprint`."""

@@ -373,5 +373,5 @@ def _distances_m(regions: Sequence[Region]) -> np.ndarray:
         ]
     )
     radius_m = np.array([region.radius_m for region in regions])
-    apart_m = shapely.distance(cores[:, None], cores)
+    apart_m = shapely.distance(cores[:, None], cores.copy())  # two views fail in 2.1
     return np.asarray(apart_m - radius_m[:, None] - radius_m)

@@ -1,0 +1,63 @@
+"""The verb that writes a run in the formats of other tools."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from mrmg.cli import terminal
+from mrmg.cli.run_options import add_overwrite, add_trust
+from mrmg.errors import ExitCode
+from mrmg.export.table import format_names
+
+
+def add_export(verbs: Any) -> None:
+    """Add the verb `export`."""
+    verb = verbs.add_parser(
+        "export",
+        help="write the drive or the plan for other tools",
+        description="Write the drive of a run, or its plan where nothing was driven: "
+        "as ROS 2 messages (mcap), orders and states of VDA 5050, GeoJSON or a table.",
+    )
+    verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    verb.add_argument(
+        "--format", required=True, choices=format_names(), help="what to write"
+    )
+    verb.add_argument(
+        "-o",
+        "--out",
+        type=Path,
+        metavar="PATH",
+        help="folder, or the file by its suffix; default RUN/export",
+    )
+    verb.add_argument(
+        "--version",
+        metavar="X.Y.Z",
+        help="of the format's standard: 2.1.0 or 3.0.0 of vda5050; default all",
+    )
+    add_overwrite(verb, "files")
+    add_trust(verb)
+    verb.add_argument(
+        "--json", action="store_true", help="print the names of the files as JSON"
+    )
+    verb.set_defaults(command=export)
+
+
+def export(options: argparse.Namespace) -> int:
+    """Write a run in a format of other tools."""
+    from mrmg.export.exporting import export_run
+
+    files = export_run(
+        options.run,
+        options.format,
+        out=options.out,
+        version=options.version,
+        overwrite=options.overwrite,
+        trust_code=options.trust_code,
+    )
+    if options.json:
+        terminal.print_json([str(path) for path in files])
+    else:
+        print("\n".join(map(str, files)))
+    return ExitCode.OK

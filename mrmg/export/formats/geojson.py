@@ -1,0 +1,124 @@
+"""The scene and the paths of its robots as GeoJSON features, in metres of the scene.
+
+Features have a `kind`, obstacle, terrain, goal, station or robot, as `mrmg scene
+import` reads them; paths have none, but the `robot` whose they are, the `motion`,
+planned or driven, and for each point time [s] and content of the battery [J].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from mrmg import storage
+from mrmg.export.mission import Course, Mission, bends, every
+from mrmg.export.table import Files, Format
+from mrmg.plans import Visit
+from mrmg.scene.types import Goal, Scene, Station
+
+PATH_TOLERANCE_M = 0.01
+_PERIOD_S = 0.1
+_LOCAL_METRES = {"type": "name", "properties": {"name": "local"}}
+
+
+def files(mission: Mission, versions: tuple[str, ...] = ()) -> Files:
+    """Return the collection of features."""
+    collection = {
+        "type": "FeatureCollection",
+        "name": mission.scene.name,
+        "crs": _LOCAL_METRES,
+        "features": [
+            *_areas(mission.scene),
+            *_places(mission),
+            *_robots(mission.scene),
+            *(_path(course, mission.motion) for course in mission.courses),
+        ],
+    }
+    return {"mission.geojson": storage.canonical_json(collection).encode()}
+
+
+def _areas(scene: Scene) -> Iterator[dict[str, Any]]:
+    for obstacle in scene.obstacles:
+        keys = {"kind": "obstacle", "id": obstacle.id, "height": obstacle.height_m}
+        some = {} if obstacle.blocks is None else {"blocks": list(obstacle.blocks)}
+        yield _feature(obstacle.shape, **keys, **some)
+    for area in scene.terrain:
+        yield _feature(
+            area.shape,
+            kind="terrain",
+            id=area.id,
+            multiplier=area.multiplier,
+            turning=area.turning_multiplier,
+        )
+
+
+def _places(mission: Mission) -> Iterator[dict[str, Any]]:
+    """Yield goals and stations with their visits."""
+    visits: dict[str, list[dict[str, Any]]] = {}
+    for course in mission.courses:
+        for visit in course.visits:
+            visits.setdefault(visit.target, []).append(_visit(visit))
+    scene = mission.scene
+    for kind, targets in (("goal", scene.goals), ("station", scene.stations)):
+        for target in targets:
+            yield _place(kind, target, visits.get(target.id, []))
+
+
+def _place(
+    kind: str, target: Goal | Station, visits: list[dict[str, Any]]
+) -> dict[str, Any]:
+    keys = {"kind": kind, "id": target.id, "dwell": target.dwell_s, "visits": visits}
+    region = target.region
+    if len(region.corners):
+        return _feature(region.shape, **keys)
+    return _feature(shapely.Point(region.center), radius=region.radius_m, **keys)
+
+
+def _visit(visit: Visit) -> dict[str, Any]:
+    return {"robot": visit.robot, "time_s": visit.time_s, "energy_J": visit.energy_J}
+
+
+def _robots(scene: Scene) -> Iterator[dict[str, Any]]:
+    for robot in scene.robots:
+        x_m, y_m, heading_rad = robot.pose
+        yield _feature(
+            shapely.Point(x_m, y_m),
+            kind="robot",
+            id=robot.id,
+            model=robot.model.name,
+            heading=heading_rad,
+            capacity_J=robot.battery.capacity_J,
+        )
+
+
+def _path(course: Course, motion: str) -> dict[str, Any]:
+    at = every(course.time_s, _PERIOD_S)
+    at = at[bends(course.state[at, :2], PATH_TOLERANCE_M)]
+    at = np.resize(at, max(2, len(at)))  # a line has two points at least
+    return _feature(
+        shapely.LineString(course.state[at, :2]),
+        robot=course.robot.id,
+        motion=motion,
+        tour=list(course.tour),
+        time_s=np.round(course.time_s[at], 3).tolist(),
+        energy_J=np.round(course.content_J[at], 1).tolist(),
+    )
+
+
+def _feature(shape: BaseGeometry, **properties: Any) -> dict[str, Any]:
+    return {
+        "type": "Feature",
+        "geometry": shapely.geometry.mapping(shape),
+        "properties": properties,
+    }
+
+
+FORMAT = Format(
+    description="map, goals, robots and their paths as features, for GIS",
+    suffix=".geojson",
+    files=files,
+)

@@ -1,0 +1,278 @@
+"""A recording of ROS 2 messages (MCAP) that Foxglove, RViz and others show as it is.
+
+Times are seconds of the mission: it starts at time 0.
+
+| topic | type | when |
+|---|---|---|
+| /map | nav_msgs/OccupancyGrid | at the start |
+| /scene, /robots | visualization_msgs/MarkerArray | at the start |
+| /goals | visualization_msgs/MarkerArray | at the start; each once more when visited |
+| /tf | tf2_msgs/TFMessage | 20 times a second, from `map` to `ROBOT/base_link` |
+| /ROBOT/pose | geometry_msgs/PoseStamped | 10 times a second |
+| /ROBOT/battery | sensor_msgs/BatteryState | once a second, and at changes |
+| /ROBOT/planned_path, /ROBOT/driven_path | nav_msgs/Path | at the start |
+"""
+
+from __future__ import annotations
+
+import heapq
+import io
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from mrmg import __version__
+from mrmg.energy.metering import Motion
+from mrmg.export.mission import Course, Mission, bends, every
+from mrmg.export.ros_messages import RosTypes, nanoseconds, ros_names
+from mrmg.export.ros_scene import (
+    goal_markers,
+    occupancy_grid,
+    robot_markers,
+    scene_markers,
+)
+from mrmg.export.table import Files, Format
+from mrmg.extras import import_extra
+from mrmg.scene.types import Scene
+from mrmg.simulation import palette
+from mrmg.world.relief import gradient_at, lifted
+
+TF_PERIOD_S = 0.05
+POSE_PERIOD_S = 0.1
+BATTERY_PERIOD_S = 1.0
+PATH_TOLERANCE_M = 0.01
+
+_GRID, _MARKERS, _PATH = (
+    "nav_msgs/OccupancyGrid",
+    "visualization_msgs/MarkerArray",
+    "nav_msgs/Path",
+)
+_LATCHED_QOS = """\
+- history: 1
+  depth: 1000
+  reliability: 1
+  durability: 1
+  deadline: {sec: 9223372036, nsec: 854775807}
+  lifespan: {sec: 9223372036, nsec: 854775807}
+  liveliness: 1
+  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
+  avoid_ros_namespace_conventions: false
+"""
+"""Of map, markers and paths: who subscribes late gets what was sent before, too."""
+
+
+class _Message(NamedTuple):
+    time_s: float
+    topic: str
+    type: str
+    cdr: bytes
+
+
+def files(mission: Mission, versions: tuple[str, ...] = ()) -> Files:
+    """Return the recording.
+
+    Raises:
+        MachineError: if mcap or rosbags is not installed.
+    """
+    mcap = import_extra("mcap.writer", extra="ros", purpose="writes MCAP files")
+    ros = RosTypes()
+    data = io.BytesIO()
+    writer = mcap.Writer(data)
+    writer.start(profile="ros2", library=f"mrmg {__version__}")
+    writer.add_metadata("mrmg", _metadata(mission))
+    schemas: dict[str, int] = {}
+    channels: dict[str, int] = {}
+    for time_s, topic, kind, cdr in _messages(ros, mission):
+        if kind not in schemas:
+            name = kind.replace("/", "/msg/")
+            text = ros.definition(kind)
+            schemas[kind] = writer.register_schema(name, "ros2msg", text)
+        if topic not in channels:
+            latched = kind in (_GRID, _MARKERS, _PATH)
+            qos = {"offered_qos_profiles": _LATCHED_QOS} if latched else {}
+            channels[topic] = writer.register_channel(topic, "cdr", schemas[kind], qos)
+        time_ns = nanoseconds(time_s)
+        writer.add_message(channels[topic], time_ns, cdr, time_ns)
+    writer.finish()
+    return {"mission.mcap": data.getvalue()}
+
+
+def _metadata(mission: Mission) -> dict[str, str]:
+    """Return what the recording shows."""
+    plan = mission.plan
+    return {
+        "motion": mission.motion,
+        "scene": plan.scene_name,
+        "scene_digest": plan.scene_digest,
+        "plan_digest": plan.digest,
+        "seed": str(plan.seed),
+    }
+
+
+def _messages(ros: RosTypes, mission: Mission) -> Iterator[_Message]:
+    """Return all messages in the order of their times."""
+    names = ros_names(course.robot.id for course in mission.courses)
+    streams = [
+        _still(ros, mission, names),
+        _goals(ros, mission),
+        _transforms(ros, mission, names),
+    ]
+    for course in mission.courses:
+        name = names[course.robot.id]
+        streams += [
+            _poses(ros, mission.scene, course, f"/{name}/pose"),
+            _battery(ros, course, f"/{name}/battery"),
+        ]
+    return heapq.merge(*streams, key=lambda message: message.time_s)
+
+
+def _still(
+    ros: RosTypes, mission: Mission, names: Mapping[str, str]
+) -> Iterator[_Message]:
+    """Yield what does not change: map, scene, shapes of the robots, and paths."""
+    scene = mission.scene
+    grid = ros.encoded(_GRID, occupancy_grid(ros, scene))
+    yield _Message(0.0, "/map", _GRID, grid)
+    things = ros.encoded(_MARKERS, scene_markers(ros, scene))
+    yield _Message(0.0, "/scene", _MARKERS, things)
+    robots = ros.encoded(_MARKERS, robot_markers(ros, scene, names))
+    yield _Message(0.0, "/robots", _MARKERS, robots)
+    motions: list[tuple[str, Motion]] = [
+        ("planned", trajectory) for trajectory in mission.plan.trajectories
+    ]
+    if mission.log is not None:
+        motions += [("driven", motion) for motion in mission.log.driven_motions()]
+    for kind, motion in motions:
+        path = ros.encoded(_PATH, _path(ros, scene, motion))
+        yield _Message(0.0, f"/{names[motion.robot]}/{kind}_path", _PATH, path)
+
+
+def _path(ros: RosTypes, scene: Scene, motion: Motion) -> Any:
+    """Return the path of a motion, with the times at which it gets to its bends."""
+    at = every(motion.time_s, POSE_PERIOD_S)
+    at = at[bends(motion.state[at, :2], PATH_TOLERANCE_M)]
+    pose_stamped = ros["geometry_msgs/PoseStamped"]
+    poses = [
+        pose_stamped(ros.header(time_s), ros.pose(pose[:3], pose[3:]))
+        for time_s, pose in zip(
+            motion.time_s[at].tolist(),
+            _poses_3d(scene, motion.state[at]).tolist(),
+            strict=True,
+        )
+    ]
+    return ros[_PATH](ros.header(0.0), poses)
+
+
+def _goals(ros: RosTypes, mission: Mission) -> Iterator[_Message]:
+    """Yield all goals, then each that is visited in the colour of its robot."""
+    scene = mission.scene
+    every_goal = goal_markers(ros, scene, [goal.id for goal in scene.goals])
+    yield _Message(0.0, "/goals", _MARKERS, ros.encoded(_MARKERS, every_goal))
+    robots = [course.robot.id for course in mission.courses]
+    visits = [visit for course in mission.courses for visit in course.visits]
+    for visit in sorted(visits, key=lambda visit: visit.time_s):
+        if visit.kind == "goal":
+            color = palette.robot_colour(robots.index(visit.robot))
+            goal = goal_markers(
+                ros, scene, [visit.target], color=color, time_s=visit.time_s
+            )
+            cdr = ros.encoded(_MARKERS, goal)
+            yield _Message(visit.time_s, "/goals", _MARKERS, cdr)
+
+
+def _transforms(
+    ros: RosTypes, mission: Mission, names: Mapping[str, str]
+) -> Iterator[_Message]:
+    """Yield the frames of all robots, each time all of them."""
+    kind = "tf2_msgs/TFMessage"
+    stamped = ros["geometry_msgs/TransformStamped"]
+    transform = ros["geometry_msgs/Transform"]
+    frames = [f"{names[course.robot.id]}/base_link" for course in mission.courses]
+
+    def message_of(header: Any, numbers: list[float]) -> Any:
+        rows = np.reshape(numbers, (-1, 7)).tolist()
+        transforms = [
+            transform(ros.vector(*row[:3]), ros.quaternion(*row[3:])) for row in rows
+        ]
+        return ros[kind](
+            [stamped(header, *each) for each in zip(frames, transforms, strict=True)]
+        )
+
+    at = every(mission.time_s, TF_PERIOD_S)
+    poses = [_poses_3d(mission.scene, course.state[at]) for course in mission.courses]
+    time_s = mission.time_s[at]
+    messages = ros.encoded_series(kind, message_of, time_s, np.hstack(poses))
+    for at_s, cdr in zip(time_s.tolist(), messages, strict=True):
+        yield _Message(at_s, "/tf", kind, cdr)
+
+
+def _poses(
+    ros: RosTypes, scene: Scene, course: Course, topic: str
+) -> Iterator[_Message]:
+    """Yield the poses of a robot's reference point."""
+    kind = "geometry_msgs/PoseStamped"
+
+    def message_of(header: Any, numbers: list[float]) -> Any:
+        return ros[kind](header, ros.pose(numbers[:3], numbers[3:]))
+
+    at = every(course.time_s, POSE_PERIOD_S)
+    time_s, poses = course.time_s[at], _poses_3d(scene, course.state[at])
+    messages = ros.encoded_series(kind, message_of, time_s, poses)
+    for at_s, cdr in zip(time_s.tolist(), messages, strict=True):
+        yield _Message(at_s, topic, kind, cdr)
+
+
+def _battery(ros: RosTypes, course: Course, topic: str) -> Iterator[_Message]:
+    """Yield the state of charge of a robot."""
+    kind = "sensor_msgs/BatteryState"
+    charging, discharging = 1, 2
+    unknown = float("nan")
+    none = np.empty(0, dtype=np.float32)
+    changes = np.flatnonzero(np.diff(course.charging.astype(int))) + 1
+    ticks = np.union1d(every(course.time_s, BATTERY_PERIOD_S), changes)
+    for at in ticks.tolist():
+        time_s = float(course.time_s[at])
+        state = ros[kind](
+            header=ros.header(time_s),
+            voltage=unknown,
+            temperature=unknown,
+            current=unknown,
+            charge=unknown,
+            capacity=unknown,
+            design_capacity=unknown,
+            percentage=float(course.charge[at]),
+            power_supply_status=charging if course.charging[at] else discharging,
+            power_supply_health=0,
+            power_supply_technology=0,
+            present=True,
+            cell_voltage=none,
+            cell_temperature=none,
+            location=course.robot.id,
+            serial_number="",
+        )
+        yield _Message(time_s, topic, kind, ros.encoded(kind, state))
+
+
+def _poses_3d(scene: Scene, state: np.ndarray) -> np.ndarray:
+    """Return poses on the ground: x, y, z and a quaternion x, y, z, w, shape (n, 7).
+
+    The x axis points along the heading, the z axis along the normal of the ground.
+    """
+    points, heading = state[:, :2], state[:, 2]
+    slope = gradient_at(scene, points)
+    flat = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
+    forward = np.column_stack([flat, np.sum(flat * slope, axis=1)])
+    normal = np.column_stack([-slope, np.ones(len(slope))])
+    axes = np.stack([forward, np.cross(normal, forward), normal], axis=-1)
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    turn = Rotation.from_matrix(axes).as_quat()
+    return np.column_stack([lifted(scene, points, 0.0), turn])
+
+
+FORMAT = Format(
+    description="a recording of ROS 2 messages, for Foxglove, RViz and others",
+    suffix=".mcap",
+    files=files,
+)

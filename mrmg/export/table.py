@@ -1,0 +1,60 @@
+"""The table of export formats: one module of `mrmg.export.formats` each."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from mrmg.errors import UsageError, nearest
+
+if TYPE_CHECKING:
+    from mrmg.export.mission import Mission
+
+_FORMATS = "mrmg.export.formats"
+
+Files = Mapping[str, bytes]
+"""Content of the files of an export by their path, relative to its folder."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Format:
+    """A format that a run can be exported to; a module calls its own `FORMAT`.
+
+    Attributes:
+        description: what it is, for the command line.
+        suffix: of its file; "" of a format that is a folder of files.
+        versions: of its standard that can be written; all of them are by default.
+        files: returns the files of a mission in the versions asked for. A single file
+            is called "mission" with its suffix.
+    """
+
+    description: str
+    suffix: str = ""
+    versions: tuple[str, ...] = ()
+    files: Callable[[Mission, tuple[str, ...]], Files]
+
+
+def format_names() -> list[str]:
+    """Return the names of all formats; imports none of them."""
+    package = importlib.import_module(_FORMATS)
+    return sorted(module.name for module in pkgutil.iter_modules(package.__path__))
+
+
+def load_format(name: str) -> Format:
+    """Return a format.
+
+    Raises:
+        UsageError: if there is none of that name.
+    """
+    names = format_names()
+    if name not in names:
+        allowed = ", ".join(names)
+        raise UsageError(
+            f"format {name!r} is unknown{nearest(name, names)}; allowed: {allowed}"
+        )
+    module = importlib.import_module(f"{_FORMATS}.{name}")
+    loaded: Format = module.FORMAT
+    return loaded
