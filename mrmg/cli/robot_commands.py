@@ -11,12 +11,12 @@ from typing import Any
 
 from mrmg.cli import terminal
 from mrmg.cli.run_options import add_trust
-from mrmg.errors import ExitCode, MachineError, SceneError
+from mrmg.errors import ExitCode, MachineError, SceneError, UsageError
 
 
 def add_robot(verbs: Any) -> None:
     """Add the verb `robot`."""
-    robot = verbs.add_parser("robot", help="check, make or list robot models")
+    robot = verbs.add_parser("robot", help="check, make, import or list robot models")
     acts = robot.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
     check = acts.add_parser(
@@ -47,11 +47,41 @@ def add_robot(verbs: Any) -> None:
     )
     new.set_defaults(command=new_robot)
 
+    _add_import(acts)
     listed = acts.add_parser("list", help="list the shipped robot models")
     listed.add_argument(
         "--json", action="store_true", help="print their figures as JSON"
     )
     listed.set_defaults(command=list_robots)
+
+
+def _add_import(acts: Any) -> None:
+    imported = acts.add_parser(
+        "import",
+        help="make a model of a robot description: URDF, xacro or MJCF",
+        description="Write a model's folder with every parameter that the description "
+        "states, and report those that it does not.",
+    )
+    imported.add_argument("file", type=Path, metavar="FILE.urdf|FILE.xacro|FILE.xml")
+    imported.add_argument(
+        "-o", "--out", type=Path, metavar="FOLDER", help="default models/NAME"
+    )
+    for flag, what in (("--drive", "turn the driven wheels"), ("--steer", "steer")):
+        imported.add_argument(
+            flag,
+            nargs=2,
+            default=(),
+            metavar=("LEFT", "RIGHT"),
+            help=f"joints that {what}; default: found by axis and place",
+        )
+    imported.add_argument(
+        "--arg",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="argument of a xacro file; may be repeated",
+    )
+    imported.set_defaults(command=import_robot)
 
 
 def check_robot(options: argparse.Namespace) -> int:
@@ -112,6 +142,36 @@ def new_robot(options: argparse.Namespace) -> int:
     reference = str(folder) if folder.is_absolute() else f"./{folder}"
     print(f"next, after changing both files:\n  mrmg robot check {name}")
     print(f"  mrmg calibrate {name}")
+    print(f"in a scene: {{id: r1, model: {reference}, pose: [5, 5, 0]}}")
+    return ExitCode.OK
+
+
+def import_robot(options: argparse.Namespace) -> int:
+    """Make a robot model of a description of another tool."""
+    from mrmg.scene.importing.robots import import_robot as imported
+
+    given = [item.replace(":=", "=").partition("=") for item in options.arg]
+    if not all(name and sign for name, sign, _ in given):
+        raise UsageError(f"--arg: got {options.arg}; expected NAME=VALUE")
+    folder = options.out or Path("models") / options.file.name.partition(".")[0]
+    found = imported(
+        options.file,
+        folder,
+        drive=options.drive,
+        steer=options.steer,
+        arguments={name: value for name, _, value in given},
+    )
+    for file in found.files:
+        print(file)
+    for note in found.notes:
+        print(f"note: {note}")
+    print(f"read: {', '.join(found.read)}")
+    print("not in the file, and assumed (marked in robot.yaml):")
+    for line in found.assumed:
+        print(f"  {line}")
+    name = shlex.quote(str(folder))
+    reference = str(folder) if folder.is_absolute() else f"./{folder}"
+    print(f"next:\n  mrmg robot check {name}\n  mrmg calibrate {name}")
     print(f"in a scene: {{id: r1, model: {reference}, pose: [5, 5, 0]}}")
     return ExitCode.OK
 

@@ -16,6 +16,7 @@ from typing import Any
 
 from mrmg.errors import Fault, SceneError, UsageError, nearest
 from mrmg.scene.importing.layers import ImportOptions, Layer
+from mrmg.scene.loading.yaml_text import parse_yaml, read_text, read_yaml
 
 _SNIFFED_BYTES = 1 << 16
 
@@ -64,8 +65,6 @@ class Head:
 
     @cached_property
     def _yaml(self) -> Any:
-        from mrmg.scene.loading.yaml_text import parse_yaml
-
         try:
             return parse_yaml(self.start.decode("utf-8"), source=str(self.path))
         except (UnicodeDecodeError, SceneError):
@@ -129,6 +128,8 @@ def _not_known(head: Head, known: dict[str, Format]) -> str:
         return "a picture or other binary file; a map's picture is named by its YAML"
     if head.kind == "yaml" and "format" in head.mapping:
         return "a scene of mrmg already; 'mrmg scene check' looks at it"
+    if head.path.suffix in (".yaml", ".yml"):
+        read_yaml(head.path, source=str(head.path))  # names the line that is wrong
     titles = "; ".join(f"{entry.kind}: {entry.title}" for entry in known.values())
     return f"no map of a known kind; --kind forces one of: {titles}"
 
@@ -139,8 +140,6 @@ def read_json(path: Path) -> Any:
     Raises:
         SceneError: if it cannot be read or is no JSON; names the line.
     """
-    from mrmg.scene.loading.yaml_text import read_text
-
     try:
         return json.loads(read_text(path, source=str(path)).removeprefix("\ufeff"))
     except json.JSONDecodeError as error:

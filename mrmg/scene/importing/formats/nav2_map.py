@@ -47,7 +47,7 @@ class MapDocument(Strict):
         description="[x, y, yaw] of the lower left corner in m and rad"
     )
     mode: Literal["trinary", "scale", "raw"] = "trinary"
-    negate: bool | Literal[0, 1] = Field(default=0, description="0 or 1")
+    negate: Literal[0, 1, False, True] = 0
     occupied_thresh: Annotated[float, Field(ge=0, le=1)] = 0.65
     free_thresh: Annotated[float, Field(ge=0, le=1)] = 0.25
 

@@ -1,0 +1,217 @@
+"""Robot descriptions as MuJoCo reads them: URDF, xacro and MJCF."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+from mrmg.errors import Fault, SceneError
+from mrmg.extras import import_extra
+from mrmg.scene.loading.mjcf import no_warning_file
+from mrmg.scene.loading.yaml_text import read_text
+
+MESH_SUFFIXES = (".stl", ".obj", ".msh")
+"""Meshes that MuJoCo reads."""
+
+_MACROS = ("xacro:", "${", "$(")
+_COMPILER = {
+    "fusestatic": "false",  # or the masses of fixed links would be lost
+    "discardvisual": "false",
+    "strippath": "false",
+    "balanceinertia": "true",
+    "boundmass": "1e-6",
+    "boundinertia": "1e-9",
+}
+
+
+@dataclass(frozen=True)
+class JointLimit:
+    """What a description states of a joint's drive; infinite where it does not."""
+
+    speed_rad_s: float = math.inf
+    effort_Nm: float = math.inf
+
+
+@dataclass(frozen=True)
+class Description:
+    """A robot that MuJoCo has compiled.
+
+    Attributes:
+        model: as compiled, its root fixed to the world unless it states otherwise.
+        limits: of joints, by name.
+        friction: of tyres on the ground, by body.
+        notes: what was dropped or changed.
+    """
+
+    model: Any
+    limits: Mapping[str, JointLimit] = field(default_factory=dict)
+    friction: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+
+def read_description(path: Path, arguments: Mapping[str, str]) -> Description:
+    """Read a robot description of any kind, told by its content.
+
+    Args:
+        path: of the file.
+        arguments: of xacro, by name.
+
+    Raises:
+        SceneError: if it cannot be used.
+        MachineError: if it needs xacro, which is not installed.
+    """
+    source = str(path)
+    text = read_text(path, source=source)
+    if any(mark in text for mark in _MACROS) or path.suffix == ".xacro":
+        text = _expanded(path, arguments)
+    try:
+        root = ET.fromstring(text)
+    except ET.ParseError as error:
+        line, column = error.position
+        place = f"line {line}, column {column + 1}"
+        message = f"no valid XML: {str(error).partition(':')[0]}"
+        raise SceneError(source, [Fault(place, message)]) from error
+    if root.tag not in ("robot", "mujoco"):
+        message = f"got <{root.tag}>; expected <robot> (URDF, xacro) or <mujoco> (MJCF)"
+        raise SceneError(source, [Fault("", message)])
+    is_urdf = root.tag == "robot"
+    notes = _without_lost_meshes(root, path.parent) if is_urdf else []
+    try:
+        with no_warning_file():
+            model = _compiled_urdf(root) if is_urdf else _compiled_mjcf(path, notes)
+    except (ValueError, OSError) as error:
+        reason = " ".join(str(error).split())
+        raise SceneError(
+            source, [Fault("", f"MuJoCo cannot use it: {reason}")]
+        ) from error
+    if is_urdf:
+        return Description(model, _limits(root), _gazebo_friction(root), tuple(notes))
+    return Description(model, {}, _geom_friction(model), tuple(notes))
+
+
+def _expanded(path: Path, arguments: Mapping[str, str]) -> str:
+    xacro = import_extra("xacro", extra="ros", purpose="expands macros of descriptions")
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            document = xacro.process_file(str(path), mappings=dict(arguments))
+    except Exception as error:  # xacro raises what the expressions in a file raise
+        reason = " ".join(str(error).split()) or type(error).__name__
+        message = f"xacro cannot expand it: {reason}; --arg NAME=VALUE sets arguments"
+        raise SceneError(str(path), [Fault("", message)]) from error
+    return str(document.toxml())
+
+
+def _without_lost_meshes(root: ET.Element, folder: Path) -> list[str]:
+    """Resolve the meshes of a URDF; drop those MuJoCo cannot read, and say so."""
+    lost: dict[str, list[str]] = {"visual": [], "collision": []}
+    for link in root.iter("link"):
+        for part in [item for item in link if item.tag in lost]:
+            mesh = part.find("geometry/mesh")
+            if mesh is None:
+                continue
+            name = mesh.get("filename", "")
+            file = _mesh_file(name, folder)
+            if file is not None and file.suffix.lower() in MESH_SUFFIXES:
+                mesh.set("filename", str(file))
+                continue
+            link.remove(part)
+            reason = "missing" if file is None else "of a format MuJoCo does not read"
+            lost[part.tag].append(f"{Path(name).name} of {link.get('name')} ({reason})")
+    return [
+        f"{tag} meshes left out, collision shapes stand for them: {', '.join(names)}"
+        for tag, names in lost.items()
+        if names
+    ]
+
+
+def _mesh_file(name: str, folder: Path) -> Path | None:
+    """Return the file of a mesh, in a package beside or above a folder, if there."""
+    if name.startswith(("package://", "model://")):
+        package, _, rest = name.partition("://")[2].partition("/")
+        for place in (folder, *folder.resolve().parents):
+            for base in (place / package, place if place.name == package else None):
+                if base is not None and (base / rest).is_file():
+                    return (base / rest).resolve()
+        return None
+    file = folder / unquote(name.removeprefix("file://"))
+    return file.resolve() if name and file.is_file() else None
+
+
+def _compiled_urdf(root: ET.Element) -> Any:
+    import mujoco
+
+    for extension in root.findall("mujoco"):
+        root.remove(extension)
+    ET.SubElement(ET.SubElement(root, "mujoco"), "compiler", _COMPILER)
+    return mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode")).compile()
+
+
+def _compiled_mjcf(path: Path, notes: list[str]) -> Any:
+    import mujoco
+
+    spec = mujoco.MjSpec.from_file(str(path))
+    folder = path.parent / spec.meshdir
+    lost = {
+        mesh.name or Path(mesh.file).stem: mesh
+        for mesh in spec.meshes
+        if mesh.file and not (folder / mesh.file).is_file()
+    }
+    for geom in [geom for geom in spec.geoms if geom.meshname in lost]:
+        spec.delete(geom)
+    for mesh in lost.values():
+        spec.delete(mesh)
+    if lost:
+        notes.append(f"meshes left out, as their files are missing: {', '.join(lost)}")
+    textures = [item for item in spec.textures if item.file]
+    for texture in textures:  # surfaces are not taken over
+        spec.delete(texture)
+    for material in spec.materials:
+        material.textures = [""] * len(material.textures)
+    return spec.compile()
+
+
+def _limits(root: ET.Element) -> dict[str, JointLimit]:
+    found = {}
+    for joint in root.iter("joint"):
+        limit = joint.find("limit")
+        if limit is not None:
+            found[str(joint.get("name"))] = JointLimit(
+                _positive(limit.get("velocity")), _positive(limit.get("effort"))
+            )
+    return found
+
+
+def _gazebo_friction(root: ET.Element) -> dict[str, float]:
+    stated = {
+        str(part.get("reference")): _positive(
+            part.findtext("mu1") or part.findtext("mu")
+        )
+        for part in root.iter("gazebo")
+    }
+    return {name: value for name, value in stated.items() if value < math.inf}
+
+
+def _geom_friction(model: Any) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for geom in range(model.ngeom):
+        if model.geom_contype[geom] or model.geom_conaffinity[geom]:
+            name = model.body(model.geom_bodyid[geom]).name
+            own = float(model.geom_friction[geom, 0])
+            found[name] = max(own, found.get(name, 0.0))
+    return found
+
+
+def _positive(text: str | None) -> float:
+    try:
+        value = float(text or "inf")
+    except ValueError:
+        return math.inf
+    return value if value > 0.0 else math.inf

@@ -1,0 +1,207 @@
+"""From a robot description to a model's folder, and what is left to find out."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mrmg import shipped, storage
+from mrmg.errors import Fault, SceneError, UsageError
+from mrmg.scene.importing.robots.description import Description, read_description
+from mrmg.scene.importing.robots.mjcf_text import mjcf_text
+from mrmg.scene.importing.robots.parameters import Parameter, parameters_of
+from mrmg.scene.importing.robots.survey import Survey, survey
+from mrmg.scene.loading.models import load_model
+
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
+
+
+@dataclass(frozen=True)
+class ImportedRobot:
+    """What was made.
+
+    Attributes:
+        files: that were written.
+        read: names of the parameters that the description states.
+        assumed: names and reasons of those it does not.
+        notes: what was dropped, changed or assumed of its parts.
+    """
+
+    files: tuple[Path, ...]
+    read: tuple[str, ...]
+    assumed: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def import_robot(
+    path: Path,
+    folder: Path,
+    *,
+    drive: Sequence[str] = (),
+    steer: Sequence[str] = (),
+    arguments: Mapping[str, str] | None = None,
+) -> ImportedRobot:
+    """Write the model of a robot that a URDF, xacro or MJCF file describes.
+
+    Args:
+        path: the description.
+        folder: to make; the model is called like it.
+        drive: joints of the driven wheels, left and right; () to find them.
+        steer: joints that steer, left and right; () to find them.
+        arguments: of xacro, by name.
+
+    Raises:
+        UsageError: if there is something in that place, or it cannot name a model.
+        SceneError: if the description cannot be used; nothing is written then.
+        MachineError: if a package is missing.
+    """
+    name = folder.name
+    if not _NAME.fullmatch(name) or name in shipped.model_names():
+        raise UsageError(
+            f"'{name}' cannot name a robot model; use letters, digits, '_', '.' and "
+            "'-', and no shipped model's name"
+        )
+    if os.path.lexists(folder):
+        raise UsageError(f"{folder} is there already; give another -o FOLDER")
+    description = read_description(path, arguments or {})
+    found = survey(description, str(path), drive, steer)
+    values = parameters_of(found, description)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".import-") as place:
+        work = Path(place) / name
+        drawn, assets = _drawn(description, found, work / "meshes")
+        text = mjcf_text(name, path.name, found, values, drawn, assets)
+        storage.write_text(work / f"{name}.xml", text)
+        storage.write_text(work / "robot.yaml", _robot_yaml(name, path, found, values))
+        try:
+            load_model(work)
+        except SceneError as error:
+            faults = [Fault(f.path, f.message) for f in error.faults]
+            raise SceneError(str(path), faults) from error
+        shutil.move(work, folder)
+    files = sorted(file for file in folder.rglob("*") if file.is_file())
+    return ImportedRobot(
+        tuple(files),
+        tuple(key for key, value in values.items() if value.source),
+        tuple(
+            f"{key}: {value.value:g} {value.unit}".rstrip() + f", {value.reason}"
+            for key, value in values.items()
+            if not value.source
+        ),
+        (*description.notes, *found.notes, *_doubts(found)),
+    )
+
+
+def _doubts(found: Survey) -> list[str]:
+    """Return what of a robot the simulation does not show as it is."""
+    if found.steered or not found.supports_m:
+        return []
+    share = abs(found.lead_m) / max(abs(x) for x in found.supports_m)
+    if share <= 0.5:
+        return []
+    return [
+        f"{share:.0%} of the weight is on the casters: the driven wheels may slip, as "
+        "half of it on them is counted on"
+    ]
+
+
+def _robot_yaml(
+    name: str, path: Path, found: Survey, values: Mapping[str, Parameter]
+) -> str:
+    motion = "car" if found.steered else "unicycle"
+    lines = [
+        f"# {name}: imported from {path.name}. What is marked ASSUMED is not in that",
+        "# file: measure it or look it up. 'mrmg calibrate' measures the energy of the",
+        "# simulated robot. Frame: origin in the middle of the driven axle on the",
+        "# ground, x forward, y left. SI units.",
+        "format: 1",
+        f"motion_model: {motion}",
+    ]
+    group = ""
+    for key, value in values.items():
+        outer, _, inner = key.rpartition(".")
+        if outer != group and outer:
+            lines.append(f"{outer}:")
+        group = outer
+        shown: Any = value.value
+        origin = f"from {value.source}" if value.source else f"ASSUMED: {value.reason}"
+        indent = "  " if outer else ""
+        unit = f"{value.unit}; " if value.unit else ""
+        lines.append(f"{indent}{inner}: {shown}  # {unit}{origin}")
+    lines.append(f"mjcf: {name}.xml")
+    return shipped.with_modeline("\n".join(lines) + "\n", shipped.robot_schema_file())
+
+
+def _drawn(
+    description: Description, found: Survey, folder: Path
+) -> tuple[dict[int, list[str]], list[str]]:
+    """Return the geoms to draw, by wheel (-1: chassis), and write their meshes."""
+    import mujoco
+
+    model, data = description.model, mujoco.MjData(description.model)
+    mujoco.mj_forward(model, data)
+    kinds = mujoco.mjtGeom
+    shapes = {
+        kinds.mjGEOM_SPHERE: "sphere",
+        kinds.mjGEOM_CAPSULE: "capsule",
+        kinds.mjGEOM_ELLIPSOID: "ellipsoid",
+        kinds.mjGEOM_CYLINDER: "cylinder",
+        kinds.mjGEOM_BOX: "box",
+        kinds.mjGEOM_MESH: "mesh",
+    }
+    wheels = (*found.driven, *found.steered)
+    of_body = {body: index for index, w in enumerate(wheels) for body in w.bodies}
+    seen = model.geom_contype | model.geom_conaffinity
+    looks = {int(model.geom_bodyid[at]) for at in np.flatnonzero(seen == 0)}
+    lines: dict[int, list[str]] = {}
+    meshes: dict[int, str] = {}
+    for geom in range(model.ngeom):
+        body, kind = int(model.geom_bodyid[geom]), kinds(model.geom_type[geom])
+        if kind not in shapes or body == 0 or (seen[geom] and body in looks):
+            continue
+        wheel = of_body.get(body, -1)
+        center = found.origin_m + (wheels[wheel].place_m if wheel >= 0 else 0.0)
+        pos = _row(data.geom_xpos[geom] - center)
+        quat = np.zeros(4)
+        mujoco.mju_mat2Quat(quat, data.geom_xmat[geom])
+        if kind == kinds.mjGEOM_MESH:
+            mesh = int(model.geom_dataid[geom])
+            meshes.setdefault(mesh, f"mesh_{mesh}")
+            size = f'mesh="{meshes[mesh]}"'
+        else:
+            size = f'size="{_row(model.geom_size[geom])}"'
+        paint = "rubber" if wheel >= 0 else "paint"
+        lines.setdefault(wheel, []).append(
+            f'<geom type="{shapes[kind]}" {size} pos="{pos}" quat="{_row(quat)}" '
+            f'material="{paint}"/>'
+        )
+    for mesh, name in meshes.items():
+        _write_mesh(model, mesh, folder / f"{name}.stl")
+    files = [f'<mesh name="{n}" file="meshes/{n}.stl"/>' for n in meshes.values()]
+    return lines, files
+
+
+def _write_mesh(model: Any, mesh: int, path: Path) -> None:
+    import trimesh
+
+    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    start, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+    shape = trimesh.Trimesh(
+        model.mesh_vert[first : first + count],
+        model.mesh_face[start : start + faces],
+        process=False,
+    )
+    path.parent.mkdir(parents=True, exist_ok=True)
+    shape.export(str(path))
+
+
+def _row(values: Any) -> str:
+    return " ".join(f"{float(value) + 0.0:.9g}" for value in values)
