@@ -9,7 +9,7 @@ The verbs of the command line are the functions of this package:
     account = mrmg.audit(scene, result.plan, log)
     mrmg.render(scene, result.plan, log, Path("mission.mp4"))
 
-A mission that may go wrong is driven under mission control, which plans anew:
+A mission that may go wrong is driven under supervision, which plans anew:
 
     driven = mrmg.drive(scene, result.plan, faults=["r2@40s"])
     account = mrmg.audit(scene, driven.plan, driven.log)

@@ -104,7 +104,7 @@ class EnergyAudit:
             the simulation ran to the end, and robots took the energy planned.
         reasons: why not, one sentence each.
         causes: the kinds of these reasons: why the simulation was given up
-            (`ExecutionLog.gave_up`), "ended" by mission control, "goal missed",
+            (`ExecutionLog.gave_up`), "ended" by supervision, "goal missed",
             "contact", "station shared", "late", "below reserve", "battery empty",
             `MODEL_MISMATCH`, `ENERGY_IMBALANCE`.
         robots: one account per robot, in the scene's order.

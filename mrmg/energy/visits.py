@@ -7,7 +7,7 @@ the battery at once as the visit begins, or with its charging power for as long 
 robot is at the station, up to the beginning of its next visit. A station for one robot
 at a time holds one reference point at any time.
 
-Planner, verifier, mission control and audit all judge by these functions.
+Planner, verifier, supervision and audit all judge by these functions.
 """
 
 from __future__ import annotations

@@ -115,7 +115,7 @@ def _event(event: Event, end_s: float) -> str:
 
 
 def events(log: ExecutionLog | None) -> list[str]:
-    """Return what mission control saw and did, one sentence an event."""
+    """Return what the supervisor saw and did, one sentence an event."""
     return [
         f"{event.time_s:.1f} s: {event.message}" + _DONE.get(event.action, "")
         for event in (log.events if log else ())

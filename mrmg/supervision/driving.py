@@ -1,4 +1,4 @@
-"""Driving a mission under mission control, from the first plan to its end."""
+"""Driving a mission under supervision, from the first plan to its end."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from mrmg.scene.types import Scene
 from mrmg.simulation import ExecutionLog, simulate
 from mrmg.simulation.disturbance import Disturbance
 from mrmg.simulation.log import require_same_mission
-from mrmg.supervision.control import MissionControl
 from mrmg.supervision.faults import checked_faults
 from mrmg.supervision.parameters import ControlParams
 from mrmg.supervision.replanning import Replan, Replanner
+from mrmg.supervision.supervisor import FleetSupervisor
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,7 +80,7 @@ def drive_mission(
     require_same_mission(scene, plan)
     require_drivable(scene.robots)
     params = params or ControlParams()
-    control = MissionControl(
+    supervisor = FleetSupervisor(
         scene,
         plan,
         faults=checked_faults(scene, tuple(faults)),
@@ -96,7 +96,9 @@ def drive_mission(
         plan,
         controller=controller,
         disturbance=disturbance,
-        supervisor=control if replan or faults else None,
+        supervisor=supervisor if replan or faults else None,
         on_progress=on_progress,
     )
-    return Drive(log=log, plan=control.course.plan, replans=tuple(control.replans))
+    return Drive(
+        log=log, plan=supervisor.course.plan, replans=tuple(supervisor.replans)
+    )

@@ -1,4 +1,4 @@
-"""When mission control steps in, and how hard it tries to go on."""
+"""When the supervisor steps in, and how hard it tries to go on."""
 
 from __future__ import annotations
 
@@ -55,4 +55,4 @@ class ControlParams:
         wrong = [name for name, fine in allowed.items() if not fine]
         if wrong:
             values = ", ".join(f"{name} = {getattr(self, name)!r}" for name in wrong)
-            raise UsageError(f"mission control parameters out of range: {values}")
+            raise UsageError(f"supervision parameters out of range: {values}")

@@ -1,4 +1,4 @@
-"""Small missions for the tests of mission control."""
+"""Small missions for the tests of supervision."""
 
 from __future__ import annotations
 
