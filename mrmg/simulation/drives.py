@@ -8,18 +8,8 @@ import mujoco
 import numpy as np
 
 from mrmg.errors import Fault, FileError
+from mrmg.scene.loading.force_drive import drive_fault, transmission
 from mrmg.scene.types import Robot
-
-_ON_JOINT = (
-    int(mujoco.mjtTrn.mjTRN_JOINT),
-    int(mujoco.mjtTrn.mjTRN_JOINTINPARENT),
-)
-_DYNAMICS = (
-    int(mujoco.mjtDyn.mjDYN_NONE),
-    int(mujoco.mjtDyn.mjDYN_FILTER),
-    int(mujoco.mjtDyn.mjDYN_FILTEREXACT),
-)
-_BIASES = (int(mujoco.mjtBias.mjBIAS_NONE), int(mujoco.mjtBias.mjBIAS_AFFINE))
 
 
 class ForceDrives:
@@ -47,7 +37,7 @@ class ForceDrives:
         self._out = model.actuator_outadr[ids]
         moment = transmission(model)[self._out]
         for robot, index, row in zip(robots, ids.tolist(), moment, strict=True):
-            fault = _drive_fault(model, index, row)
+            fault = drive_fault(model, index, row)
             if fault:
                 name = model.actuator(index).name.removeprefix(f"{robot.id}/")
                 text = f"actuator '{name}' {fault}"
@@ -64,59 +54,3 @@ class ForceDrives:
         constant, damping = self._bias
         bias = constant + damping * self._velocity[self._out]
         self._control[self._ctrl] = (force_N / self._traction - bias) / self._gain
-
-
-def transmission(model: mujoco.MjModel) -> np.ndarray:
-    """Return what joint velocities make of actuators' velocities, shape (nout, nv)."""
-    still = mujoco.MjData(model)
-    mujoco.mj_forward(model, still)
-    moment = np.zeros((model.nout, model.nv))
-    mujoco.mju_sparse2dense(
-        moment,
-        still.actuator_moment,
-        still.moment_rownnz,
-        still.moment_rowadr,
-        still.moment_colind,
-    )
-    return moment
-
-
-def is_metered(model: mujoco.MjModel, index: int) -> bool:
-    """Return whether an actuator acts on a joint or a fixed tendon."""
-    return not _transmission_fault(model, index)
-
-
-def _drive_fault(model: mujoco.MjModel, index: int, moment: np.ndarray) -> str:
-    """Return why an actuator cannot be commanded as a force; "" if it can."""
-    elsewhere = _transmission_fault(model, index)
-    dofs = np.flatnonzero(moment)
-    limited = model.jnt_actfrclimited[model.dof_jntid[dofs]].any()
-    gain = model.actuator_gainprm[index, 0]
-    is_fixed = model.actuator_gaintype[index] == mujoco.mjtGain.mjGAIN_FIXED
-    faults = {
-        elsewhere: bool(elsewhere),
-        "moves no wheel; check its gear and its joint or tendon": not moment.sum(),
-        "acts on a joint with actuatorfrcrange; limit it by a forcerange instead": (
-            limited
-        ),
-        "has a dynamics other than none, filter and filterexact; make it a motor": (
-            model.actuator_dyntype[index] not in _DYNAMICS
-        ),
-        "has no constant gain; make it a motor": not is_fixed or gain == 0.0,
-        "has a bias that is not affine in its velocity; make it a motor": (
-            model.actuator_biastype[index] not in _BIASES
-            or model.actuator_biasprm[index, 1] != 0.0
-        ),
-    }
-    return next((text for text, is_so in faults.items() if is_so), "")
-
-
-def _transmission_fault(model: mujoco.MjModel, index: int) -> str:
-    kind, target = model.actuator_trntype[index], model.actuator_trnid[index, 0]
-    if kind in _ON_JOINT:
-        return ""
-    if kind == mujoco.mjtTrn.mjTRN_TENDON:
-        first = model.tendon_adr[target]
-        if model.wrap_type[first] == mujoco.mjtWrap.mjWRAP_JOINT:
-            return ""
-    return "acts neither on a joint nor on a fixed tendon"

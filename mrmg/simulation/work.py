@@ -25,8 +25,8 @@ import mujoco
 import numpy as np
 
 from mrmg.scene.driven_parts import CHASSIS, PARTS
+from mrmg.scene.loading.force_drive import is_metered, transmission
 from mrmg.scene.types import Robot
-from mrmg.simulation.drives import is_metered, transmission
 
 BALANCE_TERMS = ("steering", "kinetic", "potential", "joints", "contacts")
 """Columns of `WorkMeter.balance_J`: one more work, two gains, and two losses."""

@@ -139,9 +139,9 @@ def _wrong_parts(robot: CompiledRobot, parts: DrivenParts) -> Iterator[Fault]:
             message = f"the wheel of joint '{name}' has no geom that touches the floor"
             yield Fault("mjcf", f"{message}; give its tyre conaffinity=1")
     for name in parts.motors:
-        if not robot.is_motor(name):
-            message = f"actuator '{name}' must be a motor: its control is a force"
-            yield Fault("mjcf", message)
+        fault = robot.drive_fault(name)
+        if fault:
+            yield Fault("mjcf", f"actuator '{name}' {fault}")
     for name in parts.servos:
         if abs(robot.servo_gain(name) - 1.0) > LENGTH_SHARE:
             message = f"actuator '{name}' must be a position servo that holds the angle"

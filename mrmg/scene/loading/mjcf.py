@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from mrmg.scene.driven_parts import CHASSIS, FLOOR_BIT, OBSTACLE_BIT, ROOT
+from mrmg.scene.loading.force_drive import drive_fault, transmission
 
 _TURNED_RAD = 1.0
 """By which a wheel is turned to see how long that makes a tendon."""
@@ -154,29 +155,38 @@ class CompiledRobot:
             vector @ self.origin_m
         )
 
-    def traction_N(self, motor: str, joints: Sequence[str], control: float) -> float:
-        """Return the force of wheels on the ground under the control of one motor."""
+    def traction_N(self, motor: str, joints: Sequence[str], force_N: float) -> float:
+        """Return the force of wheels on the ground as one motor is asked for `force_N`.
+
+        That is what `simulation.drives` asks of it at rest; its ranges may cut it.
+        """
+        model, at = self._model, self._id("actuator", motor)
+        (moment,) = transmission(model)[[model.actuator_outadr[at]]]
+        effort = force_N * self.radius_m(joints[0]) / moment.sum()
+        control = (effort - model.actuator_biasprm[at, 0]) / model.actuator_gainprm[
+            at, 0
+        ]
+        if model.actuator_ctrllimited[at]:
+            control = np.clip(control, *model.actuator_ctrlrange[at])
         self._data.ctrl[:] = 0.0
-        self._data.ctrl[self._id("actuator", motor)] = control
-        self._mujoco.mj_forward(self._model, self._data)
-        force_N = 0.0
-        for joint in joints:
-            dof = self._model.jnt_dofadr[self._id("joint", joint)]
-            force_N += float(self._data.qfrc_actuator[dof]) / self.radius_m(joint)
-        return force_N
+        self._data.ctrl[model.actuator_ctrladr[at]] = control
+        if model.actuator_actadr[at] >= 0:  # a filter, once it has settled
+            self._data.act[model.actuator_actadr[at]] = control
+        self._mujoco.mj_forward(model, self._data)
+        dofs = [model.jnt_dofadr[self._id("joint", joint)] for joint in joints]
+        radii_m = [self.radius_m(joint) for joint in joints]
+        return float((self._data.qfrc_actuator[dofs] / radii_m).sum())
 
     def yaw_inertia_kg_m2(self) -> float:
         """Return the inertia about the upright axis through the chassis' origin."""
         first = self._model.jnt_dofadr[self._id("joint", ROOT)]
         return float(self._model.dof_M0[first + 5])
 
-    def is_motor(self, actuator: str) -> bool:
-        """Return whether its force follows from its control alone, and at once."""
-        at, model, types = self._id("actuator", actuator), self._model, self._mujoco
-        return bool(
-            model.actuator_biastype[at] == types.mjtBias.mjBIAS_NONE
-            and model.actuator_dyntype[at] == types.mjtDyn.mjDYN_NONE
-        )
+    def drive_fault(self, actuator: str) -> str:
+        """Return why an actuator cannot be commanded as a force; "" if it can."""
+        at = self._id("actuator", actuator)
+        moment = transmission(self._model)[self._model.actuator_outadr[at]]
+        return drive_fault(self._model, at, moment)
 
     def servo_gain(self, servo: str) -> float:
         """Return the angle a position servo holds for a control of 1; else 0."""

@@ -98,13 +98,11 @@ ONE_DIFFERENCE: list[tuple[str, Change, str, str]] = [
      "limits.u1_max", r"for 356 N .* 'drive' of car.xml gives 90 N"),
     ("car", ('tendon="axle" gear="1"', 'tendon="axle" ctrlrange="-90 900"'),
      "limits.u1_max", r"gives 90 N"),
-    ("car", ('tendon="axle" gear="1"', 'tendon="axle" gear="-1"'),
-     "limits.u1_max", r"gives -706 N"),
     ("car", ("u1_max: 1.5", "u1_max: 4.5"),
      "limits.u1_max", r"asks for 856 N .* tyres of friction 1 transmit, 706 N"),
     ("diffdrive", ("u2_max: 2.0", "u2_max: 60"),
      "limits.u2_max", r"51 rad/s\^2 .* N m"),
-    ("diffdrive", ('"spin_r" gear="0.15"', '"spin_r" gear="0.01"'),
+    ("diffdrive", ('"spin_r" gear="0.15"', '"spin_r" gear="0.15" forcerange="-1 1"'),
      "limits.u1_max", r"actuator 'drive_r'"),
     ("car", ('<motor name="drive"', '<motor name="engine"'),
      "mjcf", r"car.xml has no actuator 'drive'"),
@@ -129,8 +127,8 @@ ONE_DIFFERENCE: list[tuple[str, Change, str, str]] = [
     ("car", ('contype="0" conaffinity="1" condim="3"', 'condim="3"'),
      "mjcf", r"no geom that touches the floor"),
     ("car", ('motor name="drive" tendon="axle" gear="1"',
-             'velocity name="drive" tendon="axle" kv="900"'),
-     "mjcf", r"must be a motor"),
+             'position name="drive" tendon="axle" kp="900"'),
+     "mjcf", r"actuator 'drive' has a bias .*make it a motor"),
     ("car", ('position name="steer_l" joint="steer_fl" kp="2560" kv="34"',
              'motor name="steer_l" joint="steer_fl"'),
      "mjcf", r"must be a position servo"),
@@ -140,6 +138,37 @@ ONE_DIFFERENCE: list[tuple[str, Change, str, str]] = [
     ("car", ("<asset>", '<asset><mesh name="m" file="absent.stl"/>'),
      "mjcf", r"cannot use car.xml: .*absent.stl"),
 ]  # fmt: skip
+
+
+DRIVE = '<motor name="drive" tendon="axle" gear="1"/>'
+DRIVES = {
+    "gear": '<motor name="drive" tendon="axle" gear="-0.4"/>',
+    "filter": '<general name="drive" tendon="axle" gear="3" dyntype="filterexact" '
+    'dynprm="0.05" gainprm="2"/>',
+    "damped": '<general name="drive" tendon="axle" gainprm="2" biastype="affine" '
+    'biasprm="5 0 -30"/>',
+    "velocity": '<velocity name="drive" tendon="axle" kv="900"/>',
+    "limited": '<motor name="drive" tendon="axle" gear="2" ctrlrange="-300 300"/>',
+    "hubs": '<motor name="drive" joint="spin_rl" gear="0.25"/>'
+    '<motor name="drive_2" joint="spin_rr" gear="0.25"/>',
+}
+
+
+@pytest.mark.parametrize("drive", DRIVES)
+def test_any_drive_that_gives_a_commanded_force_is_good(
+    tmp_path: Path, drive: str
+) -> None:
+    found = faults_of(own_model(tmp_path, "car", (DRIVE, DRIVES[drive])))
+    assert "mjcf" not in found
+
+
+@pytest.mark.parametrize("drive", ["filter", "limited"])
+def test_a_drive_that_is_too_weak_for_its_gear_is_named(
+    tmp_path: Path, drive: str
+) -> None:
+    weak = DRIVES[drive].replace("/>", ' forcerange="-50 50"/>')
+    found = faults_of(own_model(tmp_path, "car", (DRIVE, weak)))
+    assert "actuator 'drive' of car.xml gives" in found["limits.u1_max"]
 
 
 @pytest.mark.parametrize(("like", "change", "key", "message"), ONE_DIFFERENCE)
