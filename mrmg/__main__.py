@@ -25,7 +25,7 @@ def command() -> None:
             interruption.end()  # whatever became of the interrupt on its way
         raise
     if interruption.is_pending():
-        interruption.end(told=code == interruption.EXIT_CODE)
+        interruption.end(reported=code == interruption.EXIT_CODE)
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):
             stream.flush()

@@ -20,7 +20,7 @@ Result = TypeVar("Result")
 
 
 PATIENCE_S = 10.0
-"""How long the end of a process waits for each work that was told to halt [s]."""
+"""How long the end of a process waits for each work that was asked to halt [s]."""
 
 _running: set[threading.Thread] = set()
 

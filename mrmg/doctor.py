@@ -25,13 +25,13 @@ class Finding:
         name: of the thing.
         found: what is there.
         ok: False where something that is needed is missing.
-        cure: what to do about it; "" where nothing is to be done.
+        remedy: what to do about it; "" where nothing is to be done.
     """
 
     name: str
     found: str
     ok: bool = True
-    cure: str = ""
+    remedy: str = ""
 
     def to_json(self) -> dict[str, Any]:
         """Return the finding as JSON data."""
@@ -65,7 +65,7 @@ def _python() -> Finding:
     found = f"mrmg {__version__} on Python {platform.python_version()}"
     good = sys.version_info >= (3, 11)
     return Finding(
-        name="python", found=found, ok=good, cure="" if good else "use Python >= 3.11"
+        name="python", found=found, ok=good, remedy="" if good else "use Python >= 3.11"
     )
 
 
@@ -91,7 +91,7 @@ def _packages() -> Iterator[Finding]:
                 name=name,
                 found="not installed",
                 ok=False,
-                cure=f"pip install {name}",
+                remedy=f"pip install {name}",
             )
 
 
@@ -109,7 +109,7 @@ def _bundle() -> Finding:
         name="mujoco parts",
         found=", ".join(f"{name} {value}" for name, value in found.items()),
         ok=False,
-        cure=f"pip install {wanted}",
+        remedy=f"pip install {wanted}",
     )
 
 
@@ -120,7 +120,7 @@ def _shipped_files() -> Finding:
         name="shipped files",
         found=f"{len(scenes)} scenes, {len(models)} robot models",
         ok=complete,
-        cure="" if complete else "install mrmg again: its scenes or models are gone",
+        remedy="" if complete else "install mrmg again: its scenes or models are gone",
     )
 
 
@@ -134,7 +134,7 @@ def _kernel_cache() -> Finding:
             name="kernel cache",
             found=f"{nearest} cannot be written",
             ok=False,
-            cure="set NUMBA_CACHE_DIR to a folder that can be written",
+            remedy="set NUMBA_CACHE_DIR to a folder that can be written",
         )
     state = (
         "filled" if kernels_are_compiled() else "incomplete; the next planning compiles"
@@ -148,7 +148,10 @@ def _offscreen_drawing() -> Finding:
     try:
         return Finding(name="offscreen GL", found=choose_backend())
     except MachineError as error:
-        found, _, cure = str(error).partition("\n")
+        found, _, remedy = str(error).partition("\n")
         return Finding(
-            name="offscreen GL", found=found, ok=False, cure=cure.replace("\n", "; ")
+            name="offscreen GL",
+            found=found,
+            ok=False,
+            remedy=remedy.replace("\n", "; "),
         )

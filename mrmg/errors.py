@@ -86,7 +86,7 @@ class IdentityError(RunFolderError, UsageError):
 
 
 class MachineError(MrmgError):
-    """Something the command needs is missing on this machine; names the cure."""
+    """Something the command needs is missing on this machine; names the remedy."""
 
     exit_code = ExitCode.MACHINE
 

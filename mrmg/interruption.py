@@ -67,11 +67,11 @@ def cleaned_up_by(cleanup: Callable[[], object]) -> Iterator[None]:
         _cleanups.remove(cleanup)
 
 
-def end(*, told: bool = False) -> NoReturn:
+def end(*, reported: bool = False) -> NoReturn:
     """End the process at once, without children and unfinished files.
 
     Args:
-        told: whether the user has been told.
+        reported: whether the user has been informed.
     """
     for child in _children(os.getpid()):
         with suppress(OSError):
@@ -80,7 +80,7 @@ def end(*, told: bool = False) -> NoReturn:
     for cleanup in [*_cleanups]:
         with suppress(Exception):
             cleanup()
-    if not told:
+    if not reported:
         with suppress(OSError):
             os.write(2, f"{MESSAGE}\n".encode())
     os._exit(EXIT_CODE)

@@ -25,7 +25,7 @@ def test_the_command_tells_the_findings_as_json(
     findings = json.loads(capsys.readouterr().out)
     missing = [finding for finding in findings if not finding["ok"]]
     assert code == (ExitCode.MACHINE if missing else ExitCode.OK)
-    assert all(finding["cure"] for finding in missing)
+    assert all(finding["remedy"] for finding in missing)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
@@ -36,7 +36,7 @@ def test_a_cache_that_cannot_be_written_is_told_with_its_cure(
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
     finding = doctor._kernel_cache()
     assert not finding.ok
-    assert "NUMBA_CACHE_DIR" in finding.cure
+    assert "NUMBA_CACHE_DIR" in finding.remedy
 
 
 @pytest.mark.parametrize("name", ["shapely", "mujoco"])
@@ -53,6 +53,6 @@ def test_a_missing_package_is_told_with_its_cure(
 
     monkeypatch.setattr(doctor, "version", hidden)
     assert main(["doctor"]) == ExitCode.MACHINE
-    told = capsys.readouterr().out
-    assert "MISSING" in told
-    assert f"pip install {name}" in told
+    output = capsys.readouterr().out
+    assert "MISSING" in output
+    assert f"pip install {name}" in output

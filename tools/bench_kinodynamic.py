@@ -124,7 +124,7 @@ def bench(path: Path, seeds: range, folder: Path, trials: Trials) -> Row:
 
 
 def is_infeasible(name: str) -> bool:
-    """Tell whether a benchmark must be answered by its infeasibility."""
+    """Return whether a benchmark must be answered by its infeasibility."""
     return name.startswith("infeasible")
 
 

@@ -206,8 +206,8 @@ class Trials:
             old = path.with_name(f"{path.name}.old")
             storage.write_text(old, text)
             dropped = f"{len(lines) - len(used)} lines of other code or arguments"
-            told = f"{path}: {dropped}, or broken, are dropped; {old} has them"
-            print(told, file=sys.stderr)
+            output = f"{path}: {dropped}, or broken, are dropped; {old} has them"
+            print(output, file=sys.stderr)
         whole = "".join(f"{line}\n" for line in used)
         if whole != text:
             storage.write_text(path, whole)

@@ -32,8 +32,8 @@ def calibrate(options: argparse.Namespace) -> int:
     require_other_folder(folder, out)
     require_absent(out, overwrite=options.overwrite)
     model, _ = load_model(folder, trust_code=options.trust_code)
-    with terminal.progress_of("measuring") as told:
-        calibration = calibrate(model, on_progress=told)
+    with terminal.progress_of("measuring") as on_progress:
+        calibration = calibrate(model, on_progress=on_progress)
     write_calibration(calibration, folder, out, in_place=options.in_place)
     draw_calibration(calibration, plot)
     if options.json:

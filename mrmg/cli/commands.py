@@ -23,15 +23,15 @@ def run(options: argparse.Namespace) -> int:
 
     scene = _scene(options)
     terminal.compile_kernels()
-    with terminal.progress() as told:
+    with terminal.progress() as on_progress:
         result = pipeline.run(
             scene,
             out=options.out,
             overwrite=options.overwrite,
             video=None if options.no_video else DEFAULT_VIDEO,
             trust_code=options.trust_code,
-            on_progress=told,
-            on_improvement=terminal.improvement_teller(told),
+            on_progress=on_progress,
+            on_improvement=terminal.improvement_reporter(on_progress),
             **given(options),
         )
     if options.json:
@@ -64,13 +64,13 @@ def plan(options: argparse.Namespace) -> int:
     scene = arguments.scene(loaded)
     terminal.compile_kernels()
     folder = RunFolder(options.out or default_folder(scene, arguments.seed))
-    with folder.opened_for_writing(), terminal.progress() as told:
+    with folder.opened_for_writing(), terminal.progress() as on_progress:
         work = Run(
             scene=scene,
             arguments=arguments,
             folder=folder,
-            on_progress=told,
-            on_improvement=terminal.improvement_teller(told),
+            on_progress=on_progress,
+            on_improvement=terminal.improvement_reporter(on_progress),
         )
         if not options.overwrite:
             require_room(work)
@@ -96,7 +96,7 @@ def verify(options: argparse.Namespace) -> int:
     from mrmg.runs.folder import Step
 
     work = _make(options, Step.VERIFY)
-    verdict = work.folder.read_json("verdict.json", cure="mrmg verify")
+    verdict = work.folder.read_json("verdict.json", remedy="mrmg verify")
     lines = ["valid" if verdict["ok"] else "not valid:"]
     lines += [f"  {violation['message']}" for violation in verdict["violations"]]
     _print(options, verdict, "\n".join(lines))
@@ -106,16 +106,16 @@ def verify(options: argparse.Namespace) -> int:
 def execute(options: argparse.Namespace) -> int:
     """Drive the plan of a run folder in MuJoCo."""
     work, note = _driven(options)
-    log = work.folder.read_json("log.json", cure="mrmg execute --overwrite")
+    log = work.folder.read_json("log.json", remedy="mrmg execute --overwrite")
     lost = [item for item in log["events"] if item["action"] in ("end", "give_up")]
     driven = log["completed"] and not lost
     ended = "driven to the end" if driven else "given up on the way"
-    told = [f"{item['time_s']:>7.1f} s  {item['message']}" for item in log["events"]]
+    events = [f"{item['time_s']:>7.1f} s  {item['message']}" for item in log["events"]]
     account = work.account(work.plan_in_force(), work.log())
     lines = [
         f"{ended}, {len(log['contacts'])} contacts",
         *(f"  {reason}" for reason in account.reasons),
-        *told,
+        *events,
         f"  {note}",
     ]
     _print(options, log, "\n".join(lines))
@@ -166,7 +166,7 @@ def audit(options: argparse.Namespace) -> int:
     from mrmg.runs.folder import Step
 
     work = _make(options, Step.AUDIT, **given(options))
-    account = work.folder.read_json("audit.json", cure="mrmg audit")
+    account = work.folder.read_json("audit.json", remedy="mrmg audit")
     lines = ["mission done" if account["mission_ok"] else "mission failed:"]
     lines += [f"  {reason}" for reason in account["reasons"]]
     _print(options, account, "\n".join(lines))
@@ -208,8 +208,8 @@ def doctor(options: argparse.Namespace) -> int:
         for finding in findings:
             mark = "ok     " if finding.ok else "MISSING"
             print(f"{mark} {finding.name:<14} {finding.found}")
-            if finding.cure:
-                print(f"{'':22} cure: {finding.cure}")
+            if finding.remedy:
+                print(f"{'':22} remedy: {finding.remedy}")
     return ExitCode.OK if all(item.ok for item in findings) else ExitCode.MACHINE
 
 
@@ -225,8 +225,8 @@ def _make(
     from mrmg.runs.steps import taken_up
 
     folder = existing(options.run)
-    with folder.opened_for_writing(), terminal.progress() as told:
-        work = taken_up(folder, told, trust_code=options.trust_code)
+    with folder.opened_for_writing(), terminal.progress() as on_progress:
+        work = taken_up(folder, on_progress, trust_code=options.trust_code)
         changed = work.arguments.changed(video or {}, **changes)
         work = replace(work, arguments=checked_drive(work.scene, changed))
         shown = [step for step in (Step.DRAW, Step.REPORT) if folder.holds(step)]

@@ -20,7 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line `arguments` (those of the process if None).
 
     Returns:
-        The exit code; errors are told on stderr, by their message alone.
+        The exit code; errors go to stderr, by their message alone.
     """
     options = make_parser().read(sys.argv[1:] if arguments is None else arguments)
     # What imports make stays: to search it for garbage again and again takes a tenth of
@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return interruption.EXIT_CODE
     except OSError as error:
         if error.errno == errno.EPIPE:
-            # The reader of our output has gone; nothing is left to be told.
+            # The reader of our output has gone; nothing is left to be written.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return int(ExitCode.OK)
         about = f"{error.filename}: {error.strerror}" if error.filename else error

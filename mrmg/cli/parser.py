@@ -58,7 +58,7 @@ def make_parser() -> Parser:
     shells = verbs.add_parser("completion", help="print the completion of a shell")
     shells.add_argument("shell", choices=completion.SHELLS, metavar="bash|zsh|fish")
     shells.set_defaults(command=completion.completion)
-    doctor = verbs.add_parser("doctor", help="check this machine, with cures")
+    doctor = verbs.add_parser("doctor", help="check this machine, with remedies")
     _add_json(doctor, "the findings")
     doctor.set_defaults(command=commands.doctor)
     return parser

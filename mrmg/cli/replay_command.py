@@ -21,7 +21,7 @@ def add_replay(verbs: Any) -> None:
         "replay",
         help="repeat a failed execution from its capsule",
         description="Repeat the execution of a capsule, which every failed execution "
-        "leaves as capsule.zip in its run folder, and tell whether it fails again in "
+        "leaves as capsule.zip in its run folder, and report whether it fails again in "
         "the same way. Exit code 0 if it does, 6 if not.",
     )
     verb.add_argument("capsule", type=Path, metavar="CAPSULE", help="capsule.zip")
@@ -46,11 +46,11 @@ def replay(options: argparse.Namespace) -> int:
     from mrmg.runs.reproduction import reproduce
 
     out = options.out or options.capsule.parent / "replay"
-    with terminal.progress() as told:
+    with terminal.progress() as on_progress:
         outcome = reproduce(
             options.capsule,
             out,
-            told,
+            on_progress,
             overwrite=options.overwrite,
             trust_code=options.trust_code,
         )
@@ -69,8 +69,11 @@ def _render(folder: Path, trust_code: bool) -> None:
     from mrmg.runs.folder import Step, existing
     from mrmg.runs.steps import taken_up
 
-    with existing(folder).opened_for_writing() as opened, terminal.progress() as told:
-        taken_up(opened, told, trust_code=trust_code).make(Step.RENDER)
+    with (
+        existing(folder).opened_for_writing() as opened,
+        terminal.progress() as on_progress,
+    ):
+        taken_up(opened, on_progress, trust_code=trust_code).make(Step.RENDER)
     print(folder / "mission.mp4")
 
 

@@ -84,14 +84,14 @@ def robustness(options: argparse.Namespace) -> int:
         run = taken_up(folder, trust_code=options.trust_code)
         drive = {"replan": False, "faults": (), **given_drive}
         driven = replace(run, arguments=replace(run.arguments, **drive))
-        with terminal.progress_of("driving") as told:
+        with terminal.progress_of("driving") as on_progress:
             study = study_robustness(
                 driven,
                 trials=options.trials,
                 seed=options.seed,
                 disturb=options.disturb,
                 workers=options.workers,
-                on_trial=_trial_teller(told),
+                on_trial=_trial_reporter(on_progress),
             )
         if folder.file("report.html").exists():
             run.make(Step.REPORT)
@@ -102,10 +102,10 @@ def robustness(options: argparse.Namespace) -> int:
     return ExitCode.OK
 
 
-def _trial_teller(told: Callable[[float, str], None] | None) -> OnTrial | None:
-    if told is None:
+def _trial_reporter(report: Callable[[float, str], None] | None) -> OnTrial | None:
+    if report is None:
         return None
-    return lambda done, trials, feasible: told(
+    return lambda done, trials, feasible: report(
         done / trials, f"{done} of {trials} trials, {feasible} feasible"
     )
 

@@ -40,7 +40,7 @@ def figure(options: argparse.Namespace) -> int:
 
 
 def view(options: argparse.Namespace) -> int:
-    """Show a run or a scene in three dimensions, until told to stop."""
+    """Show a run or a scene in three dimensions, until stopped."""
     return watch(
         options.source,
         place=options.place,
@@ -58,7 +58,7 @@ def watch(
     port: int = PORT,
     trust_code: bool = False,
 ) -> int:
-    """Show a run or a scene until told to stop.
+    """Show a run or a scene until stopped.
 
     Args:
         source: run folder, scene file or name of a shipped scene.

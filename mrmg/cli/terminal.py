@@ -38,12 +38,12 @@ def progress() -> Iterator[StepProgress | None]:
             return
         tasks: dict[Step, Any] = {}
 
-        def told(step: Step, fraction: float, text: str) -> None:
+        def report(step: Step, fraction: float, text: str) -> None:
             if step not in tasks:
                 tasks[step] = bars.add_task(_DOING[step], total=1.0, note="")
             bars.update(tasks[step], completed=fraction, note=text)
 
-        yield told
+        yield report
 
 
 @contextmanager
@@ -79,11 +79,11 @@ def _bars() -> Iterator[Progress | None]:
         yield bars
 
 
-def improvement_teller(
-    told: StepProgress | None,
+def improvement_reporter(
+    report: StepProgress | None,
 ) -> Callable[[Improvement], None] | None:
     """Return a callback that prints a line per better plan; None without progress."""
-    if told is None:
+    if report is None:
         return None
     return lambda found: print(
         f"{found.time_s:9.2f} s  {quality(found.to_json())}", file=sys.stderr
@@ -94,17 +94,17 @@ def quality(found: Mapping[str, Any]) -> str:
     """Return what plans are compared by, its bound and the gap in words."""
     objective = found["objective"]
 
-    def told(value: float) -> str:
+    def shown(value: float) -> str:
         if objective["unit"] == "J":
             return f"{value / 1000:.2f} kJ"
         return f"{value:.1f} s" if objective["unit"] == "s" else f"{value:.1f}"
 
     name = "cost" if objective["name"] == "energy" else objective["name"]
-    text = f"{name} {told(objective['value'])}"
+    text = f"{name} {shown(objective['value'])}"
     if objective["name"] != "energy":
         text += f" ({found['cost_J'] / 1000:.2f} kJ, {found['makespan_s']:.1f} s)"
     if objective["bound"] is not None:
-        text += f", proven bound {told(objective['bound'])}"
+        text += f", proven bound {shown(objective['bound'])}"
     if found["gap"] is not None:
         text += f", gap {found['gap']:.1%}"
     return text

@@ -63,7 +63,7 @@ class Comparison:
     """Some runs, and what they have in common to be compared by.
 
     Attributes:
-        names: what tells the runs apart, one per run.
+        names: what distinguishes the runs apart, one per run.
         records: of the runs.
         rows: their figures.
         differences: what they were made with, as far as it differs, by its name: one

@@ -64,7 +64,7 @@ class Failure:
     def of(
         log: ExecutionLog, causes: tuple[str, ...], reasons: tuple[str, ...]
     ) -> Failure:
-        """Return the failure that a log and its audit tell of."""
+        """Return the failure that a log and its audit show."""
         # Time runs along the second axis of what is kept by robot.
         last = {
             name: values[:, -LAST_TICKS:]
@@ -219,5 +219,5 @@ def _members(path: Path) -> dict[str, bytes]:
 
 
 def _refused(path: Path, message: str) -> FileError:
-    cure = f"a failed execution leaves one as {CAPSULE_FILE} in its run folder"
-    return FileError(str(path), [Fault("", f"{message}; {cure}")])
+    remedy = f"a failed execution leaves one as {CAPSULE_FILE} in its run folder"
+    return FileError(str(path), [Fault("", f"{message}; {remedy}")])

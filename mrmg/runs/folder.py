@@ -145,7 +145,7 @@ class RunFolder:
         return dict(self._record().get("finished", {}))
 
     def is_done(self, step: Step, fingerprint: str) -> bool:
-        """Tell whether the outcome of `step` under `fingerprint` is there."""
+        """Return whether the outcome of `step` under `fingerprint` is there."""
         done = self.marks().get(step) == fingerprint
         return done and self.file(OUTPUTS[step][-1]).exists()
 
@@ -193,22 +193,22 @@ class RunFolder:
         """Mark `step` as finished under `fingerprint`."""
         self._write(self.arguments(), {**self.marks(), str(step): fingerprint})
 
-    def read_json(self, name: str, *, cure: str) -> Any:
+    def read_json(self, name: str, *, remedy: str) -> Any:
         """Read one of the folder's JSON files.
 
         Raises:
-            RunFolderError: if it is missing or unreadable; names `cure`.
+            RunFolderError: if it is missing or unreadable; names `remedy`.
         """
         try:
             return storage.read_json(self.file(name))
         except (OSError, ValueError) as error:
-            fault = Fault(name, f"not readable ({error}); run '{cure}'")
+            fault = Fault(name, f"not readable ({error}); run '{remedy}'")
             raise RunFolderError(str(self.path), [fault]) from error
 
     def _record(self) -> dict[str, Any]:
         if not self.file("run.json").exists():
             return {}
-        record = self.read_json("run.json", cure="mrmg run")
+        record = self.read_json("run.json", remedy="mrmg run")
         if not isinstance(record, dict) or record.get("format") != RUN_FORMAT:
             fault = Fault("run.json", f"this version reads format {RUN_FORMAT} only")
             raise RunFolderError(str(self.path), [fault])

@@ -58,8 +58,8 @@ def run(
             arguments or of another version; refused if not.
         video: how the video is made; None for no video.
         trust_code: whether robot models may bring Python code (`scene.loading.trust`).
-        on_progress: told (step, fraction, text).
-        on_improvement: told of every plan that is cheaper than all before it.
+        on_progress: called with (step, fraction, text).
+        on_improvement: called with every plan that is cheaper than all before it.
         **arguments: fields of `RunArguments`, which are the options of `mrmg run`:
 
     Raises:
@@ -93,7 +93,7 @@ def run(
             if replace(work, arguments=kept).is_done(Step.RENDER):
                 work = replace(work, arguments=kept)  # `mrmg render` made it
         if video is not None and not work.is_done(Step.RENDER):
-            choose_backend()  # better told now than after minutes of driving
+            choose_backend()  # better found now than after minutes of driving
         work.ensure(Step.PLAN)
         if work.status() is PlanStatus.SOLVED:
             work.ensure(Step.VERIFY)

@@ -95,13 +95,13 @@ def _why_no_record(folder: Path) -> Fault:
         return Fault("", why_no_run(folder))
     if not (folder / "run.json").exists():
         return Fault("planning.json", "missing: this is not a run folder")
-    cure = f"'mrmg run SCENE --out {folder}' goes on with it"
-    return Fault("planning.json", f"missing: the run was stopped early; {cure}")
+    remedy = f"'mrmg run SCENE --out {folder}' goes on with it"
+    return Fault("planning.json", f"missing: the run was stopped early; {remedy}")
 
 
-def _read(folder: Path, name: str, cure: str) -> dict[str, Any]:
+def _read(folder: Path, name: str, remedy: str) -> dict[str, Any]:
     try:
         return dict(storage.read_json(folder / name))
     except (OSError, ValueError) as error:
-        fault = Fault(name, f"cannot be read ({error}); run '{cure}'")
+        fault = Fault(name, f"cannot be read ({error}); run '{remedy}'")
         raise RunFolderError(str(folder), [fault]) from error

@@ -21,7 +21,7 @@ class Reproduction:
     """A failure, and what came of the same execution here and now.
 
     Attributes:
-        before: the failure the capsule tells of.
+        before: the failure the capsule holds.
         after: that of the repeated execution; None if it did not fail.
     """
 
@@ -107,7 +107,7 @@ def reproduce(
     Args:
         path: of the capsule.
         out: run folder to make, with log and audit.
-        on_progress: told (step, fraction, text).
+        on_progress: called with (step, fraction, text).
         overwrite: replace another run, or a drive by another version, in `out`.
         trust_code: whether robot models may bring Python code (`loading.trust`).
 

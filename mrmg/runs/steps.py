@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from mrmg.simulation.log import ExecutionLog
 
 StepProgress = Callable[[Step, float, str], None]
-"""Told (step, fraction 0..1, text) while a step is under way."""
+"""Called with (step, fraction 0..1, text) while a step is under way."""
 
 OnImprovement = Callable[["Improvement"], None]
-"""Told of every plan that is cheaper than all before it."""
+"""Called with every plan that is cheaper than all before it."""
 
 Write = Callable[[], None]
 """Puts the outcome of a step that has been worked out into the run folder."""
@@ -52,7 +52,7 @@ class Run:
             self.make(step)
 
     def is_done(self, step: Step) -> bool:
-        """Tell whether the folder holds the outcome of `step`."""
+        """Return whether the folder holds the outcome of `step`."""
         return self.folder.is_done(step, self.fingerprint(step))
 
     def is_readable(self, step: Step) -> bool:
@@ -104,7 +104,7 @@ class Run:
     def planning(self) -> dict[str, Any]:
         """Return how planning ended: status, reason, statistics."""
         return dict(
-            self.folder.read_json("planning.json", cure="mrmg plan --overwrite")
+            self.folder.read_json("planning.json", remedy="mrmg plan --overwrite")
         )
 
     def status(self) -> PlanStatus:
@@ -136,12 +136,12 @@ class Run:
         """Return why there is no plan, or why the mission failed; "" if it did not."""
         if self.status() is not PlanStatus.SOLVED or not self.folder.holds(Step.AUDIT):
             return str(self.planning()["reason"])
-        account = self.folder.read_json("audit.json", cure="mrmg audit")
+        account = self.folder.read_json("audit.json", remedy="mrmg audit")
         return "; ".join(account["reasons"])
 
     def summary(self) -> dict[str, Any]:
         """Return the content of `summary.json`."""
-        return dict(self.folder.read_json("summary.json", cure="mrmg report"))
+        return dict(self.folder.read_json("summary.json", remedy="mrmg report"))
 
     def exit_code(self) -> ExitCode:
         """Return the exit code the whole run ends with."""
@@ -151,7 +151,7 @@ class Run:
         return ExitCode.OK if self.summary()["mission_ok"] else ExitCode.MISSION_FAILED
 
     def progress_of(self, step: Step) -> Callable[[float, str], None]:
-        """Return the callback that tells the progress of one step."""
+        """Return the callback that reports the progress of one step."""
         return lambda fraction, text: self._told(step, fraction, text)
 
     def _told(self, step: Step, fraction: float, text: str = "") -> None:

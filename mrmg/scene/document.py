@@ -74,7 +74,7 @@ def _document(scene: Scene) -> _Entry:
 
 
 def is_as_loaded(scene: Scene, name: str) -> bool:
-    """Tell whether a field of a scene holds what it was loaded as."""
+    """Return whether a field of a scene holds what it was loaded as."""
     if scene.written is None:
         return False
     now, then = getattr(scene, name), getattr(scene.written.loaded, name)
@@ -255,7 +255,7 @@ def _battery(battery: Battery) -> _Entry:
 
 
 def _model(robot: Robot) -> _Entry:
-    """Return what tells a robot's model: its origin, and what differs from that."""
+    """Return what identifies a robot's model: its origin, and what differs from it."""
     model, origin = robot.model, robot.model.origin
     if origin is None or (model.mjcf, model.motion_model) != (
         origin.model.mjcf,

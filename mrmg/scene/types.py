@@ -43,7 +43,7 @@ class Obstacle:
         return self.height_m == 0.0
 
     def stops(self, robot_id: str) -> bool:
-        """Tell whether `robot_id` must keep off this obstacle."""
+        """Return whether `robot_id` must keep off this obstacle."""
         return self.blocks is None or robot_id in self.blocks
 
 
@@ -339,7 +339,7 @@ class Scene:
         return hash(self.digest)
 
     def is_named(self, digest: str) -> bool:
-        """Tell whether a digest is this scene's, by this version or an older one."""
+        """Return whether a digest is this scene's, by this version or an older one."""
         if digest == self.digest:
             return True
         legacy = self.written is not None and digest == self.written.legacy_digest

@@ -45,7 +45,7 @@ class Ending:
             self._got_on_s = self._data.time
 
     def is_done(self, state: np.ndarray) -> bool:
-        """Tell whether the fleet has been at rest after its plan; `state` is (R, 5)."""
+        """Return whether the fleet rests after its plan; `state` has shape (R, 5)."""
         if self._data.time - self.finished_s < _REST_S:
             return False
         return bool(np.abs(state[self._is_speed]).max() < _AT_REST)

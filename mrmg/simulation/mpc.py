@@ -81,7 +81,7 @@ class TrackingMpc:
         return self._deviation[NX:_STAGE].copy()
 
     def _solve(self) -> bool:
-        """Solve the QP; tell whether question and answer are all numbers."""
+        """Solve the QP; return whether question and answer are all numbers."""
         if not np.isfinite(self._guess).all():
             return False
         self._solve_unbounded()
@@ -91,7 +91,7 @@ class TrackingMpc:
         return bool(np.isfinite(self._solution).all())
 
     def _keeps_bounds(self) -> bool:
-        """Tell whether the solution keeps all bounds, which nan does not."""
+        """Return whether the solution keeps all bounds, which nan does not."""
         above, below = self._solution >= self._lower, self._solution <= self._upper
         return bool((above & below).all())
 

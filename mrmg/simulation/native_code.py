@@ -62,7 +62,7 @@ def _library(source: str) -> Path | None:
 
 
 def _agree(function: ca.Function, native: ca.Function) -> bool:
-    """Tell whether both give the same bits."""
+    """Return whether both give the same bits."""
     rng = np.random.default_rng(0)
     for _ in range(_PROBES):
         probe = [

@@ -119,7 +119,7 @@ class SetPoints:
 
 
 def _stands(horizon: np.ndarray) -> bool:
-    """Tell whether a robot stands all along its horizon, shape (n, 5)."""
+    """Return whether a robot stands all along its horizon, shape (n, 5)."""
     # Most robots move, and that is seen sooner.
     if not _is_still(horizon[-1, 3]):
         return False

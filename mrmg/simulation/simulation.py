@@ -190,7 +190,7 @@ class _Run:
             self._record()
 
     def ended(self) -> bool:
-        """Tell whether the fleet is at rest after its plan, or is past helping."""
+        """Return whether the fleet is at rest after its plan, or is past helping."""
         return self._completed() or bool(self._trouble())
 
     def observation(self) -> Observation:

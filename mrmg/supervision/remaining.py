@@ -165,7 +165,7 @@ def _home(entry: dict[str, Any], robot: Robot) -> dict[str, Any]:
 
 
 def is_over(rest: Scene) -> bool:
-    """Tell whether nothing is left to do: no goal, and all robots where they end."""
+    """Return whether nothing is left to do: no goal, and all robots where they end."""
     return not rest.goals and all(
         robot.finish is None or _at_finish(robot.pose, robot.finish)
         for robot in rest.robots

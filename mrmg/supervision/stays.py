@@ -56,7 +56,7 @@ def stays_under_way(
 
 
 def keeps_stays(visits: Iterable[Visit], stays: Mapping[str, StayUnderWay]) -> bool:
-    """Tell whether all stays end where, and by whom, they were begun.
+    """Return whether all stays end where, and by whom, they were begun.
 
     Args:
         visits: of a plan that begins with the stays under way.

@@ -278,7 +278,7 @@ class Stage:
         self._view.update_ground()
 
     def _mark_goals(self, reading: Reading) -> bool:
-        """Give visited goals their robot's colour; tell whether any is new."""
+        """Give visited goals their robot's colour; return whether any is new."""
         before = len(self._marked)
         for goal, robot in reading.visited.items():
             if goal not in self._marked:

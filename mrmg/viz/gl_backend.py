@@ -48,7 +48,7 @@ def choose_backend() -> str:
     The variable `MUJOCO_GL`, where it names one of the backends, puts that one first.
 
     Raises:
-        MachineError: if none works; names the packages that cure it.
+        MachineError: if none works; names the packages that remedy it.
     """
     wish = os.environ.get("MUJOCO_GL", "").strip().lower()
     reasons = []

@@ -84,11 +84,11 @@ def _refuse_without_screen() -> None:
     # The viewer would end the whole process without a word of what to do.
     import glfw
 
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always")
         opened = glfw.init()
     if not opened:
-        reasons = "; ".join(str(item.message) for item in told) or "no reason given"
+        reasons = "; ".join(str(item.message) for item in raised) or "no reason given"
         raise MachineError(
             f"no window could be opened ({reasons}); 'mrmg view --in browser' needs "
             "none"

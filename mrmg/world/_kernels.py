@@ -92,7 +92,7 @@ def point_segment_distance(px, py, ax, ay, bx, by):
 
 @leaf_kernel
 def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
-    """Tell whether segments ab and cd properly cross."""
+    """Return whether segments ab and cd properly cross."""
     d1 = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
     d2 = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
     d3 = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
@@ -102,7 +102,7 @@ def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
 
 @leaf_kernel
 def point_in_convex(px, py, corners):
-    """Tell whether a point lies in a convex counter-clockwise polygon."""
+    """Return whether a point lies in a convex counter-clockwise polygon."""
     n = len(corners)
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
@@ -205,7 +205,7 @@ def bilinear(value, column, row):
 
 @leaf_kernel
 def footprint_is_clear(space, placed, cx, cy, radius, margin):
-    """Tell whether a placed footprint keeps `margin` [m] from every obstacle; exact.
+    """Return whether a placed footprint keeps `margin` [m] from every obstacle; exact.
 
     Args:
         space: the free space; its `reach` is at least radius + margin.
@@ -296,7 +296,7 @@ def segment_clearance(space, ax, ay, bx, by, needed, enough):
 
 @leaf_kernel
 def segment_is_clear(space, ax, ay, bx, by, needed):
-    """Tell whether a segment keeps `needed` clearance [m]."""
+    """Return whether a segment keeps `needed` clearance [m]."""
     return segment_clearance(space, ax, ay, bx, by, needed, needed) >= needed
 
 

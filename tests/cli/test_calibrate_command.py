@@ -69,7 +69,7 @@ def test_wrong_usage_is_told_before_anything_is_driven(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == ExitCode.USAGE
-    told = capsys.readouterr()
-    assert named in told.err
-    assert told.out == ""
+    output = capsys.readouterr()
+    assert named in output.err
+    assert output.out == ""
     assert list(tmp_path.iterdir()) == []

@@ -91,10 +91,10 @@ def test_a_fault_alone_ends_the_mission(
 ) -> None:
     failed = ["execute", str(own_run), "--fault", "r1@2s"]
     assert main(failed) == ExitCode.MISSION_FAILED
-    told = capsys.readouterr().out
-    assert "given up on the way" in told
-    assert "r1 has broken down" in told
-    assert "replanning is off; goals left: " in told
+    output = capsys.readouterr().out
+    assert "given up on the way" in output
+    assert "r1 has broken down" in output
+    assert "replanning is off; goals left: " in output
     folder = own_run.parent / "run-fault-r1-2s"
     assert all((folder / name).exists() for name in CONTROL_FILES)
     assert main(["audit", str(folder)]) == ExitCode.MISSION_FAILED

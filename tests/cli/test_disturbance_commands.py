@@ -68,9 +68,9 @@ def test_a_wrong_disturbance_is_refused(
 ) -> None:
     before = (run / "log.npz").read_bytes()
     assert main([verb, str(run), "--disturb", spec]) == ExitCode.USAGE
-    told = capsys.readouterr().err
-    assert named in told
-    assert told.count("\n") == 1
+    output = capsys.readouterr().err
+    assert named in output
+    assert output.count("\n") == 1
     assert (run / "log.npz").read_bytes() == before
 
 
@@ -99,9 +99,9 @@ def test_a_study_is_printed_and_its_worst_case_repeatable(
 ) -> None:
     command = ["robustness", str(run), "--trials", "2", "--disturb", "capacity=-80%"]
     assert main(command) == ExitCode.OK
-    told = capsys.readouterr().out
-    assert told.startswith("2 of 2 trials feasible: probability 100.0%, 95% interval")
-    (worst,) = (line for line in told.splitlines() if "worst case" in line)
+    output = capsys.readouterr().out
+    assert output.startswith("2 of 2 trials feasible: probability 100.0%, 95% interval")
+    (worst,) = (line for line in output.splitlines() if "worst case" in line)
     words = shlex.split(worst.split("worst case")[1])
     assert words[:3] == ["mrmg", "execute", str(run)]
     study = json.loads((run / "robustness.json").read_text())["studies"][0]
@@ -133,9 +133,9 @@ def test_a_failed_execution_is_replayed(
     assert main(command) == ExitCode.MISSION_FAILED
     run = run.parent / "failed"
     assert main(["replay", str(run / "capsule.zip")]) == ExitCode.OK
-    told = capsys.readouterr().out
-    assert "fails in the same way, bit for bit" in told
-    assert "battery ran empty" in told
+    output = capsys.readouterr().out
+    assert "fails in the same way, bit for bit" in output
+    assert "battery ran empty" in output
     assert (run / "replay" / "log.json").exists()
     assert main(["replay", str(run / "capsule.zip"), "--json"]) == ExitCode.OK
     assert json.loads(capsys.readouterr().out)["same_bits"] is True

@@ -95,8 +95,8 @@ def reference(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a run that nobody stopped."""
     out = tmp_path_factory.mktemp("reference") / "run"
     process = start(scene, out)
-    _, told = process.communicate()
-    assert process.returncode == ExitCode.OK, told
+    _, output = process.communicate()
+    assert process.returncode == ExitCode.OK, output
     return out
 
 
@@ -124,8 +124,8 @@ def assert_every_file_is_whole(folder: Path) -> None:
 
 def assert_finishes_like(scene: Path, out: Path, reference: Path) -> None:
     process = start(scene, out)
-    _, told = process.communicate()
-    assert process.returncode == ExitCode.OK, told
+    _, output = process.communicate()
+    assert process.returncode == ExitCode.OK, output
     assert_every_file_is_whole(out)
     names = {path.name for path in reference.iterdir()}
     assert {path.name for path in out.iterdir()} == names
@@ -168,9 +168,9 @@ def test_ctrl_c_ends_in_one_line(tmp_path: Path, scene: Path, reference: Path) -
     process = start(scene, out)
     wait_for(out / "planning.json", process)
     process.send_signal(signal.SIGINT)
-    _, told = process.communicate()
+    _, output = process.communicate()
     assert process.returncode == 130
-    assert told == "mrmg: stopped; the same command takes it up again\n"
+    assert output == "mrmg: stopped; the same command takes it up again\n"
     assert_finishes_like(scene, out, reference)
 
 
@@ -199,8 +199,8 @@ def duration_s(
     def measured(verb: str) -> float:
         began = time.monotonic()
         process = started(words_of(verb, tmp_path_factory.mktemp("measured")))
-        _, told = process.communicate()
-        assert process.returncode == ExitCode.OK, told
+        _, output = process.communicate()
+        assert process.returncode == ExitCode.OK, output
         return time.monotonic() - began
 
     return measured
@@ -255,12 +255,12 @@ def test_ctrl_c_ends_every_verb_at_any_moment(
                 os.killpg(process.pid, signal.SIGINT)
             else:
                 process.send_signal(signal.SIGINT)
-        _, told = process.communicate(timeout=PATIENCE_S)
+        _, output = process.communicate(timeout=PATIENCE_S)
         took_s = time.monotonic() - began
         if process.returncode != 0 or took_s > DONE_ANYWAY_S:
             break
-    assert process.returncode == 130, told
-    assert told.endswith("mrmg: stopped; the same command takes it up again\n")
+    assert process.returncode == 130, output
+    assert output.endswith("mrmg: stopped; the same command takes it up again\n")
     assert left_in_group(process.pid) == []
     assert [path.name for path in tmp_path.rglob(".part-*")] == []
     for made in (folder / "run", folder / "new"):
@@ -304,9 +304,9 @@ def test_ctrl_c_while_improving_keeps_the_best_plan(tmp_path: Path) -> None:
     while b"cost" not in shown:
         shown += os.read(screen, 1000)
     process.send_signal(signal.SIGINT)
-    told, _ = process.communicate(timeout=PATIENCE_S)
+    output, _ = process.communicate(timeout=PATIENCE_S)
     os.close(screen)
     assert process.returncode == ExitCode.OK
-    assert b"solved" in told
+    assert b"solved" in output
     assert (out / "plan.npz").exists()
     assert_every_file_is_whole(out)

@@ -133,15 +133,15 @@ def test_results_of_something_else_are_not_replaced(
     video = ["--no-video"] if verb == "run" else []
     command = [verb, scene, *options, *video, "--out", str(run)]
     assert main(command) == ExitCode.USAGE
-    told = capsys.readouterr()
+    output = capsys.readouterr()
     for part in (
         named,
         "plan, drive, video, trials under disturbances",
         "--overwrite",
         "--out DIR",
     ):
-        assert part in told.err
-    assert told.out == ""
+        assert part in output.err
+    assert output.out == ""
     assert content(run) == before
 
 
@@ -162,9 +162,9 @@ def test_an_edited_scene_is_not_run_over_its_results(
     before = content(tmp_path / "runs")
     Path("site.yaml").write_text(SCENE.read_text() + "time_limit: 900\n")
     assert main(command) == ExitCode.USAGE
-    told = capsys.readouterr().err
-    assert "before it was changed" in told
-    assert "runs/one_goal-s0" in told
+    output = capsys.readouterr().err
+    assert "before it was changed" in output
+    assert "runs/one_goal-s0" in output
     assert content(tmp_path / "runs") == before
     assert main([*command, "--overwrite"]) == ExitCode.OK
     assert content(tmp_path / "runs") != before

@@ -59,10 +59,10 @@ def test_a_run_tells_its_outcome_and_where_the_report_is(
 ) -> None:
     out = ["--no-video", "--out", str(own_run)]
     assert main(["run", "quickstart", *out]) == ExitCode.OK
-    told = capsys.readouterr()
-    assert "mission done" in told.out
-    assert str(own_run / "report.html") in told.out
-    assert told.err == ""
+    reported = capsys.readouterr()
+    assert "mission done" in reported.out
+    assert str(own_run / "report.html") in reported.out
+    assert reported.err == ""
 
 
 def test_the_verbs_do_the_run_step_by_step(
@@ -178,9 +178,9 @@ def test_a_damaged_file_is_named(
 ) -> None:
     (own_run / name).write_bytes((own_run / name).read_bytes()[:50])
     assert main(["audit", str(own_run)]) == ExitCode.INVALID_FILE
-    told = capsys.readouterr()
-    assert str(own_run) in told.err
-    assert told.out == ""
+    reported = capsys.readouterr()
+    assert str(own_run) in reported.err
+    assert reported.out == ""
 
 
 @pytest.mark.parametrize(

@@ -178,15 +178,15 @@ def test_check_gives_faults_as_json(
     path = tmp_path / "turned.yaml"
     path.write_text(DEGREES.replace("radius: 1.5", "radius: -1"))
     assert main(["scene", "check", "--json", str(path)]) == ExitCode.INVALID_FILE
-    told = capsys.readouterr()
-    found = json.loads(told.out)
+    output = capsys.readouterr()
+    found = json.loads(output.out)
     (fault,) = found["faults"]
     assert (fault["path"], fault["id"], fault["line"]) == (
         "goals.0.circle.radius",
         "g1",
         8,
     )
-    assert fault["message"] in told.err
+    assert fault["message"] in output.err
     assert len(found["warnings"]) == 3
 
 
@@ -256,9 +256,9 @@ def test_a_map_that_is_none_is_told(
     path = tmp_path / "letter.txt"
     path.write_text("Dear all,\nthis is no map.\n")
     assert main(["scene", "import", str(path)]) == ExitCode.INVALID_FILE
-    told = capsys.readouterr()
-    assert "letter.txt" in told.err
-    assert told.out == ""
+    output = capsys.readouterr()
+    assert "letter.txt" in output.err
+    assert output.out == ""
 
 
 def test_the_roadmap_is_a_graph_other_tools_read(tmp_path: Path) -> None:

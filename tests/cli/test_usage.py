@@ -67,10 +67,10 @@ def test_wrong_usage_names_the_argument(
 ) -> None:
     with pytest.raises(SystemExit) as ended:
         main(arguments)
-    told = capsys.readouterr()
+    output = capsys.readouterr()
     assert ended.value.code == ExitCode.USAGE
-    assert named in told.err
-    assert told.out == ""
+    assert named in output.err
+    assert output.out == ""
 
 
 @pytest.mark.parametrize(
@@ -99,10 +99,10 @@ def test_a_mistyped_word_is_answered_with_the_nearest(
 ) -> None:
     with pytest.raises(SystemExit) as ended:
         main(line.split())
-    told = capsys.readouterr().err
+    output = capsys.readouterr().err
     assert ended.value.code == ExitCode.USAGE
-    assert answer in told
-    message, usage = told.splitlines()
+    assert answer in output
+    message, usage = output.splitlines()
     assert usage.startswith("usage: mrmg")
     assert len(message) < 100, "no wall of choices"
 
@@ -147,9 +147,9 @@ def test_steps_ask_for_a_run_folder(
     verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main([verb, str(tmp_path / "none")]) == ExitCode.INVALID_FILE
-    told = capsys.readouterr()
-    assert "not a run folder" in told.err
-    assert told.out == ""
+    output = capsys.readouterr()
+    assert "not a run folder" in output.err
+    assert output.out == ""
     assert list(tmp_path.iterdir()) == []
 
 

@@ -299,16 +299,16 @@ def test_early_end_fails_the_mission(mission: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "cure"),
+    ("changes", "remedy"),
     [
         ({"scene_digest": "another"}, "another scene"),
         ({"plan_digest": "another"}, "another plan"),
         ({"robots": ("r2", "r1")}, "log of robots"),
     ],
 )
-def test_foreign_log_is_refused(mission: Any, changes: Any, cure: str) -> None:
+def test_foreign_log_is_refused(mission: Any, changes: Any, remedy: str) -> None:
     scene, plan, log = mission()
-    with pytest.raises(RunFolderError, match=cure):
+    with pytest.raises(RunFolderError, match=remedy):
         audit(scene, plan, replace(log, **changes))
 
 

@@ -163,9 +163,9 @@ def test_the_command_prints_the_table_and_writes_the_page(
     page = tmp_path / "c.html"
     runs = [str(quickstart_run), str(own_run)]
     assert main(["compare", *runs, "-o", str(page)]) == ExitCode.OK
-    told = capsys.readouterr().out
-    assert "simulated energy" in told
-    assert told.endswith(f"{page}\n")
+    output = capsys.readouterr().out
+    assert "simulated energy" in output
+    assert output.endswith(f"{page}\n")
     assert "simulated energy" in page.read_text()
     assert main(["compare", *runs, "-o", str(page), "--json"]) == ExitCode.OK
     assert json.loads(capsys.readouterr().out)["runs"] == ["quickstart", "run"]
@@ -201,8 +201,8 @@ def test_what_differs_is_a_column_and_the_same_scene_is_one(
     head, first, second = comparison.difference_table()
     assert head == ["run", "objective", "time limit", "controller"]
     assert (first[1], second[1]) == ("energy", "makespan")
-    told = comparison.to_json()["differences"]
-    assert {"name": "objective", "values": ["energy", "makespan"]} in told
+    output = comparison.to_json()["differences"]
+    assert {"name": "objective", "values": ["energy", "makespan"]} in output
     assert "tvlqr" in comparison.to_text().splitlines()[2]
     assert "<td>tvlqr</td>" in comparison_html(comparison)
     rows = {row.name: row.cells() for row in comparison.rows}

@@ -159,9 +159,9 @@ def test_the_timeline_s_spans_are_the_activities(mission) -> None:
         float(w) for w in re.findall(r'class="act \w+" style=".*?width:([\d.]+)%', page)
     ]
     assert sum(widths) == pytest.approx(200.0, abs=0.1)  # two full rows
-    told = re.findall(r'data-tip="(r1 [^"]*)"', page)
-    assert told[1].startswith("r1 charges at s from 4.")
-    assert told[-2:] == [
+    output = re.findall(r'data-tip="(r1 [^"]*)"', page)
+    assert output[1].startswith("r1 charges at s from 4.")
+    assert output[-2:] == [
         f"r1 enters {visit.kind} {visit.target} at {visit.time_s:.1f} s"
         for visit in shown_visits(scene, plan, log.driven_motions()[0])
     ]
@@ -187,6 +187,6 @@ def test_ticks_are_round_and_few(
     scene = make_scene()
     still = [(0.0, 0.0)] * round(end_s / 0.1)
     page = timeline(scene, make_plan(scene, {"r1": still}, {"r1": ()}), None)
-    told = re.findall(r'class="tick"[^>]*>([^<]*)<', page)
-    assert told[:3] == ticks
-    assert len(told) <= 11
+    output = re.findall(r'class="tick"[^>]*>([^<]*)<', page)
+    assert output[:3] == ticks
+    assert len(output) <= 11

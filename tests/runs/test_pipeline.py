@@ -115,17 +115,17 @@ def test_an_infeasible_mission_ends_with_its_proof_and_a_report(
 def test_progress_goes_through_every_step_to_its_end(
     walled_scene: Path, tmp_path: Path
 ) -> None:
-    told: list[tuple[Step, float]] = []
+    output: list[tuple[Step, float]] = []
     pipeline.run(
         walled_scene,
         out=tmp_path / "run",
         video=None,
-        on_progress=lambda step, fraction, text: told.append((step, fraction)),
+        on_progress=lambda step, fraction, text: output.append((step, fraction)),
     )
-    steps = list(dict.fromkeys(step for step, _ in told))
+    steps = list(dict.fromkeys(step for step, _ in output))
     assert steps == [Step.PLAN, Step.DRAW, Step.REPORT]
     for step in steps:
-        fractions = [fraction for name, fraction in told if name is step]
+        fractions = [fraction for name, fraction in output if name is step]
         assert fractions[0] == 0.0
         assert fractions[-1] == 1.0
         assert fractions == sorted(fractions)

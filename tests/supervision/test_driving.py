@@ -277,9 +277,9 @@ def test_a_robot_that_is_stuck_is_done_without(yard: Scene, yard_plan: Plan) -> 
     drive = drive_mission(yard, yard_plan, disturbance=powerless)
     account = audit(yard, drive.plan, drive.log)
     assert account.mission_ok, account.reasons
-    told = [(e.cause, e.robot, e.action) for e in drive.log.events]
-    assert told[0] == ("tracking", "r1", "stop")
-    assert told[-1] == ("rest", "", "replan")
+    output = [(e.cause, e.robot, e.action) for e in drive.log.events]
+    assert output[0] == ("tracking", "r1", "stop")
+    assert output[-1] == ("rest", "", "replan")
     assert any("out of service" in event.message for event in drive.log.events)
     assert np.hypot(*np.ptp(drive.log.state[0, :, :2], axis=0)) < 1.0
 

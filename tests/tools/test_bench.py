@@ -105,11 +105,11 @@ def test_the_document_has_the_same_keys_whatever_is_measured(
     plain = quickstart.run("--seeds", "0")
     assert plain.keys() == {"bench", "protocol", "rows", "ok", "ratios"}
     assert (plain["bench"], plain["ok"], plain["ratios"]) == ("bench", True, [])
-    told = plain["protocol"]
-    assert (told["scenes"], told["seeds"]) == (["quickstart"], [0])
-    assert (told["profile"], told["budget"]) == (["default"], None)
-    assert {"mrmg", "mujoco", "numba", "Python"} <= told["versions"].keys()
-    assert told["machine"]
+    reported = plain["protocol"]
+    assert (reported["scenes"], reported["seeds"]) == (["quickstart"], [0])
+    assert (reported["profile"], reported["budget"]) == (["default"], None)
+    assert {"mrmg", "mujoco", "numba", "Python"} <= reported["versions"].keys()
+    assert reported["machine"]
     (row,) = plain["rows"]
     assert (row["scene"], row["profile"]) == ("quickstart", "default")
     assert (row["ok"], row["runs"]) == (1, 1)

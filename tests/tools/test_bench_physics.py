@@ -53,7 +53,7 @@ def test_a_mission_within_all_figures_holds(bench: SimpleNamespace) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "reported"),
     [
         ({"feasible": False}, "seed 1 infeasible"),
         ({"metered_pct": -2.1}, "worst metered_pct 2.1 > 2"),
@@ -63,15 +63,15 @@ def test_a_mission_within_all_figures_holds(bench: SimpleNamespace) -> None:
     ],
 )
 def test_one_bad_mission_makes_the_row_miss(
-    bench: SimpleNamespace, changes: dict[str, Any], told: str
+    bench: SimpleNamespace, changes: dict[str, Any], reported: str
 ) -> None:
     faults = bench.missions.faults_of([row(0), row(1, **changes), row(2)])
-    assert faults == [told]
-    assert bench.figures.verdict(faults) == f"MISSES: {told}"
+    assert faults == [reported]
+    assert bench.figures.verdict(faults) == f"MISSES: {reported}"
 
 
 @pytest.mark.parametrize(
-    ("changes", "told"),
+    ("changes", "reported"),
     [
         ({"metered_pct": 1.1}, "median metered_pct 1.1 > 1"),
         ({"measured_pct": -2.1}, "median measured_pct 2.1 > 2"),
@@ -85,9 +85,9 @@ def test_one_bad_mission_makes_the_row_miss(
     ],
 )
 def test_medians_count_where_figures_are_of_the_median(
-    bench: SimpleNamespace, changes: dict[str, Any], told: str
+    bench: SimpleNamespace, changes: dict[str, Any], reported: str
 ) -> None:
-    assert bench.missions.faults_of([row(0, **changes)] * 3) == [told]
+    assert bench.missions.faults_of([row(0, **changes)] * 3) == [reported]
     if "fleet" not in changes:
         assert bench.missions.faults_of([row(0), row(1, **changes), row(2)]) == []
 
@@ -143,10 +143,10 @@ def test_every_figure_is_told_and_judged(
         "x real time with 2 robots, slowest scene"
     ]
     bench.figures.print_figures(figures)
-    told = capsys.readouterr().out
-    assert "feasible missions | 4/4 | all | PASS" in told
-    assert "slowest scene | 39 | >= 40 | FAIL" in told
-    assert told.endswith("1 figures FAIL\n")
+    reported = capsys.readouterr().out
+    assert "feasible missions | 4/4 | all | PASS" in reported
+    assert "slowest scene | 39 | >= 40 | FAIL" in reported
+    assert reported.endswith("1 figures FAIL\n")
 
 
 def test_rows_that_nothing_is_asked_of_are_told_but_not_judged(
@@ -162,8 +162,8 @@ def test_rows_that_nothing_is_asked_of_are_told_but_not_judged(
         trials, "study_of", lambda _, kind, __: study(10 if kind.least else 1, 10)
     )
     figures, table = trials.disturbance_figures(None)
-    told = capsys.readouterr().out.splitlines()
-    rows = [line.split(" | ") for line in told if line.startswith("scene")][1:]
+    reported = capsys.readouterr().out.splitlines()
+    rows = [line.split(" | ") for line in reported if line.startswith("scene")][1:]
     assert {row[4]: row[-1] for row in rows} == {"10/10": "holds", "1/10": "not judged"}
     assert [line["feasible"] for line in table] == [10, 1, 10, 1, 10] * 2
     names = [figure.what for figure in figures]
@@ -208,11 +208,11 @@ def test_the_quickstart_is_driven_kept_and_not_driven_again(
     arguments += ["--json", str(document)]
     monkeypatch.setattr(sys, "argv", ["bench", *arguments, "--seeds", "0-1"])
     code = bench.script.main()
-    told = capsys.readouterr().out
-    line = next(item for item in told.splitlines() if item.startswith("quickstart"))
+    reported = capsys.readouterr().out
+    line = next(item for item in reported.splitlines() if item.startswith("quickstart"))
     assert " | 2/2 | " in line
-    assert code == ("| FAIL" in told)
-    assert "a mission driven again | same log | same log | PASS" in told
+    assert code == ("| FAIL" in reported)
+    assert "a mission driven again | same log | same log | PASS" in reported
     rows = [json.loads(item) for item in output.read_text().splitlines()]
     assert [item["seed"] for item in rows] == [0, 1]
     for item in rows:

@@ -26,7 +26,7 @@ def test_no_seeds_are_refused() -> None:
 
 
 def test_versions_name_packages_python_and_processor() -> None:
-    told = versions()
-    assert "mujoco " in told
-    assert f"Python {platform.python_version()}, " in told
-    assert not told.endswith(", ")
+    output = versions()
+    assert "mujoco " in output
+    assert f"Python {platform.python_version()}, " in output
+    assert not output.endswith(", ")

@@ -77,6 +77,6 @@ def test_figures_add_up_and_are_written(
     assert found["wide_functions"] == [
         {"module": "mrmg.scene.long", "function": "wide", "parameters": 9}
     ]
-    told = capsys.readouterr().out
-    assert "    452  total\n" in told
-    assert "      9  mrmg.scene.long.wide\n" in told
+    output = capsys.readouterr().out
+    assert "    452  total\n" in output
+    assert "      9  mrmg.scene.long.wide\n" in output

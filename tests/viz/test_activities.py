@@ -17,13 +17,13 @@ def motion_of(speed: list[tuple[float, float]], tick_s: float = 0.1) -> LoggedMo
     return LoggedMotion(robot="r1", time_s=tick_s * np.arange(len(v)), state=state)
 
 
-def told(spans) -> list[tuple[str, float, float]]:
+def output(spans) -> list[tuple[str, float, float]]:
     return [(s.kind, round(s.start_s, 6), round(s.end_s, 6)) for s in spans]
 
 
 def test_activities_are_the_pieces_of_the_drive(make_scene) -> None:
     motion = motion_of([(2.0, 1.0), (3.0, 0.0), (4.0, 2.0), (1.5, 0.0)])
-    assert told(activities(make_scene(), motion, ())) == [
+    assert output(activities(make_scene(), motion, ())) == [
         ("driving", 0.0, 2.0),
         ("waiting", 2.0, 5.0),
         ("driving", 5.0, 9.0),
@@ -33,7 +33,7 @@ def test_activities_are_the_pieces_of_the_drive(make_scene) -> None:
 
 def test_a_moment_s_standing_still_is_part_of_driving(make_scene) -> None:
     motion = motion_of([(2.0, 1.0), (0.3, 0.0), (2.0, -1.0), (1.0, 0.0)])
-    assert told(activities(make_scene(), motion, ())) == [
+    assert output(activities(make_scene(), motion, ())) == [
         ("driving", 0.0, 4.3),
         ("finished", 4.3, 5.3),
     ]
@@ -48,7 +48,7 @@ def test_charging_lasts_while_the_robot_is_in_the_station_of_its_tour(
     motion = motion_of([(20.0, 1.0), (1.0, 0.0)])
     visits = find_visits(scene, motion, ("s", "g"))
     spans = activities(scene, motion, visits)
-    assert told(spans)[:3] == [
+    assert output(spans)[:3] == [
         ("driving", 0.0, 4.0),
         ("charging", 4.0, 6.1),
         ("driving", 6.1, 20.0),

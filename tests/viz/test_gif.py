@@ -76,8 +76,8 @@ def test_the_command_shows_a_part_from_a_robot_s_place(
     small = ["--size", "320x240", "--fps", "5", "--speed", "4"]
     part = ["--from", "10", "--to", "14", "--view", "chase", "--robot", "r2"]
     assert main(["render", str(own_run), *small, *part, "--gif"]) == ExitCode.OK
-    told = capsys.readouterr().out.split()
-    assert [Path(line).name for line in told] == [
+    output = capsys.readouterr().out.split()
+    assert [Path(line).name for line in output] == [
         "overview.png",
         "energy.png",
         "mission.gif",

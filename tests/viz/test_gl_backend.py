@@ -1,4 +1,4 @@
-"""Finding OpenGL: a working backend is taken, a missing one is named with its cure."""
+"""Finding OpenGL: a working backend is taken, a missing one is named."""
 
 from __future__ import annotations
 

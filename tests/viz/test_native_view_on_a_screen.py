@@ -86,7 +86,7 @@ native_view.open_window(replay.film.scene, replay)
 def test_slider_and_keys_move_the_time(quickstart_run: Path, tmp_path: Path) -> None:
     script = tmp_path / "person.py"
     script.write_text(PERSON)
-    shown, told = subprocess.PIPE, subprocess.STDOUT
+    shown, output = subprocess.PIPE, subprocess.STDOUT
     screen = subprocess.Popen(
         ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x720x24"],
         stdout=shown,
@@ -100,7 +100,7 @@ def test_slider_and_keys_move_the_time(quickstart_run: Path, tmp_path: Path) -> 
             [sys.executable, str(script), str(quickstart_run)],
             env={**os.environ, "DISPLAY": f":{number}"},
             stdout=shown,
-            stderr=told,
+            stderr=output,
             text=True,
         )
         assert viewer.stdout is not None

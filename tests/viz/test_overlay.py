@@ -75,10 +75,12 @@ def test_the_legend_names_obstacles_for_some_robots_where_there_are_any(
 
 
 @pytest.mark.parametrize(
-    ("heading_for", "broken_down", "told"),
+    ("heading_for", "broken_down", "output"),
     [("g1", False, "to g1"), ("", False, "tour done"), ("g1", True, "broken down")],
 )
-def test_a_robot_s_way_is_told(heading_for: str, broken_down: bool, told: str) -> None:
+def test_a_robot_s_target_is_shown(
+    heading_for: str, broken_down: bool, output: str
+) -> None:
     robot = RobotReading(
         robot="r1",
         charge=0.5,
@@ -86,4 +88,4 @@ def test_a_robot_s_way_is_told(heading_for: str, broken_down: bool, told: str) -
         heading_for=heading_for,
         broken_down=broken_down,
     )
-    assert robot.way("to") == told
+    assert robot.way("to") == output

@@ -265,8 +265,8 @@ def test_the_command_serves_until_it_is_stopped(
     with urllib.request.urlopen(line.split()[2]) as answer:
         assert answer.status == 200
     served.send_signal(signal.SIGINT)
-    _, told = served.communicate()
-    assert (served.returncode, told) == (130, "")
+    _, output = served.communicate()
+    assert (served.returncode, output) == (130, "")
 
 
 def test_a_file_that_is_neither_run_nor_scene_is_told(

@@ -51,7 +51,7 @@ def decoded(path: Path) -> list[av.VideoFrame]:
 @pytest.mark.parametrize("view", VIEWS)
 def test_file_plays_with_all_frames_and_is_not_blank(mission, view, tmp_path) -> None:
     scene, plan, log = mission
-    path, told = tmp_path / "mission.mp4", []
+    path, output = tmp_path / "mission.mp4", []
     render_video(
         scene,
         plan,
@@ -61,11 +61,11 @@ def test_file_plays_with_all_frames_and_is_not_blank(mission, view, tmp_path) ->
         speed=4.0,
         size=(640, 360),
         fps=5,
-        on_progress=lambda fraction, _: told.append(fraction),
+        on_progress=lambda fraction, _: output.append(fraction),
     )
     frames = decoded(path)
     assert len(frames) == int(log.time_s[-1] / (4.0 / 5)) + 1
-    assert told == pytest.approx([(n + 1) / len(frames) for n in range(len(frames))])
+    assert output == pytest.approx([(n + 1) / len(frames) for n in range(len(frames))])
     for frame in (frames[0], frames[-1]):
         assert (frame.width, frame.height) == (640, 360)
         assert frame.format.name == "yuv420p"

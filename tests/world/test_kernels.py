@@ -208,7 +208,7 @@ def test_footprints_are_clear_exactly_when_shapely_says(
     maps: list, outline: np.ndarray, margin_m: float
 ) -> None:
     rng = np.random.default_rng(7)
-    told = []
+    output = []
     for world_map in maps:
         for point in world_map.random_points(rng, 250):
             pose = np.array([*point, rng.uniform(-4.0, 4.0)])
@@ -216,8 +216,8 @@ def test_footprints_are_clear_exactly_when_shapely_says(
             exact = exact_clearance_m(world_map, placed)
             if abs(exact - margin_m) > TIE_M:
                 assert clear == (exact > margin_m), (world_map.bounds, pose, exact)
-                told.append(clear)
-    assert 0.2 < np.mean(told) < 0.8, "both answers must be drawn"
+                output.append(clear)
+    assert 0.2 < np.mean(output) < 0.8, "both answers must be drawn"
 
 
 def test_a_lath_just_inside_an_obstacle_is_not_clear(make_map: Callable) -> None:
@@ -307,7 +307,7 @@ def test_segment_clearance_is_exact_within_half_a_cell(maps: list) -> None:
 
 def test_segments_are_clear_within_half_a_cell(maps: list) -> None:
     rng = np.random.default_rng(9)
-    told = []
+    output = []
     for world_map in maps:
         for a, b in world_map.random_points(rng, 60).reshape(-1, 2, 2):
             exact = exact_segment_clearance_m(world_map, a, b)
@@ -315,8 +315,8 @@ def test_segments_are_clear_within_half_a_cell(maps: list) -> None:
                 clear = _kernels.segment_is_clear(world_map.space, *a, *b, needed)
                 if abs(exact - needed) > 0.5 * CELL_M:
                     assert clear == (exact > needed)
-                    told.append(clear)
-    assert 0.1 < np.mean(told) < 0.9
+                    output.append(clear)
+    assert 0.1 < np.mean(output) < 0.9
 
 
 def test_segments_without_length_are_points(make_map: Callable) -> None:

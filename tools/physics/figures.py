@@ -43,8 +43,8 @@ class Figure:
 
 def verdict(faults: Iterable[str]) -> str:
     """Return the last cell of a table's row."""
-    told = ", ".join(faults)
-    return f"MISSES: {told}" if told else "holds"
+    output = ", ".join(faults)
+    return f"MISSES: {output}" if output else "holds"
 
 
 def print_figures(figures: list[Figure]) -> None:

@@ -137,8 +137,8 @@ def _repeated(rows: Sequence[Row]) -> Figure:
     same = first is not None and (
         mission((first["scene"], first["seed"]))["log_digest"] == first["log_digest"]
     )
-    told = "same log" if same else "another log"
-    return Figure("a mission driven again", told, "same log", same)
+    output = "same log" if same else "another log"
+    return Figure("a mission driven again", output, "same log", same)
 
 
 def figures_of(rows: Sequence[Row]) -> list[Figure]:

@@ -93,9 +93,9 @@ def disturbance_figures(options: TrialOptions) -> tuple[list[Figure], list[Row]]
             studies[kind].append(study)
             figure = figure_of(source, kind, study)
             faults = [] if figure.holds else [f"{figure.found} not {figure.asked}"]
-            told = verdict(faults) if kind.least else "not judged"
+            output = verdict(faults) if kind.least else "not judged"
             rows.append(study_row(source, kind, study))
-            print(" | ".join([*cells(rows[-1]), told]), flush=True)
+            print(" | ".join([*cells(rows[-1]), output]), flush=True)
             if kind.least:
                 figures.append(figure)
     figures.append(gain_figure(studies[TIGHT], studies[SAVED]))
@@ -214,5 +214,5 @@ def repeated_figure(options: TrialOptions) -> Figure:
         arguments = replace(run.arguments, disturb="", disturb_seed=trial.seed)
         again = drive_as(run.scene, run.plan(), arguments)
     same = again.log.digest == trial.log_digest
-    told = "same log" if same else "another log"
-    return Figure("a trial by a worker and here", told, "same log", same)
+    output = "same log" if same else "another log"
+    return Figure("a trial by a worker and here", output, "same log", same)

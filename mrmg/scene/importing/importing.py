@@ -35,7 +35,7 @@ def import_files(
     Args:
         files: maps, layouts and features, of any kinds.
         options: how to read them.
-        kind: what the files are; None to tell by their content.
+        kind: what the files are; None to find it by their content.
         keepout: mask of a Nav2 map, or another file, whose obstacles close ground.
         terrain_mask: speed or cost mask of a Nav2 map.
         land_cover: raster or GeoJSON of classes that the table in `options` explains.

@@ -46,7 +46,7 @@ def carried_files(scene: Scene) -> dict[str, bytes]:
 
 
 def safe_path(name: str) -> bool:
-    """Tell whether a path of a carried file stays in the folder it is put into."""
+    """Return whether a path of a carried file stays in the folder it is put into."""
     path = PurePosixPath(name)
     return (
         path.parts[:1] == (MODELS_FOLDER,)

@@ -155,7 +155,7 @@ def _merged_battery(battery: _Entry, given: Any) -> Any:
 
 
 def _named(key: str, given: _Entry) -> bool:
-    """Tell whether a battery's entry names a key, in whatever unit."""
+    """Return whether a battery's entry names a key, in whatever unit."""
     capacities = [name for name in given if name.startswith("capacity_")]
     return key in given or (key.startswith("capacity_") and bool(capacities))
 

@@ -40,7 +40,7 @@ def faults_of(error: ValidationError, model: type[BaseModel]) -> list[Fault]:
 
 
 def _is_meant(detail: dict[str, Any]) -> bool:
-    """Tell whether an error is about what the user meant of a word or a mapping."""
+    """Return whether an error is about what the user meant of a word or a mapping."""
     end = detail["loc"][-1] if detail["loc"] else ""
     if _is_word(end):
         return not isinstance(detail["input"], dict)

@@ -27,7 +27,7 @@ class Strict(BaseModel):
 
 
 def exactly_one(*keys: str) -> ConfigDict:
-    """Return what tells editors that exactly one of some keys is given."""
+    """Return what distinguishes editors that exactly one of some keys is given."""
     return ConfigDict(json_schema_extra={"oneOf": [{"required": [k]} for k in keys]})
 
 

@@ -84,7 +84,7 @@ def test_shipped_models_can_be_edited(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "path", "told"),
+    ("text", "path", "output"),
     [
         (TEXT, "turning", "turning: missing"),
         (TEXT, "wheel__mass", "wheel.mass: missing"),
@@ -94,6 +94,6 @@ def test_shipped_models_can_be_edited(name: str) -> None:
         ("", "a", "a: missing"),
     ],
 )
-def test_what_cannot_be_changed_is_named(text: str, path: str, told: str) -> None:
-    with pytest.raises(SceneError, match=told):
+def test_what_cannot_be_changed_is_named(text: str, path: str, output: str) -> None:
+    with pytest.raises(SceneError, match=output):
         changed(text, **{path: new("1")})

@@ -259,8 +259,8 @@ def test_avoiding_survives_the_scenes_document(tmp_path: Path) -> None:
             {"grid": [[0, 0], [0, 0]], "slope": "avoid"}, tmp_path, robots=ASIDE
         )
         moved = replace(flat, elevation=scene.elevation)
-        told = scene_from_document(moved.document, source="told")
-        assert len(told.barriers) == len(scene.barriers)
+        output = scene_from_document(moved.document, source="output")
+        assert len(output.barriers) == len(scene.barriers)
 
 
 def test_nobody_starts_on_ground_too_steep() -> None:

@@ -27,17 +27,17 @@ CAR = of("car")
 @pytest.fixture(scope="module", params=shipped.model_names())
 def measured(request: pytest.FixtureRequest) -> Calibration:
     """A shipped model, calibrated from beliefs that are far off."""
-    told: list[float] = []
+    output: list[float] = []
     model = replace(
         of(request.param),
         rolling_coefficient=0.6 * of(request.param).rolling_coefficient,
         turning_coefficient=2.0 * of(request.param).turning_coefficient,
         wheel_inertia_kg_m2=0.5 * of(request.param).wheel_inertia_kg_m2,
     )
-    calibration = calibrate(model, on_progress=lambda done, _: told.append(done))
-    assert told == sorted(told)
-    assert told[0] == 0.0
-    assert told[-1] < 1.0
+    calibration = calibrate(model, on_progress=lambda done, _: output.append(done))
+    assert output == sorted(output)
+    assert output[0] == 0.0
+    assert output[-1] < 1.0
     return calibration
 
 

@@ -79,10 +79,10 @@ def test_a_stopped_study_is_taken_up(run: Run, three: tuple[Study, str]) -> None
     kept = sorted(run.folder.file("trials").rglob("*.json"))
     assert [path.name for path in kept] == ["000005.json", "000006.json"]
     before = [path.stat().st_mtime_ns for path in kept]
-    told: list[tuple[int, int, int]] = []
-    study_robustness(run, trials=3, seed=5, on_trial=lambda *now: told.append(now))
+    output: list[tuple[int, int, int]] = []
+    study_robustness(run, trials=3, seed=5, on_trial=lambda *now: output.append(now))
     assert [path.stat().st_mtime_ns for path in kept] == before
-    assert told == [(1, 3, 1), (2, 3, 2), (3, 3, 3)]
+    assert output == [(1, 3, 1), (2, 3, 2), (3, 3, 3)]
     assert run.folder.file("robustness.json").read_text() == three[1]
 
 

@@ -57,7 +57,7 @@ class Description:
 
 
 def read_description(path: Path, arguments: Mapping[str, str]) -> Description:
-    """Read a robot description of any kind, told by its content.
+    """Read a robot description of any kind, found by its content.
 
     Args:
         path: of the file.
