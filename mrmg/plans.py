@@ -134,7 +134,9 @@ class Plan:
 
     Attributes:
         scene_name, scene_digest: the scene it was made for.
-        seed, profile, parameters_digest, versions: how it was made.
+        seed, profile, parameters_digest, versions: how it was made; versions include
+            those of packages that added planner or router.
+        planner, router: names of what made it; "" in plans of older versions.
         dt_s: step length of all trajectories.
         trajectories: one per robot, in the scene's order.
         tours: targets of each robot in the order of its visits.
@@ -160,6 +162,8 @@ class Plan:
     ledger: EnergyLedger
     content_J: Mapping[str, np.ndarray] = field(default_factory=dict)
     rolling_factor: Mapping[str, np.ndarray] = field(default_factory=dict)
+    planner: str = ""
+    router: str = ""
 
     @property
     def cost_J(self) -> float:
@@ -202,6 +206,9 @@ class Plan:
         header = {**self._header(), "motions": motions}
         storage.write_json(folder / f"{name}.json", header)
 
+    def _makers(self) -> dict[str, str]:
+        return {"planner": self.planner, "router": self.router}
+
     def _header(self) -> dict[str, Any]:
         return {
             "format": PLAN_FORMAT,
@@ -211,6 +218,7 @@ class Plan:
             "profile": self.profile,
             "parameters_digest": self.parameters_digest,
             "versions": dict(self.versions),
+            **{name: made for name, made in self._makers().items() if made},
             "dt_s": self.dt_s,
             "robots": [trajectory.robot for trajectory in self.trajectories],
             "tours": {robot: list(tour) for robot, tour in self.tours.items()},
@@ -275,6 +283,8 @@ def _plan_from(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Plan:
         tours={robot: tuple(tour) for robot, tour in header["tours"].items()},
         visits=tuple(Visit(**visit) for visit in header["visits"]),
         ledger=EnergyLedger.from_rows(header["ledger"]),
+        planner=header.get("planner", ""),
+        router=header.get("router", ""),
         content_J=_by_robot(arrays, _CONTENT),
         rolling_factor=_by_robot(arrays, _FACTOR),
     )

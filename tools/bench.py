@@ -51,7 +51,7 @@ from protocol import (
 import mrmg
 from mrmg.energy.model import ENERGY_PRESETS, EnergyPreset
 from mrmg.planning import plan_mission, profile_params
-from mrmg.planning.planner import bounds_of
+from mrmg.planning.bounding import bounds_of
 from mrmg.planning.statistics import UNKNOWN
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene

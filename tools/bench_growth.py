@@ -40,7 +40,7 @@ import mrmg
 from mrmg import seeding
 from mrmg.errors import UsageError
 from mrmg.planning import PlannerParams, plan_mission
-from mrmg.planning.planner import compile_kernels
+from mrmg.planning.preparation import compile_kernels
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.populating import populate
 

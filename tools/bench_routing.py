@@ -26,9 +26,10 @@ from protocol import Row, Trials, add_file_options, run, write_document
 
 from mrmg import storage
 from mrmg.planning.bound.exact_tours import exact_routing
-from mrmg.planning.routers import route
+from mrmg.planning.routers import find_router
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import RouterParams, routing_arrays
+from mrmg.planning.routing.routing_problem import RoutingProblem
 
 PROVEN = {
     "S1_2i6s": 1578.12,
@@ -86,7 +87,7 @@ def against_exact(instances: int, trials: Trials) -> tuple[list[Row], list[Row]]
     rows, table = [], []
     print("router | within 1 % | optimal | worst gap | median s | slowest s")
     for params in COMPARED:
-        ready = cache(partial(route, cases[0][1], params, 0))
+        ready = cache(partial(find_router(params), RoutingProblem.of(cases[0][1]), 0))
         of_router = [
             trials.row(
                 partial(compared, ready, params, *case),
@@ -214,7 +215,7 @@ def compared(
     """Solve one mission, with a router that has been at work before."""
     ready()
     began = time.perf_counter()
-    routing = route(problem, params, seed)
+    routing = find_router(params)(RoutingProblem.of(problem), seed)
     return {
         "router": params.method,
         "seed": seed,
@@ -243,7 +244,7 @@ def green_row(path: Path, optimum: float, params: RouterParams) -> Row:
     """Solve a Green VRP instance."""
     problem = read_green_vrp(path)
     began = time.perf_counter()
-    routing = route(problem, params, 0)
+    routing = find_router(params)(RoutingProblem.of(problem), 0)
     return {
         "router": params.method,
         "instance": path.stem,

@@ -59,7 +59,9 @@ def _verbs(parser: Parser, name: str = "") -> Iterator[tuple[str, list[_Argument
 
 def _argument(action: argparse.Action, parser: Parser) -> _Argument:
     metavar = str(action.metavar or action.dest.upper())
-    words = dict.fromkeys(map(str, action.choices or ()), "")
+    words = dict.fromkeys(
+        map(str, action.choices or getattr(action, "suggested", ()) or ()), ""
+    )
     is_verb = not action.option_strings and action.choices is not None
     if is_verb and parser.verbs():
         words = {name: verb.summary for name, verb in parser.verbs().items()}

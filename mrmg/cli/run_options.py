@@ -6,6 +6,8 @@ import argparse
 from collections.abc import Callable
 from typing import Any
 
+from mrmg import extensions
+from mrmg.errors import UsageError
 from mrmg.runs.arguments import RunArguments, VideoArguments
 from mrmg.runs.options import Option, options_of
 
@@ -25,13 +27,14 @@ def add_options(
             exclusive = parser.add_mutually_exclusive_group
             place = groups.setdefault(option.group, None) or exclusive()
             groups[option.group] = place
-        place.add_argument(
+        argument = place.add_argument(
             option.flag,
             dest=option.name,
             default=argparse.SUPPRESS,
             help=option.help.replace("%", "%%"),
             **_details(option),
         )
+        argument.suggested = option.choices  # to complete
         for retired in option.formerly:
             place.add_argument(
                 "--" + retired.replace("_", "-"),
@@ -78,12 +81,26 @@ def reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
     return read_text
 
 
+def _name(group: str) -> Callable[[str], str]:
+    """Return a reader of names of planners or routers."""
+
+    def read_name(text: str) -> str:
+        try:
+            return extensions.require(group, text)
+        except UsageError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return read_name
+
+
 def _details(option: Option) -> dict[str, Any]:
     """Return the keywords of `add_argument` for one option."""
     if isinstance(option.default, bool):
         both = option.verbs == ("render",)  # which keeps what it was asked before
         action: Any = argparse.BooleanOptionalAction if both else "store_true"
         return {"action": action}
+    if option.extended:
+        return {"type": _name(option.extended), "metavar": option.metavar}
     if option.choices:
         return {"choices": option.choices}
     if option.default == ():

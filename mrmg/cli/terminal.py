@@ -124,7 +124,7 @@ def compile_kernels() -> None:
     with _bars() as bars:
         if bars is None:
             return  # planning does it
-        from mrmg.planning.planner import compile_kernels
+        from mrmg.planning.preparation import compile_kernels
 
         task = bars.add_task("compiling", total=None, note="")
         note = "{} kernels, once for this version"

@@ -1,15 +1,30 @@
-"""From a scene to a plan: roadmap, routers, planners."""
+"""From a scene to a plan: roadmap, routers, planners.
 
-from mrmg.planning.parameters import (
-    PROFILES as PROFILES,
-)
-from mrmg.planning.parameters import (
-    PlannerParams as PlannerParams,
-)
-from mrmg.planning.parameters import (
-    profile_params as profile_params,
-)
-from mrmg.planning.planner import plan_mission as plan_mission
-from mrmg.planning.statistics import Improvement as Improvement
+For planners and routers of your own: `Planner`, `Problem`, `Request` and `Attempt`;
+`Router`, `RoutingProblem` and `Routing`.
+"""
 
-__all__ = ["Improvement", "PROFILES", "PlannerParams", "plan_mission", "profile_params"]
+from mrmg.planning.attempt import Attempt, Request
+from mrmg.planning.parameters import PROFILES, PlannerParams, profile_params
+from mrmg.planning.planner import plan_mission
+from mrmg.planning.planners import Planner
+from mrmg.planning.problem.problem import Problem
+from mrmg.planning.routers import Router
+from mrmg.planning.routing.routing import Routing
+from mrmg.planning.routing.routing_problem import RoutingProblem
+from mrmg.planning.statistics import Improvement
+
+__all__ = [
+    "Attempt",
+    "Improvement",
+    "PROFILES",
+    "Planner",
+    "PlannerParams",
+    "Problem",
+    "Request",
+    "Router",
+    "Routing",
+    "RoutingProblem",
+    "plan_mission",
+    "profile_params",
+]

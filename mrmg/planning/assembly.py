@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import version
 
+from mrmg import extensions
 from mrmg.energy.metering import battery_profile, find_visits, plan_ledger
 from mrmg.energy.visits import crowded_stations
 from mrmg.planning.feasibility import energy_and_metres
@@ -53,10 +54,9 @@ def make_plan(
         seed=seed,
         profile=params.profile,
         parameters_digest=params.digest,
-        versions={
-            name: version(name)
-            for name in ("mrmg", "numba", "numpy", "scipy", "shapely")
-        },
+        planner=params.planner,
+        router=params.router.method,
+        versions=_versions(params),
         dt_s=params.dt_s,
         trajectories=tuple(
             replace(each, motion=scene.robot(each.robot).model.motion_name)
@@ -66,6 +66,18 @@ def make_plan(
         visits=tuple(visits),
         ledger=plan_ledger(scene, trajectories, visits),
     )
+
+
+def _versions(params: PlannerParams) -> dict[str, str]:
+    """Return the versions of the packages that decide a plan."""
+    own = {
+        name: version(name) for name in ("mrmg", "numba", "numpy", "scipy", "shapely")
+    }
+    added = (
+        extensions.origin(extensions.PLANNERS, params.planner),
+        extensions.origin(extensions.ROUTERS, params.router.method),
+    )
+    return own | dict(package.rsplit(" ", 1) for package in added if package)
 
 
 def why_refused(

@@ -15,7 +15,6 @@ import numpy as np
 from mrmg import seeding
 from mrmg.compared import compared
 from mrmg.planning import endings
-from mrmg.planning.attempt import router_problem
 from mrmg.planning.bound.joint_bound import Divisions
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.bound.tour_existence import NoTours, proof_of_no_tours
@@ -23,8 +22,9 @@ from mrmg.planning.endings import counted, listed
 from mrmg.planning.feasibility import energy_and_metres, proof_of_infeasibility
 from mrmg.planning.halting import NEVER, Halted
 from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.path_following import easiest
 from mrmg.planning.preference import TIME_MARGIN_S
-from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.problem import Problem, unjoined_goals
 from mrmg.planning.problem.targets import finish_of
 from mrmg.planning.roadmap.roadmap import Roadmap
 from mrmg.planning.routing.shortfall import shortfall
@@ -125,14 +125,6 @@ def _more_energy(robot: Robot, share: float) -> str:
     return f"{share:.0%} more usable energy, which is {more} for {robot.id}"
 
 
-def unjoined_goals(scene: Scene, roadmap: Roadmap) -> list[str]:
-    """Return the goals to which the roadmap knows no path for any robot."""
-    joined = np.isfinite(roadmap.start_distance).any(axis=0)
-    return [
-        goal.id for goal, fine in zip(scene.goals, joined, strict=False) if not fine
-    ]
-
-
 def _unjoined_finishes(scene: Scene, roadmap: Roadmap) -> list[str]:
     """Return the finishes to which the roadmap knows no path for their robots."""
     return [
@@ -217,7 +209,7 @@ def _missing_tours(problem: Problem, params: PlannerParams, seed: int) -> str:
     """Return which goals tours leave out on the roadmap, and what they are short of."""
     scene = problem.scene
     missing = shortfall(
-        router_problem(problem, params).mission.routing,
+        easiest(problem, params).mission.routing,
         params.router,
         seeding.stream_seed(seed, "shortfall"),
     )

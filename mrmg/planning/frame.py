@@ -10,6 +10,7 @@ it found where the mission really is.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import compress
 from math import pi, remainder, tau
 
 import numpy as np
@@ -165,10 +166,12 @@ def on_the_map(
     """
     if problem.scene is scene:
         return attempt
-    moved = [
-        (found, _moved(plan, problem, scene, params)) for found, plan in attempt.plans
-    ]
-    return replace(attempt, plans=[(found, plan) for found, plan in moved if plan])
+    moved = [_moved(plan, problem, scene, params) for plan in attempt.plans]
+    return replace(
+        attempt,
+        plans=[plan for plan in moved if plan],
+        found_at=list(compress(attempt.found_at, moved)),
+    )
 
 
 def _moved(

@@ -14,8 +14,9 @@ from mrmg.planning.guided_tree.planner import grow_guided_tree
 from mrmg.planning.parameters import GUIDED_TREE, PlannerParams
 from mrmg.planning.problem.problem import Problem, state_problem
 from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
-from mrmg.planning.routers import route
+from mrmg.planning.routers import find_router
 from mrmg.planning.routing.routing import Routing
+from mrmg.planning.routing.routing_problem import RoutingProblem
 from mrmg.planning.tree.motion_tree import Growth as TreeGrowth
 from mrmg.planning.tree.motion_tree import grow_tree
 from mrmg.plans import Trajectory
@@ -96,7 +97,9 @@ def _grow(
     if params.planner == GUIDED_TREE:
         guided = grow_guided_tree(problem, params, draw, halt)
         return Routing(guided.first_tours, cost_J=0.0), guided
-    routing = route(problem.mission.routing, params.router, draw)
+    routing = find_router(params.router)(
+        RoutingProblem.of(problem.mission.routing), draw
+    )
     if not routing.feasible:
         return routing, None
     return routing, grow_tree(problem, params, routing, draw, halt)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field, replace
 
-from mrmg import storage
+from mrmg import extensions, storage
 from mrmg.errors import UsageError
 from mrmg.planning.routing.routing import RouterParams
 
 PROFILES = ("default", "paper")
 
-PATH_FOLLOWING, GUIDED_TREE = PLANNERS = ("path_following", "guided_tree")
-"""Planners by name: path following along tours, with a motion tree where that fails;
-and the paper's method (`guided_tree`)."""
+PATH_FOLLOWING, GUIDED_TREE = PLANNERS = extensions.BUILT_IN[extensions.PLANNERS]
+"""Planners of this package: path following along tours, with a motion tree where that
+fails; and the paper's method (`guided_tree`)."""
 
 THOROUGH = 6
 """Refinements of each plan when there is a budget to be spent."""
@@ -86,7 +86,7 @@ class PlannerParams:
 
     Attributes:
         profile: "default", or "paper" for the paper's method and parameters.
-        planner: one of PLANNERS.
+        planner: name of the planner (`planners.find_planner`).
         guided_tree: parameters of the planner of that name.
         samples: free samples of the roadmap (ConstructPRM).
         neighbours: nearest vertices joined in the roadmap.
@@ -152,7 +152,6 @@ class PlannerParams:
     def __post_init__(self) -> None:
         allowed = {
             "profile": self.profile in PROFILES,
-            "planner": self.planner in PLANNERS,
             "samples": self.samples >= 0,
             "neighbours": self.neighbours >= 1,
             "dt_s": 0.0 < self.dt_s <= 0.2,
@@ -207,8 +206,8 @@ def profile_params(
 
     Args:
         profile: "default" or "paper", which is planner guided_tree with router nrpa.
-        planner: one of PLANNERS; None for the profile's.
-        router: one of `routing.METHODS`; None for the planner's.
+        planner: name of the planner; None for the profile's.
+        router: name of the router; None for the planner's.
         budget_s: time limit [s]; None for none.
         trees: number of trees to grow, all of them; None for the profile's.
         spare: share of every battery's capacity that plans leave above the reserve
@@ -218,6 +217,10 @@ def profile_params(
         UsageError: if a name is unknown, names contradict each other, or a number is
             out of range.
     """
+    if planner is not None:
+        extensions.require(extensions.PLANNERS, planner)
+    if router is not None:
+        extensions.require(extensions.ROUTERS, router)
     guided = planner == GUIDED_TREE or (planner is None and profile == "paper")
     params = paper_params() if guided else PlannerParams()
     if profile != "default":

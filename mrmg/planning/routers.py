@@ -1,47 +1,80 @@
-"""The routers by name: whoever asks for tours asks here."""
+"""Routers: who visits which goals in which order, and recharges where."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from types import MappingProxyType
 from typing import Protocol
 
+from mrmg import extensions
 from mrmg.planning.bound.exact_tours import exact_routing
-from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import RouterParams, Routing, solve_routing
+from mrmg.planning.routing.routing_problem import RoutingProblem, faults_of_tours
 
 
 class Router(Protocol):
-    """Solves routing problems.
+    """Solves routing problems; `mrmg.testing.RouterContract` tests what it must keep.
 
     Tours visit every open goal once, keep every battery above its reserve and every
-    route within its limit; the cost is theirs. The same seed gives the same tours.
+    tour within its limit; the cost is their energy. The same problem and seed give the
+    same tours, on any thread.
     """
 
-    def __call__(
-        self, problem: RoutingArrays, params: RouterParams, seed: int
-    ) -> Routing:
+    def __call__(self, problem: RoutingProblem, seed: int) -> Routing:
         """Return tours, of infinite cost if none were found."""
 
 
-def _nrpa_alone(problem: RoutingArrays, params: RouterParams, seed: int) -> Routing:
-    return solve_routing(problem, replace(params, rounds=0), seed)
+def search(params: RouterParams, problem: RoutingProblem, seed: int) -> Routing:
+    """Find tours by NRPA, and improve them by ruin and recreate."""
+    return solve_routing(problem.arrays, params, seed)
 
 
-def _exact(problem: RoutingArrays, params: RouterParams, seed: int) -> Routing:
-    best = exact_routing(problem)
-    return solve_routing(problem, params, seed) if best is None else best
+def nrpa(params: RouterParams, problem: RoutingProblem, seed: int) -> Routing:
+    """Find tours by nested rollout policy adaptation alone."""
+    return solve_routing(problem.arrays, replace(params, rounds=0), seed)
 
 
-ROUTERS: Mapping[str, Router] = MappingProxyType(
-    {"nrpa": _nrpa_alone, "search": solve_routing, "exact": _exact}
+def exact(params: RouterParams, problem: RoutingProblem, seed: int) -> Routing:
+    """Return the cheapest tours, or those of `search` where `exact_routing` has none.
+
+    It has none where the mission is too large, or has an option that it does not know.
+    """
+    best = exact_routing(problem.arrays)
+    return search(params, problem, seed) if best is None else best
+
+
+ROUTERS: Mapping[str, Callable[[RouterParams, RoutingProblem, int], Routing]] = (
+    MappingProxyType({"search": search, "nrpa": nrpa, "exact": exact})
 )
-"""nrpa: nested rollout policy adaptation alone; search: improved by ruin and recreate;
-exact: the cheapest tours there are, or those of `search` where the mission is too large
-or has an option that exact tours do not know (`exact_routing`)."""
+"""The routers of this package by name."""
 
 
-def route(problem: RoutingArrays, params: RouterParams, seed: int) -> Routing:
-    """Solve a routing problem with the router that the parameters name."""
-    return ROUTERS[params.method](problem, params, seed)
+def find_router(params: RouterParams) -> Router:
+    """Return the router that parameters name.
+
+    Raises:
+        UsageError: if there is none of that name.
+        MachineError: if the package that adds it is broken.
+    """
+    if params.method in ROUTERS:
+        return partial(ROUTERS[params.method], params)
+    return checked(extensions.load(extensions.ROUTERS, params.method), params.method)
+
+
+def checked(router: Router, name: str) -> Router:
+    """Return a router whose tours are refused if they break their rules."""
+
+    def route(problem: RoutingProblem, seed: int) -> Routing:
+        routing = router(problem, seed)
+        if not isinstance(routing, Routing):
+            what = f"returned {routing!r}, not a Routing"
+            raise extensions.fault(extensions.ROUTERS, name, what)
+        faults = "; ".join(faults_of_tours(problem, routing))
+        if faults:
+            what = f"returned wrong tours: {faults}"
+            raise extensions.fault(extensions.ROUTERS, name, what)
+        return routing
+
+    return route

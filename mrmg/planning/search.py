@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
+from itertools import repeat
 
 import numpy as np
 
@@ -48,8 +50,8 @@ class Search:
         statistics: receives counts, times and improvements.
         workers: threads.
         on_progress, on_improvement: told how it goes.
-        proof: asked, once an attempt has failed, why the mission has no solution; None
-            if that is not known.
+        proof: returns why the mission has no solution, None if that is not known; takes
+            whether no tours were found. Called once an attempt has failed.
         preference: what plans are compared by.
         best: the best plan so far that is in time.
         earliest_s: when the earliest of all plans is over.
@@ -66,7 +68,7 @@ class Search:
     workers: int
     on_progress: Progress
     on_improvement: OnImprovement
-    proof: Callable[[], str | None]
+    proof: Callable[[bool], str | None]
     preference: Preference = field(default_factory=Preference)
     best: Plan | None = None
     earliest_s: float = math.inf
@@ -98,11 +100,17 @@ class Search:
                     self.tours_found |= attempt.tours_found
                     self.blocked = attempt.blocked or self.blocked
                     self.statistics.add(dict(attempt.counts), attempt.routing_s)
-                    found += any([self._take(*each) for each in attempt.plans])
+                    times = attempt.found_at or repeat(time.perf_counter())
+                    plans = zip(times, attempt.plans, strict=False)
+                    found += any([self._take(*each) for each in plans])
                     self.on_progress(self._fraction(found), f"{found} plans")
                     if self._enough(found):
                         break
-                    if self.attempts == 1 and not found and self.proof():
+                    if (
+                        self.attempts == 1
+                        and not found
+                        and self.proof(self.tours_missing)
+                    ):
                         break
             except KeyboardInterrupt:
                 if self.best is None or self.params.budget_s is None:

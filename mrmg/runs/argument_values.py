@@ -84,6 +84,16 @@ def switch(value: Any) -> bool:
     return value
 
 
+def name(value: Any) -> str:
+    """Read the name of a planner or router."""
+    if not isinstance(value, str):
+        raise ValueError(
+            f"{value!r} is not a name; `mrmg.plan` takes objects, a run takes names, "
+            "which packages add by entry points"
+        )
+    return value
+
+
 def words(value: Any) -> tuple[str, ...]:
     """Read several texts."""
     if isinstance(value, str) or not all(isinstance(word, str) for word in value):

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Self
 
+from mrmg import extensions
 from mrmg.runs import argument_values as values
 from mrmg.runs.options import Checked, option, options_of
 
@@ -101,16 +102,23 @@ class RunArguments(Checked):
     )
     planner: str | None = option(
         None,
-        "path_following, which is the default, or guided_tree, the published method",
+        "path_following, which is the default, guided_tree, the published method, or "
+        "one that another package adds",
         decides="plan",
-        choices=("path_following", "guided_tree"),
+        choices=extensions.BUILT_IN[extensions.PLANNERS],
+        extended=extensions.PLANNERS,
+        read=values.name,
+        metavar="NAME",
     )
     router: str | None = option(
         None,
-        "what finds tours: search, which is the default, nrpa or exact; guided_tree "
-        "takes nrpa only",
+        "what finds tours: search, which is the default, nrpa, exact, or one that "
+        "another package adds; guided_tree takes nrpa only",
         decides="plan",
-        choices=("nrpa", "search", "exact"),
+        choices=extensions.BUILT_IN[extensions.ROUTERS],
+        extended=extensions.ROUTERS,
+        read=values.name,
+        metavar="NAME",
     )
     objective: str | Mapping[str, float] | None = option(
         None,
@@ -210,6 +218,28 @@ class RunArguments(Checked):
             for each in options_of(RunArguments)
             if each.decides == what
         }
+
+    def require_names(self) -> None:
+        """Refuse names of planner and router that nothing installed has.
+
+        Raises:
+            UsageError: naming those allowed.
+        """
+        for group, name in self._added():
+            extensions.require(group, name)
+
+    def packages(self) -> list[str]:
+        """Return the packages, with versions, that add what the plan is made by."""
+        found = [extensions.origin(group, name) for group, name in self._added()]
+        return [package for package in found if package]
+
+    def _added(self) -> list[tuple[str, str]]:
+        """Return groups of entry points with the names that are asked of them."""
+        return [
+            (each.extended, getattr(self, each.name))
+            for each in options_of(RunArguments)
+            if each.extended and getattr(self, each.name)
+        ]
 
     def words(self) -> list[str]:
         """Return the options of `mrmg run` that make the same plan and drive again."""

@@ -36,6 +36,9 @@ class Option:
         verbs: of the command line that take it.
         metavar: name of its value in the help; None for a switch or with `choices`.
         choices: allowed values, where they are few.
+        extended: group of entry points by which other packages add further choices;
+            `RunArguments.require_names` checks them, as recorded ones need not be
+            installed.
         bare: value of the flag alone, where its value may be left out.
         group: name of a set of options that exclude each other.
         formerly: retired names of the field, still read everywhere and shown nowhere.
@@ -51,6 +54,7 @@ class Option:
     verbs: tuple[str, ...]
     metavar: str | None
     choices: tuple[str, ...] | None
+    extended: str | None
     bare: str | None
     group: str | None
     formerly: tuple[str, ...]
@@ -105,6 +109,7 @@ def _option_of(each: Field[Any]) -> Option:
         "verbs": _VERBS[decides],
         "metavar": None,
         "choices": None,
+        "extended": None,
         "bare": None,
         "group": None,
         "formerly": (),
@@ -128,8 +133,9 @@ class Checked:
                 value = option.read(value)
             except ValueError as error:
                 raise UsageError(f"{option.name}: {error}") from error
-            if option.choices and value not in option.choices:
-                allowed = ", ".join(option.choices)
+            choices = () if option.extended else option.choices
+            if choices and value not in choices:
+                allowed = ", ".join(choices)
                 raise UsageError(f"{option.name}: {value!r}; allowed: {allowed}")
             object.__setattr__(self, option.name, value)
             other = groups.setdefault(option.group or option.name, option.name)

@@ -119,7 +119,9 @@ def _arguments(scene: Scene, given: dict[str, Any]) -> RunArguments:
         if name not in known:
             allowed = ", ".join(known)
             raise TypeError(f"run() takes no argument {name!r}; allowed: {allowed}")
-    return checked_drive(scene, RunArguments(**named))
+    asked = RunArguments(**named)
+    asked.require_names()
+    return checked_drive(scene, asked)
 
 
 def _document_arguments() -> None:

@@ -91,8 +91,9 @@ class Run:
 
     def fingerprint(self, step: Step) -> str:
         """Return the digest of all that decides the outcome of `step`."""
+        added = self.arguments.packages()
         deciding: dict[Step, Any] = {
-            Step.PLAN: [self.scene.digest, self.arguments.deciding("plan")],
+            Step.PLAN: [self.scene.digest, self.arguments.deciding("plan"), *added],
             Step.EXECUTE: self.arguments.deciding("drive"),
             Step.AUDIT: self.arguments.deciding("audit"),
             Step.RENDER: asdict(self.arguments.video),

@@ -17,7 +17,7 @@ import pytest
 import mrmg
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.frame import Frame
-from mrmg.planning.planner import state_mission
+from mrmg.planning.problem.problem import state_mission
 from mrmg.plans import Plan
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene

@@ -99,7 +99,13 @@ def test_a_fleet_of_none_is_a_fault_of_the_scene(yard: MakeScene) -> None:
 @pytest.mark.parametrize("name", ["two_swap", "no_goals", "goal_out_of_energy"])
 def test_statistics_have_all_counts_and_times(name: str) -> None:
     statistics = plan_mission(edge_scene(name)).statistics
-    counts = {"drafts", "vertices", "groups", "router_calls", "expansions"}
+    counts = {
+        "path_following_plans",
+        "vertices",
+        "groups",
+        "router_calls",
+        "expansions",
+    }
     assert counts <= set(statistics)
     assert set(statistics["time_s"]) == {"init", "routing", "first_solution", "total"}
     assert all(value >= 0.0 for value in statistics["time_s"].values())

@@ -1,111 +1,74 @@
-"""What every router promises, and the options of the routing problem.
+"""What routers promise beyond their contract, and the options of the routing problem.
 
-Tours are judged by driving them leg by leg (`fully_driven`), and compared with all
-tours there are (`cheapest`), which share nothing with the routers.
+Tours are compared with all tours there are (`cheapest`), which share nothing with the
+routers.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+import mrmg
 from mrmg.errors import UsageError
-from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.routers import ROUTERS, route
+from mrmg.planning import Router, RoutingProblem
+from mrmg.planning.routers import find_router
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing.routing import METHODS, RouterParams, Routing, routing_arrays
+from mrmg.planning.routing.routing import RouterParams, Routing, routing_arrays
+from mrmg.planning.routing.routing_problem import faults_of_tours, tour_ledger
+from mrmg.testing import RouterContract, sample_routing_problem
 
 SLACK = 1e-9
 """Share by which sums may differ."""
 
-Mission = Callable[..., RoutingArrays]
+SEARCH, NRPA, EXACT = (
+    find_router(RouterParams(method=name)) for name in ("search", "nrpa", "exact")
+)
 
 
-def town(
-    seed: int,
-    *,
-    goals: int = 3,
-    stations: int = 1,
-    robots: int = 2,
-    range_m: tuple[float, float] = (150.0, 250.0),
-    closed: bool = False,
-    **options: Any,
-) -> RoutingArrays:
-    """Return a mission over 100 x 100 m with one-way slopes, driven at 2 m/s.
-
-    Args:
-        seed: draws everything.
-        goals, stations, robots: their numbers.
-        range_m: between these lies the way a full battery lasts for.
-        closed: whether robots return to where they start.
-        options: further arguments of `routing_arrays`.
-    """
-    rng = np.random.default_rng(seed)
-    targets = goals + stations
-    point = rng.uniform(0.0, 100.0, (targets + robots, 2))
-    way = np.hypot(*(point[:, None] - point[None]).transpose(2, 0, 1))
-    climb = rng.uniform(0.0, 20.0, len(point))
-    cost = way + np.maximum(climb[None] - climb[:, None], 0.0)
-    dwell = rng.uniform(0.0, 20.0, targets)
-    capacity = rng.uniform(*range_m, robots)
-    legs = [np.r_[np.arange(targets), targets + r] for r in range(robots)]
-    if closed:
-        options["finish_distance"] = np.stack(
-            [cost[leg, targets + r] for r, leg in enumerate(legs)]
-        )
-        options["finish_time"] = np.stack(
-            [way[leg, targets + r] / 2.0 for r, leg in enumerate(legs)]
-        )
-    return routing_arrays(
-        goals=goals,
-        distance=np.repeat(cost[None, :targets, :targets], robots, axis=0),
-        start_distance=cost[targets:, :targets],
-        plain=np.ones(robots),
-        energy=capacity * rng.uniform(0.5, 1.0, robots),
-        capacity=capacity,
-        reserve=0.05 * capacity,
-        time=np.stack([way[leg, :targets] / 2.0 + dwell for leg in legs]),
-        **options,
-    )
+class TestSearch(RouterContract):
+    def router(self) -> Router:
+        return SEARCH
 
 
-def fully_driven(
-    problem: RoutingArrays, robot: int, tour: Sequence[int]
+class TestNrpa(RouterContract):
+    def router(self) -> Router:
+        return NRPA
+
+
+class TestExact(RouterContract):
+    def router(self) -> Router:
+        return EXACT
+
+
+def made(**arguments: Any) -> RoutingProblem:
+    return RoutingProblem.of(routing_arrays(**arguments))
+
+
+def driven(
+    problem: RoutingProblem, robot: int, tour: Sequence[int]
 ) -> tuple[float, float, bool]:
     """Return (energy, time, whether it can be driven) of a tour and its finish."""
-    place = problem.cost.shape[2]
-    energy, spent, clock = problem.energy[robot], 0.0, 0.0
-    least = np.inf
-    for target in tour:
-        leg = problem.cost[robot, place, target]
-        spent += leg
-        energy -= leg
-        least = min(least, energy)
-        clock += problem.time[robot, place, target]
-        if target >= problem.goals:
-            clock += (problem.capacity[robot] - energy) / problem.charge_power[robot]
-            energy = problem.capacity[robot]
-        place = target
-    leg = problem.finish[robot, place]
-    moves = len(tour) > 0 or leg > 0.0
-    least = min(least, energy - leg)
-    enough = not moves or least >= problem.reserve[robot] * (1.0 - SLACK)
-    clock += problem.finish_time[robot, place]
-    in_time = clock <= problem.limit[robot] * (1.0 + SLACK)
-    return spent + leg, clock, bool(enough and in_time)
+    ledger = tour_ledger(problem, robot, tour)
+    moves = len(tour) > 0 or ledger.energy_J > 0.0
+    reserve_J = problem.reserve_J[robot] * (1.0 - SLACK)
+    in_time = ledger.time_s <= problem.time_limit_s[robot] * (1.0 + SLACK)
+    fine = in_time and (not moves or ledger.least_J >= reserve_J)
+    return ledger.energy_J, ledger.time_s, bool(fine)
 
 
-def objective(problem: RoutingArrays, tours: Sequence[Sequence[int]]) -> float:
+def objective(problem: RoutingProblem, tours: Sequence[Sequence[int]]) -> float:
     """Return the objective of tours; inf if one of them cannot be driven."""
-    driven = [fully_driven(problem, r, tour) for r, tour in enumerate(tours)]
-    if not all(fine for _, _, fine in driven):
+    found = [driven(problem, r, tour) for r, tour in enumerate(tours)]
+    if not all(fine for _, _, fine in found):
         return np.inf
-    spent = sum(cost for cost, _, _ in driven)
-    longest = max(time for _, time, _ in driven)
+    spent = sum(cost for cost, _, _ in found)
+    longest = max(time for _, time, _ in found)
     return problem.energy_weight * spent + problem.makespan_weight * longest
 
 
@@ -119,10 +82,10 @@ def divisions(goals: int, robots: int) -> Iterator[list[tuple[int, ...]]]:
             yield [order[a:b] for a, b in itertools.pairwise(edges)]
 
 
-def cheapest(problem: RoutingArrays) -> float:
+def cheapest(problem: RoutingProblem) -> float:
     """Return the least objective of all tours with up to two stations in a row."""
-    goals, robots = problem.goals, len(problem.energy)
-    stations = range(goals, problem.cost.shape[2])
+    goals, robots = problem.goals, problem.robots
+    stations = range(goals, problem.targets)
     pauses = [p for n in range(3) for p in itertools.permutations(stations, n)]
     ways: dict[tuple[int, tuple[int, ...]], set[tuple[float, float]]] = {}
     for r in range(robots):
@@ -136,7 +99,7 @@ def cheapest(problem: RoutingArrays) -> float:
                         for t in (*pause, goal)
                         if t is not None
                     ]
-                    cost, time, fine = fully_driven(problem, r, tour)
+                    cost, time, fine = driven(problem, r, tour)
                     if fine:
                         found.add((cost, time))
                 ways[r, own] = {
@@ -157,115 +120,57 @@ def cheapest(problem: RoutingArrays) -> float:
     return best
 
 
-def assert_valid(problem: RoutingArrays, routing: Routing) -> None:
-    """Every open goal once, energy and time within their limits, the cost as stated."""
-    visited = [t for tour in routing.tours for t in tour if t < problem.goals]
-    assert sorted(visited) == np.flatnonzero(problem.open_goal).tolist()
-    driven = [fully_driven(problem, r, tour) for r, tour in enumerate(routing.tours)]
-    assert all(fine for _, _, fine in driven)
-    assert routing.cost_J == pytest.approx(sum(cost for cost, _, _ in driven))
-
-
 def renamed(
-    problem: RoutingArrays, goal: np.ndarray, robot: np.ndarray
-) -> RoutingArrays:
+    problem: RoutingProblem, goal: np.ndarray, robot: np.ndarray
+) -> RoutingProblem:
     """Return a problem whose goal i was goal[i] before, and likewise its robots."""
-    stations = np.arange(problem.goals, problem.cost.shape[2])
-    target = np.r_[goal, stations]
-    place = np.r_[target, problem.cost.shape[2]]
-    return problem._replace(
-        cost=np.ascontiguousarray(problem.cost[np.ix_(robot, place, target)]),
-        time=np.ascontiguousarray(problem.time[np.ix_(robot, place, target)]),
-        energy=problem.energy[robot],
-        capacity=problem.capacity[robot],
-        reserve=problem.reserve[robot],
-        escape=np.ascontiguousarray(problem.escape[np.ix_(robot, target)]),
-        finish=np.ascontiguousarray(problem.finish[np.ix_(robot, place)]),
-        finish_time=np.ascontiguousarray(problem.finish_time[np.ix_(robot, place)]),
-        limit=problem.limit[robot],
-        charge_power=problem.charge_power[robot],
-    )
+    target = np.r_[goal, np.arange(problem.goals, problem.targets)]
+    node = np.r_[target, problem.targets]
+    of_robot = ("start_energy_J", "capacity_J", "reserve_J", "time_limit_s")
+    changed = {
+        name: getattr(problem, name)[robot] for name in (*of_robot, "charging_power_W")
+    }
+    for name in ("leg_energy_J", "leg_time_s"):
+        changed[name] = getattr(problem, name)[np.ix_(robot, node, target)]
+    for name in ("finish_energy_J", "finish_time_s"):
+        changed[name] = getattr(problem, name)[np.ix_(robot, node)]
+    changed["escape_J"] = problem.escape_J[np.ix_(robot, target)]
+    return replace(problem, **changed)
 
 
-# --- what every router promises ----------------------------------------------------
-
-
-@pytest.fixture(params=sorted(ROUTERS))
-def params(request: pytest.FixtureRequest) -> RouterParams:
-    """Return the parameters of each router."""
-    return RouterParams(method=request.param)
-
-
-OPTIONS: list[dict[str, Any]] = [
-    {},
-    {"closed": True},
-    {"closed": True, "limit": np.full(2, 240.0)},
-    {"limit": np.full(2, 200.0), "charge_power": np.full(2, 4.0)},
-    {"makespan_weight": 1.0, "charge_power": np.full(2, 4.0)},
-]
-
-
-@pytest.mark.parametrize("options", OPTIONS, ids=lambda o: "-".join(o) or "plain")
-def test_tours_are_valid(params: RouterParams, options: dict[str, Any]) -> None:
-    feasible = 0
-    for seed in range(12):
-        problem = town(seed, goals=6, stations=2, **options)
-        routing = route(problem, params, seed)
-        if routing.feasible:
-            assert_valid(problem, routing)
-            feasible += 1
-        else:
-            assert routing.cost_J == np.inf
-    assert feasible >= 6
-
-
-def test_the_same_seed_gives_the_same_tours(params: RouterParams) -> None:
-    problem = town(1, goals=9, stations=2)
-    assert route(problem, params, 3) == route(problem, params, 3)
-
-
-def test_costs_scale_with_energy(params: RouterParams) -> None:
+@pytest.mark.parametrize(
+    "router", [SEARCH, NRPA, EXACT], ids=["search", "nrpa", "exact"]
+)
+def test_costs_scale_with_energy(router: Router) -> None:
     for seed in range(6):
-        problem = town(seed, goals=6, stations=2)
-        names = ("cost", "energy", "capacity", "reserve", "escape")
-        fourfold = problem._replace(**{n: 4.0 * getattr(problem, n) for n in names})
-        once = route(problem, params, seed).cost_J
-        assert route(fourfold, params, seed).cost_J == pytest.approx(4.0 * once)
+        problem = sample_routing_problem(seed, goals=6, stations=2)
+        names = (
+            "leg_energy_J",
+            "start_energy_J",
+            "capacity_J",
+            "reserve_J",
+            "escape_J",
+        )
+        fourfold = replace(problem, **{n: 4.0 * getattr(problem, n) for n in names})
+        once = router(problem, seed).cost_J
+        assert router(fourfold, seed).cost_J == pytest.approx(4.0 * once)
 
 
-@pytest.mark.parametrize("method", ["search", "exact"])
-def test_names_do_not_matter(method: str) -> None:
+@pytest.mark.parametrize("router", [SEARCH, EXACT], ids=["search", "exact"])
+def test_names_do_not_matter(router: Router) -> None:
     for seed in range(8):
         rng = np.random.default_rng(seed)
-        problem = town(seed, goals=7, stations=2, robots=3, closed=seed % 2 == 0)
+        problem = sample_routing_problem(
+            seed, goals=7, stations=2, robots=3, closed=seed % 2 == 0
+        )
         other = renamed(problem, rng.permutation(7), rng.permutation(3))
-        params = RouterParams(method=method)
-        cost = route(problem, params, seed).cost_J
-        assert route(other, params, seed).cost_J == pytest.approx(cost, rel=0.01)
-
-
-def test_no_goals_cost_nothing(params: RouterParams) -> None:
-    problem = town(0, closed=True)._replace(open_goal=np.zeros(3, bool))
-    assert route(problem, params, 0) == Routing(((), ()), 0.0)
-
-
-def test_a_goal_out_of_reach_makes_costs_infinite(params: RouterParams) -> None:
-    problem = town(0)
-    cost = problem.cost.copy()
-    cost[:, :, 1] = np.inf
-    assert not route(problem._replace(cost=cost), params, 0).feasible
-
-
-def test_a_finish_out_of_reach_makes_costs_infinite(params: RouterParams) -> None:
-    problem = town(0, closed=True)
-    finish = np.full_like(problem.finish, np.inf)
-    assert not route(problem._replace(finish=finish), params, 0).feasible
+        cost = router(problem, seed).cost_J
+        assert router(other, seed).cost_J == pytest.approx(cost, rel=0.01)
 
 
 def test_an_unknown_router_is_refused_by_name() -> None:
-    assert set(METHODS) == set(ROUTERS)
-    with pytest.raises(UsageError, match=r"'magic'; there are: nrpa, search, exact"):
-        PlannerParams(router=RouterParams(method="magic"))
+    with pytest.raises(UsageError, match=r"'magic' .* allowed: search, nrpa, exact"):
+        mrmg.plan(mrmg.load_scene("quickstart"), router="magic")
 
 
 # --- options against all tours there are -------------------------------------------
@@ -287,14 +192,14 @@ def test_an_unknown_router_is_refused_by_name() -> None:
 def test_the_search_finds_the_best_tours(options: dict[str, Any]) -> None:
     feasible = 0
     for seed in range(8):
-        problem = town(seed, **options)
+        problem = sample_routing_problem(seed, **options)
         best = cheapest(problem)
-        routing = route(problem, RouterParams(), seed)
+        routing = SEARCH(problem, seed)
         if not np.isfinite(best):
             assert not routing.feasible
             continue
         feasible += 1
-        assert_valid(problem, routing)
+        assert list(faults_of_tours(problem, routing)) == []
         assert objective(problem, routing.tours) == pytest.approx(best, rel=1e-3)
     assert feasible >= 3
 
@@ -302,18 +207,20 @@ def test_the_search_finds_the_best_tours(options: dict[str, Any]) -> None:
 def test_exact_tours_return_to_the_start() -> None:
     feasible = 0
     for seed in range(10):
-        problem = town(seed, closed=True, range_m=(100.0, 200.0), stations=2)
+        problem = sample_routing_problem(
+            seed, closed=True, range_m=(100.0, 200.0), stations=2
+        )
         best = cheapest(problem)
-        routing = route(problem, RouterParams(method="exact"), seed)
+        routing = EXACT(problem, seed)
         assert routing.cost_J == pytest.approx(best)
         if routing.feasible:
-            assert_valid(problem, routing)
+            assert list(faults_of_tours(problem, routing)) == []
             feasible += 1
     assert feasible >= 3
 
 
 def test_any_number_of_stations_may_stand_in_a_row(chain: RoutingArrays) -> None:
-    routing = route(chain, RouterParams(), 0)
+    routing = SEARCH(RoutingProblem.of(chain), 0)
     assert routing == Routing(((1, 2, 3, 4, 5, 0),), 60.0)
 
 
@@ -330,10 +237,10 @@ def test_charging_counts_towards_the_limit() -> None:
         "reserve": np.zeros(1),
         "time": np.array([[[0.0, 10.0], [10.0, 0.0], [20.0, 10.0]]]),
     }
-    slow = routing_arrays(**place, charge_power=np.ones(1))
-    assert route(slow, RouterParams(), 0).tours == ((1, 0),)
-    assert fully_driven(slow, 0, (1, 0))[1] == 10.0 + 35.0 + 10.0
-    late = routing_arrays(**place, charge_power=np.ones(1), limit=np.array([54.0]))
-    assert not route(late, RouterParams(), 0).feasible
-    fast = routing_arrays(**place, charge_power=np.full(1, 2.0), limit=np.array([54.0]))
-    assert route(fast, RouterParams(), 0).feasible
+    slow = made(**place, charge_power=np.ones(1))
+    assert SEARCH(slow, 0).tours == ((1, 0),)
+    assert tour_ledger(slow, 0, (1, 0)).time_s == 10.0 + 35.0 + 10.0
+    late = made(**place, charge_power=np.ones(1), limit=np.array([54.0]))
+    assert not SEARCH(late, 0).feasible
+    fast = made(**place, charge_power=np.full(1, 2.0), limit=np.array([54.0]))
+    assert SEARCH(fast, 0).feasible

@@ -10,8 +10,7 @@ import bench_routing
 import numpy as np
 import pytest
 
-from mrmg.planning.routers import route
-from mrmg.planning.routing.routing import RouterParams
+from mrmg.planning.routing.routing import RouterParams, solve_routing
 
 ROOT = Path(__file__).parents[2]
 
@@ -41,7 +40,7 @@ def test_instances_are_read(tmp_path: Path) -> None:
     assert problem.time[0, 3] == pytest.approx(
         [2 * DEGREE / 40 + 0.5, DEGREE / 40 + 0.5, DEGREE / 40 + 0.25]
     )
-    routing = route(problem, RouterParams(rounds=50), 0)
+    routing = solve_routing(problem, RouterParams(rounds=50), 0)
     assert routing.cost_J == pytest.approx(6 * DEGREE)
 
 
@@ -51,7 +50,7 @@ def test_proven_optima_are_found(name: str) -> None:
     if not path.exists():
         pytest.skip(f"needs {path.name} in ../shared/routing")
     problem = bench_routing.read_green_vrp(path)
-    routing = route(problem, RouterParams(rounds=5000), 0)
+    routing = solve_routing(problem, RouterParams(rounds=5000), 0)
     assert round(routing.cost_J, 2) == bench_routing.PROVEN[name]
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mrmg import seeding
 from mrmg.energy.model import CONSUMERS_W
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
@@ -14,10 +15,11 @@ from mrmg.planning.problem._safety_kernels import Gates
 from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.problem.leg_times import routing_times
 from mrmg.planning.problem.targets import finish_of, gate_arrays, target_arrays
+from mrmg.planning.problem.time_weighting import priced_world, with_energies
 from mrmg.planning.roadmap._fleet_kernels import Spaces
 from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
 from mrmg.planning.roadmap.fleet import fleet_array, stack_spaces
-from mrmg.planning.roadmap.roadmap import Roadmap
+from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import routing_arrays
 from mrmg.scene.types import Scene
@@ -177,3 +179,37 @@ def _last_legs(scene: Scene, roadmap: Roadmap, fleet: np.ndarray) -> np.ndarray:
             legs[r, places] = roadmap.start_distance[r, finish]
             legs[r] *= fleet[r]["plain"]
     return legs
+
+
+ROADMAPS = 3
+"""Roadmaps built at most, each with three times the samples, to join all goals."""
+
+
+def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
+    """Build the roadmap, denser while it does not join all goals, and the problem."""
+    world = World.from_scene(scene)
+    priced = priced_world(scene, world)
+    samples = params.samples
+    for attempt in range(ROADMAPS):
+        roadmap = build_roadmap(
+            scene,
+            priced,
+            samples=samples,
+            neighbours=params.neighbours,
+            margin_m=params.obstacle_margin_m,
+            rng=seeding.stream(seed, "roadmap", attempt),
+        )
+        if not unjoined_goals(scene, roadmap):
+            break
+        samples *= 3
+    if priced is not world:
+        roadmap = with_energies(roadmap, scene, world, params.obstacle_margin_m)
+    return state_problem(scene, world, roadmap, params)
+
+
+def unjoined_goals(scene: Scene, roadmap: Roadmap) -> list[str]:
+    """Return the goals to which the roadmap knows no path for any robot."""
+    joined = np.isfinite(roadmap.start_distance).any(axis=0)
+    return [
+        goal.id for goal, fine in zip(scene.goals, joined, strict=False) if not fine
+    ]

@@ -10,13 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrmg.errors import UsageError
 from mrmg.planning.routing import _routing_kernels
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing._routes_kernels import IMPOSSIBLE
-
-METHODS = ("nrpa", "search", "exact")
-"""Names of the routers."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,9 +20,10 @@ class RouterParams:
     """Parameters of the router.
 
     Attributes:
-        method: name of the router, one of METHODS: "nrpa" alone, "search" (NRPA, then
-            ruin and recreate) or "exact" (see `routers.ROUTERS`). Tours that are drawn
-            anew while a tree grows are never exact.
+        method: name of the router (`routers.find_router`): "nrpa" alone, "search"
+            (NRPA, then ruin and recreate), "exact", or one of another package. The
+            other parameters are of the first two; tours that are drawn anew while a
+            tree grows are always theirs.
         levels: nesting levels of NRPA.
         iterations: iterations of each level.
         alpha: step of the policy adaptation.
@@ -39,11 +36,6 @@ class RouterParams:
     iterations: int = 20
     alpha: float = 1.0
     rounds: int = 600
-
-    def __post_init__(self) -> None:
-        if self.method not in METHODS:
-            known = ", ".join(METHODS)
-            raise UsageError(f"unknown router {self.method!r}; there are: {known}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ import mrmg
 from mrmg.planning import plan_mission
 from mrmg.planning.bound.bound import lower_bound_J
 from mrmg.planning.bound.joint_bound import Divisions
-from mrmg.planning.planner import bounds_of
+from mrmg.planning.bounding import bounds_of
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.objective import Objective
 from mrmg.scene.types import Scene

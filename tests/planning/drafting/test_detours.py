@@ -23,8 +23,7 @@ from mrmg.planning.drafting.errand import Errand
 from mrmg.planning.drafting.lanes import Lane, apart_m, lane_of, spacing_m
 from mrmg.planning.drafting.refine import surfaces_of
 from mrmg.planning.drafting.tracking import Drive
-from mrmg.planning.planner import state_mission
-from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.scene.types import Scene
 
 PARAMS = PlannerParams(samples=400)

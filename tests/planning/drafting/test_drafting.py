@@ -19,8 +19,8 @@ from mrmg.planning.drafting.drafting import (
     path_cost_J,
     tour_path,
 )
-from mrmg.planning.planner import state_mission
-from mrmg.planning.routers import route
+from mrmg.planning.problem.problem import state_mission
+from mrmg.planning.routing.routing import solve_routing
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 
@@ -29,7 +29,7 @@ PARAMS = PlannerParams(samples=600)
 
 def drafted(scene: Scene) -> list[Plan]:
     problem = state_mission(scene, 0, PARAMS).with_soc_margin(LEAST_SPARE)
-    tours = route(problem.mission.routing, PARAMS.router, 0)
+    tours = solve_routing(problem.mission.routing, PARAMS.router, 0)
     return list(drafts(problem, PARAMS, tours, 0, np.zeros(1, np.bool_)))
 
 
@@ -57,7 +57,7 @@ def test_drafts_leave_something_of_every_battery(name: str) -> None:
 def test_tours_are_judged_nearly_by_what_driving_takes() -> None:
     scene = mrmg.load_scene("quickstart")
     problem = state_mission(scene, 0, PARAMS)
-    tours = route(problem.mission.routing, PARAMS.router, 0)
+    tours = solve_routing(problem.mission.routing, PARAMS.router, 0)
     best_J = min(plan.cost_J for plan in drafted(scene))
     assert 0.9 * best_J < path_cost_J(problem, tours) < 1.02 * best_J
 
@@ -116,7 +116,7 @@ def test_where_time_counts_cars_back_out_of_what_is_too_narrow(
 
 def test_halted_it_gives_nothing(yard: Callable[..., Scene]) -> None:
     problem = state_mission(yard(), 0, PARAMS)
-    tours = route(problem.mission.routing, PARAMS.router, 0)
+    tours = solve_routing(problem.mission.routing, PARAMS.router, 0)
     halted = np.ones(1, np.bool_)
     assert not list(drafts(problem, PARAMS, tours, 0, halted))
 

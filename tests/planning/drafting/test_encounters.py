@@ -16,8 +16,7 @@ from mrmg.planning.drafting.encounters import MOST, Encounters, in_the_way, wait
 from mrmg.planning.drafting.errand import Errand
 from mrmg.planning.drafting.refine import surfaces_of
 from mrmg.planning.drafting.tracking import Drive
-from mrmg.planning.planner import state_mission
-from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.planning.routing.routing import Routing
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene

@@ -13,7 +13,7 @@ from mrmg.planning.drafting.band import SPACINGS_M
 from mrmg.planning.drafting.drafting import tour_path
 from mrmg.planning.drafting.errand import Errand, lack_m
 from mrmg.planning.drafting.refine import surfaces_of
-from mrmg.planning.planner import state_mission
+from mrmg.planning.problem.problem import state_mission
 from mrmg.scene.types import Scene
 
 FENCE = [{"id": "fence", "box": {"center": [15, 13], "size": [0.4, 14]}}]

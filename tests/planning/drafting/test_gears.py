@@ -15,8 +15,7 @@ from mrmg.planning.drafting.band import SPACINGS_M, Path, tightened
 from mrmg.planning.drafting.drafting import tour_path
 from mrmg.planning.drafting.gears import WORTH_M_S, with_best_gears
 from mrmg.planning.drafting.refine import surfaces_of
-from mrmg.planning.planner import state_mission
-from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.scene.types import Scene
 
 PARAMS = PlannerParams(samples=300)

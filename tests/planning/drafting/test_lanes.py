@@ -17,7 +17,7 @@ from mrmg.planning.drafting.drafting import tour_path
 from mrmg.planning.drafting.errand import Errand
 from mrmg.planning.drafting.lanes import Lane, apart_m, clashes, hull, lane_of
 from mrmg.planning.drafting.refine import surfaces_of
-from mrmg.planning.planner import state_mission
+from mrmg.planning.problem.problem import state_mission
 from mrmg.scene.types import Scene
 
 

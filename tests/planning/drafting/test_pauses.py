@@ -12,8 +12,8 @@ from mrmg.energy.metering import battery_profile
 from mrmg.planning import PlannerParams
 from mrmg.planning.drafting.drafting import LEAST_SPARE, drafts, tour_path
 from mrmg.planning.drafting.pauses import with_pauses
-from mrmg.planning.planner import state_mission
-from mrmg.planning.routers import route
+from mrmg.planning.problem.problem import state_mission
+from mrmg.planning.routing.routing import solve_routing
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 
@@ -23,7 +23,7 @@ PARAMS = PlannerParams(samples=600)
 
 def drafted(scene: Scene) -> Plan:
     problem = state_mission(scene, 0, PARAMS).with_soc_margin(LEAST_SPARE)
-    tours = route(problem.mission.routing, PARAMS.router, 0)
+    tours = solve_routing(problem.mission.routing, PARAMS.router, 0)
     return list(drafts(problem, PARAMS, tours, 0, np.zeros(1, np.bool_)))[-1]
 
 

@@ -13,8 +13,7 @@ import mrmg
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.drafting.band import visit_steps
 from mrmg.planning.drafting.refine import refine, tour_numbers
-from mrmg.planning.planner import state_mission
-from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.planning.problem.targets import TARGET_MARGIN_M
 from mrmg.plans import Plan
 from mrmg.scene.loading import scene_from_document

@@ -17,7 +17,7 @@ from mrmg.planning.drafting.tracking import (
     redriven,
     steerable_speeds,
 )
-from mrmg.planning.planner import state_mission
+from mrmg.planning.problem.problem import state_mission
 from mrmg.scene.types import Scene
 
 

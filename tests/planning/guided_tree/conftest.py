@@ -16,8 +16,7 @@ from shapely.geometry import Point, Polygon
 from mrmg.motion.dynamics import car_derivative, rk4_step
 from mrmg.planning.guided_tree.planner import Growth, grow_guided_tree
 from mrmg.planning.parameters import GuidedTreeParams, PlannerParams, paper_params
-from mrmg.planning.planner import state_mission
-from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.planner import state_mission
 from mrmg.planning.preference import TIME_MARGIN_S
 from mrmg.planning.problem.leg_times import TIE_SHARE
+from mrmg.planning.problem.problem import state_mission
 from mrmg.planning.problem.targets import LONGER_S
 from mrmg.planning.routing.routing import RouterParams, solve_routing
 

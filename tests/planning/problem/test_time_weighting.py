@@ -10,7 +10,7 @@ import pytest
 
 from mrmg.planning.drafting.tracking import HARD_SHARE, courses_of
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.planner import state_mission
+from mrmg.planning.problem.problem import state_mission
 from mrmg.planning.problem.time_weighting import (
     along_ways,
     brakes_hard,

@@ -1,4 +1,4 @@
-"""What every way to find plans promises, be it drafting or growing a tree.
+"""What every way of path following to find plans promises.
 
 Both refine what they find: plans of one attempt are each better than the one before.
 """
@@ -17,16 +17,29 @@ import pytest
 
 import mrmg
 from mrmg.energy.metering import battery_profile
-from mrmg.planning import PlannerParams, attempt
-from mrmg.planning.attempt import Attempt, attempt_plan, draft_plans, tree_plans
-from mrmg.planning.planner import state_mission
-from mrmg.planning.problem.problem import Problem
+from mrmg.planning import Attempt, PlannerParams, Problem, Request, path_following
+from mrmg.planning.path_following import Schedule, follow_paths, follow_tree
+from mrmg.planning.problem.problem import state_mission
+from mrmg.planning.routers import find_router
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 
 SCENES = Path(__file__).parents[1] / "scenes"
 PARAMS = PlannerParams(samples=500)
-WAYS: tuple[Callable[..., Attempt], ...] = (draft_plans, tree_plans, attempt_plan)
+
+
+def request(number: int = 0, params: PlannerParams = PARAMS) -> Request:
+    router = find_router(params.router)
+    return Request(params=params, router=router, seed=7, number=number)
+
+
+def along_paths(problem: Problem, asked: Request) -> Attempt:
+    schedule = Schedule.of(problem, asked.params, asked.number)
+    return follow_paths(problem, asked, schedule.followed[0][1])
+
+
+Way = Callable[[Problem, Request], Attempt]
+WAYS: tuple[Way, ...] = (along_paths, follow_tree, path_following.path_following)
 MISSIONS = ("quickstart", "station_needed", "polygon_regions", "blocks_only_r1")
 
 
@@ -37,21 +50,19 @@ def problem_of(name: str) -> Problem:
     return state_mission(scene, 0, PARAMS)
 
 
-def attempted(way: Callable[..., Attempt], name: str, number: int = 0) -> Attempt:
-    return way(problem_of(name), 7, PARAMS, number, np.zeros(1, np.bool_))
+def attempted(way: Way, name: str, number: int = 0) -> Attempt:
+    return way(problem_of(name), request(number))
 
 
 @pytest.fixture(params=WAYS, ids=lambda way: way.__name__)
-def way(request: pytest.FixtureRequest) -> Callable[..., Attempt]:
+def way(request: pytest.FixtureRequest) -> Way:
     return request.param
 
 
 @pytest.mark.parametrize("name", MISSIONS)
-def test_plans_are_valid_and_each_better_than_the_last(
-    way: Callable[..., Attempt], name: str
-) -> None:
+def test_plans_are_valid_and_each_better_than_the_last(way: Way, name: str) -> None:
     problem = problem_of(name)
-    plans = [plan for _, plan in attempted(way, name).plans]
+    plans = attempted(way, name).plans
     assert plans
     for plan in plans:
         assert mrmg.verify(problem.scene, plan).violations == ()
@@ -59,12 +70,12 @@ def test_plans_are_valid_and_each_better_than_the_last(
         assert problem.preference.rank(after) < problem.preference.rank(before)
 
 
-def digests(way: Callable[..., Attempt], number: int) -> list[str]:
+def digests(way: Way, number: int) -> list[str]:
     found = attempted(way, "quickstart", number)
-    return [plan.digest for _, plan in found.plans]
+    return [plan.digest for plan in found.plans]
 
 
-def test_an_attempt_is_a_function_of_its_number(way: Callable[..., Attempt]) -> None:
+def test_an_attempt_is_a_function_of_its_number(way: Way) -> None:
     """Whatever was attempted in between."""
     numbers = (0, 3, 1)
     first = [digests(way, number) for number in numbers]
@@ -72,23 +83,24 @@ def test_an_attempt_is_a_function_of_its_number(way: Callable[..., Attempt]) -> 
 
 
 def test_other_numbers_grow_other_trees() -> None:
-    assert digests(tree_plans, 0) != digests(tree_plans, 1)
+    assert digests(follow_tree, 0) != digests(follow_tree, 1)
 
 
-def test_halted_it_gives_nothing(way: Callable[..., Attempt]) -> None:
-    halt = np.ones(1, np.bool_)
-    found = way(problem_of("quickstart"), 7, PARAMS, 0, halt)
+def test_halted_it_gives_nothing(way: Way) -> None:
+    halted = replace(request(), halt=np.ones(1, np.bool_))
+    found = way(problem_of("quickstart"), halted)
     assert list(found.plans) == []
 
 
 def test_trees_are_grown_only_where_drafting_fails() -> None:
-    drafted = attempted(attempt_plan, "quickstart")
-    assert drafted.counts == {"drafts": 1, "router_calls": 1}
+    drafted = attempted(path_following.path_following, "quickstart")
+    assert drafted.counts == {"path_following_plans": 1, "router_calls": 1}
     without = PlannerParams(samples=500, drafts=False)
-    halt = np.zeros(1, np.bool_)
-    grown = attempt_plan(problem_of("quickstart"), 7, without, 0, halt)
+    grown = path_following.path_following(
+        problem_of("quickstart"), request(params=without)
+    )
     assert grown.counts["vertices"] > 1
-    assert "drafts" not in grown.counts
+    assert "path_following_plans" not in grown.counts
 
 
 def test_other_tours_are_drafted_before_a_tree_grows(
@@ -96,14 +108,14 @@ def test_other_tours_are_drafted_before_a_tree_grows(
 ) -> None:
     """Where robots get stuck along the router's tours, they may not along others."""
     driven: list[tuple[tuple[int, ...], ...]] = []
-    drive = attempt.drafts
+    drive = path_following.drafts
 
     def failing_at_first(*given: Any, **options: Any) -> Iterator[Plan]:
         driven.append(given[2].tours)
         return drive(*given, **options) if len(driven) > 3 else iter(())
 
-    monkeypatch.setattr(attempt, "drafts", failing_at_first)
-    found = attempted(attempt_plan, "scene1")
+    monkeypatch.setattr(path_following, "drafts", failing_at_first)
+    found = attempted(path_following.path_following, "scene1")
     assert found.plans
     assert "vertices" not in found.counts
     assert driven[3] not in driven[:2]
@@ -113,9 +125,9 @@ def test_drafts_that_failed_are_counted_with_the_tree(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """With and without charge to spare, along other tours, then the tree."""
-    monkeypatch.setattr(attempt, "drafts", lambda *_, **__: iter(()))
-    found = attempted(attempt_plan, "quickstart")
-    assert found.counts["drafts"] == 4
+    monkeypatch.setattr(path_following, "drafts", lambda *_, **__: iter(()))
+    found = attempted(path_following.path_following, "quickstart")
+    assert found.counts["path_following_plans"] == 4
     assert found.counts["router_calls"] >= 5
     assert found.counts["vertices"] > 1
 
@@ -124,8 +136,8 @@ def test_drafts_that_failed_are_counted_with_the_tree(
 def test_plans_leave_charge_to_spare(spare: float) -> None:
     problem = problem_of("station_needed")
     params = replace(PARAMS, spare=spare)
-    found = attempt_plan(problem, 7, params, 0, np.zeros(1, np.bool_))
-    for _, plan in found.plans:
+    found = path_following.path_following(problem, request(params=params))
+    for plan in found.plans:
         assert least_share(problem.scene, plan) >= spare
     assert found.plans
 
@@ -133,10 +145,10 @@ def test_plans_leave_charge_to_spare(spare: float) -> None:
 def test_who_cannot_spare_charge_is_planned_for_all_the_same() -> None:
     problem = problem_of("station_needed")
     params = replace(PARAMS, spare=0.9)
-    assert attempt_plan(problem, 7, params, 0, np.zeros(1, np.bool_)).plans
-    for way in (draft_plans, tree_plans):
+    assert path_following.path_following(problem, request(params=params)).plans
+    for way in (along_paths, follow_tree):
         spared = problem.with_soc_margin(0.9)
-        assert not way(spared, 7, params, 0, np.zeros(1, np.bool_)).plans
+        assert not way(spared, request(params=params)).plans
 
 
 def least_share(scene: Scene, plan: Plan) -> float:

@@ -1,0 +1,56 @@
+"""Planners: what finds the motions of a mission."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Protocol
+
+from mrmg import extensions
+from mrmg.planning.attempt import Attempt, Request
+from mrmg.planning.guided_tree.strategy import guided_tree
+from mrmg.planning.path_following import path_following
+from mrmg.planning.problem.problem import Problem
+
+
+class Planner(Protocol):
+    """Finds plans; `mrmg.testing.PlannerContract` tests what it must keep.
+
+    An attempt is a function of its arguments alone, changes none of them, and ends soon
+    after `request.halt` has turned true. Several may be made at once, by threads. Every
+    plan is one that `mrmg.verify` accepts.
+    """
+
+    def __call__(self, problem: Problem, request: Request) -> Attempt:
+        """Return what one attempt at a mission gave."""
+
+
+PLANNERS: Mapping[str, Planner] = MappingProxyType(
+    {"path_following": path_following, "guided_tree": guided_tree}
+)
+"""The planners of this package by name."""
+
+
+def find_planner(name: str) -> Planner:
+    """Return the planner of a name.
+
+    Raises:
+        UsageError: if there is none of that name.
+        MachineError: if the package that adds it is broken.
+    """
+    if name in PLANNERS:
+        return PLANNERS[name]
+    return checked(extensions.load(extensions.PLANNERS, name), name)
+
+
+def checked(planner: Planner, name: str) -> Planner:
+    """Return a planner whose attempts are refused if they are none."""
+
+    def attempt(problem: Problem, request: Request) -> Attempt:
+        found = planner(problem, request)
+        if not isinstance(found, Attempt):
+            what = f"returned {found!r}, not an Attempt"
+            raise extensions.fault(extensions.PLANNERS, name, what)
+        return found
+
+    return attempt

@@ -1,0 +1,141 @@
+"""Compiling and loading kernels before planning, so that no time limit includes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from mrmg.compilation import (
+    compile_in_processes,
+    kernels_are_compiled,
+    note_kernels_are_compiled,
+)
+from mrmg.planning.attempt import Request
+from mrmg.planning.bound.bound import Relaxation, lower_bound_J
+from mrmg.planning.bound.exact_tours import exact_routing
+from mrmg.planning.bound.makespan_bound import makespan_bound_s
+from mrmg.planning.bounding import bounds_of
+from mrmg.planning.frame import Frame, on_the_map
+from mrmg.planning.guided_tree.strategy import guided_tree
+from mrmg.planning.parameters import (
+    GUIDED_TREE,
+    PATH_FOLLOWING,
+    PLANNERS,
+    GuidedTreeParams,
+    PlannerParams,
+    paper_params,
+)
+from mrmg.planning.path_following import path_following
+from mrmg.planning.planners import Planner
+from mrmg.planning.problem.problem import Problem, state_mission
+from mrmg.planning.routers import find_router
+from mrmg.planning.routing.routing import Routing
+from mrmg.planning.tree.motion_tree import grow_tree
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.objective import Objective
+from mrmg.scene.types import Scene
+
+
+def compile_kernels(on_progress: Callable[[int], None] | None = None) -> None:
+    """Compile every kernel that this machine does not hold compiled.
+
+    Args:
+        on_progress: told the number of kernels compiled so far, while there are any to
+            compile, which happens once for these sources.
+    """
+    if kernels_are_compiled():
+        return
+    calls = (grow_smallest, follow_smallest, guide_smallest, bound_smallest)
+    compile_in_processes(calls, on_progress or (lambda number: None))
+    for planner in PLANNERS:
+        load_kernels(planner, trees=True)
+    bound_smallest()
+    with suppress(OSError):  # without a cache that can be written, plan all the same
+        note_kernels_are_compiled()
+
+
+@cache
+def load_kernels(planner: str, *, trees: bool) -> None:
+    """Load the kernels of a planner, so that no time limit or figure includes it.
+
+    Those of trees take as long as all others; few missions need them where paths are
+    followed, and load them then. Planners of other packages load their own.
+    """
+    if planner == GUIDED_TREE:
+        guide_smallest()
+    elif planner == PATH_FOLLOWING:
+        follow_smallest()
+        if trees:
+            _plan_smallest(path_following, replace(SMALL_PARAMS, drafts=False))
+
+
+def grow_smallest() -> None:
+    """Grow a tree in the smallest mission."""
+    _, problem = _smallest_mission()
+    routing = Routing(tours=((0,),), cost_J=0.0)
+    growth = grow_tree(problem, SMALL_PARAMS, routing, 0, np.zeros(1, np.bool_))
+    assert growth.solved, "the smallest mission has a plan, or not all is compiled"
+
+
+def follow_smallest() -> None:
+    """Plan the smallest mission without a tree."""
+    _plan_smallest(path_following, SMALL_PARAMS)
+
+
+def guide_smallest() -> None:
+    """Plan the smallest mission by the paper's method."""
+    _plan_smallest(guided_tree, SMALL_PAPER_PARAMS)
+
+
+@cache
+def load_bounds(objective: Objective) -> None:
+    """Load the kernels of the bounds of an objective."""
+    bounds_of(replace(_smallest_scene(), objective=objective), 0.1, cells=50)
+
+
+def bound_smallest() -> None:
+    """Bound the energy and the makespan of the smallest mission, in all ways."""
+    scene = _smallest_scene()
+    lower_bound_J(scene, cells=50)
+    makespan_bound_s(scene, cells=50)
+    exact_routing(Relaxation.of(scene, cells=50).problem)
+
+
+SMALL_PARAMS = PlannerParams(samples=20, max_vertices=20, trees=1)
+"""What suffices to plan the smallest mission."""
+
+SMALL_PAPER_PARAMS = replace(
+    paper_params(), guided_tree=GuidedTreeParams(iterations=1000)
+)
+"""The same for the paper's method."""
+
+
+def _plan_smallest(planner: Planner, params: PlannerParams) -> None:
+    scene, problem = _smallest_mission()
+    request = Request(params=params, router=find_router(params.router), seed=0)
+    found = on_the_map(planner(problem, request), problem, scene, params)
+    assert found.plans, "the smallest mission has a plan, or not all is compiled"
+
+
+@cache
+def _smallest_mission() -> tuple[Scene, Problem]:
+    scene = _smallest_scene()
+    return scene, state_mission(Frame.of(scene).scene(scene), 0, SMALL_PARAMS)
+
+
+@cache
+def _smallest_scene() -> Scene:
+    """Return the smallest mission there is: types do not depend on a scene's size."""
+    document = {
+        "format": 1,
+        "name": "smallest",
+        "bounds": [1, 0, 21, 10],
+        "goals": [{"id": "g", "circle": {"center": [13, 5], "radius": 2}}],
+        "battery": {"capacity_m": 100},
+        "robots": [{"id": "r", "model": "car", "pose": [6, 5, 0]}],
+    }
+    return scene_from_document(document, source="smallest mission")

@@ -1,0 +1,17 @@
+"""Contract suites: what planners, routers, controllers and motion models must keep.
+
+They run under plain pytest. Subclass a suite in a test module of yours and return what
+is to be tested:
+
+    import mrmg.testing
+
+    class TestMine(mrmg.testing.RouterContract):
+        def router(self):
+            return my_router
+
+The suites of this package's own parts are made the same way.
+"""
+
+from mrmg.testing.router_contract import RouterContract, sample_routing_problem
+
+__all__ = ["RouterContract", "sample_routing_problem"]
