@@ -228,10 +228,10 @@ class RunArguments(Checked):
         for group, name in self._added():
             extensions.require(group, name)
 
-    def packages(self) -> list[str]:
-        """Return the packages, with versions, that add what the plan is made by."""
-        found = [extensions.origin(group, name) for group, name in self._added()]
-        return [package for package in found if package]
+    def planning(self) -> list[Any]:
+        """Return what decides the plan: arguments, and versions of other packages."""
+        added = [extensions.origin(group, name) for group, name in self._added()]
+        return [self.deciding("plan"), *filter(None, added)]
 
     def _added(self) -> list[tuple[str, str]]:
         """Return groups of entry points with the names that are asked of them."""

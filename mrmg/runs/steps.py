@@ -91,9 +91,8 @@ class Run:
 
     def fingerprint(self, step: Step) -> str:
         """Return the digest of all that decides the outcome of `step`."""
-        added = self.arguments.packages()
         deciding: dict[Step, Any] = {
-            Step.PLAN: [self.scene.digest, self.arguments.deciding("plan"), *added],
+            Step.PLAN: [self.scene.digest, *self.arguments.planning()],
             Step.EXECUTE: self.arguments.deciding("drive"),
             Step.AUDIT: self.arguments.deciding("audit"),
             Step.RENDER: asdict(self.arguments.video),
