@@ -84,6 +84,22 @@ def plan_mission(
     require_robots(scene)
     if workers < 1:
         raise UsageError(f"workers = {workers}; planning needs at least 1")
+    params, made_by, routed_by = _resolved(params, planner, router)
+    compile_kernels()
+    request = Request(params=params, router=routed_by, seed=seed)
+    planning = _Planning(scene, made_by, request, workers, callbacks)
+    try:
+        return planning.result(with_bound)
+    finally:
+        request.halt[0] = True  # nobody waits any longer for what is still under way
+
+
+def _resolved(
+    params: PlannerParams | None,
+    planner: str | Planner | None,
+    router: str | Router | None,
+) -> tuple[PlannerParams, Planner, Router]:
+    """Return parameters that name planner and router, with both."""
     if params is None:
         params = profile_params(
             planner=planner if isinstance(planner, str) else None,
@@ -102,13 +118,7 @@ def plan_mission(
         router = routers.find_router(params.router)
     else:
         router = routers.checked(router, params.router.method)
-    compile_kernels()
-    request = Request(params=params, router=router, seed=seed)
-    planning = _Planning(scene, planner, request, workers, callbacks)
-    try:
-        return planning.result(with_bound)
-    finally:
-        request.halt[0] = True  # nobody waits any longer for what is still under way
+    return params, planner, router
 
 
 @dataclass(frozen=True, slots=True)
