@@ -18,20 +18,20 @@ from mrmg.scene.types import Scene
 from mrmg.simulation import simulate
 from mrmg.verification.verify import verify
 
-ERRANDS = Path(__file__).parent / "scenes" / "errands.yaml"
+ONE_SIDED = Path(__file__).parent / "scenes" / "one_sided.yaml"
 QUICK = PlannerParams(samples=400)
 LONGEST_S = 26.0
 """A time limit that the plan of least energy does not keep."""
 
 
-def errands(**changes: Any) -> Scene:
-    document = load_scene(ERRANDS).document
-    return scene_from_document({**document, **changes}, source="errands")
+def one_sided(**changes: Any) -> Scene:
+    document = load_scene(ONE_SIDED).document
+    return scene_from_document({**document, **changes}, source="one_sided")
 
 
 @cache
 def planned(seed: int, **changes: Any) -> PlanResult:
-    return plan_mission(errands(**changes), seed=seed, params=QUICK, with_bound=True)
+    return plan_mission(one_sided(**changes), seed=seed, params=QUICK, with_bound=True)
 
 
 def plan_of(seed: int, **changes: Any) -> Plan:
@@ -44,12 +44,14 @@ def test_the_soonest_plan_shares_the_work_and_the_cheapest_does_not() -> None:
     cheap, soon = plan_of(0), plan_of(0, objective="makespan")
     assert [len(tour) for tour in cheap.tours.values()] == [4, 0]
     assert [len(tour) for tour in soon.tours.values()] == [2, 2]
-    assert verify(errands(objective="makespan"), soon).ok
+    assert verify(one_sided(objective="makespan"), soon).ok
     assert soon.makespan_s < 0.8 * cheap.makespan_s
     assert soon.cost_J > cheap.cost_J
 
 
-@pytest.mark.parametrize("source", [ERRANDS, "quickstart"], ids=["errands", "shipped"])
+@pytest.mark.parametrize(
+    "source", [ONE_SIDED, "quickstart"], ids=["one_sided", "shipped"]
+)
 def test_by_makespan_plans_are_sooner_in_the_median(source: Path | str) -> None:
     document = load_scene(source).document
     medians_s = []
@@ -62,7 +64,7 @@ def test_by_makespan_plans_are_sooner_in_the_median(source: Path | str) -> None:
 
 
 def test_a_blend_without_weight_on_time_is_energy() -> None:
-    blend = errands(objective={"energy": 3.0, "makespan": 0.0})
+    blend = one_sided(objective={"energy": 3.0, "makespan": 0.0})
     plan = plan_mission(blend, seed=0, params=QUICK).plan
     assert plan is not None
     for one, other in zip(plan.trajectories, plan_of(0).trajectories, strict=True):
@@ -70,7 +72,7 @@ def test_a_blend_without_weight_on_time_is_energy() -> None:
 
 
 def test_a_blend_lies_between_both() -> None:
-    scene = errands(objective={"energy": 1, "makespan": 150})
+    scene = one_sided(objective={"energy": 1, "makespan": 150})
     plan = plan_mission(scene, seed=0, params=QUICK).plan
     assert plan is not None
     assert verify(scene, plan).ok
@@ -100,7 +102,7 @@ def test_a_time_limit_is_kept_by_dearer_plans() -> None:
     cheap, timely = plan_of(0), plan_of(0, time_limit=LONGEST_S)
     assert cheap.makespan_s > LONGEST_S >= timely.makespan_s
     assert timely.cost_J > cheap.cost_J
-    assert verify(errands(time_limit=LONGEST_S), timely).ok
+    assert verify(one_sided(time_limit=LONGEST_S), timely).ok
 
 
 def test_attempts_that_were_late_are_followed_by_hastier_tours() -> None:
@@ -137,7 +139,7 @@ def test_a_limit_that_nothing_found_keeps_is_no_proof() -> None:
     "wish", [{"objective": "makespan"}, {"time_limit": LONGEST_S}], ids=str
 )
 def test_timed_missions_are_driven_as_planned(wish: dict[str, Any]) -> None:
-    scene, plan = errands(**wish), plan_of(0, **wish)
+    scene, plan = one_sided(**wish), plan_of(0, **wish)
     log = simulate(scene, plan)
     assert audit(scene, plan, log).reasons == ()
     assert over_s(scene, log) == pytest.approx(plan.makespan_s, abs=1.0)

@@ -80,7 +80,7 @@ def draw_method(
 
 
 def _draw_roadmap(axes: Axes, edges: np.ndarray, multiplier: np.ndarray) -> None:
-    """Draw the edges, the darker the dearer they are."""
+    """Draw the edges, darker where they cost more."""
     steps = np.linspace(1.0, max(float(multiplier.max()), 1.01), _BANDS + 1)
     band = np.clip(np.digitize(multiplier, steps) - 1, 0, _BANDS - 1)
     for rank in range(_BANDS):

@@ -142,7 +142,7 @@ def _quality(figures: Mapping[str, Any] | None) -> str:
     return html.paragraph(
         {
             "energy": f"No plan for this mission needs less than {least}: this one "
-            f"({value}) is at most {share} dearer than the cheapest there is.",
+            f"({value}) is at most {share} above the minimum.",
             "makespan": f"No plan for this mission is over before {least}: this one "
             f"({value}) takes at most {share} longer than the shortest there is.",
             "blend": "No plan for this mission has a weighted sum of energy and "

@@ -250,7 +250,7 @@ class BrowserView:
             with self._watch:
                 replay.toggle()
 
-        def hastened(_: Any) -> None:
+        def sped_up(_: Any) -> None:
             replay.speed = float(speed.value.removeprefix("×"))
 
         def switched(_: Any) -> None:
@@ -259,7 +259,7 @@ class BrowserView:
 
         self._slider.on_update(slid)
         play.on_click(pressed)
-        speed.on_update(hastened)
+        speed.on_update(sped_up)
         driven.on_update(switched)
 
     def _look_from_above(self) -> None:

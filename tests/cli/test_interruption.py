@@ -56,7 +56,7 @@ VERBS = {
 }
 ERRAND = """\
 format: 1
-name: errand
+name: short
 bounds: [0, 0, 30, 12]
 obstacles:
   - {box: {center: [15, 3], size: [4, 3]}}
@@ -84,8 +84,8 @@ def started(words: list[str]) -> subprocess.Popen[str]:
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One robot on a short errand, so that a run takes few seconds."""
-    path = tmp_path_factory.mktemp("scene") / "errand.yaml"
+    """One robot with one goal nearby, so that a run takes few seconds."""
+    path = tmp_path_factory.mktemp("scene") / "short.yaml"
     path.write_text(ERRAND)
     return path
 

@@ -64,11 +64,11 @@ def test_runs_without_a_course_have_no_chart() -> None:
 
 def test_the_section_tells_quality_shares_and_what_it_has_no_name_for() -> None:
     said = "".join(planner(record(FOUND, bound_J=46e3, gap=50 / 46 - 1)))
-    assert "less than 46.00 kJ: this one (50.00 kJ) is at most 8.7 % dearer" in said
+    assert "less than 46.00 kJ: this one (50.00 kJ) is at most 8.7 % above" in said
     assert "0.750 s (25 % of all)" in said
     assert "<td>37.5 %</td>" in said
     assert "of_a_kind_unheard_of" in said
-    assert "dearer" not in "".join(planner(record(FOUND)))
+    assert "above the minimum" not in "".join(planner(record(FOUND)))
     bounded = record(FOUND)
     bounded.planning["statistics"]["bound_J"] = 46e3
     assert "bound_J" not in "".join(planner(bounded))
@@ -76,7 +76,7 @@ def test_the_section_tells_quality_shares_and_what_it_has_no_name_for() -> None:
 
 def test_a_mission_that_costs_nothing_has_no_gap() -> None:
     free = record([{"time_s": 0.1, "cost_J": 0.0}], cost_J=0.0, bound_J=0.0, gap=None)
-    assert "dearer" not in "".join(planner(free))
+    assert "above the minimum" not in "".join(planner(free))
 
 
 def test_bounds_never_fall() -> None:
