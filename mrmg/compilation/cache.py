@@ -1,26 +1,42 @@
 """Where compiled kernels are kept, and when they are good.
 
 numba's cache does not notice edits in other files: a cached caller keeps the old
-callee. The cache folder is therefore named after a digest of all sources that feed
-kernels, and is set before numba is imported anywhere. Whatever has the same sources,
-another copy or version of the package, finds the same compiled kernels.
+callee. Kernels are therefore kept in a folder named after a digest of everything that
+compiled code depends on. numba is told of that folder only while it looks for the place
+of a kernel's cache, so that nobody else's functions are kept there.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable
+import platform
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any
+
+import numba
+from llvmlite import binding
 
 from mrmg import storage
 
 PACKAGE = Path(__file__).resolve().parents[1]
 """Folder of the package."""
 
-_SOURCES = ("compilation/*.py", "energy.py", "motion/dynamics.py", "**/*_kernels.py")
+_SOURCES = (
+    "compilation/*.py",
+    "energy/model.py",
+    "motion/dynamics.py",
+    "**/*_kernels.py",
+)
+
+_COMPLETE = "complete"
+"""Name of the file that says that no kernel is missing."""
+
+_LOCK = threading.Lock()
+"""Held while numba's setting is another."""
 
 
 def kernel_sources() -> list[Path]:
@@ -28,82 +44,84 @@ def kernel_sources() -> list[Path]:
     return sorted({path for name in _SOURCES for path in PACKAGE.glob(name)})
 
 
+def processor() -> tuple[str, str]:
+    """Return the name and features of the processor that numba compiles for."""
+    name, features = numba.config.CPU_NAME, numba.config.CPU_FEATURES
+    if name is None:
+        name = binding.get_host_cpu_name()
+    if features is None:
+        features = binding.get_host_cpu_features().flatten()
+    return str(name), str(features)
+
+
 @cache
-def sources_digest() -> str:
-    """Return a fingerprint of the sources, wherever they lie and whenever written."""
+def compilation_digest() -> str:
+    """Return a fingerprint of all that compiled kernels depend on.
+
+    It covers the sources, their place (numba's cache goes by it), the versions of numba
+    and Python, and the processor.
+    """
     state = hashlib.sha256()
+    for part in (
+        str(PACKAGE),
+        numba.__version__,
+        platform.python_implementation(),
+        platform.python_version(),
+        *processor(),
+    ):
+        state.update(f"{part}\0".encode())
     for path in kernel_sources():
-        state.update(str(path.relative_to(PACKAGE)).encode())
+        state.update(f"{path.relative_to(PACKAGE)}\0".encode())
         state.update(path.read_bytes())
     return state.hexdigest()[:16]
 
 
+@cache
 def cache_folder() -> Path:
-    """Return the folder of compiled kernels that belongs to the present sources."""
-    return storage.user_cache_folder() / "kernels" / sources_digest()
+    """Return the folder of this machine's compiled kernels: numba's, if one is set."""
+    own = storage.user_cache_folder() / "kernels"
+    return Path(numba.config.CACHE_DIR or own) / compilation_digest()
 
 
-os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))
-# Vectorisers and the last optimisation level double the time to compile and gain
-# nothing on kernels that branch at every step (measured on the planner's).
-os.environ.setdefault("NUMBA_OPT", "2")
-os.environ.setdefault("NUMBA_LOOP_VECTORIZE", "0")
-os.environ.setdefault("NUMBA_SLP_VECTORIZE", "0")
-# After the package's own kernels come numba's ways for users' functions.
-os.environ.setdefault(
-    "NUMBA_CACHE_LOCATOR_CLASSES",
-    f"{__name__}.KernelLocator,UserProvidedCacheLocator,InTreeCacheLocator,"
-    "UserWideCacheLocator,IPythonCacheLocator",
-)
+@contextmanager
+def cache_setting() -> Iterator[bool]:
+    """Have numba keep what is decorated meanwhile in the folder of kernels.
 
-import numba  # noqa: E402  (must follow the cache setting)
-from numba.core import caching  # noqa: E402
-
-numba.core.config.reload_config()  # in case somebody imported numba before
-
-
-class KernelLocator(caching.UserProvidedCacheLocator):
-    """Finds compiled kernels by their place in the package and its sources' digest.
-
-    numba goes by a file's full path and its date, which differ from copy to copy.
+    Yields:
+        whether that folder can be written to; kernels are not kept elsewhere.
     """
+    folder = cache_folder()
+    with _LOCK:
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = str(folder)
+        try:
+            yield _is_writable(folder)
+        finally:
+            numba.config.CACHE_DIR = before
 
-    @classmethod
-    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> Any:
-        """Return a locator for a function of this package, None for any other."""
-        if not Path(py_file).resolve().is_relative_to(PACKAGE):
-            return None
-        return super().from_function(py_func, py_file)
 
-    @classmethod
-    def get_suitable_cache_subpath(cls, py_file: str) -> str:
-        """Return the folder of a file's kernels below the cache folder."""
-        place = Path(py_file).resolve().relative_to(PACKAGE)
-        return ".".join(place.with_suffix("").parts)
-
-    def get_source_stamp(self) -> str:
-        """Return what must not have changed for compiled kernels to be good."""
-        return sources_digest()
+@cache
+def _is_writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK)
 
 
 def compiled_kernels() -> int:
-    """Return how many kernels of these sources this machine holds compiled."""
-    return sum(1 for _ in _folder().rglob("*.nbc"))
+    """Return how many kernels this machine holds compiled."""
+    return sum(1 for _ in cache_folder().rglob("*.nbc"))
 
 
 def kernels_are_compiled() -> bool:
     """Tell whether this machine holds all the kernels that missions need, if any."""
-    return bool(numba.config.DISABLE_JIT) or (_folder() / _COMPLETE).exists()
+    return bool(numba.config.DISABLE_JIT) or (cache_folder() / _COMPLETE).exists()
 
 
 def note_kernels_are_compiled() -> None:
     """Have the next process know that this machine holds all kernels."""
     if not kernels_are_compiled():
-        storage.write_text(_folder() / _COMPLETE, f"{compiled_kernels()} kernels\n")
-
-
-def _folder() -> Path:
-    return Path(os.environ["NUMBA_CACHE_DIR"])
-
-
-_COMPLETE = "complete"
+        storage.write_text(
+            cache_folder() / _COMPLETE, f"{compiled_kernels()} kernels\n"
+        )

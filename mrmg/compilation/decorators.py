@@ -1,18 +1,49 @@
-"""The kinds of kernels: decorators that compile functions."""
+"""The decorator of kernels."""
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
+from numba.extending import overload
 
-from mrmg.compilation.calls import Kernel
+from mrmg.compilation.cache import cache_setting
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-SHORT = 1000
-"""Bytes of bytecode up to which a function is linked into its callers."""
+_OPTIONS = {"error_model": "numpy"}
+
+
+class Kernel:
+    """A compiled function, which Python and kernels call.
+
+    What is compiled for kernels is a part of its callers: it lacks what takes arguments
+    out of Python's objects, which is long, and is kept in nobody's cache but theirs.
+
+    Args:
+        function: it.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        functools.update_wrapper(self, function)
+        self.py_func = function
+
+        @overload(self, jit_options=_OPTIONS)
+        @functools.wraps(function)
+        def _compile_for_kernels(*_: Any) -> Callable[..., Any]:
+            return function
+
+    @functools.cached_property
+    def for_python(self) -> Any:
+        """Return the function as Python calls it, kept in the cache."""
+        with cache_setting() as cached:
+            return numba.njit(cache=cached, nogil=True, **_OPTIONS)(self.py_func)
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the function from Python."""
+        return self.for_python(*arguments)
 
 
 def kernel(function: F) -> F:
@@ -21,29 +52,4 @@ def kernel(function: F) -> F:
     Fast-math and parallel reductions would let a branch of the search depend on the
     order of additions, which would end reproducibility.
     """
-    return _compiled(function)
-
-
-def leaf_kernel(function: F) -> F:
-    """Compile a function that neither makes nor returns arrays: no reference counting.
-
-    Counting the references of every array handed on is a good part of the time of a
-    short function, and of the time it takes to compile. What it calls is compiled the
-    same way, so that must be leaf kernels and views.
-    """
-    return _compiled(function, _nrt=False)
-
-
-def view(function: F) -> F:
-    """Compile a function that returns parts of its arguments: into its callers.
-
-    An array handed back by a function would have to be counted.
-    """
-    return numba.njit(inline="always", error_model="numpy")(function)
-
-
-def _compiled(function: F, **options: bool) -> F:
-    if numba.config.DISABLE_JIT:
-        return function
-    linked = len(function.__code__.co_code) <= SHORT
-    return Kernel(function, linked=linked, **options)  # type: ignore[return-value]
+    return function if numba.config.DISABLE_JIT else Kernel(function)  # type: ignore[return-value]

@@ -6,8 +6,8 @@ from math import cos, sin, tan
 
 import numba
 
-from mrmg.compilation import leaf_kernel
-from mrmg.motion._pointer_kernels import call_steer, call_step
+from mrmg.compilation import kernel
+from mrmg.motion._pointer_kernels import steer_at, step_at
 from mrmg.motion.dynamics import (
     car_derivative,
     car_turn_speed,
@@ -29,15 +29,15 @@ _car_turn_speed = numba.njit(car_turn_speed(tan))
 _unicycle_turn_speed = numba.njit(unicycle_turn_speed(tan))
 
 
-@leaf_kernel
+@kernel
 def step(robot, state, u1, u2, dt, out):
     """Write the state after `dt` under held controls into `out`, shape (5,).
 
     `robot` is a record with `model`, `wheelbase` and, for a user's model, `step_at`.
     """
     if robot.model == USER:
-        x, y, theta, v, w = call_step(
-            robot.step_at, state[0], state[1], state[2], state[3], state[4], u1, u2,
+        x, y, theta, v, w = step_at(robot.step_at)(
+            (state[0], state[1], state[2], state[3], state[4]), (u1, u2),
             robot.wheelbase, dt,
         )  # fmt: skip
     elif robot.model == CAR:
@@ -53,7 +53,7 @@ def step(robot, state, u1, u2, dt, out):
     out[0], out[1], out[2], out[3], out[4] = x, y, theta, v, w
 
 
-@leaf_kernel
+@kernel
 def turn_speed(model, v, w, track):
     """Return L |theta'| for the energy model's turning part [m/s]."""
     if model == CAR:
@@ -61,7 +61,7 @@ def turn_speed(model, v, w, track):
     return _unicycle_turn_speed(v, w, track)
 
 
-@leaf_kernel
+@kernel
 def copy_numbers(source, target):
     """Copy numbers element by element into an array that is at least as long.
 
@@ -72,13 +72,13 @@ def copy_numbers(source, target):
         target[i] = source[i]
 
 
-@leaf_kernel
+@kernel
 def steer_user(robot, state, wx, wy, share, dt):
     """Return a user's model's control (u1, u2) towards a waypoint.
 
     `share` of the top speed is wanted; 0 asks to brake.
     """
-    return call_steer(
-        robot.steer_at, state[0], state[1], state[2], state[3], state[4], wx, wy,
+    return steer_at(robot.steer_at)(
+        (state[0], state[1], state[2], state[3], state[4]), (wx, wy),
         share, robot.wheelbase, dt,
     )  # fmt: skip

@@ -116,32 +116,25 @@ def _imported(path: str) -> ModuleType:
 @cache
 def _addresses(motion: UserMotion, limits: tuple[float, ...]) -> tuple[int, int]:
     import numba
-    from numba import carray, types
+
+    from mrmg.motion._pointer_kernels import STEER, STEP
 
     step, steer = numba.njit(motion.step), numba.njit(motion.steer)
-    number, numbers = types.float64, types.CPointer(types.float64)
 
-    def call_step(inputs: Any, length: float, dt: float, outputs: Any) -> None:
-        i, o = carray(inputs, 7), carray(outputs, 5)
-        o[0], o[1], o[2], o[3], o[4] = step(
-            (i[0], i[1], i[2], i[3], i[4]), (i[5], i[6]), length, dt
-        )
+    def call_step(state: Any, control: Any, length: float, dt: float) -> Any:
+        x, y, theta, v, w = step(state, control, length, dt)
+        return float(x), float(y), float(theta), float(v), float(w)
 
     def call_steer(
-        inputs: Any, share: float, length: float, dt: float, outputs: Any
-    ) -> None:
-        i, o = carray(inputs, 7), carray(outputs, 2)
-        o[0], o[1] = steer(
-            (i[0], i[1], i[2], i[3], i[4]), (i[5], i[6]), share, limits, length, dt
-        )
+        state: Any, waypoint: Any, share: float, length: float, dt: float
+    ) -> Any:
+        u1, u2 = steer(state, waypoint, share, limits, length, dt)
+        return float(u1), float(u2)
 
-    signatures = (
-        types.void(numbers, number, number, numbers),
-        types.void(numbers, number, number, number, numbers),
-    )
     addresses = []
-    for name, function, signature in zip(
-        ("step", "steer"), (call_step, call_steer), signatures, strict=True
+    for name, function, signature in (
+        ("step", call_step, STEP),
+        ("steer", call_steer, STEER),
     ):
         try:
             compiled = numba.cfunc(signature)(function)

@@ -13,10 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, leaf_kernel
+from mrmg.compilation import by_reference, kernel
 
 
-@by_pointer
 class FreeSpace(NamedTuple):
     """Free space of one set of obstacles as flat arrays.
 
@@ -53,7 +52,7 @@ UNIFORM_TURNING = np.ones((1, 1))
 """The multipliers of turning where all terrain resists it alike."""
 
 
-@by_pointer
+@by_reference
 class TerrainGrid(NamedTuple):
     """What the ground costs.
 
@@ -77,7 +76,7 @@ class TerrainGrid(NamedTuple):
     turning: np.ndarray = UNIFORM_TURNING
 
 
-@leaf_kernel
+@kernel
 def point_segment_distance(px, py, ax, ay, bx, by):
     """Return the distance of a point from a segment."""
     dx = bx - ax
@@ -90,7 +89,7 @@ def point_segment_distance(px, py, ax, ay, bx, by):
     return hypot(px - ax - t * dx, py - ay - t * dy)
 
 
-@leaf_kernel
+@kernel
 def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
     """Return whether segments ab and cd properly cross."""
     d1 = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
@@ -100,7 +99,7 @@ def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
     return (d1 > 0.0) != (d2 > 0.0) and (d3 > 0.0) != (d4 > 0.0)
 
 
-@leaf_kernel
+@kernel
 def point_in_convex(px, py, corners):
     """Return whether a point lies in a convex counter-clockwise polygon."""
     n = len(corners)
@@ -113,7 +112,7 @@ def point_in_convex(px, py, corners):
     return True
 
 
-@leaf_kernel
+@kernel
 def convex_segment_distance(corners, ax, ay, bx, by):
     """Return the distance of a convex polygon from a segment; 0 where they meet."""
     if point_in_convex(ax, ay, corners):
@@ -132,7 +131,7 @@ def convex_segment_distance(corners, ax, ay, bx, by):
     return best
 
 
-@leaf_kernel
+@kernel
 def convex_convex_distance(first, second):
     """Return the distance of two convex polygons; 0 where they meet."""
     if point_in_convex(second[0, 0], second[0, 1], first):
@@ -154,7 +153,7 @@ def convex_convex_distance(first, second):
     return best
 
 
-@leaf_kernel
+@kernel
 def place_footprint(footprint, x, y, theta, out):
     """Write the footprint's corners at a pose into `out`, shape (m, 2)."""
     c = cos(theta)
@@ -164,7 +163,7 @@ def place_footprint(footprint, x, y, theta, out):
         out[i, 1] = y + s * footprint[i, 0] + c * footprint[i, 1]
 
 
-@leaf_kernel
+@kernel
 def clearance_at_least(space, x, y):
     """Return a lower bound of the signed distance from obstacles [m]; -inf off grid."""
     rows, columns = space.distance.shape
@@ -177,7 +176,7 @@ def clearance_at_least(space, x, y):
     return space.distance[row, column] - sqrt(dx * dx + dy * dy)
 
 
-@leaf_kernel
+@kernel
 def clearance_estimate(space, x, y):
     """Return the signed distance from obstacles [m], bilinear in the field."""
     fx = (x - space.x_min) / space.cell - 0.5
@@ -185,7 +184,7 @@ def clearance_estimate(space, x, y):
     return bilinear(space.distance, fx, fy)
 
 
-@leaf_kernel
+@kernel
 def bilinear(value, column, row):
     """Return a grid's value between its nodes; beyond them, that of the nearest edge.
 
@@ -203,7 +202,7 @@ def bilinear(value, column, row):
     return low * (1.0 - v) + high * v
 
 
-@leaf_kernel
+@kernel
 def footprint_is_clear(space, placed, cx, cy, radius, margin):
     """Return whether a placed footprint keeps `margin` [m] from every obstacle; exact.
 
@@ -243,7 +242,7 @@ def footprint_is_clear(space, placed, cx, cy, radius, margin):
     return clearance_estimate(space, cx, cy) > 0.0
 
 
-@leaf_kernel
+@kernel
 def cell_value(values, terrain, x, y):
     """Return the value of the cell of a terrain's grid that holds a point."""
     rows, columns = values.shape
@@ -254,19 +253,19 @@ def cell_value(values, terrain, x, y):
     return values[row, column]
 
 
-@leaf_kernel
+@kernel
 def multiplier_in(terrain, x, y):
     """Return the terrain's energy multiplier of the cell that holds a point."""
     return cell_value(terrain.multiplier, terrain, x, y)
 
 
-@leaf_kernel
+@kernel
 def turning_multiplier_in(terrain, x, y):
     """Return the terrain's multiplier of turning in the cell that holds a point."""
     return cell_value(terrain.turning, terrain, x, y)
 
 
-@leaf_kernel
+@kernel
 def height_in(terrain, x, y):
     """Return the height of the ground [m], bilinear; 0 on flat ground."""
     if terrain.height.shape[0] == 0:
@@ -276,7 +275,7 @@ def height_in(terrain, x, y):
     return bilinear(terrain.height, fx, fy)
 
 
-@leaf_kernel
+@kernel
 def segment_clearance(space, ax, ay, bx, by, needed, enough):
     """Return the smallest clearance [m] along a segment, capped at `enough`.
 
@@ -294,13 +293,13 @@ def segment_clearance(space, ax, ay, bx, by, needed, enough):
     return best
 
 
-@leaf_kernel
+@kernel
 def segment_is_clear(space, ax, ay, bx, by, needed):
     """Return whether a segment keeps `needed` clearance [m]."""
     return segment_clearance(space, ax, ay, bx, by, needed, needed) >= needed
 
 
-@leaf_kernel
+@kernel
 def sloped_length(way, rise, slope_price, floor):
     """Return what a way costs on a slope [m of plain ground]; see `planning.slopes`.
 
@@ -313,7 +312,7 @@ def sloped_length(way, rise, slope_price, floor):
     return max(way + slope_price * rise, floor * way)
 
 
-@leaf_kernel
+@kernel
 def segment_cost(terrain, ax, ay, bx, by, slope_price, floor):
     """Return the cost of driving along a segment [m of plain ground], by midpoints.
 

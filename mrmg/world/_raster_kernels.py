@@ -9,7 +9,7 @@ from math import ceil, floor, log2, sqrt
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.world._kernels import point_segment_distance
 
 
@@ -78,7 +78,7 @@ def fill_rings(ring_start, point, x_min, y_min, cell, rows, columns):
     return inside
 
 
-@leaf_kernel
+@kernel
 def _sort(values):
     """Put a few values in order."""
     for i in range(1, len(values)):

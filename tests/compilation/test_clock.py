@@ -19,7 +19,7 @@ def moments(count):
 
 def test_a_kernel_reads_the_clock_of_python() -> None:
     moments(1)
-    before = time.monotonic_ns()
+    before = time.perf_counter_ns()
     first, last = moments(1000)
-    after = time.monotonic_ns()
+    after = time.perf_counter_ns()
     assert before <= first < last <= after

@@ -41,19 +41,3 @@ def names_compiled() -> list[str]:
 def test_no_kernel_is_compiled_in_a_second_process() -> None:
     names_compiled()
     assert names_compiled() == []
-
-
-def test_a_process_imports_nothing_that_only_compiling_needs() -> None:
-    names_compiled()
-    look = "import sys; print(*(name for name in sys.modules))"
-    done = subprocess.run(
-        [sys.executable, "-c", f"{COUNT}\n{look}"],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    imported = set(done.stdout.split())
-    assert "mrmg.planning.bound.bound" in imported
-    # The first is what numba compiles array functions with.
-    heavy = {"numba.np.arraymath", "scipy.linalg", "scipy.sparse", "scipy.spatial"}
-    assert not heavy & imported

@@ -16,7 +16,7 @@ from math import sqrt
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.planning.roadmap._heap_kernels import pop, push
 
 UNREACHED = 1e18
@@ -82,7 +82,7 @@ def certified_field(price, cell, seed, rounds, band):
     return field, level, certified
 
 
-@leaf_kernel
+@kernel
 def steepness(field, cell, row, column):
     """Return the largest gradient in a cell, cut along the better diagonal.
 
@@ -98,7 +98,7 @@ def steepness(field, cell, row, column):
     return sqrt(min(from_a, from_b)) / cell
 
 
-@leaf_kernel
+@kernel
 def _lower_where_steep(field, price, cell, step):
     """Lower the working price of too steep cells, by sqrt(2) at most."""
     for row in range(price.shape[0]):
@@ -199,7 +199,7 @@ def _follow(step, side, field, width, order):
                     stale[node + width + 1] = True
 
 
-@leaf_kernel
+@kernel
 def _node_value(step, field, width, node):
     """Return the least value that the four cells about a node allow it."""
     best = UNREACHED
@@ -214,7 +214,7 @@ def _node_value(step, field, width, node):
     return best
 
 
-@leaf_kernel
+@kernel
 def _corner_value(a, b, step):
     """Return the value of a cell's corner between corners of known values."""
     if abs(a - b) < step:

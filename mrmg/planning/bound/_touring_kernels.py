@@ -16,14 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, kernel, leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 
 NOTHING = -1
 """Parent of the first label."""
 
 
-@by_pointer
 class Completions(NamedTuple):
     """What the rest of a mission costs at least, were batteries to last for ever.
 
@@ -40,7 +39,6 @@ class Completions(NamedTuple):
     before: np.ndarray
 
 
-@by_pointer
 class TourSearch(NamedTuple):
     """What cheapest tours are sought among.
 
@@ -62,7 +60,6 @@ class TourSearch(NamedTuple):
     most: float
 
 
-@by_pointer
 class Labels(NamedTuple):
     """Labels in the order in which they were set, and room for candidates.
 
@@ -167,13 +164,13 @@ def cheapest_tours(search, room):
     return cost, last, labels.trace[:count]
 
 
-@leaf_kernel
+@kernel
 def _set(labels, k, cost, left):
     """Write the value of label k."""
     labels.value[k, 0], labels.value[k, 1] = cost, left
 
 
-@leaf_kernel
+@kernel
 def _trace(labels, k, r, node, arc, parent):
     """Write where label k is, and the label that it continues."""
     labels.trace[k, 0], labels.trace[k, 1] = r, node
@@ -207,7 +204,7 @@ def _visit_goal(search, labels, r, mask, g, count):
     return count
 
 
-@leaf_kernel
+@kernel
 def _offers(search, labels, r, rest, g, arc):
     """Write what comes of all labels that the g-th goal may follow; return the number.
 
@@ -276,7 +273,7 @@ def _visit_stations(search, labels, r, mask, count):
         count += 1
 
 
-@leaf_kernel
+@kernel
 def _lead_on(search, labels, r, k, usable, ahead, cost, origin):
     """Lower the costs of all stations' arcs to what they are by way of label k.
 
@@ -300,7 +297,7 @@ def _lead_on(search, labels, r, k, usable, ahead, cost, origin):
                 origin[s, arc] = k
 
 
-@leaf_kernel
+@kernel
 def _after_station(search, r, mask, s):
     """Return a bound of what is still to come with robot r at a station."""
     rest = search.rest
@@ -312,7 +309,7 @@ def _after_station(search, r, mask, s):
     return least
 
 
-@leaf_kernel
+@kernel
 def _end_tours(search, labels, r, cost, last):
     """Write the cost of each set of goals once robot r has ended, and its last label.
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, kernel, leaf_kernel
+from mrmg.compilation import by_reference, kernel
 
 SOFT_TURN = 0.05
 """Angle below which the scrub of turning is rounded off [rad]."""
@@ -33,7 +33,7 @@ EVENNESS_WEIGHT = 0.3
 """Cost of neighbouring segments of unequal length [m/m^2]."""
 
 
-@by_pointer
+@by_reference
 class Surface(NamedTuple):
     """What a path is priced on: grids of one robot's clearance and of the terrain.
 
@@ -61,7 +61,7 @@ class Surface(NamedTuple):
     scrub: float
 
 
-@by_pointer
+@by_reference
 class Stops(NamedTuple):
     """The targets at a path's nodes.
 
@@ -81,7 +81,6 @@ class Stops(NamedTuple):
     deeper: np.ndarray
 
 
-@by_pointer
 class Shape(NamedTuple):
     """The form of a path, by segment and its first node, with the cost's derivatives.
 
@@ -102,7 +101,7 @@ class Shape(NamedTuple):
     d_size: np.ndarray
 
 
-@leaf_kernel
+@kernel
 def value_and_slope(grid, x_min, y_min, cell, x, y):
     """Return (value, d/dx, d/dy) of a grid of cell values, bilinear."""
     rows, columns = grid.shape
@@ -120,7 +119,7 @@ def value_and_slope(grid, x_min, y_min, cell, x, y):
     return low + (high - low) * fy, slope_x, (high - low) / cell
 
 
-@leaf_kernel
+@kernel
 def outside(stops, i, x, y):
     """Return (distance outside a stop's region, drawn in, d/dx, d/dy); 0 inside."""
     if stops.corners[i] == 0:
@@ -142,7 +141,7 @@ def outside(stops, i, x, y):
     return worst, nx, ny
 
 
-@leaf_kernel
+@kernel
 def add_terrain_and_clearance(surface, p, gear, gradient):
     """Add the cost of the ground under each segment and of what it comes near to."""
     total = 0.0
@@ -194,7 +193,7 @@ def add_terrain_and_clearance(surface, p, gear, gradient):
     return total
 
 
-@leaf_kernel
+@kernel
 def write_turns(p, gear, ux, uy, shape):
     """Write the length of each segment, and the turn and curvature at its first node.
 
@@ -212,7 +211,7 @@ def write_turns(p, gear, ux, uy, shape):
         ax, ay, last = bx, by, gear[i]
 
 
-@leaf_kernel
+@kernel
 def bending_cost(surface, gear, pivot, shape):
     """Return the cost of turning, of too much curvature and of its changes.
 
@@ -257,7 +256,7 @@ def bending_cost(surface, gear, pivot, shape):
     return total
 
 
-@leaf_kernel
+@kernel
 def add_bending(surface, p, gear, pivot, shape, gradient):
     """Add the cost of turning, of too much curvature and of its changes."""
     total = bending_cost(surface, gear, pivot, shape)
@@ -281,7 +280,7 @@ def add_bending(surface, p, gear, pivot, shape, gradient):
     return total
 
 
-@leaf_kernel
+@kernel
 def add_evenness(p, gear, size, gradient):
     """Add the cost of unequal neighbours, which keeps nodes from gathering."""
     total = 0.0
@@ -300,7 +299,7 @@ def add_evenness(p, gear, size, gradient):
     return total
 
 
-@leaf_kernel
+@kernel
 def band_cost(surface, stops, p, gear, pivot, ux, uy, shape, gradient):
     """Return a path's cost [m of plain ground] and write its gradient, shape (n, 2)."""
     gradient[:] = 0.0

@@ -9,7 +9,7 @@ from math import hypot
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.planning.drafting._band_kernels import band_cost, new_shape
 
 MEMORY = 8
@@ -28,7 +28,7 @@ LEAST_GAIN = 2e-5
 """... and the share of the cost that they must gain to be followed by more."""
 
 
-@leaf_kernel
+@kernel
 def dot(a, b):
     """Return the scalar product of two arrays of shape (n, 2)."""
     total = 0.0
@@ -37,7 +37,7 @@ def dot(a, b):
     return total
 
 
-@leaf_kernel
+@kernel
 def add_scaled(a, factor, b, out):
     """Write a + factor b, shapes (n, 2)."""
     for i in range(len(a)):
@@ -63,7 +63,7 @@ def descent(gradient, steps, changes, scale, pairs, out):
         add_scaled(out, weight[m] - scale[m] * dot(changes[m], out), steps[m], out)
 
 
-@leaf_kernel
+@kernel
 def longest_row(a):
     """Return the length of the longest row, shape (n, 2)."""
     most = 0.0

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, kernel, leaf_kernel
+from mrmg.compilation import by_reference, kernel
 from mrmg.motion._kernels import UNICYCLE, step
 from mrmg.planning.problem._control_kernels import control_towards, wrap
 from mrmg.planning.problem._safety_kernels import (
@@ -55,7 +55,7 @@ ATTEMPTS = 3
 """Controls tried before a robot brakes as committed."""
 
 
-@by_pointer
+@by_reference
 class Courses(NamedTuple):
     """The fleet's paths, padded to one length.
 
@@ -106,7 +106,7 @@ class Waits(NamedTuple):
     until: np.ndarray
 
 
-@leaf_kernel
+@kernel
 def advance(courses, r, i, x, y):
     """Return (segment, way along the path) nearest to a point, from segment i on."""
     while True:
@@ -119,7 +119,7 @@ def advance(courses, r, i, x, y):
         i += 1
 
 
-@leaf_kernel
+@kernel
 def bend_at(courses, r, i, s):
     """Return the curvature of the path at a way, within the stretch of segment i."""
     last = courses.end[r, i]
@@ -130,7 +130,7 @@ def bend_at(courses, r, i, s):
     return courses.bend[r, i] + t * (courses.bend[r, i + 1] - courses.bend[r, i])
 
 
-@leaf_kernel
+@kernel
 def waiting_at(waits, driven, r):
     """Return the way along its path at which robot r has to wait now, inf for none.
 
@@ -147,20 +147,20 @@ def waiting_at(waits, driven, r):
     return nearest
 
 
-@leaf_kernel
+@kernel
 def turned(courses, r, state):
     """Tell whether a robot has the heading that it must end with."""
     return abs(wrap(courses.heading[r] - state[2])) < 0.5 * courses.tolerance[r]
 
 
-@leaf_kernel
+@kernel
 def turning_rate(fleet, r, lacking):
     """Return the rate at which a robot turns on the spot by an angle [rad/s]."""
     w = sqrt(2.0 * TURNING_SHARE * fleet[r].limit[4] * abs(lacking))
     return w if lacking > 0.0 else -w
 
 
-@leaf_kernel
+@kernel
 def follow(fleet, courses, r, i, state, barrier):
     """Return (segment, way, way left in this gear, off the path, wanted v, wanted w).
 
@@ -329,7 +329,7 @@ def drive(
     return steps, order[robots - 1]
 
 
-@leaf_kernel
+@kernel
 def first_inside(targets, t, state, first):
     """Return the first of the states from `first` on in a target; their number if none.
 
@@ -345,7 +345,7 @@ def first_inside(targets, t, state, first):
     return len(state)
 
 
-@leaf_kernel
+@kernel
 def write_states(fleet, r, dt, control, state):
     """Write the states that controls, shape (n, 2), lead robot r to from state[0]."""
     for k in range(len(control)):

@@ -7,7 +7,7 @@ from math import atan, atan2, cos, hypot, isnan, pi, sin
 import numba
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.energy.model import battery_power
 from mrmg.motion._kernels import CAR, copy_numbers, step, turn_speed
 from mrmg.planning.guided_tree._regions_kernels import point_on_path, region_of
@@ -46,7 +46,7 @@ REST = 1e-9
 """Speed below which a robot is at rest [m/s], [rad/s]."""
 
 
-@leaf_kernel
+@kernel
 def decay(visits, rules):
     """Return the probability of steering after so many expansions of the group.
 
@@ -56,13 +56,13 @@ def decay(visits, rules):
     return rules.decay_least + (rules.decay_start - rules.decay_least) * fallen
 
 
-@leaf_kernel
+@kernel
 def towards(value, wanted, rate, hold_s):
     """Return the rate of change that, held for hold_s, gets nearest to a value."""
     return max(-rate, min(rate, (wanted - value) / hold_s))
 
 
-@leaf_kernel
+@kernel
 def steer(robot, state, x, y, hold_s):
     """Return the control that, held, drives a robot at a point; NaN brakes (Steer).
 
@@ -103,7 +103,7 @@ def steer(robot, state, x, y, hold_s):
     return towards(state[3], v, u1_max, hold_s), towards(state[4], w, u2_max, hold_s)
 
 
-@leaf_kernel
+@kernel
 def choose_controls(setting, rules, state, visits, target, random, draw, control):
     """Write each robot's control (Algorithm 3, lines 2-5).
 
@@ -129,7 +129,7 @@ def choose_controls(setting, rules, state, visits, target, random, draw, control
             )
 
 
-@leaf_kernel
+@kernel
 def step_energy(setting, r, before, after, u1, dt):
     """Return the battery energy of one step on flat ground [J], by its midpoint."""
     robot = setting.fleet[r]
@@ -142,7 +142,7 @@ def step_energy(setting, r, before, after, u1, dt):
     return dt * _battery_power(v, u1, turn, k, 0.0, robot.energy)
 
 
-@leaf_kernel
+@kernel
 def arrive(setting, tours, row, state, energy, visited):
     """Enter goals and stations; return whether one of the tour is reached.
 

@@ -6,7 +6,7 @@ from math import hypot
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.planning.roadmap._bucket_kernels import nearest_points
 from mrmg.world._kernels import multiplier_in
 
@@ -28,7 +28,7 @@ def region_of(roadmap, joined, x, y):
     return nearest[0]
 
 
-@leaf_kernel
+@kernel
 def path_energy(setting, r, t, x, y, region):
     """Return the energy from a point to a target along the roadmap [J].
 
@@ -42,7 +42,7 @@ def path_energy(setting, r, t, x, y, region):
     return robot.plain * (costs_m + setting.roadmap.cost_to_go[robot.field, t, region])
 
 
-@leaf_kernel
+@kernel
 def point_on_path(setting, r, t, region, ahead_m, point):
     """Write the point `ahead_m` along the roadmap's path from a region to a target."""
     field = setting.fleet[r].field

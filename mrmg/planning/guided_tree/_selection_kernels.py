@@ -6,12 +6,12 @@ from math import cos, exp, pi, sin, sqrt
 
 import numpy as np
 
-from mrmg.compilation import leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.planning.guided_tree._regions_kernels import point_on_path
 from mrmg.planning.routing._random_kernels import random_unit
 
 
-@leaf_kernel
+@kernel
 def select_group(tree, rules, draw):
     """Return a group drawn by weight, or with probability `bias` the heaviest.
 
@@ -35,7 +35,7 @@ def select_group(tree, rules, draw):
     return i - leaves
 
 
-@leaf_kernel
+@kernel
 def select_vertex(tree, rules, g, draw):
     """Return a vertex of a group, drawn by its distance d to its target.
 
@@ -67,7 +67,7 @@ def select_vertex(tree, rules, g, draw):
         v = vertices.next[v]
 
 
-@leaf_kernel
+@kernel
 def sample_target(setting, rules, tree, v, target):
     """Write what each robot is to drive at: a point near its path along the roadmap.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, leaf_kernel
+from mrmg.compilation import by_reference, kernel
 from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.roadmap._fleet_kernels import Spaces, space_of
 from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
@@ -24,7 +24,7 @@ STATE_ROUNDING = 1e-9
 """Rounding of summed steps that is forgiven in the limits of speed and steering."""
 
 
-@by_pointer
+@by_reference
 class Setting(NamedTuple):
     """A mission as the method sees it.
 
@@ -44,7 +44,7 @@ class Setting(NamedTuple):
     routing: RoutingArrays
 
 
-@by_pointer
+@by_reference
 class Rules(NamedTuple):
     """Parameters of the method; see `parameters.GuidedTreeParams`."""
 
@@ -69,7 +69,7 @@ class Rules(NamedTuple):
     nrpa_alpha: float
 
 
-@leaf_kernel
+@kernel
 def in_region(targets, t, x, y):
     """Return whether a point lies in a target's region."""
     far = hypot(x - targets.center[t, 0], y - targets.center[t, 1])
@@ -79,7 +79,7 @@ def in_region(targets, t, x, y):
     return n == 0 or point_in_convex(x, y, targets.corner[t, :n])
 
 
-@leaf_kernel
+@kernel
 def wrap(angle):
     """Return the angle in (-pi, pi]."""
     while angle > pi:
@@ -89,7 +89,7 @@ def wrap(angle):
     return angle
 
 
-@leaf_kernel
+@kernel
 def within_limits(robot, state):
     """Return whether speed and steering (or turning rate) keep the robot's limits."""
     if state[3] < robot.limit[0] - STATE_ROUNDING:
@@ -99,7 +99,7 @@ def within_limits(robot, state):
     return abs(state[4]) <= robot.limit[2] + STATE_ROUNDING
 
 
-@leaf_kernel
+@kernel
 def collision_free(setting, state, corner, middle):
     """Return whether a composite state keeps all limits and margins (CollisionFree).
 

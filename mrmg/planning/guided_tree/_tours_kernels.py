@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel, now_ns
+from mrmg.compilation import kernel, now_ns
 from mrmg.planning.guided_tree._regions_kernels import path_energy
 from mrmg.planning.guided_tree._tree_kernels import (
     ROUTER_CALLS,
@@ -15,7 +15,7 @@ from mrmg.planning.guided_tree._tree_kernels import (
 from mrmg.planning.routing._nrpa_kernels import UNVISITED, RoutingArrays, nrpa
 
 
-@leaf_kernel
+@kernel
 def feasible(setting, tours, row, state, energy, region):
     """Return whether every battery lasts for a tour from a composite state.
 
@@ -37,7 +37,7 @@ def feasible(setting, tours, row, state, energy, region):
     return True
 
 
-@leaf_kernel
+@kernel
 def write_tours(setting, sequence, moves, margin, tours, row):
     """Write the tours of a playout's moves, and what they need on the way."""
     problem = setting.routing

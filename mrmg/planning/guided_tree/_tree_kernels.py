@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, leaf_kernel
+from mrmg.compilation import by_reference, kernel
 
 
-@by_pointer
+@by_reference
 class Vertices(NamedTuple):
     """Vertices of the motion tree; N at most, R robots.
 
@@ -39,7 +39,7 @@ class Vertices(NamedTuple):
     to_target_m: np.ndarray
 
 
-@by_pointer
+@by_reference
 class Groups(NamedTuple):
     """Vertices with the same region of every robot and the same visited goals.
 
@@ -69,7 +69,7 @@ class Groups(NamedTuple):
     scale: np.ndarray
 
 
-@by_pointer
+@by_reference
 class Tours(NamedTuple):
     """Tours that vertices carry; a row for each call of CreateNewTour that found some.
 
@@ -85,7 +85,7 @@ class Tours(NamedTuple):
     need: np.ndarray
 
 
-@by_pointer
+@by_reference
 class Trace(NamedTuple):
     """What happened in each iteration; I at most.
 
@@ -111,7 +111,7 @@ class Trace(NamedTuple):
     ended: np.ndarray
 
 
-@by_pointer
+@by_reference
 class MotionTree(NamedTuple):
     """A motion tree and all that changes as it grows.
 
@@ -150,7 +150,7 @@ N_COUNTS = 7
 """Places in the array of counts; the last is the time that router calls took."""
 
 
-@leaf_kernel
+@kernel
 def group_weight(groups, g, rules):
     """Return a group's weight by eq. (5).
 
@@ -165,7 +165,7 @@ def group_weight(groups, g, rules):
     )
 
 
-@leaf_kernel
+@kernel
 def weigh(groups, g, rules):
     """Bring the binary trees up to date with a group's weight."""
     i = len(groups.total) // 2 + g
@@ -177,7 +177,7 @@ def weigh(groups, g, rules):
         i //= 2
 
 
-@leaf_kernel
+@kernel
 def find_group(tree, region, visited):
     """Return the group of regions and visited goals; a new one if there is none."""
     groups = tree.groups
@@ -213,7 +213,7 @@ def find_group(tree, region, visited):
     return g
 
 
-@leaf_kernel
+@kernel
 def add_to_group(tree, rules, g, n):
     """Add vertex n to group g."""
     vertices, groups = tree.vertices, tree.groups

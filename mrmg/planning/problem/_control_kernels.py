@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from math import pi
 
-from mrmg.compilation import leaf_kernel
+from mrmg.compilation import kernel
 
 
-@leaf_kernel
+@kernel
 def wrap(angle):
     """Return the angle in (-pi, pi]."""
     while angle > pi:
@@ -17,7 +17,7 @@ def wrap(angle):
     return angle
 
 
-@leaf_kernel
+@kernel
 def control_towards(fleet, r, state, v, w, dt):
     """Return the control (u1, u2) that brings speed and steering to (v, w)."""
     v = max(fleet[r].limit[0], min(fleet[r].limit[1], v))

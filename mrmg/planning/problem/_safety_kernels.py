@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, kernel, leaf_kernel, view
+from mrmg.compilation import by_reference, kernel
 from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, step
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS, space_of
 from mrmg.world._kernels import (
@@ -30,7 +30,7 @@ REST = 1e-9
 """Speed below which a robot counts as standing [m/s]."""
 
 
-@by_pointer
+@by_reference
 class Gates(NamedTuple):
     """Convex regions that one robot at a time may be in, or committed to enter.
 
@@ -47,7 +47,6 @@ class Gates(NamedTuple):
     corners: np.ndarray
 
 
-@by_pointer
 class Commitment(NamedTuple):
     """Committed motions; two slots a robot, one active and one for a proposal.
 
@@ -95,7 +94,7 @@ def new_commitment(fleet, gates, dt):
     )
 
 
-@leaf_kernel
+@kernel
 def toward_zero(value, bound, dt):
     """Return the rate that brings `value` to 0 as fast as `bound` allows."""
     if abs(value) < REST:
@@ -103,7 +102,7 @@ def toward_zero(value, bound, dt):
     return max(-bound, min(bound, -value / dt))
 
 
-@leaf_kernel
+@kernel
 def braking_control(fleet, r, state, dt):
     """Return the control (u1, u2) of full braking; a car holds its steering."""
     if fleet[r].model == USER:
@@ -115,13 +114,13 @@ def braking_control(fleet, r, state, dt):
     return u1, u2
 
 
-@leaf_kernel
+@kernel
 def stands(fleet, r, state):
     """Tell whether a robot is at rest."""
     return abs(state[3]) < REST and (fleet[r].model == CAR or abs(state[4]) < REST)
 
 
-@leaf_kernel
+@kernel
 def write_braking(fleet, r, first, dt, commitment, slot):
     """Fill a slot with `first` and the braking that follows it."""
     states = commitment.state[r, slot]
@@ -141,7 +140,7 @@ def write_braking(fleet, r, first, dt, commitment, slot):
     commitment.length[r, slot] = n
 
 
-@leaf_kernel
+@kernel
 def place(fleet, commitment, r, slot, k):
     """Place a committed footprint, if it is not yet."""
     if not commitment.placed[r, slot, k]:
@@ -152,7 +151,7 @@ def place(fleet, commitment, r, slot, k):
         commitment.placed[r, slot, k] = True
 
 
-@leaf_kernel
+@kernel
 def clear_of_obstacles(fleet, spaces, commitment, r, slot, first):
     """Tell whether a slot's states from `first` on keep the margin from obstacles."""
     space = space_of(spaces, fleet[r].space)
@@ -168,7 +167,7 @@ def clear_of_obstacles(fleet, spaces, commitment, r, slot, first):
     return True
 
 
-@leaf_kernel
+@kernel
 def clear_of_robot(fleet, commitment, r, slot, first, other, other_first, margin):
     """Tell whether two committed motions keep `margin`, step by step.
 
@@ -202,7 +201,7 @@ def clear_of_robot(fleet, commitment, r, slot, first, other, other_first, margin
     return True
 
 
-@leaf_kernel
+@kernel
 def passes_gate(commitment, gate, r, slot, first):
     """Tell whether a slot's states from `first` on are in a gate at any time."""
     gates = commitment.gates
@@ -217,7 +216,7 @@ def passes_gate(commitment, gate, r, slot, first):
     return False
 
 
-@leaf_kernel
+@kernel
 def gate_is_taken(commitment, gate, r):
     """Tell whether a robot other than r is in a gate or committed to enter it."""
     for other in range(len(commitment.now)):
@@ -228,7 +227,7 @@ def gate_is_taken(commitment, gate, r):
     return False
 
 
-@leaf_kernel
+@kernel
 def clear_of_gates(commitment, r, slot):
     """Tell whether a slot's states enter no gate that another robot has taken."""
     for gate in range(len(commitment.gates.reach)):
@@ -279,14 +278,14 @@ def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):
     return True
 
 
-@leaf_kernel
+@kernel
 def follow_braking(commitment, r):
     """Advance robot r one step along its commitment."""
     last = commitment.length[r, commitment.active[r]] - 1
     commitment.now[r] = min(commitment.now[r] + 1, last)
 
 
-@view
+@kernel
 def present_state(commitment, r):
     """Return robot r's present state, a view of shape (5,)."""
     return commitment.state[r, commitment.active[r], commitment.now[r]]

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, leaf_kernel
+from mrmg.compilation import by_reference, kernel
 from mrmg.world._kernels import point_in_convex
 
 
-@by_pointer
+@by_reference
 class Targets(NamedTuple):
     """Goals, stations and finishes: convex regions; T targets, in that order.
 
@@ -42,7 +42,7 @@ class Targets(NamedTuple):
     gate: np.ndarray
 
 
-@leaf_kernel
+@kernel
 def in_target(targets, t, x, y):
     """Tell whether a point lies in a target's region."""
     far = hypot(x - targets.center[t, 0], y - targets.center[t, 1])

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg import seeding
+from mrmg.compilation import by_reference
 from mrmg.energy.model import CONSUMERS_W
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
@@ -27,6 +28,7 @@ from mrmg.world._kernels import TerrainGrid
 from mrmg.world.world import World
 
 
+@by_reference
 class Mission(NamedTuple):
     """A planning problem as arrays.
 

@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, leaf_kernel
+from mrmg.compilation import kernel
 
 
-@by_pointer
 class Buckets(NamedTuple):
     """Points by the squares that they lie in.
 
@@ -30,7 +29,7 @@ class Buckets(NamedTuple):
     member: np.ndarray
 
 
-@leaf_kernel
+@kernel
 def bucket_of(buckets, x, y):
     """Return (column, row) of the square that holds a point, or of the nearest one."""
     column = int((x - buckets.x_min) / buckets.side)
@@ -38,7 +37,7 @@ def bucket_of(buckets, x, y):
     return min(max(column, 0), buckets.columns - 1), min(max(row, 0), buckets.rows - 1)
 
 
-@leaf_kernel
+@kernel
 def nearest_points(buckets, point, usable, x, y, nearest, square):
     """Write the nearest usable points; return their number.
 
@@ -76,7 +75,7 @@ def nearest_points(buckets, point, usable, x, y, nearest, square):
     return found
 
 
-@leaf_kernel
+@kernel
 def _insert(point, other, x, y, nearest, square, found):
     """Insert a point among the nearest, if it is one of them; return their number."""
     dx, dy = point[other, 0] - x, point[other, 1] - y

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, view
+from mrmg.compilation import by_reference, kernel
 from mrmg.energy.model import N_COEFFICIENTS
 from mrmg.world._kernels import FreeSpace
 
@@ -42,7 +42,7 @@ FLEET = np.dtype(
 """One robot as a record; a fleet is an array of them, shape (R,)."""
 
 
-@by_pointer
+@by_reference
 class Spaces(NamedTuple):
     """The free spaces of a world stacked: their number is not part of a type."""
 
@@ -59,7 +59,7 @@ class Spaces(NamedTuple):
     edge: np.ndarray
 
 
-@view
+@kernel
 def space_of(spaces, index):
     """Return one free space of the stack."""
     return FreeSpace(

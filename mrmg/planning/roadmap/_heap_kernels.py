@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from mrmg.compilation import leaf_kernel
+from mrmg.compilation import kernel
 
 
-@leaf_kernel
+@kernel
 def push(key, entry, size, value, node):
     """Add an entry to a heap; return its size.
 
@@ -22,7 +22,7 @@ def push(key, entry, size, value, node):
     return size + 1
 
 
-@leaf_kernel
+@kernel
 def pop(key, entry, size):
     """Take the first entry off a heap; return its size.
 

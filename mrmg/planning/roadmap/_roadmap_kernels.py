@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, kernel
+from mrmg.compilation import by_reference, kernel
 from mrmg.planning.roadmap._bucket_kernels import Buckets, bucket_of
 from mrmg.world._kernels import (
     clearance_estimate,
@@ -19,7 +19,7 @@ from mrmg.world._kernels import (
 )
 
 
-@by_pointer
+@by_reference
 class RoadmapArrays(NamedTuple):
     """The roadmap as the kernels see it; V vertices, T targets, F travel classes.
 

@@ -10,14 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, kernel
+from mrmg.compilation import kernel
 
 USABLE, MISSING, CHARGE_TIME, LIMIT = range(4)
 """Columns of robots: energy of a full battery above the reserve, how much of it is
 missing at the start [J], time that recharging takes [s/J], longest time [s]."""
 
 
-@by_pointer
 class Legs(NamedTuple):
     """What the routes of a problem are made of.
 

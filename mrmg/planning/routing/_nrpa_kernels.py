@@ -11,14 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, kernel, leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.planning.routing._random_kernels import random_unit
 
 UNVISITED = 1e13
 """Cost of each goal that a playout left unvisited."""
 
 
-@by_pointer
 class RoutingArrays(NamedTuple):
     """An energy-constrained multi-robot route problem with recharging.
 
@@ -56,7 +55,6 @@ class RoutingArrays(NamedTuple):
     makespan_weight: float
 
 
-@by_pointer
 class Fleet(NamedTuple):
     """Where the robots of a playout have got to.
 
@@ -88,7 +86,7 @@ def new_fleet(problem):
     )
 
 
-@leaf_kernel
+@kernel
 def goals_to_visit(problem):
     """Return the number of open goals."""
     left = 0
@@ -97,7 +95,7 @@ def goals_to_visit(problem):
     return left
 
 
-@leaf_kernel
+@kernel
 def legal_moves(problem, fleet, left, moves):
     """Write the legal moves (robot * T + target) into `moves`; return their number.
 
@@ -139,7 +137,7 @@ def legal_moves(problem, fleet, left, moves):
     return n
 
 
-@leaf_kernel
+@kernel
 def apply_move(problem, move, fleet):
     """Carry out a move; return (cost, number of goals it visits)."""
     targets = problem.cost.shape[2]
@@ -159,7 +157,7 @@ def apply_move(problem, move, fleet):
     return cost, 0
 
 
-@leaf_kernel
+@kernel
 def ending_cost(problem, fleet, spent):
     """Return the objective of a fleet that now drives to its finish.
 
@@ -172,7 +170,7 @@ def ending_cost(problem, fleet, spent):
     return problem.energy_weight * spent + problem.makespan_weight * longest
 
 
-@leaf_kernel
+@kernel
 def move_bias(problem, scale, r, place, t, energy):
     """Return the logit of a move before any learning: near targets first.
 
@@ -184,7 +182,7 @@ def move_bias(problem, scale, r, place, t, energy):
     return bias
 
 
-@leaf_kernel
+@kernel
 def move_weights(problem, policy, scale, fleet, moves, n, weight):
     """Write the moves' unnormalised probabilities into `weight`; return their sum."""
     targets = problem.cost.shape[2]
@@ -303,7 +301,7 @@ def nrpa(problem, levels, iterations, alpha, random, sequence):
         )
 
 
-@leaf_kernel
+@kernel
 def mean_cost(problem):
     """Return the scale of the playouts' bias: a fraction of the mean finite cost."""
     total = 0.0

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, kernel, leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.planning.routing._nrpa_kernels import goals_to_visit
 from mrmg.planning.routing._subset_kernels import join_robot
 
@@ -19,7 +19,6 @@ MOST_POOLED = 10
 """Open goals up to which routes are pooled; subsets of subsets are 3 to that power."""
 
 
-@by_pointer
 class Pool(NamedTuple):
     """The cheapest route met for each robot and set of goals, numbered by its bits.
 
@@ -58,7 +57,7 @@ def new_pool(problem):
     )
 
 
-@leaf_kernel
+@kernel
 def pool_route(pool, r, goal, length, cost):
     """Keep a route of robot r if it is cheaper than all others of the same goals."""
     if pool.cost.shape[1] == 1:

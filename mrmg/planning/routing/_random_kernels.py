@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from mrmg.compilation import leaf_kernel
+from mrmg.compilation import kernel
 
 
-@leaf_kernel
+@kernel
 def random_unit(state):
     """Return a number in [0, 1) by splitmix64; advances `state` (uint64, (1,))."""
     state[0] += np.uint64(0x9E3779B97F4A7C15)
@@ -18,7 +18,7 @@ def random_unit(state):
     return np.float64(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@leaf_kernel
+@kernel
 def random_below(state, n):
     """Return an integer in [0, n)."""
     return int(random_unit(state) * n)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, kernel, leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.planning.routing._legs_kernels import CHARGE_TIME, LIMIT, MISSING, USABLE
 
 COST, TIME, DRAW, RATE, ORIGIN, STATION = range(6)
@@ -34,7 +34,6 @@ TIMED_WAYS = 6
 """Recharged ways kept at a station if time counts; else the cheapest is enough."""
 
 
-@by_pointer
 class Labels(NamedTuple):
     """The undominated ways along every route, from both ends; one row for each step.
 
@@ -68,13 +67,13 @@ def new_labels(legs):
     )
 
 
-@leaf_kernel
+@kernel
 def row_of(legs, r, end, step):
     """Return the row of a step's labels."""
     return (end * len(legs.robot) + r) * (legs.goals + 2) + step
 
 
-@leaf_kernel
+@kernel
 def add_label(label, row, n, new):
     """Add a label to a row of n unless one is as good in all; return their number.
 
@@ -107,13 +106,13 @@ def add_label(label, row, n, new):
     return m + 1
 
 
-@leaf_kernel
+@kernel
 def towards(table, r, end, a, b):
     """Return the entry for the leg from a to b, as seen from an end of the route."""
     return table[r, a, b] if end == 0 else table[r, b, a]
 
 
-@leaf_kernel
+@kernel
 def recharge(legs, labels, r, end, place, row):
     """Lead the ways of a row, to a place, on to each station by the cheapest hops."""
     stations = legs.hop.shape[1]
@@ -138,7 +137,7 @@ def recharge(legs, labels, r, end, place, row):
                     labels.fulls[at] = add_label(labels.full, at, labels.fulls[at], new)
 
 
-@leaf_kernel
+@kernel
 def extend(legs, labels, r, end, place, follower, row):
     """Lead the ways of a row, to a place, on to its neighbour in the next row."""
     stations = legs.hop.shape[1]
@@ -159,7 +158,7 @@ def extend(legs, labels, r, end, place, follower, row):
     labels.ways[row + 1] = n
 
 
-@leaf_kernel
+@kernel
 def place_at(legs, goal, length, end, step):
     """Return the place of a route that is some steps away from one of its ends."""
     if step == 0 or step > length:
@@ -167,7 +166,7 @@ def place_at(legs, goal, length, end, step):
     return goal[step - 1] if end == 0 else goal[length - step]
 
 
-@leaf_kernel
+@kernel
 def label_route(legs, labels, r, goal, length, front, back):
     """Write the labels of a route and return (cost, time, label) of its best way.
 
@@ -210,7 +209,7 @@ def label_route(legs, labels, r, goal, length, front, back):
     return best_cost, best_time, label
 
 
-@leaf_kernel
+@kernel
 def route_value(legs, cost, time, longest):
     """Return what a route adds to the objective; ties in makespan go to the shorter.
 
@@ -224,7 +223,7 @@ def route_value(legs, cost, time, longest):
     )
 
 
-@leaf_kernel
+@kernel
 def value_with(legs, labels, r, before, goal, behind, longest, ceiling):
     """Return the value of a route with one more goal; inf if it cannot be driven.
 
@@ -257,7 +256,7 @@ def value_with(legs, labels, r, before, goal, behind, longest, ceiling):
     return best
 
 
-@leaf_kernel
+@kernel
 def least_on(legs, labels, r, begun, goal, behind, longest, ceiling):
     """Return the least value of a route whose beginning ends with a goal.
 
@@ -286,7 +285,7 @@ def least_on(legs, labels, r, begun, goal, behind, longest, ceiling):
     return best
 
 
-@leaf_kernel
+@kernel
 def write_tour(legs, labels, r, goal, length, label, tour):
     """Write goals and stations of a labelled route; return their number.
 
@@ -318,7 +317,7 @@ def write_tour(legs, labels, r, goal, length, label, tour):
     return n
 
 
-@leaf_kernel
+@kernel
 def append(tour, n, target):
     """Write a target behind n others if there is room; return n + 1."""
     if n < len(tour):
@@ -326,7 +325,7 @@ def append(tour, n, target):
     return n + 1
 
 
-@leaf_kernel
+@kernel
 def reverse(items, first, end):
     """Turn a piece of an array round, if it lies within it."""
     if end > len(items):

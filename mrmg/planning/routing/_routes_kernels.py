@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, kernel, leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.planning.routing._pool_kernels import pool_route
 from mrmg.planning.routing._random_kernels import random_unit
 from mrmg.planning.routing._refuel_kernels import (
@@ -24,7 +24,6 @@ COST, TIME, DIRECT, LABEL = range(4)
 [J], and label of its best way."""
 
 
-@by_pointer
 class Routes(NamedTuple):
     """Goals of each robot in order, without stations.
 
@@ -58,7 +57,7 @@ def new_routes(robots, goals):
     )
 
 
-@leaf_kernel
+@kernel
 def add_absent(open_goal, seen, routes):
     """Write goals that are to be visited but were not seen on any route as absent."""
     absent = len(routes.length) - 1
@@ -68,7 +67,7 @@ def add_absent(open_goal, seen, routes):
             routes.length[absent] += 1
 
 
-@leaf_kernel
+@kernel
 def copy_routes(source, copy, changed):
     """Copy those routes that have changed, and the absent goals."""
     robots = len(changed) - 1
@@ -83,7 +82,7 @@ def copy_routes(source, copy, changed):
             copy.back[r] = 0
 
 
-@leaf_kernel
+@kernel
 def update(legs, routes, labels, pool):
     """Bring labels and costs of changed routes up to date, and pool those routes."""
     end = legs.cost.shape[1] - 1
@@ -109,7 +108,7 @@ def update(legs, routes, labels, pool):
         routes.changed[r] = 1
 
 
-@leaf_kernel
+@kernel
 def objective(legs, routes):
     """Return the objective, with IMPOSSIBLE for each absent goal."""
     robots = len(routes.length) - 1
@@ -122,7 +121,7 @@ def objective(legs, routes):
     return total + legs.makespan_weight * longest
 
 
-@leaf_kernel
+@kernel
 def longest_other(routes, r):
     """Return the longest time of the other robots' routes [s]."""
     longest = 0.0
@@ -132,7 +131,7 @@ def longest_other(routes, r):
     return longest
 
 
-@leaf_kernel
+@kernel
 def put_goal(legs, routes, labels, goal, random, blink):
     """Put a goal where it costs least; return whether it fits anywhere.
 
@@ -180,7 +179,7 @@ def put_goal(legs, routes, labels, goal, random, blink):
     return True
 
 
-@leaf_kernel
+@kernel
 def remove_goals(routes, gone):
     """Take the flagged goals out of all routes; they become absent."""
     robots = len(routes.length) - 1

@@ -11,7 +11,7 @@ from math import log
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.planning.routing._legs_kernels import new_legs
 from mrmg.planning.routing._nrpa_kernels import goals_to_visit, nrpa
 from mrmg.planning.routing._pool_kernels import combine, new_pool
@@ -111,7 +111,7 @@ def search(legs, routes, labels, near, pool, rounds, random):
     update(legs, routes, labels, pool)
 
 
-@leaf_kernel
+@kernel
 def read_playout(problem, sequence, moves, routes, seen):
     """Turn the moves of a playout into routes; what it has not `seen` is absent."""
     targets = problem.cost.shape[2]
@@ -168,7 +168,7 @@ def improve_routes(problem, routes, rounds, random, tour, tour_length):
     return write_tours(legs, routes, labels, tour, tour_length)
 
 
-@leaf_kernel
+@kernel
 def write_tours(legs, routes, labels, tour, tour_length):
     """Write the tours of up-to-date routes; return their energy [J]."""
     robots = len(routes.length) - 1

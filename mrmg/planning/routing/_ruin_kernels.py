@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mrmg.compilation import leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.planning.routing._random_kernels import random_below, random_unit
 
 MOST_RUINED = 10
@@ -17,7 +17,7 @@ STRINGS = 0.6
 """How often strings of routes are taken out instead of a seed's nearest goals."""
 
 
-@leaf_kernel
+@kernel
 def round_trips(problem, near):
     """Write the least cost from goal to goal and back over the robots, (G, G)."""
     near[:] = np.inf
@@ -28,7 +28,7 @@ def round_trips(problem, near):
                 near[a, b] = min(near[a, b], both)
 
 
-@leaf_kernel
+@kernel
 def choose_ruin(routes, near, random, home, gone):
     """Flag goals to be taken out: strings of routes near a seed, or its neighbours.
 
@@ -77,7 +77,7 @@ def choose_ruin(routes, near, random, home, gone):
                 home[routes.goal[r, i]] = -1
 
 
-@leaf_kernel
+@kernel
 def cut_string(routes, r, goal, longest, random, gone):
     """Flag a string of a route that holds a goal, or two with a piece kept between."""
     n = routes.length[r]
@@ -98,7 +98,7 @@ def cut_string(routes, r, goal, longest, random, gone):
             gone[routes.goal[r, first + i]] = 1
 
 
-@leaf_kernel
+@kernel
 def swap_tails(routes, random):
     """Exchange the ends of two routes from drawn places on, or all of both."""
     robots = len(routes.length) - 1
@@ -117,7 +117,7 @@ def swap_tails(routes, random):
     routes.back[a] = routes.back[b] = 1
 
 
-@leaf_kernel
+@kernel
 def order_absent(legs, routes, random, key):
     """Put the absent goals into a drawn order, or the farthest or nearest first."""
     robots = len(routes.length) - 1

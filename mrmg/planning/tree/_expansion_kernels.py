@@ -7,7 +7,7 @@ from math import atan2, hypot
 import numba
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.energy.model import battery_power
 from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, turn_speed
 from mrmg.planning.problem._control_kernels import control_towards, wrap
@@ -60,7 +60,7 @@ HELD_ATTEMPTS = 2
 """The same where a motion is held."""
 
 
-@leaf_kernel
+@kernel
 def choose_modes(tree, v, target, params, steer, random, stuck, mode):
     """Draw what each robot does next: steer, or random controls when that has failed.
 
@@ -104,7 +104,7 @@ def choose_modes(tree, v, target, params, steer, random, stuck, mode):
                 mode[r] = WAIT
 
 
-@leaf_kernel
+@kernel
 def draw_motion(fleet, r, mode, gear, random):
     """Return a random wanted (v, w): any, or one that backs off from where it heads."""
     low, high = fleet[r].limit[0], fleet[r].limit[1]
@@ -139,7 +139,7 @@ def choose_motion(mission, r, target, state, waypoint, stuck, gear, random, moti
     return not (motion[0] < 0.0 and off > BEHIND and stuck < 2)
 
 
-@leaf_kernel
+@kernel
 def attempt_control(fleet, r, state, v, w, attempt, dt):
     """Return the control of the n-th attempt to get on: ever slower and wider.
 
@@ -159,7 +159,7 @@ def attempt_control(fleet, r, state, v, w, attempt, dt):
     return control_towards(fleet, r, state, v, w, dt)
 
 
-@leaf_kernel
+@kernel
 def attempt_user_control(fleet, r, state, wx, wy, held, attempt, dt):
     """Return the n-th attempt of a user's model: a held control, or ever slower."""
     if held:
@@ -194,7 +194,7 @@ def drive_step(mission, commitment, decided, r, v, w, held, attempts):
     return braking_control(mission.fleet, r, state, dt)
 
 
-@leaf_kernel
+@kernel
 def step_energy(mission, r, before, after, u1):
     """Return the battery energy of one step [J], charged at its midpoint."""
     robot = mission.fleet[r]
@@ -222,7 +222,7 @@ def step_energy(mission, r, before, after, u1):
     )
 
 
-@leaf_kernel
+@kernel
 def must_queue(mission, commitment, r, target, state):
     """Tell whether robot r is near a station that another one has taken."""
     if target < 0 or mission.targets.gate[target] < 0:
@@ -311,7 +311,7 @@ def expand(
     return params.steps, False, True
 
 
-@leaf_kernel
+@kernel
 def set_out(mission, r, target, state, waypoint, gear, wanted):
     """Write what a steering robot wants: (v, w), or a user's model's waypoint."""
     if mission.fleet[r].model == USER:

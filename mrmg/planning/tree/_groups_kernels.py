@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, kernel, leaf_kernel
+from mrmg.compilation import by_reference, kernel
 from mrmg.planning.routing._random_kernels import random_below, random_unit
 
 AGAIN = 0.005
@@ -20,7 +20,7 @@ NEAREST_SHARE = 0.7
 """How often the vertex nearest to its targets is taken from a group, not any."""
 
 
-@by_pointer
+@by_reference
 class Tree(NamedTuple):
     """The motion tree; N vertices at most, R robots.
 
@@ -61,7 +61,6 @@ class Tree(NamedTuple):
     sibling: np.ndarray
 
 
-@by_pointer
 class Groups(NamedTuple):
     """Vertex groups: same regions of the robots, same visited goals."""
 
@@ -111,7 +110,7 @@ def new_groups(n):
     )
 
 
-@leaf_kernel
+@kernel
 def group_key(state, visited, spent, region):
     """Return the hash of the robots' regions, the visited goals and what was stayed."""
     key = np.uint64(0xCBF29CE484222325)
@@ -128,7 +127,7 @@ def group_key(state, visited, spent, region):
     return key ^ (key >> np.uint64(29))
 
 
-@leaf_kernel
+@kernel
 def add_to_group(groups, tree, n_groups, v, region):
     """Put a vertex into its group, a new one if need be; return their number."""
     key = group_key(tree.state[v], tree.visited[v], tree.spent[v], region)
@@ -153,7 +152,7 @@ def add_to_group(groups, tree, n_groups, v, region):
     return n_groups
 
 
-@leaf_kernel
+@kernel
 def group_weight(groups, g, params, initial):
     """Return w = lambda^visits (alpha / |unvisited| + beta dist).
 
@@ -166,7 +165,7 @@ def group_weight(groups, g, params, initial):
     )
 
 
-@leaf_kernel
+@kernel
 def select_vertex(groups, tree, n_groups, params, initial, random):
     """Choose a group by weight, then a vertex in it by distance to its target."""
     chosen = 0

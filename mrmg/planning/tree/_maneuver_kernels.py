@@ -12,7 +12,7 @@ from math import atan2, cos, pi, sin
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.motion._kernels import copy_numbers, step
 from mrmg.planning.problem._control_kernels import control_towards, wrap
 from mrmg.planning.problem._safety_kernels import toward_zero
@@ -118,7 +118,7 @@ def way_left(mission, r, target, state, waypoint):
     return to_go, min(turn * off, tail)
 
 
-@leaf_kernel
+@kernel
 def _motion(limit, i, steerings):
     """Return the (v, w) of the i-th of 2 x `steerings` motions, forward ones first."""
     v = 0.7 * limit[1] if i < steerings else limit[0]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, kernel, leaf_kernel
+from mrmg.compilation import by_reference, kernel
 from mrmg.energy.model import CONSUMERS_W
 from mrmg.planning.problem._safety_kernels import Gates
 from mrmg.planning.problem._target_kernels import Targets
@@ -17,7 +17,7 @@ from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.world._kernels import TerrainGrid, height_in
 
 
-@by_pointer
+@by_reference
 class TreeParams(NamedTuple):
     """Numbers the tree is grown by; see `parameters.PlannerParams`."""
 
@@ -40,7 +40,7 @@ class TreeParams(NamedTuple):
     rounds: int
 
 
-@by_pointer
+@by_reference
 class TreeMission(NamedTuple):
     """A `problem.Mission` with the numbers the tree is grown by."""
 
@@ -84,7 +84,7 @@ def look_ahead(mission, r, target, state, view, waypoint):
     )
 
 
-@leaf_kernel
+@kernel
 def load_height(mission, r, state):
     """Return the height of the ground below robot r's centre of mass [m]."""
     lead = mission.fleet[r].lead
@@ -95,7 +95,7 @@ def load_height(mission, r, state):
     )
 
 
-@leaf_kernel
+@kernel
 def leg_energy(mission, r, target, state, way):
     """Return the energy of the way to a target and of the stay there [J].
 

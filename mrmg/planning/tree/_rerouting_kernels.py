@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mrmg.compilation import kernel, leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing._routes_kernels import add_absent, new_routes
 from mrmg.planning.routing._routing_kernels import improve_routes, solve_routing
@@ -14,7 +14,7 @@ AGAIN_SHARE = 0.2
 """Share of the rounds that searching on from the tours so far takes."""
 
 
-@leaf_kernel
+@kernel
 def elapsed(tree, v, dt):
     """Return the time from the root of the tree to a vertex [s]."""
     steps = 0

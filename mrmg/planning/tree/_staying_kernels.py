@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mrmg.compilation import leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.energy.model import CONSUMERS_W
 from mrmg.planning.problem._target_kernels import in_target
 
@@ -22,7 +22,7 @@ WORTH_M_S = 0.05
 """Way as which each second that must still be stayed counts in rating vertices."""
 
 
-@leaf_kernel
+@kernel
 def must_stay(mission, r, t):
     """Tell whether robot r has to stay at target t to visit it."""
     targets = mission.targets
@@ -33,7 +33,7 @@ def must_stay(mission, r, t):
     return t >= targets.goals and mission.fleet[r].charge < np.inf
 
 
-@leaf_kernel
+@kernel
 def has_stayed(mission, r, t, spent, energy):
     """Tell whether `spent` seconds at target t and an energy there are enough."""
     if spent < mission.targets.dwell[t] - ROUNDING_S:
@@ -44,7 +44,7 @@ def has_stayed(mission, r, t, spent, energy):
     return energy >= FULL * robot.capacity
 
 
-@leaf_kernel
+@kernel
 def staying_worth(mission, r, t, spent, energy):
     """Return the energy as which the rest of a stay counts in rating vertices [J].
 
@@ -58,7 +58,7 @@ def staying_worth(mission, r, t, spent, energy):
     return WORTH_M_S * robot.plain * max(left, 0.0)
 
 
-@leaf_kernel
+@kernel
 def note_arrivals(mission, state, energy, visited, serving, spent, target):
     """Mark goals that robots have visited, and let stations give what they give.
 
@@ -108,7 +108,7 @@ def note_arrivals(mission, state, energy, visited, serving, spent, target):
     return event
 
 
-@leaf_kernel
+@kernel
 def has_visited_station(mission, r, t, state, serving, spent, energy):
     """Tell whether `t` is a station that robot r has now visited."""
     targets = mission.targets
@@ -121,7 +121,7 @@ def has_visited_station(mission, r, t, state, serving, spent, energy):
     return serving == t and has_stayed(mission, r, t, spent, energy)
 
 
-@leaf_kernel
+@kernel
 def is_queuing(mission, serving, r, t):
     """Tell whether robot r's next target t is a station where another one stays."""
     if t < 0 or mission.targets.gate[t] < 0:

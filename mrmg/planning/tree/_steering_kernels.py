@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import atan, atan2, cos, hypot, pi, sin
 
-from mrmg.compilation import leaf_kernel
+from mrmg.compilation import kernel
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.problem._control_kernels import wrap
 from mrmg.world._kernels import segment_is_clear
@@ -27,7 +27,7 @@ NARROWER = 10
 """Smaller offsets tried in passing a robot where there is no room for the full one."""
 
 
-@leaf_kernel
+@kernel
 def pursue(fleet, r, state, wx, wy, gear):
     """Return the wanted (v, w) to drive at a waypoint in a gear by pure pursuit."""
     dx = wx - state[0]
@@ -60,7 +60,7 @@ def pursue(fleet, r, state, wx, wy, gear):
     return fastest * max(0.6, min(1.0, 1.2 - error)), psi
 
 
-@leaf_kernel
+@kernel
 def sidestep(fleet, r, state, space, others, wx, wy, out):
     """Move a waypoint aside where a slower or oncoming robot is in the way.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_pointer, kernel, leaf_kernel, now_ns
+from mrmg.compilation import by_reference, kernel, now_ns
 from mrmg.motion._kernels import copy_numbers
 from mrmg.planning.problem._safety_kernels import (
     braking_control,
@@ -46,7 +46,7 @@ VERTICES, GROUPS, ROUTER_CALLS, EXPANSIONS, ROUTER_FAILURES, ROUTING_NS = range(
 """Places in the array of counts; the last is the time that router calls took."""
 
 
-@by_pointer
+@by_reference
 class Tours(NamedTuple):
     """The tours the vertices of a tree follow.
 
@@ -59,7 +59,7 @@ class Tours(NamedTuple):
     length: np.ndarray
 
 
-@leaf_kernel
+@kernel
 def next_targets(mission, tree, tours, v, target):
     """Write each robot's next target at a vertex, -1 for none."""
     row = tree.tour[v]
@@ -72,7 +72,7 @@ def next_targets(mission, tree, tours, v, target):
             target[r] = -1
 
 
-@leaf_kernel
+@kernel
 def skip_visited(mission, tree, tours, v):
     """Advance a vertex's places in its tours past goals somebody has visited."""
     row = tree.tour[v]
@@ -84,7 +84,7 @@ def skip_visited(mission, tree, tours, v):
             tree.position[v, r] += 1
 
 
-@leaf_kernel
+@kernel
 def goals_left(tree, v):
     """Return the number of goals not visited at a vertex."""
     left = 0
@@ -159,7 +159,7 @@ def rest_of_tours(mission, tree, tours, v, otherwise):
     return total, enough
 
 
-@leaf_kernel
+@kernel
 def plant(mission, tree, tours, start, energy):
     """Write the root of the tree; return the energy of the first tours [J]."""
     for r in range(len(start)):
