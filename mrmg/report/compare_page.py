@@ -11,9 +11,10 @@ import numpy as np
 from mrmg import storage
 from mrmg.energy.battery_curves import BatteryCurve, measured_curves, planned_curves
 from mrmg.report import chart_spec
-from mrmg.report import page as html
 from mrmg.report.compare import Comparison
 from mrmg.report.map import mission_map
+from mrmg.report.page import elements as html
+from mrmg.report.page import page
 from mrmg.runs.record import RunRecord
 from mrmg.viz import style
 from mrmg.viz.activities import shown_motions, shown_visits
@@ -48,7 +49,7 @@ def comparison_html(comparison: Comparison) -> str:
         html.toggle("owner", _owner(number), html.robot_dot(number, names[number]))
         for number in solved
     ]
-    return html.page(
+    return page(
         "Comparison of runs",
         [
             html.heading(f"Comparison of {len(names)} runs"),
@@ -57,10 +58,7 @@ def comparison_html(comparison: Comparison) -> str:
                 "Figures",
                 html.table(
                     ["", *names],
-                    [
-                        [html.text(row.name), *map(html.text, row.cells())]
-                        for row in comparison.rows
-                    ],
+                    [[row.name, *row.cells()] for row in comparison.rows],
                 ),
                 html.note(
                     "In brackets: the difference from the first run, where it is one "
@@ -81,7 +79,7 @@ def _differences(comparison: Comparison) -> list[str]:
     if not comparison.differences:
         return [html.note("These runs were made with the same scene and parameters.")]
     head, *rows = comparison.difference_table()
-    return [html.table(head, [[html.text(cell) for cell in row] for row in rows])]
+    return [html.table(head, [[cell for cell in row] for row in rows])]
 
 
 def _owner(number: int) -> str:
@@ -90,12 +88,12 @@ def _owner(number: int) -> str:
 
 
 def _maps(comparison: Comparison) -> str:
-    boxes = "".join(
-        f'<div class="chart"><h3>{html.text(name)}</h3>'
-        f"{mission_map(record.scene, record.plan, record.log)}</div>"
-        for name, record in zip(comparison.names, comparison.records, strict=True)
+    return html.maps(
+        [
+            (name, mission_map(record.scene, record.plan, record.log))
+            for name, record in zip(comparison.names, comparison.records, strict=True)
+        ]
     )
-    return f'<div class="charts two">{boxes}</div>'
 
 
 def _charts(comparison: Comparison, solved: Sequence[int]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mrmg.report import chart_spec
-from mrmg.report import page as html
+from mrmg.report.page import elements as html
 from mrmg.report.sections import kJ
 from mrmg.runs.record import RunRecord
 
@@ -48,7 +48,7 @@ def planner(record: RunRecord) -> list[str]:
     statistics = record.planning["statistics"]
     times = statistics.get("time_s", {})
     rows = [
-        [html.text(_NAMES.get(place, place)), html.text(_said(place, value, times))]
+        [_NAMES.get(place, place), _said(place, value, times)]
         for place, value in _flat(statistics)
         if place not in _TOLD_IN_WORDS
         and (record.plan is not None or place != "time_s.first_solution")

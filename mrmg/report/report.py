@@ -11,10 +11,11 @@ from typing import Any
 
 from mrmg import shipped, storage
 from mrmg.plans import Plan
-from mrmg.report import page as html
 from mrmg.report import sections
 from mrmg.report.charts import chart_data
 from mrmg.report.map import mission_map
+from mrmg.report.page import elements as html
+from mrmg.report.page import page
 from mrmg.report.planner import cost_chart, planner
 from mrmg.report.robustness import robustness
 from mrmg.report.timeline import events, timeline
@@ -57,7 +58,7 @@ def report_html(record: RunRecord) -> str:
     places: dict[str, list[tuple[str, str]]] = {}
     for chart in data["charts"] if data else ():
         places.setdefault(chart["group"], []).append((chart["id"], chart["title"]))
-    return html.page(
+    return page(
         f"{scene.name}: mission report",
         [
             html.heading(scene.name),
@@ -69,7 +70,7 @@ def report_html(record: RunRecord) -> str:
                 timeline(scene, plan, log) if plan else "",
                 html.bullets(events(log)),
             ),
-            html.section("Video", html.video(record.folder / "mission.mp4")),
+            html.section("Video", _video(record.folder / "mission.mp4")),
             html.section(
                 "State of charge", html.charts(places.get("charge", ()), columns=2)
             ),
@@ -116,6 +117,10 @@ def _map(record: RunRecord) -> list[str]:
             f"ground. {partial}Point at anything for its name."
         ),
     ]
+
+
+def _video(path: Path) -> str:
+    return html.video(path.name) if path.exists() else ""
 
 
 def _named(record: RunRecord, robot: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 
-from mrmg.report import page as html
+from mrmg.report.page import elements as html
 from mrmg.runs.record import RunRecord
 from mrmg.studies.outcomes import CONFIDENCE, Study, wilson_interval
 
@@ -40,13 +40,13 @@ def _row(study: Study) -> list[str]:
     margins, failures = figures["margins"], figures["failures"]
     charge = margins["charge_fraction"]
     return [
-        html.text(_options(study)),
-        html.text(f"{study.feasible} of {count}"),
+        _options(study),
+        f"{study.feasible} of {count}",
         f"{100.0 * low:.1f} to {100.0 * high:.1f} %",
         *(f"{100.0 * charge[key]:.1f} %" for key in ("worst", "median")),
         _metres(margins, "obstacle_clearance_m"),
         _metres(margins, "robot_distance_m"),
-        html.text(
+        (
             ", ".join(f"{cause} {number}" for cause, number in sorted(failures.items()))
             or "none"
         ),

@@ -7,7 +7,7 @@ from mrmg.energy.by_terrain import energy_by_terrain
 from mrmg.energy.ledger import EnergyLedger
 from mrmg.energy.model import PARTS
 from mrmg.plans import Plan
-from mrmg.report import page as html
+from mrmg.report.page import elements as html
 from mrmg.runs.record import RunRecord
 from mrmg.viz.activities import shown_motions, standing_of, way_to
 from mrmg.viz.style import terrain_classes
@@ -126,7 +126,7 @@ def tours(record: RunRecord) -> list[str]:
     head += ["Leg measured", "Charge planned", "Charge on arrival"]
     parts = []
     for robot in record.plan.tours:
-        parts.append(f"<h3>{dots[robot]}</h3>")
+        parts.append(html.subheading(dots[robot]))
         rows = _tour_rows(record, record.plan, robot)
         parts.append(
             html.table(head, rows, text_columns=(0, 1, 2))
@@ -160,7 +160,7 @@ def _tour_rows(record: RunRecord, plan: Plan, robot: str) -> list[list[str]]:
         rows.append(
             [
                 str(leg + 1),
-                html.text(target),
+                target,
                 "⚡ station" if kind == "station" else kind,
                 f"{hope.time_s:.1f} s" if hope else "not reached",
                 f"{fact.time_s:.1f} s" if fact else "not reached" if driven else "",
@@ -206,14 +206,14 @@ def checks(record: RunRecord) -> list[str]:
         head = ["Robot", "Tracking rms", "Tracking max", "Lowest charge"]
         rows = [
             [
-                html.text(robot.robot),
+                robot.robot,
                 f"{100 * robot.tracking_rms_m:.1f} cm",
                 f"{100 * robot.tracking_max_m:.1f} cm",
                 f"{100 * robot.min_charge_fraction:.1f} %",
             ]
             for robot in audit.robots
         ]
-        parts += ["<h3>Execution</h3>", html.table(head, rows)]
+        parts += [html.subheading("Execution"), html.table(head, rows)]
         parts += _balances(audit)
     return parts
 
@@ -222,7 +222,7 @@ def _balances(audit: EnergyAudit) -> list[str]:
     """Return what became of the work of every robot's actuators."""
     rows = [
         [
-            html.text(robot.robot),
+            robot.robot,
             kJ(balance.work_J),
             kJ(balance.steering_J),
             kJ(balance.kinetic_J + balance.potential_J),
@@ -244,7 +244,11 @@ def _balances(audit: EnergyAudit) -> list[str]:
     )
     if not rows:
         return []
-    return ["<h3>Energy balance</h3>", html.table(head, rows), html.note(explained)]
+    return [
+        html.subheading("Energy balance"),
+        html.table(head, rows),
+        html.note(explained),
+    ]
 
 
 def _shortened(items: list[str]) -> list[str]:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
-from html import escape
+from typing import Any
+
+from markupsafe import Markup
 
 from mrmg.plans import Plan
+from mrmg.report.page import rendered
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.simulation.supervision import Event
@@ -18,8 +21,6 @@ _WIDE_EM, _NARROW_EM = 45.0, 22.0
 """Widths of the time axis in letters of its names: windows of 900 and 400 pixels."""
 _SHORT_EM = 4.0
 """Width of robots' names that have room beside the axis in small windows."""
-_BROKEN_KEY = '<i class="act broken"></i>broken down '
-_EVENT_KEY = ' <i class="event"></i>the fleet is stopped, or planned for anew'
 _DONE = {"stop": "; the fleet stops", "end": "; the mission ends"}
 _SAID = {
     DRIVING: "drives",
@@ -30,64 +31,56 @@ _SAID = {
 }
 
 
-def timeline(scene: Scene, plan: Plan, log: ExecutionLog | None) -> str:
+def timeline(scene: Scene, plan: Plan, log: ExecutionLog | None) -> Markup:
     """Return the timeline of the driven mission (planned, where none was driven)."""
     shown, end_s = timeline_rows(scene, plan, log, (_WIDE_EM, _NARROW_EM))
-    marks = "".join(_event(event, end_s) for event in log.events) if log else ""
-    rows = []
-    for at, row in enumerate(shown):
-        parts = [_span(row, span, end_s) for span in row.spans]
-        parts += [_visit(named, end_s) for named in row.visits]
-        counts = f"--wide:{row.line_count(0)};--narrow:{row.line_count(1)}"
-        rows.append(
-            f'<div class="row" data-robot="{escape(row.robot)}" '
-            f'style="--c:var(--r{at})">'
-            f'<b class="who" data-tip="{escape(row.robot)}">{escape(row.robot)}</b>'
-            f'<div class="track" style="{counts}">{"".join(parts)}{marks}'
-            f"{_standing(row, end_s)}</div>"
-            f'<span class="sum">{_shares(row)}</span></div>'
-        )
     who_em = max(text_width_em(row.robot, bold=True) for row in shown)
-    broken = any(row.standing == "broken down" for row in shown)
-    return (
-        f'<div class="timeline{" long" if who_em > _SHORT_EM else ""}" '
-        f'data-end="{end_s:.3f}" style="--who:{who_em:.2f}em">'
-        f'{"".join(rows)}<div class="row scale"><b class="who"></b><div class="track">'
-        f"{_ticks(end_s)}"
-        '<i class="now" hidden></i></div><span class="sum"></span></div></div>'
-        '<p class="soft key"><i class="act driving"></i>driving '
-        '<i class="act waiting"></i>waiting <i class="act charging"></i>'
-        'at a station ⚡ <i class="act finished"></i>finished '
-        f"{_BROKEN_KEY if broken else ''}│ entering a goal"
-        f"{_EVENT_KEY if log and log.events else ''}</p>"
+    return rendered(
+        "timeline.html.jinja",
+        end_s=end_s,
+        who_em=who_em,
+        long=who_em > _SHORT_EM,
+        rows=[_row(row, end_s) for row in shown],
+        events=[_event(event, end_s) for event in log.events] if log else [],
+        ticks=_ticks(end_s),
+        broken=any(row.standing == "broken down" for row in shown),
     )
 
 
-def _span(row: TimelineRow, span: Activity, end_s: float) -> str:
+def _row(row: TimelineRow, end_s: float) -> dict[str, Any]:
+    return {
+        "robot": row.robot,
+        "lines": (row.line_count(0), row.line_count(1)),
+        "spans": [_span(row, span, end_s) for span in row.spans],
+        "visits": [_visit(named, end_s) for named in row.visits],
+        "standing": _standing(row, end_s),
+        "shares": _shares(row),
+    }
+
+
+def _span(row: TimelineRow, span: Activity, end_s: float) -> dict[str, Any]:
     unused = row.standing == "not used" and span.kind == FINISHED
     tip = f"{row.robot} {'is not used' if unused else _SAID[span.kind]}"
     tip += f" at {span.target}" if span.target else ""
     tip += f" from {span.start_s:.1f} to {span.end_s:.1f} s"
     left, width = 100 * span.start_s / end_s, 100 * (span.end_s - span.start_s) / end_s
-    return (
-        f'<i class="act {span.kind}" style="left:{left:.3f}%;width:{width:.3f}%" '
-        f'data-tip="{escape(tip)}"></i>'
-    )
+    return {"kind": span.kind, "left": left, "width": width, "tip": tip}
 
 
-def _visit(named: NamedVisit, end_s: float) -> str:
+def _visit(named: NamedVisit, end_s: float) -> dict[str, Any]:
     visit = named.visit
-    tip = f"{visit.robot} enters {visit.kind} {visit.target} at {visit.time_s:.1f} s"
     lines = dict(zip(("wide", "narrow"), named.lines, strict=True))
-    style = "".join(f"--{name}:{max(line, 0)};" for name, line in lines.items())
     hidden = "".join(f" no-{name}" for name, line in lines.items() if line == HIDDEN)
     left = 100 * visit.time_s / end_s
-    return (
-        f'<i class="visit {visit.kind}{hidden}" style="{style}left:{left:.3f}%" '
-        f'data-tip="{escape(tip)}"></i>'
-        f'<s class="{visit.kind}{hidden}" '
-        f'style="{style}left:{_inside(left, named.width_em)}">{escape(named.text)}</s>'
-    )
+    return {
+        "look": f"{visit.kind}{hidden}",
+        "lines": "".join(f"--{name}:{max(line, 0)};" for name, line in lines.items()),
+        "left": left,
+        "inside": _inside(left, named.width_em),
+        "text": named.text,
+        "tip": f"{visit.robot} enters {visit.kind} {visit.target} "
+        f"at {visit.time_s:.1f} s",
+    }
 
 
 def _inside(left_percent: float, width_em: float) -> str:
@@ -96,22 +89,19 @@ def _inside(left_percent: float, width_em: float) -> str:
     return f"clamp({half},{left_percent:.3f}%,calc(100% - {half}))"
 
 
-def _standing(row: TimelineRow, end_s: float) -> str:
+def _standing(row: TimelineRow, end_s: float) -> dict[str, str] | None:
     if not row.standing:
-        return ""
+        return None
     broken = [span.start_s for span in row.spans if span.kind == BROKEN]
     text = f"✖ {row.standing}" if broken else row.standing
     from_percent = 100 * broken[0] / end_s if broken else 0.0
     left = f"min({from_percent:.3f}%,calc(100% - {text_width_em(text) + 1.0:.2f}em))"
-    return f'<em class="{"bad" if broken else ""}" style="left:{left}">{text}</em>'
+    return {"look": "bad" if broken else "", "left": left, "text": text}
 
 
-def _event(event: Event, end_s: float) -> str:
+def _event(event: Event, end_s: float) -> dict[str, Any]:
     tip = f"{event.time_s:.1f} s: {event.message}"
-    return (
-        f'<i class="event" style="left:{100 * event.time_s / end_s:.3f}%" '
-        f'data-tip="{escape(tip)}"></i>'
-    )
+    return {"left": 100 * event.time_s / end_s, "tip": tip}
 
 
 def events(log: ExecutionLog | None) -> list[str]:
@@ -137,14 +127,16 @@ def _shares(row: TimelineRow) -> str:
     return ", ".join(words) or "stays where it is"
 
 
-def _ticks(end_s: float) -> str:
+def _ticks(end_s: float) -> list[dict[str, str]]:
     step_s = _step(end_s)
-    ticks = []
-    for number in range(int(end_s / step_s) + 1):
-        text = f"{number * step_s:g} s"
-        left = _inside(100 * number * step_s / end_s, text_width_em(text))
-        ticks.append(f'<i class="tick" style="left:{left}">{text}</i>')
-    return "".join(ticks)
+    texts = [f"{number * step_s:g} s" for number in range(int(end_s / step_s) + 1)]
+    return [
+        {
+            "left": _inside(100 * number * step_s / end_s, text_width_em(text)),
+            "text": text,
+        }
+        for number, text in enumerate(texts)
+    ]
 
 
 def _step(end_s: float) -> float:

@@ -195,7 +195,7 @@ def test_names_on_the_timeline_fit_and_lie_above_the_cursor(
     names = {goal.id: f"loading{at}" for at, goal in enumerate(scene.goals)}
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(style, "goal_labels", lambda _: names)
-        crowded = timeline(scene, plan, log)
+        crowded = str(timeline(scene, plan, log))
     start = text.index('<div class="timeline')
     page.write_text(text[:start] + crowded + text[text.index("</section>", start) :])
     tab.open(page, size=(width, 800))
