@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mrmg.cli import terminal
+from mrmg.cli.run_options import given
 from mrmg.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def calibrate(options: argparse.Namespace) -> int:
     require_absent(out, overwrite=options.overwrite)
     model, _ = load_model(folder, trust_code=options.trust_code)
     with terminal.progress_of("measuring") as on_progress:
-        calibration = calibrate(model, on_progress=on_progress)
+        calibration = calibrate(model, on_progress=on_progress, **given(options))
     write_calibration(calibration, folder, out, in_place=options.in_place)
     draw_calibration(calibration, plot)
     if options.json:

@@ -140,7 +140,8 @@ def _driven(options: argparse.Namespace) -> tuple[Run, str]:
     from mrmg.simulation.log import require_same_mission
 
     undisturbed = RunArguments().deciding("drive")
-    del undisturbed["controller"]
+    for name in ("controller", "plant"):
+        del undisturbed[name]
     again = {"overwrite": options.overwrite}
     kept = "driven before, --overwrite drives again"
     with existing(options.run).opened_for_writing() as folder, terminal.progress() as p:

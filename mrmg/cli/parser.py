@@ -328,6 +328,7 @@ def _add_calibrate(verbs: _Verbs) -> None:  # type: ignore[type-arg]
         action="store_true",
         help="change the model's own robot.yaml, too",
     )
+    add_options(verb, "calibrate")
     add_trust(verb)
     _add_json(verb, "calibration.json")
     verb.set_defaults(command=calibrate_command.calibrate)

@@ -78,7 +78,7 @@ def robustness(options: argparse.Namespace) -> int:
     given_drive = {
         name: value
         for name, value in given(options).items()
-        if name in ("controller", "replan")
+        if name in ("controller", "plant", "replan")
     }
     with existing(options.run).opened_for_writing() as folder:
         run = taken_up(folder, trust_code=options.trust_code)

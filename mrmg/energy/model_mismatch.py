@@ -37,7 +37,9 @@ def model_mismatches(
     if changed or not log.completed:
         return []
     return [
-        _sentence(scene.robot(item.robot).model, item, error_pct, tolerance_pct)
+        _sentence(
+            scene.robot(item.robot).model, item, error_pct, tolerance_pct, log.plant
+        )
         for item in robots
         for error_pct in [_error_pct(scene.robot(item.robot).model, plan, item)]
         if abs(error_pct) > tolerance_pct
@@ -57,7 +59,11 @@ def _error_pct(model: RobotModel, plan: Plan, item: RobotAudit) -> float:
 
 
 def _sentence(
-    model: RobotModel, item: RobotAudit, error_pct: float, tolerance_pct: float
+    model: RobotModel,
+    item: RobotAudit,
+    error_pct: float,
+    tolerance_pct: float,
+    plant: str,
 ) -> str:
     measured, planned = compared(item.measured_J / 1000, item.planned_J / 1000, 2)
     size, allowed = compared(abs(error_pct), tolerance_pct)
@@ -65,14 +71,15 @@ def _sentence(
     return (
         f"the model '{model.name}' does not describe {item.robot}: it took {measured} "
         f"kJ where {planned} kJ were planned ({sign}{size} %, tolerance {allowed} %); "
-        f"measure its energy parameters with '{_calibration(model)}'"
+        f"measure its energy parameters with '{_calibration(model, plant)}'"
     )
 
 
-def _calibration(model: RobotModel) -> str:
-    """Return the command line that calibrates a model."""
+def _calibration(model: RobotModel, plant: str) -> str:
+    """Return the command line that calibrates a model on a plant."""
+    on = "" if plant == "default" else f" --plant {plant}"
     if model.mjcf is None:
-        return "mrmg calibrate MODEL"
+        return f"mrmg calibrate MODEL{on}"
     folder = model.mjcf.parent
     is_shipped = folder.resolve().parent == shipped.models_folder().resolve()
-    return f"mrmg calibrate {folder.name if is_shipped else folder}"
+    return f"mrmg calibrate {folder.name if is_shipped else folder}{on}"

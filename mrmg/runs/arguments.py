@@ -174,6 +174,14 @@ class RunArguments(Checked):
         verbs=("run", "execute", "robustness"),
         metavar="NAME",
     )
+    plant: str = option(
+        "default",
+        "ground contact: default, as the energy model has it, or scrub, which it does "
+        "not know: by wheel, load and slip; default that of the run, or default",
+        decides="drive",
+        verbs=("run", "execute", "robustness", "calibrate"),
+        choices=("default", "scrub"),
+    )
     disturb: str | None = option(
         None, DISTURBANCE_HELP, decides="drive", bare="", metavar="SPEC"
     )

@@ -51,6 +51,7 @@ def drive(
         plan,
         controller=arguments.controller,
         disturbance=disturbance,
+        plant=arguments.plant,
         replan=arguments.replan,
         faults=arguments.faults,
         seed=arguments.seed,

@@ -37,6 +37,8 @@ def folder_beside(run: Run, arguments: RunArguments) -> Path:
 def _description(own: RunArguments, other: RunArguments) -> Iterator[str]:
     if other.controller != own.controller:
         yield other.controller
+    if other.plant != own.plant:
+        yield f"on-{other.plant}"
     if other.disturb is not None:
         yield f"disturbed-{other.disturb}-s{other.disturb_seed}"
     elif own.disturb is not None:

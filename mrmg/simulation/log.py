@@ -80,6 +80,7 @@ class ExecutionLog:
         qpos: MuJoCo's positions, shape (n, nq); what a video is drawn from.
         contacts: every contact other than wheel and floor.
         events: what a supervisor saw and did, in order of time.
+        plant: ground contact that it was driven on.
         balance_J: what became of the drives' work over the whole drive, by the terms of
             `work.BALANCE_TERMS`, shape (R, 5); None where it was not recorded, or a
             state is no number.
@@ -114,6 +115,7 @@ class ExecutionLog:
     disturbance: Disturbance | None = None
     motions: tuple[str, ...] = ()
     balance_J: np.ndarray | None = None
+    plant: str = "default"
 
     def driven_motions(self) -> tuple[LoggedMotion, ...]:
         """Return the motion of each robot in the simulation."""

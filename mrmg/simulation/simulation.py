@@ -26,10 +26,10 @@ from mrmg.simulation.ground import (
     Ground,
     TerrainUnderfoot,
     believed_resistance,
-    true_resistance,
 )
 from mrmg.simulation.incline import Incline
 from mrmg.simulation.log import ExecutionLog, package_versions, require_same_mission
+from mrmg.simulation.plants import DEFAULT_PLANT, plant_of, require_plant
 from mrmg.simulation.recording import Recording
 from mrmg.simulation.reference import FleetReference, speed_states
 from mrmg.simulation.sensing import sensing_of
@@ -56,6 +56,7 @@ def simulate(
     *,
     controller: str = "mpc",
     disturbance: Disturbance | None = None,
+    plant: str = DEFAULT_PLANT,
     supervisor: Supervisor | None = None,
     on_progress: Progress | None = None,
 ) -> ExecutionLog:
@@ -70,22 +71,25 @@ def simulate(
         plan: what to drive.
         controller: name of the tracking controller.
         disturbance: how the robots differ from their models; None if they do not.
+        plant: of `PLANTS`: what the ground takes from the tyres.
         supervisor: watches every tick and may give the fleet another plan; the log is
             then of the plan in force at the end, which begins with those before.
         on_progress: called with the fraction done and a text.
 
     Raises:
-        UsageError: if the controller is unknown, or a robot is of a kind that cannot
-            be executed.
+        UsageError: if the controller or the plant is unknown, or a robot is of a kind
+            that cannot be executed.
         IdentityError: if the plan is of another scene.
     """
     maker = controller_maker(controller)
+    require_plant(plant)
     require_same_mission(scene, plan)
     require_drivable(scene.robots)
     for robot in scene.robots:
         chassis_maker(robot)
     controllers = [maker(robot.model) for robot in scene.robots]
-    run = _Run(build_world(scene, drawn=False), plan, controllers, disturbance)
+    world = build_world(scene, drawn=False)
+    run = _Run(world, plan, controllers, disturbance, plant)
     started, watched_s = time.perf_counter(), 0.0
     with no_warning_file():
         while not run.ended():
@@ -112,8 +116,9 @@ class _Run:
         plan: Plan,
         controllers: list[Controller],
         disturbance: Disturbance | None,
+        plant: str,
     ) -> None:
-        self.ticks = 0
+        self.ticks, self._plant_name = 0, plant
         self._disturbance = disturbance
         if disturbance is None:
             robots = [robot.id for robot in world.scene.robots]
@@ -130,7 +135,7 @@ class _Run:
         self._set_points = SetPoints(world.scene, self._reference, controllers)
         self._drive = DriveControl(world.scene)
         self._believed = believed_resistance(world.scene)
-        self._true = true_resistance(world, disturbance)
+        self._plant = plant_of(plant, world, self.data, disturbance)
         self._contacts = ContactWatch(world)
         self._recording = Recording()
         self._work_J = np.zeros((len(world.scene.robots), 2))
@@ -171,13 +176,9 @@ class _Run:
         if self._disturbance is not None:
             ground = self._ground(true, steer_to)
             level, _ = self._slopes
-        # The slope carries a part of the weight that the tyres then need not.
-        resistance = level * self._true.force_N(*ground)
-        self._fleet.set_resistance(
-            resistance,
-            ground.turning_multiplier * self._true.swing_N,
-            believed_swing_N,
-        )
+        resistance = self._plant.resistance(ground, level)
+        self._fleet.set_resistance(*resistance, believed_swing_N)
+        self._plant.resist()
         work = self._fleet.drive(force, steer_from, steer_to, STEPS_PER_TICK)
         self._clock.advance(self._period_s)
         self.ticks += 1
@@ -236,6 +237,7 @@ class _Run:
             completed=self._completed(),
             gave_up="" if self._completed() else self._trouble(),
             disturbance=self._disturbance,
+            plant=self._plant_name,
             robots=tuple(robot.id for robot in scene.robots),
             motions=tuple(robot.model.motion_name for robot in scene.robots),
             versions=package_versions(),
@@ -266,8 +268,8 @@ class _Run:
         still = np.zeros(len(self._world.scene.robots))
         _, slope = self._incline.under(self._fleet.state())
         parked = self._drive.force_N(still, still, still, still, self._period_s, slope)
-        force = self._true.force_N(still + 1.0, still)
-        self._fleet.set_resistance(force, self._true.swing_N)
+        plain = Ground(still + 1.0, still, still + 1.0)
+        self._fleet.set_resistance(*self._plant.resistance(plain, still + 1.0))
         self._fleet.drive(parked, still, still, _SETTLING_STEPS)
         self.data.time = 0.0
         self._fleet.work.restart()

@@ -27,7 +27,7 @@ class SpeedLoopParams:
 
     proportional_per_s: float = 4.0
     integral_per_s2: float = 6.0
-    integral_limit_m_s2: float = 3.0
+    integral_limit_m_s2: float = 8.0
     standstill_m_s: float = 1e-4
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from mrmg import storage
 from mrmg.planning import PlannerParams
@@ -12,7 +13,6 @@ from mrmg.plans import DRIVEN_PLAN, Plan
 from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.types import Scene
 from mrmg.simulation import ExecutionLog, simulate
-from mrmg.simulation.disturbance import Disturbance
 from mrmg.simulation.log import require_same_mission
 from mrmg.supervision.faults import checked_faults
 from mrmg.supervision.parameters import ControlParams
@@ -47,14 +47,12 @@ def drive_mission(
     scene: Scene,
     plan: Plan,
     *,
-    controller: str = "mpc",
-    disturbance: Disturbance | None = None,
     replan: bool = True,
     faults: Sequence[str] = (),
     seed: int = 0,
     planner: PlannerParams | None = None,
     params: ControlParams | None = None,
-    on_progress: Callable[[float, str], None] | None = None,
+    **simulation: Any,
 ) -> Drive:
     """Drive a plan in MuJoCo, and plan anew where the mission leaves it.
 
@@ -63,14 +61,13 @@ def drive_mission(
     Args:
         scene: the mission.
         plan: it starts by.
-        controller: name of the tracking controller.
-        disturbance: how the robots differ from their models; None if they do not.
         replan: whether to plan anew; if not, the mission ends safely after a fault.
         faults: robots that break down, such as `r2@40s`.
         seed: of all random streams of planning anew.
         planner: parameters of planning anew; the default profile's if None.
         params: corridors and effort.
-        on_progress: called with the fraction done and a text.
+        **simulation: further arguments of `simulate`: controller, disturbance, plant,
+            on_progress.
 
     Raises:
         UsageError: if the controller or a fault's robot is unknown, a fault cannot be
@@ -94,10 +91,8 @@ def drive_mission(
     log = simulate(
         scene,
         plan,
-        controller=controller,
-        disturbance=disturbance,
         supervisor=supervisor if replan or faults else None,
-        on_progress=on_progress,
+        **simulation,
     )
     return Drive(
         log=log, plan=supervisor.course.plan, replans=tuple(supervisor.replans)

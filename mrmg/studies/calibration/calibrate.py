@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from typing import Any
 
@@ -15,6 +15,7 @@ from mrmg.errors import UsageError
 from mrmg.scene.driven_parts import why_not_driven
 from mrmg.scene.loading.editing import KeyPath, NewValue
 from mrmg.scene.robot_model import RobotModel
+from mrmg.simulation.plants import DEFAULT_PLANT
 from mrmg.studies.calibration.fit import CONFIDENCE, LinearFit, fit_linear
 from mrmg.studies.calibration.manoeuvres import manoeuvres_of
 from mrmg.studies.calibration.measurement import PARAMETERS, UNITS, Leg, drive_legs
@@ -75,17 +76,19 @@ class Calibration:
         fit: of the legs' power by the parameters of `measurement.PARAMETERS`.
         estimates: by name; those of `PARAMETERS` and the wheel inertia that makes the
             model's effective mass the measured one.
+        plant: ground contact that they were driven on.
     """
 
     model: RobotModel
     legs: tuple[Leg, ...]
     fit: LinearFit
     estimates: Mapping[str, Estimate]
+    plant: str = DEFAULT_PLANT
 
     def changes(self) -> dict[KeyPath, NewValue]:
         """Return what `robot.yaml` should say instead."""
         return {
-            item.key: _new_value(item)
+            item.key: _new_value(item, self.plant)
             for item in self.estimates.values()
             if item.key is not None
         }
@@ -109,6 +112,7 @@ class Calibration:
         return {
             "format": 1,
             "model": self.model.name,
+            "plant": self.plant,
             "confidence": CONFIDENCE,
             "parameters": {
                 name: item.to_json() for name, item in self.estimates.items()
@@ -120,7 +124,12 @@ class Calibration:
         }
 
 
-def calibrate(model: RobotModel, *, on_progress: Progress | None = None) -> Calibration:
+def calibrate(
+    model: RobotModel,
+    *,
+    plant: str = DEFAULT_PLANT,
+    on_progress: Progress | None = None,
+) -> Calibration:
     """Drive the manoeuvres of a model in MuJoCo and fit its energy model to them.
 
     Equal models give equal calibrations.
@@ -128,6 +137,7 @@ def calibrate(model: RobotModel, *, on_progress: Progress | None = None) -> Cali
     Args:
         model: gives limits, geometry, mass and MJCF; what it believes of rolling,
             turning and inertia only helps its drive control.
+        plant: ground contact that it is driven on.
         on_progress: called with the fraction done and what is being driven.
 
     Raises:
@@ -145,8 +155,8 @@ def calibrate(model: RobotModel, *, on_progress: Progress | None = None) -> Cali
     for index, manoeuvre in enumerate(manoeuvres):
         if on_progress is not None:
             on_progress(index / len(manoeuvres), manoeuvre.name)
-        legs += drive_legs(model, manoeuvre)
-    return fit_legs(model, legs)
+        legs += drive_legs(model, manoeuvre, plant)
+    return replace(fit_legs(model, legs), plant=plant)
 
 
 def fit_legs(model: RobotModel, legs: Sequence[Leg]) -> Calibration:
@@ -206,7 +216,10 @@ def _wheel_inertia(model: RobotModel, effective_mass: Estimate) -> Estimate:
     )
 
 
-def _new_value(item: Estimate) -> NewValue:
+def _new_value(item: Estimate, plant: str) -> NewValue:
     unit = "" if item.unit == "1" else f" {item.unit}"
-    detail = f" {version('mujoco')}: +-{item.half_width:.1g}{unit} ({CONFIDENCE:.0%})"
+    where = "" if plant == DEFAULT_PLANT else f" on the plant {plant}"
+    detail = (
+        f" {version('mujoco')}{where}: +-{item.half_width:.1g}{unit} ({CONFIDENCE:.0%})"
+    )
     return NewValue(item.rounded(), item.unit, "calibrated in MuJoCo", detail)

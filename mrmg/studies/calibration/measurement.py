@@ -16,6 +16,7 @@ from mrmg.plans import Plan, Trajectory
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Battery, Robot, Scene, TerrainArea
 from mrmg.simulation import ExecutionLog, simulate
+from mrmg.simulation.plants import DEFAULT_PLANT
 from mrmg.studies.calibration.manoeuvres import STEP_S, Manoeuvre
 
 UNITS = {
@@ -55,13 +56,15 @@ class Leg:
     features: np.ndarray
 
 
-def drive_legs(model: RobotModel, manoeuvre: Manoeuvre) -> Iterator[Leg]:
+def drive_legs(
+    model: RobotModel, manoeuvre: Manoeuvre, plant: str = DEFAULT_PLANT
+) -> Iterator[Leg]:
     """Drive a manoeuvre and yield its legs in which the robot moves.
 
     Raises:
         UsageError: if the robot cannot drive it.
     """
-    log = drive(model, manoeuvre)
+    log = drive(model, manoeuvre, plant)
     ends = STEP_S * np.cumsum([piece.steps for piece in manoeuvre.pieces])
     ticks = np.searchsorted(log.clock_s, [0.0, *(ends - 1e-6)])
     features = step_features(model, log)
@@ -81,7 +84,9 @@ def drive_legs(model: RobotModel, manoeuvre: Manoeuvre) -> Iterator[Leg]:
         )
 
 
-def drive(model: RobotModel, manoeuvre: Manoeuvre) -> ExecutionLog:
+def drive(
+    model: RobotModel, manoeuvre: Manoeuvre, plant: str = DEFAULT_PLANT
+) -> ExecutionLog:
     """Drive a manoeuvre, alone on a plain of one terrain.
 
     Raises:
@@ -89,7 +94,7 @@ def drive(model: RobotModel, manoeuvre: Manoeuvre) -> ExecutionLog:
     """
     states = manoeuvre.states(model)
     scene = _plain(model, manoeuvre.multiplier, float(np.abs(states[:, :2]).max()))
-    log = simulate(scene, _plan(scene, manoeuvre, states))
+    log = simulate(scene, _plan(scene, manoeuvre, states), plant=plant)
     if not log.completed:
         raise UsageError(f"model '{model.name}' cannot drive a {manoeuvre.name}")
     return log

@@ -76,8 +76,10 @@ def study_robustness(
 def execute_options(arguments: RunArguments) -> dict[str, str | bool]:
     """Return the options with which `mrmg execute` drives as `arguments` want it."""
     options: dict[str, str | bool] = {"disturb": arguments.disturb or ""}
-    if arguments.controller != RunArguments().controller:
-        options["controller"] = arguments.controller
+    usual = RunArguments()
+    for name in ("controller", "plant"):
+        if getattr(arguments, name) != getattr(usual, name):
+            options[name] = getattr(arguments, name)
     if arguments.replan:
         options["replan"] = True
     return options
