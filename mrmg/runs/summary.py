@@ -160,7 +160,11 @@ def _execution_figures(log: ExecutionLog, audit: EnergyAudit) -> dict[str, Any]:
         "gave_up": log.gave_up,
         "disturbance": log.disturbance.to_json() if log.disturbance else None,
         "realtime_factor": log.timing["realtime_factor"],
-        "controller_ms": {name: controller_ms[name] for name in ("median", "p99")},
+        "controller_ms": {
+            **{name: controller_ms[name] for name in ("median", "p99")},
+            **{name: controller_ms.get(name) for name in ("riccati", "qp")},
+        },
+        "bounded_solves": sum(log.bounded_solves),
         "tracking": {
             "rms_m": (sum(squares) / len(squares)) ** 0.5,
             "max_m": max(robot.tracking_max_m for robot in audit.robots),

@@ -81,14 +81,17 @@ class ExecutionLog:
         contacts: every contact other than wheel and floor.
         events: what a supervisor saw and did, in order of time.
         plant: ground contact that it was driven on.
+        bounded_solves: QP solves of the MPC with active bounds, by robot; empty where
+            they were not counted.
         balance_J: what became of the drives' work over the whole drive, by the terms of
             `work.BALANCE_TERMS`, shape (R, 5); None where it was not recorded, or a
             state is no number.
         motions: motion models of the robots, which decide the columns; empty where they
             are not recorded.
         timing: wall_s and realtime_factor by the clock, controller_ms {median, p99} a
-            robot and call by the processor. Kept apart: all else is equal between
-            equal runs.
+            robot and call by the processor, and the same with the number of calls for
+            each branch of the MPC (`controller_calls.BRANCHES`). Kept apart: all else
+            is equal between equal runs.
     """
 
     scene_digest: str
@@ -116,6 +119,7 @@ class ExecutionLog:
     motions: tuple[str, ...] = ()
     balance_J: np.ndarray | None = None
     plant: str = "default"
+    bounded_solves: tuple[int, ...] = ()
 
     def driven_motions(self) -> tuple[LoggedMotion, ...]:
         """Return the motion of each robot in the simulation."""
@@ -218,6 +222,7 @@ class ExecutionLog:
             if header.pop("format") != LOG_FORMAT:
                 raise ValueError(f"this version reads format {LOG_FORMAT} only")
             header["robots"] = tuple(header["robots"])
+            header["bounded_solves"] = tuple(header.get("bounded_solves", ()))
             header["motions"] = tuple(header.get("motions", ()))
             header["contacts"] = tuple(Contact(**row) for row in header["contacts"])
             header["events"] = tuple(Event(**row) for row in header.get("events", ()))

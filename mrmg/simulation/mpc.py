@@ -46,13 +46,19 @@ class MpcParams:
 
 
 class TrackingMpc:
-    """Model predictive tracking of one robot."""
+    """Model predictive tracking of one robot.
+
+    Attributes:
+        branch: what solved the last problem: "riccati", where no bound was active, or
+            "qp".
+    """
 
     def __init__(self, model: RobotModel, params: MpcParams | None = None) -> None:
         """Set up the problem for a robot of `model`."""
         kind = (model.motion_model, model.wheelbase_m, params or MpcParams())
         self._lower, self._upper = _bounds(model.limits)
         self._limits = model.limits
+        self.branch = "riccati"
         self._deviation = np.zeros(_SIZE)
         self._guess = np.zeros(_SIZE)
         self._target = np.zeros(_SIZE)
@@ -85,7 +91,8 @@ class TrackingMpc:
         if not np.isfinite(self._guess).all():
             return False
         self._solve_unbounded()
-        if self._keeps_bounds():
+        self.branch = "riccati" if self._keeps_bounds() else "qp"
+        if self.branch == "riccati":
             return True
         self._solve_bounded()
         return bool(np.isfinite(self._solution).all())

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from mrmg.scene.types import Scene
 from mrmg.simulation.controller import HORIZON, HORIZON_STEP_S, Controller
+from mrmg.simulation.controller_calls import ControllerCalls
 from mrmg.simulation.reference import STANDSTILL_M_S, FleetReference, speed_states
 
 _STALL_M_S = 0.3
@@ -49,25 +52,28 @@ class SetPoints:
         """Go on by another plan, from the present set-points."""
         self._reference = reference
 
-    def correct(self, state: np.ndarray, clock_s: float, rate: float) -> int:
-        """Let the controllers look ahead from the true states, shape (R, 5).
+    def correct(
+        self, state: np.ndarray, clock_s: float, rate: float, calls: ControllerCalls
+    ) -> None:
+        """Let the controllers look ahead from the true states.
 
         A robot whose plan waits for the whole horizon has nothing to correct.
 
-        Returns:
-            Number of controllers called.
+        Args:
+            state: true states, shape (R, 5).
+            clock_s: time of the fleet's clock.
+            rate: plan seconds per second.
+            calls: what the calls are noted in.
         """
         horizon = self._reference.paced(clock_s, rate, HORIZON_STEP_S, HORIZON + 1)
         start = np.concatenate([state[:, :3], self.following], axis=1)
-        calls = 0
         for index, controller in enumerate(self._controllers):
             own = horizon[:, index]
             if rate > 0.0 and _stands(own):
                 self._correction[index] = 0.0
             else:
-                self._correction[index] = controller.correct(start[index], own)
-                calls += 1
-        return calls
+                call = partial(controller.correct, start[index], own)
+                self._correction[index] = calls.timed(index, controller, call)
 
     def advance(
         self,

@@ -16,6 +16,7 @@ from mrmg.simulation.actuation import actuation_of
 from mrmg.simulation.chassis import chassis_maker
 from mrmg.simulation.contacts import ContactWatch
 from mrmg.simulation.controller import Controller, controller_maker
+from mrmg.simulation.controller_calls import ControllerCalls
 from mrmg.simulation.disturbance import Disturbance, DisturbanceRanges
 from mrmg.simulation.disturbed_world import disturb_world, move_starts
 from mrmg.simulation.drive import DriveControl
@@ -139,7 +140,7 @@ class _Run:
         self._contacts = ContactWatch(world)
         self._recording = Recording()
         self._work_J = np.zeros((len(world.scene.robots), 2))
-        self._call_s: list[float] = []
+        self._calls = ControllerCalls(len(world.scene.robots))
         self._ending = Ending(self.data, self._is_speed)
         self._fleet = Fleet(world, self.data)
         self._incline = Incline(world.scene)
@@ -227,7 +228,6 @@ class _Run:
         scene, recording = self._world.scene, self._recording
         robots = len(scene.robots)
         state = recording.by_robot("state", robots)
-        call_ms = 1e3 * np.array(self._call_s or [0.0])
         return ExecutionLog(
             scene_digest=scene.digest,
             plan_digest=self._plan.digest,
@@ -238,6 +238,7 @@ class _Run:
             gave_up="" if self._completed() else self._trouble(),
             disturbance=self._disturbance,
             plant=self._plant_name,
+            bounded_solves=tuple(self._calls.bounded_solves),
             robots=tuple(robot.id for robot in scene.robots),
             motions=tuple(robot.model.motion_name for robot in scene.robots),
             versions=package_versions(),
@@ -256,10 +257,7 @@ class _Run:
             timing={
                 "wall_s": wall_s,
                 "realtime_factor": self.data.time / wall_s,
-                "controller_ms": {
-                    "median": float(np.median(call_ms)),
-                    "p99": float(np.percentile(call_ms, 99)),
-                },
+                "controller_ms": self._calls.milliseconds(),
             },
         )
 
@@ -282,13 +280,9 @@ class _Run:
         clock = self._clock
         clock.pace(self._sensing.state, self._planned, self._period_s)
         if self.ticks % TICKS_PER_CORRECTION == 0:
-            # Of this thread: what other processes do on its processor does not count.
-            started = time.thread_time()
-            calls = self._set_points.correct(
-                self._sensing.state, clock.time_s, clock.rate
+            self._set_points.correct(
+                self._sensing.state, clock.time_s, clock.rate, self._calls
             )
-            if calls:
-                self._call_s.append((time.thread_time() - started) / calls)
         self._coming = self._reference.at_once(
             clock.time_s + clock.rate * self._period_s
         )

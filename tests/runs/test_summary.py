@@ -47,6 +47,7 @@ SECTIONS = {
         "disturbance",
         "realtime_factor",
         "controller_ms",
+        "bounded_solves",
         "tracking",
         "events",
         "replans",

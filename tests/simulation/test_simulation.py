@@ -19,6 +19,7 @@ from mrmg.scene.types import Scene, TerrainArea
 from mrmg.shipped import model_names
 from mrmg.simulation import simulate
 from mrmg.simulation.controller import controller_names
+from mrmg.simulation.disturbance import DisturbanceRanges
 from mrmg.simulation.log import ExecutionLog
 
 STRIPES = [
@@ -150,6 +151,10 @@ def test_timing_is_reported(wild_log: ExecutionLog) -> None:
         wild_log.time_s[-1] / timing["wall_s"]
     )
     assert 0 < timing["controller_ms"]["median"] <= timing["controller_ms"]["p99"]
+    riccati, qp = timing["controller_ms"]["riccati"], timing["controller_ms"]["qp"]
+    assert riccati["calls"] > 0
+    assert 0 < riccati["median"] <= riccati["p99"]
+    assert (qp is None) == (sum(wild_log.bounded_solves) == 0)
 
 
 @pytest.mark.quick("plain-mpc", "two-pure_pursuit", "four-tvlqr")
@@ -425,3 +430,25 @@ def test_larger_fleets_use_the_sparse_solver_and_track_as_well(
     log = simulate(scene, plan)
     assert log.completed
     assert off_m(log).max() < 0.05
+
+
+def test_solves_with_active_bounds_are_counted_and_timed(
+    driving: SimpleNamespace, tmp_path: Path
+) -> None:
+    """A start a metre off asks for more than the limits; being on the plan does not."""
+    scene = driving.open_ground([(-20.0, 0.0, 0.0)])
+    plan = driving.plan_of(scene, [driving.straight(12.0, 1.5, 1.0)])
+    aside = DisturbanceRanges().draw(0, ["r1"])
+    aside = replace(aside, robots=(replace(aside.robots[0], start_x_m=-1.2),))
+    log = simulate(scene, plan, disturbance=aside)
+    branches = log.timing["controller_ms"]
+    assert log.bounded_solves == (branches["qp"]["calls"],)
+    assert branches["qp"]["calls"] > 5
+    assert branches["qp"]["median"] > branches["riccati"]["median"]
+    log.save(tmp_path)
+    assert ExecutionLog.load(tmp_path).bounded_solves == log.bounded_solves
+    assert simulate(scene, plan, disturbance=aside).bounded_solves == log.bounded_solves
+    lqr = simulate(scene, plan, controller="tvlqr")
+    assert lqr.bounded_solves == (0,)
+    assert lqr.timing["controller_ms"]["qp"] is None
+    assert lqr.timing["controller_ms"]["median"] > 0.0
