@@ -243,6 +243,11 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     populate.add_argument(
         "--seed", type=reader(values.seed), default=3, metavar="N", help="default 3"
     )
+    populate.add_argument(
+        "--model",
+        default="car",
+        help="of all robots: a shipped model, or a folder such as ./mine; default car",
+    )
     _add_scene_out(populate)
     add_trust(populate)
     populate.set_defaults(command=scene_commands.populate)

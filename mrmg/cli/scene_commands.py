@@ -204,6 +204,8 @@ def populate(options: argparse.Namespace) -> int:
         goals=options.goals,
         stations=options.stations,
         seed=options.seed,
+        model=options.model,
+        trust_code=options.trust_code,
     )
     _write(document, options.out)
     return ExitCode.OK

@@ -19,9 +19,6 @@ from mrmg.errors import UsageError
 RESERVE = 0.05
 """Share of the capacity that populated scenes hold back."""
 
-_START_GAP_M = 5.0
-"""Least distance of two robots at the start: either can leave first."""
-
 _SHORTCUTS = (0.82, 0.9)
 """A robot may find roads this much shorter, in gaps narrower than those counted on;
 the first is safe on mazes, the second is tried where the first leaves no capacity."""
@@ -39,9 +36,25 @@ class Placement:
     capacity_m: float
 
 
+@dataclass(frozen=True, kw_only=True)
+class Sites:
+    """Places that may be chosen.
+
+    Attributes:
+        road_m: energy between all places [m of plain ground], shape (n, n).
+        climb_m: what climbing adds to that at most, shape (n, n).
+        points_m: where they are, shape (n, 2).
+        start_gap_m: least distance of two robots at the start.
+    """
+
+    road_m: np.ndarray
+    climb_m: np.ndarray
+    points_m: np.ndarray
+    start_gap_m: float
+
+
 def place_mission(
-    road_m: np.ndarray,
-    points_m: np.ndarray,
+    places: Sites,
     robots: int,
     goals: int,
     stations: int,
@@ -49,9 +62,10 @@ def place_mission(
 ) -> Placement:
     """Return the first placement whose two bounds on the capacity leave room.
 
+    If there is none, the first one of all: its capacity may do without recharging.
+
     Args:
-        road_m: energy between all places [m of plain ground], shape (n, n).
-        points_m: the places, shape (n, 2).
+        places: to choose from.
         robots: how many to place.
         goals: how many to place.
         stations: how many to place.
@@ -60,38 +74,39 @@ def place_mission(
     Raises:
         UsageError: if no placement is found.
     """
+    road_m, uphill_m = places.road_m, places.road_m + places.climb_m
+    easy: Placement | None = None
     for attempt in range(len(_SHORTCUTS) * _ATTEMPTS):
         shortcut = _SHORTCUTS[attempt // _ATTEMPTS]
-        starts = _depot(road_m, points_m, robots, rng)
+        starts = _depot(places, robots, rng)
         if len(starts) < robots:
             continue
         free = [i for i in range(len(road_m)) if i not in starts]
         posts = [free[i] for i in _medoids(road_m[np.ix_(free, free)], stations, rng)]
         rest = [i for i in free if i not in posts]
         sites = _spread(road_m, rest, [*starts, *posts], goals)
-        least = _least_capacity_m(road_m, starts, sites, posts)
+        least = _least_capacity_m(uphill_m, starts, sites, posts)
         most = shortcut * _most_capacity_m(road_m, starts, sites)
         if math.ceil(least) <= most:
             # The largest capacity that still forces recharging is the fairest to drive.
             return Placement(starts, sites, posts, math.floor(most))
-    message = (
-        f"found no mission of {robots} robots, {goals} goals and {stations} stations "
-        "that needs recharging and stays feasible; ask for more stations"
-    )
+        easy = easy or Placement(starts, sites, posts, math.ceil(least))
+    if easy is not None:
+        return easy
+    message = f"found no place where {robots} robots can start; ask for fewer robots"
     raise UsageError(message)
 
 
-def _depot(
-    road_m: np.ndarray, points_m: np.ndarray, robots: int, rng: np.random.Generator
-) -> list[int]:
+def _depot(places: Sites, robots: int, rng: np.random.Generator) -> list[int]:
     """Return places near each other at one end of the map, one for each robot."""
+    road_m, points_m = places.road_m, places.points_m
     eccentricity = road_m.max(axis=1)
     ends = np.flatnonzero(eccentricity >= np.quantile(eccentricity, 0.7))
     first = int(rng.choice(ends))
     starts: list[int] = []
     for index in np.argsort(road_m[first], kind="stable"):
         gap = points_m[starts] - points_m[index]
-        if len(starts) < robots and (np.hypot(*gap.T) >= _START_GAP_M).all():
+        if len(starts) < robots and (np.hypot(*gap.T) >= places.start_gap_m).all():
             starts.append(int(index))
     return starts
 

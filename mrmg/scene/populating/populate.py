@@ -11,15 +11,16 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from shapely.geometry import Polygon
 
-from mrmg import shipped
 from mrmg.errors import UsageError
+from mrmg.scene.climbing import steep_ground
 from mrmg.scene.loading import scene_from_document
-from mrmg.scene.loading.models import load_model
+from mrmg.scene.loading.models import load_model, model_folder
 from mrmg.scene.populating.ground import Ground
-from mrmg.scene.populating.placement import RESERVE, Placement, place_mission
+from mrmg.scene.populating.placement import RESERVE, Placement, Sites, place_mission
 from mrmg.scene.robot_model import RobotModel
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Battery, Robot, Scene
 from mrmg.seeding import stream
 
 GOAL_RADIUS_M = 1.5
@@ -27,6 +28,18 @@ STATION_RADIUS_M = 2.0
 
 _MARGINS_M = (1.3, 0.9, 0.6, 0.4)
 """Added to half the robot's width: the widest roads that span the map are used."""
+
+_LEAST_MARGIN_M = 0.4
+"""Margin that also small robots get: what the planner keeps clear, and its slack."""
+
+_USUAL_RADIUS_M = 1.5
+"""Reach of the robots that lengths here are made for; all shrink for smaller ones."""
+
+_CELL_M, _MOST_POINTS = 0.5, 250_000
+"""Spacing of the grid of places, and how many it has at most."""
+
+_START_GAP_M = 5.0
+"""Least distance of two robots at the start: either can leave first."""
 
 _LEAST_SHARE = 0.4
 """Share of the free ground that must hang together, or the map is too narrow."""
@@ -44,17 +57,19 @@ def populate(
     stations: int = 5,
     seed: int = 3,
     model: str = "car",
+    trust_code: bool = False,
 ) -> dict[str, Any]:
     """Place a mission on a map; an earlier one in the document is replaced.
 
     Args:
-        document: a scene document; bounds, obstacles, terrain, objective and time limit
-            are used.
+        document: a scene document; bounds, obstacles, terrain, elevation, objective
+            and time limit are used.
         robots: how many, at least one.
         goals: how many, at least one.
         stations: how many, at least one.
         seed: equal seeds place equally.
-        model: name of the shipped model all robots are of.
+        model: of all robots: name of a shipped one, or a folder with a '/' in it.
+        trust_code: whether the model may bring Python code (`loading.trust`).
 
     Returns:
         A scene document with the mission.
@@ -66,11 +81,11 @@ def populate(
     for name, count in (("robots", robots), ("goals", goals), ("stations", stations)):
         if count < 1:
             raise UsageError(f"cannot place {count} {name}; ask for at least 1")
-    if model not in shipped.model_names():
-        allowed = ", ".join(shipped.model_names())
-        raise UsageError(f"unknown model '{model}'; shipped models: {allowed}")
+    folder = model_folder(model, None)
+    if isinstance(folder, str):
+        raise UsageError(folder)
     wishes = ("objective", "time_limit")
-    kept = ("format", "name", "bounds", "obstacles", "terrain", *wishes)
+    kept = ("format", "name", "bounds", "obstacles", "terrain", "elevation", *wishes)
     bare = {key: document[key] for key in kept if key in document}
     for obstacle in bare.get("obstacles", []):
         if isinstance(obstacle, dict) and "blocks" in obstacle:
@@ -80,7 +95,7 @@ def populate(
             )
             raise UsageError(message)
     scene = scene_from_document(bare, source=str(document.get("name", "the map")))
-    robot_model, _ = load_model(shipped.models_folder() / model)
+    robot_model, _ = load_model(folder, trust_code=trust_code)
     rng = stream(seed, "populate")
     ground = _drivable(scene, robot_model)
     wanted = robots + goals + stations
@@ -93,22 +108,32 @@ def populate(
         )
         raise UsageError(message)
     road_m = ground.distances(places)[:, places]
-    placement = place_mission(
-        road_m, ground.points_m[places], robots, goals, stations, rng
+    points_m = ground.points_m[places]
+    sites = Sites(
+        road_m=road_m,
+        climb_m=_climbs_m(scene, robot_model, points_m),
+        points_m=points_m,
+        start_gap_m=_START_GAP_M * _size(robot_model),
     )
+    placement = place_mission(sites, robots, goals, stations, rng)
     return _document(bare, ground, places, placement, model, robot_model)
 
 
 def _drivable(scene: Scene, model: RobotModel) -> Ground:
     """Return the ground with the widest margin that keeps most of the map together."""
+    size = _size(model)
+    x_min, y_min, x_max, y_max = scene.bounds
+    extent_m2 = (x_max - x_min) * (y_max - y_min)
     bare = Ground.over(
         scene.bounds,
-        [obstacle.shape for obstacle in scene.barriers],
+        [*(obstacle.shape for obstacle in scene.barriers), *_too_steep(scene, model)],
         [(area.shape, area.multiplier) for area in scene.terrain],
         margin_m=0.0,
+        cell_m=max(_CELL_M * size, math.sqrt(extent_m2 / _MOST_POINTS)),
     )
+    margins_m = [max(_LEAST_MARGIN_M, size * margin_m) for margin_m in _MARGINS_M]
     grounds = [
-        replace(bare, margin_m=model.half_width_m + margin_m) for margin_m in _MARGINS_M
+        replace(bare, margin_m=model.half_width_m + margin_m) for margin_m in margins_m
     ]
     sizes = [_largest(ground).sum() for ground in grounds]
     share = max(sizes) / max(1, (bare.clearance_m > 0.0).sum())
@@ -124,6 +149,29 @@ def _drivable(scene: Scene, model: RobotModel) -> Ground:
         for ground, size in zip(grounds, sizes, strict=True)
         if size >= 0.6 * max(sizes)
     )
+
+
+def _size(model: RobotModel) -> float:
+    """Return how large a robot is, relative to those that lengths here are for."""
+    return min(1.0, model.circumscribed_radius_m / _USUAL_RADIUS_M)
+
+
+def _too_steep(scene: Scene, model: RobotModel) -> list[Polygon]:
+    """Return the ground that a robot of a model cannot climb."""
+    if scene.elevation is None or not scene.elevation.avoid_steep:
+        return []
+    battery = Battery(capacity_J=1.0, start_J=1.0, reserve_fraction=0.0)
+    robot = Robot(id="r", model=model, pose=(0.0, 0.0, 0.0), battery=battery)
+    return [shape for shape, _ in steep_ground(scene.elevation, [robot], scene.terrain)]
+
+
+def _climbs_m(scene: Scene, model: RobotModel, points_m: np.ndarray) -> np.ndarray:
+    """Return what climbing between points adds at most [m of plain ground]."""
+    if scene.elevation is None:
+        return np.zeros((len(points_m), len(points_m)))
+    height_m = scene.elevation.height_at(points_m)
+    rise_m = np.abs(height_m[:, None] - height_m[None, :])
+    return np.asarray(rise_m / model.rolling_coefficient)
 
 
 def _largest(ground: Ground) -> np.ndarray:
@@ -148,8 +196,10 @@ def _candidates(
         ground.road_to_nearest(wide) <= 4.0 * model.turning_radius_m
     )
     turnable = near_wide if near_wide.sum() >= 0.5 * connected.sum() else connected
-    for clearance_m in (3.2, 2.6, 2.0, 1.5, ground.margin_m):
-        good = np.flatnonzero(turnable & (ground.clearance_m >= clearance_m))
+    size = _size(model)
+    for clearance_m in (3.2, 2.6, 2.0, 1.5, 0.0):
+        wanted_m = max(ground.margin_m, size * clearance_m)
+        good = np.flatnonzero(turnable & (ground.clearance_m >= wanted_m))
         if len(good) >= 0.25 * connected.sum():
             break
     # Many places must not crowd until goals overlap, nor be sparser than few are.
@@ -157,7 +207,7 @@ def _candidates(
         math.sqrt(len(good) * ground.cell_m**2 / number) * 0.8
         for number in (count, _LEAST_CANDIDATES)
     )
-    spacing_m = max(spacing_m, min(sparse_m, 2.0 * GOAL_RADIUS_M))
+    spacing_m = max(spacing_m, min(sparse_m, 2.0 * size * GOAL_RADIUS_M))
     chosen: list[int] = []
     for index in rng.permutation(good):
         gap = ground.points_m[chosen] - ground.points_m[index]
@@ -181,7 +231,13 @@ def _document(
 
     def regions(name: str, chosen: list[int], radius_m: float) -> list[dict[str, Any]]:
         return [
-            {"id": f"{name}{k + 1}", "circle": {"center": at(p), "radius": radius_m}}
+            {
+                "id": f"{name}{k + 1}",
+                "circle": {
+                    "center": at(p),
+                    "radius": round(radius_m * _size(robot_model), 3),
+                },
+            }
             for k, p in enumerate(chosen)
         ]
 

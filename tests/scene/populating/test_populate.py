@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 from mrmg.errors import UsageError
 from mrmg.scene.importing import import_map
@@ -148,9 +150,9 @@ def test_map_is_kept_and_mission_replaced() -> None:
         ({"robots": 0}, "cannot place 0 robots; ask for at least 1"),
         ({"goals": -1}, "cannot place -1 goals"),
         ({"stations": 0}, "cannot place 0 stations"),
-        ({"model": "cra"}, "unknown model 'cra'; shipped models: car"),
+        ({"model": "cra"}, "unknown model 'cra' .did you mean 'car'"),
         ({"goals": 500}, "506 are wanted; ask for fewer, or scale the map up"),
-        ({"stations": 1, "robots": 30}, "found no mission of 30 robots"),
+        ({"stations": 1, "robots": 99}, "no place where 99 robots can start"),
     ],
 )
 def test_what_cannot_be_placed(changes: dict[str, Any], message: str) -> None:
@@ -167,3 +169,33 @@ def test_robot_bound_obstacles_are_refused() -> None:
 def test_no_room_at_all() -> None:
     with pytest.raises(UsageError, match="scale the map up"):
         populate({"format": 1, "name": "box", "bounds": [0, 0, 1, 1]})
+
+
+def test_a_mission_that_need_not_recharge_is_better_than_none() -> None:
+    document = populate(FIELD, robots=20, goals=3, stations=1)
+    scene = scene_from_document(document, source="test")
+    assert (len(scene.robots), len(scene.goals)) == (20, 3)
+
+
+def test_small_robots_get_small_places() -> None:
+    document = populate(FIELD, goals=5, stations=2, model="diffdrive")
+    assert {robot["model"] for robot in document["robots"]} == {"diffdrive"}
+    radii = [goal["circle"]["radius"] for goal in document["goals"]]
+    assert radii == pytest.approx([math.hypot(0.55, 0.35)] * 5, abs=1e-3)
+
+
+def test_slopes_are_kept_and_steep_ground_left_out() -> None:
+    """Nothing is placed on a ridge that cars cannot climb, nor beyond what they can."""
+    ridge = {
+        "hills": [{"center": [20, 20], "height": 6, "radius": 9}],
+        "slope": "avoid",
+    }
+    document = populate({**FIELD, "elevation": ridge}, goals=6, stations=2)
+    scene = scene_from_document(document, source="test")
+    assert scene.elevation is not None
+    steep = shapely.union_all(
+        [wall.shape for wall in scene.barriers if wall.is_steep_ground]
+    )
+    assert steep.area > 10.0
+    for target in scene.targets():
+        assert not steep.contains(shapely.Point(target.region.center))
