@@ -21,7 +21,7 @@ from mrmg.viz.ground_image import paint_ground, painted_relief
 from mrmg.viz.replay import SPEEDS, Replay, spoken
 from mrmg.viz.solid_shapes import body_meshes, geom_mesh
 from mrmg.viz.world_view import floor_frame
-from mrmg.world.relief import lifted
+from mrmg.world.relief import highest_m, lifted
 
 _FRAME_S = 1.0 / 30.0
 _TAG_LIFT_M = 0.6
@@ -264,7 +264,8 @@ class BrowserView:
 
     def _look_from_above(self) -> None:
         x_min, y_min, x_max, y_max = self._scene.bounds
-        center = np.array([(x_min + x_max) / 2, (y_min + y_max) / 2, 0.0])
+        top_m = highest_m(self._scene)
+        center = np.array([(x_min + x_max) / 2, (y_min + y_max) / 2, top_m])
         reach = max(x_max - x_min, y_max - y_min)
         camera = self._server.initial_camera
         camera.position = tuple(center + reach * np.array([0.0, -0.65, 1.05]))

@@ -16,7 +16,7 @@ from mrmg.viz import style
 from mrmg.viz.ground_image import paint_ground
 from mrmg.viz.replay import SPEEDS, Replay, spoken
 from mrmg.viz.world_view import drawable_spec, floor_frame
-from mrmg.world.relief import lifted
+from mrmg.world.relief import highest_m, lifted
 
 KEYS = "space: play or pause, arrows left and right: 5 s, up and down: speed"
 HINT = "Alt+C opens the panel Control, with a slider for the time"
@@ -160,7 +160,7 @@ def _place(
 
 def _look_from_above(camera: mujoco.MjvCamera, scene: Scene) -> None:
     x_min, y_min, x_max, y_max = scene.bounds
-    camera.lookat[:] = [(x_min + x_max) / 2, (y_min + y_max) / 2, 0.0]
+    camera.lookat[:] = [(x_min + x_max) / 2, (y_min + y_max) / 2, highest_m(scene)]
     camera.distance = 1.35 * max(x_max - x_min, y_max - y_min)
     camera.azimuth, camera.elevation = 90.0, -58.0
 

@@ -74,7 +74,7 @@ class TopView:
             labels: names and where they belong [m], shape (2,).
         """
         self._view.place_robots_away(qpos)
-        camera = top_camera(self._center_m)
+        camera = top_camera(self._center_m, self._view.highest_m)
         height_m = self.pixel_m * self._size[1]
         self._view.draw(camera, fovy=height_m, shadows=False, out=self._still)
         self._background = self._still.copy()
@@ -108,7 +108,8 @@ class TopView:
         middle = np.array(self._size) / 2.0
         at = self._center_m + ((column, row) - middle) * (1.0, -1.0) * self.pixel_m
         fovy = 2 * half * self.pixel_m
-        self._view.draw(top_camera(at), fovy=fovy, shadows=False, out=patch)
+        camera = top_camera(at, self._view.highest_m)
+        self._view.draw(camera, fovy=fovy, shadows=False, out=patch)
         top, left = max(row - half, 0), max(column - half, 0)
         bottom, right = (
             min(row + half, self._size[1]),

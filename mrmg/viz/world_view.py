@@ -15,6 +15,7 @@ from mrmg.simulation.scenery import FLOOR
 from mrmg.simulation.world_model import MujocoWorld
 from mrmg.viz.gl_backend import offscreen_context
 from mrmg.viz.ground_image import GroundFrame
+from mrmg.world.relief import highest_m
 
 _SLICES, _STACKS = 20, 2
 _SMOOTH_SAMPLES = 4
@@ -27,12 +28,17 @@ _CHASE_ELEVATION_DEG = -24.0
 _CHASE_AHEAD_M = 2.0
 
 
-def top_camera(scene_center: np.ndarray) -> mujoco.MjvCamera:
-    """Return an orthographic camera that looks straight down, north up."""
+def top_camera(scene_center: np.ndarray, ground_m: float = 0.0) -> mujoco.MjvCamera:
+    """Return an orthographic camera that looks straight down, north up.
+
+    Args:
+        scene_center: what is in the middle [m], shape (2,).
+        ground_m: height of the highest ground.
+    """
     camera = mujoco.MjvCamera()
     camera.type = mujoco.mjtCamera.mjCAMERA_FREE
     camera.orthographic = 1
-    camera.lookat[:] = [*scene_center, 0.0]
+    camera.lookat[:] = [*scene_center, ground_m]
     camera.azimuth, camera.elevation = 90.0, -90.0
     camera.distance = 50.0
     return camera
@@ -63,6 +69,7 @@ class WorldView:
     ) -> None:
         """Set up drawing in the OpenGL context that is current."""
         self.model = model
+        self.highest_m = highest_m(world.scene)
         self._data = mujoco.MjData(model)
         self._target_geom = world.target_geom
         self._scene = mujoco.MjvScene(model, _MAX_GEOMS)

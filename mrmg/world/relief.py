@@ -16,6 +16,12 @@ def height_at(scene: Scene, points: np.ndarray) -> np.ndarray:
     return scene.elevation.height_at(points)
 
 
+def highest_m(scene: Scene) -> float:
+    """Return the height of the highest ground [m]."""
+    elevation = scene.elevation
+    return 0.0 if elevation is None else float(elevation.height_m.max())
+
+
 def lifted(scene: Scene, points: np.ndarray, lift_m: float) -> np.ndarray:
     """Return points `lift_m` above the ground, shape (n, 2) -> (n, 3)."""
     points = np.atleast_2d(points)
