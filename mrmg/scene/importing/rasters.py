@@ -39,8 +39,13 @@ class Raster(NamedTuple):
     def corners(self) -> np.ndarray:
         """The coordinates of its corners, shape (4, 2)."""
         rows, columns = self.values.shape
-        corners = [(0, 0), (columns, 0), (columns, rows), (0, rows)]
-        return np.array([self.transform * corner for corner in corners])
+        return self.at([(0, 0), (columns, 0), (columns, rows), (0, rows)])
+
+    def at(self, cells: Any) -> np.ndarray:
+        """Return the coordinates of places (column, row), shape (n, 2)."""
+        column, row = np.asarray(cells, dtype=float).T
+        a, b, c, d, e, f = self.transform[:6]
+        return np.stack([a * column + b * row + c, d * column + e * row + f], axis=1)
 
 
 def read_raster(path: Path, options: ImportOptions) -> Raster:

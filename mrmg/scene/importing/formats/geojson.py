@@ -265,8 +265,11 @@ def _add_area(
         entry["multiplier"] = content.number(keys, place, "multiplier", 1.0)
         if "turning" in keys:
             entry["turning_multiplier"] = content.number(keys, place, "turning", 1.0)
-    elif "height" in keys:
-        entry["height"] = content.number(keys, place, "height", 1.0)
+    else:
+        if "height" in keys:
+            entry["height"] = content.number(keys, place, "height", 1.0)
+        if "blocks" in keys:
+            entry["blocks"] = keys["blocks"]
     content.areas[kind].append(Area(valid, entry))
 
 
@@ -288,6 +291,8 @@ def _add_place(
         message = f"is a {shape.geom_type}; expected a Point or a Polygon"
         content.faults.append(Fault(f"{place}.geometry", message))
         return
+    if keys.get("dwell"):
+        entry["dwell"] = content.number(keys, place, "dwell", 1.0)
     content.entries[kind].append(entry)
 
 
@@ -302,13 +307,15 @@ def _add_robot(
     if "model" not in keys:
         content.notes.append(f"{own_id} states no model: {ROBOT_MODEL}")
     heading = content.number(keys, place, "heading", 0.0) if "heading" in keys else 0.0
-    content.entries["robot"].append(
-        {
-            "id": own_id,
-            "model": str(keys.get("model", ROBOT_MODEL)),
-            "pose": [*_rounded(shape), heading],
-        }
-    )
+    entry: dict[str, Any] = {
+        "id": own_id,
+        "model": str(keys.get("model", ROBOT_MODEL)),
+        "pose": [*_rounded(shape), heading],
+    }
+    if "capacity_J" in keys:
+        capacity_J = content.number(keys, place, "capacity_J", 1.0)
+        entry["battery"] = {"capacity_J": capacity_J}
+    content.entries["robot"].append(entry)
 
 
 def _own_id(kind: str, keys: dict[str, Any], content: _Content) -> str:

@@ -17,7 +17,7 @@ from mrmg.extras import import_extra
 from mrmg.scene.importing.frames import Frame, frame_of
 from mrmg.scene.importing.layers import Area, Heights, ImportOptions, Layer
 from mrmg.scene.importing.raster_shapes import enclosing_polygons
-from mrmg.scene.importing.rasters import read_raster
+from mrmg.scene.importing.rasters import Raster, read_raster
 from mrmg.scene.importing.registry import Format, Head
 from mrmg.scene.loading.elevation import MOST_NODES
 
@@ -33,25 +33,21 @@ def read_elevation(path: Path, options: ImportOptions) -> Layer:
     crs, heights, transform, notes = raster
     frame = options.frame or frame_of(crs, raster.corners)
     upright = transform.b == transform.d == 0.0 and transform.e < 0.0 < transform.a
-    if upright and crs in (None, frame.crs):
+    if upright and (crs is None or frame.crs in (None, crs)):
         factor = int(np.ceil(np.sqrt(heights.size / MOST_NODES)))
-        heights, transform = (
-            heights[::factor, ::factor],
-            transform * transform.scale(factor),
-        )
         if factor > 1:
             notes.append(f"every {factor}th row and column was kept: it is too large")
+            heights = heights[::factor, ::factor]
         rows, columns = heights.shape
-        x, y = transform * (0.5, 0.5)
-        right, bottom = x + transform.a * (columns - 1), y + transform.e * (rows - 1)
-        ends = np.array([x, bottom, right, y])
-        low = frame.metres([ends[:2]], crs)[0]
-        bounds = np.array([*low, *(low + ends[2:] - ends[:2])])
+        last = (0.5 + factor * (columns - 1), 0.5 + factor * (rows - 1))
+        left_top, right_bottom = raster.at([(0.5, 0.5), last])
+        (left, top), size = frame.metres([left_top], crs)[0], right_bottom - left_top
+        bounds = np.array([left, top + size[1], left + size[0], top])
     elif crs is None:
         message = "is turned and states no coordinate system; resample it north up"
         raise SceneError(str(path), [Fault("transform", message)])
     else:
-        heights, bounds = _resampled(heights, transform, crs, frame)
+        heights, bounds = _resampled(raster, crs, frame)
         notes.append(f"resampled from {crs} to {frame.crs}")
     if min(heights.shape) < 2:
         message = f"{heights.shape[0]} x {heights.shape[1]} heights; expected 2 x 2"
@@ -101,18 +97,17 @@ def _layer(
     )
 
 
-def _resampled(
-    heights: np.ndarray, transform: Any, crs: str, frame: Frame
-) -> tuple[np.ndarray, np.ndarray]:
+def _resampled(raster: Raster, crs: str, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     """Return heights at nodes of `frame`, and the bounds of the nodes.
 
     The box is the largest one about the middle of the raster that has data all over.
     """
     warp = import_extra("rasterio.warp", extra="geo", purpose="reads GeoTIFF")
     affine = import_extra("affine", extra="geo", purpose="reads GeoTIFF")
+    heights = raster.values
     rows, columns = heights.shape
     ring = [
-        frame.metres(_edge(transform, ends), crs)
+        frame.metres(raster.at(_between(*ends)), crs)
         for ends in (
             ((0.5, 0.5), (0.5, rows - 0.5)),
             ((0.5, rows - 0.5), (columns - 0.5, rows - 0.5)),
@@ -138,7 +133,7 @@ def _resampled(
     warp.reproject(
         heights,
         found,
-        src_transform=transform,
+        src_transform=raster.transform,
         src_crs=crs,
         src_nodata=np.nan,
         dst_transform=affine.Affine(cell, 0.0, left, 0.0, -cell, top),
@@ -149,10 +144,8 @@ def _resampled(
     return found, np.concatenate([low, high])
 
 
-def _edge(transform: Any, ends: Any) -> np.ndarray:
-    start, end = np.asarray(ends)
-    along = np.linspace(start, end, _EDGE_POINTS)
-    return np.stack(transform * along.T, axis=1)
+def _between(start: Any, end: Any) -> np.ndarray:
+    return np.linspace(np.array(start), np.array(end), _EDGE_POINTS)
 
 
 def _placed(shape: Any, bounds: Any, grid: tuple[int, ...]) -> Any:

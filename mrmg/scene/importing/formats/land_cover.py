@@ -22,12 +22,11 @@ def read_land_cover(path: Path, options: ImportOptions) -> Layer:
         return geojson.read_geojson(path, options)
     table = read_classes(options.classes, str(path))
     raster = read_raster(path, options)
-    crs, classes, transform, notes = raster
+    crs, classes, _, notes = raster
     frame = options.frame or frame_of(crs, raster.corners)
 
     def placed(points: np.ndarray) -> np.ndarray:
-        x, y = transform * points.T
-        return frame.metres(np.stack([x, y], axis=1), crs, str(path))
+        return frame.metres(raster.at(points), crs, str(path))
 
     cover = LandCover(table)
     for value in np.unique(classes[~np.isnan(classes)]):

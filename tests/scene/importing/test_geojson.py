@@ -1,0 +1,199 @@
+"""Features, route graphs and layouts become goals, stations and robots."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyproj
+import pytest
+import shapely
+
+from mrmg.errors import SceneError
+from mrmg.scene.importing import import_files
+from mrmg.scene.importing.layers import ImportOptions
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.types import Scene
+
+NAV2 = Path(__file__).parents[4] / "shared" / "nav2"
+BOX = shapely.box(0, 0, 40, 30)
+
+
+def feature(shape: shapely.Geometry, **properties: Any) -> dict[str, Any]:
+    geometry = shapely.geometry.mapping(shape)
+    return {"type": "Feature", "properties": properties, "geometry": geometry}
+
+
+def written(path: Path, features: list[dict[str, Any]], crs: str | None) -> Path:
+    document: dict[str, Any] = {"type": "FeatureCollection", "features": features}
+    if crs is not None:
+        document["crs"] = {"type": "name", "properties": {"name": crs}}
+    path.write_text(json.dumps(document))
+    return path
+
+
+def scene_of(*files: Path, **keys: Any) -> Scene:
+    found = import_files(files, ImportOptions(**keys))
+    return scene_from_document(found.document, source="test")
+
+
+MISSION = [
+    feature(BOX - BOX.buffer(-1), kind="obstacle", id="fence", height=2.0),
+    feature(shapely.LineString([(10, 10), (10, 20)]), kind="obstacle"),
+    feature(
+        shapely.box(20, 5, 30, 15), kind="terrain", id="mud", multiplier=2, turning=1.5
+    ),
+    feature(shapely.Point(5, 5), kind="goal", id="g1", radius=1.5, dwell=10),
+    feature(shapely.box(30, 20, 33, 23), kind="goal", id="pallet 7"),
+    feature(shapely.Point(20, 20), kind="station"),
+    feature(shapely.Point(15, 5), kind="robot", id="r1", model="car", heading=1.57),
+]
+
+
+def test_every_kind(tmp_path: Path) -> None:
+    scene = scene_of(written(tmp_path / "a.geojson", MISSION, "local"))
+    assert scene.bounds == (0.0, 0.0, 40.0, 30.0)
+    fence, wall = scene.obstacles
+    assert (fence.id, fence.height_m, len(fence.shape.interiors)) == ("fence", 2.0, 1)
+    assert wall.shape.area == pytest.approx(10 * 0.1, rel=0.02)
+    (mud,) = scene.terrain
+    assert (mud.multiplier, mud.turning_multiplier) == (2.0, 1.5)
+    assert [goal.id for goal in scene.goals] == ["g1", "pallet_7"]
+    assert (scene.goals[0].region.radius_m, scene.goals[0].dwell_s) == (1.5, 10.0)
+    assert scene.stations[0].id == "station_1"
+    assert scene.robots[0].pose == pytest.approx((15.0, 5.0, 1.57))
+
+
+@pytest.mark.parametrize("crs", ["EPSG:25832", "EPSG:4326", None, "EPSG:3857"])
+def test_any_coordinates(crs: str | None, tmp_path: Path) -> None:
+    """The same ground in other coordinates is the same scene, in true metres."""
+    at = np.array([450_000.0, 5_300_000.0])
+    to = pyproj.Transformer.from_crs("EPSG:25832", crs or "EPSG:4326", always_xy=True)
+
+    def moved(points: np.ndarray) -> np.ndarray:
+        return np.stack(to.transform(*(points + at).T), axis=1)
+
+    features = [
+        feature(
+            shapely.transform(shapely.geometry.shape(item["geometry"]), moved),
+            **item["properties"],
+        )
+        for item in MISSION
+    ]
+    scene = scene_of(written(tmp_path / "a.geojson", features, crs))
+    plain = scene_of(written(tmp_path / "b.geojson", MISSION, "local"))
+    shift = np.array(scene.bounds[:2])
+    for target, wanted in zip(scene.targets(), plain.targets(), strict=True):
+        found = target.region.center - shift
+        assert found == pytest.approx(wanted.region.center, abs=0.02)
+    assert scene.bounds[2] - scene.bounds[0] == pytest.approx(40.0, abs=0.02)
+
+
+def test_route_graph_alone_and_on_its_map() -> None:
+    if not NAV2.exists():
+        pytest.skip("no shared maps")
+    graph, depot = NAV2 / "depot_graph.geojson", NAV2 / "depot.yaml"
+    nodes = json.loads(graph.read_text())["features"]
+    stated = {
+        f"node_{item['properties']['id']}": item["geometry"]["coordinates"]
+        for item in nodes
+        if item["geometry"]["type"] == "Point"
+    }
+    alone = scene_of(graph)
+    assert {goal.id for goal in alone.goals} == set(stated)
+    for goal in alone.goals:
+        assert goal.region.center == pytest.approx(stated[goal.id], abs=1e-5)
+    lanes = scene_of(depot, graph, lane_width_m=1.2)
+    closed = shapely.union_all([wall.shape for wall in lanes.obstacles])
+    edges = shapely.union_all(
+        [
+            shapely.geometry.shape(item["geometry"])
+            for item in nodes
+            if item["geometry"]["type"] == "LineString"
+        ]
+    )
+    free = shapely.box(*lanes.bounds) - closed
+    assert free.buffer(-1e-6).difference(edges.buffer(0.6 + 1e-6)).area < 1e-6
+    assert closed.intersection(edges.buffer(0.3)).area < 1.0  # obstacles of the map
+
+
+def test_land_based_features_need_no_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "pyproj", None)
+    assert scene_of(written(tmp_path / "a.geojson", MISSION, None), crs="local").goals
+
+
+def test_geographic_features_do_not_fit_a_local_map(
+    tmp_path: Path, write_map: Any
+) -> None:
+    place = feature(shapely.Point(8.3, 47.8), kind="goal")
+    path = written(tmp_path / "a.geojson", [place], "EPSG:4326")
+    local = write_map(tmp_path, np.full((20, 20), 254))
+    with pytest.raises(SceneError, match="the map it goes with is in local metres"):
+        scene_of(local, path)
+
+
+def test_crop_leaves_out_what_lies_beside(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.geojson", MISSION, "local")
+    found = import_files([path], ImportOptions(crop=(0.0, 0.0, 25.0, 30.0)))
+    scene = scene_from_document(found.document, source="test")
+    assert scene.bounds == (0.0, 0.0, 25.0, 30.0)
+    assert [goal.id for goal in scene.goals] == ["g1"]
+    assert any("pallet 7" in note for note in found.notes)
+    assert scene.terrain[0].shape.equals(shapely.box(20, 5, 25, 15))
+
+
+LIF: dict[str, Any] = {
+    "metaInformation": {"projectIdentification": "hall", "lifVersion": "1.0.0"},
+    "layouts": [
+        {
+            "layoutId": "ground",
+            "layoutVersion": "1",
+            "nodes": [
+                {
+                    "nodeId": name,
+                    "nodePosition": {"x": x, "y": y},
+                    "vehicleTypeNodeProperties": [
+                        {"vehicleTypeId": "agv", "theta": 0.0, "actions": actions}
+                    ],
+                }
+                for name, x, y, actions in [
+                    ("N1", 1.0, 2.0, []),
+                    ("N2", 11.0, 2.0, [{"actionType": "pick", "blockingType": "HARD"}]),
+                    ("N3", 11.0, 9.0, [{"actionType": "startCharging"}]),
+                    ("N4", 1.0, 9.0, []),
+                ]
+            ],
+            "edges": [
+                {"edgeId": "E1", "startNodeId": "N1", "endNodeId": "N2"},
+                {"edgeId": "E2", "startNodeId": "N2", "endNodeId": "N1"},
+                {"edgeId": "E3", "startNodeId": "N2", "endNodeId": "N3"},
+                {"edgeId": "E4", "startNodeId": "N3", "endNodeId": "N4"},
+            ],
+            "stations": [
+                {
+                    "stationId": "S1",
+                    "stationName": "Charging bay",
+                    "interactionNodeIds": ["N4"],
+                    "stationPosition": {"x": 0.0, "y": 9.0},
+                }
+            ],
+        }
+    ],
+}
+
+
+def test_lif_layout(tmp_path: Path) -> None:
+    path = tmp_path / "hall.lif"
+    path.write_text(json.dumps(LIF))
+    scene = scene_of(path)
+    assert [goal.id for goal in scene.goals] == ["N1", "N2"]
+    assert [station.id for station in scene.stations] == ["N3", "N4"]
+    assert scene.goals[1].region.center == pytest.approx((11.0, 2.0))
+    lanes = scene_of(path, lane_width_m=2.0)
+    closed = shapely.union_all([wall.shape for wall in lanes.obstacles])
+    assert not closed.covers(shapely.Point(6, 2))
+    assert closed.covers(shapely.Point(1, 5))  # no edge goes there

@@ -1,0 +1,214 @@
+"""Elevation models and land cover keep their heights and places, in metres."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyproj
+import pytest
+import shapely
+
+from mrmg.cli import main
+from mrmg.errors import SceneError
+from mrmg.scene.elevation import Elevation
+from mrmg.scene.importing import import_files
+from mrmg.scene.importing.layers import ImportOptions
+from mrmg.scene.loading import load_scene, scene_from_document
+from mrmg.scene.types import Scene
+
+
+def imported(path: Path, **keys: Any) -> Scene:
+    cover = keys.pop("land_cover", None)
+    found = import_files([path], ImportOptions(**keys), land_cover=cover)
+    return scene_from_document(found.document, source="test")
+
+
+def elevation(scene: Scene) -> Elevation:
+    assert scene.elevation is not None
+    assert scene.elevation.avoid_steep
+    return scene.elevation
+
+
+def heights(rows: int, columns: int) -> np.ndarray:
+    row, column = np.mgrid[0:rows, 0:columns]
+    wave = 430.0 + np.sin(column / 9.0) + 0.5 * np.cos(row / 7.0)
+    return wave.astype("float32")
+
+
+@pytest.mark.parametrize("crs", [None, "EPSG:32632"])
+def test_metric_model_keeps_its_cells(
+    crs: str | None, tmp_path: Path, write_tiff: Any
+) -> None:
+    """Nodes are the cells' middles, first row in the north, at their heights."""
+    values = heights(30, 50)
+    corner = (0.0, 60.0) if crs is None else (450_000.0, 5_300_000.0)
+    path = write_tiff(tmp_path / "dem.tif", values, corner=corner, cell=2.0, crs=crs)
+    scene = imported(path)
+    assert scene.bounds == pytest.approx((1.0, 1.0, 99.0, 59.0))
+    row, column = np.mgrid[0:30, 0:50]
+    points = np.stack([1.0 + 2.0 * column, 59.0 - 2.0 * row], axis=-1).reshape(-1, 2)
+    found = elevation(scene).height_at(points)
+    assert found == pytest.approx(values.ravel(), abs=1e-4)
+
+
+def test_geographic_model_in_metres(tmp_path: Path, write_tiff: Any) -> None:
+    """Each place has the height that the raster has at its longitude and latitude."""
+    cell, west, north = 2e-5, 8.33, 47.85
+    values = heights(60, 70)
+    path = write_tiff(
+        tmp_path / "dem.tif", values, corner=(west, north), cell=cell, crs="EPSG:4326"
+    )
+    found = import_files([path])
+    scene = scene_from_document(found.document, source="test")
+    x_min, y_min, x_max, y_max = scene.bounds
+    geod = pyproj.Geod(ellps="WGS84")
+    wide = geod.line_length([west, west + 70 * cell], [north, north])
+    high = geod.line_length([west, west], [north - 60 * cell, north])
+    assert x_max - x_min == pytest.approx(wide, rel=0.06)  # edges are cut
+    assert y_max - y_min == pytest.approx(high, rel=0.06)
+    (note,) = [note for note in found.notes if "less the origin" in note]
+    origin = np.array([float(x) for x in note.partition("(")[2].rstrip(")").split(",")])
+    rng = np.random.default_rng(0)
+    points = rng.uniform((x_min, y_min), (x_max, y_max), (50, 2))
+    to_earth = pyproj.Transformer.from_crs("EPSG:32632", "EPSG:4326", always_xy=True)
+    longitude, latitude = to_earth.transform(*(points + origin).T)
+    column, row = (longitude - west) / cell - 0.5, (north - latitude) / cell - 0.5
+    wanted = 430.0 + np.sin(column / 9.0) + 0.5 * np.cos(row / 7.0)
+    assert elevation(scene).height_at(points) == pytest.approx(wanted, abs=0.02)
+
+
+def test_cells_without_data(tmp_path: Path, write_tiff: Any) -> None:
+    values = heights(20, 20)
+    values[5:8, 10:14] = -9999.0
+    values[0, 0] = np.nan
+    path = write_tiff(tmp_path / "dem.tif", values, nodata=-9999.0)
+    scene = imported(path)
+    solid = shapely.union_all([wall.shape for wall in scene.obstacles])
+    for row, column in [(5, 10), (7, 13), (0, 0)]:
+        assert solid.buffer(1e-6).covers(shapely.Point(column + 0.5, 19.5 - row))
+    assert solid.area == pytest.approx(3 * 4 + 0.25)  # bounds cut the corner cell
+    assert elevation(scene).height_m.min() > 428.0
+    assert not imported(path, unknown="free").obstacles
+
+
+@pytest.mark.parametrize("crs", ["EPSG:32632", "EPSG:4326"])
+def test_crop(crs: str, tmp_path: Path, write_tiff: Any) -> None:
+    """The part asked for, in the file's own coordinates."""
+    metric = crs == "EPSG:32632"
+    cell, corner = (2.0, (450_000.0, 5.3e6)) if metric else (2e-5, (8.33, 47.85))
+    keys = {"cell": cell, "corner": corner, "crs": crs}
+    path = write_tiff(tmp_path / "dem.tif", heights(60, 60), **keys)
+    west, north = corner
+    box = (west + 10 * cell, north - 30 * cell, west + 30 * cell, north - 10 * cell)
+    part = elevation(imported(path, crop=box))
+    assert np.prod(part.height_m.shape) == pytest.approx(20 * 20, rel=0.2)
+    rows = slice(10, 30)
+    values = heights(60, 60)[rows, rows]
+    assert part.height_m.max() == pytest.approx(values.max(), abs=0.1)
+    with pytest.raises(SceneError, match="lies beside the raster, which covers"):
+        imported(path, crop=(0.0, 0.0, 1.0, 1.0))
+
+
+def test_feet_and_bands(tmp_path: Path, write_tiff: Any) -> None:
+    import rasterio
+
+    path = write_tiff(tmp_path / "dem.tif", heights(5, 6), count=2)
+    with rasterio.open(path, "r+") as file:
+        file.units = ("ft", "ft")
+    found = import_files([path])
+    assert sum("bands" in note or "in ft" in note for note in found.notes) == 2
+    scene = scene_from_document(found.document, source="test")
+    assert elevation(scene).height_m.max() == pytest.approx(
+        0.3048 * heights(5, 6).max(), abs=1e-3
+    )
+
+
+def test_saved_heights_are_those_of_the_file(tmp_path: Path, write_tiff: Any) -> None:
+    values = heights(4, 5)
+    out = tmp_path / "scene.yaml"
+    path = write_tiff(tmp_path / "dem.tif", values)
+    assert main(["scene", "import", str(path), "-o", str(out)]) == 0
+    packed = load_scene(out).document["elevation"]["packed"]
+    steps = np.frombuffer(zlib.decompress(base64.b64decode(packed["heights"])), "<i4")
+    assert 1e-4 * steps == pytest.approx(values.ravel(), abs=1e-4)
+
+
+TABLE = "10: {multiplier: 1.5}\n20: {multiplier: 2, turning: 3}\n80: obstacle\n"
+
+
+def test_land_cover_raster(tmp_path: Path, write_tiff: Any) -> None:
+    classes = np.full((20, 30), 10, dtype="uint8")
+    classes[:, 10:20], classes[5:8, 3:6], classes[15:, 25:] = 20, 80, 99
+    table = tmp_path / "classes.yaml"
+    table.write_text(TABLE)
+    cover = write_tiff(tmp_path / "cover.tif", classes)
+    dem = write_tiff(tmp_path / "dem.tif", heights(20, 30))
+    for scene in (
+        imported(dem, land_cover=cover, classes=table),
+        scene_from_document(
+            import_files(
+                [cover], ImportOptions(classes=table), kind="land-cover"
+            ).document,
+            source="test",
+        ),
+    ):
+        spots = {(15.0, 10.0): 2.0, (2.0, 2.0): 1.5, (8.0, 18.0): 1.5}
+        for spot, multiplier in spots.items():
+            (area,) = [a for a in scene.terrain if a.shape.covers(shapely.Point(spot))]
+            assert area.multiplier == multiplier
+            assert area.turning_multiplier == (3.0 if multiplier == 2.0 else 1.0)
+        assert not any(a.shape.covers(shapely.Point(27, 2)) for a in scene.terrain)
+        (pond,) = scene.obstacles
+        assert pond.shape.equals(shapely.box(3, 12, 6, 15))
+
+
+def test_land_cover_polygons(tmp_path: Path, write_tiff: Any) -> None:
+    table = tmp_path / "classes.yaml"
+    table.write_text("forest: {multiplier: 3}\nlake: obstacle\n")
+    ring = {
+        "forest": [[0, 0], [10, 0], [10, 10], [0, 10]],
+        "lake": [[12, 2], [18, 2], [18, 8]],
+        "road": [[0, 12], [18, 12], [18, 13]],
+    }
+    features = ", ".join(
+        f'{{"type": "Feature", "properties": {{"class": "{name}"}}, "geometry": '
+        f'{{"type": "Polygon", "coordinates": [{corners}]}}}}'
+        for name, corners in ring.items()
+    )
+    cover = tmp_path / "cover.geojson"
+    cover.write_text(f'{{"type": "FeatureCollection", "features": [{features}]}}')
+    dem = write_tiff(tmp_path / "dem.tif", heights(20, 30))
+    scene = imported(dem, land_cover=cover, classes=table)
+    assert [area.multiplier for area in scene.terrain] == [3.0]
+    assert scene.obstacles[0].shape.area == pytest.approx(18.0)
+
+
+def test_classes_table_faults(tmp_path: Path, write_tiff: Any) -> None:
+    cover = write_tiff(tmp_path / "cover.tif", np.full((4, 4), 1, dtype="uint8"))
+    dem = write_tiff(tmp_path / "dem.tif", heights(4, 4))
+    command = ["scene", "import", str(dem), "--land-cover", str(cover)]
+    out = tmp_path / "scene.yaml"
+    assert main([*command, "-o", str(out)]) == 2
+    table = tmp_path / "classes.yaml"
+    for text in ("", "- 1\n", "1: {multiplier: -2}\n", "1: water\n", "1: {speed: 2}\n"):
+        table.write_text(text)
+        assert main([*command, "--classes", str(table), "-o", str(out)]) == 3
+    assert not out.exists()
+
+
+def test_large_model_is_thinned_in_place(
+    tmp_path: Path, write_tiff: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("mrmg.scene.importing.formats.geotiff.MOST_NODES", 500)
+    values = heights(60, 60)
+    scene = imported(write_tiff(tmp_path / "dem.tif", values))
+    found = elevation(scene)
+    assert found.height_m.size <= 500
+    at = np.array([[0.5, 59.5], [0.5 + 27, 59.5 - 18]])
+    assert found.height_at(at) == pytest.approx(
+        [values[0, 0], values[18, 27]], abs=1e-4
+    )
