@@ -8,17 +8,16 @@ Nav2 route graph become goals, those that charge become stations, and its edges 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import shapely
-from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.errors import Fault, SceneError, nearest
-from mrmg.scene.importing.frames import Frame, frame_of, known_crs
+from mrmg.scene.importing.features import Content, crs_of, features_of, is_graph_edge
+from mrmg.scene.importing.frames import Frame, frame_of
 from mrmg.scene.importing.land_cover import LandCover, read_classes
 from mrmg.scene.importing.layers import Area, ImportOptions, Layer, polygons
 from mrmg.scene.importing.registry import Format, Head, read_json
@@ -34,36 +33,6 @@ WALL_WIDTH_M = 0.1
 ROBOT_MODEL = "diffdrive"
 """Model of robots that state none."""
 
-_GEOGRAPHIC = "EPSG:4326"
-
-
-@dataclass
-class _Content:
-    """What was found so far, in coordinates of the file until it is placed."""
-
-    source: str
-    faults: list[Fault] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    areas: dict[str, list[Area]] = field(
-        default_factory=lambda: {"obstacle": [], "terrain": []}
-    )
-    entries: dict[str, list[dict[str, Any]]] = field(
-        default_factory=lambda: {"goal": [], "station": [], "robot": []}
-    )
-    lanes: list[BaseGeometry] = field(default_factory=list)
-
-    def number(
-        self, keys: dict[str, Any], place: str, name: str, default: float
-    ) -> float:
-        """Return a positive number of the properties, or note a fault of it."""
-        value = keys.get(name, default)
-        good = isinstance(value, int | float) and not isinstance(value, bool)
-        if not good or not np.isfinite(value) or (value <= 0.0 and name != "heading"):
-            message = f"got {shown(value)}; expected a positive number"
-            self.faults.append(Fault(f"{place}.properties.{name}", message))
-            return default
-        return float(value)
-
 
 def read_geojson(path: Path, options: ImportOptions) -> Layer:
     """Read a GeoJSON file as a layer of a scene.
@@ -71,12 +40,12 @@ def read_geojson(path: Path, options: ImportOptions) -> Layer:
     Raises:
         SceneError: naming every feature that cannot be used.
     """
-    content, document = _Content(str(path)), read_json(path)
-    features = list(_features(document, content))
+    content, document = Content(str(path)), read_json(path)
+    features = list(features_of(document, content))
     if content.faults or not features:
         faults = content.faults or [Fault("features", "there are none")]
         raise SceneError(str(path), faults)
-    crs = _crs(document, features, options, content)
+    crs = crs_of(document, features, options, content)
     points = np.concatenate([shapely.get_coordinates(item[2]) for item in features])
     frame = options.frame or frame_of(crs, points)
     if content.faults:
@@ -104,7 +73,7 @@ def read_geojson(path: Path, options: ImportOptions) -> Layer:
     )
 
 
-def _counts(content: _Content) -> Iterator[str]:
+def _counts(content: Content) -> Iterator[str]:
     counts = {kind: len(found) for kind, found in content.areas.items()}
     counts |= {kind: len(found) for kind, found in content.entries.items()}
     yield "features: " + ", ".join(f"{n} {kind}" for kind, n in counts.items() if n)
@@ -113,88 +82,6 @@ def _counts(content: _Content) -> Iterator[str]:
             f"{len(content.lanes)} edges are lanes: robots keep to them with "
             "--lanes WIDTH, in either direction; otherwise they were left out"
         )
-
-
-def _features(
-    document: Any, content: _Content
-) -> Iterator[tuple[str, dict[str, Any], BaseGeometry]]:
-    """Yield place, properties and geometry of the features that are well formed."""
-    kind = document.get("type") if isinstance(document, dict) else None
-    if kind == "FeatureCollection":
-        items = document.get("features")
-        if not isinstance(items, list):
-            message = f"got {shown(items)}; expected a list"
-            content.faults.append(Fault("features", message))
-            return
-    elif kind == "Feature":
-        items = [document]
-    else:
-        message = f"got {shown(kind)}; expected FeatureCollection or Feature"
-        content.faults.append(Fault("type", message))
-        return
-    empty = 0
-    for index, item in enumerate(items):
-        place = f"features.{index}"
-        if not isinstance(item, dict) or not isinstance(
-            item.get("properties") or {}, dict
-        ):
-            content.faults.append(
-                Fault(place, f"got {shown(item)}; expected a feature")
-            )
-        elif item.get("geometry") is None:
-            empty += 1
-        else:
-            keys = dict(item.get("properties") or {})
-            keys.setdefault("id", item.get("id"))
-            shape = _geometry(item["geometry"], f"{place}.geometry", content)
-            if shape is not None:
-                yield place, keys, shape
-    if empty:
-        content.notes.append(f"{empty} features without geometry were left out")
-
-
-def _geometry(value: Any, place: str, content: _Content) -> BaseGeometry | None:
-    try:
-        shape = shapely.force_2d(shapely.geometry.shape(value))
-        good = not shape.is_empty and np.isfinite(shapely.get_coordinates(shape)).all()
-    except (ShapelyError, ValueError, TypeError, KeyError, AttributeError, IndexError):
-        good = False
-    if good:
-        return shape
-    content.faults.append(Fault(place, f"got {shown(value)}; expected a geometry"))
-    return None
-
-
-def _crs(
-    document: Any, features: list[Any], options: ImportOptions, content: _Content
-) -> str | None:
-    """Return the coordinate system of a file; None for local metres."""
-    if options.crs is not None:
-        return known_crs(options.crs, content.source)
-    member = document.get("crs")
-    if member is not None:
-        try:
-            return known_crs(str(member["properties"]["name"]), content.source)
-        except (KeyError, TypeError):
-            message = f"got {shown(member)}; expected {{properties: {{name: ...}}}}"
-            content.faults.append(Fault("crs", message))
-            return None
-    if options.frame is not None and options.frame.crs is None:
-        content.notes.append("states no crs: taken as metres of the map before it")
-        return None
-    if any(_is_graph_edge(keys) for _, keys, _ in features):
-        content.notes.append("states no crs: a route graph's are metres of its map")
-        return None
-    points = np.concatenate([shapely.get_coordinates(item[2]) for item in features])
-    if (np.abs(points) > [180.0, 90.0]).any():
-        message = (
-            "states none, and has coordinates that are no longitude and latitude; "
-            "add it, or state one by --crs (--crs local for metres)"
-        )
-        content.faults.append(Fault("crs", message))
-        return None
-    content.notes.append("states no crs: longitude and latitude, as in RFC 7946")
-    return _GEOGRAPHIC
 
 
 def _placed(
@@ -220,15 +107,11 @@ def _land_cover(
     return cover.layer(frame, None, notes)
 
 
-def _is_graph_edge(keys: dict[str, Any]) -> bool:
-    return "startid" in keys and "endid" in keys
-
-
 def _add(
-    place: str, keys: dict[str, Any], shape: BaseGeometry, content: _Content
+    place: str, keys: dict[str, Any], shape: BaseGeometry, content: Content
 ) -> None:
     kind = keys.get("kind")
-    if kind is None and _is_graph_edge(keys):
+    if kind is None and is_graph_edge(keys):
         content.lanes.append(shape)
     elif kind is None and shape.geom_type == "Point" and keys.get("id") is not None:
         node = "station" if "charg" in str(keys).lower() else "goal"
@@ -249,7 +132,7 @@ def _add(
 
 
 def _add_area(
-    kind: str, place: str, keys: dict[str, Any], shape: BaseGeometry, content: _Content
+    kind: str, place: str, keys: dict[str, Any], shape: BaseGeometry, content: Content
 ) -> None:
     if shape.area == 0.0:
         radius_m = content.number(keys, place, "radius", WALL_WIDTH_M / 2)
@@ -274,7 +157,7 @@ def _add_area(
 
 
 def _add_place(
-    kind: str, place: str, keys: dict[str, Any], shape: BaseGeometry, content: _Content
+    kind: str, place: str, keys: dict[str, Any], shape: BaseGeometry, content: Content
 ) -> None:
     entry: dict[str, Any] = {"id": _own_id(kind, keys, content)}
     radius_m = content.number(keys, place, "radius", PLACE_RADIUS_M)
@@ -297,7 +180,7 @@ def _add_place(
 
 
 def _add_robot(
-    place: str, keys: dict[str, Any], shape: BaseGeometry, content: _Content
+    place: str, keys: dict[str, Any], shape: BaseGeometry, content: Content
 ) -> None:
     if shape.geom_type != "Point":
         message = f"is a {shape.geom_type}; expected a Point"
@@ -318,7 +201,7 @@ def _add_robot(
     content.entries["robot"].append(entry)
 
 
-def _own_id(kind: str, keys: dict[str, Any], content: _Content) -> str:
+def _own_id(kind: str, keys: dict[str, Any], content: Content) -> str:
     own_id = keys.get("id")
     if own_id is None:
         return f"{kind}_{len(content.entries[kind]) + 1}"
