@@ -11,6 +11,7 @@ from mrmg.cli import (
     commands,
     completion,
     export_command,
+    import_options,
     replay_command,
     robot_commands,
     robustness_commands,
@@ -229,7 +230,10 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     )
     schema.set_defaults(command=scene_commands.schema)
 
-    _add_scene_import(acts)
+    imported = import_options.add_import(acts)
+    _add_scene_out(imported)
+    imported.set_defaults(command=scene_commands.import_)
+
     populate = acts.add_parser("populate", help="place robots, goals and stations")
     populate.add_argument("scene", metavar="SCENE")
     for name, count in (("robots", 2), ("goals", 14), ("stations", 5)):
@@ -251,60 +255,6 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     _add_scene_out(populate)
     add_trust(populate)
     populate.set_defaults(command=scene_commands.populate)
-
-
-def _add_scene_import(acts: _Verbs) -> None:  # type: ignore[type-arg]
-    verb = acts.add_parser(
-        "import",
-        help="read maps and missions of other tools as a scene",
-        description="Read occupancy maps of ROS and Nav2, elevation models, GeoJSON, "
-        "route graphs, VDMA LIF layouts, and polygon maps as one scene. What was "
-        "dropped, changed or assumed is reported, and kept as comments of the scene.",
-    )
-    verb.add_argument("files", type=Path, nargs="+", metavar="FILE")
-    verb.add_argument("--kind", help="what the files are; default: by their content")
-    verb.add_argument(
-        "--unknown",
-        choices=("obstacle", "free"),
-        default="obstacle",
-        help="what cells become that were never seen; default obstacle",
-    )
-    verb.add_argument(
-        "--tolerance",
-        type=reader(values.time),
-        default=0.5,
-        metavar="CELLS",
-        help="how far polygons may reach beyond occupied cells; default 0.5",
-    )
-    for flag, metavar, what in (
-        ("--keepout", "FILE", "mask (or other file) of ground that robots keep off"),
-        ("--terrain-mask", "FILE", "speed or cost mask: terrain multipliers"),
-        ("--land-cover", "FILE", "raster or GeoJSON of land-cover classes"),
-        ("--classes", "TABLE.yaml", "lines 'class: {multiplier: M, turning: T}'"),
-    ):
-        verb.add_argument(flag, type=Path, metavar=metavar, help=what)
-    verb.add_argument(
-        "--lanes",
-        type=reader(values.positive),
-        metavar="WIDTH",
-        help="let robots drive on the edges of graphs and layouts only, so wide [m]",
-    )
-    verb.add_argument("--crs", help="coordinate system of the files, or local (metres)")
-    verb.add_argument(
-        "--crop",
-        nargs="+",
-        metavar="X_MIN Y_MIN X_MAX Y_MAX",
-        help="part to read, in the coordinates of the first file",
-    )
-    verb.add_argument(
-        "--longest-side",
-        type=reader(values.positive),
-        default=100.0,
-        metavar="METRES",
-        help="scale polygon maps so that their longest side measures this; default 100",
-    )
-    _add_scene_out(verb)
-    verb.set_defaults(command=scene_commands.import_)
 
 
 def _add_calibrate(verbs: _Verbs) -> None:  # type: ignore[type-arg]

@@ -84,16 +84,7 @@ def populate(
     folder = model_folder(model, None)
     if isinstance(folder, str):
         raise UsageError(folder)
-    wishes = ("objective", "time_limit")
-    kept = ("format", "name", "bounds", "obstacles", "terrain", "elevation", *wishes)
-    bare = {key: document[key] for key in kept if key in document}
-    for obstacle in bare.get("obstacles", []):
-        if isinstance(obstacle, dict) and "blocks" in obstacle:
-            message = (
-                "an obstacle with 'blocks' names robots that populate replaces; "
-                "remove 'blocks' from the map first"
-            )
-            raise UsageError(message)
+    bare = _map_of(document)
     scene = scene_from_document(bare, source=str(document.get("name", "the map")))
     robot_model, _ = load_model(folder, trust_code=trust_code)
     rng = stream(seed, "populate")
@@ -117,6 +108,21 @@ def populate(
     )
     placement = place_mission(sites, robots, goals, stations, rng)
     return _document(bare, ground, places, placement, model, robot_model)
+
+
+def _map_of(document: dict[str, Any]) -> dict[str, Any]:
+    """Return a document without its mission."""
+    wishes = ("objective", "time_limit")
+    kept = ("format", "name", "bounds", "obstacles", "terrain", "elevation", *wishes)
+    bare = {key: document[key] for key in kept if key in document}
+    for obstacle in bare.get("obstacles", []):
+        if isinstance(obstacle, dict) and "blocks" in obstacle:
+            message = (
+                "an obstacle with 'blocks' names robots that populate replaces; "
+                "remove 'blocks' from the map first"
+            )
+            raise UsageError(message)
+    return bare
 
 
 def _drivable(scene: Scene, model: RobotModel) -> Ground:
