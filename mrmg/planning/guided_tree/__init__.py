@@ -81,7 +81,9 @@ What the paper leaves open, our choice, and why:
 - A tour is feasible if every battery lasts, above its reserve, along the roadmap to the
   robot's next station or end. NRPA draws tours with a margin on energies, as driving
   takes more than the roadmap says; feasibility is judged without it.
-- Stations recharge the robot whose tour leads there next; goals count for any robot.
+- Stations recharge the robot whose tour leads there next, once each time it enters: no
+  tour begins with a station that the robot is in, but at the start. Goals count for any
+  robot.
 - Parameters: `parameters.paper_params`, tuned on seeds from 1000 on; results are of
   seeds 0-49. The number of iterations has a hard cap, which is reported with results.
 

@@ -11,11 +11,7 @@ from mrmg.compilation import kernel
 from mrmg.energy.model import battery_power
 from mrmg.motion._kernels import CAR, copy_numbers, step, turn_speed
 from mrmg.planning.guided_tree._regions_kernels import point_on_path, region_of
-from mrmg.planning.guided_tree._setting_kernels import (
-    collision_free,
-    in_region,
-    wrap,
-)
+from mrmg.planning.guided_tree._setting_kernels import collision_free
 from mrmg.planning.guided_tree._tours_kernels import create_new_tour, feasible
 from mrmg.planning.guided_tree._tree_kernels import (
     COLLIDED,
@@ -27,6 +23,9 @@ from mrmg.planning.guided_tree._tree_kernels import (
     find_group,
     weigh,
 )
+from mrmg.planning.problem._control_kernels import control_towards, wrap
+from mrmg.planning.problem._safety_kernels import braking_control, stands
+from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.planning.routing._random_kernels import random_unit
 from mrmg.world._kernels import multiplier_in, turning_multiplier_in
@@ -42,9 +41,6 @@ SLOWEST_SHARE = 0.4
 BRAKING_STEPS = 200
 """Steps within which every robot can brake; more is taken for none."""
 
-REST = 1e-9
-"""Speed below which a robot is at rest [m/s], [rad/s]."""
-
 
 @kernel
 def decay(visits, rules):
@@ -57,13 +53,7 @@ def decay(visits, rules):
 
 
 @kernel
-def towards(value, wanted, rate, hold_s):
-    """Return the rate of change that, held for hold_s, gets nearest to a value."""
-    return max(-rate, min(rate, (wanted - value) / hold_s))
-
-
-@kernel
-def steer(robot, state, x, y, hold_s):
+def steer(fleet, r, state, x, y, hold_s):
     """Return the control that, held, drives a robot at a point; NaN brakes (Steer).
 
     A car follows the circle through the point that its rear axle would roll along
@@ -72,12 +62,13 @@ def steer(robot, state, x, y, hold_s):
     better it faces it. Nothing else is looked at.
 
     Args:
-        robot: record of the fleet.
+        fleet, r: the robot.
         state: shape (5,).
         x, y: the point [m].
         hold_s: for how long the control will be held [s].
     """
-    w_max, u1_max, u2_max = robot.limit[2], robot.limit[3], robot.limit[4]
+    robot = fleet[r]
+    w_max = robot.limit[2]
     v = w = 0.0
     if not isnan(x):
         distance = hypot(x - state[0], y - state[1])
@@ -100,7 +91,7 @@ def steer(robot, state, x, y, hold_s):
             v = robot.limit[1] * max(0.0, cos(bearing)) ** 3
     elif robot.model == CAR:
         w = state[4]
-    return towards(state[3], v, u1_max, hold_s), towards(state[4], w, u2_max, hold_s)
+    return control_towards(fleet, r, state, v, w, hold_s)
 
 
 @kernel
@@ -125,7 +116,7 @@ def choose_controls(setting, rules, state, visits, target, random, draw, control
         draw[r] = random_unit(random)
         if draw[r] < decay(visits, rules):
             control[r, 0], control[r, 1] = steer(
-                robot, state[r], target[r, 0], target[r, 1], hold_s
+                setting.fleet, r, state[r], target[r, 0], target[r, 1], hold_s
             )
 
 
@@ -143,30 +134,32 @@ def step_energy(setting, r, before, after, u1, dt):
 
 
 @kernel
-def arrive(setting, tours, row, state, energy, visited):
+def arrive(setting, tree, v, state, energy, visited):
     """Enter goals and stations; return whether one of the tour is reached.
 
-    Any robot visits a goal by entering it. A robot recharges at a station that its tour
-    leads to next.
+    Any robot visits a goal by entering it. A robot recharges on entering a station that
+    its tour leads to next.
 
     Args:
         setting: the mission.
-        tours, row: the parent's tour; -1 for none.
+        tree, v: the parent; -1 for none.
         state: shape (R, 5).
         energy: battery contents [J], changed in place, shape (R,).
         visited: goals, changed in place, shape (G,).
     """
     reached = False
+    vertices, tours = tree.vertices, tree.tours
+    row = vertices.tour[v]
     for r in range(len(energy)):
         x, y = state[r, 0], state[r, 1]
         for goal in range(len(visited)):
-            if not visited[goal] and in_region(setting.targets, goal, x, y):
+            if not visited[goal] and in_target(setting.targets, goal, x, y):
                 visited[goal] = True
                 reached = True
-        if row < 0 or tours.length[row, r] == 0:
+        if v < 0 or tours.length[row, r] == 0:
             continue
         t = tours.target[row, r, 0]
-        if t >= len(visited) and in_region(setting.targets, t, x, y):
+        if t >= len(visited) and in_target(setting.targets, t, x, y):
             energy[r] = setting.fleet[r].capacity
             reached = True
     return reached
@@ -216,7 +209,7 @@ def insert(setting, rules, tree, v, iteration, state, energy):
         row = vertices.tour[v]
         copy_numbers(groups.visited[vertices.group[v]], visited)
     # 2-4: a new one if it is reached or infeasible; without one, no vertex is added.
-    reached = arrive(setting, tours, row, state, energy, visited)
+    reached = arrive(setting, tree, v, state, energy, visited)
     if row < 0 or reached or not feasible(setting, tours, row, state, energy, region):
         row = create_new_tour(setting, rules, tree, state, energy, region, visited)
         if row < 0:
@@ -258,17 +251,13 @@ def stop_freely(setting, rules, state, energy, control):
     here, after, left = state.copy(), state.copy(), energy.copy()
     corner, middle = np.empty((robots, MOST_CORNERS, 2)), np.empty((robots, 2))
     for n in range(len(control)):
-        moving = False
+        at_rest = True
         for r in range(robots):
-            moving |= abs(here[r, 3]) > REST
-            moving |= fleet[r].model != CAR and abs(here[r, 4]) > REST
-        if not moving:
+            at_rest &= stands(fleet, r, here[r])
+        if at_rest:
             return n
         for r in range(robots):
-            u1 = towards(here[r, 3], 0.0, fleet[r].limit[3], dt)
-            u2 = towards(here[r, 4], 0.0, fleet[r].limit[4], dt)
-            if fleet[r].model == CAR:
-                u2 = 0.0
+            u1, u2 = braking_control(fleet, r, here[r], dt)
             step(fleet[r], here[r], u1, u2, dt, after[r])
             left[r] -= step_energy(setting, r, here[r], after[r], u1, dt)
             control[n, r, 0], control[n, r, 1] = u1, u2

@@ -10,6 +10,10 @@ from mrmg.compilation import kernel
 from mrmg.planning.roadmap._bucket_kernels import nearest_points
 from mrmg.world._kernels import multiplier_in
 
+ENTRIES = 4
+"""Vertices at which a path may join the roadmap: the region's and those that follow.
+The region's vertex may lie behind the robot, which costs the way there and back."""
+
 
 @kernel
 def region_of(roadmap, joined, x, y):
@@ -32,14 +36,21 @@ def region_of(roadmap, joined, x, y):
 def path_energy(setting, r, t, x, y, region):
     """Return the energy from a point to a target along the roadmap [J].
 
-    The path leads straight to the region's vertex, and from there along the roadmap;
-    infinite where the roadmap does not join the two.
+    The path leads straight to the region's vertex, or to one of the next after it if
+    that is cheaper, and from there along the roadmap; infinite where the roadmap does
+    not join the two.
     """
-    robot = setting.fleet[r]
-    vertex = setting.roadmap.vertex[region]
-    straight_m = hypot(vertex[0] - x, vertex[1] - y)
-    costs_m = straight_m * multiplier_in(setting.terrain, x, y)
-    return robot.plain * (costs_m + setting.roadmap.cost_to_go[robot.field, t, region])
+    robot, roadmap = setting.fleet[r], setting.roadmap
+    multiplier = multiplier_in(setting.terrain, x, y)
+    least_m = np.inf
+    v = region
+    for _ in range(ENTRIES):
+        if v >= 0:
+            dx, dy = roadmap.vertex[v, 0] - x, roadmap.vertex[v, 1] - y
+            on_m = roadmap.cost_to_go[robot.field, t, v]
+            least_m = min(least_m, multiplier * hypot(dx, dy) + on_m)
+            v = roadmap.successor[robot.field, t, v]
+    return robot.plain * least_m
 
 
 @kernel

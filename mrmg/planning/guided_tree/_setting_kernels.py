@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, pi, sin
+from math import cos, hypot, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +17,6 @@ from mrmg.world._kernels import (
     convex_convex_distance,
     footprint_is_clear,
     place_footprint,
-    point_in_convex,
 )
 
 STATE_ROUNDING = 1e-9
@@ -67,26 +66,6 @@ class Rules(NamedTuple):
     levels: int
     nrpa_iterations: int
     nrpa_alpha: float
-
-
-@kernel
-def in_region(targets, t, x, y):
-    """Return whether a point lies in a target's region."""
-    far = hypot(x - targets.center[t, 0], y - targets.center[t, 1])
-    if far > targets.reach[t]:
-        return False
-    n = targets.corners[t]
-    return n == 0 or point_in_convex(x, y, targets.corner[t, :n])
-
-
-@kernel
-def wrap(angle):
-    """Return the angle in (-pi, pi]."""
-    while angle > pi:
-        angle -= 2.0 * pi
-    while angle <= -pi:
-        angle += 2.0 * pi
-    return angle
 
 
 @kernel

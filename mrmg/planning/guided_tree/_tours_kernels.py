@@ -11,7 +11,9 @@ from mrmg.planning.guided_tree._tree_kernels import (
     ROUTER_FAILURES,
     ROUTING_NS,
     TOURS,
+    VERTICES,
 )
+from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.routing._nrpa_kernels import UNVISITED, RoutingArrays, nrpa
 
 
@@ -82,6 +84,10 @@ def create_new_tour(setting, rules, tree, state, energy, region, visited):
     cost = problem.cost.copy()
     for r in range(robots):
         for t in range(targets):
+            inside = in_target(setting.targets, t, state[r, 0], state[r, 1])
+            if t >= problem.goals and inside and tree.counts[VERTICES] > 0:
+                cost[r, targets, t] = np.inf
+                continue
             leg = path_energy(setting, r, t, state[r, 0], state[r, 1], region[r])
             cost[r, targets, t] = leg * (1.0 + rules.route_margin)
     now = RoutingArrays(

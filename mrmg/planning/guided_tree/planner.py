@@ -10,7 +10,7 @@ import numpy as np
 from mrmg.motion._kernels import step as motion_step
 from mrmg.planning.guided_tree._expansion_kernels import BRAKING_STEPS
 from mrmg.planning.guided_tree._growth_kernels import grow
-from mrmg.planning.guided_tree._setting_kernels import Rules, Setting, in_region
+from mrmg.planning.guided_tree._setting_kernels import Rules, Setting
 from mrmg.planning.guided_tree._tree_kernels import GROUPS as N_GROUPS
 from mrmg.planning.guided_tree._tree_kernels import (
     ITERATIONS,
@@ -25,6 +25,7 @@ from mrmg.planning.guided_tree._tree_kernels import (
     Vertices,
 )
 from mrmg.planning.parameters import BETA_SHARE, GuidedTreeParams, PlannerParams
+from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Trajectory
 from mrmg.scene.types import Scene
@@ -259,12 +260,12 @@ def _visited(
         for r in range(len(robots)):
             x, y = vertices.state[v, r, :2]
             for g in np.flatnonzero(groups.visited[vertices.group[v]] & ~seen):
-                if in_region(targets, g, x, y):
+                if in_target(targets, g, x, y):
                     found[r].append(int(g))
                     seen[g] = True
             if row >= 0 and tours.length[row, r] > 0:
                 t = int(tours.target[row, r, 0])
-                if t >= len(seen) and in_region(targets, t, x, y):
+                if t >= len(seen) and in_target(targets, t, x, y):
                     found[r].append(t)
         row = int(vertices.tour[v])
     names = [target.id for target in problem.scene.targets()]

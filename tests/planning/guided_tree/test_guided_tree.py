@@ -24,6 +24,13 @@ from mrmg.scene.types import Scene
 SCENES = Path(__file__).parents[2] / "scenes"
 
 
+def test_a_robot_recharges_once_where_it_enters_a_station() -> None:
+    scene = load_scene(SCENES / "station_needed.yaml")
+    result = plan_mission(scene, seed=5, params=profile_params("paper"))
+    assert result.plan is not None, result.reason
+    assert result.plan.tours["r1"] == ("s1", "g1")
+
+
 @pytest.mark.parametrize("name", ["one_goal", "two_swap", "station_needed", "no_goals"])
 def test_plans_are_valid_and_reproducible(name: str) -> None:
     scene = load_scene(SCENES / f"{name}.yaml")

@@ -248,6 +248,18 @@ def test_energy_is_used_by_distance_terrain_and_turning(replay: Any) -> None:
             assert replay.vertices.energy[v, r] == pytest.approx(left, abs=1e-6), i
 
 
+def test_no_tour_begins_with_the_station_that_a_robot_is_in(replay: Any) -> None:
+    inside = 0
+    for v in range(1, replay.n):
+        for r, tour in enumerate(replay.tour(v)):
+            here = replay.vertices.state[v, r, :2]
+            for t in range(replay.goals, replay.goals + len(replay.scene.stations)):
+                if replay.scene.targets()[t].region.depth(here)[0] >= 0.13:
+                    inside += 1
+                    assert tour[:1] != [t]
+    assert inside
+
+
 def test_tours_are_kept_renewed_and_feasible(replay: Any) -> None:
     """Algorithm 2, with every vertex's tour."""
     renewed = 0
