@@ -20,12 +20,9 @@ DRAWERS = {"utils", "util", "common", "helpers", "helper", "misc", "tools"}
 HEAVY = {"av", "casadi", "matplotlib", "mujoco", "numba", "pydantic", "rich", "scipy"}
 
 LONG_MODULES = {
-    "_kernels": 357,
-    "geodesic": 377,
     "_tracking_kernels": 352,
     "band": 356,
     "tracking": 353,
-    "_refuel_kernels": 371,
     "_tree_kernels": 370,
     "motion_tree": 353,
     "assembly": 363,
@@ -38,10 +35,8 @@ LONG_FUNCTIONS = {
     "populate.populate": 61,
     "parser._add_scene": 71,
     "pipeline.run": 71,
-    "bound.Relaxation.of": 64,
     "_tracking_kernels.drive": 104,
     "planner._planned": 66,
-    "roadmap.build_roadmap": 73,
     "routing.routing_arrays": 65,
     "_expansion_kernels.expand": 72,
     "_rerouting_kernels.route_from": 62,

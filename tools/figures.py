@@ -15,6 +15,7 @@ from pathlib import Path
 
 from bench_figure import HEAD, draw_runtimes, table_rows
 from bench_record import BenchRow, read_rows
+from insight import look_inside
 from method_figure import draw_method
 from problem_figure import draw_problem, draw_problems
 
@@ -22,7 +23,6 @@ import mrmg
 from mrmg import storage
 from mrmg.errors import MrmgError
 from mrmg.planning import profile_params
-from mrmg.planning.insight import look_inside
 
 
 def main() -> int:

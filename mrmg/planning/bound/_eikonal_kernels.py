@@ -22,10 +22,6 @@ from mrmg.planning.roadmap._heap_kernels import pop, push
 UNREACHED = 1e18
 """Field value of nodes that no free cell joins to the source."""
 
-NEGLIGIBLE = 1e-3
-"""Share of the cost of a cell of plain ground by which a node may become less without
-its neighbours being looked at again."""
-
 
 @kernel
 def certified_field(price, cell, seed, rounds, band):
@@ -50,11 +46,11 @@ def certified_field(price, cell, seed, rounds, band):
     step = np.full((price.shape[0] + 2, price.shape[1] + 2), np.inf)
     step[1:-1, 1:-1] = price * cell
     field = seed.copy()
-    order = _march(step.ravel(), field)
+    _march(step.ravel(), field)
     for _ in range(rounds - 1):
         _lower_where_steep(field, price, cell, step)
         field[:] = seed
-        _follow(step.ravel(), cell, field.ravel(), field.shape[1], order)
+        _march(step.ravel(), field)
     low, high = np.inf, -np.inf
     for value in field.ravel():
         low = min(low, value)
@@ -114,34 +110,27 @@ def _lower_where_steep(field, price, cell, step):
 
 @kernel
 def _march(step, field):
-    """Solve |grad u| = price from the seeds that `field` holds: fast marching.
+    """Solve |grad u| = price from given seeds: fast marching (Sethian 1996).
 
     Args:
         step: price of each cell and of the rim, times the cell's side, flat.
         field: seeds, UNREACHED elsewhere; receives the solution, shape (Y + 1, X + 1).
-
-    Returns:
-        The nodes that are reached, by rising value.
     """
     width = field.shape[1]
     flat = field.ravel()
     done = np.zeros(len(flat), np.bool_)
-    order = np.empty(len(flat), np.int32)
     key = np.empty(5 * len(flat) + 1)  # a node is improved from each side at most
     entry = np.empty(len(key), np.int32)
     size = 0
     for node in range(len(flat)):
         if flat[node] < UNREACHED:
             size = push(key, entry, size, flat[node], node)
-    count = 0
     while size > 0:
         node = entry[0]
         size = pop(key, entry, size)
         if done[node]:
             continue
         done[node] = True
-        order[count] = node
-        count += 1
         above = node + node // width
         below = above + width + 1
         for side in range(4):
@@ -163,55 +152,6 @@ def _march(step, field):
             if value < UNREACHED and value < flat[to]:
                 flat[to] = value
                 size = push(key, entry, size, value, to)
-    return order[:count]
-
-
-@kernel
-def _follow(step, side, field, width, order):
-    """Solve again for somewhat other prices: the last order is nearly right.
-
-    Nodes take the least values that their neighbours allow them, and again those with
-    a neighbour that has become less since, until nothing becomes much less.
-
-    Args:
-        step, field: as of `_march`, flat.
-        side: side of a cell.
-        width: nodes of a row.
-        order: as `_march` returned it.
-    """
-    stale = np.ones(len(field) + 2 * width, np.bool_)  # a row more on both sides
-    lowered = True
-    while lowered:
-        lowered = False
-        for node in order:
-            if not stale[node + width]:
-                continue
-            stale[node + width] = False
-            value = _node_value(step, field, width, node)
-            if value < field[node]:
-                much = value < field[node] - NEGLIGIBLE * side
-                field[node] = value
-                if much:
-                    lowered = True
-                    stale[node] = True
-                    stale[node + 2 * width] = True
-                    stale[node + width - 1] = True
-                    stale[node + width + 1] = True
-
-
-@kernel
-def _node_value(step, field, width, node):
-    """Return the least value that the four cells about a node allow it."""
-    best = UNREACHED
-    cell = node + node // width
-    for down in range(2):
-        along = node - width + 2 * width * down
-        for right in range(2):
-            price = step[cell + (width + 1) * down + right]
-            if price < np.inf:
-                across = node - 1 + 2 * right
-                best = min(best, _corner_value(field[along], field[across], price))
-    return best
 
 
 @kernel

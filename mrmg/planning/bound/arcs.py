@@ -18,22 +18,17 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from shapely.ops import substring
 
 from mrmg.planning.bound._eikonal_kernels import UNREACHED
-from mrmg.planning.bound.geodesic import (
+from mrmg.planning.bound.borders import (
     ARCS,
     SPACING_M,
-    Field,
-    Ground,
-    Look,
-    Ways,
+    arc_lines,
     border,
+    sagitta_m,
 )
+from mrmg.planning.bound.geodesic import Field, Ground, Look, Ways
 from mrmg.scene.types import Region
-
-CHORDS = 4
-"""Chords that stand for an arc of a circle in straight distances."""
 
 SECTORS = 64
 """Directions that waves leave regions in."""
@@ -83,8 +78,8 @@ class ArcWays:
         """Bound all ways between arcs, and from starts to arcs."""
         regions, count = ways.regions, len(ways.regions)
         reach = ways.lowest - ways.highest[:, None, None]
-        lines = np.array([line for region in regions for line in _arc_lines(region)])
-        sagitta_m = max((_sagitta_m(region) for region in regions), default=0.0)
+        lines = np.array([line for region in regions for line in arc_lines(region)])
+        depth_m = max((sagitta_m(region) for region in regions), default=0.0)
         floor = float(np.min(ways.ground.price, initial=1.0))
         between = np.maximum(0.0, reach[:, None])
         between = np.maximum(between, reach.transpose(1, 2, 0)[..., None])
@@ -95,12 +90,12 @@ class ArcWays:
         )
         most = floor * np.hypot(*(middle[:, None] - middle).T)
         first, second = np.nonzero(np.triu(most > between, 1))
-        apart = shapely.distance(lines[first], lines[second]) - 2.0 * sagitta_m
+        apart = shapely.distance(lines[first], lines[second]) - 2.0 * depth_m
         apart = np.maximum(between[first, second], floor * apart)
         between[first, second] = between[second, first] = apart
         between = between.reshape(count, ARCS, count, ARCS)
         points = shapely.points(starts)[:, None]
-        away = floor * (shapely.distance(points, lines[None]) - sagitta_m)
+        away = floor * (shapely.distance(points, lines[None]) - depth_m)
         from_start = np.maximum(
             away.reshape(len(starts), count, ARCS), ways.from_start[..., None]
         )
@@ -151,9 +146,9 @@ class ArcWays:
             here = window.look_at(border(region), 0.5 * SPACING_M)
         if field is None or not _all_reached(field, here, away):
             return np.zeros((1, 1))
-        highest = _highest_by_arc(field, here)[: ARCS if source >= 0 else 1]
-        low = _lowest_by_arc(field, away)
-        return np.asarray(np.minimum(low - highest[:, None], outside_m))
+        highest = field.highest(here)[: ARCS if source >= 0 else 1]
+        apart = field.lowest(away) - highest[:, None]
+        return np.asarray(np.minimum(apart, outside_m))
 
     def take(self, wave: Wave, apart: np.ndarray) -> None:
         """Tighten ways by a wave's certificate."""
@@ -260,36 +255,3 @@ def _all_reached(wave: Field, *looks: Look) -> bool:
     return all(
         wave.at(look).max(initial=-UNREACHED) <= 0.5 * UNREACHED for look in looks
     )
-
-
-def _lowest_by_arc(wave: Field, look: Look) -> np.ndarray:
-    """Return bounds of the least value on each arc, UNREACHED where blocked."""
-    low = np.full(ARCS, UNREACHED)
-    np.minimum.at(low, look.arc, wave.at(look) - look.slack)
-    return low
-
-
-def _highest_by_arc(wave: Field, look: Look) -> np.ndarray:
-    """Return bounds of the greatest value on each arc of a border; -inf if blocked."""
-    high = np.full(ARCS, -np.inf)
-    np.maximum.at(high, look.arc, wave.at(look) + look.slack)
-    return high
-
-
-def _arc_lines(region: Region) -> list[shapely.LineString]:
-    """Return the arcs of a region's border, those of circles as polygonal lines."""
-    if len(region.corners):
-        ring = region.shape.exterior
-        cuts = np.linspace(0.0, ring.length, ARCS + 1)
-        return [substring(ring, *ends) for ends in zip(cuts, cuts[1:], strict=False)]
-    angle = np.linspace(0.0, 2.0 * np.pi, ARCS * CHORDS + 1)
-    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1) * region.radius_m
-    ring = ring + region.center
-    return [
-        shapely.LineString(ring[CHORDS * k : CHORDS * (k + 1) + 1]) for k in range(ARCS)
-    ]
-
-
-def _sagitta_m(region: Region) -> float:
-    """Return how far an arc departs from its line."""
-    return region.radius_m * (1.0 - float(np.cos(np.pi / (ARCS * CHORDS))))

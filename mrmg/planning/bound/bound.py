@@ -27,6 +27,7 @@ bound, by less than half a percent in all that was tried; the greater of both ho
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,7 +48,7 @@ from mrmg.planning.halting import NEVER, check
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import routing_arrays
-from mrmg.scene.types import Robot, Scene
+from mrmg.scene.types import Region, Robot, Scene
 
 CELLS = 30_000
 """Cells of the grid on which ways are bounded."""
@@ -170,30 +171,13 @@ class Relaxation:
         Raises:
             Halted: once `halt[0]` has turned true.
         """
-        x_min, y_min, x_max, y_max = scene.bounds
-        cell_m = math.sqrt((x_max - x_min) * (y_max - y_min) / cells)
         regions = [target.region for target in scene.targets()]
         targets = len(regions)
         ends = {r: one.finish for r, one in enumerate(scene.robots) if one.finish}
         regions += [finish.region for finish in ends.values() if with_finishes]
-        starts = _starts(scene)
         keys = [_travel_key(scene, robot) for robot in scene.robots]
-        ways = {}
-        for key, robot in zip(keys, scene.robots, strict=True):
-            if key not in ways:
-                check(halt)
-                ground = _ground(scene, robot, cell_m, step_s)
-                ways[key] = Ways.of(ground, regions, starts, halt)
+        ways = _ways_by_key(scene, step_s, cells, regions, halt)
         batteries = [robot.battery for robot in scene.robots]
-        descents = [_descents_J(scene, robot) for robot in scene.robots]
-        capacity_J = [
-            robot.battery.capacity_J + robot.model.top_kinetic_J + from_top_J
-            for robot, (_, from_top_J) in zip(scene.robots, descents, strict=True)
-        ]
-        energy_J = [
-            battery.start_J + from_start_J
-            for battery, (from_start_J, _) in zip(batteries, descents, strict=True)
-        ]
         price = [r.model.energy_model.plain_ground_J_per_m() for r in scene.robots]
         leg = np.stack([ways[key].between for key in keys])
         first = np.stack([ways[key].from_start[r] for r, key in enumerate(keys)])
@@ -206,8 +190,8 @@ class Relaxation:
             start_distance=first[:, :targets],
             finish_distance=last,
             plain=np.array(price),
-            energy=np.array(energy_J),
-            capacity=np.array(capacity_J),
+            energy=np.array([_relaxed_start_J(scene, one) for one in scene.robots]),
+            capacity=np.array([_relaxed_full_J(scene, one) for one in scene.robots]),
             reserve=np.array([battery.reserve_J - 1e-3 for battery in batteries]),
         )
         return Relaxation(scene, step_s, problem, keys, ways, np.array(price))
@@ -225,6 +209,26 @@ class Relaxation:
                 fine = _ground(self.scene, robot, cell_m, self.step_s)
                 found[key] = ArcWays.of(ways, fine, _starts(self.scene))
         return [found[key] for key in self.keys]
+
+
+def _ways_by_key(
+    scene: Scene,
+    step_s: float,
+    cells: int,
+    regions: Sequence[Region],
+    halt: np.ndarray,
+) -> dict[TravelKey, Ways]:
+    """Return the ways between regions of every kind of robot."""
+    x_min, y_min, x_max, y_max = scene.bounds
+    cell_m = math.sqrt((x_max - x_min) * (y_max - y_min) / cells)
+    ways: dict[TravelKey, Ways] = {}
+    for robot in scene.robots:
+        key = _travel_key(scene, robot)
+        if key not in ways:
+            check(halt)
+            ground = _ground(scene, robot, cell_m, step_s)
+            ways[key] = Ways.of(ground, regions, _starts(scene), halt)
+    return ways
 
 
 def _starts(scene: Scene) -> np.ndarray:
@@ -253,11 +257,18 @@ def most_descent_J(scene: Scene, robot: Robot) -> float:
     return climb_J(robot, max(0.0, start_m - lowest_m))
 
 
-def _descents_J(scene: Scene, robot: Robot) -> tuple[float, float]:
-    """Return what rolling down from the start, and from the top, is worth at most."""
+def _relaxed_start_J(scene: Scene, robot: Robot) -> float:
+    """Return the energy at the start, with what rolling down from there is worth."""
     _, start_m = height_span_m(scene, robot, Point(*robot.pose[:2]))
+    low_m, _ = height_span_m(scene, robot, shapely.box(*scene.bounds))
+    return robot.battery.start_J + climb_J(robot, start_m - low_m)
+
+
+def _relaxed_full_J(scene: Scene, robot: Robot) -> float:
+    """Return a full battery's energy, with what top speed on the top is worth."""
     low_m, high_m = height_span_m(scene, robot, shapely.box(*scene.bounds))
-    return climb_J(robot, start_m - low_m), climb_J(robot, high_m - low_m)
+    moving_J = robot.model.top_kinetic_J + climb_J(robot, high_m - low_m)
+    return robot.battery.capacity_J + moving_J
 
 
 def _travel_key(scene: Scene, robot: Robot) -> TravelKey:

@@ -15,10 +15,10 @@ from typing import NamedTuple
 
 import numpy as np
 import shapely
-from shapely.geometry import Point
 
 from mrmg.planning.bound import _eikonal_kernels
 from mrmg.planning.bound._eikonal_kernels import UNREACHED
+from mrmg.planning.bound.borders import ARCS, SPACING_M, border, distances_m
 from mrmg.planning.bound.prices import least_prices
 from mrmg.planning.halting import NEVER, check
 from mrmg.scene.types import Region, Robot, Scene
@@ -34,12 +34,6 @@ CLEARANCE_TOLERANCE_M = 0.02
 
 ROUND_MARGIN = 1.02
 """Factor on radii of terrain's surroundings, whose arcs are drawn by chords."""
-
-SPACING_M = 0.04
-"""Distance of the points that stand for a region's border."""
-
-ARCS = 32
-"""Arcs into which borders are cut."""
 
 SEED_SHARE = 0.95
 """Steepness of a field next to its source, as a share of the price there."""
@@ -85,6 +79,19 @@ class Field:
     def at_nodes(self) -> np.ndarray:
         """Return f(u) at all nodes, flat."""
         return self._certified(self.values)
+
+    def lowest(self, look: Look) -> np.ndarray:
+        """Return bounds of the least value on each arc, UNREACHED if blocked, (K,)."""
+        low = np.full(ARCS, UNREACHED)
+        np.minimum.at(low, look.arc, self.at(look) - look.slack)
+        return low
+
+    def highest(self, look: Look) -> np.ndarray:
+        """Return bounds of the greatest value on each arc, -inf if blocked, (K,)."""
+        high, value = np.full(ARCS, -np.inf), self.at(look)
+        reached = value < 0.5 * UNREACHED
+        np.maximum.at(high, look.arc[reached], (value + look.slack)[reached])
+        return high
 
     def _certified(self, raw: np.ndarray) -> np.ndarray:
         certified = np.interp(raw, self.level, self.certified)
@@ -262,14 +269,14 @@ class Ways:
         with ThreadPoolExecutor() as threads:
             fields = list(threads.map(field_from, regions))
         looks = [ground.look_at(border(one), 0.5 * SPACING_M) for one in regions]
-        highest = np.array(
-            [highest_of(*pair) for pair in zip(fields, looks, strict=True)]
-        )
+        pairs = zip(fields, looks, strict=True)
+        highest = np.array([field.highest(look).max() for field, look in pairs])
+        highest[highest == -np.inf] = 0.0  # no free point: nothing gets there
         check(halt)
-        lowest = _lowest_by_arc(fields, looks)
+        lowest = np.array([[field.lowest(look) for look in looks] for field in fields])
         check(halt)
         floor = float(np.min(ground.price, initial=1.0))
-        apart_m = _distances_m(regions)
+        apart_m = distances_m(regions)
         certified = lowest.min(axis=2, initial=UNREACHED) - highest[:, None]
         way = np.maximum(np.maximum(certified, floor * apart_m), 0.0)
         way = np.where(apart_m > 0.0, np.maximum(way, way.T), 0.0)
@@ -280,7 +287,7 @@ class Ways:
             for i, field in enumerate(fields):
                 apart = float(-regions[i].depth(start)[0])
                 if apart > 0.0:
-                    certified = lowest_of(field, look) - highest[i]
+                    certified = field.lowest(look).min() - highest[i]
                     start_way[r, i] = max(certified, floor * apart, 0.0)
         for table in (way, start_way):
             table[table > 0.5 * UNREACHED] = np.inf
@@ -313,65 +320,3 @@ def _on_triangles(corner: np.ndarray, look: Look) -> np.ndarray:
     near = a + x * (b - a) + y * (c - a)
     of_b = np.where(x + y <= 1.0, near, d + (1 - x) * (c - d) + (1 - y) * (b - d))
     return np.asarray(np.where(cut_from_a < cut_from_b, of_a, of_b))
-
-
-def _lowest_by_arc(fields: Sequence[Field], looks: Sequence[Look]) -> np.ndarray:
-    """Return bounds of the least values of fields on the arcs of borders, (T, T, K)."""
-    together = Look(*(np.concatenate(parts) for parts in zip(*looks, strict=True)))
-    place = np.repeat(np.arange(len(looks)), [len(look.arc) for look in looks])
-    arc, first = np.unique(place * ARCS + together.arc, return_index=True)
-    lowest = np.full((len(fields), len(looks) * ARCS), UNREACHED)
-    for own, field in zip(lowest, fields, strict=True):
-        own[arc] = np.minimum.reduceat(field.at(together) - together.slack, first)
-    return lowest.reshape(len(fields), len(looks), ARCS)
-
-
-def lowest_of(field: Field, look: Look) -> float:
-    """Return a bound of the least value of a field over a border."""
-    return float((field.at(look) - look.slack).min(initial=UNREACHED))
-
-
-def highest_of(field: Field, look: Look) -> float:
-    """Return a bound of the greatest value of a field over a border, if reached."""
-    value = field.at(look)
-    reached = value < 0.5 * UNREACHED
-    if not reached.any():  # no free point: nothing gets there
-        return 0.0
-    return float((value + look.slack)[reached].max())
-
-
-def border(region: Region) -> np.ndarray:
-    """Return points on a region's border, SPACING_M apart at most.
-
-    They lie in the middles of equal parts, whose number is a multiple of ARCS.
-    """
-    if len(region.corners):
-        ring = region.shape.exterior
-        share = _middles(ring.length)
-        return np.asarray(
-            shapely.get_coordinates(
-                shapely.line_interpolate_point(ring, share, normalized=True)
-            )
-        )
-    angle = 2.0 * np.pi * _middles(2.0 * np.pi * region.radius_m)
-    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return np.asarray(region.center + region.radius_m * ring)
-
-
-def _middles(length_m: float) -> np.ndarray:
-    """Return the middles of equal parts of a border, as shares of its length."""
-    count = ARCS * max(1, int(np.ceil(length_m / SPACING_M / ARCS)))
-    return (np.arange(count) + 0.5) / count
-
-
-def _distances_m(regions: Sequence[Region]) -> np.ndarray:
-    """Return the distances of regions, (T, T); not positive where they overlap."""
-    cores = np.array(
-        [
-            region.shape if len(region.corners) else Point(*region.center)
-            for region in regions
-        ]
-    )
-    radius_m = np.array([region.radius_m for region in regions])
-    apart_m = shapely.distance(cores[:, None], cores.copy())  # two views fail in 2.1
-    return np.asarray(apart_m - radius_m[:, None] - radius_m)

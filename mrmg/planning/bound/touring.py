@@ -15,8 +15,8 @@ import numpy as np
 
 from mrmg.planning.bound._touring_kernels import Completions
 from mrmg.planning.bound.arcs import ArcWays, Wave
+from mrmg.planning.bound.borders import ARCS
 from mrmg.planning.bound.exact_tours import cheapest_tours
-from mrmg.planning.bound.geodesic import ARCS
 from mrmg.planning.halting import NEVER
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 

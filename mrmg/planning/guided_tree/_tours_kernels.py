@@ -62,6 +62,44 @@ def write_tours(setting, sequence, moves, margin, tours, row):
 
 
 @kernel
+def _routing_from(setting, rules, tree, state, energy, region, visited):
+    """Return the routing problem as it stands at a composite state.
+
+    No robot sets out for the station that it is in, but at the root.
+
+    Args:
+        setting, rules, tree, state, energy, region, visited: as of `create_new_tour`.
+    """
+    problem = setting.routing
+    robots, _, targets = problem.cost.shape
+    cost = problem.cost.copy()
+    for r in range(robots):
+        for t in range(targets):
+            inside = in_target(setting.targets, t, state[r, 0], state[r, 1])
+            if t >= problem.goals and inside and tree.counts[VERTICES] > 0:
+                cost[r, targets, t] = np.inf
+                continue
+            leg = path_energy(setting, r, t, state[r, 0], state[r, 1], region[r])
+            cost[r, targets, t] = leg * (1.0 + rules.route_margin)
+    return RoutingArrays(
+        problem.goals,
+        cost,
+        energy,
+        problem.capacity,
+        problem.reserve,
+        problem.escape,
+        ~visited,
+        problem.finish,
+        problem.time,
+        problem.finish_time,
+        problem.limit,
+        problem.charge_power,
+        problem.energy_weight,
+        problem.makespan_weight,
+    )
+
+
+@kernel
 def create_new_tour(setting, rules, tree, state, energy, region, visited):
     """Write tours from a composite state as a new row; return it (CreateNewTour).
 
@@ -79,33 +117,7 @@ def create_new_tour(setting, rules, tree, state, energy, region, visited):
     """
     began = now_ns()
     tours, counts = tree.tours, tree.counts
-    problem = setting.routing
-    robots, _, targets = problem.cost.shape
-    cost = problem.cost.copy()
-    for r in range(robots):
-        for t in range(targets):
-            inside = in_target(setting.targets, t, state[r, 0], state[r, 1])
-            if t >= problem.goals and inside and tree.counts[VERTICES] > 0:
-                cost[r, targets, t] = np.inf
-                continue
-            leg = path_energy(setting, r, t, state[r, 0], state[r, 1], region[r])
-            cost[r, targets, t] = leg * (1.0 + rules.route_margin)
-    now = RoutingArrays(
-        problem.goals,
-        cost,
-        energy,
-        problem.capacity,
-        problem.reserve,
-        problem.escape,
-        ~visited,
-        problem.finish,
-        problem.time,
-        problem.finish_time,
-        problem.limit,
-        problem.charge_power,
-        problem.energy_weight,
-        problem.makespan_weight,
-    )
+    now = _routing_from(setting, rules, tree, state, energy, region, visited)
     sequence = np.zeros(tours.target.shape[2], np.int64)
     value, moves = nrpa(
         now,

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from insight import Insight, look_inside
 
 from mrmg.errors import UsageError
-from mrmg.planning.insight import Insight, look_inside
 from mrmg.planning.parameters import PROFILES, PlannerParams, profile_params
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene

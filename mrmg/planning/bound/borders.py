@@ -1,0 +1,77 @@
+"""Borders of regions: the points and arcs that stand for them, and how far they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely.geometry import Point
+from shapely.ops import substring
+
+from mrmg.scene.types import Region
+
+SPACING_M = 0.04
+"""Distance of the points that stand for a region's border."""
+
+ARCS = 32
+"""Arcs into which borders are cut."""
+
+CHORDS = 4
+"""Chords that stand for an arc of a circle in straight distances."""
+
+
+def border(region: Region) -> np.ndarray:
+    """Return points on a region's border, SPACING_M apart at most.
+
+    They lie in the middles of equal parts, whose number is a multiple of ARCS.
+    """
+    if len(region.corners):
+        ring = region.shape.exterior
+        share = _middles(ring.length)
+        return np.asarray(
+            shapely.get_coordinates(
+                shapely.line_interpolate_point(ring, share, normalized=True)
+            )
+        )
+    angle = 2.0 * np.pi * _middles(2.0 * np.pi * region.radius_m)
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return np.asarray(region.center + region.radius_m * ring)
+
+
+def _middles(length_m: float) -> np.ndarray:
+    """Return the middles of equal parts of a border, as shares of its length."""
+    count = ARCS * max(1, int(np.ceil(length_m / SPACING_M / ARCS)))
+    return (np.arange(count) + 0.5) / count
+
+
+def distances_m(regions: Sequence[Region]) -> np.ndarray:
+    """Return the distances of regions, (T, T); not positive where they overlap."""
+    cores = np.array(
+        [
+            region.shape if len(region.corners) else Point(*region.center)
+            for region in regions
+        ]
+    )
+    radius_m = np.array([region.radius_m for region in regions])
+    apart_m = shapely.distance(cores[:, None], cores.copy())  # two views fail in 2.1
+    return np.asarray(apart_m - radius_m[:, None] - radius_m)
+
+
+def arc_lines(region: Region) -> list[shapely.LineString]:
+    """Return the arcs of a region's border, those of circles as polygonal lines."""
+    if len(region.corners):
+        ring = region.shape.exterior
+        cuts = np.linspace(0.0, ring.length, ARCS + 1)
+        return [substring(ring, *ends) for ends in zip(cuts, cuts[1:], strict=False)]
+    angle = np.linspace(0.0, 2.0 * np.pi, ARCS * CHORDS + 1)
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1) * region.radius_m
+    ring = ring + region.center
+    return [
+        shapely.LineString(ring[CHORDS * k : CHORDS * (k + 1) + 1]) for k in range(ARCS)
+    ]
+
+
+def sagitta_m(region: Region) -> float:
+    """Return how far an arc departs from its line [m]."""
+    return region.radius_m * (1.0 - float(np.cos(np.pi / (ARCS * CHORDS))))
