@@ -23,7 +23,7 @@ from mrmg.runs.reproduction import reproduce
 from mrmg.scene.loading import load_scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
 
-OLD = Path(__file__).parent / "run_of_0.1.0"
+OLD = Path(__file__).parents[1] / "run_of_0.1.0"
 
 
 @pytest.fixture
