@@ -125,9 +125,10 @@ def _shipped_files() -> Finding:
 
 
 def _kernel_cache() -> Finding:
-    from mrmg.compilation import kernels_are_compiled
+    from mrmg.compilation import cache_folder, kernels_are_compiled
+    from mrmg.planning.parameters import PATH_FOLLOWING
 
-    folder = Path(os.environ["NUMBA_CACHE_DIR"])
+    folder = cache_folder()
     nearest = next(path for path in (folder, *folder.parents) if path.exists())
     if not os.access(nearest, os.W_OK):
         return Finding(
@@ -137,7 +138,9 @@ def _kernel_cache() -> Finding:
             remedy="set NUMBA_CACHE_DIR to a folder that can be written",
         )
     state = (
-        "filled" if kernels_are_compiled() else "incomplete; the next planning compiles"
+        "filled"
+        if kernels_are_compiled(PATH_FOLLOWING)
+        else "incomplete; the next planning compiles"
     )
     return Finding(name="kernel cache", found=f"{folder} ({state})")
 

@@ -39,7 +39,8 @@ def install() -> None:
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         return
     reader, writer = os.pipe()
-    os.set_blocking(writer, False)
+    if hasattr(os, "set_blocking"):  # Windows has it from Python 3.12 on
+        os.set_blocking(writer, False)
     signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
     signal.signal(signal.SIGINT, _raise)
     sys.unraisablehook = _end_where_dropped
@@ -105,6 +106,9 @@ def end_with_parent() -> None:
 @contextmanager
 def sheltered_children() -> Iterator[None]:
     """Start processes in the block that Ctrl-C never reaches, not even at first."""
+    if sys.platform == "win32":  # has no such masks
+        yield
+        return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield

@@ -33,7 +33,7 @@ def test_a_cache_that_cannot_be_written_is_told_with_its_cure(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     tmp_path.chmod(0o500)
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    monkeypatch.setattr("mrmg.compilation.cache_folder", lambda: tmp_path / "kernels")
     finding = doctor._kernel_cache()
     assert not finding.ok
     assert "NUMBA_CACHE_DIR" in finding.remedy

@@ -40,6 +40,7 @@ import mrmg
 from mrmg import seeding
 from mrmg.errors import UsageError
 from mrmg.planning import PlannerParams, plan_mission
+from mrmg.planning.parameters import PATH_FOLLOWING
 from mrmg.planning.preparation import compile_kernels
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.populating import populate
@@ -135,7 +136,7 @@ def measure(
 @cache
 def warm() -> None:
     """Compile kernels, and plan the first mission, which loads much."""
-    compile_kernels()
+    compile_kernels(PATH_FOLLOWING)
     plan_mission(mrmg.load_scene("quickstart"))
 
 

@@ -22,7 +22,7 @@ def run(options: argparse.Namespace) -> int:
     from mrmg.runs import pipeline
 
     scene = _scene(options)
-    terminal.compile_kernels()
+    terminal.compile_kernels(RunArguments(**given(options)))
     with terminal.progress() as on_progress:
         result = pipeline.run(
             scene,
@@ -62,7 +62,7 @@ def plan(options: argparse.Namespace) -> int:
     arguments = RunArguments(**given(options))
     loaded = _scene(options)
     scene = arguments.scene(loaded)
-    terminal.compile_kernels()
+    terminal.compile_kernels(arguments)
     folder = RunFolder(options.out or default_folder(scene, arguments.seed))
     with folder.opened_for_writing(), terminal.progress() as on_progress:
         work = Run(

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
     from mrmg.planning import Improvement
+    from mrmg.runs.arguments import RunArguments
     from mrmg.runs.folder import Step
     from mrmg.runs.steps import StepProgress
 
@@ -115,11 +116,17 @@ def iterations(found: Mapping[str, Any]) -> str:
     return f"{found['iterations']} of at most {found['iteration_cap']} iterations"
 
 
-def compile_kernels() -> None:
-    """Compile kernels where that is to be done, and tell a person who waits for it."""
-    from mrmg.compilation import compiled_kernels, kernels_are_compiled
+def compile_kernels(arguments: RunArguments) -> None:
+    """Compile kernels where that is to be done, and inform a person who waits for it.
 
-    if kernels_are_compiled():
+    Args:
+        arguments: of the planning to come.
+    """
+    from mrmg.compilation import compiled_kernels, kernels_are_compiled
+    from mrmg.planning.parameters import kernels_of, profile_params
+
+    chosen = profile_params(arguments.profile, planner=arguments.planner)
+    if kernels_are_compiled(kernels_of(chosen.planner)):
         return
     with _bars() as bars:
         if bars is None:
@@ -129,7 +136,9 @@ def compile_kernels() -> None:
         task = bars.add_task("compiling", total=None, note="")
         note = "{} kernels, once for this version"
         began = time.perf_counter()
-        compile_kernels(lambda n: bars.update(task, note=note.format(n)))
+        compile_kernels(
+            chosen.planner, lambda n: bars.update(task, note=note.format(n))
+        )
         took_s = time.perf_counter() - began
     text = f"compiled {compiled_kernels()} kernels in {took_s:.0f} s"
     print(f"{text}, once for this version", file=sys.stderr)

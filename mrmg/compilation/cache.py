@@ -32,9 +32,6 @@ _SOURCES = (
     "**/*_kernels.py",
 )
 
-_COMPLETE = "complete"
-"""Name of the file that says that no kernel is missing."""
-
 _LOCK = threading.Lock()
 """Held while numba's setting is another."""
 
@@ -114,14 +111,16 @@ def compiled_kernels() -> int:
     return sum(1 for _ in cache_folder().rglob("*.nbc"))
 
 
-def kernels_are_compiled() -> bool:
-    """Tell whether this machine holds all the kernels that missions need, if any."""
-    return bool(numba.config.DISABLE_JIT) or (cache_folder() / _COMPLETE).exists()
+def kernels_are_compiled(part: str) -> bool:
+    """Tell whether this machine holds all kernels of a part of them, if any."""
+    return bool(numba.config.DISABLE_JIT) or _complete(part).exists()
 
 
-def note_kernels_are_compiled() -> None:
-    """Have the next process know that this machine holds all kernels."""
-    if not kernels_are_compiled():
-        storage.write_text(
-            cache_folder() / _COMPLETE, f"{compiled_kernels()} kernels\n"
-        )
+def note_kernels_are_compiled(part: str) -> None:
+    """Have the next process know that this machine holds all kernels of a part."""
+    if not kernels_are_compiled(part):
+        storage.write_text(_complete(part), f"{compiled_kernels()} kernels\n")
+
+
+def _complete(part: str) -> Path:
+    return cache_folder() / f"complete-{part}"

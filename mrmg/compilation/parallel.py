@@ -20,8 +20,23 @@ _CALL = (
 """To compile is to make a million small objects that all remain: to look through them
 for garbage as often as Python usually does takes a tenth of the time."""
 
+_SETTINGS = {
+    "NUMBA_OPT": "1",
+    "NUMBA_LOOP_VECTORIZE": "0",
+    "NUMBA_SLP_VECTORIZE": "0",
+}
+"""numba's, for the processes that compile: kernels that branch at every step gain
+nothing from what else there is to optimise."""
+
 _LOOK_S = 0.2
 """How often the processes are looked at."""
+
+
+def processors() -> int:
+    """Return how many processors this process may use; only Linux limits them."""
+    if sys.platform == "linux":
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def compile_in_processes(
@@ -30,23 +45,23 @@ def compile_in_processes(
 ) -> None:
     """Call functions for the kernels they compile, each in a process of its own.
 
-    One more runs at once than there are processors, as every now and then one waits for
-    a kernel that another is compiling. What keeps one of them from compiling
-    is not told: whoever needs the kernel compiles it then, and learns of it.
+    What keeps one of them from compiling is not reported: whoever needs the kernel
+    compiles it then, and learns of it.
 
     Args:
-        calls: functions of modules, without arguments.
-        on_progress: told the number of kernels compiled so far, now and then.
+        calls: functions of modules, without arguments, the longest first.
+        on_progress: receives the number of kernels compiled so far, now and then.
     """
     path = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
+    environment = {**_SETTINGS, **os.environ, "PYTHONPATH": path.rstrip(os.pathsep)}
     waiting = [_CALL.format(call.__module__, call.__name__) for call in calls]
     running: list[subprocess.Popen[bytes]] = []
     try:
         while waiting or running:
-            while waiting and len(running) <= len(os.sched_getaffinity(0)):
+            while waiting and len(running) < processors():
                 process = subprocess.Popen(
                     [sys.executable, "-c", waiting.pop(0)],
-                    env={**os.environ, "PYTHONPATH": path.rstrip(os.pathsep)},
+                    env=environment,
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
                     stderr=subprocess.DEVNULL,

@@ -193,6 +193,11 @@ class PlannerParams:
         return storage.digest(storage.canonical_json(values))
 
 
+def kernels_of(planner: str) -> str:
+    """Return the name of the part of all kernels that a planner needs."""
+    return GUIDED_TREE if planner == GUIDED_TREE else PATH_FOLLOWING
+
+
 def profile_params(
     profile: str = "default",
     *,

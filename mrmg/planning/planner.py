@@ -85,7 +85,7 @@ def plan_mission(
     if workers < 1:
         raise UsageError(f"workers = {workers}; planning needs at least 1")
     params, made_by, routed_by = _resolved(params, planner, router)
-    compile_kernels()
+    compile_kernels(params.planner)
     request = Request(params=params, router=routed_by, seed=seed)
     planning = _Planning(scene, made_by, request, workers, callbacks)
     try:

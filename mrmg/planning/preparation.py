@@ -24,9 +24,9 @@ from mrmg.planning.guided_tree.strategy import guided_tree
 from mrmg.planning.parameters import (
     GUIDED_TREE,
     PATH_FOLLOWING,
-    PLANNERS,
     GuidedTreeParams,
     PlannerParams,
+    kernels_of,
     paper_params,
 )
 from mrmg.planning.path_following import path_following
@@ -40,22 +40,24 @@ from mrmg.scene.objective import Objective
 from mrmg.scene.types import Scene
 
 
-def compile_kernels(on_progress: Callable[[int], None] | None = None) -> None:
-    """Compile every kernel that this machine does not hold compiled.
+def compile_kernels(
+    planner: str, on_progress: Callable[[int], None] | None = None
+) -> None:
+    """Compile every kernel of a planner that this machine does not hold compiled.
 
     Args:
-        on_progress: told the number of kernels compiled so far, while there are any to
-            compile, which happens once for these sources.
+        planner: name of it; those of other packages may call what path following does.
+        on_progress: receives the number of kernels compiled so far, while there are any
+            to compile, which happens once for these sources.
     """
-    if kernels_are_compiled():
+    part = kernels_of(planner)
+    if kernels_are_compiled(part):
         return
-    calls = (grow_smallest, follow_smallest, guide_smallest, bound_smallest)
-    compile_in_processes(calls, on_progress or (lambda number: None))
-    for planner in PLANNERS:
-        load_kernels(planner, trees=True)
+    compile_in_processes(_CALLS[part], on_progress or (lambda number: None))
+    load_kernels(part, trees=True)
     bound_smallest()
     with suppress(OSError):  # without a cache that can be written, plan all the same
-        note_kernels_are_compiled()
+        note_kernels_are_compiled(part)
 
 
 @cache
@@ -104,6 +106,13 @@ def bound_smallest() -> None:
     makespan_bound_s(scene, cells=50)
     exact_routing(Relaxation.of(scene, cells=50).problem)
 
+
+_CALLS = {
+    PATH_FOLLOWING: (grow_smallest, follow_smallest, bound_smallest),
+    GUIDED_TREE: (guide_smallest, bound_smallest),
+}
+"""What compiles all kernels of a part, the longest first; the same kernels in two of
+them are compiled twice, side by side."""
 
 SMALL_PARAMS = PlannerParams(samples=20, max_vertices=20, trees=1)
 """What suffices to plan the smallest mission."""

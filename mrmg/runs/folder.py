@@ -9,8 +9,6 @@ file is put in place by renaming, so a killed run can be taken up at any moment.
 
 from __future__ import annotations
 
-import fcntl
-import os
 import shutil
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -22,6 +20,7 @@ from typing import Any
 from mrmg import storage
 from mrmg.errors import Fault, RunFolderError, UsageError
 from mrmg.interruption import cleaned_up_by
+from mrmg.runs.locking import locked
 from mrmg.runs.paths import why_no_run
 from mrmg.scene.model_files import MODELS_FOLDER
 
@@ -247,13 +246,8 @@ def existing(path: Path) -> RunFolder:
 
 @contextmanager
 def _exclusive(path: Path) -> Iterator[None]:
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
+    with locked(path) as is_free:
+        if not is_free:
             fault = Fault("", "another mrmg process is working in this folder")
-            raise RunFolderError(str(path), [fault]) from error
+            raise RunFolderError(str(path), [fault])
         yield
-    finally:
-        os.close(handle)

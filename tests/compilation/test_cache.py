@@ -1,0 +1,93 @@
+"""What counts as compiled belongs to sources, numba, Python and the processor."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numba
+import pytest
+
+import mrmg
+from mrmg.compilation import cache
+
+FOLDER = "from mrmg.compilation import cache_folder; print(cache_folder())"
+
+
+def digest() -> str:
+    return cache.compilation_digest.__wrapped__()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda patch: patch.setattr(numba, "__version__", "0.99.0"),
+        lambda patch: patch.setattr(platform, "python_version", lambda: "3.99.1"),
+        lambda patch: patch.setattr(numba.config, "CPU_NAME", "generic"),
+        lambda patch: patch.setattr(numba.config, "CPU_FEATURES", "+sse2"),
+        lambda patch: patch.setattr(
+            cache.binding, "get_host_cpu_name", lambda: "another"
+        ),
+    ],
+    ids=["numba", "python", "processor", "features", "host"],
+)
+def test_what_kernels_are_compiled_with_is_part_of_their_place(
+    monkeypatch: pytest.MonkeyPatch, change: Callable[[pytest.MonkeyPatch], None]
+) -> None:
+    before = digest()
+    assert digest() == before
+    change(monkeypatch)
+    assert digest() != before
+
+
+def test_every_kernel_source_is_part_of_their_place(tmp_path: Path) -> None:
+    package = tmp_path / "mrmg"
+    shutil.copytree(Path(mrmg.__file__).parent, package)
+
+    def folder() -> str:
+        done = subprocess.run(
+            [sys.executable, "-c", FOLDER],
+            env={**os.environ, "PYTHONPATH": str(tmp_path)},
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return done.stdout
+
+    before = folder()
+    (package / "errors.py").open("a").write("# no kernel\n")
+    assert folder() == before
+    for name in ("energy/model.py", "motion/dynamics.py", "world/_kernels.py"):
+        (package / name).open("a").write("# another comment\n")
+        after = folder()
+        assert after != before, name
+        before = after
+
+
+def test_a_part_is_complete_when_that_is_noted(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", False)
+    monkeypatch.setattr(cache, "cache_folder", lambda: tmp_path)
+    assert not cache.kernels_are_compiled("one")
+    cache.note_kernels_are_compiled("one")
+    assert cache.kernels_are_compiled("one")
+    assert not cache.kernels_are_compiled("other")
+
+
+def test_without_a_writable_folder_nothing_is_kept(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("")
+    monkeypatch.setattr(cache, "cache_folder", lambda: blocked / "kernels")
+    before = numba.config.CACHE_DIR
+    with cache.cache_setting() as cached:
+        assert not cached
+    assert before == numba.config.CACHE_DIR
