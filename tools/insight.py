@@ -13,7 +13,7 @@ from mrmg.planning.guided_tree.planner import Growth as GuidedGrowth
 from mrmg.planning.guided_tree.planner import grow_guided_tree
 from mrmg.planning.parameters import GUIDED_TREE, PlannerParams
 from mrmg.planning.problem.problem import Problem, state_problem
-from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
+from mrmg.planning.roadmap.roadmap import build_roadmap
 from mrmg.planning.routers import find_router
 from mrmg.planning.routing.routing import Routing
 from mrmg.planning.routing.routing_problem import RoutingProblem
@@ -81,7 +81,8 @@ def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
                 roadmap=edges[long],
                 multiplier=weight[long].mean(axis=1) / length_m[long],  # there and back
                 tours={
-                    name: tour_way(problem, routing, at) for at, name in enumerate(ids)
+                    name: problem.path(at, routing.tours[at])
+                    for at, name in enumerate(ids)
                 },
                 tree={name: pieces[:, :, at] for at, name in enumerate(ids)},
                 trajectories=growth.trajectories,
@@ -103,25 +104,3 @@ def _grow(
     if not routing.feasible:
         return routing, None
     return routing, grow_tree(problem, params, routing, draw, halt)
-
-
-def tour_way(problem: Problem, routing: Routing, robot: int) -> np.ndarray:
-    """Return the points of the roadmap one robot's tour leads along, shape (n, 2)."""
-    roadmap = problem.roadmap
-    field = int(problem.mission.fleet[robot]["field"])
-    here = len(roadmap.targets) + robot
-    vertices = [here]
-    for target in routing.tours[robot]:
-        vertices += _way(roadmap, field, target, vertices[-1])
-    return np.asarray(roadmap.arrays.vertex[vertices])
-
-
-def _way(roadmap: Roadmap, field: int, target: int, start: int) -> list[int]:
-    """Return the vertices after `start` on the way to a target."""
-    successor = roadmap.arrays.successor[field, target]
-    way = []
-    vertex = int(successor[start])
-    while vertex >= 0:
-        way.append(vertex)
-        vertex = int(successor[vertex])
-    return way

@@ -11,7 +11,7 @@ from mrmg.planning.planners import Planner
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.routers import Router
 from mrmg.planning.routing.routing import Routing
-from mrmg.planning.routing.routing_problem import RoutingProblem
+from mrmg.planning.routing.routing_problem import RoutingProblem, faults_of_tours
 from mrmg.planning.statistics import Improvement
 
 __all__ = [
@@ -25,6 +25,7 @@ __all__ = [
     "Router",
     "Routing",
     "RoutingProblem",
+    "faults_of_tours",
     "plan_mission",
     "profile_params",
 ]

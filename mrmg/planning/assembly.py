@@ -9,6 +9,7 @@ from importlib.metadata import version
 from mrmg import extensions
 from mrmg.energy.metering import battery_profile, find_visits, plan_ledger
 from mrmg.energy.visits import crowded_stations
+from mrmg.planning.endings import listed
 from mrmg.planning.feasibility import energy_and_metres
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.problem.problem import Problem
@@ -46,6 +47,8 @@ def make_plan(
         visits += own
     ways = {item.robot: item.state[:, :2] for item in trajectories}
     if any(crowded_stations(scene, ways)):
+        return None
+    if {goal.id for goal in scene.goals} - {visit.target for visit in visits}:
         return None
     visits.sort(key=lambda visit: (visit.step, visit.robot))
     return Plan(
@@ -86,6 +89,10 @@ def why_refused(
     tours: Mapping[str, tuple[str, ...]],
 ) -> str:
     """Return in words why `make_plan` refuses trajectories."""
+    visited = {target for tour in tours.values() for target in tour}
+    left_out = [goal.id for goal in problem.scene.goals if goal.id not in visited]
+    if left_out:
+        return f"nobody visits {listed(left_out)}"
     for trajectory in trajectories:
         robot = problem.scene.robot(trajectory.robot)
         tour = tours[robot.id]

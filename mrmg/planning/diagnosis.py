@@ -195,10 +195,11 @@ def _obstacle(
             margin_s=TIME_MARGIN_S,
         )
     trees = search.statistics.counts.get("trees", 0)
-    if search.blocked:
+    if search.blocked or not trees:
         grown = f", and none of {counted(trees, 'motion tree')} reached all goals"
         return endings.NO_PROGRESS.reason(
-            blocked=search.blocked, trees=grown if trees else ""
+            blocked=search.blocked or "the planner found no motions",
+            trees=grown if trees else "",
         )
     return endings.TREES_FAILED.reason(
         trees=counted(trees, "tree"), size=params.max_vertices

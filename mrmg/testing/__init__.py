@@ -12,6 +12,16 @@ is to be tested:
 The suites of this package's own parts are made the same way.
 """
 
+from mrmg.testing.controller_contract import ControllerContract
+from mrmg.testing.motion_contract import MotionContract
+from mrmg.testing.planner_contract import PlannerContract, sample_scene
 from mrmg.testing.router_contract import RouterContract, sample_routing_problem
 
-__all__ = ["RouterContract", "sample_routing_problem"]
+__all__ = [
+    "ControllerContract",
+    "MotionContract",
+    "PlannerContract",
+    "RouterContract",
+    "sample_routing_problem",
+    "sample_scene",
+]

@@ -90,11 +90,7 @@ def drafts(
     """
     surfaces = surfaces_of(problem)
     stops = [whole_tour(problem, routing, r) for r in range(len(surfaces))]
-    names = [target.id for target in problem.scene.targets()]
-    tours = {
-        robot.id: tuple(names[t] for t in tour)
-        for robot, tour in zip(problem.scene.robots, routing.tours, strict=True)
-    }
+    tours = problem.visits(routing.tours)
     limit = problem.mission.fleet["limit"]
     slower = -limit[:, 0] < NEARLY * limit[:, 1]  # backwards than forwards
     timed = problem.minimum_time or problem.preference.objective.makespan_weight > 0.0

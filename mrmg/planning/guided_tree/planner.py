@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from mrmg.motion._kernels import step as motion_step
 from mrmg.planning.guided_tree._expansion_kernels import BRAKING_STEPS
 from mrmg.planning.guided_tree._growth_kernels import grow
 from mrmg.planning.guided_tree._setting_kernels import Rules, Setting
@@ -113,7 +112,7 @@ def grow_guided_tree(
         branch.append(int(tree.vertices.parent[branch[-1]]))
     branch.reverse()
     return Growth(
-        trajectories=_paths(problem, params.dt_s, tree, branch, int(stop_steps)),
+        trajectories=_paths(problem, tree, branch, int(stop_steps)),
         tours=_visited(problem, tree, branch),
         counts={
             "vertices": int(counts[VERTICES]),
@@ -218,7 +217,6 @@ def new_tree(scene: Scene, params: GuidedTreeParams, seed: int) -> MotionTree:
 
 def _paths(
     problem: Problem,
-    dt_s: float,
     tree: MotionTree,
     branch: list[int],
     stop_steps: int,
@@ -233,18 +231,7 @@ def _paths(
     control = np.concatenate([held, tree.stop[:stop_steps]])
     if not len(control):
         control = np.zeros((1, len(problem.start), 2))
-    trajectories = []
-    for r, robot in enumerate(problem.scene.robots):
-        state = np.zeros((len(control) + 1, 5))
-        state[0] = problem.start[r]
-        for k, (u1, u2) in enumerate(control[:, r]):
-            one = problem.mission.fleet[r]
-            motion_step(one, state[k], u1, u2, dt_s, state[k + 1])
-        own = np.ascontiguousarray(control[:, r])
-        trajectories.append(
-            Trajectory(robot=robot.id, dt_s=dt_s, state=state, control=own)
-        )
-    return tuple(trajectories)
+    return tuple(problem.trajectory(r, u) for r, u in enumerate(control.swapaxes(0, 1)))
 
 
 def _visited(
@@ -268,7 +255,4 @@ def _visited(
                 if t >= len(seen) and in_target(targets, t, x, y):
                     found[r].append(t)
         row = int(vertices.tour[v])
-    names = [target.id for target in problem.scene.targets()]
-    return {
-        robot.id: tuple(names[t] for t in found[r]) for r, robot in enumerate(robots)
-    }
+    return problem.visits(found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -10,6 +11,7 @@ import numpy as np
 from mrmg import seeding
 from mrmg.compilation import by_reference
 from mrmg.energy.model import CONSUMERS_W
+from mrmg.motion._kernels import step as motion_step
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
 from mrmg.planning.problem._safety_kernels import Gates
@@ -23,6 +25,7 @@ from mrmg.planning.roadmap.fleet import fleet_array, stack_spaces
 from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import routing_arrays
+from mrmg.plans import Trajectory
 from mrmg.scene.types import Scene
 from mrmg.world._kernels import TerrainGrid
 from mrmg.world.world import World
@@ -81,6 +84,52 @@ class Problem:
     def preference(self) -> Preference:
         """What plans are compared by."""
         return Preference.of(self.scene)
+
+    def trajectory(self, robot: int, control: np.ndarray) -> Trajectory:
+        """Return the motion of a robot from its start under controls.
+
+        Args:
+            robot: its number.
+            control: u1, u2 held over each step of `dt_s`, shape (n, 2).
+        """
+        state = np.zeros((len(control) + 1, 5))
+        state[0] = self.start[robot]
+        one = self.mission.fleet[robot]
+        for k, (u1, u2) in enumerate(control):
+            motion_step(one, state[k], u1, u2, self.dt_s, state[k + 1])
+        return Trajectory(
+            robot=self.scene.robots[robot].id,
+            dt_s=self.dt_s,
+            state=state,
+            control=np.ascontiguousarray(control),
+        )
+
+    def path(self, robot: int, tour: Sequence[int]) -> np.ndarray:
+        """Return the points of the roadmap along a robot's tour [m], shape (n, 2).
+
+        Args:
+            robot: its number.
+            tour: numbers of its targets, goals before stations.
+        """
+        roadmap = self.roadmap
+        successors = roadmap.arrays.successor[int(self.mission.fleet[robot]["field"])]
+        vertices = [len(roadmap.targets) + robot]
+        for target in tour:
+            while successors[target, vertices[-1]] >= 0:
+                vertices.append(int(successors[target, vertices[-1]]))
+        return np.asarray(roadmap.arrays.vertex[vertices])
+
+    def visits(self, tours: Sequence[Sequence[int]]) -> dict[str, tuple[str, ...]]:
+        """Return ids of targets by ids of robots, as plans have them.
+
+        Args:
+            tours: numbers of each robot's targets, in order.
+        """
+        names = [target.id for target in self.scene.targets()]
+        return {
+            robot.id: tuple(names[t] for t in tour)
+            for robot, tour in zip(self.scene.robots, tours, strict=True)
+        }
 
     def with_margin(self, margin: float) -> Problem:
         """Return the problem with another surcharge on the roadmap's energies."""

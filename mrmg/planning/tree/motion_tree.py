@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrmg import seeding
-from mrmg.motion._kernels import step as motion_step
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.problem.problem import Problem
@@ -137,7 +136,7 @@ def grow_tree(
     branch = _branch(tree, leaf)
     control = _controls(problem, params, tree, branch)
     return Growth(
-        _replay(problem, params, control),
+        tuple(problem.trajectory(r, u) for r, u in enumerate(control.swapaxes(0, 1))),
         _visited_tours(problem, mission, tree, tours, branch),
         statistics,
         routing_s,
@@ -170,27 +169,6 @@ def _controls(
     return control if len(control) else np.zeros((1, len(problem.start), 2))
 
 
-def _replay(
-    problem: Problem, params: PlannerParams, control: np.ndarray
-) -> tuple[Trajectory, ...]:
-    trajectories = []
-    fleet = problem.mission.fleet
-    for r, robot in enumerate(problem.scene.robots):
-        state = np.zeros((len(control) + 1, 5))
-        state[0] = problem.start[r]
-        for k, (u1, u2) in enumerate(control[:, r]):
-            motion_step(fleet[r], state[k], u1, u2, params.dt_s, state[k + 1])
-        trajectories.append(
-            Trajectory(
-                robot=robot.id,
-                dt_s=params.dt_s,
-                state=state,
-                control=np.ascontiguousarray(control[:, r]),
-            )
-        )
-    return tuple(trajectories)
-
-
 def _visited_tours(
     problem: Problem, mission: TreeMission, tree: Tree, tours: Tours, branch: list[int]
 ) -> dict[str, tuple[str, ...]]:
@@ -217,10 +195,7 @@ def _visited_tours(
                 tree.energy[v, r],
             ):
                 found[r].append(t)
-    names = [target.id for target in problem.scene.targets()]
-    return {
-        robot.id: tuple(names[t] for t in found[r]) for r, robot in enumerate(robots)
-    }
+    return problem.visits(found)
 
 
 def _target_at(tree: Tree, tours: Tours, v: int, r: int) -> int:
