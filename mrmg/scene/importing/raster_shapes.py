@@ -46,18 +46,25 @@ def enclosing_polygons(mask: np.ndarray, tolerance: float) -> list[Polygon]:
     if not len(cells) or tolerance <= 0.0:
         return list(cells)
     solid = shapely.union_all(cells)
-    allowed = solid.buffer(tolerance)
-    square = {"join_style": "mitre"}
-    gaps = solid.buffer(tolerance, **square).buffer(-tolerance, **square) - solid
+    # One part of it at a time: looking into all of a map for each gap takes minutes.
+    allowed = shapely.get_parts(solid.buffer(tolerance))
     shapely.prepare(allowed)
-    filled = [gap for gap in shapely.get_parts(gaps) if allowed.covers(gap)]
+    square = {"join_style": "mitre"}
+    closed = solid.buffer(tolerance, **square).buffer(-tolerance, **square)
+    gaps = shapely.get_parts(closed - solid)
+    gap, part = shapely.STRtree(allowed).query(gaps)
+    filled = gaps[np.unique(gap[shapely.covers(allowed[part], gaps[gap])])]
     whole = shapely.union_all([solid, *filled]).simplify(0.0)
-    parts = [_with_fewer_corners(part, allowed) for part in shapely.get_parts(whole)]
+    tree, parts = shapely.STRtree(cells), []
+    for part in shapely.get_parts(whole):
+        own = cells[tree.query(part, predicate="intersects")]
+        parts.append(_with_fewer_corners(part, own, tolerance))
     return list(shapely.get_parts(shapely.union_all(parts)))
 
 
-def _with_fewer_corners(part: Polygon, allowed: Polygon) -> Polygon:
-    part, prepared = shapely.orient_polygons(part), prep(allowed)
+def _with_fewer_corners(part: Polygon, cells: np.ndarray, tolerance: float) -> Polygon:
+    part = shapely.orient_polygons(part)
+    prepared = prep(shapely.union_all(cells).buffer(tolerance))
     outline, *holes = (
         list(_shortened(shapely.get_coordinates(ring)[:-1], prepared))
         for ring in (part.exterior, *part.interiors)
