@@ -11,10 +11,10 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 from typing import Any
 
+from packaging.requirements import Requirement
+
 from mrmg import __version__, shipped
 from mrmg.errors import MachineError
-
-_BUNDLE = ("mujoco", "mujoco-core", "mujoco-studio")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,7 +41,7 @@ class Finding:
 def examine() -> list[Finding]:
     """Look at everything mrmg needs on this machine."""
     packages = list(_packages())
-    findings = [_python(), _cpu(), *packages, _bundle(), _shipped_files()]
+    findings = [_python(), _cpu(), *packages, _shipped_files()]
     if all(finding.ok for finding in packages):
         findings += [_kernel_cache(), _offscreen_drawing()]
     return findings
@@ -49,16 +49,8 @@ def examine() -> list[Finding]:
 
 def required_packages() -> list[str]:
     """Return the names of the packages mrmg needs at run time."""
-    wanted = [line for line in requires("mrmg") or [] if "extra ==" not in line]
-    return sorted(_name(line) for line in wanted)
-
-
-def _name(requirement: str) -> str:
-    end = next(
-        (i for i, char in enumerate(requirement) if char in "<>=!~;[ ("),
-        len(requirement),
-    )
-    return requirement[:end]
+    wanted = map(Requirement, requires("mrmg") or [])
+    return sorted(each.name for each in wanted if each.marker is None)
 
 
 def _python() -> Finding:
@@ -93,24 +85,6 @@ def _packages() -> Iterator[Finding]:
                 ok=False,
                 remedy=f"pip install {name}",
             )
-
-
-def _bundle() -> Finding:
-    found = {}
-    for name in _BUNDLE:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    if len(set(found.values())) == 1:
-        return Finding(name="mujoco parts", found="agree in version")
-    wanted = " ".join(f"{name}=={found['mujoco']}" for name in _BUNDLE)
-    return Finding(
-        name="mujoco parts",
-        found=", ".join(f"{name} {value}" for name, value in found.items()),
-        ok=False,
-        remedy=f"pip install {wanted}",
-    )
 
 
 def _shipped_files() -> Finding:

@@ -13,7 +13,7 @@ from mrmg.errors import ExitCode
 
 def test_everything_needed_is_looked_at() -> None:
     names = {finding.name for finding in doctor.examine()}
-    assert {"python", "cpu", "kernel cache", "offscreen GL", "mujoco parts"} <= names
+    assert {"python", "cpu", "kernel cache", "offscreen GL"} <= names
     assert {"mujoco", "casadi", "numba", "shapely", "trimesh", "networkx"} <= names
     assert not {"pytest", "ruff", "mypy"} & names
 
@@ -56,3 +56,20 @@ def test_a_missing_package_is_told_with_its_cure(
     output = capsys.readouterr().out
     assert "MISSING" in output
     assert f"pip install {name}" in output
+
+
+def test_licences_of_all_dependencies_are_listed(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["doctor", "--licences", "--json"]) == ExitCode.OK
+    found = {each["package"]: each for each in json.loads(capsys.readouterr().out)}
+    assert {*doctor.required_packages()} <= {*found}
+    assert "LGPL" in found["casadi"]["licence"]
+    assert found["llvmlite"]["required_by"] == ["numba"]
+    assert found["viser"]["extra"] == "view"
+    assert all(each["licence"] for each in found.values() if each["version"])
+    assert not {"pytest", "ruff"} & {*found}
+    assert main(["doctor", "--licences"]) == ExitCode.OK
+    header, *rows = capsys.readouterr().out.splitlines()
+    assert header.split() == ["package", "version", "licence", "extra"]
+    assert len(rows) == len(found)

@@ -198,22 +198,6 @@ def report(options: argparse.Namespace) -> int:
     return work.exit_code()
 
 
-def doctor(options: argparse.Namespace) -> int:
-    """Tell what this machine has and lacks."""
-    from mrmg.doctor import examine
-
-    findings = examine()
-    if options.json:
-        terminal.print_json([finding.to_json() for finding in findings])
-    else:
-        for finding in findings:
-            mark = "ok     " if finding.ok else "MISSING"
-            print(f"{mark} {finding.name:<14} {finding.found}")
-            if finding.remedy:
-                print(f"{'':22} remedy: {finding.remedy}")
-    return ExitCode.OK if all(item.ok for item in findings) else ExitCode.MACHINE
-
-
 def _make(
     options: argparse.Namespace,
     *steps: Any,

@@ -10,6 +10,7 @@ from mrmg.cli import (
     calibrate_command,
     commands,
     completion,
+    doctor_command,
     export_command,
     import_options,
     replay_command,
@@ -59,9 +60,7 @@ def make_parser() -> Parser:
     shells = verbs.add_parser("completion", help="print the completion of a shell")
     shells.add_argument("shell", choices=completion.SHELLS, metavar="bash|zsh|fish")
     shells.set_defaults(command=completion.completion)
-    doctor = verbs.add_parser("doctor", help="check this machine, with remedies")
-    _add_json(doctor, "the findings")
-    doctor.set_defaults(command=commands.doctor)
+    doctor_command.add_doctor(verbs)
     return parser
 
 

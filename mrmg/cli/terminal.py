@@ -163,6 +163,14 @@ def print_json(value: Any) -> None:
     sys.stdout.write(storage.canonical_json(value))
 
 
+def print_table(rows: Sequence[Sequence[str]]) -> None:
+    """Print rows in columns, the first row being their names."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        cells = [text.ljust(width) for text, width in zip(row, widths, strict=True)]
+        print("  ".join(cells).rstrip())
+
+
 def print_summary(summary: dict[str, Any], reason: str) -> None:
     """Print the outcome of a run in a few lines."""
     outcome = "done" if summary["mission_ok"] else f"not done ({summary['status']})"

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+from packaging.version import Version
 
 ROOT = Path(__file__).parents[2]
 SCRIPTS = [ROOT / "tools/environment", ROOT / "tools/demo", ROOT / "tools/test"]
@@ -85,12 +90,33 @@ def test_an_environment_that_is_up_to_date_is_left_alone(checkout: Path) -> None
     assert (ended.returncode, ended.stderr) == (0, "")
 
 
-def test_locked_versions_agree_with_the_pins() -> None:
-    locked = dict(
-        line.split("==")
+def test_dependencies_are_ranges_that_hold_the_locked_versions() -> None:
+    locked = {
+        canonicalize_name(line.split("==")[0]): Version(line.split("==")[1])
         for line in (ROOT / "constraints.txt").read_text().splitlines()
         if not line.startswith("#")
+    }
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert {"geo", "ros", "view", "cluster", "test"} <= {
+        *project["optional-dependencies"]
+    }
+    for lines in (project["dependencies"], *project["optional-dependencies"].values()):
+        for line in map(Requirement, lines):
+            if line.name == "mrmg":
+                continue
+            assert locked[canonicalize_name(line.name)] in line.specifier, line
+            assert "==" not in str(line.specifier), "exact pins are in constraints.txt"
+            assert re.match(r">=|.*,>=", str(line.specifier)), "--lowest reads it"
+
+
+def test_a_python_that_is_not_there_is_named(checkout: Path) -> None:
+    shutil.copy(ROOT / "tools/test", checkout / "tools/test")
+    ended = subprocess.run(
+        [str(checkout / "tools/test"), "--python", "3.99"],
+        capture_output=True,
+        text=True,
+        check=False,
     )
-    bundle = {locked[name] for name in ("mujoco", "mujoco-core", "mujoco-studio")}
-    assert len(bundle) == 1
-    assert f'"mujoco=={bundle.pop()}"' in (ROOT / "pyproject.toml").read_text()
+    assert ended.returncode == 7
+    assert "No Python 3.99 was found on PATH or in" in ended.stderr
+    assert not [*checkout.glob(".venv*")]

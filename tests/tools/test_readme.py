@@ -23,6 +23,7 @@ PAGES = {
     for name in (
         "README.md",
         "BENCHMARKS.md",
+        "CONTRIBUTING.md",
         "mrmg/README.md",
         "models/README.md",
         "scenes/README.md",

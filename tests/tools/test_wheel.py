@@ -56,6 +56,7 @@ def run(command: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.slow
 def test_the_wheel_carries_scenes_and_models(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
+    assert "mrmg/py.typed" in names
     for scene in (ROOT / "scenes").iterdir():
         assert f"mrmg/_shipped/scenes/{scene.name}" in names
     for part in (ROOT / "models").rglob("*.*"):

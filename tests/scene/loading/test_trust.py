@@ -96,6 +96,9 @@ class Foreign:
             if action.nargs == "+":
                 found = [*found, shutil.copytree(self.run, self.folder / "other")]
             words += map(str, found)
+        for action in verb._actions:
+            if action.required and action.option_strings:
+                words += [action.option_strings[0], next(iter(action.choices or ()))]
         return words
 
 

@@ -225,9 +225,7 @@ def _picture(path: Path, document: MapDocument) -> tuple[np.ndarray, np.ndarray]
         UnidentifiedImageError,
         Image.DecompressionBombError,
     ) as error:
-        reason = (
-            "no such file" if not file.exists() else f"no readable picture: {error}"
-        )
+        reason = "no readable picture" if file.exists() else "no such file"
         message = f"'{document.image}': {reason}; expected a PGM or PNG beside the YAML"
         raise SceneError(str(path), [Fault("image", message)]) from error
     data = data.astype(float) / white
