@@ -6,16 +6,61 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mrmg.cli import terminal
-from mrmg.cli.run_options import given
+from mrmg.cli import log_options, terminal
+from mrmg.cli.run_options import add_options, add_overwrite, add_trust, given
 from mrmg.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
-    from mrmg.studies.calibration import Calibration
+    from mrmg.studies.calibration import Calibration, LogCalibration
+
+
+_DESCRIPTION = """\
+Drive manoeuvres with a robot in MuJoCo, fit its rolling and turning coefficients and
+its inertia to the work of the drives, and leave a calibrated copy of the model with the
+figures and a plot of the fit. With --log, fit logs of the real robot instead:
+stationary power, rolling, turning and inertia by terrain, with intervals."""
+
+
+def add_calibrate(verbs: argparse._SubParsersAction) -> None:  # type: ignore[type-arg]
+    """Add the verb."""
+    verb = verbs.add_parser(
+        "calibrate",
+        help="measure a robot's energy parameters in MuJoCo, or fit them to logs",
+        description=_DESCRIPTION,
+        epilog=log_options.EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    log_options.add_logs(verb)
+    verb.add_argument(
+        "model", metavar="MODEL", help="name of a shipped model, or a model's folder"
+    )
+    verb.add_argument(
+        "-o", "--out", type=Path, metavar="DIR", help="default calibrated-MODEL"
+    )
+    add_overwrite(verb, "the folder's content")
+    verb.add_argument(
+        "--plot",
+        type=Path,
+        metavar="PICTURE.png",
+        help="PNG, SVG or PDF by its suffix; default calibration.png in DIR",
+    )
+    verb.add_argument(
+        "--in-place",
+        action="store_true",
+        help="change the model's own robot.yaml, too",
+    )
+    add_options(verb, "calibrate")
+    add_trust(verb)
+    verb.add_argument(
+        "--json", action="store_true", help="print calibration.json alone"
+    )
+    verb.set_defaults(command=calibrate)
 
 
 def calibrate(options: argparse.Namespace) -> int:
     """Calibrate a robot model, and leave a calibrated copy with the plot of the fit."""
+    if options.groups:
+        return _calibrate_from_logs(options)
     from mrmg.runs.replacing import require_absent
     from mrmg.scene.loading.models import load_model
     from mrmg.studies.calibration import (
@@ -44,6 +89,48 @@ def calibrate(options: argparse.Namespace) -> int:
     return ExitCode.OK
 
 
+def _calibrate_from_logs(options: argparse.Namespace) -> int:
+    """Fit a robot model to logs, and leave a calibrated copy with page and terrain."""
+    from mrmg.report.log_page import calibration_html
+    from mrmg.runs.replacing import require_absent
+    from mrmg.scene.loading.models import load_model
+    from mrmg.storage import write_text
+    from mrmg.studies.calibration import (
+        calibrate_from_logs,
+        read_run,
+        require_other_folder,
+        write_calibration,
+        write_terrain,
+    )
+    from mrmg.studies.calibration.files import PAGE_FILE, TERRAIN_FILE
+
+    if options.plot is not None:
+        raise UsageError(
+            f"--plot is of MuJoCo; with --log the plots are in {PAGE_FILE}"
+        )
+    logs, tests = log_options.files_by_use(options.groups)
+    folder = folder_of_model(options.model)
+    out = options.out or Path(f"calibrated-{folder.name}")
+    require_other_folder(folder, out)
+    require_absent(out, overwrite=options.overwrite)
+    model, _ = load_model(folder, trust_code=options.trust_code)
+    runs, tested = (
+        [read_run(file, terrain, model) for file, terrain in named]
+        for named in (logs, tests)
+    )
+    calibration = calibrate_from_logs(model, runs, tested)
+    page = calibration_html(calibration)
+    write_calibration(calibration, folder, out, in_place=options.in_place)
+    write_terrain(calibration, out)
+    write_text(out / PAGE_FILE, page)
+    if options.json:
+        terminal.print_json(calibration.to_json())
+    else:
+        names = ("robot.yaml", TERRAIN_FILE, PAGE_FILE)
+        print("\n".join([*_log_lines(calibration), *(f"  {out / n}" for n in names)]))
+    return ExitCode.OK
+
+
 def folder_of_model(reference: str) -> Path:
     """Return the folder that a MODEL of the command line names."""
     from mrmg.scene.loading.models import model_folder
@@ -68,4 +155,27 @@ def _lines(calibration: Calibration) -> list[str]:
             f"95 % in {low:.6g} .. {high:.6g}  ({was})"
         )
     lines.append(f"  residuals: {calibration.fit.residual_rms:.3g} W rms")
+    return lines
+
+
+def _log_lines(calibration: LogCalibration) -> list[str]:
+    lines = [f"{calibration.model.name}: {len(calibration.runs)} runs, laws compared:"]
+    lines += [
+        f"  {law['name']:<11} median error {law['median_error_pct']:5.1f} %, 90 % "
+        f"intervals hold {law['intervals_hold_pct']:3.0f} %, "
+        f"{law['interval_width_pct']:.0f} % wide"
+        for law in calibration.laws_json()
+    ]
+    lines += [
+        f"  {item.name:<12} {item.rolling_W_s_m.value:7.1f} W s/m, "
+        f"{item.turning_W_s_rad.value:7.1f} W s/rad, multiplier {item.multiplier:.2f}, "
+        f"turning {item.turning_multiplier:.2f}, spread {item.energy_spread:.0%}"
+        for item in calibration.terrains
+    ]
+    for item in (item for item in calibration.runs if not item.fitted):
+        low, high = item.interval_J
+        lines.append(
+            f"  {item.run.file}: {item.predicted_J:.0f} J ({low:.0f} .. {high:.0f}) "
+            f"predicted, {item.run.energy_J:.0f} J measured, {item.error_pct:+.1f} %"
+        )
     return lines

@@ -56,7 +56,7 @@ def make_parser() -> Parser:
     _add_view(verbs)
     _add_scene(verbs)
     robot_commands.add_robot(verbs)
-    _add_calibrate(verbs)
+    calibrate_command.add_calibrate(verbs)
     shells = verbs.add_parser("completion", help="print the completion of a shell")
     shells.add_argument("shell", choices=completion.SHELLS, metavar="bash|zsh|fish")
     shells.set_defaults(command=completion.completion)
@@ -254,38 +254,6 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     _add_scene_out(populate)
     add_trust(populate)
     populate.set_defaults(command=scene_commands.populate)
-
-
-def _add_calibrate(verbs: _Verbs) -> None:  # type: ignore[type-arg]
-    verb = verbs.add_parser(
-        "calibrate",
-        help="measure a robot's energy parameters in MuJoCo",
-        description="Drive manoeuvres with a robot in MuJoCo, fit its rolling and "
-        "turning coefficients and its inertia to the work of the drives, and leave a "
-        "calibrated copy of the model with the figures and a plot of the fit.",
-    )
-    verb.add_argument(
-        "model", metavar="MODEL", help="name of a shipped model, or a model's folder"
-    )
-    verb.add_argument(
-        "-o", "--out", type=Path, metavar="DIR", help="default calibrated-MODEL"
-    )
-    add_overwrite(verb, "the folder's content")
-    verb.add_argument(
-        "--plot",
-        type=Path,
-        metavar="PICTURE.png",
-        help="PNG, SVG or PDF by its suffix; default calibration.png in DIR",
-    )
-    verb.add_argument(
-        "--in-place",
-        action="store_true",
-        help="change the model's own robot.yaml, too",
-    )
-    add_options(verb, "calibrate")
-    add_trust(verb)
-    _add_json(verb, "calibration.json")
-    verb.set_defaults(command=calibrate_command.calibrate)
 
 
 def _add_scene_out(verb: argparse.ArgumentParser) -> None:

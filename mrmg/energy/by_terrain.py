@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtri
 
 from mrmg.energy.audit import believed_rolling, measured_step_energy
 from mrmg.energy.metering import Motion, step_energy_parts
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
-from mrmg.world.terrain import multiplier_at
+from mrmg.world.terrain import area_at, multiplier_at
+
+INTERVAL_SHARE = 0.9
+"""Probability that the energy of a mission lies in its interval."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +75,45 @@ def energy_by_terrain(
         )
         for key in sorted({*planned, *metered})
     )
+
+
+def planned_interval_J(
+    scene: Scene, plan: Plan, robots: Iterable[str]
+) -> tuple[float, float] | None:
+    """Return the interval of what robots take together, by the spreads of the terrain.
+
+    What runs take on one ground differs by a common factor, whose logarithm has the
+    ground's `energy_spread` as its standard deviation; different grounds are
+    independent. The sum is taken to be log-normal.
+
+    Returns:
+        Its ends [J]; None where the terrain states no spread, or nothing is taken.
+    """
+    by_ground: dict[tuple[float, float, float], float] = {}
+    for motion in plan.trajectories:
+        if motion.robot not in robots:
+            continue
+        factor = plan.rolling_factor.get(motion.robot)
+        energy_J = step_energy_parts(scene, motion, factor).sum(axis=1)
+        points = motion.state[:, :2]
+        areas = area_at(scene, 0.5 * (points[:-1] + points[1:]))
+        for number in np.unique(areas):
+            area = scene.terrain[number - 1] if number else None
+            key = (
+                (area.multiplier, area.turning_multiplier, area.energy_spread)
+                if area
+                else (1.0, 1.0, 0.0)
+            )
+            taken_J = float(energy_J[areas == number].sum())
+            by_ground[key] = by_ground.get(key, 0.0) + taken_J
+    total_J = sum(by_ground.values())
+    deviation_J = float(
+        np.hypot.reduce([0.0, *(k[2] * e for k, e in by_ground.items())])
+    )
+    if deviation_J == 0.0 or total_J <= 0.0:
+        return None
+    reach = float(ndtri(0.5 + 0.5 * INTERVAL_SHARE)) * deviation_J / total_J
+    return total_J * math.exp(-reach), total_J * math.exp(reach)
 
 
 def _model_energy(

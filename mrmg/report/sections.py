@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from mrmg.energy.audit_record import EnergyAudit
-from mrmg.energy.by_terrain import energy_by_terrain
+from mrmg.energy.by_terrain import energy_by_terrain, planned_interval_J
 from mrmg.energy.ledger import EnergyLedger
 from mrmg.energy.model import PARTS
 from mrmg.plans import Plan
 from mrmg.report.page import elements as html
 from mrmg.runs.record import RunRecord
+from mrmg.scene.types import Scene
 from mrmg.viz.activities import shown_motions, standing_of, way_to
 from mrmg.viz.style import terrain_classes
 
@@ -54,12 +55,34 @@ def energy(record: RunRecord) -> list[str]:
     head += ["Metered − planned", "Measured − planned"]
     return [
         html.table(head, rows, text_columns=(0, 1, 2), sums=sums),
+        *_intervals(record.scene, plan),
         html.note(
             "Planned: energy model over the plan. Metered: the same model over the "
             "simulated motion. Measured: work of the simulated drives, which has no "
             "parts but driving and the consumers that run at all times."
         ),
     ]
+
+
+def _intervals(scene: Scene, plan: Plan) -> list[str]:
+    """Return within what energies runs differ, if the terrain's spreads are known."""
+    robots = [robot.id for robot in scene.robots]
+    found = [
+        (name, planned_interval_J(scene, plan, ids))
+        for name, ids in [*((robot, [robot]) for robot in robots), ("fleet", robots)]
+    ]
+    texts = [
+        f"{name} {kJ(ends_J[0])} to {kJ(ends_J[1])}"
+        for name, ends_J in found
+        if ends_J is not None
+    ]
+    if not texts:
+        return []
+    text = (
+        "90 % intervals of the energy, as runs differ on this terrain "
+        f"(energy_spread of the scene): {', '.join(texts)}."
+    )
+    return [html.note(text)]
 
 
 def terrain(record: RunRecord) -> list[str]:

@@ -24,7 +24,8 @@ DISTURBANCE_HELP = (
     "delay, start_x, start_y, start_heading, capacity; SPEC is key=value,... such as "
     "rolling=+30%,lag=0..80ms, or a YAML file of such keys, and changes the defaults "
     "(mass=+-5%,friction=+-20%,rolling=+-10%,lag=50ms,position_noise=2cm); "
-    "a leading 'none' starts from no disturbance"
+    "a leading 'none' starts from no disturbance, a leading 'field:snow' (or asphalt, "
+    "flooring, ice, sandy_loam) from the spread found in logs of a robot on it"
 )
 
 

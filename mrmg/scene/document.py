@@ -18,6 +18,7 @@ import shapely
 
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.elevation import Elevation
+from mrmg.scene.motor import Motor
 from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
 from mrmg.scene.robot_model import RobotModel
 
@@ -311,6 +312,19 @@ def model_parameters(model: RobotModel) -> _Entry:
         "device_power": float(model.device_power_W),
         "energy": model.energy_preset,
         "battery_capacity": float(model.battery_capacity_J),
+        "skid_track": model.skid_track_m,
+        "motor": None if model.motor is None else _motor_entry(model.motor),
+    }
+
+
+def _motor_entry(motor: Motor) -> _Entry:
+    return {
+        "torque_constant": float(motor.torque_constant_Nm_A),
+        "back_emf_constant": float(motor.back_emf_constant_V_s),
+        "resistance": float(motor.resistance_Ohm),
+        "gear_ratio": float(motor.gear_ratio),
+        "gear_efficiency": float(motor.gear_efficiency),
+        "no_load_current": float(motor.no_load_current_A),
     }
 
 
@@ -318,7 +332,7 @@ def _differences(before: Mapping[str, Any], after: Mapping[str, Any]) -> _Entry:
     """Return what `after` says otherwise than `before`, part by part."""
     found: _Entry = {}
     for key, value in after.items():
-        if isinstance(value, dict):
+        if isinstance(value, dict) and isinstance(before[key], dict):
             inner = _differences(before[key], value)
             if inner:
                 found[key] = inner

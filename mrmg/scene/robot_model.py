@@ -19,6 +19,7 @@ from mrmg.energy.model import GRAVITY_M_S2, EnergyModel, EnergyPreset
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.content import ByContent, content, contents
 from mrmg.scene.model_files import ModelFiles
+from mrmg.scene.motor import Motor
 
 MAX_CORNERS = 12
 """Largest number of corners of a footprint: what the planner's arrays hold."""
@@ -117,6 +118,10 @@ class RobotModel(ByContent):
         energy_preset: which parts of the energy model count.
         battery_capacity_J: of the standard battery.
         mjcf: path of the MJCF file; None for a model that is only planned for.
+        skid_track_m: track of the differential drive that turns like it, if its wheels
+            skid in turns; None if they do not. Logs of wheel speeds are read by it.
+        motor: of each side; None where nobody states it. Logs of currents are read by
+            it.
         files: what the MJCF and a custom motion consist of, read when the model was
             made.
         origin: where it was loaded from; None for one made in memory.
@@ -145,6 +150,8 @@ class RobotModel(ByContent):
     energy_preset: EnergyPreset
     battery_capacity_J: float
     mjcf: Path | None
+    skid_track_m: float | None = None
+    motor: Motor | None = None
     files: ModelFiles = ModelFiles((), ())
     origin: ModelOrigin | None = None
 

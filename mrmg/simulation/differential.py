@@ -55,7 +55,8 @@ class DifferentialChassis:
         yaw_kg_m2, self._lead_kg_m = self._inertia_about_axle(robots)
         self._loop = SpeedLoop(
             inertia=yaw_kg_m2 + wheels_kg_m2,
-            limit=grip_N * self._track_m / 2,
+            # Errors of the resistance to turning must be within reach, too.
+            limit=grip_N * self._track_m / 2 + self._turning_Nm,
             params=params.loop,
         )
 

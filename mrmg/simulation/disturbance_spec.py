@@ -2,10 +2,11 @@
 
     rolling=+30%,lag=0..80ms,position_noise=5cm
 
-amends the default disturbances; a leading `none` starts from no disturbance instead. A
-YAML file is a mapping of the same keys and values, with `base: none` in place of the
-leading word. A value is a fixed one (`+30%`), a symmetric range (`+-5%`) or a range
-(`-10%..+30%`); numbers without a unit are in SI units.
+amends the default disturbances; a leading `none` starts from no disturbance instead,
+and a leading `field:snow` from the spread that was found in runs on that terrain. A
+YAML file is a mapping of the same keys and values, with `base: none` or
+`base: field:snow` in place of the leading word. A value is a fixed one (`+30%`), a
+symmetric range (`+-5%`) or a range (`-10%..+30%`); numbers without a unit are in SI.
 """
 
 from __future__ import annotations
@@ -16,9 +17,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
-from mrmg.errors import UsageError
+from mrmg.errors import UsageError, nearest
 from mrmg.scene.loading.yaml_text import read_yaml
-from mrmg.simulation.disturbance import DEFAULT_RANGES, DisturbanceRanges, Span
+from mrmg.simulation.disturbance import (
+    DEFAULT_RANGES,
+    FIELD_SPREADS,
+    DisturbanceRanges,
+    Span,
+    field_ranges,
+)
 
 _TIME = {"ms": 1e-3, "s": 1.0}
 _LENGTH = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
@@ -64,6 +71,7 @@ _KEYS = {
 }
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([a-zA-Z%/]*)")
 _WORD_OF_BASE = "none"
+_FIELD = "field:"
 
 
 def parse_disturbance(spec: str) -> DisturbanceRanges:
@@ -81,15 +89,15 @@ def parse_disturbance(spec: str) -> DisturbanceRanges:
         return _of_document(read_yaml(Path(spec.strip()), source=spec.strip()), spec)
     words = [word.strip() for word in spec.split(",") if word.strip()]
     ranges = DEFAULT_RANGES
-    if words and words[0] == _WORD_OF_BASE:
-        ranges, words = DisturbanceRanges(), words[1:]
+    if words and _is_base(words[0]):
+        ranges, words = _base(words[0]), words[1:]
     pairs = []
     for word in words:
         key, equals, value = word.partition("=")
         if not equals:
             _refuse(
-                f"'{word}' is not key=value, nor '{_WORD_OF_BASE}' in the first place, "
-                "nor a file that ends in .yaml"
+                f"'{word}' is not key=value, nor '{_WORD_OF_BASE}' or "
+                f"'{_FIELD}TERRAIN' in the first place, nor a file that ends in .yaml"
             )
         pairs.append((key.strip(), value.strip()))
     return _amended(ranges, pairs)
@@ -118,10 +126,28 @@ def _of_document(document: Any, source: str) -> DisturbanceRanges:
     if not isinstance(document, dict):
         _refuse(f"{source} is no mapping of keys to values")
     base = document.pop("base", "default")
-    if base not in ("default", _WORD_OF_BASE):
-        _refuse(f"base is {base!r}; allowed: default, {_WORD_OF_BASE}")
-    ranges = DEFAULT_RANGES if base == "default" else DisturbanceRanges()
+    if base != "default" and not (isinstance(base, str) and _is_base(base)):
+        allowed = f"default, {_WORD_OF_BASE}, {_FIELD}TERRAIN"
+        _refuse(f"base is {base!r}; allowed: {allowed}")
+    ranges = DEFAULT_RANGES if base == "default" else _base(base)
     return _amended(ranges, ((key, str(value)) for key, value in document.items()))
+
+
+def _is_base(word: str) -> bool:
+    return word == _WORD_OF_BASE or word.startswith(_FIELD)
+
+
+def _base(word: str) -> DisturbanceRanges:
+    """Return the ranges that a leading word stands for."""
+    if word == _WORD_OF_BASE:
+        return DisturbanceRanges()
+    terrain = word.removeprefix(_FIELD)
+    if terrain not in FIELD_SPREADS:
+        _refuse(
+            f"no logs are known of terrain '{terrain}'{nearest(terrain, FIELD_SPREADS)}"
+            f"; allowed: {', '.join(_FIELD + name for name in FIELD_SPREADS)}"
+        )
+    return field_ranges(terrain)
 
 
 def _amended(

@@ -15,7 +15,7 @@ def multiplier_at(scene: Scene, points: np.ndarray) -> np.ndarray:
     elsewhere it is 1.
     """
     multiplier = np.array([1.0, *(area.multiplier for area in scene.terrain)])
-    return np.asarray(multiplier[_area_at(scene, points)])
+    return np.asarray(multiplier[area_at(scene, points)])
 
 
 def turning_multiplier_at(scene: Scene, points: np.ndarray) -> np.ndarray:
@@ -23,10 +23,10 @@ def turning_multiplier_at(scene: Scene, points: np.ndarray) -> np.ndarray:
     multiplier = np.array([1.0, *(area.turning_multiplier for area in scene.terrain)])
     if np.all(multiplier == 1.0):
         return np.ones(len(np.atleast_2d(points)))
-    return np.asarray(multiplier[_area_at(scene, points)])
+    return np.asarray(multiplier[area_at(scene, points)])
 
 
-def _area_at(scene: Scene, points: np.ndarray) -> np.ndarray:
+def area_at(scene: Scene, points: np.ndarray) -> np.ndarray:
     """Return the number of the area at each point, from 1; 0 for plain ground."""
     points = np.atleast_2d(points)
     number = np.zeros(len(points), dtype=int)

@@ -8,7 +8,6 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from mrmg import shipped
 from mrmg.errors import UsageError
 from mrmg.motion.dynamics import DERIVATIVES, NU, NX, rk4_step
 from mrmg.scene.robot_model import RobotModel
@@ -24,7 +23,7 @@ from mrmg.testing import ControllerContract
 from mrmg.testing.controller_contract import TICKS_A_STEP, reference_of, straight
 
 
-@pytest.fixture(scope="module", params=shipped.model_names())
+@pytest.fixture(scope="module", params=["car", "diffdrive", "hauler"])
 def model(request: pytest.FixtureRequest, driving: SimpleNamespace) -> RobotModel:
     scene = driving.open_ground([(0.0, 0.0, 0.4)], models=[request.param])
     return scene.robots[0].model

@@ -5,12 +5,18 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from mrmg.errors import FileError, UsageError
-from mrmg.simulation.disturbance import DEFAULT_RANGES, DisturbanceRanges, Span
+from mrmg.simulation.disturbance import (
+    DEFAULT_RANGES,
+    FIELD_SPREADS,
+    DisturbanceRanges,
+    Span,
+)
 from mrmg.simulation.disturbance_spec import disturbance_text, parse_disturbance
 
 DEGREE = math.pi / 180
@@ -28,6 +34,27 @@ def test_nothing_stands_for_the_defaults() -> None:
 def test_the_defaults_are_those_promised() -> None:
     promised = "none,mass=+-5%,friction=+-20%,rolling=+-10%,lag=50ms,position_noise=2cm"
     assert parse_disturbance(promised) == DEFAULT_RANGES
+
+
+@pytest.mark.parametrize("terrain", FIELD_SPREADS)
+def test_a_field_has_the_spread_that_was_found_in_logs(terrain: str) -> None:
+    """Drawn rolling resistances have it as their standard deviation."""
+    ranges = parse_disturbance(f"field:{terrain}")
+    robots = [f"r{number}" for number in range(2000)]
+    drawn = [item.rolling for item in ranges.draw(4, robots).robots]
+    assert np.std(drawn) == pytest.approx(FIELD_SPREADS[terrain], rel=0.05)
+    assert np.mean(drawn) == pytest.approx(0.0, abs=0.02)
+    assert ranges.mass == Span()
+    assert ranges.position_noise_m == DEFAULT_RANGES.position_noise_m
+    assert parse_disturbance(disturbance_text(ranges)) == ranges
+    assert parse_disturbance(f"field:{terrain},rolling=+-10%").rolling == Span(
+        -0.1, 0.1
+    )
+
+
+def test_a_field_that_nobody_logged_is_refused() -> None:
+    with pytest.raises(UsageError, match=r"'snwo' .*'snow'.*allowed: field:asphalt, "):
+        parse_disturbance("field:snwo")
 
 
 def test_pairs_amend_the_defaults() -> None:

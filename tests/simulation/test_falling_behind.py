@@ -10,7 +10,6 @@ import pytest
 from shapely import Point, affinity
 from shapely.geometry import LineString, Polygon
 
-from mrmg import shipped
 from mrmg.plans import Plan
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
@@ -71,7 +70,7 @@ def planned_apart_m(scene: Scene, plan: Plan) -> float:
     return apart_m(scene, np.stack([item.state for item in plan.trajectories]))
 
 
-@pytest.fixture(scope="module", params=shipped.model_names())
+@pytest.fixture(scope="module", params=["car", "diffdrive", "hauler"])
 def mission(
     request: pytest.FixtureRequest, driving: SimpleNamespace
 ) -> tuple[Scene, Plan]:

@@ -154,7 +154,8 @@ def test_ramming_leaves_everybody_on_their_wheels(
     fleet, watch = Fleet(world, data), ContactWatch(world)
     resistance = believed_resistance(scene)
     fleet.set_resistance(resistance.rolling_N, resistance.swing_N)
-    rng, grip_N = np.random.default_rng(8), 0.5 * model.mass_kg * 9.81
+    rng = np.random.default_rng(8)
+    grip_N = 0.5 * model.mass_kg * 9.81 + model.energy_model.rolling_force_N
     w = np.zeros(2)
     for _ in range(300):
         force = rng.uniform(-0.7, 1.0, 2) * grip_N
@@ -168,7 +169,7 @@ def test_ramming_leaves_everybody_on_their_wheels(
             assert np.abs(data.xpos[world.chassis, 2]).max() < 0.15
     assert data.time == pytest.approx(60.0)
     assert np.isfinite(data.qpos).all()
-    assert len(watch.contacts) > 20
+    assert len(watch.contacts) > 10
     assert sum(warning.number for warning in data.warning) == 0
 
 

@@ -211,8 +211,11 @@ def test_turning_costs_what_the_model_says(
     """A long steady circle: rolling plus scrub by |v tan psi|, or by T |omega|."""
     plain = driving.open_ground([(0.0, 0.0, 0.0)], models=[model])
     scene = resisting_turns(plain, factor)
+    model_of = scene.robots[0].model
+    limits = model_of.limits.scaled(model_of.planning_share)
+    ramp = (min(1.0, limits.u1_max_m_s2), min(0.4, limits.u2_max, limits.w_max))
     control = np.zeros((300, 2))
-    control[:10], control[-10:] = (1.0, 0.4), (-1.0, -0.4)
+    control[:10], control[-10:] = ramp, tuple(-value for value in ramp)
     plan = driving.plan_of(scene, [control])
     log = simulate(scene, plan)
     assert off_m(log).max() < 0.05

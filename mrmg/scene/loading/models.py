@@ -27,6 +27,7 @@ from mrmg.scene.loading.places import lines_of
 from mrmg.scene.loading.shape_schema import NotNegative, Positive, Ring, Strict
 from mrmg.scene.loading.trust import file_within, refusal_of_code
 from mrmg.scene.loading.yaml_text import parse_yaml, read_text
+from mrmg.scene.motor import Motor
 from mrmg.scene.robot_model import MAX_CORNERS, Limits, ModelOrigin, RobotModel
 
 SHIPPED_MOTIONS = ("car", "unicycle")
@@ -62,6 +63,19 @@ class LimitsEntry(Strict):
     )
 
 
+class MotorEntry(Strict):
+    """The motors of a side as one, and their gear."""
+
+    torque_constant: Positive = Field(description="torque per current in N m/A")
+    back_emf_constant: Positive = Field(description="voltage per speed in V s/rad")
+    resistance: Positive = Field(description="of the winding in Ohm")
+    gear_ratio: Positive = Field(description="turns of the motor per turn of the wheel")
+    gear_efficiency: Share = Field(description="from motor to wheel, in (0, 1]")
+    no_load_current: NotNegative = Field(
+        default=0.0, description="current in A that turns motor and gear alone"
+    )
+
+
 class ModelDocument(Strict):
     """The content of `robot.yaml`."""
 
@@ -76,6 +90,10 @@ class ModelDocument(Strict):
     height: Positive = Field(description="height of the body in m")
     wheelbase: Positive = Field(description="distance of the axles in m")
     track: Positive = Field(description="distance of the wheels of an axle in m")
+    skid_track: Positive | None = Field(
+        default=None,
+        description="effective track in m where wheels skid in turns; for logs",
+    )
     mass: Positive = Field(description="mass of the whole robot in kg")
     center_of_mass: Annotated[float, Field(allow_inf_nan=False)] = Field(
         default=0.0, description="centre of mass ahead of the rear axle in m"
@@ -106,6 +124,9 @@ class ModelDocument(Strict):
     )
     battery_capacity: Positive = Field(
         description="capacity of the standard battery in J"
+    )
+    motor: MotorEntry | None = Field(
+        default=None, description="motors of each side, for logs of currents"
     )
     mjcf: Annotated[str, Field(min_length=1)] | None = Field(
         default=None, description="MJCF file in the folder; without it, not driven"
@@ -294,4 +315,17 @@ def _model(folder: Path, entry: ModelDocument) -> RobotModel:
         energy_preset=entry.energy,
         battery_capacity_J=entry.battery_capacity,
         mjcf=None if entry.mjcf is None else folder / entry.mjcf,
+        skid_track_m=entry.skid_track,
+        motor=None if entry.motor is None else _motor(entry.motor),
+    )
+
+
+def _motor(entry: MotorEntry) -> Motor:
+    return Motor(
+        torque_constant_Nm_A=entry.torque_constant,
+        back_emf_constant_V_s=entry.back_emf_constant,
+        resistance_Ohm=entry.resistance,
+        gear_ratio=entry.gear_ratio,
+        gear_efficiency=entry.gear_efficiency,
+        no_load_current_A=entry.no_load_current,
     )

@@ -54,8 +54,9 @@ class Estimate:
         return repr(float(f"{self.value:.{max(digits, 2)}g}"))
 
     def to_json(self) -> dict[str, Any]:
-        """Return the estimate as JSON data."""
-        low, high = self.interval
+        """Return the estimate as JSON data; without ends if it is not determined."""
+        known = not math.isnan(self.half_width)
+        low, high = self.interval if known else (None, None)
         return {
             "value": self.value,
             "low": low,

@@ -7,19 +7,34 @@ from pathlib import Path
 from mrmg import storage
 from mrmg.errors import UsageError
 from mrmg.scene.loading.editing import with_values
+from mrmg.scene.loading.yaml_text import dump_yaml
 from mrmg.studies.calibration.calibrate import Calibration
+from mrmg.studies.calibration.log_calibration import LogCalibration
 
 MODEL_FILE = "robot.yaml"
 RESULT_FILE = "calibration.json"
+TERRAIN_FILE = "terrain.yaml"
+PAGE_FILE = "calibration.html"
+
+_TERRAIN_HEAD = """\
+# Terrain entries for scenes with the robot '{name}' calibrated from logs.
+# Copy them to the scene's `terrain`, and give each its polygon, box or circle.
+# multiplier and turning_multiplier are relative to '{plain}', the plain ground of
+# robot.yaml; energy_spread is from run to run.
+"""
 
 
 def write_calibration(
-    calibration: Calibration, model_folder: Path, folder: Path, *, in_place: bool
+    calibration: Calibration | LogCalibration,
+    model_folder: Path,
+    folder: Path,
+    *,
+    in_place: bool,
 ) -> None:
     """Write the calibrated model and the result of the fit.
 
     Args:
-        calibration: what was found.
+        calibration: what was found, in MuJoCo or in logs.
         model_folder: the model as it was; changed only if `in_place`.
         folder: receives a copy of the model folder with the calibrated `robot.yaml`,
             and `calibration.json`.
@@ -42,6 +57,14 @@ def write_calibration(
     storage.write_json(folder / RESULT_FILE, calibration.to_json())
     if in_place:
         storage.write_text(source, text)
+
+
+def write_terrain(calibration: LogCalibration, folder: Path) -> None:
+    """Write the terrain entries that scenes may take over."""
+    plain = calibration.terrains[0].name
+    head = _TERRAIN_HEAD.format(name=calibration.model.name, plain=plain)
+    entries = [item.entry() for item in calibration.terrains]
+    storage.write_text(folder / TERRAIN_FILE, head + dump_yaml({"terrain": entries}))
 
 
 def require_other_folder(model_folder: Path, folder: Path) -> None:

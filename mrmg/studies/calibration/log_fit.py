@@ -1,0 +1,238 @@
+"""Robust fits of power laws to logged runs, and how well they predict other runs.
+
+A run is cut into pieces of about two seconds, whose mean power the law is to give. The
+pieces' errors, relative to the run's mean power, count as in a Huber-like loss
+(`soft_l1`), and every run counts alike, however long it is: runs differ more from each
+other than pieces of one run do, so that long runs must not outvote short ones.
+
+How far another run will be off is told by leaving out each run in turn: the logarithms
+of measured over predicted energy. Their root mean square on a terrain, pooled with that
+of the other terrains as if it came from `PRIOR_RUNS` more runs, is the spread, and
+Student's t gives the interval.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.special import stdtrit
+
+from mrmg.studies.calibration.power_laws import PowerLaw
+from mrmg.studies.calibration.robot_logs import LoggedRun
+
+PIECE_S = 2.0
+"""Length of a piece: longer than a speed controller takes to settle."""
+
+OUTLIER_SHARE = 0.15
+"""Relative error from which pieces count less than by its square."""
+
+PRIOR_RUNS = 2.0
+"""How many runs of a terrain the spread of the other terrains weighs as much as."""
+
+HOLD = 0.01
+"""Weight of the starting values: holds what the runs do not determine."""
+
+PREDICTED_SHARE = 0.9
+"""Probability that a run's energy lies in its interval."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pieces:
+    """The pieces of a run under a law.
+
+    Attributes:
+        features: mean features of each piece, shape (p, k).
+        power_W: mean power of each piece, shape (p,).
+        duration_s: of each piece, shape (p,).
+    """
+
+    features: np.ndarray
+    power_W: np.ndarray
+    duration_s: np.ndarray
+
+    @staticmethod
+    def of(run: LoggedRun, law: PowerLaw) -> Pieces:
+        """Cut a run into pieces."""
+        weight_s = run.weight_s
+        count = max(1, round(float(weight_s.sum()) / PIECE_S))
+        count = min(count, len(weight_s))
+        ends_s = np.linspace(0.0, weight_s.sum(), count + 1)[1:-1]
+        starts = np.append(0, np.searchsorted(np.cumsum(weight_s), ends_s) + 1)
+        starts = np.unique(np.minimum(starts, len(weight_s) - 1))
+        duration_s = np.add.reduceat(weight_s, starts)
+        features = np.add.reduceat(law.features(run) * weight_s[:, None], starts)
+        power_J = np.add.reduceat(run.power_W * weight_s, starts)
+        return Pieces(features / duration_s[:, None], power_J / duration_s, duration_s)
+
+    @property
+    def energy_J(self) -> float:
+        """What the run took."""
+        return float(self.power_W @ self.duration_s)
+
+    @property
+    def mean_power_W(self) -> float:
+        """Mean power of the run."""
+        return self.energy_J / float(self.duration_s.sum())
+
+    def predicted_J(self, coefficients: np.ndarray) -> float:
+        """Return the energy by the law."""
+        return float(self.features @ coefficients @ self.duration_s)
+
+
+@dataclass(frozen=True, slots=True)
+class LawFit:
+    """A law fitted to runs of a few terrains, and to all of them but one each time.
+
+    Attributes:
+        law: what was fitted.
+        parameters: of each terrain, shape (p,).
+        without: parameters of the run's terrain fitted without the run, by run, shape
+            (n, p).
+        log_error: logarithm of measured over predicted energy of each run by the fit
+            without it, shape (n,).
+        spread: standard deviation of that logarithm by terrain.
+        freedom: degrees of freedom of the spread by terrain.
+    """
+
+    law: PowerLaw
+    parameters: Mapping[str, np.ndarray]
+    without: np.ndarray
+    log_error: np.ndarray
+    spread: Mapping[str, float]
+    freedom: Mapping[str, float]
+
+    def factors(
+        self, terrain: str, share: float = PREDICTED_SHARE
+    ) -> tuple[float, float]:
+        """Return the ends of the interval of a run's energy, over the prediction."""
+        return interval_factors(self.spread[terrain], self.freedom[terrain], share)
+
+
+def interval_factors(
+    spread: float, freedom: float, share: float = PREDICTED_SHARE
+) -> tuple[float, float]:
+    """Return the ends of an interval about 1 for a logarithm of that spread."""
+    reach = float(stdtrit(freedom, 0.5 + 0.5 * share)) * spread
+    return float(np.exp(-reach)), float(np.exp(reach))
+
+
+def fit_law(law: PowerLaw, runs: Sequence[LoggedRun]) -> LawFit:
+    """Fit a law to runs, terrain by terrain, and without each run in turn.
+
+    A terrain of one run is predicted without it by the runs of all other terrains.
+
+    Args:
+        law: what to fit.
+        runs: at least two.
+    """
+    pieces = [Pieces.of(run, law) for run in runs]
+    terrain = [run.terrain for run in runs]
+    scale = _scale(law, runs)
+    whole = fit_pieces(law, pieces, scale, scale)
+    groups = {
+        name: _of_terrain(pieces, terrain, name) for name in dict.fromkeys(terrain)
+    }
+    parameters = {
+        name: fit_pieces(law, own, scale, whole) for name, own in groups.items()
+    }
+    without = []
+    for left_out, name in zip(pieces, terrain, strict=True):
+        others = [item for item in groups[name] if item is not left_out]
+        if others:
+            without.append(fit_pieces(law, others, scale, whole))
+        else:
+            rest = [item for item in pieces if item is not left_out]
+            without.append(fit_pieces(law, rest, scale, scale))
+    log_error = np.array(
+        [
+            _log_error(item, law.coefficients(found))
+            for item, found in zip(pieces, without, strict=True)
+        ]
+    )
+    spread, freedom = spreads(log_error, terrain)
+    return LawFit(law, parameters, np.array(without), log_error, spread, freedom)
+
+
+def fit_pieces(
+    law: PowerLaw, runs: Sequence[Pieces], scale: np.ndarray, hold: np.ndarray
+) -> np.ndarray:
+    """Return the parameters >= 0 that give the pieces' powers best.
+
+    Args:
+        law: what to fit.
+        runs: to these.
+        scale: size of the parameters, shape (p,).
+        hold: what they are where the runs do not determine them, shape (p,).
+
+    Returns:
+        Parameters of shape (p,).
+    """
+    blocks = [
+        (
+            item.features / item.mean_power_W,
+            item.power_W / item.mean_power_W,
+            np.sqrt(item.duration_s / item.duration_s.sum()),
+        )
+        for item in runs
+    ]
+    features, power, weight = (
+        np.concatenate(parts) for parts in zip(*blocks, strict=True)
+    )
+    held = hold / scale
+
+    def errors(found: np.ndarray) -> np.ndarray:
+        off = (power - features @ law.coefficients(found * scale)) / OUTLIER_SHARE
+        soft = np.sign(off) * np.sqrt(2.0 * (np.sqrt(1.0 + off**2) - 1.0))
+        return np.append(weight * soft, HOLD * (found - held))
+
+    bounds = (np.zeros(len(scale)), np.full(len(scale), np.inf))
+    starts = (np.ones(len(scale)), np.maximum(held, 0.05))
+    fits = [least_squares(errors, start, bounds=bounds) for start in starts]
+    best = min(fits, key=lambda fit: float(fit.cost))
+    return np.asarray(best.x * scale)
+
+
+def spreads(
+    log_error: np.ndarray, terrain: Sequence[str], *, without: int | None = None
+) -> tuple[dict[str, float], dict[str, float]]:
+    """Return spread and degrees of freedom by terrain.
+
+    Args:
+        log_error: of each run, shape (n,).
+        terrain: of each run.
+        without: number of a run whose error does not count.
+    """
+    names = list(dict.fromkeys(terrain))
+    squares: dict[str, np.ndarray] = {}
+    for name in names:
+        rows = [at for at, own in enumerate(terrain) if own == name and at != without]
+        squares[name] = log_error[rows] ** 2
+    means = [float(own.mean()) for own in squares.values() if len(own)]
+    pooled = float(np.mean(means)) if means else 0.0
+    spread, freedom = {}, {}
+    for name, own in squares.items():
+        total = float(own.sum()) + PRIOR_RUNS * pooled
+        spread[name] = float(np.sqrt(total / (len(own) + PRIOR_RUNS)))
+        freedom[name] = max(len(own) + PRIOR_RUNS - 1.0, 1.0)
+    return spread, freedom
+
+
+def _scale(law: PowerLaw, runs: Sequence[LoggedRun]) -> np.ndarray:
+    duration_s = sum(float(run.weight_s.sum()) for run in runs)
+    power_W = sum(run.energy_J for run in runs) / duration_s
+    way_m = sum(float(np.abs(run.speed_m_s) @ run.weight_s) for run in runs)
+    return law.start(power_W, way_m / duration_s)
+
+
+def _of_terrain(
+    pieces: Sequence[Pieces], terrain: Sequence[str], name: str
+) -> list[Pieces]:
+    return [item for item, own in zip(pieces, terrain, strict=True) if own == name]
+
+
+def _log_error(pieces: Pieces, coefficients: np.ndarray) -> float:
+    predicted_J = max(pieces.predicted_J(coefficients), 1e-3 * pieces.energy_J)
+    return float(np.log(pieces.energy_J / predicted_J))

@@ -1,0 +1,222 @@
+"""Energy parameters of terrains from a law that was fitted to logs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.special import stdtrit
+
+from mrmg.scene.robot_model import RobotModel
+from mrmg.studies.calibration.calibrate import Estimate
+from mrmg.studies.calibration.fit import CONFIDENCE
+from mrmg.studies.calibration.log_fit import LawFit
+from mrmg.studies.calibration.power_laws import PowerLaw
+from mrmg.studies.calibration.robot_logs import LoggedRun
+
+LEAST_REST_S = 1.0
+"""Time at rest that tells the stationary power."""
+
+EXCITED_SHARE = 0.02
+"""Share of its runs' time that a robot must drive, or turn, to be calibrated for it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TerrainEstimate:
+    """What the runs on a terrain tell.
+
+    Attributes:
+        name: of the terrain.
+        runs: how many there are.
+        rolling_W_s_m: power of driving straight on at cruise speed, over the speed.
+        turning_W_s_rad: power of turning at the planned rate, over the rate.
+        stationary_W: power at rest.
+        inertia_kg: mass that resists acceleration, the motors' share included.
+        multiplier: rolling over that of the first terrain.
+        turning_multiplier: turning over that of the first terrain.
+        energy_spread: of a run's energy from run to run.
+    """
+
+    name: str
+    runs: int
+    rolling_W_s_m: Estimate
+    turning_W_s_rad: Estimate
+    stationary_W: Estimate
+    inertia_kg: Estimate
+    multiplier: float
+    turning_multiplier: float
+    energy_spread: float
+
+    def entry(self) -> dict[str, float | str]:
+        """Return what the terrain's entry in a scene says."""
+        return {
+            "id": self.name,
+            "multiplier": round(self.multiplier, 3),
+            "turning_multiplier": round(self.turning_multiplier, 3),
+            "energy_spread": round(self.energy_spread, 3),
+        }
+
+    def to_json(self) -> dict[str, Any]:
+        """Return everything as JSON data."""
+        found = ("rolling_W_s_m", "turning_W_s_rad", "stationary_W", "inertia_kg")
+        estimates = {name: getattr(self, name).to_json() for name in found}
+        return {**self.entry(), "runs": self.runs, **estimates}
+
+
+def turning_length_m(model: RobotModel) -> float:
+    """Return the length by which a yaw rate is a speed of scrub in the energy model."""
+    return model.wheelbase_m if model.motion_model == "car" else model.track_m
+
+
+def stationary_power(model: RobotModel, runs: Sequence[LoggedRun]) -> Estimate:
+    """Return the power at rest: the median of the medians of runs that rest enough."""
+    rests = [
+        run.power_W[run.at_rest]
+        for run in runs
+        if float(run.weight_s[run.at_rest].sum()) >= LEAST_REST_S
+    ]
+    medians = np.array([float(np.median(power)) for power in rests])
+    if not len(medians):
+        return _estimate(model.idle_power_W, np.nan, "W", model.idle_power_W)
+    spread_W = np.median(np.abs(medians - np.median(medians)))
+    half_W = 1.96 * 1.4826 * float(spread_W) / np.sqrt(len(medians))
+    return _estimate(float(np.median(medians)), half_W, "W", model.idle_power_W)
+
+
+def terrain_estimates(
+    model: RobotModel, fit: LawFit, runs: Sequence[LoggedRun], stationary: Estimate
+) -> tuple[TerrainEstimate, ...]:
+    """Return what the runs on each terrain tell; the first terrain is plain ground."""
+    found: list[TerrainEstimate] = []
+    for name in fit.parameters:
+        rows = [at for at, run in enumerate(runs) if run.terrain == name]
+        own = [runs[at] for at in rows]
+        values = np.array(
+            [_secants(model, fit.law, item) for item in fit.without[rows]]
+        )
+        rolling, turning = _secants(model, fit.law, fit.parameters[name])
+        half = _jackknife(values)
+        drives, turns = _excitation(own)
+        half[0] = half[0] if drives else np.nan
+        half[1] = half[1] if turns else np.nan
+        inertia = np.array([_inertia(model, fit, run) for run in own])
+        weight = np.array([_jolt(run) for run in own])
+        mass = float(inertia @ weight / max(float(weight.sum()), 1e-9))
+        mass_half = _spread_of_mean(inertia, weight)
+        first = found[0] if found else None
+        found.append(
+            TerrainEstimate(
+                name=name,
+                runs=len(own),
+                rolling_W_s_m=_estimate(rolling, half[0], "W s/m", None),
+                turning_W_s_rad=_estimate(turning, half[1], "W s/rad", None),
+                stationary_W=stationary,
+                inertia_kg=_estimate(mass, mass_half, "kg", model.effective_mass_kg),
+                multiplier=_ratio(rolling, first.rolling_W_s_m if first else None),
+                turning_multiplier=_ratio(
+                    turning, first.turning_W_s_rad if first else None
+                ),
+                energy_spread=fit.spread[name],
+            )
+        )
+    return tuple(found)
+
+
+def _secants(
+    model: RobotModel, law: PowerLaw, parameters: np.ndarray
+) -> tuple[float, float]:
+    """Return power over speed at cruise, and over yaw rate in the planned turn."""
+    limits = model.limits.scaled(model.planning_share)
+    speed = limits.v_max_m_s
+    car = model.motion_model == "car"
+    turn_speed = speed if car else 0.0
+    rate = limits.w_max
+    if car:
+        rate = speed * np.tan(limits.w_max) / model.wheelbase_m
+    rest, cruise, before, turning = (
+        law_power_W(law, parameters, v, w)
+        for v, w in ((0.0, 0.0), (speed, 0.0), (turn_speed, 0.0), (turn_speed, rate))
+    )
+    return (cruise - rest) / speed, max(turning - before, 1e-6) / float(rate)
+
+
+def law_power_W(
+    law: PowerLaw, parameters: np.ndarray, speed_m_s: float, yaw_rate_rad_s: float
+) -> float:
+    """Return the power of steady motion by a law."""
+    run = LoggedRun(
+        file="",
+        terrain="",
+        time_s=np.array([0.0]),
+        speed_m_s=np.array([speed_m_s]),
+        yaw_rate_rad_s=np.array([yaw_rate_rad_s]),
+        power_W=np.zeros(1),
+    )
+    return float(law.features(run)[0] @ law.coefficients(parameters))
+
+
+def _jackknife(values: np.ndarray) -> np.ndarray:
+    """Return half-widths of the confidence intervals of a mean of runs, shape (k,)."""
+    runs = len(values)
+    if runs < 2:
+        return np.full(values.shape[1], np.nan)
+    variance = (runs - 1) / runs * ((values - values.mean(axis=0)) ** 2).sum(axis=0)
+    quantile = float(stdtrit(runs - 1, 0.5 + 0.5 * CONFIDENCE))
+    return np.asarray(quantile * np.sqrt(variance))
+
+
+def _excitation(runs: Sequence[LoggedRun]) -> tuple[bool, bool]:
+    """Return whether a robot drove, and whether it turned, in enough of the time."""
+    time_s = sum(float(run.weight_s.sum()) for run in runs)
+    drives_s = sum(float(run.weight_s @ (np.abs(run.speed_m_s) > 0.05)) for run in runs)
+    turns_s = sum(
+        float(run.weight_s @ (np.abs(run.yaw_rate_rad_s) > 0.03)) for run in runs
+    )
+    return drives_s > EXCITED_SHARE * time_s, turns_s > EXCITED_SHARE * time_s
+
+
+def _acceleration_power(run: LoggedRun) -> np.ndarray:
+    """Return v dv/dt of each row [m^2/s^3]: power of inertia per kg, shape (n,)."""
+    return np.asarray(np.gradient(0.5 * run.speed_m_s**2, run.time_s))
+
+
+def _jolt(run: LoggedRun) -> float:
+    return float(run.weight_s @ _acceleration_power(run) ** 2)
+
+
+def _inertia(model: RobotModel, fit: LawFit, run: LoggedRun) -> float:
+    """Return the mass that the law's error over accelerations shows in a run [kg]."""
+    law = fit.law
+    error_W = run.power_W - law.features(run) @ law.coefficients(
+        fit.parameters[run.terrain]
+    )
+    felt = float((run.weight_s * error_W) @ _acceleration_power(run))
+    return model.drive_efficiency * felt / max(_jolt(run), 1e-12)
+
+
+def _spread_of_mean(values: np.ndarray, weight: np.ndarray) -> float:
+    """Return the half-width of the confidence interval of a weighted mean."""
+    effective = float(weight.sum() ** 2 / max(float((weight**2).sum()), 1e-12))
+    if effective <= 1.5:
+        return float("nan")
+    mean = float(values @ weight / weight.sum())
+    variance = float(weight @ (values - mean) ** 2 / weight.sum()) / (effective - 1.0)
+    return float(stdtrit(effective - 1.0, 0.5 + 0.5 * CONFIDENCE)) * float(
+        np.sqrt(variance)
+    )
+
+
+def _ratio(value: float, first: Estimate | None) -> float:
+    if first is None:
+        return 1.0
+    return max(value / max(first.value, 1e-9), 1e-3)
+
+
+def _estimate(
+    value: float, half_width: float, unit: str, was: float | None
+) -> Estimate:
+    return Estimate(
+        value=value, half_width=float(half_width), unit=unit, was=was, key=None
+    )
