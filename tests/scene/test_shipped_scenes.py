@@ -32,6 +32,7 @@ TABLE = {
     "mixed": (3, 10, 3, 2, 70),
     "diffdrive": (2, 6, 2, 1, 45),
     "hills": (2, 8, 2, 3, 95),
+    "boreal": (2, 5, 1, 5, 80),
 }
 QUICK = pytest.mark.quick("scene1", "scene4", "quickstart", "mixed", "hills")
 MARGIN_M = 0.1
@@ -170,9 +171,12 @@ def cheapest_mission(name: str) -> tuple[list[list[int]], list[float]]:
 
 
 @QUICK
-@pytest.mark.parametrize("name", TABLE)
+@pytest.mark.parametrize("name", [name for name in TABLE if name != "boreal"])
 def test_the_energy_limit_binds(name: str) -> None:
-    """The cheapest assignment that ignores energy overdraws some battery."""
+    """The cheapest assignment that ignores energy overdraws some battery.
+
+    But for `boreal`, which is about what grounds cost, not about running out.
+    """
     _, lengths_m = cheapest_mission(name)
     # More than the grid can err.
     assert max(lengths_m) > 1.03 * usable_m(load_scene(name))
