@@ -17,7 +17,15 @@ import numpy as np
 
 from mrmg import seeding
 from mrmg.planning.attempt import Attempt, Request
-from mrmg.planning.drafting.drafting import LEAST_SPARE, draftable, drafts, path_cost_J
+from mrmg.planning.drafting.coordination.coordination import ROUNDS, coordinated
+from mrmg.planning.drafting.coordination.tasks import no_path
+from mrmg.planning.drafting.drafting import (
+    LEAST_SPARE,
+    draftable,
+    drafts,
+    path_cost_J,
+    whole_tour,
+)
 from mrmg.planning.drafting.refine import refine
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.problem.problem import Problem
@@ -116,7 +124,9 @@ class Schedule:
         shares = TREE_SOC_SHARES[number % len(TREE_SOC_SHARES)]
         return Schedule(
             time_share=TIME_SHARES[number % len(TIME_SHARES)],
-            followed=tuple(followed) if follows(problem, params) else (),
+            followed=tuple(followed)
+            if follows(problem, params) and not problem.steered_home.any()
+            else (),
             tree_margin=params.route_margin * TREE_MARGINS[number % len(TREE_MARGINS)],
             tree_soc_margins=tuple(share * params.spare for share in shares),
         )
@@ -165,12 +175,38 @@ def _tries(problem: Problem, request: Request, schedule: Schedule) -> Iterator[A
     """Yield what came of each entry of a schedule."""
     for soc_margin, draws in schedule.followed:
         yield follow_paths(problem.with_soc_margin(soc_margin), request, draws)
+    if problem.mission.targets.goals == 0 or problem.steered_home.any():
+        yield search_motions(problem, request)
     for soc_margin in schedule.tree_soc_margins:
         kept = problem.with_soc_margin(soc_margin).with_margin(schedule.tree_margin)
         grown = follow_tree(kept, request)
         yield grown
         if grown.tours_found:
             return
+
+
+def search_motions(problem: Problem, request: Request) -> Attempt:
+    """Search for motions along tours by priorities."""
+    began = time.perf_counter()
+    robots = range(len(problem.start))
+    routing = Routing(tours=((),) * len(robots), cost_J=0.0)
+    if problem.mission.targets.goals:
+        routing = request.tours(problem)
+    routing_s = time.perf_counter() - began
+    if not routing.feasible or request.halted:
+        return Attempt(routing_s=routing_s, tours_found=routing.feasible)
+    trajectories = coordinated(
+        problem,
+        [whole_tour(problem, routing, r) for r in robots],
+        [no_path(problem, r) for r in robots],
+        request.halt,
+        seed=request.stream_seed("coordination"),
+        rounds=ROUNDS[min(request.number, len(ROUNDS) - 1) :][:1],
+    )
+    tours = problem.visits(routing.tours)
+    plan = request.plan(problem, trajectories, tours) if trajectories else None
+    plans = [plan] if plan is not None else []
+    return Attempt(plans, (), routing_s, {"coordinated": 1}, True)
 
 
 def follow_tree(problem: Problem, request: Request) -> Attempt:

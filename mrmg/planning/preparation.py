@@ -19,6 +19,8 @@ from mrmg.planning.bound.bound import Relaxation, lower_bound_J
 from mrmg.planning.bound.exact_tours import exact_routing
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.bounding import bounds_of
+from mrmg.planning.drafting.coordination.coordination import coordinated
+from mrmg.planning.drafting.coordination.tasks import no_path
 from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.guided_tree.strategy import guided_tree
 from mrmg.planning.parameters import (
@@ -71,6 +73,7 @@ def load_kernels(planner: str, *, trees: bool) -> None:
         guide_smallest()
     elif planner == PATH_FOLLOWING:
         follow_smallest()
+        search_smallest()
         if trees:
             _plan_smallest(path_following, replace(SMALL_PARAMS, drafts=False))
 
@@ -81,6 +84,14 @@ def grow_smallest() -> None:
     routing = Routing(tours=((0,),), cost_J=0.0)
     growth = grow_tree(problem, SMALL_PARAMS, routing, 0, np.zeros(1, np.bool_))
     assert growth.solved, "the smallest mission has a plan, or not all is compiled"
+
+
+def search_smallest() -> None:
+    """Search for motions in the smallest mission."""
+    _, problem = _smallest_mission()
+    halt = np.zeros(1, np.bool_)
+    found = coordinated(problem, [[0]], [no_path(problem, 0)], halt)
+    assert found, "the smallest mission has a plan, or not all is compiled"
 
 
 def follow_smallest() -> None:
@@ -108,7 +119,7 @@ def bound_smallest() -> None:
 
 
 _CALLS = {
-    PATH_FOLLOWING: (grow_smallest, follow_smallest, bound_smallest),
+    PATH_FOLLOWING: (grow_smallest, search_smallest, follow_smallest, bound_smallest),
     GUIDED_TREE: (guide_smallest, bound_smallest),
 }
 """What compiles all kernels of a part, the longest first; the same kernels in two of

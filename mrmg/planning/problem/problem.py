@@ -11,6 +11,7 @@ import numpy as np
 from mrmg import seeding
 from mrmg.compilation import by_reference
 from mrmg.energy.model import CONSUMERS_W
+from mrmg.motion._kernels import CAR
 from mrmg.motion._kernels import step as motion_step
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
@@ -84,6 +85,16 @@ class Problem:
     def preference(self) -> Preference:
         """What plans are compared by."""
         return Preference.of(self.scene)
+
+    @property
+    def steered_home(self) -> np.ndarray:
+        """Whether robots are cars with a heading to end with, shape (R,).
+
+        Their paths lead to their last goals; motions from there are searched for.
+        """
+        targets = self.mission.targets
+        aims = (targets.finish >= 0) & (targets.tolerance < np.pi)
+        return np.asarray(aims & (self.mission.fleet["model"] == CAR))
 
     def trajectory(self, robot: int, control: np.ndarray) -> Trajectory:
         """Return the motion of a robot from its start under controls.

@@ -208,9 +208,6 @@ class Assembly:
         if isinstance(region, list):
             self.faults += region
             return None
-        if wanted.heading is not None and model.motion_model == "car":
-            message = "a car cannot be given one; leave it out"
-            self._fault(f"{path}.heading", message)
         return Finish(
             region=region,
             heading_rad=wanted.heading,

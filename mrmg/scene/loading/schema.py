@@ -62,8 +62,7 @@ Details:
   measures it of a loaded or worn one; metres in `battery` stay those of the model.
 - `finish` says where a robot must be at rest when the mission ends: `start` (within 1 m
   of where it started), or one of circle, polygon, with `heading` (and
-  `heading_tolerance`, default 0.2) if it matters. Robots that turn on the spot can be
-  given a heading, cars cannot.
+  `heading_tolerance`, default 0.2) if it matters.
 - `model` is the name of a shipped model, or a folder (with a `/` in it), relative to
   the scene file, that holds a `robot.yaml`; or either with values other than in its
   `robot.yaml`: `{like: car, rolling_coefficient: 0.08}`.

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import mrmg
-from mrmg.errors import SceneError
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.plans import PlanStatus
 from mrmg.scene.types import Scene
@@ -77,9 +76,15 @@ def test_a_plan_that_ends_elsewhere_is_refused(yard: MakeScene) -> None:
     assert [violation.kind.value for violation in verdict.violations] == ["finish"]
 
 
-def test_a_car_cannot_be_given_a_heading(yard: MakeScene) -> None:
-    with pytest.raises(SceneError, match=r"heading \(r1\): a car cannot be given one"):
-        yard(robots=[robot("r1", 4, 10, finish=disc(9, 9, 1, heading=1.0))])
+def test_cars_end_with_their_headings(yard: MakeScene) -> None:
+    ways = [(pi, 20.0, 14.0), (-0.5 * pi, 12.0, 6.0)]
+    robots = [
+        robot(f"r{i}", 4, 5 + 9 * i, finish=disc(x, y, 0.6, heading=yaw))
+        for i, (yaw, x, y) in enumerate(ways)
+    ]
+    plan = planned(yard(goals=[], robots=robots))
+    for trajectory, (yaw, _, _) in zip(plan.trajectories, ways, strict=True):
+        assert abs(remainder(trajectory.state[-1, 2] - yaw, tau)) <= 0.2
 
 
 def test_a_battery_must_last_to_the_finish(yard: MakeScene) -> None:

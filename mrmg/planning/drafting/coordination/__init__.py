@@ -1,0 +1,1 @@
+"""Coordination: priority-based search over kinodynamic motions in space and time."""

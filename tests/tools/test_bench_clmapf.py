@@ -1,0 +1,66 @@
+"""The bench of car-like robots, and the generator of traffic."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import bench_clmapf
+import bench_kinodynamic
+import generate_traffic
+import pytest
+import yaml
+
+FREE = """\
+agents:
+  - {start: [10, 10, 0], name: agent0, goal: [30, 24, 1.57]}
+  - {start: [30, 10, 3.14], name: agent1, goal: [12, 14, 3.14]}
+map:
+  dimensions: [40, 40]
+  obstacles:
+    - [20, 30]
+"""
+
+
+def test_files_are_planned_and_those_with_overlaps_listed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "map_40by40_obst1_agents2_ex1.yaml").write_text(FREE)
+    onto = FREE.replace("[20, 30]", "[12.5, 10]")  # 0.3 m into the first car's front
+    (tmp_path / "map_40by40_obst1_agents2_ex2.yaml").write_text(onto)
+    document = tmp_path / "bench.json"
+    arguments = ["--folder", str(tmp_path), "--seeds", "0", "--json", str(document)]
+    monkeypatch.setattr(sys, "argv", ["bench", *arguments])
+    assert bench_clmapf.main() == 0
+    assert "overlaps a disc where it starts: map_40by40_obst1_agents2_ex2" in (
+        capsys.readouterr().out
+    )
+    written = json.loads(document.read_text())
+    (line,) = written["rows"]
+    assert (line["cell"], line["solved"], line["runs"]) == (
+        "40by40_obst1_agents2",
+        1,
+        1,
+    )
+    assert written["overlapping"] == [{"file": "map_40by40_obst1_agents2_ex2"}]
+
+
+def test_yaw_is_clockwise_in_the_files() -> None:
+    west, south, east, north = bench_clmapf.body([5.0, 5.0, 1.5708]).bounds
+    assert [west, south, east, north] == pytest.approx([4, 3, 6, 6], abs=1e-3)
+
+
+def test_traffic_is_the_same_for_the_same_seed_and_readable(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for folder in ("first", "second"):
+        arguments = [str(tmp_path / folder), "--seeds", "3"]
+        monkeypatch.setattr(sys, "argv", ["generate", *arguments])
+        assert generate_traffic.main() == 0
+    files = sorted((tmp_path / "first").iterdir())
+    assert len(files) == len(generate_traffic.CLASSES)
+    for path in files:
+        assert path.read_bytes() == (tmp_path / "second" / path.name).read_bytes()
+        scene = bench_kinodynamic.benchmark_scene(path, tmp_path)
+        assert len(scene.robots) == len(yaml.safe_load(path.read_text())["robots"])

@@ -1,0 +1,217 @@
+"""Write seeded traffic for bench_kinodynamic: dense yards, swaps, windows and alcoves.
+
+Robots that cannot but get in each other's way, in the format of the outside benchmarks,
+so that planners can be tried on cases that nobody has seen. The same seed gives the
+same file.
+
+- yard6, yard7: second-order cars of 1 x 1 m among nine boxes on 10 x 10 m.
+- swap2, swap3, swap4: first-order unicycles around a point go to the opposite place.
+- window: two first-order unicycles change rooms through a window 0.6 to 0.8 m wide.
+- alcove: two first-order unicycles change ends of a corridor too narrow to pass in; one
+  of them can wait in an alcove.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Sequence
+from math import cos, pi, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+import yaml
+from protocol import run, seed_range
+from scipy import ndimage
+from shapely import affinity
+
+Document = dict[str, Any]
+
+YARD_M = 10.0
+"""Side of a yard."""
+
+BOXES = 9
+"""Boxes in a yard."""
+
+BOX_M = (0.5, 1.4)
+"""Sides of boxes, least and largest."""
+
+APART_M = 0.4
+"""Distance of cars from boxes and from each other, where they start and must end."""
+
+LANE_M = 0.75
+"""Radius of a disc that gets from everywhere to everywhere in a yard."""
+
+CELL_M = 0.1
+"""Side of the cells by which that is found."""
+
+JITTER_M, JITTER_RAD = 0.15, 0.3
+"""How far swaps are off the regular polygon."""
+
+
+def main() -> int:
+    """Write the files."""
+    parser = argparse.ArgumentParser(description=__doc__, prog="tools/generate_traffic")
+    parser.add_argument("folder", type=Path, help="receives CLASS_SEED.yaml")
+    parser.add_argument("--only", default="", help="part of the class's name")
+    parser.add_argument(
+        "--seeds", type=seed_range, default="0-4", help="first-last, default 0-4"
+    )
+    options = parser.parse_args()
+    makers = {name: make for name, make in CLASSES.items() if options.only in name}
+    if not makers:
+        print(f"no class of {', '.join(CLASSES)} is named so", file=sys.stderr)
+        return 1
+    options.folder.mkdir(parents=True, exist_ok=True)
+    for number, (name, make) in enumerate(CLASSES.items()):
+        for seed in options.seeds if name in makers else ():
+            document = make(np.random.default_rng((number, seed)))
+            path = options.folder / f"{name}_{seed}.yaml"
+            path.write_text(yaml.safe_dump(document))
+            print(path)
+    return 0
+
+
+def world(width: float, height: float, boxes: Sequence[Sequence[float]]) -> Document:
+    """Return an environment; a box is (x, y, length, width)."""
+    obstacles = [
+        {"type": "box", "center": [x, y], "size": [dx, dy]} for x, y, dx, dy in boxes
+    ]
+    return {"min": [0, 0], "max": [width, height], "obstacles": rounded(obstacles)}
+
+
+def rounded(value: Any) -> Any:
+    """Return a document with plain numbers of three decimals."""
+    if isinstance(value, dict):
+        return {key: rounded(one) for key, one in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [rounded(one) for one in value]
+    return round(float(value), 3) if isinstance(value, (float, np.floating)) else value
+
+
+def unicycle(start: Sequence[float], goal: Sequence[float]) -> Document:
+    """Return a first-order unicycle."""
+    return rounded(
+        {"type": "unicycle_first_order_0", "start": list(start), "goal": list(goal)}
+    )
+
+
+def yard(rng: np.random.Generator, cars: int) -> Document:
+    """Return a dense yard; drawn anew until there is room for everybody."""
+    while True:
+        sides = rng.uniform(*BOX_M, (BOXES, 2))
+        center = rng.uniform(0.5, YARD_M - 0.5, (BOXES, 2))
+        boxes = np.hstack([center, sides])
+        shapes = shapely.union_all([box_of(box) for box in boxes])
+        lanes = free_lanes(shapes)
+        starts = drawn_poses(rng, cars, shapes, lanes)
+        goals = drawn_poses(rng, cars, shapes, lanes)
+        if len(starts) == len(goals) == cars:
+            robots = [
+                {
+                    "type": "kcbs_second_order_car",
+                    "size": [1.0, 1.0],
+                    "start": [x, y, 0.0, 0.0, theta],
+                    "goal": list(goal[:2]),
+                }
+                for (x, y, theta), goal in zip(starts, goals, strict=True)
+            ]
+            place = world(YARD_M, YARD_M, boxes.tolist())
+            return {"environment": place, "robots": rounded(robots)}
+
+
+def box_of(box: Sequence[float]) -> shapely.Polygon:
+    """Return a box's shape."""
+    x, y, dx, dy = box
+    return shapely.box(x - dx / 2, y - dy / 2, x + dx / 2, y + dy / 2)
+
+
+def free_lanes(obstacles: shapely.Geometry) -> np.ndarray:
+    """Return the cells in the largest part that a disc of LANE_M gets around in."""
+    at = np.arange(0.5 * CELL_M, YARD_M, CELL_M)
+    x, y = np.meshgrid(at, at)
+    free = shapely.distance(shapely.points(x, y), obstacles) > LANE_M
+    part, _ = ndimage.label(free)
+    sizes = np.bincount(part.ravel())
+    sizes[0] = 0
+    return np.asarray(part == sizes.argmax())
+
+
+def drawn_poses(
+    rng: np.random.Generator,
+    cars: int,
+    obstacles: shapely.Geometry,
+    lanes: np.ndarray,
+) -> list[tuple[float, float, float]]:
+    """Return poses with room around each; fewer if there is too little."""
+    poses: list[tuple[float, float, float]] = []
+    taken = obstacles
+    cells = np.argwhere(lanes)
+    for row, column in rng.permutation(cells)[:200]:
+        x, y = (column + 0.5) * CELL_M, (row + 0.5) * CELL_M
+        theta = float(rng.uniform(-pi, pi))
+        if not 0.6 < min(x, y) <= max(x, y) < YARD_M - 0.6:
+            continue
+        car = affinity.translate(
+            affinity.rotate(box_of((0.0, 0.0, 1.0, 1.0)), theta, use_radians=True), x, y
+        )
+        if car.distance(taken) > APART_M and len(poses) < cars:
+            poses.append((x, y, theta))
+            taken = taken.union(car)
+    return poses
+
+
+def swap(rng: np.random.Generator, robots: int) -> Document:
+    """Return unicycles on a circle, each with the opposite place as its goal."""
+    turn = rng.uniform(0.0, 2.0 * pi)
+    placed = []
+    for r in range(robots):
+        angle = turn + 2.0 * pi * r / robots + rng.uniform(-JITTER_RAD, JITTER_RAD) / 2
+        off = rng.uniform(-JITTER_M, JITTER_M, 2)
+        x, y = 2.5 + 1.5 * cos(angle) + off[0], 2.5 + 1.5 * sin(angle) + off[1]
+        facing = angle + pi + rng.uniform(-JITTER_RAD, JITTER_RAD)
+        goal = (5.0 - x, 5.0 - y, facing)
+        placed.append(unicycle((x, y, facing), goal))
+    return {"environment": world(5.0, 5.0, []), "robots": placed}
+
+
+def window(rng: np.random.Generator) -> Document:
+    """Return two unicycles in two rooms that a window joins."""
+    gap, middle = rng.uniform(0.6, 0.8), rng.uniform(1.2, 2.8)
+    low, high = middle - gap / 2, middle + gap / 2
+    boxes = [(3.0, low / 2, 0.3, low), (3.0, (4.0 + high) / 2, 0.3, 4.0 - high)]
+    left = (rng.uniform(0.8, 1.6), rng.uniform(0.8, 3.2), rng.uniform(-pi, pi))
+    right = (rng.uniform(4.4, 5.2), rng.uniform(0.8, 3.2), rng.uniform(-pi, pi))
+    robots = [unicycle(left, right), unicycle(right, left)]
+    return {"environment": world(6.0, 4.0, boxes), "robots": robots}
+
+
+def alcove(rng: np.random.Generator) -> Document:
+    """Return two unicycles at the ends of a corridor with an alcove."""
+    corridor, deep, wide = 0.8, rng.uniform(0.8, 1.0), rng.uniform(0.9, 1.2)
+    at = rng.uniform(2.0, 4.0)
+    low, high = at - wide / 2, at + wide / 2
+    y = corridor + deep / 2
+    boxes = [(low / 2, y, low, deep), ((6.0 + high) / 2, y, 6.0 - high, deep)]
+    left, right = (0.6, corridor / 2, 0.0), (5.4, corridor / 2, pi)
+    robots = [unicycle(left, (5.4, corridor / 2, 0.0))]
+    robots.append(unicycle(right, (0.6, corridor / 2, pi)))
+    return {"environment": world(6.0, corridor + deep, boxes), "robots": robots}
+
+
+CLASSES: dict[str, Callable[[np.random.Generator], Document]] = {
+    "yard6": lambda rng: yard(rng, 6),
+    "yard7": lambda rng: yard(rng, 7),
+    "swap2": lambda rng: swap(rng, 2),
+    "swap3": lambda rng: swap(rng, 3),
+    "swap4": lambda rng: swap(rng, 4),
+    "window": window,
+    "alcove": alcove,
+}
+"""What makes a file of each class."""
+
+
+if __name__ == "__main__":
+    run(main)
