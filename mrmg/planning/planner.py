@@ -26,6 +26,7 @@ from mrmg.planning.planners import Planner
 from mrmg.planning.preference import Preference
 from mrmg.planning.preparation import compile_kernels, load_bounds, load_kernels
 from mrmg.planning.problem.problem import Problem, state_mission
+from mrmg.planning.roadmap.fleet import motion_addresses
 from mrmg.planning.routers import Router
 from mrmg.planning.search import GRACE_S, OnImprovement, Progress, Search
 from mrmg.planning.statistics import UNKNOWN, Statistics
@@ -151,6 +152,8 @@ class _Planning:
         own = Frame.of(self.scene).scene(self.scene)
         bounding = self._bounding(own) if with_bound else None
         load_kernels(self.params.planner, trees=not self.params.drafts)
+        for robot in own.robots:
+            motion_addresses(robot.model)
         self.statistics.begin()
         proofs = Proofs(own, self.params.dt_s, self.request.halt)
         problem = self._in_time(

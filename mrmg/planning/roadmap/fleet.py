@@ -12,6 +12,7 @@ from mrmg.motion._kernels import MODEL_ID, USER
 from mrmg.motion.user_motion import motion_of
 from mrmg.planning.roadmap._fleet_kernels import FLEET, MOST_CORNERS, Spaces
 from mrmg.planning.roadmap.slopes import SlopeCost
+from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Robot, Scene
 from mrmg.world.world import World
 
@@ -89,6 +90,20 @@ def travel_classes(
     return distinct, [distinct.index(key) for key in keys]
 
 
+def motion_addresses(model: RobotModel) -> tuple[int, int]:
+    """Return the addresses of a user's compiled step and steer, zeros if it has none.
+
+    They are compiled at the first call.
+
+    Raises:
+        SceneError: if that motion model cannot be used.
+    """
+    if model.motion_model in MODEL_ID:
+        return 0, 0
+    limits = model.limits.scaled(model.planning_share)
+    return motion_of(model).compiled(limits.as_tuple())
+
+
 def fleet_array(
     scene: Scene, world: World, *, obstacle_margin_m: float, robot_margin_m: float
 ) -> np.ndarray:
@@ -116,9 +131,7 @@ def fleet_array(
         middle = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
         one = fleet[r]
         one["model"] = MODEL_ID.get(model.motion_model, USER)
-        if model.motion_model not in MODEL_ID:
-            motion = motion_of(model)
-            one["step_at"], one["steer_at"] = motion.compiled(limits.as_tuple())
+        one["step_at"], one["steer_at"] = motion_addresses(model)
         one["wheelbase"] = model.wheelbase_m
         one["track"] = model.track_m
         one["lead"] = model.center_of_mass_m
