@@ -78,7 +78,7 @@ class WorkMeter:
         self._velocity.rows[0] = self._data.qvel
 
     def start(self, steps: int) -> None:
-        """Prepare for `steps` physics steps under the present friction losses."""
+        """Prepare for at most 50 physics steps under the present friction losses."""
         if self._used + steps > _BATCH_STEPS:
             self._sum_losses()
         self._begun = self._used
