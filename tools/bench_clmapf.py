@@ -47,6 +47,8 @@ from protocol import Row, Trials, add_file_options, run, seed_range, write_docum
 import mrmg
 from mrmg import storage
 from mrmg.planning import PlannerParams, plan_mission
+from mrmg.planning.parameters import PATH_FOLLOWING
+from mrmg.planning.preparation import compile_kernels, load_kernels
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 
@@ -115,6 +117,8 @@ def main() -> int:
     for name in overlapping:
         print(f"not counted, a car overlaps a disc where it starts: {name}")
     counted = [path for path in files if path.stem not in overlapping]
+    compile_kernels(PATH_FOLLOWING)
+    load_kernels(PATH_FOLLOWING, trees=True)
     trials = Trials(options.output, limit=options.limit)
     with tempfile.TemporaryDirectory() as folder:
         model = write_model(Path(folder))
