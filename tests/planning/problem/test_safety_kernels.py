@@ -73,7 +73,9 @@ def crowd(yard: MakeScene, state: MakeProblem) -> Callable[..., Problem]:
 def committed(problem: Problem) -> Commitment:
     """Return the commitment of robots that stand at their start."""
     fleet = problem.mission.fleet
-    commitment = new_commitment(fleet, problem.mission.gates, DT_S)
+    # In Python: kernels may not return to it what they are handed by reference.
+    make = getattr(new_commitment, "py_func", new_commitment)
+    commitment = make(fleet.view(np.recarray), problem.mission.gates, DT_S)
     for r in range(len(fleet)):
         write_braking(fleet, r, problem.start[r], DT_S, commitment, 0)
     return commitment
