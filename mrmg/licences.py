@@ -63,6 +63,8 @@ def _requirements(package: str, extras: set[str]) -> Iterator[Requirement]:
     except PackageNotFoundError:
         return
     for requirement in map(Requirement, lines):
+        if requirement.name == package:  # an extra that names another
+            continue
         marker = requirement.marker
         if marker is None:
             if "" in extras:

@@ -18,7 +18,7 @@ from mrmg.runs.reproduction import Reproduction, reproduce
 from mrmg.runs.steps import taken_up
 from mrmg.simulation.log import ExecutionLog
 
-SCENE = Path(__file__).parent / "scenes" / "one_goal.yaml"
+SCENE = Path(__file__).parents[1] / "scenes" / "one_goal.yaml"
 
 
 @pytest.fixture(scope="module")

@@ -114,7 +114,7 @@ def test_verbs_refuse_an_edited_run_folder(
 
 def test_a_run_stores_the_scene_that_was_changed(tmp_path: Path) -> None:
     """The old scene is never stored, neither is a mission of it called done."""
-    scene = load_scene(Path(__file__).parent / "scenes" / "one_goal.yaml")
+    scene = load_scene(Path(__file__).parents[1] / "scenes" / "one_goal.yaml")
     late = replace(scene, time_limit_s=1.0)
     result = mrmg.run(late, out=tmp_path / "run", video=None)
     assert load_scene(tmp_path / "run" / "scene.yaml") == late
@@ -140,7 +140,7 @@ def test_a_robot_no_file_can_state_is_refused_before_any_folder(
 
 
 def test_a_robot_changed_in_memory_is_stored_as_it_was_driven(tmp_path: Path) -> None:
-    scene = load_scene(Path(__file__).parent / "scenes" / "one_goal.yaml")
+    scene = load_scene(Path(__file__).parents[1] / "scenes" / "one_goal.yaml")
     (robot,) = scene.robots
     model = replace(robot.model, drive_efficiency=0.7, regeneration_efficiency=0.2)
     changed = replace(scene, robots=(replace(robot, model=model),))

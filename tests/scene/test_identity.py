@@ -22,6 +22,7 @@ from mrmg.scene.loading import (
     scene_from_document,
 )
 from mrmg.scene.loading.yaml_text import parse_yaml
+from mrmg.scene.motor import Motor
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Battery, Goal, Region, Robot, Scene
 
@@ -124,13 +125,29 @@ def leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         yield path
 
 
+MISSING: dict[str, Any] = {
+    "blocks": ("r1",),
+    "heading_rad": 0.3,
+    "skid_track_m": 0.7,
+    "motor": Motor(
+        torque_constant_Nm_A=0.05,
+        back_emf_constant_V_s=0.05,
+        resistance_Ohm=0.3,
+        gear_ratio=40.0,
+        gear_efficiency=0.8,
+        no_load_current_A=1.0,
+    ),
+}
+"""Values of what may be left out."""
+
+
 def changed(value: Any, path: tuple[Any, ...]) -> Any:
     """Return a value with something at a path changed."""
     if not path:
         return other(value)
     first, *rest = path
     if not rest and getattr(value, str(first), 0) is None:
-        return replace(value, **{first: {"blocks": ("r1",), "heading_rad": 0.3}[first]})
+        return replace(value, **{first: MISSING[str(first)]})
     if first == "drop":
         return value[:-1]
     if isinstance(first, int):
@@ -174,10 +191,13 @@ REFUSED = {
     # Of another robot than the MJCF describes:
     "center_of_mass_m",
     "mass_kg",
+    "skid_track_m",
     "track_m",
     "wheel_count",
     "wheel_radius_m",
     "wheelbase_m",
+    # A whole of its own, which the robots at hand have not:
+    "motor",
 }
 """Changed alone these make no valid scene, or none that a file can state."""
 
