@@ -65,7 +65,7 @@ def test_licences_of_all_dependencies_are_listed(
     found = {each["package"]: each for each in json.loads(capsys.readouterr().out)}
     assert {*doctor.required_packages()} <= {*found}
     assert "LGPL" in found["casadi"]["licence"]
-    assert found["llvmlite"]["required_by"] == ["numba"]
+    assert "numba" in found["llvmlite"]["required_by"]
     assert found["viser"]["extra"] == "view"
     assert all(each["licence"] for each in found.values() if each["version"])
     assert not {"pytest", "ruff"} & {*found}
