@@ -25,22 +25,15 @@ LONG_MODULES = {
     "tracking": 353,
     "_tree_kernels": 370,
     "motion_tree": 353,
-    "assembly": 363,
-    "schema": 366,
-    "types": 365,
 }
 """Modules that are still too long, with their lines; the list may only shrink."""
 
 LONG_FUNCTIONS = {
-    "populate.populate": 61,
-    "parser._add_scene": 71,
-    "pipeline.run": 71,
     "_tracking_kernels.drive": 104,
     "planner._planned": 66,
     "routing.routing_arrays": 65,
     "_expansion_kernels.expand": 72,
     "_rerouting_kernels.route_from": 62,
-    "audit.audit": 63,
 }
 """Functions that are still too long, with their lines; the list may only shrink."""
 
@@ -56,9 +49,6 @@ WIDE_FUNCTIONS = {
     "_expansion_kernels.choose_motion": 9,
     "_expansion_kernels.expand": 13,
     "_maneuver_kernels.best_sequel": 9,
-    "gif.render_gif": 10,
-    "video.render_video": 12,
-    "video_options.video_options": 10,
 }
 """Functions of too many parameters, with their number; the list may only shrink."""
 

@@ -233,6 +233,10 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     _add_scene_out(imported)
     imported.set_defaults(command=scene_commands.import_)
 
+    _add_populate(acts)
+
+
+def _add_populate(acts: _Verbs) -> None:  # type: ignore[type-arg]
     populate = acts.add_parser("populate", help="place robots, goals and stations")
     populate.add_argument("scene", metavar="SCENE")
     for name, count in (("robots", 2), ("goals", 14), ("stations", 5)):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Self
 
 from mrmg import extensions
@@ -29,56 +30,34 @@ DISTURBANCE_HELP = (
 )
 
 
+_shown = partial(option, verbs=("render",))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VideoArguments(Checked):
     """How the video is made."""
 
-    view: str = option(
-        "top", "what is shown", verbs=("render",), choices=("top", "chase", "split")
-    )
-    speed: float | None = option(
+    view: str = _shown("top", "what is shown", choices=("top", "chase", "split"))
+    speed: float | None = _shown(
         None,
         "simulated seconds shown per second; default fits the mission to half a minute",
-        verbs=("render",),
         read=values.positive,
         metavar="FACTOR",
     )
-    size: tuple[int, int] = option(
-        (1280, 720),
-        "in pixels, such as 1280x720",
-        verbs=("render",),
-        read=values.size,
-        metavar="WxH",
+    size: tuple[int, int] = _shown(
+        (1280, 720), "in pixels, such as 1280x720", read=values.size, metavar="WxH"
     )
-    fps: int = option(
-        30, "frames per second", verbs=("render",), read=values.count, metavar="N"
+    fps: int = _shown(30, "frames per second", read=values.count, metavar="N")
+    robot: str | None = _shown(
+        None, "followed by the chase camera; default the first", metavar="ID"
     )
-    robot: str | None = option(
-        None,
-        "followed by the chase camera; default the first",
-        verbs=("render",),
-        metavar="ID",
+    from_s: float = _shown(
+        0.0, "mission time of the first frame", read=values.time, metavar="SECONDS"
     )
-    from_s: float = option(
-        0.0,
-        "mission time of the first frame",
-        verbs=("render",),
-        read=values.time,
-        metavar="SECONDS",
+    to_s: float | None = _shown(
+        None, "mission time of the last frame", read=values.time, metavar="SECONDS"
     )
-    to_s: float | None = option(
-        None,
-        "mission time of the last frame",
-        verbs=("render",),
-        read=values.time,
-        metavar="SECONDS",
-    )
-    gif: bool = option(
-        False,
-        "make a GIF of less than 5 MB, too",
-        verbs=("render",),
-        read=values.switch,
-    )
+    gif: bool = _shown(False, "make a GIF of less than 5 MB, too", read=values.switch)
 
 
 DEFAULT_VIDEO = VideoArguments()

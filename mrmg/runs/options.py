@@ -6,14 +6,19 @@ command line, the keywords of the Python API and the records of runs are made fr
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, field, fields
-from typing import Any
+from typing import Any, TypeVar
 
 from mrmg.errors import UsageError
 from mrmg.runs import argument_values as values
 
 _OPTION = "option"
+_MARK = "`:\n"
+"""Ends what a docstring says of keywords that `documented` lists."""
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 _VERBS = {
     "plan": ("run", "plan"),
     "drive": ("run", "execute"),
@@ -141,3 +146,29 @@ class Checked:
             other = groups.setdefault(option.group or option.name, option.name)
             if other != option.name:
                 raise UsageError(f"{option.name} is not allowed with {other}")
+
+
+def documented(arguments: type[Checked]) -> Callable[[_Function], _Function]:
+    """Return a decorator that states options as keywords of a function.
+
+    It gives the function's signature the options in place of its last parameter, and
+    adds them to what its documentation says of that one, which ends with a colon.
+    """
+
+    def decorate(function: _Function) -> _Function:
+        own = inspect.signature(function)
+        every = [
+            one for one in own.parameters.values() if one.kind is not one.VAR_KEYWORD
+        ]
+        for each in options_of(arguments):
+            keyword = inspect.Parameter(each.name, inspect.Parameter.KEYWORD_ONLY)
+            every.append(keyword.replace(default=each.default, annotation=each.type))
+        function.__signature__ = own.replace(parameters=every)  # type: ignore[attr-defined]
+        head, colon, rest = (function.__doc__ or "").partition(_MARK)
+        stated = "".join(
+            f"            {each.name}: {each.help}.\n" for each in options_of(arguments)
+        )
+        function.__doc__ = f"{head}{colon}{stated}{rest}"
+        return function
+
+    return decorate

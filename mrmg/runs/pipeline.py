@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ from mrmg.plans import PlanStatus
 from mrmg.runs.arguments import DEFAULT_VIDEO, RunArguments, VideoArguments, keyword
 from mrmg.runs.drive import checked_drive
 from mrmg.runs.folder import RunFolder, Step
-from mrmg.runs.options import options_of
+from mrmg.runs.options import documented
 from mrmg.runs.replacing import recorded, require_room
 from mrmg.runs.steps import OnImprovement, Run, StepProgress
 from mrmg.scene.driven_parts import require_drivable
@@ -38,6 +37,7 @@ class RunResult:
     exit_code: ExitCode
 
 
+@documented(RunArguments)
 def run(
     source: str | Path | Scene,
     *,
@@ -66,13 +66,9 @@ def run(
         MrmgError: for everything that keeps the run from starting. A mission that
             cannot be planned, or fails, is a result and not an error.
     """
-    from mrmg.viz.gl_backend import choose_backend
-
-    loaded = (
-        source
-        if isinstance(source, Scene)
-        else load_scene(source, trust_code=trust_code)
-    )
+    loaded = source
+    if not isinstance(loaded, Scene):
+        loaded = load_scene(loaded, trust_code=trust_code)
     require_drivable(loaded.robots)
     asked = _arguments(loaded, {**arguments, "video": video or DEFAULT_VIDEO})
     scene = asked.scene(loaded)
@@ -92,23 +88,30 @@ def run(
             kept = replace(asked, video=recorded(folder).video)
             if replace(work, arguments=kept).is_done(Step.RENDER):
                 work = replace(work, arguments=kept)  # `mrmg render` made it
-        if video is not None and not work.is_done(Step.RENDER):
-            choose_backend()  # better found now than after minutes of driving
-        work.ensure(Step.PLAN)
-        if work.status() is PlanStatus.SOLVED:
-            work.ensure(Step.VERIFY)
-            work.ensure(Step.EXECUTE)
-            work.ensure(Step.AUDIT)
-            if video is not None:
-                work.ensure(Step.RENDER)
-        work.ensure(Step.DRAW)
-        work.make(Step.REPORT)
+        _make_steps(work, with_video=video is not None)
         return RunResult(
             folder=folder.path,
             summary=work.summary(),
             reason=work.reason(),
             exit_code=work.exit_code(),
         )
+
+
+def _make_steps(work: Run, *, with_video: bool) -> None:
+    """Make what is missing of a run; the report always."""
+    from mrmg.viz.gl_backend import choose_backend
+
+    if with_video and not work.is_done(Step.RENDER):
+        choose_backend()  # better found now than after minutes of driving
+    work.ensure(Step.PLAN)
+    if work.status() is PlanStatus.SOLVED:
+        work.ensure(Step.VERIFY)
+        work.ensure(Step.EXECUTE)
+        work.ensure(Step.AUDIT)
+        if with_video:
+            work.ensure(Step.RENDER)
+    work.ensure(Step.DRAW)
+    work.make(Step.REPORT)
 
 
 def _arguments(scene: Scene, given: dict[str, Any]) -> RunArguments:
@@ -122,29 +125,6 @@ def _arguments(scene: Scene, given: dict[str, Any]) -> RunArguments:
     asked = RunArguments(**named)
     asked.require_names()
     return checked_drive(scene, asked)
-
-
-def _document_arguments() -> None:
-    """Give `run` the signature and the documentation of its keyword arguments."""
-    options = options_of(RunArguments)
-    own = inspect.signature(run)
-    keywords = [
-        inspect.Parameter(
-            option.name,
-            inspect.Parameter.KEYWORD_ONLY,
-            default=option.default,
-            annotation=option.type,
-        )
-        for option in options
-    ]
-    every = [each for each in own.parameters.values() if each.name != "arguments"]
-    run.__signature__ = own.replace(parameters=[*every, *keywords])  # type: ignore[attr-defined]
-    lines = "".join(f"            {each.name}: {each.help}.\n" for each in options)
-    mark = "`mrmg run`:\n"
-    run.__doc__ = (run.__doc__ or "").replace(mark, mark + lines)
-
-
-_document_arguments()
 
 
 def rehearse(scene: Scene) -> list[str]:

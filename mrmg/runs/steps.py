@@ -291,30 +291,14 @@ def _render(run: Run) -> Write:
     from mrmg.viz.gif import render_gif
     from mrmg.viz.video import render_video
 
-    video = run.arguments.video
     plan, log = run.plan_in_force(), run.log()
-    part: dict[str, Any] = {
-        "view": video.view,
-        "robot": video.robot,
-        "speed": video.speed,
-        "from_s": video.from_s,
-        "to_s": video.to_s,
-        "on_progress": run.progress_of(Step.RENDER),
-    }
+    asked = asdict(run.arguments.video) | {"on_progress": run.progress_of(Step.RENDER)}
     made = {}
-    if video.gif:
+    if run.arguments.video.gif:
         made["mission.gif"] = run.folder.unfinished("mission.gif")
-        render_gif(run.scene, plan, log, made["mission.gif"], **part)
+        render_gif(run.scene, plan, log, made["mission.gif"], **asked)
     made["mission.mp4"] = run.folder.unfinished("mission.mp4")
-    render_video(
-        run.scene,
-        plan,
-        log,
-        made["mission.mp4"],
-        size=video.size,
-        fps=video.fps,
-        **part,
-    )
+    render_video(run.scene, plan, log, made["mission.mp4"], **asked)
 
     def write() -> None:
         for name, path in made.items():

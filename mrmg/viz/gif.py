@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image
@@ -11,6 +13,7 @@ from PIL import Image
 from mrmg import storage
 from mrmg.errors import UsageError
 from mrmg.plans import Plan
+from mrmg.runs.arguments import VideoArguments
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.viz.film import Film
@@ -35,12 +38,8 @@ def render_gif(
     log: ExecutionLog,
     path: Path,
     *,
-    view: str = "top",
-    robot: str | None = None,
-    speed: float | None = None,
-    from_s: float = 0.0,
-    to_s: float | None = None,
     on_progress: Progress | None = None,
+    **asked: Any,
 ) -> None:
     """Render the driven mission to a GIF of less than `LARGEST_BYTES`.
 
@@ -51,30 +50,17 @@ def render_gif(
         plan: adds the planned paths and tours.
         log: what is shown.
         path: file to write, atomically.
-        view: as in `video.render_video`, like `robot`, `from_s` and `to_s`.
-        robot: followed by the chase camera.
-        speed: mission seconds per second; None fits the window to twelve seconds.
-        from_s: mission time of the first picture.
-        to_s: mission time of the last one.
         on_progress: called with the share done and a text.
+        **asked: fields of `VideoArguments`; by default the speed fits the mission to
+            twelve seconds. The GIF has its own size and frames per second.
 
     Raises:
         UsageError: if an option is out of its range, or the GIF would be too large
             however small its pictures.
         MachineError: if this machine has no OpenGL that draws offscreen.
     """
-    options = video_options(
-        scene,
-        log,
-        view=view,
-        robot=robot,
-        speed=speed,
-        size=_SIZE,
-        fps=_FPS,
-        from_s=from_s,
-        to_s=to_s,
-        fitting_s=_FITTING_S,
-    )
+    video = replace(VideoArguments(**asked), size=_SIZE, fps=_FPS)
+    options = video_options(scene, log, video, _FITTING_S)
     ticks = frame_ticks(log, options)
     if len(ticks) > _MOST_FRAMES:
         raise UsageError(

@@ -24,7 +24,7 @@ class Replay:
 
     def __init__(self, scene: Scene, plan: Plan, log: ExecutionLog) -> None:
         """Start at the beginning, paused."""
-        self.film = Film(scene, plan, log, _options(log))
+        self.film = Film(scene, plan, log, VideoOptions())
         self.time_s = 0.0
         self.speed = 4.0
         self.playing = False
@@ -94,15 +94,3 @@ def spoken(scene: Scene, reading: Reading) -> tuple[str, list[tuple[str, str]]]:
         words = f"{100.0 * robot.charge:.0f} %, {going}"
         lines.append((robot.robot, words))
     return mission, lines
-
-
-def _options(log: ExecutionLog) -> VideoOptions:
-    return VideoOptions(
-        view="top",
-        robot=None,
-        speed=1.0,
-        size=(1280, 720),
-        fps=30,
-        from_s=0.0,
-        to_s=float(log.time_s[-1]),
-    )

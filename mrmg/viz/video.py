@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import av
 import numpy as np
 
 from mrmg import storage
 from mrmg.plans import Plan
+from mrmg.runs.arguments import VideoArguments
+from mrmg.runs.options import documented
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.viz.film import Film, Stage
@@ -23,20 +26,15 @@ _CRF, _PRESET = "22", "veryfast"
 _FITTING_S = 30.0
 
 
+@documented(VideoArguments)
 def render_video(
     scene: Scene,
     plan: Plan,
     log: ExecutionLog,
     path: str | Path,
     *,
-    view: str = "top",
-    robot: str | None = None,
-    speed: float | None = None,
-    size: tuple[int, int] = (1280, 720),
-    fps: int = 30,
-    from_s: float = 0.0,
-    to_s: float | None = None,
     on_progress: Progress | None = None,
+    **options: Any,
 ) -> None:
     """Render the driven mission to an MP4 file (H.264, yuv420p).
 
@@ -45,35 +43,17 @@ def render_video(
         plan: adds the planned paths and tours.
         log: what is shown.
         path: file to write, atomically.
-        view: one of `video_options.VIEWS`.
-        robot: id of the robot the chase camera follows; None takes the first.
-        speed: mission seconds per second of video; None fits the window to half a
-            minute.
-        size: width and height [pixels], even.
-        fps: frames per second.
-        from_s: mission time of the first frame.
-        to_s: mission time of the last frame at the latest; None is the log's end.
         on_progress: called with the share done and a text.
+        **options: fields of `VideoArguments`, which are the options of `mrmg render`:
 
     Raises:
         UsageError: if an option is out of its range; names it.
         MachineError: if this machine has no OpenGL that draws offscreen.
     """
-    options = video_options(
-        scene,
-        log,
-        view=view,
-        robot=robot,
-        speed=speed,
-        size=size,
-        fps=fps,
-        from_s=from_s,
-        to_s=to_s,
-        fitting_s=_FITTING_S,
-    )
-    ticks = frame_ticks(log, options)
+    made = video_options(scene, log, VideoArguments(**options), _FITTING_S)
+    ticks = frame_ticks(log, made)
     with storage.atomic_path(Path(path)) as temporary:
-        _write_video(temporary, Film(scene, plan, log, options), ticks, on_progress)
+        _write_video(temporary, Film(scene, plan, log, made), ticks, on_progress)
 
 
 def pictures(

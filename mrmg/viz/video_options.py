@@ -2,81 +2,49 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from mrmg.errors import UsageError
+from mrmg.runs.arguments import VideoArguments
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
 
-VIEWS = ("top", "chase", "split")
-"""What a video can show."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class VideoOptions:
-    """How a video is to look.
+class VideoOptions(VideoArguments):
+    """How a video is made, with nothing left open.
 
     Attributes:
-        view: one of `VIEWS`.
-        robot: id of the robot the chase camera follows; None takes the first.
         speed: mission seconds per second.
-        size: width and height [pixels].
-        fps: frames per second.
-        from_s, to_s: mission time of the first frame, and of the last at the latest.
+        to_s: mission time of the last frame at the latest.
     """
 
-    view: str
-    robot: str | None
-    speed: float
-    size: tuple[int, int]
-    fps: int
-    from_s: float
-    to_s: float
+    speed: float = 1.0
+    to_s: float = math.inf
 
 
 def video_options(
-    scene: Scene,
-    log: ExecutionLog,
-    *,
-    view: str,
-    robot: str | None,
-    speed: float | None,
-    size: tuple[int, int],
-    fps: int,
-    from_s: float,
-    to_s: float | None,
-    fitting_s: float,
+    scene: Scene, log: ExecutionLog, asked: VideoArguments, fitting_s: float
 ) -> VideoOptions:
     """Return options with nothing left open.
 
     Args:
         scene: of the mission.
         log: what is shown.
-        view: as in `VideoOptions`, like all that follow.
-        robot: followed by the chase camera.
-        speed: None takes the least whole number that fits the part of the mission to
-            `fitting_s`.
-        size: of the pictures [pixels].
-        fps: frames per second.
-        from_s: mission time of the first frame.
-        to_s: None is the log's end.
+        asked: what is given; by default everything is shown, at the least whole speed
+            that fits it to `fitting_s`.
         fitting_s: length that is aimed at.
 
     Raises:
         UsageError: if an option is out of its range; names it.
     """
-    end_s = float(log.time_s[-1]) if to_s is None else to_s
-    options = VideoOptions(
-        view=view,
-        robot=robot,
-        speed=fitting_speed(end_s - from_s, fitting_s) if speed is None else speed,
-        size=size,
-        fps=fps,
-        from_s=from_s,
-        to_s=end_s,
-    )
+    given = asdict(asked)
+    end_s = float(log.time_s[-1]) if asked.to_s is None else asked.to_s
+    speed = asked.speed or fitting_speed(end_s - asked.from_s, fitting_s)
+    options = VideoOptions(**{**given, "to_s": end_s, "speed": speed})
     _check(scene, log, options)
     return options
 
@@ -101,13 +69,9 @@ def _check(scene: Scene, log: ExecutionLog, options: VideoOptions) -> None:
     end_s = float(log.time_s[-1])
     width, height = options.size
     faults = {
-        f"view {options.view!r} is unknown; use one of {', '.join(VIEWS)}": (
-            options.view not in VIEWS
-        ),
         f"robot {options.robot!r} is not in the scene; use one of {', '.join(ids)}": (
             options.robot is not None and options.robot not in ids
         ),
-        f"speed {options.speed:g} must be greater than 0": not options.speed > 0.0,
         f"fps {options.fps} must be 1 to 120": not 1 <= options.fps <= 120,
         f"size {width}x{height} must be even numbers, 320x240 to 3840x2160": (
             width % 2 != 0
