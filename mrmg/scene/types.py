@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +16,7 @@ from mrmg.scene.document import is_as_loaded, scene_document
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.objective import ENERGY, Objective
 from mrmg.scene.robot_model import RobotModel
+from mrmg.scene.written import WrittenScene
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -211,24 +210,6 @@ class Robot:
     pose: tuple[float, float, float]
     battery: Battery
     finish: Finish | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class WrittenScene:
-    """How a scene was written down, for as much of it as is not changed since.
-
-    Attributes:
-        document: the scene file's content with defaults filled in, as plain data.
-        loaded: the scene as it was loaded, without this.
-        legacy_digest: what versions up to 0.1.0 made of the document and the values in
-            the models' `robot.yaml`; plans and logs of theirs have it.
-        base: folder that relative paths start from; None for the working directory.
-    """
-
-    document: Mapping[str, Any]
-    loaded: Scene
-    legacy_digest: str
-    base: Path | None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -9,11 +9,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
@@ -23,6 +21,7 @@ from mrmg.scene.climbing import slope_faults, steep_ground
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.loading.batteries import battery_of
 from mrmg.scene.loading.elevation import elevation_of
+from mrmg.scene.loading.elevation_schema import ElevationEntry
 from mrmg.scene.loading.faults import parsed
 from mrmg.scene.loading.geometry import region_of, shape_of
 from mrmg.scene.loading.models import load_model, model_folder
@@ -30,11 +29,11 @@ from mrmg.scene.loading.schema import (
     SECTIONS,
     BatteryEntry,
     BlendEntry,
-    ElevationEntry,
     FinishEntry,
     SceneDocument,
 )
 from mrmg.scene.loading.shape_schema import CircleEntry
+from mrmg.scene.loading.starts import crowded_robots, misplaced_robots
 from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import (
@@ -46,8 +45,8 @@ from mrmg.scene.types import (
     Scene,
     Station,
     TerrainArea,
-    WrittenScene,
 )
+from mrmg.scene.written import WrittenScene
 
 HOME_RADIUS_M = 1.0
 """How near a robot that must return ends to its start."""
@@ -92,7 +91,16 @@ class Assembly:
             for entry, region in self._regions("stations")
         ]
         self.objective = self._objective()
-        self._check_starts()
+        self.faults += self._faults_of_starts()
+
+    def _faults_of_starts(self) -> list[Fault]:
+        places = {robot: f"{path}.pose" for robot, path in self.ids.items()}
+        return [
+            *misplaced_robots(
+                self.robots, places, self.bounds, self.obstacles, self._steep
+            ),
+            *crowded_robots(self.robots, places, self.stations),
+        ]
 
     def scene(self) -> Scene:
         """Return the scene; call it only when there are no faults."""
@@ -326,34 +334,6 @@ class Assembly:
                 ]
                 self._fault(path, f"lies wholly inside {', '.join(names)}")
             yield entry, region
-
-    def _check_starts(self) -> None:
-        """Every robot must stand inside the bounds, clear of obstacles and others."""
-        shapes = {r.id: Polygon(r.model.footprint_at(r.pose)) for r in self.robots}
-        for robot in self.robots:
-            where = f"{self.ids[robot.id]}.pose"
-            shape = shapes[robot.id]
-            if self.bounds and not shapely.box(*self.bounds).covers(shape):
-                message = f"{robot.id} starts outside the bounds {list(self.bounds)}"
-                self._fault(where, message)
-            for wall in self.obstacles:
-                if wall.stops(robot.id) and wall.shape.intersects(shape):
-                    self._fault(where, f"{robot.id} starts on the obstacle '{wall.id}'")
-            steep = [ground for ground, names in self._steep if robot.id in names]
-            if shapely.intersects(steep, shape).any():
-                self._fault(where, f"{robot.id} starts on ground too steep for it")
-        for first, second in combinations(self.robots, 2):
-            if shapes[first.id].intersects(shapes[second.id]):
-                message = f"{second.id} starts where {first.id} stands"
-                self._fault(f"{self.ids[second.id]}.pose", message)
-            for station in self.stations:
-                both = np.array([first.pose[:2], second.pose[:2]])
-                if station.one_at_a_time and (station.region.depth(both) >= 0.0).all():
-                    message = (
-                        f"{first.id} and {second.id} both start in {station.id}, which "
-                        "is for one robot at a time"
-                    )
-                    self._fault(f"{self.ids[second.id]}.pose", message)
 
 
 def _default_id(section: str, index: int) -> str:

@@ -18,8 +18,8 @@ import numpy as np
 from mrmg.errors import Fault, nearest
 from mrmg.scene.document import PACKED_M, packed_heights
 from mrmg.scene.elevation import Elevation
+from mrmg.scene.loading.elevation_schema import ElevationEntry, HillEntry
 from mrmg.scene.loading.faults import shown
-from mrmg.scene.loading.schema import ElevationEntry, HillEntry
 
 FORMS = ("file", "grid", "hills", "packed")
 """Exactly one of these keys says how high the ground is."""

@@ -86,6 +86,7 @@ from pydantic_core import PydanticCustomError
 
 from mrmg import shipped
 from mrmg.energy.model import EnergyPreset
+from mrmg.scene.loading.elevation_schema import ElevationEntry
 from mrmg.scene.loading.shape_schema import (
     DISC,
     ID,
@@ -94,7 +95,6 @@ from mrmg.scene.loading.shape_schema import (
     Identifier,
     NotNegative,
     Number,
-    Point,
     Positive,
     Ring,
     ShapedEntry,
@@ -164,52 +164,6 @@ class BatteryEntry(Strict):
     )
     charging_power: Positive | None = Field(
         default=None, description="power in W with which stations fill it"
-    )
-
-
-class HillEntry(Strict):
-    """A round hill; hollow if its height is negative."""
-
-    center: Point
-    height: Number = Field(description="height of the top in m")
-    radius: Positive = Field(description="radius of the foot in m")
-
-
-class PackedEntry(Strict):
-    """Heights as saved scenes hold them: a compressed grid."""
-
-    rows: Annotated[int, Field(ge=2)] = Field(description="from north to south")
-    columns: Annotated[int, Field(ge=2)] = Field(description="from west to east")
-    heights: str = Field(description="tenths of mm, int32, zlib, base64")
-
-
-class ElevationEntry(Strict):
-    """The relief: exactly one of file, grid, hills, packed."""
-
-    model_config = exactly_one("file", "grid", "hills", "packed")
-
-    file: Annotated[str, Field(min_length=1)] | None = Field(
-        default=None, description="path of an .npy or .png file"
-    )
-    range: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = Field(
-        default=None, description="[height of black in m, height of white in m]"
-    )
-    grid: Annotated[list[list[Number]], Field(min_length=2)] | None = Field(
-        default=None, description="rows of heights in m, from north to south"
-    )
-    hills: Annotated[list[HillEntry], Field(min_length=1)] | None = Field(
-        default=None, description="round hills, which add up; heights and radii in m"
-    )
-    cell: Positive | None = Field(
-        default=None, description="distance of the samples of hills in m"
-    )
-    packed: PackedEntry | None = Field(
-        default=None, description="heights as saved scenes hold them"
-    )
-    slope: Literal["refuse", "avoid"] | None = Field(
-        default=None,
-        description="ground too steep for a robot: refuse the scene (default), or "
-        "avoid it, as an obstacle for that robot",
     )
 
 
