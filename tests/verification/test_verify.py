@@ -299,6 +299,43 @@ def test_malformed_plan_names_every_fault(case: Any) -> None:
     assert verdict.min_obstacle_clearance_m is None
 
 
+def of_r1(plan: Plan, **changes: Any) -> Plan:
+    return with_trajectory(plan, replace(plan.trajectories[0], **changes))
+
+
+@pytest.mark.parametrize(
+    ("malform", "words"),
+    [
+        (lambda plan: of_r1(plan, robot="r9"), "the plan moves robots ['r9']"),
+        (lambda plan: replace(plan, dt_s=0.0), "the step length is 0.0 s"),
+        (
+            lambda plan: of_r1(plan, state=plan.trajectories[0].state[:, :4]),
+            "r1: states and controls have shapes",
+        ),
+        (
+            lambda plan: of_r1(plan, control=plan.trajectories[0].control * np.nan),
+            "r1: a state or control is not a finite number",
+        ),
+        (lambda plan: of_r1(plan, dt_s=0.2), "r1: its step is 0.2 s long"),
+        (
+            lambda plan: replace(plan, visits=(replace(plan.visits[0], robot="r9"),)),
+            "r9: visits are stated but no motion",
+        ),
+        (
+            lambda plan: of_r1(plan, state=plan.trajectories[0].state + 1e12),
+            "r1: step 0 moves too wildly",
+        ),
+    ],
+)
+def test_a_malformed_plan_is_judged_by_that_alone(
+    malform: Callable[[Plan], Plan], words: str, case: Any
+) -> None:
+    scene, plan = case()
+    verdict = verify(scene, malform(plan))
+    assert kinds(verdict) == {Kind.MALFORMED}
+    assert any(item.message.startswith(words) for item in verdict.violations)
+
+
 @pytest.mark.parametrize(
     ("kind", "control", "amount"),
     [
