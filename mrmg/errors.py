@@ -12,7 +12,7 @@ from enum import IntEnum
 
 
 class ExitCode(IntEnum):
-    """What a command's exit status says."""
+    """What a command's exit status means."""
 
     OK = 0
     USAGE = 2

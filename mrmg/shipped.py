@@ -64,7 +64,7 @@ _MODEL_DIGESTS = (
 
 
 def model_digest(parameters: Mapping[str, Any], mjcf: Path) -> str:
-    """Return a digest of what `robot.yaml` says and of the MJCF file."""
+    """Return a digest of what `robot.yaml` states and of the MJCF file."""
     text = mjcf.read_text("latin-1")
     return storage.digest(storage.canonical_json(parameters) + text)
 

@@ -5,10 +5,10 @@ timed, so that kernels are compiled and caches warm. Times are wall-clock, of pl
 in process. The runs of one call are comparable with each other; figures of different
 machines are not.
 
-With --bound, costs (the scene's objective: energy, unless it says else) are compared
-with a proven lower bound: that of the first plan, and
-with --budget S those of the best plans after each of 5 s and 30 s that S reaches. The
-quality protocol is `tools/bench --bound --budget 30 --seeds 0-9`.
+With --bound, costs (the scene's objective: energy, unless it has another) are compared
+with a proven lower bound: that of the first plan, and with --budget S those of the best
+plans after each of 5 s and 30 s that S reaches. The quality protocol is
+`tools/bench --bound --budget 30 --seeds 0-9`.
 
 With --energy paper all robots are charged as in the paper, by distance, terrain and
 turning: in the planner, the bound and the verifier alike. The protocol of Table I is

@@ -8,7 +8,7 @@ is the distance from the plan at the fleet's shared clock: rms over robots and t
 moment, as medians over the trials; clearance the least distance to an obstacle and
 between robots, worst of the trials; energy measured over planned; time that of a call
 on its processor and how much longer than planned the mission took; the share of the
-MPC's calls in which a bound was active tells how often it did more than an unbounded
+MPC's calls in which a bound was active shows how often it did more than an unbounded
 (LQR-like) solve.
 
 Rows of --json: `scene`, `disturbance`, `controller`, `trials`, `feasible`, `rms_m`,

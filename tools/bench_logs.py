@@ -34,7 +34,7 @@ LEAST_LAWS = 3
 
 
 def main() -> int:
-    """Run the bench; return 1 if the winner misses what is asked."""
+    """Run the bench; return 1 if the winner misses what is required."""
     parser = argparse.ArgumentParser(description=__doc__, prog="tools/bench_logs")
     parser.add_argument("--folder", type=Path, default=FOLDER)
     parser.add_argument("--robot", default="husky", help="shipped model; default husky")

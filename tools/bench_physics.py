@@ -20,7 +20,7 @@ again in this process, and must give the same log.
 Missions are kept in the file --output and trials in the folder --runs: the same command
 goes on from there after an interruption. What was made with other sources, models,
 scenes, versions or on another processor is not used. The last table names each figure,
-what was found and what is asked: PASS or FAIL; the exit code is 1 if any fails.
+what was found and what is required: PASS or FAIL; the exit code is 1 if any fails.
 
 Rows of --json: `scene`, `robots`, `feasible` of `missions`, errors `metered_pct_...`
 and `measured_pct_...` (`median`, `worst`), `rms_m_worst`, `max_m_worst`,

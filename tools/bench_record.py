@@ -53,7 +53,7 @@ class BenchRow:
 
     @property
     def family(self) -> str:
-        """The scene's name without the `_rN` that tells another fleet on its map."""
+        """The scene's name without the `_rN` of another fleet on its map."""
         base, _, fleet = self.scene.rpartition("_r")
         return base if fleet.isdigit() else self.scene
 

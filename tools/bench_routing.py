@@ -1,7 +1,7 @@
 """Compare the routers with exact tours and proven optima; print tables, write JSONL.
 
 Protocol: one process, one thread, kernels compiled before anything is timed. The first
-table is of generated missions on 100 x 100 m of uneven ground whose cheapest tours
+table is of generated missions on 100 x 100 m of uneven ground whose lowest-cost tours
 recharge at least once, against exact tours. The second is of Green VRP instances
 (closed routes of any number of vehicles, dwell and route time limits, stations
 revisited freely) against proven optima; it needs their folder.

@@ -122,7 +122,7 @@ of the motion tree and the plan it found (wide); profile {method}.
 the 5th and 95th percentile.
 
 **Table I.** Medians over the runs. Init: until the roadmap is built. Solver: share of
-the discrete solver in the total time, within motion trees too. Drafts: times the fleet
+the discrete solver in the total time, within motion trees too. Plans: times the fleet
 was driven along tours without a motion tree. Iterations: expansions of motion trees;
 where not all runs grew one, median and number of those that did. Timeouts: runs without
 a verified plan.

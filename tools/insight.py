@@ -26,7 +26,7 @@ from mrmg.world.world import World
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Insight:
-    """The ways of one attempt at a mission [m].
+    """The paths of one attempt at a mission [m].
 
     Attributes:
         roadmap: edges of the first robot's roadmap, shape (E, 2, 2).

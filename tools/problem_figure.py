@@ -145,7 +145,7 @@ def problem_legend(scenes: Sequence[Scene]) -> list[Patch | Line2D]:
     for scene in scenes:
         for handle in scene_drawing.map_legend(scene):
             found.setdefault(handle.get_label(), handle)
-    # Multipliers are printed on the areas; one entry tells what they are.
+    # Multipliers are printed on the areas; one entry states what they are.
     terrain = [name for name in found if str(name).startswith("terrain ×")]
     areas = [found.pop(name) for name in terrain][-1:]
     for handle in areas:

@@ -9,7 +9,7 @@ one JSON document when it is through:
   package, `machine` and `state`, a fingerprint of code, models, scenes and versions;
 - `rows`: the rows of the table that it prints, numbers as numbers, null for none; a
   bench of several tables has one more key for each of the others;
-- `ok`: whether everything held; the exit code says the same.
+- `ok`: whether everything held; the exit code states the same.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def _versions() -> dict[str, str]:
 def state() -> str:
     """Return a fingerprint of sources, models, scenes, versions and processor.
 
-    What was measured in one state is not measured again in the same, and says nothing
+    What was measured in one state is not measured again in the same, and shows nothing
     of another.
     """
     package = Path(mrmg.__file__).parent

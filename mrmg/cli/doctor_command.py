@@ -22,7 +22,7 @@ def add_doctor(verbs: Any) -> None:
 
 
 def doctor(options: argparse.Namespace) -> int:
-    """Tell what this machine has and lacks."""
+    """Report what this machine has and what is missing."""
     if options.licences:
         return _licences(options)
     from mrmg.doctor import examine

@@ -57,7 +57,7 @@ def add_trust(verb: argparse.ArgumentParser) -> None:
 def given(
     options: argparse.Namespace, arguments: _Arguments = RunArguments
 ) -> dict[str, Any]:
-    """Return what the command line says of a class of arguments, by field."""
+    """Return what the command line gives of a class of arguments, by field."""
     known = [option.name for option in options_of(arguments)]
     return {name: value for name, value in vars(options).items() if name in known}
 
@@ -96,7 +96,7 @@ def _name(group: str) -> Callable[[str], str]:
 def _details(option: Option) -> dict[str, Any]:
     """Return the keywords of `add_argument` for one option."""
     if isinstance(option.default, bool):
-        both = option.verbs == ("render",)  # which keeps what it was asked before
+        both = option.verbs == ("render",)  # which keeps what was chosen before
         action: Any = argparse.BooleanOptionalAction if both else "store_true"
         return {"action": action}
     if option.extended:

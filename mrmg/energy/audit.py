@@ -55,7 +55,7 @@ from mrmg.simulation.log import ExecutionLog, require_same_mission
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Measured:
-    """What the simulation says of one robot.
+    """What the simulation yields of one robot.
 
     Attributes:
         motion: its logged states.
@@ -152,7 +152,7 @@ def _energy_failures(
 ) -> dict[str, list[str]]:
     """Return what speaks against the energies themselves, by its cause."""
     mismatches = model_mismatches(scene, plan, log, robots, tolerance_pct)
-    # What was measured says nothing of a model where it cannot be trusted.
+    # What was measured is no evidence about a model where it cannot be trusted.
     return {ENERGY_IMBALANCE: imbalances(robots), MODEL_MISMATCH: mismatches}
 
 

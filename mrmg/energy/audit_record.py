@@ -1,4 +1,4 @@
-"""What the audit says of a simulated mission: three meters, visits, tracking."""
+"""What the audit finds in a simulated mission: three meters, visits, tracking."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ INTERVAL_SHARE = 0.9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TerrainEnergy:
-    """What the fleet spent on ground of one multiplier.
+    """What the fleet used on ground of one multiplier.
 
     Attributes:
         multiplier: of the ground.

@@ -23,7 +23,7 @@ from mrmg.energy.visits import battery_contents, first_stay, recharging
 from mrmg.motion.dynamics import TURN_SPEEDS
 from mrmg.plans import Visit
 from mrmg.scene.types import Robot, Scene, Station
-from mrmg.world.relief import height_at, load_points
+from mrmg.world.elevation import height_at, load_points
 from mrmg.world.terrain import multiplier_at, turning_multiplier_at
 
 MEASURED_PARTS = ("drive", "idle", "device")

@@ -57,11 +57,11 @@ def _unfinished(log: ExecutionLog) -> list[str]:
 
 
 def _given_up(log: ExecutionLog, *, missed: bool) -> list[str]:
-    said = {"end": "the mission was ended", "give_up": "goals were given up"}
+    ended = {"end": "the mission was ended", "give_up": "goals were given up"}
     return [
-        f"{said[event.action]} at {event.time_s:.1f} s: {event.message}"
+        f"{ended[event.action]} at {event.time_s:.1f} s: {event.message}"
         for event in log.events
-        if event.action in said and missed
+        if event.action in ended and missed
     ]
 
 
@@ -74,11 +74,11 @@ def _goals_missed(scene: Scene, visited: tuple[str, ...]) -> list[str]:
 
 
 def _crowded(scene: Scene, log: ExecutionLog) -> list[str]:
-    ways = dict(zip(log.robots, log.state[:, :, :2], strict=True))
+    paths = dict(zip(log.robots, log.state[:, :, :2], strict=True))
     return [
         f"{' and '.join(found.robots)} were both at {found.station} at "
         f"{log.time_s[found.first]:.1f} s, which is for one robot at a time"
-        for found in crowded_stations(scene, ways)
+        for found in crowded_stations(scene, paths)
     ]
 
 
@@ -124,9 +124,9 @@ def _below_reserve(scene: Scene, least_J: Mapping[str, float]) -> list[str]:
     for robot, content_J in least_J.items():
         reserve_J = scene.robot(robot).battery.reserve_J
         if 0.0 <= content_J < reserve_J:
-            found, asked = compared(content_J, reserve_J)
+            found, needed = compared(content_J, reserve_J)
             reasons.append(
-                f"{robot}'s battery fell to {found} J, below its reserve of {asked} J"
+                f"{robot}'s battery fell to {found} J, below its reserve of {needed} J"
             )
     return reasons
 

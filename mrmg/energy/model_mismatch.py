@@ -50,7 +50,7 @@ def _error_pct(model: RobotModel, plan: Plan, item: RobotAudit) -> float:
     """Return the deviation, in percent of the planned parts' sizes together.
 
     Where no part is negative that is the error in the audit. Downhill the slope pays
-    for nearly all, and a percentage of the rest says little of the model.
+    for nearly all, and a percentage of the rest is no evidence about the model.
     """
     ledger = plan.ledger
     parts_J = [ledger.total_J(robot=item.robot, part=name) for name in ledger.parts()]

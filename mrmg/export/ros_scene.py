@@ -14,7 +14,7 @@ from mrmg.export.ros_messages import MAP_FRAME, RosTypes
 from mrmg.scene.types import Goal, Obstacle, Scene, Station
 from mrmg.simulation import palette
 from mrmg.simulation.convex import triangles
-from mrmg.world.relief import height_at, lifted
+from mrmg.world.elevation import height_at, lifted
 from mrmg.world.terrain import multiplier_at
 
 MIN_CELL_M = 0.05

@@ -10,7 +10,7 @@ The file defines two functions of plain numbers, written with `math`:
 
 State is (x, y, theta, v, w): position, heading, speed and one number that is the
 model's own; control is (u1, u2); waypoint (x, y); limits (v_min, v_max, w_max, u1_max,
-u2_max); length is the model's `wheelbase`. `share` 0 asks to brake: under it the robot
+u2_max); length is the model's `wheelbase`. `share` 0 means to brake: under it the robot
 must come to rest, v and w at 0, within a second or so from any state. Units are SI.
 
 The planner compiles both with numba and calls them by address, so that they run as fast

@@ -140,7 +140,7 @@ def compare_runs(folders: Sequence[Path], *, trust_code: bool = False) -> Compar
 
 
 def _names(folders: Sequence[Path]) -> tuple[str, ...]:
-    """Return the shortest ends of the paths that tell them apart."""
+    """Return the shortest ends of the paths that distinguish them."""
     for length in range(1, max(len(folder.parts) for folder in folders) + 1):
         names = ["/".join(folder.parts[-length:]) for folder in folders]
         if len(set(names)) == len(names):

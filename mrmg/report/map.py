@@ -14,7 +14,7 @@ from mrmg.report.page import macros
 from mrmg.scene.types import Goal, Scene, Station
 from mrmg.simulation.log import ExecutionLog
 from mrmg.viz import style
-from mrmg.viz.activities import breakdowns, visit_ranks, way_to
+from mrmg.viz.activities import breakdowns, lengths_along, visit_ranks
 from mrmg.viz.contours import contour_lines
 from mrmg.viz.map_labels import KINDS, MapLabel, map_labels
 from mrmg.viz.map_shapes import enclosing_circle, end_poses
@@ -148,7 +148,7 @@ class _Canvas:
 
     def _path(self, robot: str, state: np.ndarray, look: str) -> Markup:
         points = self._points(_thinned(state[:, :2]))
-        length_m = float(way_to(state)[-1])
+        length_m = float(lengths_along(state)[-1])
         return Markup(_SVG.path(robot, self._index[robot], look, points, length_m))
 
     def _shape(
@@ -170,7 +170,7 @@ class _Canvas:
 
 def _thinned(points: np.ndarray) -> np.ndarray:
     """Return points of a path about `_PATH_SPACING_M` apart, both ends included."""
-    way_m = way_to(points)
+    way_m = lengths_along(points)
     marks = np.diff(np.floor(way_m / _PATH_SPACING_M), prepend=-1.0) > 0.0
     marks[-1] = True
     return np.asarray(points[marks])

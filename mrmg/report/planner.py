@@ -1,4 +1,4 @@
-"""What the report says of the planner: its statistics, cost and bound over time."""
+"""What the report states of the planner: its statistics, cost and bound over time."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def planner(record: RunRecord) -> list[str]:
 
 
 def found_plans(record: RunRecord) -> Sequence[Mapping[str, Any]]:
-    """Return the plans found over time, each cheaper than the one before."""
+    """Return the plans found over time, each of lower cost than the one before."""
     return list(record.planning["statistics"].get("improvements", []))
 
 
@@ -132,7 +132,7 @@ def _said_value(value: float, unit: str) -> str:
 
 
 def _quality(figures: Mapping[str, Any] | None) -> str:
-    """Return how far the plan can be from the cheapest there is, if it is known."""
+    """Return how far the plan can be from the optimum, if that is known."""
     if figures is None or figures.get("gap") is None:
         return ""
     objective = judged(figures)

@@ -124,7 +124,7 @@ def _video(path: Path) -> str:
 
 
 def _named(record: RunRecord, robot: str) -> str:
-    """Return a robot's id, and what is to be said of it."""
+    """Return a robot's id, and its standing."""
     assert record.plan is not None
     standing = standing_of(robot, record.plan, record.log)
     return f"{robot} ({standing})" if standing else robot
@@ -235,7 +235,7 @@ def _above_bound(record: RunRecord) -> str:
 
 
 def _how_soon(record: RunRecord) -> str:
-    """Return what is known or asked of the makespan."""
+    """Return what is known or required of the makespan."""
     figures = record.summary["plan"]
     words = ["last robot at rest"]
     if math.isfinite(record.scene.time_limit_s):

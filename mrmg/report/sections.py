@@ -10,7 +10,7 @@ from mrmg.plans import Plan
 from mrmg.report.page import elements as html
 from mrmg.runs.record import RunRecord
 from mrmg.scene.types import Scene
-from mrmg.viz.activities import shown_motions, standing_of, way_to
+from mrmg.viz.activities import lengths_along, shown_motions, standing_of
 from mrmg.viz.style import terrain_classes
 
 _PART_COLORS = {
@@ -160,7 +160,7 @@ def tours(record: RunRecord) -> list[str]:
 
 def _without_tour(record: RunRecord, plan: Plan, robot: str) -> str:
     motions = {item.robot: item.state for item in shown_motions(plan, record.log)}
-    stays = way_to(motions[robot])[-1] < _STILL_M
+    stays = lengths_along(motions[robot])[-1] < _STILL_M
     standing = standing_of(robot, plan, record.log)
     return f"{standing}: stays where it is" if stays else standing
 
@@ -177,20 +177,20 @@ def _tour_rows(record: RunRecord, plan: Plan, robot: str) -> list[list[str]]:
     driven_legs = _legs(record.audit.measured, robot) if record.audit else {}
     rows = []
     for leg, target in enumerate(plan.tours[robot]):
-        hope = planned[leg] if leg < len(planned) else None
-        fact = driven[leg] if leg < len(driven) else None
-        kind = (hope or fact).kind if hope or fact else ""  # type: ignore[union-attr]
+        expected = planned[leg] if leg < len(planned) else None
+        actual = driven[leg] if leg < len(driven) else None
+        kind = (expected or actual).kind if expected or actual else ""  # type: ignore[union-attr]
         rows.append(
             [
                 str(leg + 1),
                 target,
                 "⚡ station" if kind == "station" else kind,
-                f"{hope.time_s:.1f} s" if hope else "not reached",
-                f"{fact.time_s:.1f} s" if fact else "not reached" if driven else "",
-                kJ(planned_legs[leg]) if leg in planned_legs and hope else "",
-                kJ(driven_legs[leg]) if leg in driven_legs and fact else "",
-                f"{100 * hope.energy_J / capacity_J:.1f} %" if hope else "",
-                f"{100 * fact.energy_J / capacity_J:.1f} %" if fact else "",
+                f"{expected.time_s:.1f} s" if expected else "not reached",
+                f"{actual.time_s:.1f} s" if actual else "not reached" if driven else "",
+                kJ(planned_legs[leg]) if leg in planned_legs and expected else "",
+                kJ(driven_legs[leg]) if leg in driven_legs and actual else "",
+                f"{100 * expected.energy_J / capacity_J:.1f} %" if expected else "",
+                f"{100 * actual.energy_J / capacity_J:.1f} %" if actual else "",
             ]
         )
     return rows

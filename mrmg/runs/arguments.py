@@ -102,15 +102,15 @@ class RunArguments(Checked):
     )
     objective: str | Mapping[str, float] | None = option(
         None,
-        "what plans minimise, instead of what the scene says; E and M are the weights "
-        "of each J and each s",
+        "what plans minimise, in place of the scene's objective; E and M are the "
+        "weights of each J and each s",
         decides="plan",
         read=values.objective,
         metavar="energy|makespan|E:M",
     )
     time_limit_s: float | None = option(
         None,
-        "by when all robots are at rest, instead of what the scene says",
+        "by when all robots are at rest, in place of the scene's time limit",
         decides="plan",
         read=values.positive,
         metavar="SECONDS",
@@ -222,7 +222,7 @@ class RunArguments(Checked):
         return [self.deciding("plan"), *filter(None, added)]
 
     def _added(self) -> list[tuple[str, str]]:
-        """Return groups of entry points with the names that are asked of them."""
+        """Return groups of entry points with the names that are requested of them."""
         return [
             (each.extended, getattr(self, each.name))
             for each in options_of(RunArguments)

@@ -46,7 +46,7 @@ class Failure:
     """How an execution failed.
 
     Attributes:
-        causes: kinds of failure, as the audit tells them; "crash" where the program
+        causes: kinds of failure, as the audit names them; "crash" where the program
             itself broke down.
         reasons: one sentence each.
         log_digest: of the execution's log; "" after a crash.

@@ -152,7 +152,7 @@ def documented(arguments: type[Checked]) -> Callable[[_Function], _Function]:
     """Return a decorator that states options as keywords of a function.
 
     It gives the function's signature the options in place of its last parameter, and
-    adds them to what its documentation says of that one, which ends with a colon.
+    adds them to what its documentation states of that one, which ends with a colon.
     """
 
     def decorate(function: _Function) -> _Function:

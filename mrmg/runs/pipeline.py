@@ -59,7 +59,7 @@ def run(
         video: how the video is made; None for no video.
         trust_code: whether robot models may bring Python code (`scene.loading.trust`).
         on_progress: called with (step, fraction, text).
-        on_improvement: called with every plan that is cheaper than all before it.
+        on_improvement: called with every plan of lower cost than all before it.
         **arguments: fields of `RunArguments`, which are the options of `mrmg run`:
 
     Raises:

@@ -30,7 +30,7 @@ StepProgress = Callable[[Step, float, str], None]
 """Called with (step, fraction 0..1, text) while a step is under way."""
 
 OnImprovement = Callable[["Improvement"], None]
-"""Called with every plan that is cheaper than all before it."""
+"""Called with every plan of lower cost than all before it."""
 
 Write = Callable[[], None]
 """Puts the outcome of a step that has been worked out into the run folder."""

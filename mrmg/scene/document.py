@@ -155,7 +155,7 @@ def robot_entry(robot: Robot) -> _Entry:
     """Return the entry of a robot, independent of the fleet's battery.
 
     Raises:
-        SceneError: if its model cannot be told from a `robot.yaml`.
+        SceneError: if its model cannot be traced to a `robot.yaml`.
     """
     entry: _Entry = {
         "id": robot.id,
@@ -169,7 +169,7 @@ def robot_entry(robot: Robot) -> _Entry:
 
 
 def elevation_entry(elevation: Elevation) -> _Entry:
-    """Return the entry of a relief: packed where that is exact."""
+    """Return the entry of an elevation: packed where that is exact."""
     southward = np.asarray(elevation.height_m, dtype=float)[::-1]
     steps = np.round(southward / PACKED_M)
     small = float(np.abs(steps).max(initial=0.0)) < 2**31
@@ -329,7 +329,7 @@ def _motor_entry(motor: Motor) -> _Entry:
 
 
 def _differences(before: Mapping[str, Any], after: Mapping[str, Any]) -> _Entry:
-    """Return what `after` says otherwise than `before`, part by part."""
+    """Return what `after` states otherwise than `before`, part by part."""
     found: _Entry = {}
     for key, value in after.items():
         if isinstance(value, dict) and isinstance(before[key], dict):

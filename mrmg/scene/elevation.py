@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Elevation:
-    """The relief of a scene.
+    """The elevation of a scene.
 
     Attributes:
         bounds: (x_min, y_min, x_max, y_max) [m]; the outermost nodes lie on them.

@@ -174,7 +174,7 @@ class RobotModel(ByContent):
             raise SceneError(f"model '{self.name}'", faults)
 
     def content(self) -> dict[str, Any]:
-        """Return what counts for a digest: what the model says, not where it lies."""
+        """Return what counts for a digest: what the model states, not where it lies."""
         known = contents(self, without=("name", "mjcf", "origin"))
         outline = content(shapely.Polygon(self.footprint_m))
         return {**known, "motion_model": self.motion_name, "footprint_m": outline}

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from shapely.geometry import Polygon
 
-from mrmg.scene.climbing import STEEP, steep_ground
 from mrmg.scene.content import ByContent, content, content_digest, contents
 from mrmg.scene.document import is_as_loaded, scene_document
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.objective import ENERGY, Objective
 from mrmg.scene.robot_model import RobotModel
+from mrmg.scene.slopes import STEEP, steep_ground
 from mrmg.scene.written import WrittenScene
 
 
@@ -224,7 +224,7 @@ class Scene:
         bounds: (x_min, y_min, x_max, y_max) [m].
         obstacles, terrain, goals, stations, robots: in the order of the file; where
             terrain areas overlap, the later one counts.
-        elevation: the relief; None is flat ground at height 0.
+        elevation: heights of the ground; None is flat ground at height 0.
         objective: what its plans are judged by.
         time_limit_s: by when all robots must be at rest, everything done; inf for any
             time.

@@ -25,7 +25,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    # MuJoCo and CasADi take half a second to import: only who asks for them pays.
+    # MuJoCo and CasADi take half a second to import: only who uses them pays.
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -1,4 +1,4 @@
-"""Drives and steering that do not quite do what they are told.
+"""Drives and steering that do not follow their commands exactly.
 
 Each answers a command u with the first-order lag tau y' = g u - y, g its gain. Within a
 tick the force is held at the lag's mean and the steering ramps between its ends, so
@@ -35,7 +35,7 @@ class Actuation(Protocol):
 
 
 class PerfectActuation:
-    """Does at once what it is told."""
+    """Follows its command at once."""
 
     def force_N(self, commanded_N: np.ndarray, period_s: float) -> np.ndarray:
         """Return the force commanded."""

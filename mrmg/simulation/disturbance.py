@@ -1,8 +1,8 @@
 """How a simulated mission differs from the one that was planned for.
 
-`DisturbanceRanges` says how far each quantity may stray, `draw` picks one `Disturbance`
-from them by a seed. A disturbance is a plain value: logs keep it, so that a log says
-what was simulated.
+`DisturbanceRanges` states how far each quantity may stray, `draw` picks one
+`Disturbance` from them by a seed. A disturbance is a plain value: logs keep it, so that
+a log states what was simulated.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ import numpy as np
 
 from mrmg.scene.driven_parts import ROOT
 from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
-from mrmg.simulation.incline import standing_pose
+from mrmg.simulation.slopes import standing_pose
 from mrmg.simulation.world_model import MujocoWorld
 
 

@@ -1,4 +1,4 @@
-"""The relief as shapes of the simulated world: floor, foundations, draped marks."""
+"""The elevation as shapes of the simulated world: floor, foundations, draped marks."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from mrmg.scene.types import Region, Scene
-from mrmg.world.relief import height_at
+from mrmg.world.elevation import height_at
 
 FACET_M = 1.0
 """Side of the floor's facets. Tyres lose a little at every edge between facets: over a
@@ -27,7 +27,7 @@ _BASE_M = 1.0
 def add_height_field(
     spec: mujoco.MjSpec, name: str, scene: Scene, center: np.ndarray, half: np.ndarray
 ) -> float:
-    """Add the relief as the height field `name`; return the height of its foot [m].
+    """Add the elevation as the height field `name`; return the height of its foot [m].
 
     Args:
         spec: receives it.

@@ -183,7 +183,7 @@ class ExecutionLog:
         return digest.hexdigest()[:16]
 
     def save(self, folder: Path) -> None:
-        """Write `log.npz`, `timing.json`, then `log.json`, whose presence says done."""
+        """Write `log.npz`, `timing.json`, and last `log.json`, which marks the end."""
         storage.write_arrays(folder / "log.npz", self._arrays())
         storage.write_json(folder / "timing.json", dict(self.timing))
         header = {

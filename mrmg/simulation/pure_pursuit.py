@@ -98,7 +98,7 @@ class _Steering(Protocol):
     """How robots of one motion model follow an arc."""
 
     def ends_arc(self, reference: np.ndarray, along_m_s: np.ndarray) -> np.ndarray:
-        """Tell from where on the reference is on another arc, shape (HORIZON + 1,).
+        """Return from where on the reference is on another arc, shape (HORIZON + 1,).
 
         Args:
             reference: the states ahead, shape (HORIZON + 1, 5).

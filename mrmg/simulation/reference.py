@@ -72,7 +72,7 @@ class FleetReference:
 
 
 def speed_states(scene: Scene) -> np.ndarray:
-    """Tell which states of which robot are speeds, shape (R, 5)."""
+    """Return which states of which robot are speeds, shape (R, 5)."""
     return np.array(
         [
             np.isin(np.arange(NX), SPEED_STATES[robot.model.motion_model])

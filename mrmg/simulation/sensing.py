@@ -2,8 +2,8 @@
 
 Positions and headings come from a localisation with noise and delay; wheel speed and
 steering angle from encoders, the former with noise. Odometry, the motion that the
-encoders tell, carries the estimate from tick to tick; each measurement corrects it by a
-share K of the difference from the estimate *at the time of the measurement*. K is the
+encoders report, carries the estimate from tick to tick; each measurement corrects it by
+a share K of the difference from the estimate *at the time of the measurement*. K is the
 gain of the steady Kalman filter of a random walk of variance q a tick seen with
 variance r,
 
@@ -33,7 +33,7 @@ class FilterParams:
         position_drift_m: standard deviation that odometry gathers in a second.
         heading_drift_rad: likewise.
         speed_drift_m_s: standard deviation of speed changes within a second that the
-            commands do not tell.
+            commands do not reveal.
     """
 
     position_drift_m: float = 0.005

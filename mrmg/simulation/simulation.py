@@ -28,13 +28,13 @@ from mrmg.simulation.ground import (
     TerrainUnderfoot,
     believed_resistance,
 )
-from mrmg.simulation.incline import Incline
 from mrmg.simulation.log import ExecutionLog, package_versions, require_same_mission
 from mrmg.simulation.plants import DEFAULT_PLANT, plant_of, require_plant
 from mrmg.simulation.recording import Recording
 from mrmg.simulation.reference import FleetReference, speed_states
 from mrmg.simulation.sensing import sensing_of
 from mrmg.simulation.set_points import SetPoints
+from mrmg.simulation.slopes import SlopesUnderfoot
 from mrmg.simulation.supervision import Event, Observation, Orders, Supervisor
 from mrmg.simulation.world_model import MujocoWorld, build_world
 from mrmg.world.terrain import multiplier_at
@@ -143,7 +143,7 @@ class _Run:
         self._calls = ControllerCalls(len(world.scene.robots))
         self._ending = Ending(self.data, self._is_speed)
         self._fleet = Fleet(world, self.data)
-        self._incline = Incline(world.scene)
+        self._slopes_underfoot = SlopesUnderfoot(world.scene)
         self._terrain = TerrainUnderfoot(world.scene)
         self._sensing = sensing_of(world.scene, disturbance, self._period_s)
         self._actuation = actuation_of(disturbance, self._set_points.following[:, 1])
@@ -160,7 +160,7 @@ class _Run:
         seen, true = self._sensing.state, self._state
         level, slope = self._slopes
         if seen is not true:
-            level, slope = self._incline.under(seen)
+            level, slope = self._slopes_underfoot.under(seen)
         ground = self._ground(seen, steer)
         believed = self._believed.force_N(*ground)
         believed_swing_N = ground.turning_multiplier * self._believed.swing_N
@@ -264,7 +264,7 @@ class _Run:
     def _settle(self) -> None:
         """Let the tyres take the weight, then start the time."""
         still = np.zeros(len(self._world.scene.robots))
-        _, slope = self._incline.under(self._fleet.state())
+        _, slope = self._slopes_underfoot.under(self._fleet.state())
         parked = self._drive.force_N(still, still, still, still, self._period_s, slope)
         plain = Ground(still + 1.0, still, still + 1.0)
         self._fleet.set_resistance(*self._plant.resistance(plain, still + 1.0))
@@ -309,7 +309,7 @@ class _Run:
 
     def _observe(self) -> None:
         self._state = self._fleet.state()
-        self._slopes = self._incline.under(self._state)
+        self._slopes = self._slopes_underfoot.under(self._state)
         over_map = self._slopes[0] * self._fleet.axle_speed_m_s()
         self._sensing.look(self._state, over_map, self._set_points.following[:, 0])
         self._planned = self._coming

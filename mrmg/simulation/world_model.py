@@ -13,7 +13,7 @@ from mrmg.scene.driven_parts import CHASSIS, HULL, require_drivable
 from mrmg.scene.loading.mjcf import no_warning_file
 from mrmg.scene.types import Robot, Scene
 from mrmg.simulation import palette, scenery
-from mrmg.simulation.incline import standing_pose
+from mrmg.simulation.slopes import standing_pose
 
 PHYSICS_STEP_S = 0.004
 """Short enough for the stiff tyres; contact softness scales with it."""

@@ -1,6 +1,6 @@
 """What many disturbed executions of one plan say about it.
 
-A trial is feasible when its audit says so: all goals visited, no contact, no battery
+A trial is feasible when its audit finds so: all goals visited, no contact, no battery
 below its reserve, driven to the end. Out of n trials of which k were feasible, the
 probability of a feasible mission is k / n, with the interval of Wilson (1927),
 
@@ -216,7 +216,7 @@ _MARGINS = {
     "robot_distance_m": min,
     "tracking_max_m": max,
 }
-"""What is told of the trials, and which end of it is the bad one."""
+"""What is reported of the trials, and which end of it is the bad one."""
 
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:

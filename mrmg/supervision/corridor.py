@@ -1,4 +1,4 @@
-"""The corridors a driving fleet must stay in, and what is said when it leaves one."""
+"""The corridors a driving fleet must stay in, and the reports of leaving one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mrmg.compared import compared
 from mrmg.scene.types import Scene
 from mrmg.simulation.supervision import Observation
 from mrmg.supervision.course import Course
-from mrmg.supervision.meter import RobotMeter
+from mrmg.supervision.metering import RobotMeter
 from mrmg.supervision.parameters import ControlParams
 
 _STANDING_RATE = 0.1
@@ -35,7 +35,7 @@ class Departure:
 
 
 class TrackingCorridor:
-    """Tells when a robot is off its plan, or keeps the whole fleet waiting."""
+    """Reports when a robot is off its plan, or keeps the whole fleet waiting."""
 
     def __init__(self, robots: Sequence[str], params: ControlParams) -> None:
         """Start with a fleet that gets on."""
@@ -64,7 +64,7 @@ class TrackingCorridor:
 
 
 class EnergyCorridor:
-    """Tells when a robot takes more energy than the plan in force allows for.
+    """Reports when a robot takes more energy than the plan in force allows for.
 
     Measured over planned energy since the plan began, less what may be chance, is how
     much more than planned the rest is expected to take, too.

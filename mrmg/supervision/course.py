@@ -87,11 +87,11 @@ class Course:
             states=states,
             broken=broken,
         )
-        ways = departing.ways_to_rest()
-        longest = max(len(control) for _, control in ways.values())
+        motions = departing.motions_to_rest()
+        longest = max(len(control) for _, control in motions.values())
         length = longest + round(pause_s / self.plan.dt_s)
-        ways = {name: _held(*way, length) for name, way in ways.items()}
-        return self._continued(step, ways, self.scene).with_tours(self.plan.tours)
+        motions = {name: _held(*motion, length) for name, motion in motions.items()}
+        return self._continued(step, motions, self.scene).with_tours(self.plan.tours)
 
     def resumed(
         self,
@@ -111,14 +111,14 @@ class Course:
         """
         planned = {item.robot: item for item in plan.trajectories}
         length = max(len(item.control) for item in plan.trajectories)
-        ways = {}
+        motions = {}
         for item in self.plan.trajectories:
             if item.robot in planned:
                 new = planned[item.robot]
-                ways[item.robot] = (new.state, new.control)
+                motions[item.robot] = (new.state, new.control)
             else:
-                ways[item.robot] = _held(item.state[-1:], np.zeros((0, 2)), length)
-        joined = self._continued(self.steps, ways, rest)
+                motions[item.robot] = _held(item.state[-1:], np.zeros((0, 2)), length)
+        joined = self._continued(self.steps, motions, rest)
         anew = (*self.charge_J, (self.steps, dict(charge_J)))
         return replace(joined, charge_J=anew).with_tours(tours)
 
@@ -167,20 +167,20 @@ class Course:
     def _continued(
         self,
         step: int,
-        ways: Mapping[str, tuple[np.ndarray, np.ndarray]],
+        motions: Mapping[str, tuple[np.ndarray, np.ndarray]],
         believed: Scene,
     ) -> Course:
         """Return the course up to `step`, then the given states and controls.
 
         Args:
             step: whose state is replaced by the first of the new ones.
-            ways: states, shape (n + 1, 5), and controls, shape (n, 2), by robot.
+            motions: states, shape (n + 1, 5), and controls, shape (n, 2), by robot.
             believed: whose energy models the new steps are reckoned with.
         """
         known = {robot.id for robot in believed.robots}
         trajectories, parts_J, factors = [], {}, {}
         for item in self.plan.trajectories:
-            state, control = ways[item.robot]
+            state, control = motions[item.robot]
             new = replace(item, state=state.copy(), control=control.copy())
             scene = believed if item.robot in known else self.scene
             parts_J[item.robot] = np.concatenate(

@@ -10,8 +10,8 @@ from mrmg.energy.metering import LoggedMotion, find_visits
 from mrmg.energy.visits import first_stay
 from mrmg.scene.types import Goal, Scene
 from mrmg.simulation.supervision import Observation
-from mrmg.supervision.meter import RobotMeter
-from mrmg.supervision.stays import VISITED_DEPTH_M, StayUnderWay, stays_under_way
+from mrmg.supervision.metering import RobotMeter
+from mrmg.supervision.stays import VISITED_DEPTH_M, OngoingStay, stays_under_way
 
 
 class History:
@@ -63,7 +63,7 @@ class History:
 
     def stays(
         self, visited: Set[str], out_of_service: Set[str]
-    ) -> dict[str, StayUnderWay]:
+    ) -> dict[str, OngoingStay]:
         """Return the stays of robots in service at goals without a visit, by goal."""
         goals = [
             goal

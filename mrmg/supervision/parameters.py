@@ -15,7 +15,7 @@ class ControlParams:
         energy_share: excess of measured over planned energy since the last plan that is
             tolerated, as a share of the planned.
         energy_floor: further excess tolerated, as a share of the capacity: what is
-            measured over a few metres says little.
+            measured over a few metres is uncertain.
         stall_s: how long the fleet's clock may stand still.
         off_m: how far a robot may be from its plan.
         tracked_m: offset up to which a robot counts as being where its plan has it.

@@ -10,7 +10,7 @@ import numpy as np
 
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Battery, Finish, Robot, Scene
-from mrmg.supervision.stays import StayUnderWay
+from mrmg.supervision.stays import OngoingStay
 
 _LEAST_J = 1e-9
 """A start energy in a scene must be positive."""
@@ -39,7 +39,7 @@ class FleetCondition:
     rolling_factor: Mapping[str, float]
     out_of_service: frozenset[str] = frozenset()
     visited: frozenset[str] = frozenset()
-    stays: Mapping[str, StayUnderWay] = field(default_factory=dict)
+    stays: Mapping[str, OngoingStay] = field(default_factory=dict)
     time_s: float = 0.0
 
 
@@ -92,7 +92,7 @@ def remaining_scene(
     return scene_from_document(document, source=f"rest of {scene.name}")
 
 
-def _still_to_stay(goal: dict[str, Any], stay: StayUnderWay | None) -> dict[str, Any]:
+def _still_to_stay(goal: dict[str, Any], stay: OngoingStay | None) -> dict[str, Any]:
     """Return a goal's entry with what is left of its dwell time."""
     if stay is None or not goal.get("dwell"):
         return goal

@@ -17,11 +17,11 @@ from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.supervision.parameters import ControlParams
 from mrmg.supervision.remaining import FleetCondition, is_over, remaining_scene
-from mrmg.supervision.stays import StayUnderWay, keeps_stays
+from mrmg.supervision.stays import OngoingStay, keeps_stays
 from mrmg.verification.verify import verify
 
 _GIVEN_UP_AT_ONCE = 3
-"""One in this many goals is given up when no plan is found and no proof says why."""
+"""One in this many goals is given up when no plan is found and no proof states why."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,7 +140,7 @@ class Replanner:
         return Replan(scene=last)
 
     def _plan(
-        self, rest: Scene, number: int, draws: int, stays: Mapping[str, StayUnderWay]
+        self, rest: Scene, number: int, draws: int, stays: Mapping[str, OngoingStay]
     ) -> Plan | None:
         """Return a plan that the verifier accepts and that keeps stays, or None."""
         for draw in range(draws):

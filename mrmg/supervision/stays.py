@@ -20,7 +20,7 @@ VISITED_DEPTH_M = 0.05
 
 
 @dataclass(frozen=True, slots=True)
-class StayUnderWay:
+class OngoingStay:
     """A stay at a goal that is not long enough yet.
 
     Attributes:
@@ -33,33 +33,33 @@ class StayUnderWay:
 
 
 def stays_under_way(
-    goals: Iterable[Goal], time_s: np.ndarray, ways: Mapping[str, np.ndarray]
-) -> dict[str, StayUnderWay]:
-    """Return the longest stay under way at each goal, by its id.
+    goals: Iterable[Goal], time_s: np.ndarray, paths: Mapping[str, np.ndarray]
+) -> dict[str, OngoingStay]:
+    """Return the longest ongoing stay at each goal, by its id.
 
     Args:
         goals: that still miss their visit.
         time_s: of what was seen, shape (n,).
-        ways: positions of robots in service at these times [m], shape (n, 2) each.
+        paths: positions of robots in service at these times [m], shape (n, 2) each.
     """
-    found: dict[str, StayUnderWay] = {}
+    found: dict[str, OngoingStay] = {}
     for goal in goals:
-        for robot, way in ways.items():
-            stays = runs(goal.region.depth(way) >= VISITED_DEPTH_M)
-            if not stays or stays[-1][1] < len(way):
+        for robot, path in paths.items():
+            stays = runs(goal.region.depth(path) >= VISITED_DEPTH_M)
+            if not stays or stays[-1][1] < len(path):
                 continue
             stayed_s = float(time_s[-1] - time_s[stays[-1][0]])
             known_s = found[goal.id].stayed_s if goal.id in found else 0.0
             if stayed_s > known_s:
-                found[goal.id] = StayUnderWay(robot, stayed_s)
+                found[goal.id] = OngoingStay(robot, stayed_s)
     return found
 
 
-def keeps_stays(visits: Iterable[Visit], stays: Mapping[str, StayUnderWay]) -> bool:
+def keeps_stays(visits: Iterable[Visit], stays: Mapping[str, OngoingStay]) -> bool:
     """Return whether all stays end where, and by whom, they were begun.
 
     Args:
-        visits: of a plan that begins with the stays under way.
+        visits: of a plan that begins with the ongoing stays.
         stays: by goal.
     """
     begun = {(item.robot, item.target) for item in visits if item.step == 0}

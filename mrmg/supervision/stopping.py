@@ -2,7 +2,7 @@
 
 Committed braking is what the planner keeps possible. Where a plan does not (one by
 another planner, or a robot that is off its plan), robots in service may stop along
-their planned ways instead, later but without leaving the places they were given.
+their planned paths instead, later but without leaving the places they were given.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from mrmg.verification.distances import obstacle_distance, robot_distance
 ENOUGH_M = 0.1
 """Clearance with which committed braking needs no alternative."""
 
-Way = tuple[np.ndarray, np.ndarray]
+Motion = tuple[np.ndarray, np.ndarray]
 """States, shape (n + 1, 5), and controls, shape (n, 2)."""
 
 
@@ -44,8 +44,8 @@ class Departing:
     states: Mapping[str, np.ndarray]
     broken: Set[str]
 
-    def ways_to_rest(self) -> dict[str, Way]:
-        """Return how each robot comes to rest; ways differ in length."""
+    def motions_to_rest(self) -> dict[str, Motion]:
+        """Return how each robot comes to rest; motions differ in length."""
         committed = {item.robot: self._braking(item) for item in self.trajectories}
         clear_m = self._clearance_m(committed)
         if clear_m >= ENOUGH_M:
@@ -61,12 +61,12 @@ class Departing:
     def _model(self, item: Trajectory) -> RobotModel:
         return self.scene.robot(item.robot).model
 
-    def _braking(self, item: Trajectory) -> Way:
+    def _braking(self, item: Trajectory) -> Motion:
         first = self.states[item.robot]
         states, controls = brake_to_rest(self._model(item), first, item.dt_s)
         return np.concatenate([first[None], states]), controls
 
-    def _along_plan(self, item: Trajectory) -> Way:
+    def _along_plan(self, item: Trajectory) -> Motion:
         """Return the planned motion slowed down to rest at half the braking limit.
 
         The plan is run at a rate that falls evenly from 1 to 0.
@@ -90,13 +90,13 @@ class Departing:
         rest, straighten = brake_to_rest(model, states[-1], dt_s)
         return np.concatenate([states, rest]), np.concatenate([controls, straighten])
 
-    def _clearance_m(self, ways: Mapping[str, Way]) -> float:
+    def _clearance_m(self, motions: Mapping[str, Motion]) -> float:
         """Return the least distance of a robot to anything while it comes to rest."""
         robots = self.scene.robots
-        longest = max(len(states) for states, _ in ways.values())
+        longest = max(len(states) for states, _ in motions.values())
         poses = []
         for robot in robots:
-            states, _ = ways[robot.id]
+            states, _ = motions[robot.id]
             standing = np.repeat(states[-1:], longest - len(states), axis=0)
             poses.append(np.concatenate([states, standing]))
         distances_m = [

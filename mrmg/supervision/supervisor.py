@@ -27,7 +27,7 @@ from mrmg.supervision.corridor import Departure, EnergyCorridor, TrackingCorrido
 from mrmg.supervision.course import Course
 from mrmg.supervision.faults import StopFault
 from mrmg.supervision.history import History
-from mrmg.supervision.meter import RobotMeter
+from mrmg.supervision.metering import RobotMeter
 from mrmg.supervision.parameters import ControlParams
 from mrmg.supervision.remaining import FleetCondition, is_over, remaining_scene
 from mrmg.supervision.replanning import Replan, Replanner

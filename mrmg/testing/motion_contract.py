@@ -103,7 +103,7 @@ class MotionContract:
             assert np.allclose(twice[:3], once[:3], rtol=0.0, atol=0.01), f"{state}"
 
     def test_it_moves_as_fast_as_its_state_says(self) -> None:
-        """Energy is charged for the state's speed: other motion would be free, or dear.
+        """Energy is charged for the state's speed: other motion would cost too little.
 
         The way of a step lies between what the speeds at both its ends lead over.
         """
@@ -115,8 +115,8 @@ class MotionContract:
             if state[3] * after[3] < 0.0:
                 slow = 0.0
             least_m, most_m = 0.98 * slow * self.dt_s, 1.02 * fast * self.dt_s
-            told = f"{way_m:.4f} m of {least_m:.4f} to {most_m:.4f} m at {state}"
-            assert least_m - 1e-6 <= way_m <= most_m + 1e-6, told
+            detail = f"{way_m:.4f} m of {least_m:.4f} to {most_m:.4f} m at {state}"
+            assert least_m - 1e-6 <= way_m <= most_m + 1e-6, detail
 
     def test_it_brakes_to_rest(self) -> None:
         """Steered at share 0 it stands before long, and stays where it is."""

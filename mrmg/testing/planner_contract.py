@@ -104,8 +104,8 @@ class PlannerContract:
         for name, scene in self.scenes().items():
             for seed in range(2):
                 violations = verify(scene, self.plan(scene, seed)).violations
-                told = [violation.message for violation in violations]
-                assert not told, f"{name}, seed {seed}: {told}"
+                messages = [violation.message for violation in violations]
+                assert not messages, f"{name}, seed {seed}: {messages}"
 
     def test_the_same_seed_gives_the_same_plan(self) -> None:
         """Whatever was planned in between, and whatever the number of threads."""

@@ -21,7 +21,7 @@ MINIMUM_ACCURACY_M = 1e-3
 """How far the certified minimum may lie below the true one."""
 
 RESOLUTION_M = 1e-4
-"""A gap that cannot be told from zero at this resolution counts as a touch."""
+"""A gap that cannot be distinguished from zero at this resolution counts as a touch."""
 
 SHORTEST_S = 1e-9
 """Intervals are not halved below this, so that absurd speeds end the search too."""

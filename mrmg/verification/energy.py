@@ -233,16 +233,18 @@ def _terrain(scene: Scene, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _heights_m(scene: Scene, robot: Robot, state: np.ndarray) -> np.ndarray:
     """Return the height of the ground below the mass, shape (n, 5) -> (n,)."""
-    relief = scene.elevation
-    if relief is None:
+    elevation = scene.elevation
+    if elevation is None:
         return np.zeros(len(state))
     heading = np.stack([np.cos(state[:, 2]), np.sin(state[:, 2])], axis=1)
     points = state[:, :2] + robot.model.center_of_mass_m * heading
-    west, south, east, north = relief.bounds
-    rows, columns = relief.height_m.shape
+    west, south, east, north = elevation.bounds
+    rows, columns = elevation.height_m.shape
     axes = (np.linspace(south, north, rows), np.linspace(west, east, columns))
     inside = np.clip(points, (west, south), (east, north))
-    return np.asarray(RegularGridInterpolator(axes, relief.height_m)(inside[:, ::-1]))
+    return np.asarray(
+        RegularGridInterpolator(axes, elevation.height_m)(inside[:, ::-1])
+    )
 
 
 def _contents_J(

@@ -284,9 +284,9 @@ def _check_ledger(plan: Plan, accounts: Mapping[str, MotionAccount]) -> list[Vio
         return []
     worst = int(off_J.argmax())
     robot, leg, target, part = keys[worst]
-    said, takes = compared(stated[keys[worst]], recomputed[keys[worst]], 1)
+    claimed, takes = compared(stated[keys[worst]], recomputed[keys[worst]], 1)
     message = (
-        f"{robot or 'plan'}: the ledger says {said} J for {part} on leg {leg} to "
+        f"{robot or 'plan'}: the ledger states {claimed} J for {part} on leg {leg} to "
         f"{target or 'the end'}, the motion takes {takes} J"
     )
     return [

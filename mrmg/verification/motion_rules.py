@@ -105,7 +105,7 @@ def _check_final_rest(robot: Robot, trajectory: Trajectory) -> list[Violation]:
 
 
 def _check_finish(robot: Robot, trajectory: Trajectory) -> list[Violation]:
-    """Check that the robot ends in its finish, with the heading asked for."""
+    """Check that the robot ends in its finish, with the required heading."""
     if robot.finish is None:
         return []
     violations = []

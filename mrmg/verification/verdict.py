@@ -1,4 +1,4 @@
-"""What the verifier says of a plan: a list of violations and two clearances."""
+"""What the verifier finds in a plan: a list of violations and two clearances."""
 
 from __future__ import annotations
 

@@ -104,8 +104,8 @@ def visit_ranks(plan: Plan) -> dict[str, list[tuple[str, int]]]:
     return ranks
 
 
-def way_to(states: np.ndarray) -> np.ndarray:
-    """Return the way driven up to each state [m], shape (n,)."""
+def lengths_along(states: np.ndarray) -> np.ndarray:
+    """Return the length of the path up to each state [m], shape (n,)."""
     steps_m = np.hypot(*np.diff(states[:, :2], axis=0).T)
     return np.concatenate([[0.0], np.cumsum(steps_m)])
 

@@ -17,11 +17,11 @@ from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.world_model import build_world
 from mrmg.viz import style
-from mrmg.viz.ground_image import paint_ground, painted_relief
+from mrmg.viz.ground_image import paint_ground, painted_elevation
 from mrmg.viz.replay import SPEEDS, Replay, spoken
 from mrmg.viz.solid_shapes import body_meshes, geom_mesh
 from mrmg.viz.world_view import floor_frame
-from mrmg.world.relief import highest_m, lifted
+from mrmg.world.elevation import highest_m, lifted
 
 _FRAME_S = 1.0 / 30.0
 _TAG_LIFT_M = 0.6
@@ -126,7 +126,9 @@ class BrowserView:
         frame = floor_frame(self._world)
         if self._scene.elevation is not None:
             self._server.scene.add_mesh_trimesh(
-                "/ground", painted_relief(self._scene, plan, frame), cast_shadow=False
+                "/ground",
+                painted_elevation(self._scene, plan, frame),
+                cast_shadow=False,
             )
             return
         width_m, height_m = 2.0 * frame.half_m
@@ -280,7 +282,7 @@ def _bar(share: float) -> str:
 
 def _serve(host: str, port: int) -> Any:
     viser = import_extra("viser", extra="view", purpose="shows missions in the browser")
-    # It tells its address in a box of its own.
+    # It prints its address in a box of its own.
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host=host, port=port, label="mrmg", verbose=False)
     server.scene.set_up_direction("+z")

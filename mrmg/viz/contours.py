@@ -1,4 +1,4 @@
-"""Contour lines of a scene's relief."""
+"""Contour lines of a scene's elevation."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from mrmg.viz.tags import Label, Tag, letter_px, place_tags
 from mrmg.viz.top_view import TopView
 from mrmg.viz.video_options import VideoOptions
 from mrmg.viz.world_view import CHASE_FOVY_DEG, WorldView, chase_camera, floor_frame
-from mrmg.world.relief import height_at, lifted
+from mrmg.world.elevation import height_at, lifted
 
 _TRAIL_AHEAD_M = 1.2
 _YAW_SMOOTHING_S = 0.8
@@ -86,7 +86,7 @@ class Film:
         self.map_center = np.array([(x_min + x_max) / 2, (y_min + y_max) / 2])
 
     def reading(self, tick: int) -> Reading:
-        """Return what the panel says at a tick."""
+        """Return what the panel shows at a tick."""
         goals = {goal.id for goal in self.scene.goals}
         now_s = self.log.time_s[tick]
         broken_down = {

@@ -2,7 +2,7 @@
 
 A backend is tried in a process of its own, since a broken driver may end the process
 that loads it. The context is then opened by name, so that it does not matter whether
-mujoco was imported before, or what `MUJOCO_GL` said at that time.
+mujoco was imported before, or what `MUJOCO_GL` was at that time.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.viz import scene_drawing, style
 from mrmg.viz.map_labels import MapLabel, map_labels
-from mrmg.world.relief import lifted
+from mrmg.world.elevation import lifted
 
 PIXELS = 2048
 """Longer side of the image."""
@@ -104,7 +104,7 @@ def video_labels(scene: Scene, plan: Plan | None, em_m: float) -> tuple[MapLabel
     return map_labels(scene, plan, em_m=em_m, kinds=kinds)
 
 
-def painted_relief(
+def painted_elevation(
     scene: Scene, plan: Plan | None, frame: GroundFrame
 ) -> trimesh.Trimesh:
     """Return the ground as a mesh whose corners have the colours of its image."""

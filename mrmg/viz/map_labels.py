@@ -20,7 +20,7 @@ from mrmg.plans import Plan
 from mrmg.scene.types import Obstacle, Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.viz import style
-from mrmg.viz.activities import breakdowns, visit_ranks, way_to
+from mrmg.viz.activities import breakdowns, lengths_along, visit_ranks
 from mrmg.viz.contours import contour_lines
 from mrmg.viz.label_placement import LabelBox, place, spots_around
 from mrmg.viz.map_shapes import (
@@ -179,7 +179,7 @@ def _paths(scene: Scene, plan: Plan | None, em_m: float) -> Iterator[_Wanted]:
     names = [target.region.center for target in scene.targets()]
     names += [np.array(robot.pose[:2]) for robot in scene.robots]
     for item in plan.trajectories if plan else ():
-        way_m = way_to(item.state)
+        way_m = lengths_along(item.state)
         if way_m[-1] > _SHORTEST_NAMED_EM * em_m:
             marks_m = np.linspace(0.0, way_m[-1], _SPOTS_ALONG)
             points = item.state[np.searchsorted(way_m, marks_m), :2]
@@ -239,7 +239,7 @@ def _spots_within(shape: BaseGeometry) -> np.ndarray:
 def _heights(scene: Scene, em_m: float) -> Iterator[_Wanted]:
     """Yield the height of each contour line that is long enough, rather half way."""
     for level_m, line in contour_lines(scene):
-        way_m = way_to(line)
+        way_m = lengths_along(line)
         if way_m[-1] > _SHORTEST_NAMED_EM * em_m:
             share = np.linspace(0.1, 0.9, _SPOTS_ALONG)
             spots = line[np.searchsorted(way_m, share * way_m[-1])]

@@ -16,7 +16,7 @@ from mrmg.viz import style
 from mrmg.viz.ground_image import paint_ground
 from mrmg.viz.replay import SPEEDS, Replay, spoken
 from mrmg.viz.world_view import drawable_spec, floor_frame
-from mrmg.world.relief import highest_m, lifted
+from mrmg.world.elevation import highest_m, lifted
 
 KEYS = "space: play or pause, arrows left and right: 5 s, up and down: speed"
 HINT = "Alt+C opens the panel Control, with a slider for the time"
@@ -121,13 +121,13 @@ def viewed_model(
 
 
 def follow_slider(replay: Replay, control: float) -> None:
-    """Go to the time a person has slid to; `control` is what the slider now says."""
+    """Go to the time a person has slid to; `control` is the slider's value."""
     if control != replay.time_s:
         replay.seek(control)
 
 
 def steer(replay: Replay | None, key: int) -> None:
-    """Do what a key says; see `KEYS`.
+    """Do what a key stands for; see `KEYS`.
 
     Args:
         replay: to be steered.
@@ -166,17 +166,19 @@ def _look_from_above(camera: mujoco.MjvCamera, scene: Scene) -> None:
 
 
 def annotate(extra: mujoco.MjvScene, scene: Scene, replay: Replay) -> None:
-    """Put driven ways, names of targets and batteries into the window's extra geoms."""
+    """Put driven paths, names and charges into the window's extra geoms."""
     extra.ngeom = 0
     names = {**style.goal_labels(scene), **style.station_labels(scene)}
     for target in scene.targets():
         at = lifted(scene, target.region.center, 0.3)[0]
         _add_label(extra, at, names[target.id])
     log, reading = replay.film.log, replay.reading()
-    for robot, state, said in zip(scene.robots, log.state, reading.robots, strict=True):
+    for robot, state, shown in zip(
+        scene.robots, log.state, reading.robots, strict=True
+    ):
         above = robot.model.height_m + _TAG_LIFT_M
         at = lifted(scene, state[replay.tick, :2], above)[0]
-        _add_label(extra, at, f"{robot.id} {100.0 * said.charge:.0f} %")
+        _add_label(extra, at, f"{robot.id} {100.0 * shown.charge:.0f} %")
     room = (extra.maxgeom - extra.ngeom) // len(scene.robots)
     for robot, state in zip(scene.robots, log.state, strict=True):
         color = np.array([*style.rgb(replay.film.colors[robot.id]), 255.0]) / 255.0

@@ -22,7 +22,7 @@ _SHORTEST_ID_EM = 3.3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotReading:
-    """What the panel says about one robot at one time.
+    """What the panel shows of one robot at one time.
 
     Attributes:
         robot: id of the robot.
@@ -51,7 +51,7 @@ class RobotReading:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
-    """What the panel says about the mission at one time.
+    """What the panel shows of the mission at one time.
 
     Attributes:
         time_s: mission time.

@@ -15,7 +15,7 @@ from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
 from mrmg.viz import scene_drawing, style
-from mrmg.viz.activities import breakdowns, standing_of, visit_ranks, way_to
+from mrmg.viz.activities import breakdowns, lengths_along, standing_of, visit_ranks
 from mrmg.viz.map_labels import map_labels
 from mrmg.viz.map_shapes import end_poses, end_ring
 
@@ -97,7 +97,7 @@ def _draw_path(
 
 
 def _draw_arrows(axes: Axes, state: np.ndarray, color: str) -> None:
-    way_m = way_to(state)
+    way_m = lengths_along(state)
     spacing_m = abs(axes.get_xlim()[1] - axes.get_xlim()[0]) / _ARROWS_PER_MAP
     marks_m = np.arange(spacing_m / 2, way_m[-1], spacing_m)
     for index in np.searchsorted(way_m, marks_m):

@@ -41,7 +41,7 @@ class Replay:
         return max(int(after) - 1, 0)
 
     def reading(self) -> Reading:
-        """Return what is to be said at the time."""
+        """Return what is shown at the time."""
         return self.film.reading(self.tick)
 
     def seek(self, time_s: float) -> None:

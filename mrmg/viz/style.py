@@ -56,7 +56,7 @@ _WHITE = (1.0, 1.0, 1.0)
 _LUMINANCES = (0.26, 0.26, 0.26, 0.26, 0.10, 0.10, 0.06, 0.26)
 """How light the robots' colours may be, in the palette's order. Lines of 0.26 have a
 contrast of 3.4 on white; those of hues that colour-blind eyes would take for another
-are darker, so that lightness tells them apart."""
+are darker, so that lightness distinguishes them."""
 _LIGHTEST_LUMINANCE = 0.22
 """Lines of it have a contrast of 4.3 on the dark page's cards."""
 

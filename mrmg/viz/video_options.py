@@ -1,4 +1,4 @@
-"""What is asked of a video or a GIF: checked, and completed from the log."""
+"""Options of a video or a GIF: checked, and completed from the log."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from mrmg.simulation.scenery import FLOOR
 from mrmg.simulation.world_model import MujocoWorld
 from mrmg.viz.gl_backend import offscreen_context
 from mrmg.viz.ground_image import GroundFrame
-from mrmg.world.relief import highest_m
+from mrmg.world.elevation import highest_m
 
 _SLICES, _STACKS = 20, 2
 _SMOOTH_SAMPLES = 4
@@ -101,14 +101,14 @@ class WorldView:
         self.model.geom_rgba[self._target_geom[target]] = rgba
 
     def place(self, qpos: np.ndarray) -> None:
-        """Put everything where `qpos` says."""
+        """Put everything where `qpos` has it."""
         self._data.qpos[:] = qpos
         mujoco.mj_kinematics(self.model, self._data)
         mujoco.mj_comPos(self.model, self._data)
         mujoco.mj_camlight(self.model, self._data)
 
     def place_robots_away(self, qpos: np.ndarray) -> None:
-        """Put everything where `qpos` says, but the robots out of sight."""
+        """Put everything where `qpos` has it, but the robots out of sight."""
         away = qpos.copy()
         free = self.model.jnt_type == mujoco.mjtJoint.mjJNT_FREE
         away[self.model.jnt_qposadr[free]] += _AWAY_M

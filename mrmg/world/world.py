@@ -1,4 +1,4 @@
-"""The world a planner asks: free space per set of obstacles, and terrain, on grids."""
+"""The world a planner queries: free space per set of obstacles, and terrain grids."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class World:
         spaces: one free space per distinct set of obstacles.
         space_of_robot: index into `spaces` for each robot of the scene, shape (R,).
         obstacles: union of the obstacles of each space.
-        terrain: multipliers of rolling and turning, and relief.
+        terrain: multipliers of rolling and turning, and elevation.
     """
 
     spaces: tuple[FreeSpace, ...]
@@ -41,7 +41,7 @@ class World:
 
         Args:
             scene: the scene.
-            margin_m: largest clearance that footprint tests will ask for.
+            margin_m: largest clearance that footprint tests will use.
         """
         reach = margin_m + max(
             robot.model.circumscribed_radius_m for robot in scene.robots
@@ -71,7 +71,7 @@ def free_space(
     Args:
         bounds: (x_min, y_min, x_max, y_max) [m].
         obstacles: a polygon or multipolygon, possibly empty.
-        reach: largest radius plus margin a footprint test will ask for [m].
+        reach: largest radius plus margin a footprint test will use [m].
     """
     x_min, y_min, x_max, y_max = bounds
     ring_start, points = _rings(obstacles)

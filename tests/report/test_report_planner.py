@@ -1,4 +1,4 @@
-"""What the report says of the planner is what the planner said."""
+"""What the report states of the planner is what the planner said."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The relief between its nodes, against scipy and finite differences."""
+"""The elevation between its nodes, against scipy and finite differences."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from mrmg.plans import Plan, Trajectory
 from mrmg.scene.types import Scene
 from mrmg.supervision.corridor import Departure, EnergyCorridor
 from mrmg.supervision.course import Course
-from mrmg.supervision.meter import RobotMeter
+from mrmg.supervision.metering import RobotMeter
 from mrmg.supervision.parameters import ControlParams
 
 SPEED_M_S, DT_S, STEPS = 1.5, 0.1, 1000

@@ -16,7 +16,7 @@ from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.supervision import drive_mission, remaining_scene
 from mrmg.supervision.remaining import FleetCondition
-from mrmg.supervision.stays import StayUnderWay, keeps_stays, stays_under_way
+from mrmg.supervision.stays import OngoingStay, keeps_stays, stays_under_way
 
 DWELL = Path(__file__).parents[1] / "scenes" / "dwell.yaml"
 
@@ -39,7 +39,7 @@ def test_a_stay_counts_from_when_it_was_last_begun(scene: Scene) -> None:
         "r2": way(away, away, away, there, away),
     }
     stays = stays_under_way(scene.goals, time_s, ways)
-    assert stays == {"g1": StayUnderWay("r1", 2.0)}
+    assert stays == {"g1": OngoingStay("r1", 2.0)}
 
 
 def test_the_longest_stay_under_way_counts(scene: Scene) -> None:
@@ -55,7 +55,7 @@ def test_the_rest_of_the_stay_is_left(scene: Scene) -> None:
         pose={robot.id: robot.pose for robot in scene.robots},
         energy_J={robot.id: robot.battery.start_J for robot in scene.robots},
         rolling_factor=dict.fromkeys(("r1", "r2"), 1.0),
-        stays={"g1": StayUnderWay("r1", 3.5), "g3": StayUnderWay("r2", 1.0)},
+        stays={"g1": OngoingStay("r1", 3.5), "g3": OngoingStay("r2", 1.0)},
     )
     dwell_s = [goal.dwell_s for goal in remaining_scene(scene, condition).goals]
     assert dwell_s == [2.5, 4.0, 0.0, 5.0]
@@ -65,7 +65,7 @@ def test_only_who_is_there_from_the_start_keeps_a_stay() -> None:
     visit = Visit(
         robot="r1", target="g1", kind="goal", step=0, time_s=0.0, energy_J=1.0
     )
-    stays = {"g1": StayUnderWay("r1", 2.0)}
+    stays = {"g1": OngoingStay("r1", 2.0)}
 
     assert keeps_stays([visit], stays)
     assert not keeps_stays([replace(visit, robot="r2")], stays)

@@ -59,7 +59,7 @@ def test_full_braking_is_taken_where_it_is_clear(
     lonely: tuple[Scene, list[Trajectory]],
 ) -> None:
     scene, trajectories = lonely
-    (states, controls) = departing(scene, trajectories).ways_to_rest()["r1"]
+    (states, controls) = departing(scene, trajectories).motions_to_rest()["r1"]
     limits = scene.robots[0].model.limits
     share = scene.robots[0].model.planning_share
     assert controls[0, 0] == pytest.approx(-share * limits.u1_max_m_s2)
@@ -88,10 +88,10 @@ def test_else_the_fleet_stops_along_its_plan(make_yard: Callable[..., Scene]) ->
     stop = departing(scene, trajectories)
     committed = {item.robot: stop._braking(item) for item in trajectories}
     assert stop._clearance_m(committed) < ENOUGH_M
-    ways = stop.ways_to_rest()
-    assert stop._clearance_m(ways) > stop._clearance_m(committed)
+    motions = stop.motions_to_rest()
+    assert stop._clearance_m(motions) > stop._clearance_m(committed)
     for item in trajectories:
-        states, controls = ways[item.robot]
+        states, controls = motions[item.robot]
         assert len(states) == len(controls) + 1
         np.testing.assert_allclose(states[-1, 3:], 0.0, atol=1e-9)
         off_m = np.abs(states[:, 1] - item.state[0, 1])
@@ -102,6 +102,6 @@ def test_else_the_fleet_stops_along_its_plan(make_yard: Callable[..., Scene]) ->
 def test_who_is_broken_only_brakes(make_yard: Callable[..., Scene]) -> None:
     scene, trajectories = crossing(make_yard)
     stop = departing(scene, trajectories, broken=frozenset({"r1"}))
-    states, _ = stop.ways_to_rest()["r1"]
+    states, _ = stop.motions_to_rest()["r1"]
     expected, _ = stop._braking(trajectories[0])
     np.testing.assert_array_equal(states, expected)

@@ -51,12 +51,12 @@ def random_scene(make_scene: Any, rng: np.random.Generator) -> Scene:
         )
         for i in range(rng.integers(0, 5))
     )
-    relief = None
+    elevation = None
     if rng.random() < 0.5:
         height_m = rng.uniform(-1.0, 1.0, rng.integers(2, 7, 2))
-        relief = Elevation(bounds=BOUNDS, height_m=height_m)
+        elevation = Elevation(bounds=BOUNDS, height_m=height_m)
     owned = tuple(random_robot(robot, rng) for robot in scene.robots)
-    return replace(scene, terrain=terrain, elevation=relief, robots=owned)
+    return replace(scene, terrain=terrain, elevation=elevation, robots=owned)
 
 
 def random_robot(robot: Robot, rng: np.random.Generator) -> Robot:

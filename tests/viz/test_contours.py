@@ -8,7 +8,7 @@ import pytest
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.viz.contours import contour_lines, levels_m
-from mrmg.world.relief import height_at
+from mrmg.world.elevation import height_at
 
 
 def make_scene(**parts: object) -> Scene:

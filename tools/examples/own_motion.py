@@ -21,7 +21,7 @@ def step(state, control, length, dt):
     return x + v * dt * cos(middle), y + v * dt * sin(middle), theta + w * dt, v, w
 
 def steer(state, waypoint, share, limits, length, dt):
-    """Return the control towards a waypoint; share 0 asks to brake."""
+    """Return the control towards a waypoint; share 0 means to brake."""
     if share == 0.0:
         return 0.0, 0.0
     dx, dy = waypoint[0] - state[0], waypoint[1] - state[1]

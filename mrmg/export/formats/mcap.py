@@ -37,7 +37,7 @@ from mrmg.export.table import Files, Format
 from mrmg.extras import import_extra
 from mrmg.scene.types import Scene
 from mrmg.simulation import palette
-from mrmg.world.relief import gradient_at, lifted
+from mrmg.world.elevation import gradient_at, lifted
 
 TF_PERIOD_S = 0.05
 POSE_PERIOD_S = 0.1

@@ -23,7 +23,7 @@ from mrmg.export.mission import Course, Mission, bends, every
 from mrmg.export.route import STANDING_M_S, Node, Route, route_of
 from mrmg.export.table import Files, Format
 from mrmg.scene.types import Goal, Scene, Station
-from mrmg.viz.activities import way_to
+from mrmg.viz.activities import lengths_along
 
 MANUFACTURER = "mrmg"
 STATE_PERIOD_S = 1.0
@@ -203,7 +203,7 @@ def _states(
     leave_s = np.array([node.leave_s for node in route.nodes])
     reached = np.searchsorted(plan_s, route.reached_s - _EPSILON_S)
     left = np.searchsorted(plan_s, leave_s - _EPSILON_S)
-    way_m = way_to(course.state)
+    way_m = lengths_along(course.state)
     visited = {visit.target for visit in course.visits}
     ticks = {*every(course.time_s, STATE_PERIOD_S), *reached, *left} - {len(plan_s)}
     for number, tick in enumerate(sorted(int(tick) for tick in ticks)):
@@ -228,7 +228,7 @@ def _states(
 
 
 def _part(element: _Json, name: str) -> _Json:
-    """Return what a state says of a node or edge that is still to be traversed."""
+    """Return what a state contains of a node or edge that is still to be traversed."""
     return {key: element[key] for key in (name, "sequenceId", "released")}
 
 

@@ -27,7 +27,7 @@ from mrmg.planning.roadmap.vertices import (
     roadmap_vertices,
 )
 from mrmg.scene.types import Scene
-from mrmg.world.relief import height_at
+from mrmg.world.elevation import height_at
 from mrmg.world.world import World
 
 if TYPE_CHECKING:

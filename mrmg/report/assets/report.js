@@ -8,7 +8,7 @@
   const source = one("#data");
   const data = source ? JSON.parse(source.textContent) : null;
 
-  /* Scheme: the reader's, until the button says otherwise. */
+  /* Scheme: the reader's, until the button changes it. */
   const reader = matchMedia("(prefers-color-scheme: dark)");
   let chosen = null;
   function applyScheme() {

@@ -18,7 +18,7 @@ from mrmg.scene.loading.shape_schema import Positive, Strict
 from mrmg.scene.loading.yaml_text import parse_yaml, read_text
 
 OBSTACLE = "obstacle"
-"""What the table says of classes that robots must keep off."""
+"""What the table states of classes that robots must keep off."""
 
 
 class ClassEntry(Strict):

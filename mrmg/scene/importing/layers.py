@@ -32,7 +32,7 @@ _NOT_IN_IDS = re.compile(r"[^A-Za-z0-9_.\-]+")
 
 @dataclass(frozen=True, kw_only=True)
 class ImportOptions:
-    """What the user asks of an import.
+    """What the user requests of an import.
 
     Attributes:
         frame: coordinates of the scene so far; None before the first file.

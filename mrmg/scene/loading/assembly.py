@@ -17,7 +17,6 @@ from shapely.geometry import Polygon
 
 from mrmg import storage
 from mrmg.errors import Fault, SceneError, nearest
-from mrmg.scene.climbing import slope_faults, steep_ground
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.loading.batteries import battery_of
 from mrmg.scene.loading.elevation import elevation_of
@@ -36,6 +35,7 @@ from mrmg.scene.loading.shape_schema import CircleEntry
 from mrmg.scene.loading.starts import crowded_robots, misplaced_robots
 from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
 from mrmg.scene.robot_model import RobotModel
+from mrmg.scene.slopes import slope_faults, steep_ground
 from mrmg.scene.types import (
     Finish,
     Goal,
@@ -231,7 +231,7 @@ class Assembly:
             return None
         kind = f"{folder} {changes}"
         if kind not in self._loaded:
-            # Once for all robots of a kind: its faults are told once, too.
+            # Once for all robots of a kind: its faults are reported once, too.
             try:
                 self._loaded[kind] = load_model(
                     folder,

@@ -149,7 +149,7 @@ def _plain(value: Any, written: Mapping[int, _Entry]) -> Any:
 def _merged_battery(battery: _Entry, given: Any) -> Any:
     """Return a battery's entry with what is given in place of what it named."""
     if not isinstance(given, dict):
-        return given  # and the loader says what is wrong
+        return given  # and the loader reports what is wrong
     kept = {key: item for key, item in battery.items() if not _named(key, given)}
     return _without_none(kept | given)
 

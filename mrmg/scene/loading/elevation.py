@@ -1,4 +1,4 @@
-"""The ways a scene states its relief, and what can be wrong with them.
+"""The ways a scene states its elevation, and what can be wrong with them.
 
 Grids are read like a map on paper, north up: the first row lies on the northern bound,
 the first column on the western one.
@@ -22,7 +22,7 @@ from mrmg.scene.loading.elevation_schema import ElevationEntry, HillEntry
 from mrmg.scene.loading.faults import shown
 
 FORMS = ("file", "grid", "hills", "packed")
-"""Exactly one of these keys says how high the ground is."""
+"""Exactly one of these keys states how high the ground is."""
 
 DEFAULT_CELL_M = 0.5
 MOST_NODES = 1_000_000
@@ -33,7 +33,7 @@ Bounds = tuple[float, float, float, float]
 def elevation_of(
     entry: ElevationEntry, bounds: Bounds, base: Path | None
 ) -> tuple[Elevation, dict[str, Any]] | list[Fault]:
-    """Return the relief of a scene, or what is wrong with its entry.
+    """Return the elevation of a scene, or what is wrong with its entry.
 
     Args:
         entry: the scene's `elevation`.
@@ -42,7 +42,7 @@ def elevation_of(
             directory.
 
     Returns:
-        The relief, and the entry for a document that needs no other file.
+        The elevation, and the entry for a document that needs no other file.
     """
     given = [key for key in FORMS if getattr(entry, key) is not None]
     if len(given) != 1:

@@ -32,7 +32,7 @@ class PackedEntry(Strict):
 
 
 class ElevationEntry(Strict):
-    """The relief: exactly one of file, grid, hills, packed."""
+    """The elevation: exactly one of file, grid, hills, packed."""
 
     model_config = exactly_one("file", "grid", "hills", "packed")
 

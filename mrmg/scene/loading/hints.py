@@ -1,4 +1,4 @@
-"""What a scene file probably means otherwise than it says."""
+"""What a scene file probably means otherwise than it states."""
 
 from __future__ import annotations
 

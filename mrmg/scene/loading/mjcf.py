@@ -1,4 +1,4 @@
-"""What a robot's MJCF says of it, measured in the compiled model.
+"""What a robot's MJCF states of it, measured in the compiled model.
 
 The only module below `execution` that needs MuJoCo, which it imports late: that takes a
 fifth of a second at best, and unchanged shipped models need no look.
@@ -156,9 +156,9 @@ class CompiledRobot:
         )
 
     def traction_N(self, motor: str, joints: Sequence[str], force_N: float) -> float:
-        """Return the force of wheels on the ground as one motor is asked for `force_N`.
+        """Return the force of wheels on the ground as one motor is commanded `force_N`.
 
-        That is what `simulation.drives` asks of it at rest; its ranges may cut it.
+        That is what `simulation.drives` commands at rest; its ranges may cut it.
         """
         model, at = self._model, self._id("actuator", motor)
         (moment,) = transmission(model)[[model.actuator_outadr[at]]]

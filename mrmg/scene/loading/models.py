@@ -217,7 +217,7 @@ def _checked_model(
         raise SceneError(source, faults)
     parameters = _parameters(entry)
     if entry.motion_model not in SHIPPED_MOTIONS:
-        # What the file says counts for a digest, not what it is called.
+        # The content of the file counts for a digest, not its name.
         source_text = (folder / entry.motion_model).read_text(encoding="utf-8")
         parameters["motion_model"] = storage.digest(source_text)
     return model, parameters

@@ -35,7 +35,7 @@ Details:
 - `elevation` is one of `hills` (round, height and radius in m; they add up, negative
   ones are hollows; sampled every `cell` metres, default 0.5), `grid` (rows of heights
   in m) or `file`: an .npy file of heights in m, or a grey .png whose
-  `range: [low, high]` says the heights in m of black and white; relative to the scene
+  `range: [low, high]` states the heights in m of black and white; relative to the scene
   file. Grids are read like a map, the first row in the north, and reach from bound to
   bound; between their nodes the ground is bilinear. Saved scenes hold a file's heights
   as `packed`. Ground too steep for a robot makes the scene invalid where the robot
@@ -60,7 +60,7 @@ Details:
 - `start_energy` is a share of the capacity (0..1), or one of {J: }, {Wh: }, {m: }.
 - `rolling_factor` multiplies the rolling resistance a robot is reckoned with, as one
   measures it of a loaded or worn one; metres in `battery` stay those of the model.
-- `finish` says where a robot must be at rest when the mission ends: `start` (within 1 m
+- `finish` is where a robot must be at rest when the mission ends: `start` (within 1 m
   of where it started), or one of circle, polygon, with `heading` (and
   `heading_tolerance`, default 0.2) if it matters.
 - `model` is the name of a shipped model, or a folder (with a `/` in it), relative to
@@ -68,7 +68,7 @@ Details:
   `robot.yaml`: `{like: car, rolling_coefficient: 0.08}`.
 - `energy: paper` (here or in `robot.yaml`) charges only distance times terrain and
   turning, the cost of the published method; `full`, the default, counts everything.
-- `objective` says which plan is better: that with less `energy` of the whole fleet (J,
+- `objective` sets which plan is better: that with less `energy` of the whole fleet (J,
   the default), that with the smaller `makespan`, the time at which the last robot has
   come to rest (s), or that with the smaller sum of both, each times its weight:
   `{energy: 1, makespan: 50}` has a second count as much as 50 J. Batteries must keep

@@ -25,7 +25,7 @@ PLACE_M = 0.01
 footprint: half of the default noise of measured positions."""
 
 FORCE_SHARE = 0.01
-"""By how much less than what the limits ask for a drive may give."""
+"""By how much less than what the limits require a drive may give."""
 
 GRIP_SHARE_MISSING = 0.05
 """By how much less the simulated tyres may grip than `robot.yaml` says."""

@@ -14,12 +14,12 @@ import numpy as np
 from shapely.geometry import Polygon
 
 from mrmg.errors import UsageError
-from mrmg.scene.climbing import steep_ground
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.loading.models import load_model, model_folder
 from mrmg.scene.populating.ground import Ground
 from mrmg.scene.populating.placement import RESERVE, Placement, Sites, place_mission
 from mrmg.scene.robot_model import RobotModel
+from mrmg.scene.slopes import steep_ground
 from mrmg.scene.types import Battery, Robot, Scene
 from mrmg.seeding import stream
 

@@ -31,7 +31,7 @@ class Estimate:
         value: best estimate.
         half_width: of its confidence interval.
         unit: of both.
-        was: what the model says; None where the model has no such parameter.
+        was: what the model states; None where the model has no such parameter.
         key: where `robot.yaml` has it; None where it has not.
     """
 
@@ -69,7 +69,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Calibration:
-    """What the manoeuvres of one model tell.
+    """What the manoeuvres of one model yield.
 
     Attributes:
         model: what was calibrated, as it was before.
@@ -143,7 +143,7 @@ def calibrate(
 
     Raises:
         UsageError: if the model can only be planned for, the robot cannot drive the
-            manoeuvres, or moves as if it had less mass than the model says.
+            manoeuvres, or moves as if it had less mass than the model states.
         FileError: if its MJCF cannot be used.
     """
     reason = why_not_driven(model)
@@ -164,7 +164,7 @@ def fit_legs(model: RobotModel, legs: Sequence[Leg]) -> Calibration:
     """Fit the energy model of `model` to the power of legs that were driven.
 
     Raises:
-        UsageError: if the robot moves as if it had less mass than the model says.
+        UsageError: if the robot moves as if it had less mass than the model states.
     """
     matrix = np.array([leg.features for leg in legs])
     fit = fit_linear(matrix, np.array([leg.power_W for leg in legs]))

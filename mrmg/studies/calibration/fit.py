@@ -42,14 +42,14 @@ def fit_linear(matrix: np.ndarray, measured: np.ndarray) -> LinearFit:
         measured: b, shape (n,).
 
     Raises:
-        ValueError: if the columns of A do not tell the parameters apart.
+        ValueError: if the columns of A do not separate the parameters.
     """
     rows, parameters = matrix.shape
     # Columns of like size, so that the rank is not a matter of units.
     length = np.linalg.norm(matrix, axis=0)
     scale = np.where(length > 0.0, length, 1.0)
     if rows <= parameters or np.linalg.matrix_rank(matrix / scale) < parameters:
-        raise ValueError(f"{rows} measurements do not tell {parameters} values apart")
+        raise ValueError(f"{rows} measurements do not separate {parameters} values")
     value = np.linalg.lstsq(matrix / scale, measured, rcond=None)[0] / scale
     fitted = matrix @ value
     residual = measured - fitted

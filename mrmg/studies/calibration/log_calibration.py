@@ -79,7 +79,7 @@ class RunPrediction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LogCalibration:
-    """What logs of a robot tell.
+    """What logs of a robot yield.
 
     Attributes:
         model: whose they are, as it was before.
@@ -166,7 +166,7 @@ def calibrate_from_logs(
             among theirs.
     """
     if len(runs) < 2:
-        raise UsageError("one log does not tell how runs differ; give at least two")
+        raise UsageError("one log does not show how runs differ; give at least two")
     known = list(dict.fromkeys(run.terrain for run in runs))
     for test in tests:
         if test.terrain not in known:

@@ -5,10 +5,10 @@ pieces' errors, relative to the run's mean power, count as in a Huber-like loss
 (`soft_l1`), and every run counts alike, however long it is: runs differ more from each
 other than pieces of one run do, so that long runs must not outvote short ones.
 
-How far another run will be off is told by leaving out each run in turn: the logarithms
-of measured over predicted energy. Their root mean square on a terrain, pooled with that
-of the other terrains as if it came from `PRIOR_RUNS` more runs, is the spread, and
-Student's t gives the interval.
+How far another run will be off is estimated by leaving out each run in turn: the
+logarithms of measured over predicted energy. Their root mean square on a terrain,
+pooled with that of the other terrains as if it came from `PRIOR_RUNS` more runs, is the
+spread, and Student's t gives the interval.
 """
 
 from __future__ import annotations

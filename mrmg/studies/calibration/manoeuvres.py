@@ -106,7 +106,7 @@ def circle(
     """Return a circle that `model` drives.
 
     Args:
-        model: whose motion model tells how it gets on a circle.
+        model: whose motion model determines how it gets on a circle.
         limits: of its ramps.
         speed_m_s: while cruising.
         second: psi [rad] or omega [rad/s] while cruising.

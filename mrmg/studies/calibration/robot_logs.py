@@ -20,7 +20,7 @@ STILL = 0.005
 """Speed [m/s] and yaw rate [rad/s] below which a robot stands."""
 
 LEAST_ROWS = 10
-"""Fewest rows of which a power can be told."""
+"""Fewest rows of which a power can be found."""
 
 COLUMNS = {
     "time": ("time", "t", "timestamp"),

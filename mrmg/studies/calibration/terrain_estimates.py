@@ -17,7 +17,7 @@ from mrmg.studies.calibration.power_laws import PowerLaw
 from mrmg.studies.calibration.robot_logs import LoggedRun
 
 LEAST_REST_S = 1.0
-"""Time at rest that tells the stationary power."""
+"""Time at rest from which the stationary power is found."""
 
 EXCITED_SHARE = 0.02
 """Share of its runs' time that a robot must drive, or turn, to be calibrated for it."""
@@ -25,7 +25,7 @@ EXCITED_SHARE = 0.02
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TerrainEstimate:
-    """What the runs on a terrain tell.
+    """What the runs on a terrain yield.
 
     Attributes:
         name: of the terrain.
@@ -50,7 +50,7 @@ class TerrainEstimate:
     energy_spread: float
 
     def entry(self) -> dict[str, float | str]:
-        """Return what the terrain's entry in a scene says."""
+        """Return the terrain's entry in a scene."""
         return {
             "id": self.name,
             "multiplier": round(self.multiplier, 3),
@@ -88,7 +88,7 @@ def stationary_power(model: RobotModel, runs: Sequence[LoggedRun]) -> Estimate:
 def terrain_estimates(
     model: RobotModel, fit: LawFit, runs: Sequence[LoggedRun], stationary: Estimate
 ) -> tuple[TerrainEstimate, ...]:
-    """Return what the runs on each terrain tell; the first terrain is plain ground."""
+    """Return what the runs on each terrain yield; the first terrain is plain ground."""
     found: list[TerrainEstimate] = []
     for name in fit.parameters:
         rows = [at for at, run in enumerate(runs) if run.terrain == name]

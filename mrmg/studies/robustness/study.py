@@ -22,7 +22,7 @@ from mrmg.studies.outcomes import Study, Trial, save_study
 from mrmg.studies.robustness.trials import TrialJob, jobs_of, make_trial
 
 OnTrial = Callable[[int, int, int], None]
-"""Told (trials done, trials in all, feasible ones) after each trial."""
+"""Called with (trials done, trials in all, feasible ones) after each trial."""
 
 
 def study_robustness(
@@ -46,7 +46,7 @@ def study_robustness(
         seed: of the first trial's disturbance.
         disturb: what to draw from, as `simulation.disturbance_spec` reads it.
         workers: processes that drive.
-        on_trial: told of every trial, those of earlier calls first.
+        on_trial: called after every trial, for those of earlier calls first.
 
     Raises:
         UsageError: if the run has no plan or a robot that can only be planned for, or

@@ -16,7 +16,7 @@ from mrmg.planning.roadmap.fleet import travel_classes
 from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
-from mrmg.world.relief import height_at
+from mrmg.world.elevation import height_at
 from mrmg.world.world import CELL_M, World
 
 

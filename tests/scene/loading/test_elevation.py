@@ -1,4 +1,4 @@
-"""The ways of stating a relief give the same ground; bad ones are told apart."""
+"""The ways of stating an elevation give the same ground; bad ones are named."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ import yaml
 from PIL import Image
 
 from mrmg.errors import SceneError
-from mrmg.scene.climbing import steepest_climb
 from mrmg.scene.loading import (
     dump_scene,
     load_scene,
     scene_from_document,
     scene_schema,
 )
+from mrmg.scene.slopes import steepest_climb
 from mrmg.scene.types import Scene
 
 NORTH_UP = np.array([[0.0, 0.5, 1.0], [0.0, 0.2, 0.4]])

@@ -8,14 +8,14 @@ import mujoco
 import numpy as np
 
 from mrmg.scene.types import Scene
-from mrmg.world.relief import gradient_at, height_at
+from mrmg.world.elevation import gradient_at, height_at
 
 
-class Incline:
+class SlopesUnderfoot:
     """Slopes along the headings of a fleet, below the centres of mass."""
 
     def __init__(self, scene: Scene) -> None:
-        """Look at the relief of `scene`."""
+        """Look at the elevation of `scene`."""
         self._relief = scene.elevation
         self._lead_m = [robot.model.center_of_mass_m for robot in scene.robots]
 

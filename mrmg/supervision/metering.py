@@ -1,4 +1,4 @@
-"""What the batteries of a driving fleet lose, and what that says of its tyres.
+"""What the batteries of a driving fleet lose, and what that implies for its tyres.
 
 The meter of one robot sums the energy its actuators took, follows its battery over the
 recharges of its tour, and estimates by recursive least squares the factor f by which
@@ -21,7 +21,7 @@ from mrmg.energy.metering import (
 )
 from mrmg.energy.model import PARTS
 from mrmg.scene.types import Robot, Scene
-from mrmg.supervision.gauge import BatteryGauge
+from mrmg.supervision.battery import BatteryTracker
 
 _ROLLING = PARTS.index("rolling")
 _CONSUMERS = [PARTS.index("idle"), PARTS.index("device")]
@@ -64,16 +64,16 @@ class RobotMeter:
         model = robot.model.energy_model
         self.rolling = RollingEstimate(_PRIOR_M * model.plain_ground_J_per_m())
         self._scene = scene
-        self._gauge = BatteryGauge(scene, robot)
+        self._battery = BatteryTracker(scene, robot)
 
     @property
     def charge_J(self) -> float:
         """Battery content now."""
-        return self._gauge.charge_J
+        return self._battery.charge_J
 
     def follow(self, tour: Sequence[str]) -> None:
         """Expect the visits of a tour from now on."""
-        self._gauge.follow(tour)
+        self._battery.follow(tour)
 
     def add(self, time_s: np.ndarray, state: np.ndarray, work_J: np.ndarray) -> None:
         """Take in some ticks.
@@ -86,7 +86,7 @@ class RobotMeter:
         parts_J = measured_energy_parts(self.robot, work_J, time_s)
         draw_J = parts_J.sum(axis=1)
         self.used_J += float(draw_J.sum())
-        self._gauge.add(time_s, state[:, :2], draw_J)
+        self._battery.add(time_s, state[:, :2], draw_J)
         self._estimate(time_s, state, parts_J[:, _DRIVE])
 
     def _estimate(
@@ -96,7 +96,7 @@ class RobotMeter:
         parts_J = step_energy_parts(self._scene, motion)
         driving_J = parts_J.sum(axis=1) - parts_J[:, _CONSUMERS].sum(axis=1)
         others_J = driving_J - parts_J[:, _ROLLING]
-        # While a robot coasts or brakes, its battery tells nothing of its tyres.
+        # While a robot coasts or brakes, its battery indicates nothing about its tyres.
         pulls = np.flatnonzero((driving_J > 0.0) & (drive_J > 0.0))
         spans = max(1, round((time_s[-1] - time_s[0]) / _SPAN_S))
         for ticks in np.array_split(pulls, spans):

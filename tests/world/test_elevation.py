@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.world import _kernels
-from mrmg.world.relief import gradient_at, height_at, lifted, load_points
+from mrmg.world.elevation import gradient_at, height_at, lifted, load_points
 from mrmg.world.world import World
 
 HILLS = {

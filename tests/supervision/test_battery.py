@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from mrmg.energy.metering import LoggedMotion, battery_content, find_visits
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
-from mrmg.supervision.gauge import BatteryGauge
+from mrmg.supervision.battery import BatteryTracker
 
 TOUR = ("s", "g", "s")
 
@@ -51,15 +51,15 @@ def test_it_comes_to_the_same_in_pieces(
     draw_J = np.full(len(x) - 1, 0.7)
     motion = LoggedMotion(robot="r", time_s=time_s, state=state)
     visits = find_visits(scene, motion, TOUR)
-    # The account goes on behind a target that was left out; the gauge waits for it.
+    # The account goes on behind a target that was left out; the tracker waits for it.
     if [visit.target for visit in visits] != list(TOUR[: len(visits)]):
         return
-    gauge = BatteryGauge(scene, scene.robots[0])
-    gauge.follow(TOUR)
+    tracker = BatteryTracker(scene, scene.robots[0])
+    tracker.follow(TOUR)
     for start in range(0, len(draw_J), piece):
         end = min(start + piece, len(draw_J))
-        gauge.add(
+        tracker.add(
             time_s[start : end + 1], state[start : end + 1, :2], draw_J[start:end]
         )
     expected = battery_content(scene, motion, draw_J, visits)[0][-1]
-    assert gauge.charge_J == pytest.approx(expected)
+    assert tracker.charge_J == pytest.approx(expected)

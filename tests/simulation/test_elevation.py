@@ -13,12 +13,12 @@ import pytest
 from mrmg.energy.metering import measured_energy_parts, plan_ledger
 from mrmg.scene.types import Scene
 from mrmg.simulation.ground_shape import FOUNDATION_M, draped_mark, height_span
-from mrmg.simulation.incline import Incline, standing_pose
 from mrmg.simulation.log import ExecutionLog
 from mrmg.simulation.scenery import FLOOR
 from mrmg.simulation.simulation import simulate
+from mrmg.simulation.slopes import SlopesUnderfoot, standing_pose
 from mrmg.simulation.world_model import build_world
-from mrmg.world.relief import height_at
+from mrmg.world.elevation import height_at
 
 HILLS = {"hills": [{"center": [0, 0], "height": 2.0, "radius": 20}]}
 
@@ -173,7 +173,9 @@ def test_robots_start_upright_on_the_ground(driving: SimpleNamespace) -> None:
 def test_inclines_are_positive_uphill(driving: SimpleNamespace) -> None:
     scene = driving.open_ground([(0.0, 0.0, 0.0)] * 1, elevation=ramp(0.1))
     for heading, expected in ((0.0, 0.1), (np.pi, -0.1), (np.pi / 2, 0.0)):
-        level, slope = Incline(scene).under(np.array([[5.0, 1.0, heading, 0.0, 0.0]]))
+        level, slope = SlopesUnderfoot(scene).under(
+            np.array([[5.0, 1.0, heading, 0.0, 0.0]])
+        )
         assert slope / level == pytest.approx(expected, abs=1e-12)
         assert level**2 + slope**2 == pytest.approx(1.0)
 

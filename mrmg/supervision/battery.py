@@ -11,7 +11,7 @@ from mrmg.plans import Visit
 from mrmg.scene.types import Robot, Scene, Station
 
 
-class BatteryGauge:
+class BatteryTracker:
     """The battery content of one robot, from its draws and the visits of its tour.
 
     Attributes:

@@ -14,7 +14,7 @@ from mrmg.scene.types import Scene
 from mrmg.simulation import simulate
 from mrmg.simulation.disturbance_spec import parse_disturbance
 from mrmg.simulation.log import ExecutionLog
-from mrmg.supervision.meter import RobotMeter, RollingEstimate
+from mrmg.supervision.metering import RobotMeter, RollingEstimate
 
 
 def test_the_estimate_is_that_of_least_squares() -> None:
