@@ -24,7 +24,6 @@ LONG_MODULES = {
     "band": 356,
     "tracking": 353,
     "_tree_kernels": 370,
-    "motion_tree": 353,
 }
 """Modules that are still too long, with their lines; the list may only shrink."""
 
@@ -33,7 +32,6 @@ LONG_FUNCTIONS = {
     "planner._planned": 66,
     "routing.routing_arrays": 65,
     "_expansion_kernels.expand": 72,
-    "_rerouting_kernels.route_from": 62,
 }
 """Functions that are still too long, with their lines; the list may only shrink."""
 

@@ -118,7 +118,7 @@ def main() -> int:
         print(f"not counted, a car overlaps a disc where it starts: {name}")
     counted = [path for path in files if path.stem not in overlapping]
     compile_kernels(PATH_FOLLOWING)
-    load_kernels(PATH_FOLLOWING, trees=True)
+    load_kernels(PATH_FOLLOWING)
     trials = Trials(options.output, limit=options.limit)
     with tempfile.TemporaryDirectory() as folder:
         model = write_model(Path(folder))

@@ -41,9 +41,8 @@ from mrmg.scene.types import Scene
 FOLDER = Path(__file__).resolve().parents[2] / "shared" / "kinodynamic"
 
 PARAMS = PlannerParams(
-    samples=600, region_m=2.0, obstacle_margin_m=0.08, robot_margin_m=0.15,
-    improvements=0, trees=40, max_vertices=3000,
-)  # fmt: skip
+    samples=600, obstacle_margin_m=0.08, robot_margin_m=0.15, improvements=0, trees=40
+)
 
 COMMON = {
     "format": 1, "height": 0.3, "track": 0.3, "mass": 20.0,

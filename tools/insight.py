@@ -9,16 +9,10 @@ import numpy as np
 
 from mrmg import seeding
 from mrmg.errors import UsageError
-from mrmg.planning.guided_tree.planner import Growth as GuidedGrowth
 from mrmg.planning.guided_tree.planner import grow_guided_tree
-from mrmg.planning.parameters import GUIDED_TREE, PlannerParams
-from mrmg.planning.problem.problem import Problem, state_problem
+from mrmg.planning.parameters import GUIDED_TREE, PlannerParams, profile_params
+from mrmg.planning.problem.problem import state_problem
 from mrmg.planning.roadmap.roadmap import build_roadmap
-from mrmg.planning.routers import find_router
-from mrmg.planning.routing.routing import Routing
-from mrmg.planning.routing.routing_problem import RoutingProblem
-from mrmg.planning.tree.motion_tree import Growth as TreeGrowth
-from mrmg.planning.tree.motion_tree import grow_tree
 from mrmg.plans import Trajectory
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
@@ -44,9 +38,7 @@ class Insight:
 
 
 def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
-    """Plan a mission by a motion tree, and keep what leads to its first plan.
-
-    The tree is the paper's for planner guided_tree, else the accelerated one.
+    """Plan a mission by the guided tree, and keep what leads to its first plan.
 
     Args:
         scene: the mission.
@@ -56,6 +48,8 @@ def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
     Raises:
         UsageError: if no attempt finds a plan.
     """
+    if params.planner != GUIDED_TREE:
+        params = profile_params("paper")
     world = World.from_scene(scene)
     roadmap = build_roadmap(
         scene,
@@ -68,8 +62,8 @@ def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
     problem = state_problem(scene, world, roadmap, params)
     for number in range(params.trees):
         draw = seeding.stream_seed(seed, "insight", number)
-        routing, growth = _grow(problem, params, draw)
-        if growth is not None and growth.solved:
+        growth = grow_guided_tree(problem, params, draw, np.zeros(1, np.bool_))
+        if growth.solved:
             first, second, weight = roadmap.edges[0]
             edges = roadmap.arrays.vertex[np.stack([first, second], axis=1)]
             length_m = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
@@ -81,26 +75,10 @@ def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
                 roadmap=edges[long],
                 multiplier=weight[long].mean(axis=1) / length_m[long],  # there and back
                 tours={
-                    name: problem.path(at, routing.tours[at])
+                    name: problem.path(at, growth.first_tours[at])
                     for at, name in enumerate(ids)
                 },
                 tree={name: pieces[:, :, at] for at, name in enumerate(ids)},
                 trajectories=growth.trajectories,
             )
     raise UsageError(f"{scene.name}: no plan was found in {params.trees} attempts")
-
-
-def _grow(
-    problem: Problem, params: PlannerParams, draw: int
-) -> tuple[Routing, TreeGrowth | GuidedGrowth | None]:
-    """Grow a tree; return the tours it begins with and the tree, None without tours."""
-    halt = np.zeros(1, np.bool_)
-    if params.planner == GUIDED_TREE:
-        guided = grow_guided_tree(problem, params, draw, halt)
-        return Routing(guided.first_tours, cost_J=0.0), guided
-    routing = find_router(params.router)(
-        RoutingProblem.of(problem.mission.routing), draw
-    )
-    if not routing.feasible:
-        return routing, None
-    return routing, grow_tree(problem, params, routing, draw, halt)

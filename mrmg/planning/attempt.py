@@ -83,8 +83,8 @@ class Attempt:
         found_at: readings of `time.perf_counter()` when they were found; empty if
             that is when the attempt ended.
         routing_s: time the tours took.
-        counts: of what was done, such as drafts (fleets driven along tours), trees and
-            router calls.
+        counts: of what was done, such as fleets driven along tours, searches for
+            motions and router calls.
         tours_found: whether the router found any.
         blocked: what stood in the way of a plan along them; "" if nothing did.
     """

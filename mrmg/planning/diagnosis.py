@@ -194,15 +194,11 @@ def _obstacle(
             limit_s=scene.time_limit_s,
             margin_s=TIME_MARGIN_S,
         )
-    trees = search.statistics.counts.get("trees", 0)
-    if search.blocked or not trees:
-        grown = f", and none of {counted(trees, 'motion tree')} reached all goals"
-        return endings.NO_PROGRESS.reason(
-            blocked=search.blocked or "the planner found no motions",
-            trees=grown if trees else "",
-        )
-    return endings.TREES_FAILED.reason(
-        trees=counted(trees, "tree"), size=params.max_vertices
+    rounds = search.statistics.counts.get("coordinated", 0)
+    searched = f", and {counted(rounds, 'search')} for motions found none"
+    return endings.NO_PROGRESS.reason(
+        blocked=search.blocked or "no motions were found that do not meet",
+        searched=searched if rounds else "",
     )
 
 

@@ -116,13 +116,7 @@ LATE = Ending(
 NO_PROGRESS = Ending(
     "no plan along the tours",
     PlanStatus.NO_PLAN_FOUND,
-    "tours were found, but no plan along them: {blocked}{trees}",
-)
-TREES_FAILED = Ending(
-    "no tree reaches all goals",
-    PlanStatus.NO_PLAN_FOUND,
-    "tours were found, but no motion tree reached all goals along them: {trees} grown, "
-    "of {size} vertices at most each",
+    "tours were found, but no plan along them: {blocked}{searched}",
 )
 BUDGET_FOR_ROADMAP = Ending(
     "the budget ends with the roadmap",
@@ -151,7 +145,6 @@ ENDINGS = (
     NO_TOURS_IN_TIME,
     LATE,
     NO_PROGRESS,
-    TREES_FAILED,
     BUDGET_FOR_ROADMAP,
     BUDGET_OVER,
 )

@@ -92,29 +92,19 @@ class PlannerParams:
         neighbours: nearest vertices joined in the roadmap.
         router: name and parameters of the router; the planner guided_tree takes nrpa.
         dt_s: step of the motion model, dt [s].
-        steps: steps of one expansion of the tree of path_following.
-        max_vertices: size of one such tree at which it is given up.
-        trees: trees grown at most; a tree that fails is followed by one with new draws.
-        improvements: further trees grown after the first plan; the cheapest plan
-            counts.
+        trees: attempts at most; one that fails is followed by one with new draws.
+        improvements: further attempts after the first plan; the cheapest plan counts.
         drafts: follow paths along tours without a tree where that succeeds.
         spare: share of every battery's capacity that plans leave above the reserve
             where they can, for robots that take more than their models say. With a
             tenth, a robot that uses all it may on one charge can take 12 % more.
         refinements: times that the plan of each tree is drawn tight and driven again,
             as long as that saves energy.
-        group_alpha, group_beta, group_lambda: weights of groups in such a tree.
-        group_bias: probability of taking the group of largest weight instead of
-            drawing.
-        steer_start, steer_decay, steer_least: probability that an expansion steers
-            instead of applying random controls: first value, factor per expansion,
-                floor.
         obstacle_margin_m: distance kept from obstacles at the time steps [m]. Between
             two steps of 0.1 s no corner of the car moves more than 0.16 m from both
             ends, so the default also keeps the motion in between clear, and leaves room
             for tracking errors.
         robot_margin_m: distance kept between robots at the time steps [m].
-        region_m: side of the square regions that tell groups apart [m].
         route_margin: surcharge on roadmap energies in routing, for what the roadmap
             does
             not see: turns, corrections, speed changes.
@@ -129,23 +119,13 @@ class PlannerParams:
     neighbours: int = 12
     router: RouterParams = field(default_factory=RouterParams)
     dt_s: float = 0.1
-    steps: int = 15
-    max_vertices: int = 6000
     trees: int = 12
     improvements: int = 1
     drafts: bool = True
     spare: float = 0.1
     refinements: int = 2
-    group_alpha: float = 1.0
-    group_beta: float = 4.0
-    group_lambda: float = 0.98
-    group_bias: float = 0.95
-    steer_start: float = 1.0
-    steer_decay: float = 0.9995
-    steer_least: float = 0.97
     obstacle_margin_m: float = 0.25
     robot_margin_m: float = 0.5
-    region_m: float = 6.0
     route_margin: float = 0.08
     budget_s: float | None = None
 
@@ -155,20 +135,12 @@ class PlannerParams:
             "samples": self.samples >= 0,
             "neighbours": self.neighbours >= 1,
             "dt_s": 0.0 < self.dt_s <= 0.2,
-            "steps": 1 <= self.steps <= 200,
-            "max_vertices": self.max_vertices >= 2,
             "trees": self.trees >= 1,
             "improvements": self.improvements >= 0,
             "refinements": self.refinements >= 0,
             "spare": 0.0 <= self.spare < 1.0,
-            "group_lambda": 0.0 < self.group_lambda <= 1.0,
-            "group_bias": 0.0 <= self.group_bias <= 1.0,
-            "steer_start": 0.0 <= self.steer_start <= 1.0,
-            "steer_decay": 0.0 < self.steer_decay <= 1.0,
-            "steer_least": 0.0 <= self.steer_least <= 1.0,
             "obstacle_margin_m": 0.0 <= self.obstacle_margin_m <= 1.0,
             "robot_margin_m": 0.0 <= self.robot_margin_m <= 2.0,
-            "region_m": self.region_m > 0.0,
             "route_margin": 0.0 <= self.route_margin <= 1.0,
             "budget_s": self.budget_s is None or self.budget_s > 0.0,
         }

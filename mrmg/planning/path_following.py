@@ -1,4 +1,4 @@
-"""The default planner: path following along tours, with a motion tree where that fails.
+"""The default planner: path following along tours, and a search where that fails.
 
 Its attempts differ by a schedule: which tours are drawn, for which energies, and what
 they must leave in batteries.
@@ -26,11 +26,10 @@ from mrmg.planning.drafting.drafting import (
     path_cost_J,
     whole_tour,
 )
-from mrmg.planning.drafting.refine import refine
+from mrmg.planning.drafting.refine import refine, smoothed
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.routing.routing import Routing
-from mrmg.planning.tree.motion_tree import grow_tree
 from mrmg.plans import Plan
 
 TIME_SHARES = (1.0, 0.95, 0.85, 0.7)
@@ -55,12 +54,12 @@ tight take less than the roadmap's."""
 TIMED_SURCHARGES = (0.06, 0.0, 0.12)
 """The same where the makespan counts: who brakes hard and turns round needs more."""
 
-TREE_MARGINS = (1.0, 0.0, 2.0)
-"""Multiples of the route margin in the tours of successive trees: batteries may leave
-no room for it, or driving may take more than it allows for."""
+SEARCH_MARGINS = (1.0, 0.0, 2.0)
+"""Multiples of the route margin in the tours of successive searches: batteries may
+leave no room for it, or driving may take more than it allows for."""
 
-TREE_SOC_SHARES = ((1.0, 0.0), (1.0, 0.0), (0.0,))
-"""Multiples of the state-of-charge margin in the tours of successive trees: the next
+SEARCH_SOC_SHARES = ((1.0, 0.0), (1.0, 0.0), (0.0,))
+"""Multiples of the state-of-charge margin in the tours of successive searches: the next
 one counts where no tours leave so much."""
 
 LEAST_GAIN = 0.001
@@ -100,14 +99,14 @@ class Schedule:
         time_share: of the time limit that tours may take.
         followed: state-of-charge margins with draws of tours that are followed, one
             after another until there is a plan.
-        tree_margin: surcharge on the energies of the tours that a tree grows along.
-        tree_soc_margins: of trees, until there are tours that leave so much.
+        search_margin: surcharge on the energies of the tours that are searched along.
+        search_soc_margins: of searches, until there are tours that leave so much.
     """
 
     time_share: float
     followed: tuple[tuple[float, tuple[Draw, ...]], ...]
-    tree_margin: float
-    tree_soc_margins: tuple[float, ...]
+    search_margin: float
+    search_soc_margins: tuple[float, ...]
 
     @staticmethod
     def of(problem: Problem, params: PlannerParams, number: int) -> Schedule:
@@ -121,19 +120,19 @@ class Schedule:
         followed = [(margin, draws) for margin in margins]
         if number == 0:
             followed += [(LEAST_SPARE, (Draw.of(one, timed),)) for one in FURTHER_DRAWS]
-        shares = TREE_SOC_SHARES[number % len(TREE_SOC_SHARES)]
+        margin = params.route_margin * SEARCH_MARGINS[number % len(SEARCH_MARGINS)]
+        followed.append((LEAST_SPARE, (Draw(first, 0.0, margin),)))
+        shares = SEARCH_SOC_SHARES[number % len(SEARCH_SOC_SHARES)]
         return Schedule(
             time_share=TIME_SHARES[number % len(TIME_SHARES)],
-            followed=tuple(followed)
-            if follows(problem, params) and not problem.steered_home.any()
-            else (),
-            tree_margin=params.route_margin * TREE_MARGINS[number % len(TREE_MARGINS)],
-            tree_soc_margins=tuple(share * params.spare for share in shares),
+            followed=tuple(followed) if follows(problem, params) else (),
+            search_margin=margin,
+            search_soc_margins=tuple(share * params.spare for share in shares),
         )
 
 
 def follows(problem: Problem, params: PlannerParams) -> bool:
-    """Return whether paths are followed, or trees are grown at once."""
+    """Return whether paths are followed, or motions are searched for at once."""
     return params.drafts and draftable(problem)
 
 
@@ -148,7 +147,7 @@ def easiest(problem: Problem, params: PlannerParams) -> Problem:
 
 
 def path_following(problem: Problem, request: Request) -> Attempt:
-    """Follow paths along tours; where that fails, grow a tree along other tours."""
+    """Follow paths along tours; where that fails, search for motions along others."""
     schedule = Schedule.of(problem, request.params, request.number)
     problem = problem.with_limit(schedule.time_share)
     tries = _tries(problem, request, schedule)
@@ -175,55 +174,46 @@ def _tries(problem: Problem, request: Request, schedule: Schedule) -> Iterator[A
     """Yield what came of each entry of a schedule."""
     for soc_margin, draws in schedule.followed:
         yield follow_paths(problem.with_soc_margin(soc_margin), request, draws)
-    if problem.mission.targets.goals == 0 or problem.steered_home.any():
-        yield search_motions(problem, request)
-    for soc_margin in schedule.tree_soc_margins:
-        kept = problem.with_soc_margin(soc_margin).with_margin(schedule.tree_margin)
-        grown = follow_tree(kept, request)
-        yield grown
-        if grown.tours_found:
+    for soc_margin in schedule.search_soc_margins:
+        kept = problem.with_soc_margin(soc_margin).with_margin(schedule.search_margin)
+        searched = search_motions(kept, request)
+        yield searched
+        if searched.tours_found:
             return
 
 
+def _tours(problem: Problem, request: Request, seed: int | None = None) -> Routing:
+    """Return tours; without goals there is nothing to find, and nothing to miss."""
+    if problem.mission.targets.goals == 0:
+        return Routing(tours=((),) * len(problem.start), cost_J=0.0)
+    return request.tours(problem, seed)
+
+
 def search_motions(problem: Problem, request: Request) -> Attempt:
-    """Search for motions along tours by priorities."""
+    """Search for motions along tours, and refine their plan."""
     began = time.perf_counter()
-    robots = range(len(problem.start))
-    routing = Routing(tours=((),) * len(robots), cost_J=0.0)
-    if problem.mission.targets.goals:
-        routing = request.tours(problem)
+    routing = _tours(problem, request)
     routing_s = time.perf_counter() - began
     if not routing.feasible or request.halted:
         return Attempt(routing_s=routing_s, tours_found=routing.feasible)
+    robots = range(len(routing.tours))
+    targets = [whole_tour(problem, routing, r) for r in robots]
     trajectories = coordinated(
         problem,
-        [whole_tour(problem, routing, r) for r in robots],
+        targets,
         [no_path(problem, r) for r in robots],
         request.halt,
         seed=request.stream_seed("coordination"),
         rounds=ROUNDS[min(request.number, len(ROUNDS) - 1) :][:1],
     )
     tours = problem.visits(routing.tours)
-    plan = request.plan(problem, trajectories, tours) if trajectories else None
-    plans = [plan] if plan is not None else []
-    return Attempt(plans, (), routing_s, {"coordinated": 1}, True)
-
-
-def follow_tree(problem: Problem, request: Request) -> Attempt:
-    """Grow a tree along tours, and refine its plan."""
-    began = time.perf_counter()
-    routing = request.tours(problem)
-    routing_s = time.perf_counter() - began
-    if not routing.feasible or request.halted:
-        return Attempt(routing_s=routing_s, tours_found=routing.feasible)
-    growth = grow_tree(
-        problem, request.params, routing, request.stream_seed("tree"), request.halt
-    )
     plans: list[Plan] = []
     found_at = []
-    plan = None
-    if growth.solved:
-        plan = request.plan(problem, growth.trajectories, growth.tours)
+    plan = request.plan(problem, trajectories, tours) if trajectories else None
+    if trajectories and plan is None:  # batteries may suffice along smoother paths
+        drawn = smoothed(problem, request.params, targets, trajectories, request.halt)
+        plans_of = (request.plan(problem, one, tours) for one in drawn)
+        plan = next((one for one in plans_of if one is not None), None)
     left = request.params.refinements
     while plan is not None:
         plans.append(plan)
@@ -236,8 +226,8 @@ def follow_tree(problem: Problem, request: Request) -> Attempt:
         enough = not problem.preference.gains(better, plan, LEAST_GAIN)
         plan = better if better is not plan else None
         left = 0 if enough else left - 1
-    counts = {**growth.counts, "trees": 1}
-    return Attempt(plans, found_at, routing_s + growth.routing_s, counts)
+    counts = {"coordinated": 1, "router_calls": 1}
+    return Attempt(plans, found_at, routing_s, counts)
 
 
 def follow_paths(
@@ -295,7 +285,7 @@ def _drawn_tours(
         arrays = arrays._replace(cost=arrays.cost * factor, time=arrays.time * factor)
         varied = replace(varied, mission=varied.mission._replace(routing=arrays))
         seed = seeding.stream_seed(request.seed, "draft", draw.number)
-        tours = request.tours(varied, seed)
+        tours = _tours(varied, request, seed)
         if tours.feasible:
             found.setdefault(tours.tours, tours)
     if len(found) < 2:

@@ -151,7 +151,7 @@ class _Planning:
         """Return the result of planning."""
         own = Frame.of(self.scene).scene(self.scene)
         bounding = self._bounding(own) if with_bound else None
-        load_kernels(self.params.planner, trees=not self.params.drafts)
+        load_kernels(self.params.planner)
         for robot in own.robots:
             motion_addresses(robot.model)
         self.statistics.begin()

@@ -7,8 +7,6 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 
-import numpy as np
-
 from mrmg.compilation import (
     compile_in_processes,
     kernels_are_compiled,
@@ -19,8 +17,6 @@ from mrmg.planning.bound.bound import Relaxation, lower_bound_J
 from mrmg.planning.bound.exact_tours import exact_routing
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.bounding import bounds_of
-from mrmg.planning.drafting.coordination.coordination import coordinated
-from mrmg.planning.drafting.coordination.tasks import no_path
 from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.guided_tree.strategy import guided_tree
 from mrmg.planning.parameters import (
@@ -35,8 +31,6 @@ from mrmg.planning.path_following import path_following
 from mrmg.planning.planners import Planner
 from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.planning.routers import find_router
-from mrmg.planning.routing.routing import Routing
-from mrmg.planning.tree.motion_tree import grow_tree
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.objective import Objective
 from mrmg.scene.types import Scene
@@ -56,46 +50,32 @@ def compile_kernels(
     if kernels_are_compiled(part):
         return
     compile_in_processes(_CALLS[part], on_progress or (lambda number: None))
-    load_kernels(part, trees=True)
+    load_kernels(part)
     bound_smallest()
     with suppress(OSError):  # without a cache that can be written, plan all the same
         note_kernels_are_compiled(part)
 
 
 @cache
-def load_kernels(planner: str, *, trees: bool) -> None:
+def load_kernels(planner: str) -> None:
     """Load the kernels of a planner, so that no time limit or figure includes it.
 
-    Those of trees take as long as all others; few missions need them where paths are
-    followed, and load them then. Planners of other packages load their own.
+    Planners of other packages load their own.
     """
     if planner == GUIDED_TREE:
         guide_smallest()
     elif planner == PATH_FOLLOWING:
         follow_smallest()
         search_smallest()
-        if trees:
-            _plan_smallest(path_following, replace(SMALL_PARAMS, drafts=False))
-
-
-def grow_smallest() -> None:
-    """Grow a tree in the smallest mission."""
-    _, problem = _smallest_mission()
-    routing = Routing(tours=((0,),), cost_J=0.0)
-    growth = grow_tree(problem, SMALL_PARAMS, routing, 0, np.zeros(1, np.bool_))
-    assert growth.solved, "the smallest mission has a plan, or not all is compiled"
 
 
 def search_smallest() -> None:
     """Search for motions in the smallest mission."""
-    _, problem = _smallest_mission()
-    halt = np.zeros(1, np.bool_)
-    found = coordinated(problem, [[0]], [no_path(problem, 0)], halt)
-    assert found, "the smallest mission has a plan, or not all is compiled"
+    _plan_smallest(path_following, replace(SMALL_PARAMS, drafts=False))
 
 
 def follow_smallest() -> None:
-    """Plan the smallest mission without a tree."""
+    """Follow paths in the smallest mission."""
     _plan_smallest(path_following, SMALL_PARAMS)
 
 
@@ -119,13 +99,13 @@ def bound_smallest() -> None:
 
 
 _CALLS = {
-    PATH_FOLLOWING: (grow_smallest, search_smallest, follow_smallest, bound_smallest),
+    PATH_FOLLOWING: (search_smallest, follow_smallest, bound_smallest),
     GUIDED_TREE: (guide_smallest, bound_smallest),
 }
 """What compiles all kernels of a part, the longest first; the same kernels in two of
 them are compiled twice, side by side."""
 
-SMALL_PARAMS = PlannerParams(samples=20, max_vertices=20, trees=1)
+SMALL_PARAMS = PlannerParams(samples=20, trees=1)
 """What suffices to plan the smallest mission."""
 
 SMALL_PAPER_PARAMS = replace(

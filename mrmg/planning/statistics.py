@@ -153,7 +153,7 @@ class Statistics:
         times = {"init": 0.0, "routing": 0.0, **self.time_s, "first_solution": first}
         names = (
             "path_following_plans",
-            "trees",
+            "coordinated",
             "vertices",
             "groups",
             "router_calls",

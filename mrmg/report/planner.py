@@ -22,6 +22,7 @@ _NAMES = {
     "time_s.total": "Time of planning in all",
     "router_calls": "Calls of the discrete solver",
     "trees": "Motion trees",
+    "coordinated": "Searches for motions of the fleet",
     "path_following_plans": "Times the fleet followed paths along its tours",
     "expansions": "Expansions of motion trees",
     "iterations": "Iterations of the guided tree",

@@ -120,7 +120,7 @@ def test_a_run_that_an_older_version_called_a_timeout_is_readable(
     planning = json.loads((run / "planning.json").read_text())
     old = {"status": "timeout", "reason": "no motion tree reached all goals"}
     statistics = dict(planning["statistics"])
-    del statistics["trees"]
+    del statistics["coordinated"]
     storage.write_json(run / "planning.json", {**old, "statistics": statistics})
     capsys.readouterr()
     assert main(["report", str(run), "--json"]) == ExitCode.OUT_OF_BUDGET

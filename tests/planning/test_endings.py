@@ -66,7 +66,7 @@ SWAP = {
 }
 """Two robots that must get past each other where there is no room for it."""
 
-NARROW = PlannerParams(max_vertices=60, trees=1)
+NARROW = PlannerParams(trees=1)
 
 
 @dataclass(frozen=True)
@@ -160,14 +160,8 @@ ROWS = (
     Row(
         endings.NO_PROGRESS,
         SWAP,
-        ("makes no progress", "in its way", "1 motion tree"),
+        ("makes no progress", "in its way", "1 search"),
         NARROW,
-    ),
-    Row(
-        endings.TREES_FAILED,
-        {},
-        ("3 trees", "4 vertices"),
-        PlannerParams(max_vertices=4, trees=3, drafts=False),
     ),
     Row(endings.BUDGET_FOR_ROADMAP, {}, ("1e-06 s",), options=("--budget", "1e-6")),
     Row(endings.BUDGET_OVER, SWAP, ("2 s",), options=("--budget", "2")),

@@ -20,12 +20,8 @@ from mrmg.planning.routing.routing import RouterParams
         ("neighbours", 0),
         ("dt_s", 0.0),
         ("dt_s", 0.5),
-        ("steps", 0),
-        ("max_vertices", 1),
         ("trees", 0),
         ("improvements", -1),
-        ("group_lambda", 0.0),
-        ("group_bias", 1.5),
         ("budget_s", 0.0),
         ("budget_s", -3.0),
     ],
@@ -63,7 +59,7 @@ def test_the_digest_tells_apart_what_decides_the_plan() -> None:
     assert len({base.digest, *(params.digest for params in others)}) == 4
 
 
-def test_a_number_of_trees_is_grown_to_the_last() -> None:
+def test_a_number_of_attempts_is_made_to_the_last() -> None:
     params = profile_params("default", trees=7)
     assert (params.trees, params.improvements, params.budget_s) == (7, 7, None)
     assert params.digest != profile_params("default").digest

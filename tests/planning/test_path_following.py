@@ -18,7 +18,7 @@ import pytest
 import mrmg
 from mrmg.energy.metering import battery_profile
 from mrmg.planning import Attempt, PlannerParams, Problem, Request, path_following
-from mrmg.planning.path_following import Schedule, follow_paths, follow_tree
+from mrmg.planning.path_following import Schedule, follow_paths, search_motions
 from mrmg.planning.problem.problem import state_mission
 from mrmg.planning.routers import find_router
 from mrmg.plans import Plan
@@ -39,7 +39,7 @@ def along_paths(problem: Problem, asked: Request) -> Attempt:
 
 
 Way = Callable[[Problem, Request], Attempt]
-WAYS: tuple[Way, ...] = (along_paths, follow_tree, path_following.path_following)
+WAYS: tuple[Way, ...] = (along_paths, search_motions, path_following.path_following)
 MISSIONS = ("quickstart", "station_needed", "polygon_regions", "blocks_only_r1")
 
 
@@ -82,8 +82,8 @@ def test_an_attempt_is_a_function_of_its_number(way: Way) -> None:
     assert [digests(way, number) for number in reversed(numbers)] == first[::-1]
 
 
-def test_other_numbers_grow_other_trees() -> None:
-    assert digests(follow_tree, 0) != digests(follow_tree, 1)
+def test_other_numbers_find_other_motions() -> None:
+    assert digests(search_motions, 0) != digests(search_motions, 1)
 
 
 def test_halted_it_gives_nothing(way: Way) -> None:
@@ -92,18 +92,18 @@ def test_halted_it_gives_nothing(way: Way) -> None:
     assert list(found.plans) == []
 
 
-def test_trees_are_grown_only_where_drafting_fails() -> None:
+def test_motions_are_searched_for_only_where_drafting_fails() -> None:
     drafted = attempted(path_following.path_following, "quickstart")
     assert drafted.counts == {"path_following_plans": 1, "router_calls": 1}
     without = PlannerParams(samples=500, drafts=False)
     grown = path_following.path_following(
         problem_of("quickstart"), request(params=without)
     )
-    assert grown.counts["vertices"] > 1
+    assert grown.counts["coordinated"] == 1
     assert "path_following_plans" not in grown.counts
 
 
-def test_other_tours_are_drafted_before_a_tree_grows(
+def test_other_tours_are_drafted_before_motions_are_searched_for(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Where robots get stuck along the router's tours, they may not along others."""
@@ -117,19 +117,19 @@ def test_other_tours_are_drafted_before_a_tree_grows(
     monkeypatch.setattr(path_following, "drafts", failing_at_first)
     found = attempted(path_following.path_following, "scene1")
     assert found.plans
-    assert "vertices" not in found.counts
+    assert "coordinated" not in found.counts
     assert driven[3] not in driven[:2]
 
 
-def test_drafts_that_failed_are_counted_with_the_tree(
+def test_drafts_that_failed_are_counted_with_the_search(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """With and without charge to spare, along other tours, then the tree."""
+    """With and without charge to spare, along other tours, then the search."""
     monkeypatch.setattr(path_following, "drafts", lambda *_, **__: iter(()))
     found = attempted(path_following.path_following, "quickstart")
-    assert found.counts["path_following_plans"] == 4
+    assert found.counts["path_following_plans"] == 5
     assert found.counts["router_calls"] >= 5
-    assert found.counts["vertices"] > 1
+    assert found.counts["coordinated"] == 1
 
 
 @pytest.mark.parametrize("spare", [0.0, 0.1, 0.2])
@@ -146,7 +146,7 @@ def test_who_cannot_spare_charge_is_planned_for_all_the_same() -> None:
     problem = problem_of("station_needed")
     params = replace(PARAMS, spare=0.9)
     assert path_following.path_following(problem, request(params=params)).plans
-    for way in (along_paths, follow_tree):
+    for way in (along_paths, search_motions):
         spared = problem.with_soc_margin(0.9)
         assert not way(spared, request(params=params)).plans
 

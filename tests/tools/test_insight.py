@@ -9,7 +9,7 @@ import pytest
 from insight import Insight, look_inside
 
 from mrmg.errors import UsageError
-from mrmg.planning.parameters import PROFILES, PlannerParams, profile_params
+from mrmg.planning.parameters import PROFILES, GuidedTreeParams, profile_params
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
@@ -66,6 +66,7 @@ def test_the_tree_holds_the_plan(scene: Scene, inside: Insight) -> None:
 
 
 def test_failing_to_find_a_plan_is_told(scene: Scene) -> None:
-    small = replace(PlannerParams(), max_vertices=3, trees=2)
+    paper = profile_params("paper")
+    small = replace(paper, guided_tree=GuidedTreeParams(iterations=3), trees=2)
     with pytest.raises(UsageError, match="no plan was found in 2 attempts"):
         look_inside(scene, seed=0, params=small)

@@ -45,12 +45,6 @@ STUCK_STEPS = 150
 TURNING_SHARE = 0.5
 """Share of the acceleration of turning with which a turn on the spot is slowed down."""
 
-WAITING_M = 0.3
-"""How near to the place where it waits a standing robot counts as waiting ..."""
-
-PASSED_M = 1.0
-"""... and how far behind that place it no longer waits."""
-
 ATTEMPTS = 3
 """Controls tried before a robot brakes as committed."""
 
@@ -90,22 +84,6 @@ class Courses(NamedTuple):
     tolerance: np.ndarray
 
 
-class Waits(NamedTuple):
-    """Who waits for whom; W waits.
-
-    Attributes:
-        robot: that waits, shape (W,).
-        at: way along its path at which it waits [m], shape (W,).
-        other: for which it waits, shape (W,).
-        until: way along the other's path that the other must have driven [m], (W,).
-    """
-
-    robot: np.ndarray
-    at: np.ndarray
-    other: np.ndarray
-    until: np.ndarray
-
-
 @kernel
 def advance(courses, r, i, x, y):
     """Return (segment, way along the path) nearest to a point, from segment i on."""
@@ -131,23 +109,6 @@ def bend_at(courses, r, i, s):
 
 
 @kernel
-def waiting_at(waits, driven, r):
-    """Return the way along its path at which robot r has to wait now, inf for none.
-
-    Args:
-        waits: who waits for whom.
-        driven: way that each robot has driven along its path [m], shape (R,).
-        r: robot.
-    """
-    nearest = np.inf
-    for k in range(len(waits.robot)):
-        unmet = waits.robot[k] == r and driven[waits.other[k]] < waits.until[k]
-        if unmet and driven[r] < waits.at[k] + PASSED_M:
-            nearest = min(nearest, waits.at[k])
-    return nearest
-
-
-@kernel
 def turned(courses, r, state):
     """Tell whether a robot has the heading that it must end with."""
     return abs(wrap(courses.heading[r] - state[2])) < 0.5 * courses.tolerance[r]
@@ -161,11 +122,8 @@ def turning_rate(fleet, r, lacking):
 
 
 @kernel
-def follow(fleet, courses, r, i, state, barrier):
-    """Return (segment, way, way left in this gear, off the path, wanted v, wanted w).
-
-    The robot stops before `barrier`, a way along its path.
-    """
+def follow(fleet, courses, r, i, state):
+    """Return (segment, way, way left in this gear, off the path, wanted v and w)."""
     i, s = advance(courses, r, i, state[0], state[1])
     ax, ay = courses.node[r, i, 0], courses.node[r, i, 1]
     bx, by = courses.node[r, i + 1, 0] - ax, courses.node[r, i + 1, 1] - ay
@@ -184,8 +142,6 @@ def follow(fleet, courses, r, i, state, barrier):
     top = fleet[r].limit[1] if gear > 0 else -fleet[r].limit[0]
     ease = courses.ease[r]
     v = min(top, sqrt(2.0 * ease * max(left - 0.5 * ARRIVED_M, 0.0)) + 0.02)
-    if barrier < np.inf:
-        v = min(v, sqrt(2.0 * ease * max(barrier - s, 0.0)))
     near = max(courses.way[r, i + 1] - s, 0.0)
     v = min(v, sqrt(courses.fastest[r, i + 1] ** 2 + 2.0 * ease * near))
     ahead = s + max(abs(state[3]), 0.2) * PREVIEW_S
@@ -224,7 +180,7 @@ def track_step(fleet, spaces, commitment, decided, r, v, w, dt):
 
 @kernel
 def drive(
-    fleet, spaces, gates, courses, waits, given, start, order, dt, control, driven, halt
+    fleet, spaces, gates, courses, given, start, order, dt, control, driven, halt
 ):
     """Drive the fleet to the ends of its paths.
 
@@ -232,7 +188,6 @@ def drive(
         fleet, spaces: robots and their free spaces.
         gates: where one robot at a time may be.
         courses: their paths.
-        waits: who waits for whom.
         given: number of steps for which each robot follows the controls that it finds
             in `control`, before it takes to its path, shape (R,).
         start: state of each robot, shape (R, 5).
@@ -296,14 +251,9 @@ def drive(
                 w = turning_rate(fleet, r, wrap(courses.heading[r] - state[2]))
                 u1, u2 = track_step(fleet, spaces, commitment, decided, r, 0.0, w, dt)
             else:
-                barrier = waiting_at(waits, driven, r)
-                i, s, left, off, v, w = follow(
-                    fleet, courses, r, segment[r], state, barrier
-                )
+                i, s, left, off, v, w = follow(fleet, courses, r, segment[r], state)
                 segment[r] = i
                 driven[r] = s
-                if barrier - s < WAITING_M:
-                    still[r] = 0
                 if abs(off) > STRAYED_M or still[r] > STUCK_STEPS:
                     return n, r
                 if left < ARRIVED_M:
@@ -316,6 +266,7 @@ def drive(
                         if stood[r] < courses.pause[r, last]:
                             stood[r] += 1
                             idle = 0
+                            still[:] = 0  # others may wait for it to go on
                         else:
                             stood[r] = 0
                             done[r] = last + 1 >= courses.nodes[r]

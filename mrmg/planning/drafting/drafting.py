@@ -1,9 +1,9 @@
-"""Drafts: plans driven straight along tours, without a motion tree.
+"""Drafts: plans driven straight along tours.
 
 The ways of the roadmap along tours are drawn tight and driven in closed loop
 (`refine.run_errands`). Where that succeeds, which is nearly always where there is room,
-it gives what a tree along the same tours and its refinement would give, sooner. Where
-it does not, a tree has to find the way.
+that is all. Where robots get in each other's way, or a car must end with a heading, a
+search for motions starts from the paths (`coordination`).
 """
 
 from __future__ import annotations
@@ -90,6 +90,7 @@ def drafts(
     """
     surfaces = surfaces_of(problem)
     stops = [whole_tour(problem, routing, r) for r in range(len(surfaces))]
+    steered = problem.steered_home
     tours = problem.visits(routing.tours)
     limit = problem.mission.fleet["limit"]
     slower = -limit[:, 0] < NEARLY * limit[:, 1]  # backwards than forwards
@@ -98,7 +99,8 @@ def drafts(
     tried: list[list[Path]] = []
     for sharp in (*ROOMY, SHARP) if timed and slower.any() else (SHARP, *ROOMY):
         paths = [
-            tour_path(problem, r, tour, sharp, deeper_m) for r, tour in enumerate(stops)
+            tour_path(problem, r, tour[: len(tour) - steers], sharp, deeper_m)
+            for r, (tour, steers) in enumerate(zip(stops, steered, strict=True))
         ]
         if any(_same_gears(paths, before) for before in tried):
             continue

@@ -30,6 +30,7 @@ class Errand:
         repeated: number of steps that it drives as before.
         swerves: places that it was led round.
         slow: places that it passes slowly.
+        longer_s: how much longer it stands at stops than its path says, shape (L,).
         cost_m: what the way takes, in metres of plain ground.
     """
 
@@ -40,7 +41,11 @@ class Errand:
     repeated: int = 0
     swerves: list[np.ndarray] = field(default_factory=list)
     slow: list[SlowPlace] = field(default_factory=list)
+    longer_s: np.ndarray = field(init=False)
     cost_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        self.longer_s = np.zeros(len(self.tour))
 
     def tighten(self, problem: Problem, spacings_m: Sequence[float]) -> None:
         """Draw the path tight; one without targets only leads out of the way."""

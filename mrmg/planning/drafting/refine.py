@@ -1,7 +1,7 @@
 """Refinement: robots drive along paths drawn tight.
 
 Each robot's way is drawn tight (`band`) and driven in closed loop under committed
-braking, as the motion tree does it (`tracking`), so that margins to obstacles and
+braking (`tracking`), so that margins to obstacles and
 robots, dynamics and limits hold by construction. What goes wrong is put right, and the
 fleet drives again: where a robot does not get along its path (it is stuck in a tight
 place, or in the way of another), its path is led farther from obstacles; where it
@@ -23,15 +23,16 @@ from mrmg.planning.assembly import make_plan
 from mrmg.planning.drafting._band_kernels import Surface
 from mrmg.planning.drafting.band import (
     SPACINGS_M,
+    Path,
     path_of,
     smooth_terrain,
     surface_of,
     visit_steps,
     wary,
 )
-from mrmg.planning.drafting.encounters import Encounters
+from mrmg.planning.drafting.coordination.coordination import ROUNDS, coordinated
 from mrmg.planning.drafting.errand import Errand
-from mrmg.planning.drafting.pauses import with_pauses
+from mrmg.planning.drafting.pauses import missing_charge_s, with_pauses
 from mrmg.planning.drafting.tracking import Drive, braking_places, redriven
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.problem._control_kernels import wrap
@@ -60,6 +61,9 @@ NEAR_M = 3.0
 OnFailure = Callable[[str], None]
 """Receives why driving along paths failed, in words."""
 
+CONTACT_M = 0.6
+"""How much farther apart than they must be robots may be in each other's way."""
+
 BLOCKING_M = 4.0
 """Distance within which another robot counts as being in the way."""
 
@@ -80,25 +84,45 @@ def refine(
         plan: a valid plan.
         halt: shape (1,); refinement ends soon after it has turned true.
     """
-    targets = problem.mission.targets
-    kept = problem.mission.fleet["model"] == USER
-    surfaces = surfaces_of(problem)
-    errands = []
-    for r, tour in enumerate(tour_numbers(problem, plan)):
-        trajectory = plan.trajectories[r]
-        visits = visit_steps(targets, tour, trajectory)
-        if len(visits) < len(tour):
-            return plan
-        repeated = len(trajectory.control) if kept[r] else 0
-        path = path_of(tour, visits, trajectory, repeated)
-        errands.append(Errand(tour, path, surfaces[r], (trajectory, visits), repeated))
     best = plan
     rank = problem.preference.rank
-    for trajectories in run_errands(problem, params, errands, halt):
+    tours = tour_numbers(problem, plan)
+    for trajectories in smoothed(problem, params, tours, plan.trajectories, halt):
         found = make_plan(problem, plan.seed, params, trajectories, plan.tours)
         if found is not None and rank(found) < rank(best):
             best = found
     return best
+
+
+def smoothed(
+    problem: Problem,
+    params: PlannerParams,
+    tours: Sequence[list[int]],
+    trajectories: Sequence[Trajectory],
+    halt: np.ndarray,
+) -> Iterator[tuple[Trajectory, ...]]:
+    """Yield trajectories of all robots along the paths of given ones, drawn tight.
+
+    Args:
+        problem: the mission.
+        params: parameters.
+        tours: numbers of each robot's targets; where it must end comes last.
+        trajectories: that visit them.
+        halt: shape (1,); smoothing ends soon after it has turned true.
+    """
+    targets = problem.mission.targets
+    kept = problem.mission.fleet["model"] == USER
+    surfaces = surfaces_of(problem)
+    errands = []
+    for r, (tour, trajectory) in enumerate(zip(tours, trajectories, strict=True)):
+        visits = visit_steps(targets, tour, trajectory)
+        if len(visits) < len(tour):
+            return
+        repeated = len(trajectory.control) if kept[r] else 0
+        stops = len(tour) - problem.steered_home[r]
+        path = path_of(tour[:stops], visits[:stops], trajectory, repeated)
+        errands.append(Errand(tour, path, surfaces[r], (trajectory, visits), repeated))
+    yield from run_errands(problem, params, errands, halt)
 
 
 def run_errands(
@@ -118,22 +142,26 @@ def run_errands(
     """
     for errand in errands:
         errand.tighten(problem, SPACINGS_M)
-    encounters = Encounters()
+    if problem.steered_home.any():
+        yield from _coordinated(problem, errands, halt)
+        on_failure("no motions were found that end with the headings asked for")
+        return
     slower = tries = 0
     while tries < TRIES:
         outcome = redriven(
             problem,
             params,
-            [with_pauses(problem, r, one.path) for r, one in enumerate(errands)],
+            _paused(problem, errands),
             [errand.slow for errand in errands],
             [errand.controls() for errand in errands],
-            encounters.waits,
             halt,
         )
         if halt[0]:
             return
-        if outcome.stuck >= 0 and encounters.resolve(problem, errands, outcome):
-            continue
+        if outcome.stuck >= 0 and in_the_way(problem, outcome) >= 0:
+            yield from _coordinated(problem, errands, halt)
+            on_failure(_no_progress(problem, errands, outcome))
+            return
         tries += 1
         if outcome.stuck >= 0:
             if not _put_right(problem, errands[outcome.stuck], outcome.place):
@@ -151,10 +179,61 @@ def run_errands(
         if not _ends_well(problem, outcome):
             on_failure("not every robot ends where its finish asks for")
             return
+        if _charged_longer(problem, errands, outcome):
+            continue
         yield outcome.trajectories
         if not slowed:
             return
     on_failure(_no_progress(problem, errands, outcome))
+
+
+def in_the_way(problem: Problem, outcome: Drive) -> int:
+    """Return the robot that the stuck one cannot get past, -1 if there is none near."""
+    fleet, r = problem.mission.fleet, outcome.stuck
+    reach = fleet["radius"] + fleet["radius"][r]
+    reach += np.maximum(fleet["spacing"], fleet["spacing"][r]) + CONTACT_M
+    turn = np.stack([np.cos(outcome.state[:, 2]), np.sin(outcome.state[:, 2])], axis=1)
+    left = np.stack([-turn[:, 1], turn[:, 0]], axis=1)
+    offset = fleet["middle"]
+    middle = outcome.state[:, :2] + offset[:, :1] * turn + offset[:, 1:] * left
+    gap = np.hypot(*(middle - middle[r]).T) - reach
+    gap[r] = np.inf
+    return int(gap.argmin()) if gap.min() < 0.0 else -1
+
+
+def _paused(problem: Problem, errands: Sequence[Errand]) -> list[Path]:
+    """Return paths with how long robots stand at their stops."""
+    return [
+        with_pauses(problem, r, errand.path, errand.longer_s)
+        for r, errand in enumerate(errands)
+    ]
+
+
+def _charged_longer(
+    problem: Problem, errands: Sequence[Errand], outcome: Drive
+) -> bool:
+    """Prolong stays after which batteries ran low; tell if there were any."""
+    prolonged = False
+    for r, (errand, trajectory) in enumerate(
+        zip(errands, outcome.trajectories, strict=True)
+    ):
+        missing_s = missing_charge_s(problem, r, errand.tour, trajectory)
+        errand.longer_s = errand.longer_s + missing_s
+        prolonged |= bool(missing_s.any())
+    return prolonged
+
+
+def _coordinated(
+    problem: Problem, errands: Sequence[Errand], halt: np.ndarray
+) -> Iterator[tuple[Trajectory, ...]]:
+    """Yield trajectories near the robots' paths that do not meet, if there are any."""
+    if any(errand.repeated for errand in errands):
+        return
+    paths = _paused(problem, errands)
+    tours = [errand.tour for errand in errands]
+    trajectories = coordinated(problem, tours, paths, halt, rounds=ROUNDS[:1])
+    if trajectories:
+        yield trajectories
 
 
 def _no_progress(problem: Problem, errands: Sequence[Errand], outcome: Drive) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from mrmg.energy.model import EFFECTIVE_MASS_KG, ROLLING_N
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.drafting import _tracking_kernels
-from mrmg.planning.drafting._tracking_kernels import Courses, Waits
+from mrmg.planning.drafting._tracking_kernels import Courses
 from mrmg.planning.drafting.band import Path, nimble_share, path_curvature
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.problem.problem import Problem
@@ -49,12 +49,6 @@ STIFFNESS = 0.8
 PLACE_M = 0.6
 """Distance within which nodes belong to a place."""
 
-MOVED_M = 8.0
-"""How far along its path a place may move when a path is drawn anew ..."""
-
-RESOLUTION_M = 0.1
-"""... and how exactly it is found again."""
-
 
 @dataclass(frozen=True, slots=True)
 class SlowPlace:
@@ -67,42 +61,6 @@ class SlowPlace:
 
     place: np.ndarray
     speed_m_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class PathPlace:
-    """A place on a robot's path.
-
-    Attributes:
-        robot: number of the robot.
-        way_m: way along the path to it.
-        point: it, shape (2,).
-    """
-
-    robot: int
-    way_m: float
-    point: np.ndarray
-
-    def way_along(self, path: Path) -> float:
-        """Return the way to the place, or to what is nearest to it on a new path."""
-        first = max(0.0, self.way_m - MOVED_M)
-        last = min(path.way[-1], self.way_m + MOVED_M)
-        at = np.linspace(first, last, max(2, int((last - first) / RESOLUTION_M)))
-        far = np.hypot(*(path.points(at) - self.point).T)
-        return float(at[far.argmin()])
-
-
-@dataclass(frozen=True, slots=True)
-class Wait:
-    """One robot waits for another one.
-
-    Attributes:
-        at: where.
-        until: where on its own path the other one must have got.
-    """
-
-    at: PathPlace
-    until: PathPlace
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +92,6 @@ def redriven(
     paths: Sequence[Path],
     slow: Sequence[Sequence[SlowPlace]],
     repeated: Sequence[np.ndarray],
-    waits: Sequence[Wait],
     halt: np.ndarray,
 ) -> Drive:
     """Drive the fleet along paths.
@@ -145,7 +102,6 @@ def redriven(
         paths: one for each robot, from where repeating ends.
         slow: places that each robot passes slowly.
         repeated: controls with which each robot begins, shape (n, 2).
-        waits: who waits for whom.
         halt: shape (1,); driving ends soon after it has turned true.
     """
     mission = problem.mission
@@ -159,7 +115,6 @@ def redriven(
         mission.spaces,
         mission.gates,
         courses_of(problem, paths, slow),
-        waits_of(paths, waits),
         given,
         problem.start,
         np.arange(len(paths)),
@@ -249,18 +204,6 @@ def courses_of(
         ),
         heading=targets.heading,
         tolerance=np.where(turned, targets.tolerance, np.inf),
-    )
-
-
-def waits_of(paths: Sequence[Path], waits: Sequence[Wait]) -> Waits:
-    """Return who waits for whom in the form that driving needs."""
-    return Waits(
-        robot=np.array([wait.at.robot for wait in waits], np.int64),
-        at=np.array([wait.at.way_along(paths[wait.at.robot]) for wait in waits]),
-        other=np.array([wait.until.robot for wait in waits], np.int64),
-        until=np.array(
-            [wait.until.way_along(paths[wait.until.robot]) for wait in waits]
-        ),
     )
 
 

@@ -1,4 +1,4 @@
-"""Committed braking: what keeps every state of the motion tree safe.
+"""Committed braking: what keeps robots safe while they follow paths.
 
 Each robot carries a committed motion: the states it will go through if it brakes from
 now on, steering held, until it stands. All committed motions keep clear of obstacles

@@ -27,7 +27,6 @@ from mrmg.planning.problem._safety_kernels import (
     write_braking,
 )
 from mrmg.planning.problem.problem import Problem
-from mrmg.planning.tree._tree_kernels import stop_all
 from mrmg.scene.types import Scene
 
 PLANNING_MARGIN_M = PlannerParams().obstacle_margin_m
@@ -208,6 +207,20 @@ def test_committed_braking_ends_at_rest_as_early_as_the_limits_allow(
             assert np.abs(np.diff(own[:, 3])).max(initial=0.0) <= step_v + 1e-12
 
 
+def stop_all(fleet: np.ndarray, problem: Problem, now: np.ndarray) -> np.ndarray:
+    """Return the controls that brake all robots to rest, shape (n, R, 2)."""
+    commitment = new_commitment(fleet, problem.mission.gates, DT_S)
+    for r, state in enumerate(now):
+        write_braking(fleet, r, state, DT_S, commitment, 0)
+    lasting = commitment.length[:, 0] - 1
+    control = np.zeros((int(lasting.max()), len(now), 2))
+    for k, held in enumerate(control):
+        for r in range(len(now)):
+            state = commitment.state[r, 0, min(k, lasting[r])]
+            held[r] = braking_control(fleet, r, state, DT_S)
+    return control
+
+
 def test_stopping_from_any_moment_is_safe_and_ends_at_rest(
     crowd: Callable[..., Problem],
 ) -> None:
@@ -219,7 +232,7 @@ def test_stopping_from_any_moment_is_safe_and_ends_at_rest(
         if n % 10:
             continue
         now = np.stack([present_state(commitment, r) for r in range(4)])
-        control = stop_all(fleet, problem.mission.gates, now, DT_S)
+        control = stop_all(fleet, problem, now)
         states = [now]
         for held in control:
             after = np.empty((4, 5))

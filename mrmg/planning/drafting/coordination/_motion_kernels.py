@@ -202,7 +202,7 @@ def track_control(own, courses, segment, state, dt):
         rate = turning_rate(own, 0, wrap(courses.heading[0] - state[2]))
         u1, u2 = control_towards(own, 0, state, 0.0, rate, dt)
         return u1, u2, segment
-    i, _, left, _, v, w = follow(own, courses, 0, segment, state, np.inf)
+    i, _, left, _, v, w = follow(own, courses, 0, segment, state)
     if left < ARRIVED_M:
         v = 0.0
         if own[0].model == UNICYCLE:

@@ -82,7 +82,7 @@ def test_cars_end_with_their_headings(yard: MakeScene) -> None:
         robot(f"r{i}", 4, 5 + 9 * i, finish=disc(x, y, 0.6, heading=yaw))
         for i, (yaw, x, y) in enumerate(ways)
     ]
-    plan = planned(yard(goals=[], robots=robots))
+    plan = planned(yard(robots=robots))
     for trajectory, (yaw, _, _) in zip(plan.trajectories, ways, strict=True):
         assert abs(remainder(trajectory.state[-1, 2] - yaw, tau)) <= 0.2
 
@@ -96,5 +96,5 @@ def test_a_battery_must_last_to_the_finish(yard: MakeScene) -> None:
     back = yard(
         goals=goals, robots=[robot("r1", 4, 10, battery=battery, finish="start")]
     )
-    result = plan_mission(back, params=replace(QUICK, trees=2, max_vertices=300))
+    result = plan_mission(back, params=replace(QUICK, trees=2))
     assert result.plan is None

@@ -17,7 +17,7 @@ from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.verification.verify import verify
 
-SCENES = Path(__file__).parents[2] / "scenes"
+SCENES = Path(__file__).parents[1] / "scenes"
 PLANS = {"path following": True, "tree": False}
 
 
