@@ -20,18 +20,13 @@ DRAWERS = {"utils", "util", "common", "helpers", "helper", "misc", "tools"}
 HEAVY = {"av", "casadi", "matplotlib", "mujoco", "numba", "pydantic", "rich", "scipy"}
 
 LONG_MODULES = {
-    "_tracking_kernels": 352,
     "band": 356,
-    "tracking": 353,
-    "_tree_kernels": 370,
 }
 """Modules that are still too long, with their lines; the list may only shrink."""
 
 LONG_FUNCTIONS = {
-    "_tracking_kernels.drive": 104,
-    "planner._planned": 66,
+    "_tracking_kernels.drive": 99,
     "routing.routing_arrays": 65,
-    "_expansion_kernels.expand": 72,
 }
 """Functions that are still too long, with their lines; the list may only shrink."""
 
@@ -40,13 +35,10 @@ WIDE_FUNCTIONS = {
     "_pointer_kernels.call_step": 11,
     "dynamics.rk4_step.step": 9,
     "_band_kernels.band_cost": 9,
-    "_tracking_kernels.drive": 12,
+    "_tracking_kernels.drive": 11,
     "_roadmap_kernels.best_vertex": 9,
     "_roadmap_kernels.find_waypoint": 10,
     "routing.routing_arrays": 15,
-    "_expansion_kernels.choose_motion": 9,
-    "_expansion_kernels.expand": 13,
-    "_maneuver_kernels.best_sequel": 9,
 }
 """Functions of too many parameters, with their number; the list may only shrink."""
 

@@ -15,7 +15,7 @@ from mrmg import extensions
 from mrmg.cli.main import main
 from mrmg.errors import MachineError, UsageError
 from mrmg.planning import Attempt, Problem, Request, Routing, RoutingProblem
-from mrmg.planning.path_following import path_following
+from mrmg.planning.path_following.strategy import path_following
 from mrmg.planning.routers import find_router
 from mrmg.planning.routing.routing import RouterParams
 
@@ -25,7 +25,7 @@ Path(__file__).with_suffix(".imported").touch()
 {imports}
 """
 WORKING = """
-from mrmg.planning.path_following import path_following
+from mrmg.planning.path_following.strategy import path_following
 from mrmg.planning.routers import find_router
 from mrmg.planning.routing.routing import RouterParams
 

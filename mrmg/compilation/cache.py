@@ -112,7 +112,7 @@ def compiled_kernels() -> int:
 
 
 def kernels_are_compiled(part: str) -> bool:
-    """Tell whether this machine holds all kernels of a part of them, if any."""
+    """Return whether this machine holds all kernels of a part of them, if any."""
     return bool(numba.config.DISABLE_JIT) or _complete(part).exists()
 
 

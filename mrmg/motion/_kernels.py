@@ -76,7 +76,7 @@ def copy_numbers(source, target):
 def steer_user(robot, state, wx, wy, share, dt):
     """Return a user's model's control (u1, u2) towards a waypoint.
 
-    `share` of the top speed is wanted; 0 asks to brake.
+    `share` of the top speed is wanted; 0 requires braking.
     """
     return steer_at(robot.steer_at)(
         (state[0], state[1], state[2], state[3], state[4]), (wx, wy),

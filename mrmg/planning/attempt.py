@@ -25,7 +25,7 @@ class Request:
 
     Attributes:
         params: parameters, such as `obstacle_margin_m` and `robot_margin_m`, which
-            plans keep at every step, and `spare`.
+            plans keep at every step, and `soc_margin`.
         router: finds tours.
         seed: of the whole search.
         number: of the attempt, from 0; each has random streams of its own.

@@ -22,7 +22,7 @@ from mrmg.planning.endings import counted, listed
 from mrmg.planning.feasibility import energy_and_metres, proof_of_infeasibility
 from mrmg.planning.halting import NEVER, Halted
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.path_following import easiest
+from mrmg.planning.path_following.strategy import easiest
 from mrmg.planning.preference import TIME_MARGIN_S
 from mrmg.planning.problem.problem import Problem, unjoined_goals
 from mrmg.planning.problem.targets import finish_of

@@ -270,7 +270,7 @@ class _Reach:
         return reach._with_stations()
 
     def is_connected(self, region: Region) -> bool:
-        """Tell whether the robot may get into a region as far as obstacles go."""
+        """Return whether the robot may get into a region as far as obstacles go."""
         near = outer_polygon(region).buffer(self.offset_m + 0.05)
         return bool(self.free.intersects(near))
 

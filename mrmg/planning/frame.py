@@ -20,8 +20,8 @@ from shapely.geometry import Polygon
 from mrmg.motion._kernels import MODEL_ID
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.attempt import Attempt
-from mrmg.planning.drafting import _tracking_kernels
 from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.path_following import _tracking_kernels
 from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Plan
 from mrmg.scene.elevation import Elevation

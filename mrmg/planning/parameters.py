@@ -94,11 +94,11 @@ class PlannerParams:
         dt_s: step of the motion model, dt [s].
         trees: attempts at most; one that fails is followed by one with new draws.
         improvements: further attempts after the first plan; the cheapest plan counts.
-        drafts: follow paths along tours without a tree where that succeeds.
-        spare: share of every battery's capacity that plans leave above the reserve
+        follow_paths: follow paths along tours without a tree where that succeeds.
+        soc_margin: share of every battery's capacity that plans leave above the reserve
             where they can, for robots that take more than their models say. With a
             tenth, a robot that uses all it may on one charge can take 12 % more.
-        refinements: times that the plan of each tree is drawn tight and driven again,
+        refinements: times that the plan of each tree is smoothed and driven again,
             as long as that saves energy.
         obstacle_margin_m: distance kept from obstacles at the time steps [m]. Between
             two steps of 0.1 s no corner of the car moves more than 0.16 m from both
@@ -121,8 +121,8 @@ class PlannerParams:
     dt_s: float = 0.1
     trees: int = 12
     improvements: int = 1
-    drafts: bool = True
-    spare: float = 0.1
+    follow_paths: bool = True
+    soc_margin: float = 0.1
     refinements: int = 2
     obstacle_margin_m: float = 0.25
     robot_margin_m: float = 0.5
@@ -138,7 +138,7 @@ class PlannerParams:
             "trees": self.trees >= 1,
             "improvements": self.improvements >= 0,
             "refinements": self.refinements >= 0,
-            "spare": 0.0 <= self.spare < 1.0,
+            "soc_margin": 0.0 <= self.soc_margin < 1.0,
             "obstacle_margin_m": 0.0 <= self.obstacle_margin_m <= 1.0,
             "robot_margin_m": 0.0 <= self.robot_margin_m <= 2.0,
             "route_margin": 0.0 <= self.route_margin <= 1.0,
@@ -177,7 +177,7 @@ def profile_params(
     router: str | None = None,
     budget_s: float | None = None,
     trees: int | None = None,
-    spare: float | None = None,
+    soc_margin: float | None = None,
 ) -> PlannerParams:
     """Return the parameters of a profile.
 
@@ -187,7 +187,7 @@ def profile_params(
         router: name of the router; None for the planner's.
         budget_s: time limit [s]; None for none.
         trees: number of trees to grow, all of them; None for the profile's.
-        spare: share of every battery's capacity that plans leave above the reserve
+        soc_margin: share of every battery's capacity that plans leave above the reserve
             where they can; None for the profile's.
 
     Raises:
@@ -209,8 +209,8 @@ def profile_params(
     params = replace(params, budget_s=budget_s)
     if params.refinements and (budget_s is not None or trees is not None):
         params = replace(params, refinements=THOROUGH)
-    if spare is not None:
-        params = replace(params, spare=spare)
+    if soc_margin is not None:
+        params = replace(params, soc_margin=soc_margin)
     if trees is not None:
         return replace(params, trees=trees, improvements=trees)
     return params
@@ -224,6 +224,6 @@ def paper_params() -> PlannerParams:
         router=RouterParams(method="nrpa", levels=2, iterations=12, rounds=0),
         trees=1,
         improvements=0,
-        spare=0.0,
+        soc_margin=0.0,
         refinements=0,
     )

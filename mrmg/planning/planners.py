@@ -9,7 +9,7 @@ from typing import Protocol
 from mrmg import extensions
 from mrmg.planning.attempt import Attempt, Request
 from mrmg.planning.guided_tree.strategy import guided_tree
-from mrmg.planning.path_following import path_following
+from mrmg.planning.path_following.strategy import path_following
 from mrmg.planning.problem.problem import Problem
 
 

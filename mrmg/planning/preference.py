@@ -49,7 +49,7 @@ class Preference:
         return self.late_s(plan), self.value(plan), plan.cost_J
 
     def gains(self, better: Plan, plan: Plan, share: float) -> bool:
-        """Tell whether one plan betters another one by a share of the objective."""
+        """Return whether one plan betters another one by a share of the objective."""
         if self.late_s(plan) > 0.0:
             return self.late_s(better) < self.late_s(plan)
         return self.value(better) < (1.0 - share) * self.value(plan)

@@ -27,7 +27,7 @@ from mrmg.planning.parameters import (
     kernels_of,
     paper_params,
 )
-from mrmg.planning.path_following import path_following
+from mrmg.planning.path_following.strategy import path_following
 from mrmg.planning.planners import Planner
 from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.planning.routers import find_router
@@ -71,7 +71,7 @@ def load_kernels(planner: str) -> None:
 
 def search_smallest() -> None:
     """Search for motions in the smallest mission."""
-    _plan_smallest(path_following, replace(SMALL_PARAMS, drafts=False))
+    _plan_smallest(path_following, replace(SMALL_PARAMS, follow_paths=False))
 
 
 def follow_smallest() -> None:

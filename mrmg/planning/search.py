@@ -46,10 +46,10 @@ class Search:
 
     Attributes:
         attempt: makes attempt number n; ends soon after `halt[0]` has turned true.
-        params: says when to stop.
+        params: set when to stop.
         statistics: receives counts, times and improvements.
         workers: threads.
-        on_progress, on_improvement: told how it goes.
+        on_progress, on_improvement: called with progress.
         proof: returns why the mission has no solution, None if that is not known; takes
             whether no tours were found. Called once an attempt has failed.
         preference: what plans are compared by.

@@ -193,7 +193,7 @@ def _plan(run: Run) -> Write:
             router=arguments.router,
             budget_s=arguments.budget_s,
             trees=arguments.trees,
-            spare=arguments.soc_margin,
+            soc_margin=arguments.soc_margin,
         ),
         workers=arguments.workers,
         with_bound=True,

@@ -176,14 +176,14 @@ def test_more_obstacles_never_lower_a_price(
 
 
 @settings(FEW, max_examples=50)
-@given(seed=st.integers(0, 1000), dearer=st.lists(st.integers(0, 83), max_size=20))
-def test_dearer_legs_never_make_tours_cheaper(seed: int, dearer: list[int]) -> None:
+@given(seed=st.integers(0, 1000), costlier=st.lists(st.integers(0, 83), max_size=20))
+def test_costlier_legs_never_make_tours_cheaper(seed: int, costlier: list[int]) -> None:
     """Exactly, as tours are the least of all and not sought by chance."""
     rng = np.random.default_rng(seed)
     distance = rng.uniform(1.0, 30.0, (2, 6, 6))
     start_distance = rng.uniform(1.0, 30.0, (2, 6))
     raised = np.concatenate([distance.ravel(), start_distance.ravel()])
-    raised[np.array(dearer, int)] *= rng.uniform(1.0, 1.5, len(dearer))
+    raised[np.array(costlier, int)] *= rng.uniform(1.0, 1.5, len(costlier))
     problems = [
         routing_arrays(
             goals=4,

@@ -27,9 +27,9 @@ def changed(scene: Scene, **changes: object) -> Scene:
     return scene_from_document(document, source=scene.name)
 
 
-def planned(scene: Scene, seed: int = 0, drafts: bool = True) -> Plan:
-    # Without spare charge, so that robots recharge no more often than they must.
-    params = PlannerParams(drafts=drafts, spare=0.0)
+def planned(scene: Scene, seed: int = 0, follow_paths: bool = True) -> Plan:
+    # Without a margin, so that robots recharge no more often than they must.
+    params = PlannerParams(follow_paths=follow_paths, soc_margin=0.0)
     plan = plan_mission(scene, seed=seed, params=params).plan
     assert plan is not None
     assert verify(scene, plan).violations == ()
@@ -77,10 +77,10 @@ def test_dwelling_takes_its_time() -> None:
         assert plan.makespan_s <= dwell_s + at_once.makespan_s + 6.0
 
 
-@pytest.mark.parametrize("drafts", PLANS.values(), ids=PLANS)
-def test_a_battery_is_filled_before_a_robot_goes_on(drafts: bool) -> None:
+@pytest.mark.parametrize("follow_paths", PLANS.values(), ids=PLANS)
+def test_a_battery_is_filled_before_a_robot_goes_on(follow_paths: bool) -> None:
     scene = load_scene(SCENES / "charging.yaml")
-    plan = planned(scene, drafts=drafts)
+    plan = planned(scene, follow_paths=follow_paths)
     battery = scene.robots[0].battery
     assert "s1" in plan.tours["r1"]
     visit = next(visit for visit in plan.visits if visit.target == "s1")

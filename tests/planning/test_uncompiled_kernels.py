@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).parent
-QUICK = ("band", "expansion", "pool", "random", "refuel", "roadmap", "safety")
+QUICK = ("band", "reeds_shepp", "pool", "random", "refuel", "roadmap", "safety")
 """Kernels whose tests take seconds uncompiled."""
 
 

@@ -168,7 +168,7 @@ def test_the_video_is_checked_alike() -> None:
 
 
 def test_retired_names_are_read_everywhere_and_shown_nowhere() -> None:
-    """The state-of-charge margin was called spare charge in 0.1.0."""
+    """The state-of-charge margin was called state-of-charge margin in 0.1.0."""
     wanted = RunArguments(soc_margin=0.3)
     parsed = make_parser().parse_args(["run", "yard", "--spare", "0.3"])
     assert RunArguments(**given(parsed)) == wanted

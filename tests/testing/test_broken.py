@@ -20,7 +20,7 @@ from mrmg.planning import (
     Routing,
     RoutingProblem,
 )
-from mrmg.planning.path_following import path_following
+from mrmg.planning.path_following.strategy import path_following
 from mrmg.planning.problem.problem import state_mission
 from mrmg.planning.routers import find_router
 from mrmg.planning.routing.routing import RouterParams

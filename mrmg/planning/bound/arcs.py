@@ -251,7 +251,7 @@ class ArcWays:
 
 
 def _all_reached(wave: Field, *looks: Look) -> bool:
-    """Tell whether a field knows all points of looks."""
+    """Return whether a field knows all points of looks."""
     return all(
         wave.at(look).max(initial=-UNREACHED) <= 0.5 * UNREACHED for look in looks
     )

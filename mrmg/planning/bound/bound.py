@@ -5,7 +5,7 @@ energy of that is at least the rolling resistance on the shortest ways (`geodesi
 a robot that starts and ends at rest gets no inertia for nothing, and turning, idling
 and other robots only cost more. The least over all orders is the bound.
 
-Up to MOST_GOALS goals, orders are told apart by where each region is touched first
+Up to MOST_GOALS goals, orders are distinguished by where each region is touched first
 (`touring`), as the way through a region is no more for nothing than any other.
 
 On slopes the battery also pays for climbing and is paid for rolling down, at most what

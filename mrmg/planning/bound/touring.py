@@ -67,7 +67,7 @@ def touring_bound_J(
 def _tighten(
     ways: Sequence[ArcWays], leg: np.ndarray, tours: Sequence[Sequence[int]]
 ) -> bool:
-    """Tighten the ways that tours take; tell whether any had not been tightened yet."""
+    """Tighten the ways that tours take; return whether any was new."""
     new: dict[tuple[int, Wave], ArcWays] = {}
     for r, tour in enumerate(tours):
         arcs = _arcs_along(leg[r], tour)

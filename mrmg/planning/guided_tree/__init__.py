@@ -80,7 +80,7 @@ What the paper leaves open, our choice, and why:
   (`motion.dynamics`).
 - A tour is feasible if every battery lasts, above its reserve, along the roadmap to the
   robot's next station or end. NRPA draws tours with a margin on energies, as driving
-  takes more than the roadmap says; feasibility is judged without it.
+  takes more than by the roadmap; feasibility is judged without it.
 - Stations recharge the robot whose tour leads there next, once each time it enters: no
   tour begins with a station that the robot is in, but at the start. Goals count for any
   robot.

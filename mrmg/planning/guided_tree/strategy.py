@@ -15,7 +15,7 @@ def guided_tree(problem: Problem, request: Request) -> Attempt:
         UsageError: if the scene has features that the paper lacks.
     """
     refuse_unknown_features(problem.scene)
-    problem = problem.with_soc_margin(request.params.spare)
+    problem = problem.with_soc_margin(request.params.soc_margin)
     draw = request.stream_seed("guided tree")
     growth = grow_guided_tree(problem, request.params, draw, request.halt)
     plan = None

@@ -1,11 +1,10 @@
 """Committed braking: what keeps robots safe while they follow paths.
 
-Each robot carries a committed motion: the states it will go through if it brakes from
-now on, steering held, until it stands. All committed motions keep clear of obstacles
-and, step by step, of each other. A robot may replace its commitment by "one step under
-a new control, then brake" only if that keeps clear too; otherwise it follows the one it
-has. So braking is always possible, no expansion ever dies, and a mission may end at any
-time.
+Each robot carries a contingency trajectory: the states it will go through if it brakes
+from now on, steering held, until it stands. All of them keep clear of obstacles and,
+step by step, of each other. A robot may replace its own by "one step under a new
+control, then brake" only if that keeps clear too; otherwise it follows the one it has.
+So braking is always possible, and a mission may end at any time.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ REST = 1e-9
 
 
 @by_reference
-class Gates(NamedTuple):
+class Zones(NamedTuple):
     """Convex regions that one robot at a time may be in, or committed to enter.
 
     Attributes:
@@ -47,7 +46,7 @@ class Gates(NamedTuple):
     corners: np.ndarray
 
 
-class Commitment(NamedTuple):
+class Contingency(NamedTuple):
     """Committed motions; two slots a robot, one active and one for a proposal.
 
     Attributes:
@@ -59,7 +58,7 @@ class Commitment(NamedTuple):
         length: number of states in each slot, shape (R, 2).
         active: slot in force, shape (R,).
         now: index of the present state in the active slot, shape (R,).
-        gates: where one robot at a time may be.
+        zones: where one robot at a time may be.
     """
 
     state: np.ndarray
@@ -69,12 +68,12 @@ class Commitment(NamedTuple):
     length: np.ndarray
     active: np.ndarray
     now: np.ndarray
-    gates: Gates
+    zones: Zones
 
 
 @kernel
-def new_commitment(fleet, gates, dt):
-    """Return an empty commitment large enough for the fleet's longest braking."""
+def new_contingency(fleet, zones, dt):
+    """Return an empty contingency that holds the fleet's longest braking."""
     robots = len(fleet)
     longest = 0
     for r in range(robots):
@@ -82,7 +81,7 @@ def new_commitment(fleet, gates, dt):
         if fleet[r].model != CAR:
             slowing_s = max(slowing_s, fleet[r].limit[2] / fleet[r].limit[4])
         longest = max(longest, int(ceil(slowing_s / dt)) + 3)
-    return Commitment(
+    return Contingency(
         np.zeros((robots, 2, longest, 5)),
         np.empty((robots, 2, longest, MOST_CORNERS, 2)),
         np.zeros((robots, 2, longest), np.bool_),
@@ -90,7 +89,7 @@ def new_commitment(fleet, gates, dt):
         np.zeros((robots, 2), np.int64),
         np.zeros(robots, np.int64),
         np.zeros(robots, np.int64),
-        gates,
+        zones,
     )
 
 
@@ -116,14 +115,14 @@ def braking_control(fleet, r, state, dt):
 
 @kernel
 def stands(fleet, r, state):
-    """Tell whether a robot is at rest."""
+    """Return whether a robot is at rest."""
     return abs(state[3]) < REST and (fleet[r].model == CAR or abs(state[4]) < REST)
 
 
 @kernel
-def write_braking(fleet, r, first, dt, commitment, slot):
+def write_braking(fleet, r, first, dt, contingency, slot):
     """Fill a slot with `first` and the braking that follows it."""
-    states = commitment.state[r, slot]
+    states = contingency.state[r, slot]
     copy_numbers(first, states[0])
     n = 1
     while n < len(states) and not stands(fleet, r, states[n - 1]):
@@ -134,67 +133,67 @@ def write_braking(fleet, r, first, dt, commitment, slot):
     for k in range(n):
         x, y, theta = states[k, 0], states[k, 1], states[k, 2]
         c, s = cos(theta), sin(theta)
-        commitment.middle[r, slot, k, 0] = x + c * mx - s * my
-        commitment.middle[r, slot, k, 1] = y + s * mx + c * my
-        commitment.placed[r, slot, k] = False
-    commitment.length[r, slot] = n
+        contingency.middle[r, slot, k, 0] = x + c * mx - s * my
+        contingency.middle[r, slot, k, 1] = y + s * mx + c * my
+        contingency.placed[r, slot, k] = False
+    contingency.length[r, slot] = n
 
 
 @kernel
-def place(fleet, commitment, r, slot, k):
+def place(fleet, contingency, r, slot, k):
     """Place a committed footprint, if it is not yet."""
-    if not commitment.placed[r, slot, k]:
-        state = commitment.state[r, slot, k]
+    if not contingency.placed[r, slot, k]:
+        state = contingency.state[r, slot, k]
         outline = fleet[r].corner[: fleet[r].corners]
-        corners = commitment.corner[r, slot, k]
+        corners = contingency.corner[r, slot, k]
         place_footprint(outline, state[0], state[1], state[2], corners)
-        commitment.placed[r, slot, k] = True
+        contingency.placed[r, slot, k] = True
 
 
 @kernel
-def clear_of_obstacles(fleet, spaces, commitment, r, slot, first):
-    """Tell whether a slot's states from `first` on keep the margin from obstacles."""
+def clear_of_obstacles(fleet, spaces, contingency, r, slot, first):
+    """Return whether a slot's states from `first` on keep the margin from obstacles."""
     space = space_of(spaces, fleet[r].space)
     radius, margin = fleet[r].radius, fleet[r].margin
-    for k in range(first, commitment.length[r, slot]):
-        cx, cy = commitment.middle[r, slot, k, 0], commitment.middle[r, slot, k, 1]
+    for k in range(first, contingency.length[r, slot]):
+        cx, cy = contingency.middle[r, slot, k, 0], contingency.middle[r, slot, k, 1]
         if clearance_at_least(space, cx, cy) > radius + margin:
             continue
-        place(fleet, commitment, r, slot, k)
-        corners = commitment.corner[r, slot, k, : fleet[r].corners]
+        place(fleet, contingency, r, slot, k)
+        corners = contingency.corner[r, slot, k, : fleet[r].corners]
         if not footprint_is_clear(space, corners, cx, cy, radius, margin):
             return False
     return True
 
 
 @kernel
-def clear_of_robot(fleet, commitment, r, slot, first, other, other_first, margin):
-    """Tell whether two committed motions keep `margin`, step by step.
+def clear_of_robot(fleet, contingency, r, slot, first, other, other_first, margin):
+    """Return whether two committed motions keep `margin`, step by step.
 
     State `first + k` of robot r is compared with state `other_first + k` of the other;
     a robot that stands stays.
     """
-    other_slot = commitment.active[other]
-    last = commitment.length[r, slot] - 1
-    other_last = commitment.length[other, other_slot] - 1
+    other_slot = contingency.active[other]
+    last = contingency.length[r, slot] - 1
+    other_last = contingency.length[other, other_slot] - 1
     reach = fleet[r].radius + fleet[other].radius + margin
     span = max(last - first, other_last - other_first)
     for k in range(max(span, 0) + 1):
         i = min(first + k, last)
         j = min(other_first + k, other_last)
         apart = hypot(
-            commitment.middle[r, slot, i, 0]
-            - commitment.middle[other, other_slot, j, 0],
-            commitment.middle[r, slot, i, 1]
-            - commitment.middle[other, other_slot, j, 1],
+            contingency.middle[r, slot, i, 0]
+            - contingency.middle[other, other_slot, j, 0],
+            contingency.middle[r, slot, i, 1]
+            - contingency.middle[other, other_slot, j, 1],
         )
         if apart >= reach:
             continue
-        place(fleet, commitment, r, slot, i)
-        place(fleet, commitment, other, other_slot, j)
+        place(fleet, contingency, r, slot, i)
+        place(fleet, contingency, other, other_slot, j)
         between = convex_convex_distance(
-            commitment.corner[r, slot, i, : fleet[r].corners],
-            commitment.corner[other, other_slot, j, : fleet[other].corners],
+            contingency.corner[r, slot, i, : fleet[r].corners],
+            contingency.corner[other, other_slot, j, : fleet[other].corners],
         )
         if between < margin:
             return False
@@ -202,49 +201,49 @@ def clear_of_robot(fleet, commitment, r, slot, first, other, other_first, margin
 
 
 @kernel
-def passes_gate(commitment, gate, r, slot, first):
-    """Tell whether a slot's states from `first` on are in a gate at any time."""
-    gates = commitment.gates
-    n = gates.corners[gate]
-    for k in range(first, commitment.length[r, slot]):
-        x, y = commitment.state[r, slot, k, 0], commitment.state[r, slot, k, 1]
-        far = hypot(x - gates.center[gate, 0], y - gates.center[gate, 1])
-        if far > gates.reach[gate]:
+def passes_gate(contingency, zone, r, slot, first):
+    """Return whether a slot's states from `first` on are in a gate at any time."""
+    zones = contingency.zones
+    n = zones.corners[zone]
+    for k in range(first, contingency.length[r, slot]):
+        x, y = contingency.state[r, slot, k, 0], contingency.state[r, slot, k, 1]
+        far = hypot(x - zones.center[zone, 0], y - zones.center[zone, 1])
+        if far > zones.reach[zone]:
             continue
-        if n == 0 or point_in_convex(x, y, gates.corner[gate, :n]):
+        if n == 0 or point_in_convex(x, y, zones.corner[zone, :n]):
             return True
     return False
 
 
 @kernel
-def gate_is_taken(commitment, gate, r):
-    """Tell whether a robot other than r is in a gate or committed to enter it."""
-    for other in range(len(commitment.now)):
+def gate_is_taken(contingency, zone, r):
+    """Return whether a robot other than r is in a gate or committed to enter it."""
+    for other in range(len(contingency.now)):
         if other != r and passes_gate(
-            commitment, gate, other, commitment.active[other], commitment.now[other]
+            contingency, zone, other, contingency.active[other], contingency.now[other]
         ):
             return True
     return False
 
 
 @kernel
-def clear_of_gates(commitment, r, slot):
-    """Tell whether a slot's states enter no gate that another robot has taken."""
-    for gate in range(len(commitment.gates.reach)):
-        if passes_gate(commitment, gate, r, slot, 0) and gate_is_taken(
-            commitment, gate, r
+def clear_of_gates(contingency, r, slot):
+    """Return whether a slot's states enter no gate that another robot has taken."""
+    for zone in range(len(contingency.zones.reach)):
+        if passes_gate(contingency, zone, r, slot, 0) and gate_is_taken(
+            contingency, zone, r
         ):
             return False
     return True
 
 
 @kernel
-def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):
-    """Replace robot r's commitment by one step of a control and braking, if it is safe.
+def try_control(fleet, spaces, contingency, decided, r, u1, u2, dt):
+    """Replace robot r's contingency by one step of a control and braking, if safe.
 
     Args:
         fleet, spaces: the fleet and its free spaces.
-        commitment: changed in place on success.
+        contingency: changed in place on success.
         decided: which robots have already made this step, shape (R,).
         r: robot.
         u1, u2: control.
@@ -253,39 +252,39 @@ def try_control(fleet, spaces, commitment, decided, r, u1, u2, dt):
     Returns:
         Whether it was safe.
     """
-    active = commitment.active[r]
+    active = contingency.active[r]
     slot = 1 - active
-    state = commitment.state[r, active, commitment.now[r]]
+    state = contingency.state[r, active, contingency.now[r]]
     after = np.empty(5)
     step(fleet[r], state, u1, u2, dt, after)
-    write_braking(fleet, r, after, dt, commitment, slot)
-    if not clear_of_obstacles(fleet, spaces, commitment, r, slot, 0):
+    write_braking(fleet, r, after, dt, contingency, slot)
+    if not clear_of_obstacles(fleet, spaces, contingency, r, slot, 0):
         return False
-    if not clear_of_gates(commitment, r, slot):
+    if not clear_of_gates(contingency, r, slot):
         return False
     for other in range(len(fleet)):
         if other == r:
             continue
         # A robot that has not moved yet is met where its braking takes it.
-        other_first = commitment.now[other] + (0 if decided[other] else 1)
+        other_first = contingency.now[other] + (0 if decided[other] else 1)
         spacing = max(fleet[r].spacing, fleet[other].spacing)
         if not clear_of_robot(
-            fleet, commitment, r, slot, 0, other, other_first, spacing
+            fleet, contingency, r, slot, 0, other, other_first, spacing
         ):
             return False
-    commitment.active[r] = slot
-    commitment.now[r] = 0
+    contingency.active[r] = slot
+    contingency.now[r] = 0
     return True
 
 
 @kernel
-def follow_braking(commitment, r):
-    """Advance robot r one step along its commitment."""
-    last = commitment.length[r, commitment.active[r]] - 1
-    commitment.now[r] = min(commitment.now[r] + 1, last)
+def follow_braking(contingency, r):
+    """Advance robot r one step along its contingency trajectory."""
+    last = contingency.length[r, contingency.active[r]] - 1
+    contingency.now[r] = min(contingency.now[r] + 1, last)
 
 
 @kernel
-def present_state(commitment, r):
+def present_state(contingency, r):
     """Return robot r's present state, a view of shape (5,)."""
-    return commitment.state[r, commitment.active[r], commitment.now[r]]
+    return contingency.state[r, contingency.active[r], contingency.now[r]]

@@ -26,7 +26,7 @@ class Targets(NamedTuple):
         corner: padded corners of polygons, shape (T, M, 2).
         corners: number of corners; 0 for a circle, shape (T,).
         dwell: how long a visit takes [s], shape (T,).
-        gate: number among the gates of the safety kernels, -1 for none, shape (T,).
+        zone: number among the gates of the safety kernels, -1 for none, shape (T,).
     """
 
     goals: int
@@ -39,12 +39,12 @@ class Targets(NamedTuple):
     corner: np.ndarray
     corners: np.ndarray
     dwell: np.ndarray
-    gate: np.ndarray
+    zone: np.ndarray
 
 
 @kernel
 def in_target(targets, t, x, y):
-    """Tell whether a point lies in a target's region."""
+    """Return whether a point lies in a target's region."""
     far = hypot(x - targets.center[t, 0], y - targets.center[t, 1])
     if far > targets.reach[t]:
         return False

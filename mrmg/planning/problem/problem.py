@@ -15,7 +15,7 @@ from mrmg.motion._kernels import CAR
 from mrmg.motion._kernels import step as motion_step
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
-from mrmg.planning.problem._safety_kernels import Gates
+from mrmg.planning.problem._safety_kernels import Zones
 from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.problem.leg_times import routing_times
 from mrmg.planning.problem.targets import finish_of, gate_arrays, target_arrays
@@ -38,7 +38,7 @@ class Mission(NamedTuple):
 
     Attributes:
         fleet, spaces, terrain, roadmap, targets: robots, world and where to go.
-        gates: stations that one robot at a time may be at.
+        zones: stations that one robot at a time may be at.
         routing: the routing problem at the start; costs include the route margin.
         last_leg: energy from each place (the start last) to each robot's finish [J],
             shape (R, G + S + 1); zero where a robot may end anywhere.
@@ -49,7 +49,7 @@ class Mission(NamedTuple):
     terrain: TerrainGrid
     roadmap: RoadmapArrays
     targets: Targets
-    gates: Gates
+    zones: Zones
     routing: RoutingArrays
     last_leg: np.ndarray
 
@@ -205,7 +205,7 @@ def state_problem(
         terrain=world.terrain,
         roadmap=roadmap.arrays,
         targets=targets,
-        gates=gate_arrays(scene),
+        zones=gate_arrays(scene),
         routing=routing_arrays(
             goals=len(scene.goals),
             distance=roadmap.distance[fleet["field"], :places, :places]

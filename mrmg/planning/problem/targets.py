@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mrmg.planning.problem._safety_kernels import Gates
+from mrmg.planning.problem._safety_kernels import Zones
 from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.roadmap.vertices import planned_regions
 from mrmg.scene.types import Scene, Station
@@ -24,7 +24,7 @@ LONGER_S = 0.5
 
 
 def has_options(scene: Scene) -> bool:
-    """Tell whether robots must stay anywhere, or something else than energy counts."""
+    """Return whether robots must stay somewhere, or more than energy counts."""
     return any(target.dwell_s > 0.0 for target in scene.targets()) or any(
         robot.battery.takes_time_to_fill for robot in scene.robots
     )
@@ -75,7 +75,7 @@ def target_arrays(scene: Scene) -> Targets:
         corner=corner,
         corners=np.array([len(corners) for corners in shrunk], np.int64),
         dwell=_dwell_s(scene),
-        gate=_gates_of(scene),
+        zone=_gates_of(scene),
     )
 
 
@@ -94,14 +94,14 @@ def _exclusive(scene: Scene) -> list[Station]:
 
 def _gates_of(scene: Scene) -> np.ndarray:
     """Return each target's number among the gates, -1 for none, shape (T,)."""
-    gate = np.full(len(planned_regions(scene)), -1, np.int64)
+    zone = np.full(len(planned_regions(scene)), -1, np.int64)
     numbers = {station.id: i for i, station in enumerate(_exclusive(scene))}
     for t, target in enumerate(scene.targets()):
-        gate[t] = numbers.get(target.id, -1)
-    return gate
+        zone[t] = numbers.get(target.id, -1)
+    return zone
 
 
-def gate_arrays(scene: Scene) -> Gates:
+def gate_arrays(scene: Scene) -> Zones:
     """Return the stations for one robot at a time, a margin wider than they are."""
     regions = [station.region for station in _exclusive(scene)]
     outlines = []
@@ -118,7 +118,7 @@ def gate_arrays(scene: Scene) -> Gates:
         reach[i] = region.radius_m + GATE_MARGIN_M
         if len(corners):
             reach[i] = np.hypot(*(corners - region.center).T).max()
-    return Gates(
+    return Zones(
         center=np.array([region.center for region in regions], float).reshape(-1, 2),
         reach=reach,
         corner=corner,

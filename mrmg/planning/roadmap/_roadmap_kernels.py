@@ -44,7 +44,7 @@ class RoadmapArrays(NamedTuple):
 
 
 TIGHT_M = 0.7
-"""Clearance beyond the passage below which driving is made dearer in the roadmap."""
+"""Clearance beyond the passage below which driving costs more in the roadmap."""
 
 TIGHT_SHARE = 0.35
 """Surcharge of an edge that has no clearance to spare."""

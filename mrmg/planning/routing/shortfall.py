@@ -73,7 +73,7 @@ def least_share(suffices: Callable[[float], bool]) -> tuple[float, float]:
     """Return a share that does not suffice, and one little above it that does.
 
     Args:
-        suffices: tells whether a share suffices; 0 does not.
+        suffices: returns whether a share suffices; 0 does not.
 
     Returns:
         Both; the second one is inf if MAX_SHARE does not suffice.

@@ -60,7 +60,7 @@ def random_fleet(
 
 
 def drives(problem: RoutingArrays, r: int, order: tuple[int, ...], left: float) -> bool:
-    """Tell whether robot r can visit goals in an order, trying every station chain."""
+    """Return whether robot r can visit goals in an order, by any station chain."""
     full = float(problem.capacity[r])
 
     def ends(

@@ -174,13 +174,13 @@ def border_points(center: np.ndarray, arc: int, arcs: int) -> np.ndarray:
     return center + RADIUS_M * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
 
-WALL = {"id": "w", "polygon": [[15, 6], [17, 6], [17, 20], [15, 20]], "height": 1}
+WALL_SHARE = {"id": "w", "polygon": [[15, 6], [17, 6], [17, 20], [15, 20]], "height": 1}
 
 
 @pytest.mark.parametrize("walls", [0, 1])
 def test_no_way_between_arcs_is_shorter_than_its_bound(walls: int) -> None:
     """Straight, or round a wall; the robot's disc reaches 0.3 m."""
-    ways = arc_ways(field(obstacles=[WALL] * walls))
+    ways = arc_ways(field(obstacles=[WALL_SHARE] * walls))
     before = ways.between.copy()
     middle = ways.between.shape[1] // 2
     waves = ways.waves(0, 0, 1, middle)
@@ -229,7 +229,7 @@ def test_no_way_through_dear_ground_costs_less_than_its_bound() -> None:
 
 def test_no_way_from_a_start_is_shorter_than_its_bound() -> None:
     """The wall hides the second goal; what a wave from the start tells is nearly so."""
-    ways = arc_ways(field(obstacles=[WALL]))
+    ways = arc_ways(field(obstacles=[WALL_SHARE]))
     (wave,) = ways.waves(-1, 0, 1, 0)
     ways.take(wave, ways.certificate(wave))
     assert not ways.waves(-1, 0, 1, 5)

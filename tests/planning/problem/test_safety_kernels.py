@@ -16,10 +16,10 @@ from mrmg.motion._kernels import CAR, UNICYCLE, step
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.problem._control_kernels import control_towards
 from mrmg.planning.problem._safety_kernels import (
-    Commitment,
+    Contingency,
     braking_control,
     follow_braking,
-    new_commitment,
+    new_contingency,
     present_state,
     stands,
     toward_zero,
@@ -69,19 +69,19 @@ def crowd(yard: MakeScene, state: MakeProblem) -> Callable[..., Problem]:
     return make
 
 
-def committed(problem: Problem) -> Commitment:
-    """Return the commitment of robots that stand at their start."""
+def committed(problem: Problem, now: np.ndarray | None = None) -> Contingency:
+    """Return the contingency trajectories of robots, which stand at their start."""
     fleet = problem.mission.fleet
     # In Python: kernels may not return to it what they are handed by reference.
-    make = getattr(new_commitment, "py_func", new_commitment)
-    commitment = make(fleet.view(np.recarray), problem.mission.gates, DT_S)
-    for r in range(len(fleet)):
-        write_braking(fleet, r, problem.start[r], DT_S, commitment, 0)
-    return commitment
+    make = getattr(new_contingency, "py_func", new_contingency)
+    contingency = make(fleet.view(np.recarray), problem.mission.zones, DT_S)
+    for r, state in enumerate(problem.start if now is None else now):
+        write_braking(fleet, r, state, DT_S, contingency, 0)
+    return contingency
 
 
 def drive_at_random(
-    problem: Problem, commitment: Commitment, seed: int, steps: int
+    problem: Problem, contingency: Contingency, seed: int, steps: int
 ) -> Iterator[list[bool]]:
     """Drive all robots, in random order of right of way; yield who got its wish."""
     fleet, spaces = problem.mission.fleet, problem.mission.spaces
@@ -95,31 +95,31 @@ def drive_at_random(
             if n % 12 == 0:
                 fast = rng.choice([0.0, 1.0, -1.0], p=[0.1, 0.65, 0.25])
                 wanted[r] = 3.0 * fast, rng.uniform(-1.0, 1.0)
-            before = present_state(commitment, r).copy()
+            before = present_state(contingency, r).copy()
             u1, u2 = control_towards(fleet, r, before, *wanted[r], DT_S)
             if rng.random() < 0.95:
                 granted[r] = try_control(
-                    fleet, spaces, commitment, decided, r, u1, u2, DT_S
+                    fleet, spaces, contingency, decided, r, u1, u2, DT_S
                 )
             if not granted[r]:
                 u1, u2 = braking_control(fleet, r, before, DT_S)
-                follow_braking(commitment, r)
+                follow_braking(contingency, r)
             after = np.empty(5)
             step(fleet[r], before, u1, u2, DT_S, after)
-            assert present_state(commitment, r) == pytest.approx(after, abs=1e-9)
+            assert present_state(contingency, r) == pytest.approx(after, abs=1e-9)
             decided[r] = True
         yield granted
 
 
-def committed_states(commitment: Commitment) -> np.ndarray:
+def committed_states(contingency: Contingency) -> np.ndarray:
     """Return what each robot is committed to from now on, shape (R, K, 5)."""
-    robots, _, most, _ = commitment.state.shape
+    robots, _, most, _ = contingency.state.shape
     states = np.empty((robots, most, 5))
     for r in range(robots):
-        slot = commitment.active[r]
-        last = commitment.length[r, slot] - 1
-        index = np.minimum(commitment.now[r] + np.arange(most), last)
-        states[r] = commitment.state[r, slot, index]
+        slot = contingency.active[r]
+        last = contingency.length[r, slot] - 1
+        index = np.minimum(contingency.now[r] + np.arange(most), last)
+        states[r] = contingency.state[r, slot, index]
     return states
 
 
@@ -166,11 +166,11 @@ def test_all_that_robots_are_committed_to_keeps_the_margins(
     crowd: Callable[..., Problem], models: tuple[int, ...], seed: int
 ) -> None:
     problem = crowd(models)
-    commitment = committed(problem)
+    contingency = committed(problem)
     granted, states = [], []
-    for outcome in drive_at_random(problem, commitment, seed, 500):
+    for outcome in drive_at_random(problem, contingency, seed, 500):
         granted.append(outcome)
-        states.append(committed_states(commitment))
+        states.append(committed_states(contingency))
     ahead = np.array(states).swapaxes(0, 1)  # (R, n, K, 5)
     obstacle, pair = distances(problem, footprints(problem, ahead))
     assert obstacle.min() >= PLANNING_MARGIN_M - ROUNDING_M
@@ -187,12 +187,12 @@ def test_committed_braking_ends_at_rest_as_early_as_the_limits_allow(
 ) -> None:
     problem = crowd(models)
     fleet = problem.mission.fleet
-    commitment = committed(problem)
-    for _ in drive_at_random(problem, commitment, 7, 200):
+    contingency = committed(problem)
+    for _ in drive_at_random(problem, contingency, 7, 200):
         for r in range(len(fleet)):
-            slot = commitment.active[r]
-            n = commitment.length[r, slot]
-            own = commitment.state[r, slot, :n]
+            slot = contingency.active[r]
+            n = contingency.length[r, slot]
+            own = contingency.state[r, slot, :n]
             assert stands(fleet, r, own[-1])
             assert abs(own[-1, 3]) < 1e-9
             step_v = fleet[r]["limit"][3] * DT_S
@@ -209,14 +209,12 @@ def test_committed_braking_ends_at_rest_as_early_as_the_limits_allow(
 
 def stop_all(fleet: np.ndarray, problem: Problem, now: np.ndarray) -> np.ndarray:
     """Return the controls that brake all robots to rest, shape (n, R, 2)."""
-    commitment = new_commitment(fleet, problem.mission.gates, DT_S)
-    for r, state in enumerate(now):
-        write_braking(fleet, r, state, DT_S, commitment, 0)
-    lasting = commitment.length[:, 0] - 1
+    contingency = committed(problem, now)
+    lasting = contingency.length[:, 0] - 1
     control = np.zeros((int(lasting.max()), len(now), 2))
     for k, held in enumerate(control):
         for r in range(len(now)):
-            state = commitment.state[r, 0, min(k, lasting[r])]
+            state = contingency.state[r, 0, min(k, lasting[r])]
             held[r] = braking_control(fleet, r, state, DT_S)
     return control
 
@@ -226,12 +224,12 @@ def test_stopping_from_any_moment_is_safe_and_ends_at_rest(
 ) -> None:
     problem = crowd((CAR, UNICYCLE, CAR, CAR))
     fleet = problem.mission.fleet
-    commitment = committed(problem)
+    contingency = committed(problem)
     moments = 0
-    for n, _ in enumerate(drive_at_random(problem, commitment, 11, 300)):
+    for n, _ in enumerate(drive_at_random(problem, contingency, 11, 300)):
         if n % 10:
             continue
-        now = np.stack([present_state(commitment, r) for r in range(4)])
+        now = np.stack([present_state(contingency, r) for r in range(4)])
         control = stop_all(fleet, problem, now)
         states = [now]
         for held in control:
@@ -270,15 +268,15 @@ def test_a_refused_control_changes_nothing(crowd: Callable[..., Problem]) -> Non
     """A proposal is written to the idle slot: what is in force must not move."""
     problem = crowd((CAR, CAR))
     fleet, spaces = problem.mission.fleet, problem.mission.spaces
-    commitment = committed(problem)
+    contingency = committed(problem)
     out_of_the_yard = 1e5
-    for _ in drive_at_random(problem, commitment, 5, 100):
-        before = committed_states(commitment)
-        book = commitment.active.copy(), commitment.now.copy()
+    for _ in drive_at_random(problem, contingency, 5, 100):
+        before = committed_states(contingency)
+        book = contingency.active.copy(), contingency.now.copy()
         decided = np.ones(2, bool)
         assert not try_control(
-            fleet, spaces, commitment, decided, 0, out_of_the_yard, 0.0, DT_S
+            fleet, spaces, contingency, decided, 0, out_of_the_yard, 0.0, DT_S
         )
-        assert np.array_equal(committed_states(commitment), before)
-        assert np.array_equal(commitment.active, book[0])
-        assert np.array_equal(commitment.now, book[1])
+        assert np.array_equal(committed_states(contingency), before)
+        assert np.array_equal(contingency.active, book[0])
+        assert np.array_equal(contingency.now, book[1])

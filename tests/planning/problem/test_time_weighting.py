@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mrmg.planning.drafting.tracking import HARD_SHARE, courses_of
 from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.path_following.tracking import HARD_SHARE, courses_of
 from mrmg.planning.problem.problem import state_mission
 from mrmg.planning.problem.time_weighting import (
     along_ways,

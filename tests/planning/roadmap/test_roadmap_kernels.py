@@ -1,4 +1,4 @@
-"""Finding the way from any place: waypoints in sight, and dearer tight edges."""
+"""Finding the way from any place: waypoints in sight, and costlier tight edges."""
 
 from __future__ import annotations
 

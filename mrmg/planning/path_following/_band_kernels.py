@@ -1,0 +1,332 @@
+"""An elastic band: the cheapest path of a given kind past a robot's targets.
+
+A path is a chain of nodes. Its cost, in metres of plain ground, adds up terrain, the
+scrub of turning, and penalties on curvature no robot can drive, on jumps of curvature,
+on footprints too near to obstacles and on targets that are missed.
+"""
+
+from __future__ import annotations
+
+from math import atan2, floor, hypot, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.compilation import by_reference, kernel
+
+SOFT_TURN = 0.05
+"""Angle below which the scrub of turning is rounded off [rad]."""
+
+CURVATURE_WEIGHT = 60.0
+"""Cost per metre of a curvature that exceeds the limit by its own size [m/m]."""
+
+RATE_WEIGHT = 20.0
+"""Likewise for changes of curvature."""
+
+CLEARANCE_WEIGHT = 600.0
+"""Cost per metre and square metre of missing clearance [m/m^3]."""
+
+TARGET_WEIGHT = 600.0
+"""Cost per square metre of a target's distance [m/m^2]."""
+
+EVENNESS_WEIGHT = 0.3
+"""Cost of neighbouring segments of unequal length [m/m^2]."""
+
+
+@by_reference
+class CostMap(NamedTuple):
+    """What a path is priced on: grids of one robot's clearance and of the terrain.
+
+    Attributes:
+        x_min, y_min, cell: of both grids [m].
+        distance: signed distance from obstacles, shape (ny, nx).
+        multiplier: of energy, smoothed, shape (ny, nx).
+        disc: centres of the discs that cover the footprint, ahead of the reference
+            point [m], shape (D,).
+        room: clearance their centres need [m].
+        curvature: greatest [1/m].
+        curvature_rate: greatest change of it per metre [1/m^2].
+        scrub: plain ground that turning by one radian is worth [m].
+    """
+
+    x_min: float
+    y_min: float
+    cell: float
+    distance: np.ndarray
+    multiplier: np.ndarray
+    disc: np.ndarray
+    room: float
+    curvature: float
+    curvature_rate: float
+    scrub: float
+
+
+@by_reference
+class Stops(NamedTuple):
+    """The targets at a path's nodes.
+
+    Attributes:
+        node: number of the node, increasing, shape (S,).
+        center, reach: circle about each region, shapes (S, 2) and (S,).
+        corner: padded corners of polygons, counter-clockwise, shape (S, M, 2).
+        corners: number of corners; 0 for a circle, shape (S,).
+        deeper: how deep the node is to lie inside [m], shape (S,).
+    """
+
+    node: np.ndarray
+    center: np.ndarray
+    reach: np.ndarray
+    corner: np.ndarray
+    corners: np.ndarray
+    deeper: np.ndarray
+
+
+class Shape(NamedTuple):
+    """The form of a path, by segment and its first node, with the cost's derivatives.
+
+    Attributes:
+        size: length of the segment [m].
+        way: length its turn is spread over [m].
+        turn: at the first node [rad].
+        bend: curvature there [1/m].
+        d_turn, d_bend, d_size: derivatives of the cost.
+    """
+
+    size: np.ndarray
+    way: np.ndarray
+    turn: np.ndarray
+    bend: np.ndarray
+    d_turn: np.ndarray
+    d_bend: np.ndarray
+    d_size: np.ndarray
+
+
+@kernel
+def value_and_slope(grid, x_min, y_min, cell, x, y):
+    """Return (value, d/dx, d/dy) of a grid of cell values, bilinear."""
+    rows, columns = grid.shape
+    fx = (x - x_min) / cell - 0.5
+    fy = (y - y_min) / cell - 0.5
+    column = min(max(int(floor(fx)), 0), columns - 2)
+    row = min(max(int(floor(fy)), 0), rows - 2)
+    fx = min(1.0, max(0.0, fx - column))
+    fy = min(1.0, max(0.0, fy - row))
+    a, b = grid[row, column], grid[row, column + 1]
+    c, d = grid[row + 1, column], grid[row + 1, column + 1]
+    low = a + (b - a) * fx
+    high = c + (d - c) * fx
+    slope_x = ((b - a) * (1.0 - fy) + (d - c) * fy) / cell
+    return low + (high - low) * fy, slope_x, (high - low) / cell
+
+
+@kernel
+def outside(stops, i, x, y):
+    """Return (distance outside a stop's region, drawn in, d/dx, d/dy); 0 inside."""
+    if stops.corners[i] == 0:
+        dx, dy = x - stops.center[i, 0], y - stops.center[i, 1]
+        far = hypot(dx, dy)
+        off = far - stops.reach[i] + stops.deeper[i]
+        return (off, dx / far, dy / far) if off > 0.0 else (0.0, 0.0, 0.0)
+    worst, nx, ny = 0.0, 0.0, 0.0
+    n = stops.corners[i]
+    for k in range(n):
+        j = k + 1 if k + 1 < n else 0
+        ex = stops.corner[i, j, 0] - stops.corner[i, k, 0]
+        ey = stops.corner[i, j, 1] - stops.corner[i, k, 1]
+        size = hypot(ex, ey)
+        ox, oy = x - stops.corner[i, k, 0], y - stops.corner[i, k, 1]
+        off = (ey * ox - ex * oy) / size + stops.deeper[i]
+        if off > worst:
+            worst, nx, ny = off, ey / size, -ex / size
+    return worst, nx, ny
+
+
+@kernel
+def add_terrain_and_clearance(cost_map, p, gear, gradient):
+    """Add the cost of the ground under each segment and of what it comes near to."""
+    total = 0.0
+    for i in range(len(p) - 1):
+        bx, by = p[i + 1, 0] - p[i, 0], p[i + 1, 1] - p[i, 1]
+        size = sqrt(bx * bx + by * by + 1e-12)
+        tx, ty = bx / size, by / size
+        mx, my = 0.5 * (p[i, 0] + p[i + 1, 0]), 0.5 * (p[i, 1] + p[i + 1, 1])
+        k, kx, ky = value_and_slope(
+            cost_map.multiplier, cost_map.x_min, cost_map.y_min, cost_map.cell, mx, my
+        )
+        # A cost per metre times the length of the segment: density and its gradient.
+        density, gx, gy, across = k, kx, ky, 0.0
+        middle = 0.5 * (cost_map.disc[0] + cost_map.disc[-1]) * gear[i]
+        free, _, _ = value_and_slope(
+            cost_map.distance,
+            cost_map.x_min,
+            cost_map.y_min,
+            cost_map.cell,
+            mx + middle * tx,
+            my + middle * ty,
+        )
+        wide = free > cost_map.room + cost_map.disc[-1] - cost_map.disc[0]
+        for j in range(0 if wide else len(cost_map.disc)):
+            ahead = cost_map.disc[j] * gear[i]
+            free, fx, fy = value_and_slope(
+                cost_map.distance,
+                cost_map.x_min,
+                cost_map.y_min,
+                cost_map.cell,
+                mx + ahead * tx,
+                my + ahead * ty,
+            )
+            lack = cost_map.room - free
+            if lack > 0.0:
+                density += CLEARANCE_WEIGHT * lack * lack
+                push = -2.0 * CLEARANCE_WEIGHT * lack
+                gx += push * fx
+                gy += push * fy
+                # Turning the segment swings the disc sideways.
+                across += push * (fy * tx - fx * ty) * ahead
+        total += density * size
+        swing_x, swing_y = -ty * across, tx * across
+        along_x, along_y = density * tx, density * ty
+        gradient[i, 0] += 0.5 * gx * size - along_x - swing_x
+        gradient[i, 1] += 0.5 * gy * size - along_y - swing_y
+        gradient[i + 1, 0] += 0.5 * gx * size + along_x + swing_x
+        gradient[i + 1, 1] += 0.5 * gy * size + along_y + swing_y
+    return total
+
+
+@kernel
+def write_turns(p, gear, ux, uy, shape):
+    """Write the length of each segment, and the turn and curvature at its first node.
+
+    At a change of gear the turn is that of the heading. The first turn is that from the
+    robot's heading (ux, uy) at the start.
+    """
+    ax, ay, last = ux, uy, 1
+    for i in range(len(p) - 1):
+        bx, by = p[i + 1, 0] - p[i, 0], p[i + 1, 1] - p[i, 1]
+        shape.size[i] = max(hypot(bx, by), 1e-6)
+        sign = last * gear[i]
+        shape.turn[i] = atan2((ax * by - ay * bx) * sign, (ax * bx + ay * by) * sign)
+        shape.way[i] = 0.5 * (shape.size[max(i - 1, 0)] + shape.size[i])
+        shape.bend[i] = shape.turn[i] / shape.way[i]
+        ax, ay, last = bx, by, gear[i]
+
+
+@kernel
+def bending_cost(cost_map, gear, pivot, shape):
+    """Return the cost of turning, of too much curvature and of its changes.
+
+    Turns on the spot (`pivot`) have no curvature. Writes the cost's derivatives by turn
+    and size.
+    """
+    total = 0.0
+    n = len(shape.turn)
+    shape.d_bend[:] = 0.0
+    shape.d_size[:] = 0.0
+    for i in range(n):
+        rounded = sqrt(shape.turn[i] * shape.turn[i] + SOFT_TURN * SOFT_TURN)
+        total += cost_map.scrub * (rounded - SOFT_TURN)
+        shape.d_turn[i] = cost_map.scrub * shape.turn[i] / rounded
+    for i in range(n):
+        if pivot[i]:
+            continue
+        at = max(i - 1, 0)
+        sharp = abs(shape.bend[i]) / cost_map.curvature - 1.0
+        if sharp > 0.0:
+            total += CURVATURE_WEIGHT * shape.way[i] * sharp * sharp
+            slope = 2.0 * CURVATURE_WEIGHT * shape.way[i] * sharp / cost_map.curvature
+            shape.d_bend[i] += slope if shape.bend[i] > 0.0 else -slope
+            shape.d_size[at] += 0.5 * CURVATURE_WEIGHT * sharp * sharp
+            shape.d_size[i] += 0.5 * CURVATURE_WEIGHT * sharp * sharp
+        if i == 0 or gear[i] != gear[at] or pivot[at]:
+            continue
+        rate = (shape.bend[i] - shape.bend[at]) / shape.size[at]
+        fast = abs(rate) / cost_map.curvature_rate - 1.0
+        if fast > 0.0:
+            total += RATE_WEIGHT * shape.size[at] * fast * fast
+            slope = 2.0 * RATE_WEIGHT * fast / cost_map.curvature_rate
+            slope = slope if rate > 0.0 else -slope
+            shape.d_bend[i] += slope
+            shape.d_bend[at] -= slope
+            shape.d_size[at] -= RATE_WEIGHT * fast * (fast + 2.0)
+    for i in range(n):
+        shape.d_turn[i] += shape.d_bend[i] / shape.way[i]
+        longer = -0.5 * shape.d_bend[i] * shape.bend[i] / shape.way[i]
+        shape.d_size[max(i - 1, 0)] += longer
+        shape.d_size[i] += longer
+    return total
+
+
+@kernel
+def add_bending(cost_map, p, gear, pivot, shape, gradient):
+    """Add the cost of turning, of too much curvature and of its changes."""
+    total = bending_cost(cost_map, gear, pivot, shape)
+    for i in range(len(shape.turn)):
+        bx, by = p[i + 1, 0] - p[i, 0], p[i + 1, 1] - p[i, 1]
+        size = shape.size[i]
+        swing = shape.d_turn[i] / (size * size)
+        stretch = shape.d_size[i] / size
+        gx, gy = stretch * bx - swing * by, stretch * by + swing * bx
+        gradient[i + 1, 0] += gx
+        gradient[i + 1, 1] += gy
+        gradient[i, 0] -= gx
+        gradient[i, 1] -= gy
+        if i > 0:
+            ax, ay = p[i, 0] - p[i - 1, 0], p[i, 1] - p[i - 1, 1]
+            swing = shape.d_turn[i] / (shape.size[i - 1] * shape.size[i - 1])
+            gradient[i, 0] += swing * ay
+            gradient[i, 1] -= swing * ax
+            gradient[i - 1, 0] -= swing * ay
+            gradient[i - 1, 1] += swing * ax
+    return total
+
+
+@kernel
+def add_evenness(p, gear, size, gradient):
+    """Add the cost of unequal neighbours, which keeps nodes from gathering."""
+    total = 0.0
+    for i in range(1, len(size)):
+        if gear[i] != gear[i - 1]:
+            continue
+        uneven = size[i] - size[i - 1]
+        total += EVENNESS_WEIGHT * uneven * uneven
+        slope = 2.0 * EVENNESS_WEIGHT * uneven
+        for j in range(2):
+            ahead = slope * (p[i + 1, j] - p[i, j]) / size[i]
+            behind = slope * (p[i, j] - p[i - 1, j]) / size[i - 1]
+            gradient[i + 1, j] += ahead
+            gradient[i, j] -= ahead + behind
+            gradient[i - 1, j] += behind
+    return total
+
+
+@kernel
+def band_cost(cost_map, stops, p, gear, pivot, ux, uy, shape, gradient):
+    """Return a path's cost [m of plain ground] and write its gradient, shape (n, 2)."""
+    gradient[:] = 0.0
+    write_turns(p, gear, ux, uy, shape)
+    total = add_terrain_and_clearance(cost_map, p, gear, gradient)
+    total += add_bending(cost_map, p, gear, pivot, shape, gradient)
+    total += add_evenness(p, gear, shape.size, gradient)
+    for i in range(len(stops.node)):
+        v = stops.node[i]
+        off, dx, dy = outside(stops, i, p[v, 0], p[v, 1])
+        if off > 0.0:
+            total += TARGET_WEIGHT * off * off
+            gradient[v, 0] += 2.0 * TARGET_WEIGHT * off * dx
+            gradient[v, 1] += 2.0 * TARGET_WEIGHT * off * dy
+    gradient[0] = 0.0
+    return total
+
+
+@kernel
+def new_shape(segments):
+    """Return an empty `Shape`."""
+    return Shape(
+        np.zeros(segments),
+        np.zeros(segments),
+        np.zeros(segments),
+        np.zeros(segments),
+        np.zeros(segments),
+        np.zeros(segments),
+        np.zeros(segments),
+    )

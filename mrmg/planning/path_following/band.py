@@ -1,0 +1,356 @@
+"""Smoothed paths of a plan's robots: from trajectories to chains of nodes.
+
+A path keeps the order of targets and the gears of the trajectory it comes from; its
+nodes slip to where driving along them takes the least energy (`_band_kernels`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import cos, sin
+
+import numpy as np
+
+from mrmg.motion._kernels import UNICYCLE
+from mrmg.planning.path_following import _relax_kernels, _tracking_kernels
+from mrmg.planning.path_following._band_kernels import CostMap, Stops
+from mrmg.planning.problem._target_kernels import Targets
+from mrmg.planning.problem.problem import Problem
+from mrmg.plans import Trajectory
+
+SPACINGS_M = (2.4, 0.8)
+"""Distance of a path's nodes, at first and in the end.
+
+Few nodes find the way sooner, and a shorter one: many stick where they lie.
+"""
+
+NODE_TURN = 1.2
+"""Largest turn between two nodes [rad]; nimble robots' nodes are nearer together ..."""
+
+LEAST_SHARE = 0.25
+"""... but no nearer than this share of others'."""
+
+UNHINDERED_M = 0.65
+"""Room that paths need from which on nodes need not be nearer to each other, either."""
+
+MERGED_M = 0.1
+"""Distance within which places that must be nodes become one."""
+
+SHORTEST_M = 0.15
+"""Way between two changes of gear below which there is none."""
+
+STAYING_M = 0.005
+"""Way of a step below which a robot stays where it is."""
+
+LEAST_PIVOT = 0.5
+"""Angle of a turn on the spot that counts as one [rad]."""
+
+DISCS_M = 0.4
+"""Distance of the discs that cover a footprint."""
+
+TRACKING_M = 0.03
+"""How much deeper than needed a path enters its targets, to begin with."""
+
+WARY_M = 4.0
+"""How far around a place a path is led farther from obstacles ..."""
+
+WARINESS_M = 0.06
+"""... and how much farther, at the place."""
+
+SPARE_M = 0.06
+"""Room beyond the margin that a path leaves for what tracking may be off: it costs next
+to nothing, and robots seldom get stuck."""
+
+CURVATURE_SHARE = 0.92
+"""Share of the steering that a path uses."""
+
+SERIES = 200
+"""Steps of L-BFGS after which nodes are spread evenly again."""
+
+MOST_SERIES = 30
+"""Series of steps at most ..."""
+
+LEAST_GAIN = 3e-4
+"""... and the share of the cost that one must gain to be followed by another."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """The way of one robot.
+
+    Attributes:
+        node: shape (n, 2) [m].
+        gear: of each segment, 1 or -1, shape (n - 1,).
+        stop: numbers of the nodes at which a target is visited, shape (S,).
+        target: those targets, shape (S,).
+        deeper: how much deeper than needed the path enters them [m], shape (S,).
+        pivot: numbers of the nodes at which the robot turns on the spot, shape (P,).
+        heading: of the robot at the start [rad].
+        pause_s: how long it stands at each stop, shape (S,).
+    """
+
+    node: np.ndarray
+    gear: np.ndarray
+    stop: np.ndarray
+    target: np.ndarray
+    deeper: np.ndarray
+    pivot: np.ndarray
+    heading: float
+    pause_s: np.ndarray
+
+    @property
+    def way(self) -> np.ndarray:
+        """Way to each node [m], shape (n,)."""
+        size = np.hypot(*np.diff(self.node, axis=0).T)
+        return np.concatenate([[0.0], np.cumsum(size)])
+
+    def points(self, at_m: np.ndarray) -> np.ndarray:
+        """Return the points at ways along the path [m], shape (n,) -> (n, 2)."""
+        own = self.way
+        return np.stack([np.interp(at_m, own, one) for one in self.node.T], axis=1)
+
+    @property
+    def edges(self) -> np.ndarray:
+        """Numbers of the nodes between which it is driven without a stop."""
+        changes = np.flatnonzero(np.diff(self.gear)) + 1
+        pauses = self.stop[self.pause_s > 0.0]
+        return np.unique(
+            [0, *changes.tolist(), *self.pivot, *pauses, len(self.node) - 1]
+        )
+
+
+def visit_steps(
+    targets: Targets, tour: Sequence[int], trajectory: Trajectory
+) -> list[int]:
+    """Return the steps at which a trajectory enters its targets as deep as planned.
+
+    The list ends before the first target that it does not.
+    """
+    state = np.ascontiguousarray(trajectory.state)
+    visits: list[int] = []
+    step = 0
+    for t in tour:
+        step = _tracking_kernels.first_inside(targets, t, state, step)
+        if step == len(state):
+            break
+        visits.append(step)
+    return visits
+
+
+def path_of(
+    tour: Sequence[int], visits: Sequence[int], trajectory: Trajectory, first: int = 0
+) -> Path:
+    """Return the way a trajectory goes from step `first` up to its last target.
+
+    Args:
+        tour: numbers of its targets.
+        visits: steps at which they are visited.
+        trajectory: of one robot.
+        first: where the path begins.
+    """
+    left = [(t, v - first) for t, v in zip(tour, visits, strict=True) if v >= first]
+    last = left[-1][1] if left else 0
+    state = trajectory.state[first : first + last + 1]
+    speed = 0.5 * (state[:-1, 3] + state[1:, 3])
+    gear = _gears(speed * trajectory.dt_s)
+    path = Path(
+        node=state[:, :2],
+        gear=gear,
+        stop=np.array([v for _, v in left], np.int64),
+        target=np.array([t for t, _ in left], np.int64),
+        deeper=np.full(len(left), TRACKING_M),
+        pivot=_pivots(state),
+        heading=float(state[0, 2]),
+        pause_s=np.zeros(len(left)),
+    )
+    return respaced(path)
+
+
+def _pivots(state: np.ndarray) -> np.ndarray:
+    """Return the steps at which turns on the spot end, shape (P,)."""
+    stays = np.hypot(*np.diff(state[:, :2], axis=0).T) < STAYING_M
+    turned = np.concatenate(
+        [[0.0], np.cumsum(np.where(stays, np.diff(state[:, 2]), 0))]
+    )
+    ends = np.flatnonzero(np.diff(np.concatenate([stays, [False]]).astype(int)) < 0) + 1
+    before = np.concatenate([[0.0], turned[ends[:-1]]]) if len(ends) else turned[:0]
+    return np.asarray(ends[np.abs(turned[ends] - before) > LEAST_PIVOT])
+
+
+def _gears(advance: np.ndarray) -> np.ndarray:
+    """Return the gear of each step; short ways to and fro belong to what is before."""
+    gear = np.where(advance < 0.0, -1, 1)
+    edges = [0, *(np.flatnonzero(np.diff(gear)) + 1).tolist(), len(gear)]
+    ways = [abs(advance[a:b].sum()) for a, b in zip(edges, edges[1:], strict=False)]
+    present = next(
+        (int(gear[a]) for a, way in zip(edges, ways, strict=False) if way > SHORTEST_M),
+        1,
+    )
+    for a, b, way in zip(edges, edges[1:], ways, strict=False):
+        present = int(gear[a]) if way > SHORTEST_M else present
+        gear[a:b] = present
+    return gear
+
+
+def respaced(path: Path, spacing_m: float = SPACINGS_M[-1]) -> Path:
+    """Return the path with evenly spaced nodes; stops and stretches' ends stay nodes.
+
+    Places that must be nodes become one where they nearly coincide.
+    """
+    way = path.way
+    keys = np.unique([*path.edges, *path.stop])
+    ways: list[np.ndarray] = []
+    gear: list[int] = []
+    number = {int(keys[0]): 0}
+    kept = int(keys[0])
+    for key in keys[1:].tolist():
+        length = way[key] - way[kept]
+        if length >= MERGED_M:
+            pieces = max(1, round(length / spacing_m))
+            ways.append(np.linspace(way[kept], way[key], pieces, endpoint=False))
+            gear += [int(path.gear[key - 1])] * pieces
+            kept = key
+        number[key] = len(gear)
+    at = np.concatenate([*ways, way[[kept]]])
+    return replace(
+        path,
+        node=np.stack([np.interp(at, way, path.node[:, j]) for j in range(2)], axis=1),
+        gear=np.array(gear, np.int64),
+        stop=np.array([number[int(v)] for v in path.stop], np.int64),
+        pivot=np.unique([number[int(v)] for v in path.pivot]).astype(np.int64),
+    )
+
+
+def smooth_path(
+    targets: Targets,
+    cost_map: CostMap,
+    path: Path,
+    spacings_m: Sequence[float] = SPACINGS_M,
+) -> tuple[Path, float]:
+    """Return a smoothed path, and its cost [m of plain ground].
+
+    Args:
+        targets: the targets.
+        cost_map: what the path is priced on.
+        path: the path to begin with.
+        spacings_m: distances of nodes, one after the other.
+    """
+    cost = 0.0
+    for spacing_m in spacings_m:
+        spacing_m *= min(nimble_share(cost_map.curvature), cost_map.room / UNHINDERED_M)
+        path, cost = _relaxed(targets, cost_map, path, spacing_m)
+    return path, cost
+
+
+def nimble_share(curvature: float) -> float:
+    """Return how much shorter lengths are for a robot that turns in little room.
+
+    Args:
+        curvature: of the sharpest turn that its paths may have [1/m].
+    """
+    return min(1.0, max(LEAST_SHARE, NODE_TURN / (SPACINGS_M[-1] * curvature)))
+
+
+def _relaxed(
+    targets: Targets, cost_map: CostMap, path: Path, spacing_m: float
+) -> tuple[Path, float]:
+    cost = np.inf
+    for _ in range(MOST_SERIES):
+        path = respaced(path, spacing_m)
+        if len(path.node) < 2:
+            return path, 0.0
+        node, before = path.node.copy(), cost
+        pivot = np.zeros(len(path.gear), np.bool_)
+        pivot[path.pivot[path.pivot < len(pivot)]] = True
+        cost = _relax_kernels.relax(
+            cost_map,
+            stops_of(targets, path),
+            node,
+            path.gear,
+            pivot,
+            cos(path.heading),
+            sin(path.heading),
+            SERIES,
+        )
+        path = replace(path, node=node)
+        if cost > (1.0 - LEAST_GAIN) * before:
+            break
+    return respaced(path, spacing_m), float(cost)
+
+
+def stops_of(targets: Targets, path: Path) -> Stops:
+    """Return a path's targets, drawn in by what tracking may be off."""
+    return Stops(
+        node=path.stop,
+        center=targets.center[path.target],
+        reach=targets.reach[path.target],
+        corner=targets.corner[path.target],
+        corners=targets.corners[path.target],
+        deeper=path.deeper,
+    )
+
+
+def cost_map_of(problem: Problem, r: int, smooth: np.ndarray) -> CostMap:
+    """Return what robot r's paths are priced on; `smooth` is `smooth_terrain`."""
+    robot = problem.mission.fleet[r]
+    spaces = problem.mission.spaces
+    model = problem.scene.robots[r].model
+    outline = robot["corner"][: robot["corners"]]
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    half = max(-low[1], high[1])
+    pieces = max(1, int(np.ceil((high[0] - low[0]) / DISCS_M)))
+    length = (high[0] - low[0]) / pieces
+    limit = robot["limit"]
+    if robot["model"] == UNICYCLE:
+        arm = float(robot["track"])
+        rate = 4.0 * limit[4] / limit[1] ** 2
+    else:
+        arm = float(robot["wheelbase"])
+        rate = limit[4] / (arm * limit[1])
+    energy = model.energy_model
+    return CostMap(
+        x_min=spaces.x_min,
+        y_min=spaces.y_min,
+        cell=spaces.cell,
+        distance=spaces.distance[robot["space"]],
+        multiplier=smooth,
+        disc=low[0] + length * (np.arange(pieces) + 0.5),
+        room=float(np.hypot(0.5 * length, half) + robot["margin"] + SPARE_M),
+        curvature=path_curvature(robot),
+        curvature_rate=float(CURVATURE_SHARE * rate),
+        scrub=arm * energy.turning_force_N / max(energy.rolling_force_N, 1e-9),
+    )
+
+
+def path_curvature(robot: np.ndarray) -> float:
+    """Return the curvature of the sharpest turn of a robot's paths [1/m].
+
+    Args:
+        robot: a record of FLEET.
+    """
+    limit, radius = robot["limit"], float(robot["turning_radius"])
+    if robot["model"] == UNICYCLE:
+        # Sharper than it can turn at full speed: it slows down there.
+        return float(CURVATURE_SHARE * 2.0 * limit[2] / limit[1])
+    return CURVATURE_SHARE / radius if radius > 0.0 else np.inf  # a user's motion
+
+
+def inflated(cost_map: CostMap, place: np.ndarray) -> CostMap:
+    """Return the surface with obstacles counted as nearer around a place."""
+    rows, columns = cost_map.distance.shape
+    x = cost_map.x_min + (np.arange(columns) + 0.5) * cost_map.cell - place[0]
+    y = cost_map.y_min + (np.arange(rows) + 0.5) * cost_map.cell - place[1]
+    near = np.maximum(0.0, 1.0 - np.hypot(x[None, :], y[:, None]) / WARY_M)
+    return cost_map._replace(distance=cost_map.distance - WARINESS_M * near)
+
+
+def smooth_terrain(multiplier: np.ndarray) -> np.ndarray:
+    """Return the terrain with its borders blurred over about a metre."""
+    weights = np.array([1.0, 4.0, 6.0, 4.0, 1.0]) / 16.0
+    for axis in (0, 1):
+        width = [(2, 2) if a == axis else (0, 0) for a in (0, 1)]
+        padded = np.pad(multiplier, width, "edge")
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 5, axis=axis)
+        multiplier = windows @ weights
+    return np.ascontiguousarray(multiplier)

@@ -1,0 +1,70 @@
+"""Where motions of robots meet."""
+
+from __future__ import annotations
+
+from math import cos, sin
+
+import numpy as np
+
+from mrmg.compilation import kernel
+from mrmg.planning.path_following.coordination._motion_kernels import (
+    first_conflict,
+    in_zone,
+)
+from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
+
+
+@kernel
+def note_motion(fleet, zones, traffic, inside, r, count):
+    """Note middles and zones of robot r's first states in the traffic.
+
+    Args:
+        fleet, zones: robots and mutual-exclusion zones.
+        traffic: of all robots; `pose` of robot r is new.
+        inside: receives which zones it is in, shape (R, G, K).
+        r: robot.
+        count: number of its states.
+    """
+    mx, my = fleet[r].middle[0], fleet[r].middle[1]
+    traffic.last[r] = count - 1
+    for k in range(inside.shape[2]):
+        i = min(k, count - 1)
+        x, y, theta = (
+            traffic.pose[r, i, 0],
+            traffic.pose[r, i, 1],
+            traffic.pose[r, i, 2],
+        )
+        if k < count:
+            c, s = cos(theta), sin(theta)
+            traffic.middle[r, k, 0] = x + c * mx - s * my
+            traffic.middle[r, k, 1] = y + s * mx + c * my
+        for zone in range(len(zones.reach)):
+            inside[r, zone, k] = in_zone(zones, zone, x, y)
+
+
+@kernel
+def conflicts_of(fleet, traffic, inside, r, conflict):
+    """Write the step of robot r's first conflict with each other one, inf for never.
+
+    Args:
+        fleet: the robots.
+        traffic: their motions; `closing` is robot r's.
+        inside: which zones they are in, shape (R, G, K).
+        r: robot.
+        conflict: receives the steps, shape (R,).
+    """
+    corner = np.empty((2, MOST_CORNERS, 2))
+    own = traffic.pose[r, : traffic.last[r] + 1]
+    for other in range(len(fleet)):
+        conflict[other] = np.inf
+        if other == r:
+            continue
+        count = max(traffic.last[r], traffic.last[other])
+        k = first_conflict(fleet[r : r + 1], traffic, other, own, count, 0, corner)
+        if k >= 0:
+            conflict[other] = k
+        for zone in range(inside.shape[1]):
+            for step in range(min(count + 1, inside.shape[2])):
+                if inside[r, zone, step] and inside[other, zone, step]:
+                    conflict[other] = min(conflict[other], step)
+                    break

@@ -1,0 +1,229 @@
+"""How a robot's task ends: whom it meets on its way home, and where it may stay."""
+
+from __future__ import annotations
+
+from math import cos, hypot, pi, sin
+
+import numpy as np
+
+from mrmg.compilation import kernel
+from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, step
+from mrmg.planning.path_following.coordination._motion_kernels import (
+    BRAKE,
+    HOME,
+    blocked_for_good,
+    clear,
+    drive_curve,
+    first_conflict,
+    write_curve,
+)
+from mrmg.planning.problem._control_kernels import wrap
+from mrmg.planning.problem._safety_kernels import braking_control, stands
+from mrmg.planning.problem._target_kernels import in_target
+from mrmg.planning.roadmap._heap_kernels import push
+
+MOST_BRAKING_STEPS = 300
+"""Steps within which every robot comes to rest."""
+
+HOME_STEPS = 4000
+"""Steps that driving home may take."""
+
+CREEPING_SHARE = 1e-3
+"""Share of its top speed with which a custom motion model turns at its finish."""
+
+LEAST_NEARNESS = 0.2
+"""Share of the cost of a conflict that it costs in any case."""
+
+
+@kernel
+def may_end(targets, task, state):
+    """Return whether a robot at rest in a state is where and as it must end."""
+    if task.finish < 0:
+        return True
+    off = abs(wrap(task.heading - state[2]))
+    return off <= task.tolerance and in_target(targets, task.finish, state[0], state[1])
+
+
+@kernel
+def brake(own, dt, state, control):
+    """Write the braking from state[0] until the robot stands; return the steps."""
+    k = 0
+    while k < MOST_BRAKING_STEPS and not stands(own, 0, state[k]):
+        u1, u2 = braking_control(own, 0, state[k], dt)
+        control[k, 0], control[k, 1] = u1, u2
+        step(own[0], state[k], u1, u2, dt, state[k + 1])
+        k += 1
+    return k
+
+
+@kernel
+def steer_home(search, state, control):
+    """Write a drive of a custom motion model to the finish; return the steps, or -1.
+
+    It is steered to the finish's middle, then slowly at a point that lies in the
+    direction of the final heading.
+    """
+    own, targets, task, dt = search.own, search.targets, search.task, search.dt
+    center = targets.center[task.finish]
+    near = 0.5 * targets.reach[task.finish]
+    arrived = False
+    for k in range(min(HOME_STEPS, len(control) - MOST_BRAKING_STEPS)):
+        here = state[k]
+        gap = hypot(center[0] - here[0], center[1] - here[1])
+        arrived = gap < (2.0 * near if arrived else near)
+        if arrived and may_end(targets, task, here):
+            return k + brake(own, dt, state[k:], control[k:])
+        share, wx, wy = 1.0, center[0], center[1]
+        if arrived:
+            share = CREEPING_SHARE
+            wx, wy = here[0] + cos(task.heading), here[1] + sin(task.heading)
+        u1, u2 = steer_user(own[0], here, wx, wy, share, dt)
+        control[k, 0], control[k, 1] = u1, u2
+        step(own[0], here, u1, u2, dt, state[k + 1])
+    return -1
+
+
+@kernel
+def drive_home(search, course, state, control):
+    """Write a drive to the finish without regard to others; return the steps, or -1.
+
+    A car drives along the shortest curve, a robot that turns on the spot straight.
+    """
+    own, task = search.own, search.task
+    if own[0].model == USER:
+        return steer_home(search, state, control)
+    x = search.targets.center[task.finish, 0]
+    y = search.targets.center[task.finish, 1]
+    heading, free = task.heading, task.tolerance >= pi
+    if free and own[0].model == CAR:
+        heading = np.arctan2(y - state[0, 1], x - state[0, 0])
+        if abs(wrap(heading - state[0, 2])) > 0.5 * pi:
+            heading = wrap(heading + pi)
+    if not write_curve(own, state[0], x, y, heading, course) < np.inf:
+        return -1
+    course.heading[0] = task.heading
+    course.tolerance[0] = np.inf if free or own[0].model == CAR else task.tolerance
+    return drive_curve(own, course, search.dt, state, control)
+
+
+@kernel
+def list_all(search, room):
+    """Write which robots are minded at all; return their number."""
+    count = 0
+    for other in range(len(search.traffic.last)):
+        if search.traffic.hard[other] or search.traffic.soft[other]:
+            room.near[count] = other
+            count += 1
+    return count
+
+
+@kernel
+def list_near(search, room, first):
+    """Write which robots may be met within the next motion; return their number."""
+    own, traffic, state = search.own, search.traffic, room.state[0]
+    count = 0
+    for other in range(len(traffic.last)):
+        if not (traffic.hard[other] or traffic.soft[other]):
+            continue
+        j = min(first, traffic.last[other])
+        apart = hypot(
+            state[0] - traffic.middle[other, j, 0],
+            state[1] - traffic.middle[other, j, 1],
+        )
+        reach = 2.0 * own[0].radius + traffic.fleet[other].radius
+        reach += max(own[0].spacing, traffic.fleet[other].spacing)
+        if apart < reach + (search.task.steps + 1) * traffic.closing[other]:
+            room.near[count] = other
+            count += 1
+    return count
+
+
+@kernel
+def conflict_cost(search, room, nears, first, steps):
+    """Return the cost of conflicts with others in some steps [s]; inf if forbidden.
+
+    The nearer the robots' middles come to each other, the more it costs, so that robots
+    make room even where they cannot make enough.
+    """
+    traffic = search.traffic
+    cost = 0.0
+    for i in range(nears):
+        other = room.near[i]
+        conflict = first_conflict(
+            search.own, traffic, other, room.state, steps, first, room.corner
+        )
+        if conflict < 0:
+            continue
+        if traffic.hard[other]:
+            return np.inf
+        reach = search.own[0].radius + traffic.fleet[other].radius
+        apart = reach
+        for k in range(conflict, min(steps, conflict + search.task.steps) + 1):
+            j = min(first + k, traffic.last[other])
+            dx = room.state[k, 0] - traffic.middle[other, j, 0]
+            dy = room.state[k, 1] - traffic.middle[other, j, 1]
+            apart = min(apart, hypot(dx, dy))
+        cost += search.task.soft_s * max(LEAST_NEARNESS, 1.0 - apart / reach)
+    return cost
+
+
+@kernel
+def passing_cost(search, room, count, first):
+    """Return what passing through states 1 to `count` costs [s]; inf if it must not be.
+
+    That is the cost of conflicts, beside the time it takes.
+    """
+    if not clear(
+        search.own, search.spaces, search.zones, search.traffic, room.state, count,
+        first, room.corner,
+    ):  # fmt: skip
+        return np.inf
+    return conflict_cost(search, room, list_all(search, room), first, count)
+
+
+@kernel
+def add_end(search, nodes, room, a, motion, count):
+    """Open an end of the task: through states 1 to `count` after node a, and to stay.
+
+    Returns whether it may be.
+    """
+    first = nodes.step[a]
+    last = room.state[count]
+    if count < 0 or not may_end(search.targets, search.task, last):
+        return False
+    conflict_s = passing_cost(search, room, count, first)
+    if not conflict_s < np.inf or blocked_for_good(
+        search.own, search.traffic, last, first + count, room.corner
+    ):
+        return False
+    b = nodes.size[0]
+    nodes.size[0] = b + 1
+    nodes.parent[b], nodes.motion[b], nodes.step[b] = a, motion, first + count
+    nodes.cost[b] = nodes.cost[a] + count * search.dt + conflict_s
+    nodes.size[1] = push(nodes.key, nodes.entry, nodes.size[1], nodes.cost[b], 2 * b)
+    if nodes.size[2] < 0 or nodes.cost[b] < nodes.cost[nodes.size[2]]:
+        nodes.size[2] = b
+    return True
+
+
+@kernel
+def home_is_tried(search, state, tries):
+    """Return whether to drive home from a state: the farther away, the more rarely."""
+    finish = search.task.finish
+    if finish < 0:
+        return False
+    center = search.targets.center[finish]
+    far = hypot(state[0] - center[0], state[1] - center[1])
+    return tries % (1 + int(0.2 * far / max(search.own[0].radius, 0.1))) == 0
+
+
+@kernel
+def end_from(search, nodes, room, a, tries):
+    """Open the ends of the task that node a leads to: to brake, or to drive home."""
+    copy_numbers(nodes.state[a], room.state[0])
+    count = brake(search.own, search.dt, room.state, room.control)
+    if not add_end(search, nodes, room, a, BRAKE, count) and home_is_tried(
+        search, room.state[0], tries
+    ):
+        count = drive_home(search, room.curve, room.state, room.control)
+        add_end(search, nodes, room, a, HOME, count)

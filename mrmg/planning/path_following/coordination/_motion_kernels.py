@@ -1,0 +1,337 @@
+"""Motions that a search over states of one robot is made of, and what they meet.
+
+Every motion is a closed-loop control law held for some steps of the robot's own motion
+model, so that what is found can be driven exactly.
+"""
+
+from __future__ import annotations
+
+from math import atan, cos, hypot, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.compilation import by_reference, kernel
+from mrmg.motion._kernels import CAR, UNICYCLE, USER, copy_numbers, steer_user, step
+from mrmg.planning.path_following._tracking_kernels import (
+    ARRIVED_M,
+    follow,
+    turned,
+    turning_rate,
+)
+from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
+    MOST_PIECES,
+    reeds_shepp,
+)
+from mrmg.planning.problem._control_kernels import control_towards, wrap
+from mrmg.planning.problem._safety_kernels import braking_control, stands
+from mrmg.planning.roadmap._fleet_kernels import space_of
+from mrmg.world._kernels import (
+    clearance_at_least,
+    convex_convex_distance,
+    footprint_is_clear,
+    place_footprint,
+    point_in_convex,
+)
+
+BRAKE, HOME, STAY, TRACK, HOLD, MOVE = range(-3, 3)
+"""Brake, or drive home, and be through; stand in a target; follow the path; brake, and
+stand; hold a speed and a steering, numbered from MOVE on."""
+
+SETTLING_SHARE = 0.45
+"""Share of a turn's radius that a car may drive while it steers into the turn."""
+
+SPACING_M = 0.3
+"""Distance of the nodes of a curve that is driven along."""
+
+REACH_STEPS = 80
+"""Steps that driving along a curve may take beyond its length at full speed."""
+
+
+@by_reference
+class Traffic(NamedTuple):
+    """The other robots' motions; after its last state a robot stays.
+
+    Attributes:
+        fleet: all robots, shape (R,).
+        pose: states at each step, of which (x, y, theta) count, shape (R, K, 5).
+        middle: middles of the footprints, shape (R, K, 2).
+        last: number of each robot's last state, shape (R,).
+        closing: by how much a robot and the one that plans come nearer to each other in
+            one step at most [m], shape (R,).
+        hard: robots with which no conflict may be, shape (R,).
+        soft: robots with which conflicts cost, shape (R,).
+        busy: whether such a robot is in a mutual-exclusion zone, shape (G, K).
+        end: step from which on all of them stand.
+    """
+
+    fleet: np.ndarray
+    pose: np.ndarray
+    middle: np.ndarray
+    last: np.ndarray
+    closing: np.ndarray
+    hard: np.ndarray
+    soft: np.ndarray
+    busy: np.ndarray
+    end: int
+
+
+@kernel
+def middle_of(robot, x, y, theta, out):
+    """Write the middle of a robot's footprint at a pose."""
+    c, s = cos(theta), sin(theta)
+    out[0] = x + c * robot.middle[0] - s * robot.middle[1]
+    out[1] = y + s * robot.middle[0] + c * robot.middle[1]
+
+
+@kernel
+def first_conflict(own, traffic, other, state, count, first, corner):
+    """Return the first of some states in which two robots are too near, or -1.
+
+    Args:
+        own: the robot that moves, shape (1,).
+        traffic: the other robots.
+        other: one of them.
+        state: states 1 to `count` are looked at; the last one lasts, shape (n, 5).
+        count: number of the last one.
+        first: step of state 0.
+        corner: room for two footprints, shape (2, M, 2).
+    """
+    n, m = own[0].corners, traffic.fleet[other].corners
+    margin = max(own[0].spacing, traffic.fleet[other].spacing)
+    reach = own[0].radius + traffic.fleet[other].radius + margin
+    mx, my = own[0].middle[0], own[0].middle[1]
+    k = 1
+    while k <= count:
+        i, j = min(k, len(state) - 1), min(first + k, traffic.last[other])
+        x, y, theta = state[i, 0], state[i, 1], state[i, 2]
+        c, s = cos(theta), sin(theta)
+        apart = hypot(
+            x + c * mx - s * my - traffic.middle[other, j, 0],
+            y + s * mx + c * my - traffic.middle[other, j, 1],
+        )
+        if apart >= reach:  # until they may have come near to each other
+            k += max(1, int((apart - reach) / traffic.closing[other]))
+            continue
+        place_footprint(own[0].corner[:n], x, y, theta, corner[0, :n])
+        pose = traffic.pose[other, j]
+        place_footprint(
+            traffic.fleet[other].corner[:m], pose[0], pose[1], pose[2], corner[1, :m]
+        )
+        if convex_convex_distance(corner[0, :n], corner[1, :m]) < margin:
+            return k
+        k += 1
+    return -1
+
+
+@kernel
+def blocked_for_good(own, traffic, state, first, corner):
+    """Return whether a robot that stands from step `first` on is ever run into."""
+    still = np.empty((2, 5))
+    copy_numbers(state, still[0])
+    copy_numbers(state, still[1])
+    for other in range(len(traffic.last)):
+        if not traffic.hard[other]:
+            continue
+        k = first
+        while k <= max(first, traffic.last[other]):
+            if first_conflict(own, traffic, other, still, 1, k - 1, corner) >= 0:
+                return True
+            j = min(k, traffic.last[other])
+            apart = hypot(
+                state[0] - traffic.middle[other, j, 0],
+                state[1] - traffic.middle[other, j, 1],
+            )
+            reach = traffic.fleet[other].radius + own[0].radius + own[0].spacing
+            reach += traffic.fleet[other].spacing + own[0].radius
+            k += max(1, int((apart - reach) / traffic.closing[other]))
+    return False
+
+
+@kernel
+def in_zone(zones, zone, x, y):
+    """Return whether a point lies in a mutual-exclusion zone."""
+    n = zones.corners[zone]
+    if hypot(x - zones.center[zone, 0], y - zones.center[zone, 1]) > zones.reach[zone]:
+        return False
+    return n == 0 or point_in_convex(x, y, zones.corner[zone, :n])
+
+
+@kernel
+def clear(own, spaces, zones, traffic, state, count, first, corner):
+    """Return whether states 1 to `count` keep clear of obstacles and occupied zones.
+
+    Args:
+        own: the robot, shape (1,).
+        spaces, zones: its surroundings.
+        traffic: gives when zones are occupied.
+        state: shape (n, 5).
+        count: number of the last one that is looked at.
+        first: step of state 0.
+        corner: room for a footprint, shape (2, M, 2).
+    """
+    space = space_of(spaces, own[0].space)
+    n, radius, margin = own[0].corners, own[0].radius, own[0].margin
+    mx, my = own[0].middle[0], own[0].middle[1]
+    for k in range(1, count + 1):
+        x, y, theta = state[k, 0], state[k, 1], state[k, 2]
+        c, s = cos(theta), sin(theta)
+        cx, cy = x + c * mx - s * my, y + s * mx + c * my
+        if clearance_at_least(space, cx, cy) <= radius + margin:
+            place_footprint(own[0].corner[:n], x, y, theta, corner[0, :n])
+            if not footprint_is_clear(space, corner[0, :n], cx, cy, radius, margin):
+                return False
+        for zone in range(len(zones.reach)):
+            j = min(first + k, traffic.busy.shape[1] - 1)
+            if traffic.busy[zone, j] and in_zone(zones, zone, x, y):
+                return False
+    return True
+
+
+@kernel
+def track_control(own, courses, segment, state, dt):
+    """Return (u1, u2, segment) of a robot that follows its path.
+
+    The segment is the number of nodes once it stands at the path's end.
+    """
+    nodes = courses.nodes[0]
+    if segment >= nodes or nodes < 2:
+        if turned(courses, 0, state):
+            u1, u2 = braking_control(own, 0, state, dt)
+            return u1, u2, segment
+        rate = turning_rate(own, 0, wrap(courses.heading[0] - state[2]))
+        u1, u2 = control_towards(own, 0, state, 0.0, rate, dt)
+        return u1, u2, segment
+    i, _, left, _, v, w = follow(own, courses, 0, segment, state)
+    if left < ARRIVED_M:
+        v = 0.0
+        if own[0].model == UNICYCLE:
+            w = 0.0
+        if stands(own, 0, state):
+            last = courses.end[0, i]
+            i = nodes if last + 1 >= nodes else last
+    u1, u2 = control_towards(own, 0, state, v, w, dt)
+    return u1, u2, i
+
+
+@kernel
+def move(search, motion, segment, steps, state, control):
+    """Write the states and controls of a motion from state[0]; return the segment.
+
+    Args:
+        search: gives robot, path, motions and step.
+        motion: TRACK, HOLD, or from MOVE on a wanted speed and steering; of a custom
+            motion model a waypoint in the robot's frame.
+        segment: of its path that it is on.
+        steps: number of steps.
+        state: shape (n, 5), n > steps.
+        control: shape (n, 2).
+    """
+    own, dt = search.own, search.dt
+    v = w = x = y = 0.0
+    if motion >= MOVE:
+        v, w = (
+            search.task.motion[motion - MOVE, 0],
+            search.task.motion[motion - MOVE, 1],
+        )
+        c, s = cos(state[0, 2]), sin(state[0, 2])
+        x, y = state[0, 0] + c * v - s * w, state[0, 1] + s * v + c * w
+    for k in range(steps):
+        if motion == TRACK:
+            u1, u2, segment = track_control(own, search.courses, segment, state[k], dt)
+        elif motion == HOLD:
+            u1, u2 = braking_control(own, 0, state[k], dt)
+        elif own[0].model == USER:
+            u1, u2 = steer_user(own[0], state[k], x, y, 1.0, dt)
+        else:
+            u1, u2 = control_towards(own, 0, state[k], v, w, dt)
+        control[k, 0], control[k, 1] = u1, u2
+        step(own[0], state[k], u1, u2, dt, state[k + 1])
+    return segment
+
+
+@kernel
+def drivable_radius(robot):
+    """Return the radius of turns that a car hardly leaves as it steers [m]."""
+    radius = 1.08 * robot.turning_radius
+    for _ in range(20):
+        steering_s = atan(robot.wheelbase / radius) / robot.limit[4]
+        if robot.limit[1] * steering_s <= SETTLING_SHARE * radius:
+            break
+        radius *= 1.1
+    return radius
+
+
+@kernel
+def write_curve(own, state, x, y, theta, course):
+    """Write a path to a pose: a line for robots that turn on the spot, else a curve.
+
+    Args:
+        own: the robot, shape (1,).
+        state: where it begins.
+        x, y, theta: where it ends.
+        course: receives the path.
+
+    Returns:
+        Its length [m]; inf if there is none, or no room for it.
+    """
+    dx, dy = x - state[0], y - state[1]
+    turn, length = np.zeros(MOST_PIECES), np.zeros(MOST_PIECES)
+    radius = 1.0
+    if own[0].model == CAR:
+        radius = drivable_radius(own[0])
+        total = reeds_shepp(dx, dy, state[2], theta, radius, turn, length)
+        heading = state[2]
+    else:
+        total = length[0] = hypot(dx, dy)
+        heading = np.arctan2(dy, dx)
+    if not total < SPACING_M * (course.node.shape[1] - 2 * MOST_PIECES):
+        return np.inf
+    px, py = state[0], state[1]
+    course.node[0, 0, 0], course.node[0, 0, 1] = px, py
+    n = stretch = 0
+    for p in range(MOST_PIECES):
+        if abs(length[p]) < 1e-6:
+            continue
+        gear = 1 if length[p] > 0.0 else -1
+        bend = gear * turn[p] / radius
+        if n > 0 and course.gear[0, n - 1] != gear:
+            course.end[0, stretch:n] = n
+            stretch = n
+            course.bend[0, n] = bend
+        if n == 0:
+            course.bend[0, 0] = bend
+        pieces = int(abs(length[p]) / SPACING_M) + 1
+        way = length[p] / pieces
+        for _ in range(pieces):
+            # The chord of the arc.
+            swing = 0.5 * way * turn[p] / radius
+            chord = way * (sin(swing) / swing if abs(swing) > 1e-9 else 1.0)
+            px += chord * cos(heading + swing)
+            py += chord * sin(heading + swing)
+            heading += 2.0 * swing
+            course.gear[0, n] = gear
+            n += 1
+            course.node[0, n, 0], course.node[0, n, 1] = px, py
+            course.way[0, n] = course.way[0, n - 1] + abs(chord)
+            course.bend[0, n] = bend
+    course.end[0, stretch : n + 1] = n
+    course.nodes[0] = n + 1 if n > 0 else 0
+    return total
+
+
+@kernel
+def drive_curve(own, course, dt, state, control):
+    """Drive along a path until the robot rests at its end; return the steps, or -1."""
+    way = course.way[0, max(course.nodes[0] - 1, 0)]
+    most = int(way / (own[0].limit[1] * dt)) + REACH_STEPS
+    most = min(most, len(control) - 1)
+    segment = 0 if course.nodes[0] > 1 else course.nodes[0]
+    for k in range(most):
+        done = segment >= course.nodes[0] and turned(course, 0, state[k])
+        if done and stands(own, 0, state[k]):
+            return k
+        u1, u2, segment = track_control(own, course, segment, state[k], dt)
+        control[k, 0], control[k, 1] = u1, u2
+        step(own[0], state[k], u1, u2, dt, state[k + 1])
+    return -1

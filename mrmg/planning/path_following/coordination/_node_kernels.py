@@ -1,0 +1,246 @@
+"""Nodes of the search for one robot's motion: what they hold and count as."""
+
+from __future__ import annotations
+
+from math import ceil, floor, hypot, pi
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.compilation import by_reference, kernel
+from mrmg.motion._kernels import CAR, copy_numbers
+from mrmg.planning.path_following._tracking_kernels import Courses, advance
+from mrmg.planning.path_following.coordination._field_kernels import field_at
+from mrmg.planning.path_following.coordination._motion_kernels import (
+    Traffic,
+)
+from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
+    MOST_PIECES,
+    reeds_shepp,
+)
+from mrmg.planning.problem._control_kernels import wrap
+from mrmg.planning.problem._safety_kernels import Zones
+from mrmg.planning.problem._target_kernels import Targets
+from mrmg.planning.roadmap._fleet_kernels import Spaces
+from mrmg.planning.roadmap._heap_kernels import push
+from mrmg.world._kernels import TerrainGrid
+
+OFF_PATH = -1
+"""Segment of a robot that is not on its path."""
+
+SIDEWAYS = 2.0
+"""Metres of way that a metre off the path counts as."""
+
+
+@by_reference
+class Task(NamedTuple):
+    """What one robot is to do, and how it is searched for.
+
+    Attributes:
+        leg: targets to visit, in order, shape (L,).
+        stay: steps to stand in each of them, shape (L,).
+        along: way along the path to each of them [m]; inf where it leads to none, (L,).
+        rest_s: time from each of them to the end by the fields, shape (L + 1,); the
+            last entry is that from the end of the path.
+        finish: target to end in, or -1.
+        home_along: whether the path leads to the finish.
+        heading, tolerance: to end with [rad]; a tolerance of at least pi for any.
+        field: cost-to-go to each leg's target and to the finish [s], (L + 1, ny, nx).
+        field_cell: side of their cells [m].
+        motion: (v, w) of each MOVE, shape (P, 2).
+        steps: that a motion lasts.
+        resolution: sides of cells: position [m], heading [rad], speed [m/s], steering.
+        weight: of the cost-to-go: a plan takes at most so many times the least cost.
+        hold_share: cost of a second of standing, of moving it is 1.
+        soft_s: cost of a conflict with a robot of lower priority [s].
+        most: nodes at most.
+    """
+
+    leg: np.ndarray
+    stay: np.ndarray
+    along: np.ndarray
+    rest_s: np.ndarray
+    finish: int
+    home_along: bool
+    heading: float
+    tolerance: float
+    field: np.ndarray
+    field_cell: float
+    motion: np.ndarray
+    steps: int
+    resolution: np.ndarray
+    weight: float
+    hold_share: float
+    soft_s: float
+    most: int
+
+
+@by_reference
+class Setting(NamedTuple):
+    """One robot's search.
+
+    Attributes:
+        own: the robot, shape (1,).
+        spaces, terrain, targets, zones: its surroundings.
+        courses: its path, which may be empty.
+        traffic: how the others move.
+        task: what it is to do.
+        dt: step [s].
+    """
+
+    own: np.ndarray
+    spaces: Spaces
+    terrain: TerrainGrid
+    targets: Targets
+    zones: Zones
+    courses: Courses
+    traffic: Traffic
+    task: Task
+    dt: float
+
+
+@by_reference
+class Nodes(NamedTuple):
+    """Nodes of a search, and what led to each.
+
+    Attributes:
+        state: shape (N, 5).
+        parent: shape (N,).
+        step: that a node is at, shape (N,).
+        leg: that the robot is on, shape (N,).
+        segment: of its path that it is on, or OFF_PATH; the number of nodes at its end.
+        left: last segment that it was on, shape (N,).
+        cost: what it took [s], shape (N,).
+        motion: that led to it, shape (N,).
+        key, entry: heap of open nodes; entries are 2 a, and 2 a + 1 for a node of which
+            only the way along the path has been looked at.
+        table: cells that have been reached.
+        size: number of nodes, of open ones, and the cheapest end or -1, shape (3,).
+    """
+
+    state: np.ndarray
+    parent: np.ndarray
+    step: np.ndarray
+    leg: np.ndarray
+    segment: np.ndarray
+    left: np.ndarray
+    cost: np.ndarray
+    motion: np.ndarray
+    key: np.ndarray
+    entry: np.ndarray
+    table: np.ndarray
+    size: np.ndarray
+
+
+@by_reference
+class Scratch(NamedTuple):
+    """Room for one motion: states, controls, two footprints, near robots, a curve."""
+
+    state: np.ndarray
+    control: np.ndarray
+    corner: np.ndarray
+    near: np.ndarray
+    curve: Courses
+
+
+@kernel
+def cell_of(task, state, leg, step):
+    """Return the number of the cell that a state lies in; `step` 0 leaves out time."""
+    key = np.int64(floor(state[0] / task.resolution[0])) & 0x3FFF
+    key = key << 14 | np.int64(floor(state[1] / task.resolution[0])) & 0x3FFF
+    turns = int(ceil(2.0 * pi / task.resolution[1]))
+    key = key << 6 | np.int64(round(wrap(state[2]) / (2.0 * pi) * turns)) % turns & 0x3F
+    key = key << 4 | np.int64(round(state[3] / task.resolution[2])) & 0xF
+    key = key << 4 | np.int64(round(state[4] / task.resolution[3])) & 0xF
+    key = key << 8 | leg & 0xFF
+    return key << 13 | step // task.steps & 0x1FFF
+
+
+@kernel
+def is_new(table, key):
+    """Enter a key into a table of 2^n places; return whether it was not in it."""
+    mask = len(table) - 1
+    at = (key ^ (key >> 29)) * 0x9E3779B1
+    at = (at ^ (at >> 17)) & mask
+    while table[at] != -1:
+        if table[at] == key:
+            return False
+        at = (at + 1) & mask
+    table[at] = key
+    return True
+
+
+@kernel
+def cost_to_go_s(search, leg, segment, left, state):
+    """Return an estimate of the time from a state to the end of the task [s].
+
+    Args:
+        search: the search.
+        leg: that the robot is on.
+        segment, left: of its path that it is on, and was on last.
+        state: its state.
+    """
+    own, courses, task = search.own, search.courses, search.task
+    top = own[0].limit[1]
+    legs, nodes = len(task.leg), courses.nodes[0]
+    on_path = task.home_along if leg == legs else task.along[leg] < np.inf
+    if on_path and segment < nodes:
+        i, s = advance(courses, 0, left, state[0], state[1])
+        size = courses.way[0, i + 1] - courses.way[0, i]
+        t = min(1.0, max(0.0, (s - courses.way[0, i]) / max(size, 1e-9)))
+        px = (1.0 - t) * courses.node[0, i, 0] + t * courses.node[0, i + 1, 0]
+        py = (1.0 - t) * courses.node[0, i, 1] + t * courses.node[0, i + 1, 1]
+        s = courses.way[0, i] + t * size
+        way = courses.way[0, nodes - 1] - s
+        way += SIDEWAYS * hypot(state[0] - px, state[1] - py)
+        if leg < legs:
+            way += 2.0 * max(0.0, s - task.along[leg])
+        return way / top + task.rest_s[legs]
+    if leg == legs and task.finish < 0:
+        return 0.0
+    target = task.leg[leg] if leg < legs else task.finish
+    x_min, y_min = search.spaces.x_min, search.spaces.y_min
+    x, y = state[0], state[1]
+    time_s = field_at(task.field, leg, x_min, y_min, task.field_cell, x, y)
+    if leg < legs:
+        return time_s + task.rest_s[leg]
+    if task.tolerance < pi and own[0].model == CAR:
+        turn, length = np.empty(MOST_PIECES), np.empty(MOST_PIECES)
+        dx = search.targets.center[target, 0] - x
+        dy = search.targets.center[target, 1] - y
+        radius = 1.05 * own[0].turning_radius
+        curve = reeds_shepp(dx, dy, state[2], task.heading, radius, turn, length)
+        if curve < np.inf:
+            reach = search.targets.reach[target]
+            time_s = max(time_s, max(0.0, curve - reach) / top)
+    elif task.tolerance < pi:
+        off = abs(wrap(task.heading - state[2])) - task.tolerance
+        time_s += max(0.0, off) / own[0].limit[2]
+    return time_s
+
+
+@kernel
+def add(search, nodes, a, motion, state, place, cost):
+    """Add a node and open it, if its cost-to-go is finite.
+
+    Args:
+        search: the search.
+        nodes: receive it.
+        a: the node before it.
+        motion: that leads to it.
+        state: the robot's.
+        place: (step, leg, segment, last segment).
+        cost: what it took [s].
+    """
+    step_number, leg, segment, left = place
+    b = nodes.size[0]
+    rest_s = cost_to_go_s(search, leg, segment, left, state)
+    if not rest_s < np.inf:
+        return
+    nodes.size[0] = b + 1
+    copy_numbers(state, nodes.state[b])
+    nodes.parent[b], nodes.motion[b], nodes.step[b] = a, motion, step_number
+    nodes.leg[b], nodes.segment[b], nodes.left[b] = leg, segment, left
+    nodes.cost[b] = cost
+    value = cost + search.task.weight * rest_s
+    nodes.size[1] = push(nodes.key, nodes.entry, nodes.size[1], value, 2 * b)

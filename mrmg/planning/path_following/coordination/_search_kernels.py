@@ -1,0 +1,213 @@
+"""Search over one robot's states in space and time, among robots that move as given.
+
+A weighted A* over the robot's own motions (`_motion_kernels`): follow the path, hold,
+and hold each of some speeds and steerings. States that share a cell of position,
+heading, speed, steering, target and time count as one, as in hybrid A*: D. Dolgov et
+al., Practical search techniques in path planning for autonomous driving, 2008. From
+time to time it tries to drive home along the shortest curve.
+"""
+
+from __future__ import annotations
+
+from math import atan2, hypot, pi
+
+import numpy as np
+
+from mrmg.compilation import kernel
+from mrmg.motion._kernels import copy_numbers
+from mrmg.planning.path_following._tracking_kernels import advance
+from mrmg.planning.path_following.coordination._end_kernels import (
+    MOST_BRAKING_STEPS,
+    brake,
+    conflict_cost,
+    drive_home,
+    end_from,
+    list_near,
+    passing_cost,
+)
+from mrmg.planning.path_following.coordination._motion_kernels import (
+    BRAKE,
+    HOLD,
+    HOME,
+    MOVE,
+    STAY,
+    TRACK,
+    clear,
+    move,
+)
+from mrmg.planning.path_following.coordination._node_kernels import (
+    OFF_PATH,
+    add,
+    cell_of,
+    is_new,
+)
+from mrmg.planning.problem._control_kernels import wrap
+from mrmg.planning.problem._target_kernels import in_target
+from mrmg.planning.roadmap._heap_kernels import pop, push
+from mrmg.world._kernels import multiplier_in
+
+REJOIN_M, REJOIN_ANGLE = 0.4, 0.4
+"""Distance [m] and deviation [rad] within which a robot takes to its path again."""
+
+WIDENING_SHARE = 0.25
+"""How much later than the motion along the path the others are looked at, as a share
+of a motion's time."""
+
+
+@kernel
+def legs_done(targets, task, leg, state, first, last):
+    """Return the leg that a robot is on after some states; a stay ends none."""
+    for k in range(first, last + 1):
+        while (
+            leg < len(task.leg)
+            and task.stay[leg] == 0
+            and in_target(targets, task.leg[leg], state[k, 0], state[k, 1])
+        ):
+            leg += 1
+    return leg
+
+
+@kernel
+def rejoined(courses, left, state):
+    """Return (segment or OFF_PATH, least segment it may rejoin) of a state."""
+    i, s = advance(courses, 0, left, state[0], state[1])
+    for _ in range(2):
+        dx = courses.node[0, i + 1, 0] - courses.node[0, i, 0]
+        dy = courses.node[0, i + 1, 1] - courses.node[0, i, 1]
+        size = max(hypot(dx, dy), 1e-9)
+        ex, ey = state[0] - courses.node[0, i, 0], state[1] - courses.node[0, i, 1]
+        along, off = (ex * dx + ey * dy) / size, (dx * ey - dy * ex) / size
+        ahead = atan2(dy, dx) + (0.0 if courses.gear[0, i] > 0 else pi)
+        near = abs(off) < REJOIN_M and -REJOIN_M < along < size + REJOIN_M
+        if near and abs(wrap(state[2] - ahead)) < REJOIN_ANGLE:
+            return i, i
+        last = courses.end[0, i]
+        if last + 1 >= courses.nodes[0] or s < courses.way[0, last] - REJOIN_M:
+            break
+        i = last  # from the next stretch on
+    return OFF_PATH, left
+
+
+@kernel
+def expand(search, nodes, room, a, motion, nears):
+    """Add what a motion leads to from node a, if it is free and new."""
+    task, courses, state = search.task, search.courses, room.state
+    own, dt, steps = search.own, search.dt, task.steps
+    segment, left, first = nodes.segment[a], nodes.left[a], nodes.step[a]
+    segment = move(search, motion, segment, steps, state, room.control)
+    if not clear(
+        own, search.spaces, search.zones, search.traffic, state, steps, first,
+        room.corner,
+    ):  # fmt: skip
+        return
+    conflict_s = conflict_cost(search, room, nears, first, steps)
+    if not conflict_s < np.inf:
+        return
+    leg = legs_done(search.targets, task, nodes.leg[a], state, 1, steps)
+    after = state[steps]
+    if motion == TRACK:
+        left = min(segment, courses.nodes[0] - 2)
+    elif motion >= MOVE and courses.nodes[0] > 1:
+        segment, left = rejoined(courses, left, after)
+    stamp = first + steps if first < search.traffic.end else 0
+    if not is_new(nodes.table, cell_of(task, after, leg, stamp)) and motion != TRACK:
+        return
+    share = task.hold_share
+    if motion != HOLD:
+        share = multiplier_in(search.terrain, after[0], after[1])
+    cost = nodes.cost[a] + share * steps * dt + conflict_s
+    place = (first + steps, leg, segment, left)
+    add(search, nodes, a, motion, after, place, cost)
+
+
+@kernel
+def stay(search, nodes, room, a):
+    """Add a stay in the leg's target, if braking from node a ends in it."""
+    task, targets, leg = search.task, search.targets, nodes.leg[a]
+    tail = brake(search.own, search.dt, room.state, room.control)
+    x, y = room.state[tail, 0], room.state[tail, 1]
+    if not in_target(targets, task.leg[leg], x, y):
+        return
+    last = tail + task.stay[leg]
+    first = nodes.step[a]
+    if first + last + MOST_BRAKING_STEPS >= len(room.control):
+        return
+    for k in range(tail, last):
+        copy_numbers(room.state[k], room.state[k + 1])
+    conflict_s = passing_cost(search, room, last, first)
+    if conflict_s < np.inf:
+        cost = nodes.cost[a] + task.hold_share * last * search.dt + conflict_s
+        place = (first + last, leg + 1, nodes.segment[a], nodes.left[a])
+        add(search, nodes, a, STAY, room.state[last], place, cost)
+
+
+@kernel
+def write_controls(search, nodes, room, a, control):
+    """Write the controls that lead to end a; return their number."""
+    branch = np.empty(nodes.size[0], np.int64)
+    n, b = 0, nodes.parent[a]
+    while b > 0:
+        branch[n] = b
+        n += 1
+        b = nodes.parent[b]
+    for i in range(n - 1, -1, -1):
+        b = branch[i]
+        p, motion = nodes.parent[b], nodes.motion[b]
+        first, steps = nodes.step[p], nodes.step[b] - nodes.step[p]
+        copy_numbers(nodes.state[p], room.state[0])
+        held = HOLD if motion == STAY else motion
+        segment = nodes.segment[p]
+        move(search, held, segment, steps, room.state, control[first:])
+    p = nodes.parent[a]
+    copy_numbers(nodes.state[p], room.state[0])
+    if nodes.motion[a] == BRAKE:
+        brake(search.own, search.dt, room.state, control[nodes.step[p] :])
+    else:
+        drive_home(search, room.curve, room.state, control[nodes.step[p] :])
+    return nodes.step[a]
+
+
+@kernel
+def find_motion(search, nodes, room, start, control):
+    """Find controls for one robot's task; return (their number or -1, nodes).
+
+    Args:
+        search: the robot, its surroundings, its task and the others.
+        nodes: empty room for nodes.
+        room: for motions as long as `control`.
+        start: its state, shape (5,).
+        control: receives the controls, shape (n, 2).
+    """
+    task, legs = search.task, len(search.task.leg)
+    copy_numbers(start, room.state[0])
+    leg = legs_done(search.targets, task, 0, room.state, 0, 0)
+    begin = 0 if search.courses.nodes[0] > 1 else OFF_PATH
+    add(search, nodes, -1, HOLD, start, (0, leg, begin, 0), 0.0)
+    motions, tries, most = len(task.motion), 0, task.most
+    while nodes.size[1] > 0 and nodes.size[0] + motions + 4 < task.most:
+        value, number = nodes.key[0], nodes.entry[0]
+        nodes.size[1] = pop(nodes.key, nodes.entry, nodes.size[1])
+        a, widened = number >> 1, number & 1
+        if nodes.motion[a] <= HOME:
+            return write_controls(search, nodes, room, a, control), nodes.size[0]
+        if nodes.step[a] + 2 * MOST_BRAKING_STEPS >= len(control):
+            continue
+        if widened == 0 and nodes.leg[a] == legs:
+            end_from(search, nodes, room, a, tries)
+            tries += 1
+        elif widened == 0 and task.stay[nodes.leg[a]] > 0:
+            copy_numbers(nodes.state[a], room.state[0])
+            stay(search, nodes, room, a)
+        copy_numbers(nodes.state[a], room.state[0])
+        nears = list_near(search, room, nodes.step[a])
+        if widened == 0 and 0 <= nodes.segment[a] < search.courses.nodes[0]:
+            expand(search, nodes, room, a, TRACK, nears)
+            later = value + WIDENING_SHARE * task.steps * search.dt
+            entry = 2 * a + 1
+            nodes.size[1] = push(nodes.key, nodes.entry, nodes.size[1], later, entry)
+            continue
+        for motion in range(HOLD, MOVE + motions):
+            expand(search, nodes, room, a, motion, nears)
+    if nodes.size[2] >= 0:  # the best there is, if not good enough to end sooner
+        return write_controls(search, nodes, room, nodes.size[2], control), most
+    return -1, most

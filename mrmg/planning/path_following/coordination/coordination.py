@@ -1,0 +1,271 @@
+"""Motions of a whole fleet along its tours, found robot by robot.
+
+Each robot's motion is found by a search over its own motions (`_search_kernels`), and
+who has priority over whom by a search over the orders of robots (`priorities`). All
+that is found can be driven exactly, and keeps clear at every step.
+
+What is promised: every plan found keeps all margins. A round of the search ends without
+a plan only if none of the orders that it may look at has one, with cells as fine and
+searches as long as the round allows; each round is finer and longer than the one
+before, and begins with other motions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from mrmg import seeding
+from mrmg.planning.path_following import _tracking_kernels
+from mrmg.planning.path_following._tracking_kernels import Courses
+from mrmg.planning.path_following.band import Path
+from mrmg.planning.path_following.coordination import _search_kernels
+from mrmg.planning.path_following.coordination._node_kernels import (
+    Nodes,
+    Scratch,
+    Setting,
+)
+from mrmg.planning.path_following.coordination.priorities import search_priorities
+from mrmg.planning.path_following.coordination.tasks import (
+    Fields,
+    Round,
+    stays_s,
+    task_of,
+)
+from mrmg.planning.path_following.coordination.traffic import FleetTraffic, Motion
+from mrmg.planning.path_following.tracking import courses_of
+from mrmg.planning.problem.problem import Problem
+from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
+from mrmg.plans import Trajectory
+
+ROUNDS = (
+    Round(most=1_000, orders=50, weight=1.5, fineness=1.0, soft_s=2.0),
+    Round(most=4_000, orders=100, weight=1.5, fineness=1.0, soft_s=4.0),
+    Round(most=16_000, orders=200, weight=2.0, fineness=2.0, soft_s=1.0),
+    Round(most=64_000, orders=400, weight=2.0, fineness=3.0, soft_s=4.0),
+)
+"""Rounds one after the other."""
+
+YIELDING_WEIGHT = 1.1
+"""Weight of its cost-to-go."""
+
+YIELDING_S = 20.0
+"""Cost of conflicts with robots for one that makes room for others [s]."""
+
+MOST_CURVE_NODES = 1500
+"""Nodes of the curve that a robot drives home along, at most."""
+
+BRAKING_SHARE = 0.8
+"""Share of the largest deceleration that it brakes with at the end."""
+
+SLOWEST = 4.0
+"""Motions may take so many times as long as way and stays do at full speed ..."""
+
+LEAST_STEPS = 1500
+"""... and so many steps more."""
+
+
+def empty_course(most: int) -> Courses:
+    """Return room for the path of one robot."""
+    return Courses(
+        node=np.zeros((1, most, 2)),
+        gear=np.ones((1, most), np.int64),
+        bend=np.zeros((1, most)),
+        way=np.zeros((1, most)),
+        end=np.zeros((1, most), np.int64),
+        fastest=np.full((1, most), np.inf),
+        pause=np.zeros((1, most), np.int64),
+        nodes=np.zeros(1, np.int64),
+        ease=np.zeros(1),
+        stiffness=np.ones(1),
+        heading=np.zeros(1),
+        tolerance=np.full(1, np.inf),
+    )
+
+
+def empty_nodes(most: int) -> Nodes:
+    """Return room for a search of at most so many nodes."""
+    return Nodes(
+        state=np.empty((most, 5)),
+        parent=np.empty(most, np.int64),
+        step=np.empty(most, np.int64),
+        leg=np.empty(most, np.int64),
+        segment=np.empty(most, np.int64),
+        left=np.empty(most, np.int64),
+        cost=np.empty(most),
+        motion=np.empty(most, np.int64),
+        key=np.empty(2 * most + 2),
+        entry=np.empty(2 * most + 2, np.int64),
+        table=np.full(1 << (4 * most).bit_length(), -1, np.int64),
+        size=np.array([0, 0, -1]),
+    )
+
+
+class _Planning:
+    """Finds motions of one problem's robots in one round."""
+
+    def __init__(
+        self,
+        problem: Problem,
+        tours: Sequence[Sequence[int]],
+        paths: Sequence[Path],
+        horizon: int,
+    ) -> None:
+        self._problem = problem
+        self._tours, self._paths = tours, paths
+        self._courses = courses_of(problem, paths, [()] * len(paths))
+        self._fields = Fields(problem)
+        self._traffic = FleetTraffic(problem, horizon)
+        self._control = np.zeros((horizon, 2))
+        self._room = Scratch(
+            state=np.zeros((horizon + 1, 5)),
+            control=np.zeros((horizon, 2)),
+            corner=np.empty((2, MOST_CORNERS, 2)),
+            near=np.empty(len(tours), np.int64),
+            curve=empty_course(MOST_CURVE_NODES),
+        )
+        self.round = ROUNDS[0]
+        self.nodes = 0
+
+    def find(
+        self,
+        r: int,
+        motions: Sequence[Motion | None],
+        above: np.ndarray,
+        *,
+        yielding: bool = False,
+    ) -> Motion | None:
+        """Return a motion of robot r without conflicts with the robots marked."""
+        mission, now, dt_s = self._problem.mission, self.round, self._problem.dt_s
+        led = len(self._paths[r].target) == len(self._tours[r])
+        steered = self._problem.steered_home[r] and len(self._tours[r]) == 1
+        quick = now is ROUNDS[0] and (led or steered)
+        if yielding:
+            now = replace(now, weight=YIELDING_WEIGHT, soft_s=YIELDING_S)
+        own = slice(r, r + 1)
+        courses = Courses(*(np.ascontiguousarray(part[own]) for part in self._courses))
+        search = Setting(
+            own=mission.fleet[own],
+            spaces=mission.spaces,
+            terrain=mission.terrain,
+            targets=mission.targets,
+            zones=mission.zones,
+            courses=courses,
+            traffic=self._traffic.around(r, motions, above),
+            task=task_of(
+                self._problem,
+                r,
+                self._tours[r],
+                self._paths[r],
+                None if quick else self._fields,
+                now,
+            ),
+            dt=dt_s,
+        )
+        self._room.curve.ease[0] = BRAKING_SHARE * mission.fleet["limit"][r, 3]
+        self._room.curve.stiffness[0] = courses.stiffness[0]
+        count, nodes = _search_kernels.find_motion(
+            search,
+            empty_nodes(now.most),
+            self._room,
+            self._problem.start[r],
+            self._control,
+        )
+        self.nodes += nodes
+        if count < 0:
+            return None
+        control = self._control[:count].copy()
+        state = np.zeros((count + 1, 5))
+        state[0] = self._problem.start[r]
+        _tracking_kernels.write_states(mission.fleet, r, dt_s, control, state)
+        return Motion(state, control)
+
+    def find_alone(
+        self, r: int, motions: Sequence[Motion | None], first: Round, halt: np.ndarray
+    ) -> Motion | None:
+        """Return a motion of a robot that may meet the others, as hard as it takes."""
+        for self.round in ROUNDS[ROUNDS.index(first) :]:
+            found = self.find(r, motions, np.zeros(len(motions), bool))
+            if found is not None or halt[0]:
+                return found
+        return None
+
+    def conflicts(self, r: int, motions: Sequence[Motion]) -> np.ndarray:
+        """Return the step of r's first conflict with each robot, inf for never."""
+        return self._traffic.conflicts(r, motions)
+
+
+def coordinated(
+    problem: Problem,
+    tours: Sequence[Sequence[int]],
+    paths: Sequence[Path],
+    halt: np.ndarray,
+    *,
+    seed: int = 0,
+    rounds: Sequence[Round] = ROUNDS,
+) -> tuple[Trajectory, ...]:
+    """Return trajectories of all robots along their tours; empty if none were found.
+
+    Args:
+        problem: the mission.
+        tours: targets of each robot; a finish comes last.
+        paths: of each robot, with its stays; empty ones where there are none.
+        halt: shape (1,); the search ends soon after it has turned true.
+        seed: of the orders in which robots are looked at.
+        rounds: that are made one after the other.
+    """
+    robots = len(tours)
+    planning = _Planning(problem, tours, paths, _horizon(problem, tours, paths))
+    rng = seeding.stream(seed, "coordination")
+    for now in rounds:
+        motions: list[Motion | None] = [None] * robots
+        for r in rng.permutation(robots).tolist():
+            motions[r] = planning.find_alone(r, motions, now, halt)
+            if motions[r] is None:
+                return ()
+        alone = [motion for motion in motions if motion is not None]
+        planning.round = now
+        found = search_priorities(alone, planning, now.orders, halt)
+        if found is not None:
+            return _trajectories(problem, found)
+    return ()
+
+
+def _trajectories(
+    problem: Problem, motions: Sequence[Motion]
+) -> tuple[Trajectory, ...]:
+    """Return motions as trajectories of one length: who is through stands."""
+    steps = max(1, *(len(motion.control) for motion in motions))
+    trajectories = []
+    dt_s = problem.dt_s
+    for r, (robot, motion) in enumerate(
+        zip(problem.scene.robots, motions, strict=True)
+    ):
+        control = np.zeros((steps, 2))
+        control[: len(motion.control)] = motion.control
+        state = np.zeros((steps + 1, 5))
+        state[0] = problem.start[r]
+        _tracking_kernels.write_states(problem.mission.fleet, r, dt_s, control, state)
+        trajectories.append(
+            Trajectory(robot=robot.id, dt_s=dt_s, state=state, control=control)
+        )
+    return tuple(trajectories)
+
+
+def _horizon(
+    problem: Problem, tours: Sequence[Sequence[int]], paths: Sequence[Path]
+) -> int:
+    """Return the steps that motions may take."""
+    mission = problem.mission
+    top = mission.fleet["limit"][:, 1]
+    spans_s, standing_s = [], 0.0
+    for r, (tour, path) in enumerate(zip(tours, paths, strict=True)):
+        way = np.vstack([problem.start[r, :2], mission.targets.center[list(tour)]])
+        straight_m = float(np.hypot(*np.diff(way, axis=0).T).sum())
+        longest_m = max(straight_m, float(path.way[-1]))
+        spans_s.append(longest_m / float(top[r]))
+        # One robot may have to wait for the stays of all others.
+        standing_s += max(float(stays_s(problem, r, tour).sum()), path.pause_s.sum())
+    return int((SLOWEST * max(spans_s) + standing_s) / problem.dt_s) + LEAST_STEPS

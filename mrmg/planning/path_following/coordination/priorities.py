@@ -1,0 +1,153 @@
+"""Priority-based search for motions of a fleet without conflicts.
+
+H. Ma, D. Harabor, P. J. Stuckey, J. Li, S. Koenig: Searching with consistent
+prioritization for multi-agent path finding, AAAI 2019. Each node is a partial order of
+the robots and a motion for each of them that has no conflict with higher ones. Where
+two motions conflict, one child gives one robot priority and the other child the other
+one. The search goes depth first and back, so that it looks at every order that may
+matter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from mrmg.planning.path_following.coordination.traffic import Motion
+
+YIELDS = 2
+"""Times that each of two robots makes room for the other one."""
+
+
+class MotionPlanning(Protocol):
+    """What the search needs to know of motions."""
+
+    def find(
+        self,
+        r: int,
+        motions: Sequence[Motion],
+        above: np.ndarray,
+        *,
+        yielding: bool = False,
+    ) -> Motion | None:
+        """Return a motion of robot r without conflicts with the robots marked.
+
+        A yielding robot makes as much room for the others as it can.
+        """
+
+    def conflicts(self, r: int, motions: Sequence[Motion]) -> np.ndarray:
+        """Return the step of r's first conflict with each robot, inf for never."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Node:
+    """A node of the search.
+
+    Attributes:
+        above: whether robot j has priority over robot i, transitively, shape (R, R).
+        motions: of all robots.
+        conflict: step of the first one of each two robots, inf for never, (R, R).
+    """
+
+    above: np.ndarray
+    motions: tuple[Motion, ...]
+    conflict: np.ndarray
+
+    @property
+    def cost(self) -> tuple[int, int]:
+        """Pairs in conflict, and steps that all motions take."""
+        steps = sum(len(motion.control) for motion in self.motions)
+        return int(np.isfinite(self.conflict).sum()), steps
+
+
+def search_priorities(
+    motions: Sequence[Motion],
+    planning: MotionPlanning,
+    most_nodes: int,
+    halt: np.ndarray,
+) -> tuple[Motion, ...] | None:
+    """Return motions that do not meet, or None.
+
+    Args:
+        motions: one for each robot, found without regard to the others.
+        planning: finds motions.
+        most_nodes: nodes looked at, at most.
+        halt: shape (1,); the search ends soon after it has turned true.
+    """
+    robots = len(motions)
+    conflict = np.stack([planning.conflicts(r, motions) for r in range(robots)])
+    stack = [_Node(np.zeros((robots, robots), bool), tuple(motions), conflict)]
+    for _ in range(most_nodes):
+        if not stack or halt[0]:
+            return None
+        node = stack.pop()
+        if not np.isfinite(node.conflict).any():
+            return node.motions
+        first, second = divmod(int(node.conflict.argmin()), robots)
+        children = [
+            _with_priority(node, low, high, planning)
+            for low, high in ((first, second), (second, first))
+            if not node.above[high, low]
+        ]
+        found = [child for child in children if child is not None]
+        stack += sorted(found, key=lambda child: child.cost, reverse=True)
+    return None
+
+
+def _with_priority(
+    node: _Node, low: int, high: int, planning: MotionPlanning
+) -> _Node | None:
+    """Return the node in which one more robot has priority over another one."""
+    above = node.above.copy()
+    upper = np.append(np.flatnonzero(above[high]), high)
+    lower = np.append(np.flatnonzero(above[:, low]), low)
+    above[np.ix_(lower, upper)] = True
+    motions, conflict = list(node.motions), node.conflict.copy()
+    for r in sorted(lower.tolist(), key=lambda r: int(above[r].sum())):
+        if not np.isfinite(conflict[r, above[r]]).any():
+            continue
+        found = planning.find(r, motions, above[r])
+        if found is None and r == low:
+            found = _giving_way(low, high, above, motions, planning)
+            conflict[high] = conflict[:, high] = planning.conflicts(high, motions)
+        if found is None:
+            return None
+        motions[r] = found
+        conflict[r] = conflict[:, r] = planning.conflicts(r, motions)
+    return _Node(above, tuple(motions), conflict)
+
+
+def _giving_way(
+    low: int,
+    high: int,
+    above: np.ndarray,
+    motions: list[Motion],
+    planning: MotionPlanning,
+) -> Motion | None:
+    """Return a motion of a robot that passes another one where both make room.
+
+    In turn one of them makes as much room for the other one as it can, until the other
+    one gets past; `motions` receives that of the other one.
+    """
+    trial = list(motions)
+    beside = above[low].copy()
+    beside[high] = False
+    for one, other, blocked in YIELDS * (
+        (high, low, above[high]),
+        (low, high, beside),
+    ):
+        aside = planning.find(one, trial, blocked, yielding=True)
+        if aside is None:
+            return None
+        trial[one] = aside
+        must = (beside if other == low else above[high]).copy()
+        must[one] = True
+        passing = planning.find(other, trial, must)
+        if passing is not None:
+            trial[other] = passing
+            motions[high] = trial[high]
+            return trial[low]
+    return None

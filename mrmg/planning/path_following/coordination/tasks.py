@@ -1,0 +1,242 @@
+"""What each robot is to do, in the form that its search needs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, pi
+
+import numpy as np
+
+from mrmg.energy.model import CONSUMERS_W
+from mrmg.motion._kernels import USER
+from mrmg.planning.path_following.band import Path
+from mrmg.planning.path_following.coordination import _field_kernels
+from mrmg.planning.path_following.coordination._node_kernels import Task
+from mrmg.planning.problem.problem import Problem
+
+MOTION_SHARE = 0.6
+"""Way that a motion leads at full speed, in lengths of the robot."""
+
+MOTION_S = (0.3, 1.2)
+"""Time that a motion lasts, at least and at most [s]."""
+
+BEARINGS = 8
+"""Directions in which a custom motion model is steered."""
+
+WAYPOINT_SHARE = 4.0
+"""How far ahead its waypoints lie, in ways of a motion."""
+
+GENTLE_SHARE = 0.3
+"""Share of the largest steering in gentle turns."""
+
+HEADINGS = 18
+"""Cells of the heading."""
+
+LEVELS = 2
+"""Cells of speed and of steering to either side of zero."""
+
+HOLD_SHARE = 0.3
+"""Cost of standing, as a share of that of moving: it takes time, but no energy."""
+
+TIGHT_PRICE = 2.0
+"""Factor on the cost of a metre where a robot cannot turn round."""
+
+LONG_HOLD_SHARE = 0.02
+"""The same where robots wait for each other at stations, which takes minutes."""
+
+MOST_CELLS = 60_000
+"""Cells of a field of costs-to-go, about."""
+
+
+def motion_steps(robot: np.ndarray, dt_s: float, fineness: float) -> int:
+    """Return the number of steps that a robot's motions last."""
+    way_m = MOTION_SHARE * 2.0 * float(robot["radius"]) / fineness
+    least_s, most_s = MOTION_S
+    lasting_s = min(most_s, max(least_s, way_m / float(robot["limit"][1])))
+    return ceil(lasting_s / dt_s - 1e-9)
+
+
+def motions(robot: np.ndarray, steps: int, dt_s: float) -> np.ndarray:
+    """Return what a robot's motions aim at, shape (P, 2).
+
+    Speed and steering, or of a custom motion model the waypoint in its frame.
+    """
+    v_min, v_max, w_max = (float(x) for x in robot["limit"][:3])
+    if robot["model"] == USER:
+        angle = np.linspace(0.0, 2.0 * pi, BEARINGS, endpoint=False)
+        far_m = WAYPOINT_SHARE * v_max * steps * dt_s
+        return far_m * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    speeds = (v_max, v_min, 0.0) if v_min < 0.0 else (v_max, 0.0)
+    angles = (0.0, w_max, -w_max, GENTLE_SHARE * w_max, -GENTLE_SHARE * w_max)
+    pairs = [(v, w) for v in speeds for w in angles[: 5 if v else 3]]
+    return np.array([pair for pair in pairs if pair != (0.0, 0.0)])
+
+
+def no_path(problem: Problem, r: int) -> Path:
+    """Return a path that leads robot r nowhere."""
+    none = np.zeros(0, np.int64)
+    return Path(
+        node=problem.start[r : r + 1, :2].copy(),
+        gear=none,
+        stop=none,
+        target=none,
+        deeper=np.zeros(0),
+        pivot=none,
+        heading=float(problem.start[r, 2]),
+        pause_s=np.zeros(0),
+    )
+
+
+def stays_s(problem: Problem, r: int, legs: Sequence[int]) -> np.ndarray:
+    """Return how long robot r stays at targets at most [s], shape (L,)."""
+    targets, robot = problem.mission.targets, problem.mission.fleet[r]
+    stay_s = targets.dwell[list(legs)].astype(float)
+    if np.isfinite(robot["charge"]):
+        filling_s = robot["capacity"] / (robot["charge"] - robot["energy"][CONSUMERS_W])
+        stations = np.array([t >= targets.goals for t in legs], bool)
+        stay_s[stations] = np.maximum(stay_s[stations], filling_s)
+    return stay_s
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """How hard one round of the search tries.
+
+    Attributes:
+        most: nodes of one robot's search at most.
+        orders: nodes of the search over priorities at most.
+        weight: of costs-to-go: motions take at most so many times the least cost.
+        fineness: how much shorter motions, and finer cells, are than usual.
+        soft_s: cost of conflicts with robots of lower priority [s].
+    """
+
+    most: int
+    orders: int
+    weight: float
+    fineness: float
+    soft_s: float
+
+
+class Fields:
+    """Costs-to-go over grids, made when they are asked for."""
+
+    def __init__(self, problem: Problem) -> None:
+        """Keep the problem; no field is made yet."""
+        self._problem = problem
+        self._known: dict[tuple[int, float, int], np.ndarray] = {}
+        spaces = problem.mission.spaces
+        cells = spaces.distance[0].size
+        self._coarser = max(1, round((cells / MOST_CELLS) ** 0.5))
+
+    def cell_m(self, r: int) -> float:
+        """Return the side of a cell of robot r's fields."""
+        return float(self._problem.mission.spaces.cell * self._coarser)
+
+    def of(self, r: int, target: int) -> np.ndarray:
+        """Return the way from each cell to a target [m], inf where there is none."""
+        mission = self._problem.mission
+        robot = mission.fleet[r]
+        needed_m = float(robot["passage"])
+        key = (int(robot["space"]), needed_m, target)
+        if key not in self._known:
+            spaces, n = mission.spaces, self._coarser
+            cell_m = self.cell_m(r)
+            distance = spaces.distance[robot["space"]]
+            rows, columns = (-(-size // n) for size in distance.shape)
+            padded = np.full((rows * n, columns * n), -np.inf)
+            padded[: distance.shape[0], : distance.shape[1]] = distance
+            nearest = padded.reshape(rows, n, columns, n).max(axis=(1, 3))
+            at = mission.targets.center[target] - (spaces.x_min, spaces.y_min)
+            column, row = np.clip((at / cell_m).astype(int), 0, (columns - 1, rows - 1))
+            roomy_m = float(robot["radius"] + robot["margin"])
+            lacking = (roomy_m - nearest) / max(roomy_m - needed_m, cell_m)
+            self._known[key] = cell_m * _field_kernels.cost_to_go(
+                nearest > needed_m - 0.5 * cell_m,
+                1.0 + TIGHT_PRICE * np.clip(lacking, 0.0, 1.0),
+                int(row),
+                int(column),
+            )
+        return self._known[key]
+
+
+def _guidance(
+    problem: Problem, r: int, goals: Sequence[int], fields: Fields | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return costs-to-go to each target, and from each target to the last one [s].
+
+    Shapes (L, ny, nx) and (L,); all zero without fields.
+    """
+    mission = problem.mission
+    if fields is None or not goals:
+        return np.zeros((max(1, len(goals)), 1, 1)), np.zeros(len(goals) + 1)
+    top = float(mission.fleet["limit"][r, 1])
+    field = np.stack([fields.of(r, t) / top for t in goals])
+    cell_m, rest_s = fields.cell_m(r), np.zeros(len(goals) + 1)
+    x_min, y_min = mission.spaces.x_min, mission.spaces.y_min
+    for i in range(len(goals) - 2, -1, -1):
+        x, y = mission.targets.center[goals[i]]
+        there_s = _field_kernels.field_at(field, i + 1, x_min, y_min, cell_m, x, y)
+        rest_s[i] = there_s + rest_s[i + 1]
+    return field, rest_s
+
+
+def task_of(
+    problem: Problem,
+    r: int,
+    tour: Sequence[int],
+    path: Path,
+    fields: Fields | None,
+    effort: Round,
+) -> Task:
+    """Return what robot r is to do.
+
+    Args:
+        problem: the mission.
+        r: robot.
+        tour: its targets; a finish comes last.
+        path: along them, or an empty one.
+        fields: costs-to-go; None to do without.
+        effort: how hard it is searched for.
+    """
+    robot, targets = problem.mission.fleet[r], problem.mission.targets
+    dt_s, finish = problem.dt_s, int(targets.finish[r])
+    legs = [t for t in tour if t != finish or finish < 0]
+    along, stay_s = np.full(len(legs), np.inf), stays_s(problem, r, legs)
+    led = min(len(legs), len(path.stop))
+    along[:led] = path.way[path.stop[:led]]
+    stay_s[:led] = path.pause_s[:led]
+    field, after_s = _guidance(problem, r, [*legs, *[finish] * (finish >= 0)], fields)
+    home_along = finish >= 0 and finish in path.target[-1:]
+    rest_s = after_s[: len(legs) + 1].copy()
+    # Of the last entry, what is left behind the end of the path.
+    rest_s[-1] = 0.0 if home_along or finish < 0 or not legs else after_s[len(legs) - 1]
+    # Stays yet to come cost what they cost, whatever the weight of the rest.
+    ahead_s = np.cumsum(stay_s[::-1])[::-1]
+    standing = (
+        LONG_HOLD_SHARE if problem.mission.targets.zone.max() >= 0 else HOLD_SHARE
+    )
+    rest_s[: len(legs)] += standing / effort.weight * ahead_s
+    steps = motion_steps(robot, dt_s, effort.fineness)
+    top, turn = float(robot["limit"][1]), max(float(robot["limit"][2]), 1e-6)
+    headings = round(HEADINGS * min(2.0, effort.fineness))
+    sides = [0.5 * top * steps * dt_s, 2.0 * pi / headings, top / LEVELS, turn / LEVELS]
+    return Task(
+        leg=np.array(legs, np.int64),
+        stay=np.ceil(stay_s / dt_s).astype(np.int64),
+        along=along,
+        rest_s=rest_s,
+        finish=finish,
+        home_along=bool(home_along),
+        heading=float(targets.heading[r]),
+        tolerance=float(targets.tolerance[r]),
+        field=field,
+        field_cell=fields.cell_m(r) if fields is not None else 1e9,
+        motion=motions(robot, steps, dt_s),
+        steps=steps,
+        resolution=np.array(sides),
+        weight=effort.weight,
+        hold_share=standing,
+        soft_s=effort.soft_s,
+        most=effort.most,
+    )

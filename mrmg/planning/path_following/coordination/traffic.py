@@ -1,0 +1,98 @@
+"""The motions of a fleet, side by side, as the kernels see them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mrmg.planning.path_following.coordination import _conflict_kernels
+from mrmg.planning.path_following.coordination._motion_kernels import Traffic
+from mrmg.planning.problem.problem import Problem
+
+CLOSING_SHARE = 1.5
+"""How much faster than the reference point at most the middle of a footprint moves."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """One robot's motion.
+
+    Attributes:
+        state: shape (n + 1, 5).
+        control: shape (n, 2).
+    """
+
+    state: np.ndarray
+    control: np.ndarray
+
+
+class FleetTraffic:
+    """The motions of all robots; only those that change are copied."""
+
+    def __init__(self, problem: Problem, horizon: int) -> None:
+        """Make room for motions of so many steps."""
+        mission = problem.mission
+        robots, zones = len(mission.fleet), len(mission.zones.reach)
+        top = np.maximum(mission.fleet["limit"][:, 1], -mission.fleet["limit"][:, 0])
+        middle = np.hypot(*mission.fleet["middle"].T)
+        turning = middle * np.where(
+            mission.fleet["turning_radius"] > 0.0,
+            top / np.maximum(mission.fleet["turning_radius"], 1e-6),
+            mission.fleet["limit"][:, 2],
+        )
+        speed = CLOSING_SHARE * (top + turning)
+        self._problem = problem
+        self._closing = (speed[:, None] + speed) * problem.dt_s
+        self._noted: list[Motion | None] = [None] * robots
+        self._inside = np.zeros((robots, zones, horizon), bool)
+        self._traffic = Traffic(
+            fleet=mission.fleet,
+            pose=np.zeros((robots, horizon + 1, 5)),
+            middle=np.zeros((robots, horizon + 1, 2)),
+            last=np.zeros(robots, np.int64),
+            closing=np.zeros(robots),
+            hard=np.zeros(robots, bool),
+            soft=np.zeros(robots, bool),
+            busy=np.zeros((zones, horizon), bool),
+            end=0,
+        )
+
+    def _note(self, motions: Sequence[Motion | None]) -> None:
+        mission = self._problem.mission
+        for r, motion in enumerate(motions):
+            if motion is None or motion is self._noted[r]:
+                continue
+            count = len(motion.state)
+            self._traffic.pose[r, :count] = motion.state
+            _conflict_kernels.note_motion(
+                mission.fleet, mission.zones, self._traffic, self._inside, r, count
+            )
+            self._noted[r] = motion
+
+    def around(
+        self, r: int, motions: Sequence[Motion | None], above: np.ndarray
+    ) -> Traffic:
+        """Return the traffic for robot r, which must not meet the robots marked."""
+        self._note(motions)
+        known = np.array([motion is not None for motion in motions])
+        known[r] = False
+        hard = above & known
+        lasting = self._traffic.last[known]
+        return self._traffic._replace(
+            closing=np.ascontiguousarray(self._closing[r]),
+            hard=hard,
+            soft=known & ~hard,
+            busy=self._inside[hard].any(axis=0),
+            end=int(lasting.max()) if len(lasting) else 0,
+        )
+
+    def conflicts(self, r: int, motions: Sequence[Motion]) -> np.ndarray:
+        """Return the step of r's first conflict with each robot, inf for never."""
+        self._note(motions)
+        fleet = self._problem.mission.fleet
+        traffic = self._traffic._replace(closing=np.ascontiguousarray(self._closing[r]))
+        conflict = np.full(len(fleet), np.inf)
+        _conflict_kernels.conflicts_of(fleet, traffic, self._inside, r, conflict)
+        return conflict

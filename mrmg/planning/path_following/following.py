@@ -1,0 +1,231 @@
+"""Drafts: plans driven straight along tours.
+
+The roadmap's paths along tours are smoothed and followed in closed loop
+(`refine.follow_paths`). Where that succeeds, nearly always where there is room, that
+is all. Where robots get in each other's way, or a car must end with a heading, a
+search for motions starts from the paths (`coordination`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from math import cos, pi, radians, sin
+
+import numpy as np
+
+from mrmg.motion._kernels import CAR, UNICYCLE
+from mrmg.planning.assembly import make_plan, why_refused
+from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.path_following._band_kernels import CostMap
+from mrmg.planning.path_following.band import TRACKING_M, Path, smooth_path
+from mrmg.planning.path_following.gears import with_best_gears
+from mrmg.planning.path_following.refine import OnFailure, cost_maps_of, follow_paths
+from mrmg.planning.path_following.robot_task import RobotTask
+from mrmg.planning.problem.problem import Problem
+from mrmg.planning.routing.routing import Routing
+from mrmg.plans import Plan
+
+SHARP = radians(110.0)
+"""Turn at a target from which on a car goes on in its other gear [rad]."""
+
+LENIENT_TURNS = (pi, radians(150.0))
+"""The same where time counts, as far as there is room to turn round."""
+
+REVERSE_SPEED_SHARE = 0.9
+"""Share of its speed forwards from which on a car is as fast backwards."""
+
+PIVOT = radians(60.0)
+"""Turn from which on a robot that can turns on the spot [rad]."""
+
+LEAST_SOC_MARGIN = 0.02
+"""Share of a battery's capacity that plans always leave above its reserve: a robot may
+take a percent or two more than planned on slopes and in turns on the spot."""
+
+FIRST_PLAN_DEPTH_M = 0.08
+"""How much deeper than needed first plans enter targets: they seldom miss one, which
+spares driving again."""
+
+JUDGED_M = 4.0
+"""Distance of the nodes of paths that only tours are judged by."""
+
+DIRECTION_M = 4.0
+"""How far before and after a target a way's direction is read."""
+
+
+def can_follow(problem: Problem) -> bool:
+    """Return whether path following knows all that a mission requires.
+
+    They do not know how a user's models drive.
+    """
+    models = problem.mission.fleet["model"]
+    known = (models == CAR) | (models == UNICYCLE)
+    return bool(known.all())
+
+
+def follow_tours(
+    problem: Problem,
+    params: PlannerParams,
+    routing: Routing,
+    seed: int,
+    halt: np.ndarray,
+    *,
+    soon: bool = False,
+    on_failure: OnFailure = lambda reason: None,
+) -> Iterator[Plan]:
+    """Yield plans along tours, in the order found; none if driving them fails.
+
+    The first one is driven without regard to braking. Where time counts, cars that are
+    slower backwards turn round rather than change gear, if there is room. What fails
+    with one way of turning is tried with the others.
+
+    Args:
+        problem: the mission.
+        params: parameters.
+        routing: the tours.
+        seed: of the search that the plan belongs to.
+        halt: shape (1,); following ends soon after it has turned true.
+        soon: find the first plan soon rather than a cheap one.
+        on_failure: receives why driving failed, in words, each time it does.
+    """
+    cost_maps = cost_maps_of(problem)
+    stops = [whole_tour(problem, routing, r) for r in range(len(cost_maps))]
+    steered = problem.steered_home
+    tours = problem.visits(routing.tours)
+    limit = problem.mission.fleet["limit"]
+    slower = -limit[:, 0] < REVERSE_SPEED_SHARE * limit[:, 1]  # backwards than forwards
+    timed = problem.minimum_time or problem.preference.objective.makespan_weight > 0.0
+    deeper_m = FIRST_PLAN_DEPTH_M if soon else TRACKING_M
+    tried: list[list[Path]] = []
+    lenient_first = timed and slower.any()
+    for sharp in (*LENIENT_TURNS, SHARP) if lenient_first else (SHARP, *LENIENT_TURNS):
+        paths = [
+            tour_path(problem, r, tour[: len(tour) - steers], sharp, deeper_m)
+            for r, (tour, steers) in enumerate(zip(stops, steered, strict=True))
+        ]
+        if any(_same_gears(paths, before) for before in tried):
+            continue
+        tried.append(paths)
+        if not soon and not timed:
+            paths = [
+                _geared(problem, r, cost_maps[r], path) for r, path in enumerate(paths)
+            ]
+        tasks = [RobotTask(*one) for one in zip(stops, paths, cost_maps, strict=True)]
+        found = False
+        for trajectories in follow_paths(problem, params, tasks, halt, on_failure):
+            plan = make_plan(problem, seed, params, trajectories, tours)
+            if plan is None:
+                on_failure(why_refused(problem, trajectories, tours))
+            else:
+                found = True
+                yield plan
+        if found or halt[0]:
+            return
+
+
+def _same_gears(paths: Sequence[Path], others: Sequence[Path]) -> bool:
+    pairs = zip(paths, others, strict=True)
+    return all(np.array_equal(one.gear, other.gear) for one, other in pairs)
+
+
+def path_cost_J(problem: Problem, routing: Routing) -> float:
+    """Return the cost of tours along smoothed paths of few nodes [J]."""
+    plain = problem.mission.fleet["plain"]
+    total = 0.0
+    for r, cost_map in enumerate(cost_maps_of(problem)):
+        path = tour_path(problem, r, whole_tour(problem, routing, r))
+        _, cost_m = smooth_path(problem.mission.targets, cost_map, path, (JUDGED_M,))
+        total += cost_m * float(plain[r])
+    return total
+
+
+def whole_tour(problem: Problem, routing: Routing, r: int) -> list[int]:
+    """Return robot r's targets; where it must end comes last."""
+    finish = int(problem.mission.targets.finish[r])
+    return [*routing.tours[r], *([finish] if finish >= 0 else [])]
+
+
+def tour_path(
+    problem: Problem,
+    r: int,
+    tour: Sequence[int],
+    sharp: float = SHARP,
+    deeper_m: float = TRACKING_M,
+) -> Path:
+    """Return the way of the roadmap along robot r's tour.
+
+    A car changes gear at a target where its way turns sharply; a robot that can turns
+    on the spot there.
+
+    Args:
+        problem: the mission.
+        r: robot.
+        tour: numbers of its targets.
+        sharp: turn from which on a car changes gear [rad].
+        deeper_m: how much deeper than needed it enters its targets.
+    """
+    vertices, ends = tour_vertices(problem, r, tour)
+    node = problem.roadmap.arrays.vertex[vertices]
+    moves = np.hypot(*np.diff(node, axis=0).T) > 0.0
+    node = node[np.concatenate([[True], moves])]
+    stops = np.concatenate([[0], np.cumsum(moves)])[ends].astype(np.int64)
+    heading = float(problem.start[r, 2])
+    path = Path(
+        node=node,
+        gear=np.ones(len(node) - 1, np.int64),
+        stop=stops,
+        target=np.array(tour, np.int64),
+        deeper=np.full(len(tour), deeper_m),
+        pivot=np.zeros(0, np.int64),
+        heading=heading,
+        pause_s=np.zeros(len(tour)),
+    )
+    turns = _turns(path)
+    if problem.mission.fleet[r]["model"] == UNICYCLE:
+        pivots = [at for at, turn in turns if turn > PIVOT]
+        return replace(path, pivot=np.array(pivots, np.int64))
+    for at, turn in turns:
+        if turn > sharp:
+            path.gear[at:] *= -1
+    return path
+
+
+def _geared(problem: Problem, r: int, cost_map: CostMap, path: Path) -> Path:
+    if problem.mission.fleet[r]["model"] == UNICYCLE:
+        return path
+    return with_best_gears(problem, r, cost_map, path, _turns(path))
+
+
+def tour_vertices(
+    problem: Problem, r: int, tour: Sequence[int]
+) -> tuple[list[int], list[int]]:
+    """Return the roadmap's vertices along robot r's tour, and where each leg ends."""
+    roadmap = problem.roadmap
+    field = problem.mission.fleet[r]["field"]
+    vertices, ends = [len(roadmap.targets) + r], []
+    for target in tour:
+        successor = roadmap.arrays.successor[field, target]
+        while successor[vertices[-1]] >= 0:
+            vertices.append(int(successor[vertices[-1]]))
+        ends.append(len(vertices) - 1)
+    return vertices, ends
+
+
+def _turns(path: Path) -> list[tuple[int, float]]:
+    """Return how much a path turns at its start and at its stops, in order [rad]."""
+    way = path.way
+
+    def at(along: float) -> np.ndarray:
+        return np.array([np.interp(along, way, path.node[:, j]) for j in range(2)])
+
+    turns = []
+    for node in dict.fromkeys([0, *path.stop.tolist()]):
+        if node == len(way) - 1:
+            break
+        ahead = at(way[node] + DIRECTION_M) - path.node[node]
+        before = np.array([cos(path.heading), sin(path.heading)])
+        if node > 0:
+            before = path.node[node] - at(way[node] - DIRECTION_M)
+        turn = np.arctan2(before[0] * ahead[1] - before[1] * ahead[0], before @ ahead)
+        turns.append((node, abs(float(turn))))
+    return turns

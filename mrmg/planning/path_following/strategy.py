@@ -1,0 +1,297 @@
+"""The default planner: path following along tours, and a search where that fails.
+
+Its attempts differ by a schedule: which tours are drawn, for which energies, and what
+they must leave in batteries.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import product
+
+import numpy as np
+
+from mrmg import seeding
+from mrmg.planning.attempt import Attempt, Request
+from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.path_following.coordination.coordination import ROUNDS, coordinated
+from mrmg.planning.path_following.coordination.tasks import no_path
+from mrmg.planning.path_following.following import (
+    LEAST_SOC_MARGIN,
+    can_follow,
+    follow_tours,
+    path_cost_J,
+    whole_tour,
+)
+from mrmg.planning.path_following.refine import along_trajectories, refine
+from mrmg.planning.problem.problem import Problem
+from mrmg.planning.routing.routing import Routing
+from mrmg.plans import Plan
+
+TIME_SHARES = (1.0, 0.95, 0.85, 0.7)
+"""Shares of the time limit that the tours of successive attempts may take: driving
+takes longer than by the roadmap where robots turn much or get in each other's way."""
+
+DRAWS_PER_ATTEMPT = 4
+"""Tours drawn by each attempt after the first one, of which the best are followed."""
+
+FURTHER_DRAWS = (1, 3)
+"""Draws that the first attempt goes on with where its first one fails: the next is of
+other energies, the third of energies that differ most."""
+
+SPREADS = (0.0, 0.04, 0.08, 0.12, 0.06)
+"""Standard deviations of the logarithms of the factors on energies and times in
+successive draws: the roadmap's energies are not quite what driving takes."""
+
+SURCHARGES = (0.0, 0.0, -0.06)
+"""Shares added to the roadmap's energies in successive draws; below 0, as paths drawn
+tight take less than the roadmap's."""
+
+TIMED_SURCHARGES = (0.06, 0.0, 0.12)
+"""The same where the makespan counts: who brakes hard and turns round needs more."""
+
+SEARCH_MARGINS = (1.0, 0.0, 2.0)
+"""Multiples of the route margin in the tours of successive searches: batteries may
+leave no room for it, or driving may take more than it allows for."""
+
+SEARCH_SOC_SHARES = ((1.0, 0.0), (1.0, 0.0), (0.0,))
+"""Multiples of the state-of-charge margin in the tours of successive searches: the next
+one counts where no tours leave so much."""
+
+LEAST_GAIN = 0.001
+"""Share of the objective that a refinement must save to be followed by another."""
+
+
+@dataclass(frozen=True, slots=True)
+class Draw:
+    """One draw of tours, for energies and times that differ by chance.
+
+    Attributes:
+        number: of its random streams.
+        spread: standard deviation of the logarithms of their factors.
+        surcharge: share added to all energies.
+    """
+
+    number: int
+    spread: float
+    surcharge: float
+
+    @staticmethod
+    def of(number: int, timed: bool) -> Draw:
+        """Return draw `number` of a mission in which the makespan counts or not."""
+        surcharges = TIMED_SURCHARGES if timed else SURCHARGES
+        return Draw(
+            number,
+            SPREADS[number % len(SPREADS)],
+            surcharges[number % len(surcharges)],
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Schedule:
+    """What one attempt tries, in this order.
+
+    Attributes:
+        time_share: of the time limit that tours may take.
+        followed: state-of-charge margins with draws of tours that are followed, one
+            after another until there is a plan.
+        search_margin: surcharge on the energies of the tours that are searched along.
+        search_soc_margins: of searches, until there are tours that leave so much.
+    """
+
+    time_share: float
+    followed: tuple[tuple[float, tuple[Draw, ...]], ...]
+    search_margin: float
+    search_soc_margins: tuple[float, ...]
+
+    @staticmethod
+    def of(problem: Problem, params: PlannerParams, number: int) -> Schedule:
+        """Return the schedule of attempt `number`."""
+        timed = problem.preference.objective.makespan_weight > 0.0
+        alone = number == 0 or problem.preference.timed
+        first = number * DRAWS_PER_ATTEMPT
+        numbers = range(first, first + (1 if alone else DRAWS_PER_ATTEMPT))
+        draws = tuple(Draw.of(one, timed) for one in numbers)
+        wanted = max(params.soc_margin, LEAST_SOC_MARGIN)
+        margins = sorted({wanted, LEAST_SOC_MARGIN}, reverse=True)
+        followed = [(margin, draws) for margin in margins]
+        if number == 0:
+            further = [(Draw.of(one, timed),) for one in FURTHER_DRAWS]
+            followed += [(LEAST_SOC_MARGIN, each) for each in further]
+        margin = params.route_margin * SEARCH_MARGINS[number % len(SEARCH_MARGINS)]
+        followed.append((LEAST_SOC_MARGIN, (Draw(first, 0.0, margin),)))
+        shares = SEARCH_SOC_SHARES[number % len(SEARCH_SOC_SHARES)]
+        return Schedule(
+            time_share=TIME_SHARES[number % len(TIME_SHARES)],
+            followed=tuple(followed) if follows(problem, params) else (),
+            search_margin=margin,
+            search_soc_margins=tuple(share * params.soc_margin for share in shares),
+        )
+
+
+def follows(problem: Problem, params: PlannerParams) -> bool:
+    """Return whether paths are followed, or motions are searched for at once."""
+    return params.follow_paths and can_follow(problem)
+
+
+def easiest(problem: Problem, params: PlannerParams) -> Problem:
+    """Return the problem of the least energies that tours are drawn for.
+
+    A plan may be found along tours that it has, though not with every draw of tours.
+    """
+    if follows(problem, params):
+        return problem.with_margin(0.0).with_soc_margin(LEAST_SOC_MARGIN)
+    return problem.with_margin(params.route_margin).with_soc_margin(0.0)
+
+
+def path_following(problem: Problem, request: Request) -> Attempt:
+    """Follow paths along tours; where that fails, search for motions along others."""
+    schedule = Schedule.of(problem, request.params, request.number)
+    problem = problem.with_limit(schedule.time_share)
+    tries = _tries(problem, request, schedule)
+    routing_s, tours_found, blocked = 0.0, False, ""
+    counts: Counter[str] = Counter()
+    found = Attempt()
+    for found in tries:
+        routing_s += found.routing_s
+        counts.update(found.counts)
+        tours_found |= found.tours_found
+        blocked = found.blocked or blocked
+        if found.plans or request.halted:
+            break
+    return replace(
+        found,
+        routing_s=routing_s,
+        counts=counts,
+        tours_found=tours_found,
+        blocked=blocked,
+    )
+
+
+def _tries(problem: Problem, request: Request, schedule: Schedule) -> Iterator[Attempt]:
+    """Yield what came of each entry of a schedule."""
+    for soc_margin, draws in schedule.followed:
+        yield follow_paths(problem.with_soc_margin(soc_margin), request, draws)
+    for soc_margin in schedule.search_soc_margins:
+        kept = problem.with_soc_margin(soc_margin).with_margin(schedule.search_margin)
+        searched = search_motions(kept, request)
+        yield searched
+        if searched.tours_found:
+            return
+
+
+def _tours(problem: Problem, request: Request, seed: int | None = None) -> Routing:
+    """Return tours; without goals there is nothing to find, and nothing to miss."""
+    if problem.mission.targets.goals == 0:
+        return Routing(tours=((),) * len(problem.start), cost_J=0.0)
+    return request.tours(problem, seed)
+
+
+def search_motions(problem: Problem, request: Request) -> Attempt:
+    """Search for motions along tours, and refine their plan."""
+    began = time.perf_counter()
+    routing = _tours(problem, request)
+    routing_s = time.perf_counter() - began
+    if not routing.feasible or request.halted:
+        return Attempt(routing_s=routing_s, tours_found=routing.feasible)
+    robots = range(len(routing.tours))
+    targets = [whole_tour(problem, routing, r) for r in robots]
+    trajectories = coordinated(
+        problem,
+        targets,
+        [no_path(problem, r) for r in robots],
+        request.halt,
+        seed=request.stream_seed("coordination"),
+        rounds=ROUNDS[min(request.number, len(ROUNDS) - 1) :][:1],
+    )
+    tours = problem.visits(routing.tours)
+    plans: list[Plan] = []
+    found_at = []
+    plan = request.plan(problem, trajectories, tours) if trajectories else None
+    if trajectories and plan is None:  # batteries may suffice along smoother paths
+        drawn = along_trajectories(
+            problem, request.params, targets, trajectories, request.halt
+        )
+        plans_of = (request.plan(problem, one, tours) for one in drawn)
+        plan = next((one for one in plans_of if one is not None), None)
+    left = request.params.refinements
+    while plan is not None:
+        plans.append(plan)
+        found_at.append(time.perf_counter())
+        late = problem.preference.late_s(plan) > 0.0
+        sooner = replace(problem, minimum_time=late)
+        better = plan
+        if left > 0:
+            better = refine(sooner, request.params, plan, request.halt)
+        enough = not problem.preference.gains(better, plan, LEAST_GAIN)
+        plan = better if better is not plan else None
+        left = 0 if enough else left - 1
+    counts = {"coordinated": 1, "router_calls": 1}
+    return Attempt(plans, found_at, routing_s, counts)
+
+
+def follow_paths(
+    problem: Problem, request: Request, draws: tuple[Draw, ...]
+) -> Attempt:
+    """Drive straight along tours.
+
+    The first attempt takes the router's tours as they are; others the best of several
+    draws.
+    """
+    began = time.perf_counter()
+    choice = _drawn_tours(problem, request, draws)
+    routing_s = time.perf_counter() - began
+    problem = problem.with_margin(0.0)
+    preference = problem.preference
+    plans: list[Plan] = []
+    found_at: list[float] = []
+    failures = [""]
+    driven = 0
+    for tours, minimum_time in product(choice, (False, True)):
+        if request.halted or (plans and not preference.late_s(plans[-1])):
+            break
+        if minimum_time and not plans:
+            continue
+        driven += 1
+        made = follow_tours(
+            replace(problem, minimum_time=minimum_time),
+            request.params,
+            tours,
+            request.seed,
+            request.halt,
+            soon=request.number == 0,
+            on_failure=failures.append,
+        )
+        for plan in made:
+            if not plans or preference.rank(plan) < preference.rank(plans[-1]):
+                plans.append(plan)
+                found_at.append(time.perf_counter())
+    counts = {"path_following_plans": driven, "router_calls": len(draws)}
+    return Attempt(plans, found_at, routing_s, counts, bool(choice), failures[-1])
+
+
+def _drawn_tours(
+    problem: Problem, request: Request, draws: tuple[Draw, ...]
+) -> list[Routing]:
+    """Return the different tours of several draws, those that look best first."""
+    found: dict[tuple[tuple[int, ...], ...], Routing] = {}
+    for draw in draws:
+        varied = problem.with_margin(draw.surcharge)
+        arrays = varied.mission.routing
+        noise = seeding.stream(request.seed, "costs", draw.number).standard_normal(
+            arrays.cost.shape[1:]
+        )
+        factor = np.exp(draw.spread * noise)
+        arrays = arrays._replace(cost=arrays.cost * factor, time=arrays.time * factor)
+        varied = replace(varied, mission=varied.mission._replace(routing=arrays))
+        seed = seeding.stream_seed(request.seed, "tours", draw.number)
+        tours = _tours(varied, request, seed)
+        if tours.feasible:
+            found.setdefault(tours.tours, tours)
+    if len(found) < 2:
+        return list(found.values())
+    return sorted(found.values(), key=partial(path_cost_J, problem))

@@ -1,0 +1,90 @@
+"""The search over priorities finds an order wherever one is needed, on a toy model.
+
+Robots on a line of places; a motion is where a robot is at each step. Who must not meet
+another one leaves later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from mrmg.planning.path_following.coordination.priorities import search_priorities
+from mrmg.planning.path_following.coordination.traffic import Motion
+
+LONG = 40
+
+
+class Crossing:
+    """Robots that cross one place; `slow` ones need so many steps to it."""
+
+    def __init__(self, approach: Sequence[int], latest: Sequence[int]) -> None:
+        self.approach, self.latest = approach, latest
+
+    def motion(self, r: int, delay: int) -> Motion:
+        """Return robot r's motion that crosses `delay` steps later than it could."""
+        at = np.zeros((LONG, 5))
+        at[:, 0] = np.arange(LONG) - self.approach[r] - delay
+        return Motion(at, np.zeros((self.approach[r] + delay, 2)))
+
+    def crossing(self, motion: Motion) -> int:
+        """Return the step at which a motion crosses."""
+        return int(np.flatnonzero(motion.state[:, 0] == 0)[0])
+
+    def find(
+        self,
+        r: int,
+        motions: Sequence[Motion],
+        above: np.ndarray,
+        *,
+        yielding: bool = False,
+    ) -> Motion | None:
+        """Return the soonest motion that crosses when nobody above does."""
+        taken = {self.crossing(motions[i]) for i in np.flatnonzero(above)}
+        for delay in range(self.latest[r] + 1):
+            if self.approach[r] + delay not in taken:
+                return self.motion(r, delay)
+        return None
+
+    def conflicts(self, r: int, motions: Sequence[Motion]) -> np.ndarray:
+        """Return the step at which robot r crosses with each other one."""
+        own = self.crossing(motions[r])
+        conflict = [own if self.crossing(one) == own else np.inf for one in motions]
+        conflict[r] = np.inf
+        return np.array(conflict, float)
+
+
+@pytest.mark.parametrize(
+    ("approach", "latest"),
+    [
+        ([3, 3], [5, 0]),
+        ([3, 3], [0, 5]),
+        ([3, 3, 3, 3], [3, 2, 1, 0]),
+        ([3, 3, 4, 4], [2, 0, 3, 1]),
+    ],
+)
+def test_an_order_is_found_where_only_some_can_wait(
+    approach: list[int], latest: list[int]
+) -> None:
+    planning = Crossing(approach, latest)
+    alone = [planning.motion(r, 0) for r in range(len(approach))]
+    found = search_priorities(alone, planning, 100, np.zeros(1, bool))
+    assert found is not None
+    times = [planning.crossing(motion) for motion in found]
+    assert len(set(times)) == len(times)
+    for r, time in enumerate(times):
+        assert approach[r] <= time <= approach[r] + latest[r]
+
+
+def test_none_is_found_where_nobody_can_wait() -> None:
+    planning = Crossing([3, 3], [0, 0])
+    alone = [planning.motion(r, 0) for r in range(2)]
+    assert search_priorities(alone, planning, 100, np.zeros(1, bool)) is None
+
+
+def test_halted_it_finds_nothing() -> None:
+    planning = Crossing([3, 3], [5, 5])
+    alone = [planning.motion(r, 0) for r in range(2)]
+    assert search_priorities(alone, planning, 100, np.ones(1, bool)) is None

@@ -1,0 +1,55 @@
+"""Shortest curves lead where they should, and are as long as they say."""
+
+from __future__ import annotations
+
+from math import cos, hypot, pi, remainder, sin, tau
+
+import numpy as np
+
+from mrmg.planning.path_following.coordination._reeds_shepp_kernels import reeds_shepp
+
+
+def end_of(
+    start: float, radius: float, turn: np.ndarray, length: np.ndarray
+) -> np.ndarray:
+    """Return the pose that pieces lead to from the origin."""
+    x, y, heading = 0.0, 0.0, start
+    for side, way in zip(turn, length, strict=True):
+        after = heading + side * way / radius
+        if side == 0.0:
+            x, y = x + way * cos(heading), y + way * sin(heading)
+        else:
+            x += radius * side * (sin(after) - sin(heading))
+            y -= radius * side * (cos(after) - cos(heading))
+        heading = after
+    return np.array([x, y, heading])
+
+
+def test_curves_end_where_they_are_asked_to_and_are_no_longer_mirrored() -> None:
+    rng = np.random.default_rng(0)
+    turn, length = np.zeros(3), np.zeros(3)
+    found = 0
+    for _ in range(2000):
+        (dx, dy), (start, goal) = rng.uniform(-6, 6, 2), rng.uniform(-pi, pi, 2)
+        way = reeds_shepp(dx, dy, start, goal, 1.3, turn, length)
+        if not np.isfinite(way):
+            continue
+        found += 1
+        x, y, heading = end_of(start, 1.3, turn, length)
+        assert hypot(x - dx, y - dy) < 1e-6
+        assert abs(remainder(heading - goal, tau)) < 1e-6
+        assert abs(np.abs(length).sum() - way) < 1e-9
+        assert way >= hypot(dx, dy) - 1e-9
+        mirrored = reeds_shepp(dx, -dy, -start, -goal, 1.3, turn, length)
+        assert abs(mirrored - way) < 1e-6
+        back = reeds_shepp(-dx, -dy, goal, start, 1.3, turn, length)
+        assert back <= way + 1e-6
+    assert found > 1900
+
+
+def test_straight_ahead_and_back_are_straight() -> None:
+    turn, length = np.zeros(3), np.zeros(3)
+    for way in (5.0, -5.0):
+        found = reeds_shepp(way, 0.0, 0.0, 0.0, 1.0, turn, length)
+        assert abs(found - 5.0) < 1e-9
+        assert abs(length.sum() - way) < 1e-9

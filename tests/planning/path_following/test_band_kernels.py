@@ -1,0 +1,178 @@
+"""The cost of an elastic band and its gradient against closed forms."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mrmg.planning.path_following import _band_kernels, _relax_kernels
+from mrmg.planning.path_following._band_kernels import CostMap, Stops
+
+
+def cost_map(**changes: Any) -> CostMap:
+    """Return open, plain ground of 20 x 20 m."""
+    given = {
+        "x_min": 0.0,
+        "y_min": 0.0,
+        "cell": 0.25,
+        "distance": np.full((80, 80), 9.0),
+        "multiplier": np.ones((80, 80)),
+        "disc": np.array([0.1, 0.6, 1.1]),
+        "room": 0.9,
+        "curvature": 0.4,
+        "curvature_rate": 0.4,
+        "scrub": 0.3,
+    }
+    return CostMap(**{**given, **changes})
+
+
+def stops(*circles: tuple[int, float, float, float], deeper: float = 0.0) -> Stops:
+    """Return circular targets, each (node, x, y, radius)."""
+    n = len(circles)
+    return Stops(
+        node=np.array([c[0] for c in circles], np.int64),
+        center=np.array([c[1:3] for c in circles], float).reshape(-1, 2),
+        reach=np.array([c[3] for c in circles], float),
+        corner=np.zeros((n, 3, 2)),
+        corners=np.zeros(n, np.int64),
+        deeper=np.full(n, deeper),
+    )
+
+
+NO_PIVOT = np.zeros(40, np.bool_)
+"""Of paths that never turn on the spot."""
+
+
+def cost(ground: CostMap, marks: Stops, p: np.ndarray, gear: np.ndarray) -> Any:
+    """Return (cost, gradient) of a path that starts heading east."""
+    gradient = np.zeros_like(p)
+    shape = _band_kernels.new_shape(len(p) - 1)
+    value = _band_kernels.band_cost(
+        ground, marks, p, gear, NO_PIVOT[: len(gear)], 1.0, 0.0, shape, gradient
+    )
+    return value, gradient
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_gradient_is_that_of_the_cost(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n = 12
+    ground = cost_map(
+        distance=5.0 * rng.random((80, 80)), multiplier=1.0 + rng.random((80, 80))
+    )
+    marks = stops((4, 5.0, 5.0, 0.5), (9, 9.0, 9.0, 0.4), deeper=0.1)
+    marks.corner[1] = [[8, 8], [9, 8], [8.5, 9]]
+    marks.corners[1] = 3
+    p = 3.0 + np.cumsum(0.4 + 0.8 * rng.random((n, 2)), axis=0)
+    gear = np.where(np.arange(n - 1) < 6, 1, -1)
+    _, gradient = cost(ground, marks, p, gear)
+    slopes = np.zeros_like(p)
+    for i in range(1, n):
+        for j in range(2):
+            ends = []
+            for sign in (1.0, -1.0):
+                q = p.copy()
+                q[i, j] += sign * 1e-6
+                ends.append(cost(ground, marks, q, gear)[0])
+            slopes[i, j] = (ends[0] - ends[1]) / 2e-6
+    scale = np.abs(gradient).max()
+    assert np.abs(slopes - gradient).max() < 1e-6 * scale
+    assert gradient[0].tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("gear", [1, -1])
+def test_a_straight_way_costs_its_length(gear: int) -> None:
+    x = 10.0 + gear * np.arange(9.0)
+    p = np.stack([x, np.full(9, 5.0)], axis=1)
+    value, _ = cost(cost_map(), stops(), p, np.full(8, gear))
+    assert value == pytest.approx(8.0)
+
+
+def test_terrain_multiplies_the_length() -> None:
+    p = np.stack([np.arange(1.0, 10.0), np.full(9, 5.0)], axis=1)
+    ground = cost_map(multiplier=np.full((80, 80), 2.5))
+    value, _ = cost(ground, stops(), p, np.ones(8, np.int64))
+    assert value == pytest.approx(20.0)
+
+
+def test_an_arc_costs_length_and_scrub_and_more_beyond_the_limit() -> None:
+    angle = np.linspace(0.0, 0.5 * pi, 40)
+    costs = []
+    for radius in (4.0, 2.0):
+        p = np.stack(
+            [5 + radius * np.sin(angle), 5 + radius * (1 - np.cos(angle))], axis=1
+        )
+        ground = cost_map(curvature_rate=1e3)
+        value, _ = cost(ground, stops(), p, np.ones(39, np.int64))
+        costs.append(value - 0.5 * pi * radius)
+    assert 0.0 < costs[0] <= 0.3 * 0.5 * pi
+    # Radius 2 m bends by 0.5 / m where 0.4 / m is allowed.
+    over = _band_kernels.CURVATURE_WEIGHT * 0.25**2 * pi
+    assert costs[1] - costs[0] == pytest.approx(over, rel=0.05)
+
+
+def test_a_change_of_gear_turns_the_heading_not_the_way() -> None:
+    there = [(5.0 + 0.5 * i, 5.0) for i in range(9)]
+    back = there[-2::-1]
+    p = np.array(there + back)
+    gear = np.array([1] * 8 + [-1] * 8)
+    assert cost(cost_map(), stops(), p, gear)[0] == pytest.approx(8.0)
+    assert cost(cost_map(), stops(), p, np.ones(16, np.int64))[0] > 50.0
+
+
+def relaxed(ground: CostMap, marks: Stops, p: np.ndarray, gear: np.ndarray) -> Any:
+    node = p.copy()
+    value = _relax_kernels.relax(
+        ground, marks, node, gear, NO_PIVOT[: len(gear)], 1.0, 0.0, 400
+    )
+    return value, node
+
+
+def test_a_slack_band_becomes_straight() -> None:
+    x = np.linspace(2.0, 18.0, 21)
+    p = np.stack([x, 10.0 + 2.0 * np.sin(0.9 * x) * (x - 2.0) / 16.0], axis=1)
+    value, node = relaxed(cost_map(), stops((20, 18.0, 10.0, 0.5)), p, np.ones(20, int))
+    assert value == pytest.approx(15.5, abs=0.02)
+    assert np.abs(node[:, 1] - 10.0).max() < 0.1
+
+
+def test_a_band_round_a_disc_touches_it_and_no_more() -> None:
+    """About a disc of room 3 m the shortest way is two tangents and an arc."""
+    x, y = np.meshgrid((np.arange(80) + 0.5) * 0.25, (np.arange(80) + 0.5) * 0.25)
+    distance = np.hypot(x - 10.0, y - 10.0) - 2.0
+    ground = cost_map(distance=distance, disc=np.zeros(1), room=1.0, scrub=0.0)
+    angle = np.linspace(pi, 0.0, 31)
+    p = np.stack([10.0 + 8.0 * np.cos(angle), 10.0 + 4.5 * np.sin(angle)], axis=1)
+    p = np.concatenate([[[1.5, 10.0]], p])
+    ground = ground._replace(curvature=50.0, curvature_rate=500.0)
+    value, node = relaxed(ground, stops((31, 18.0, 10.0, 0.1)), p, np.ones(31, int))
+    reach = np.hypot(*(node - 10.0).T).min()
+    assert 2.8 < reach < 3.05
+    tangent = (8.5**2 - 9.0) ** 0.5 + (7.9**2 - 9.0) ** 0.5
+    arc = 3.0 * (pi - np.arccos(3 / 8.5) - np.arccos(3 / 7.9))
+    assert value == pytest.approx(tangent + arc, rel=0.02)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_relaxing_never_costs_more_and_keeps_the_start(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    angle = rng.uniform(0.0, 2.0 * pi)
+    p = 10.0 + np.cumsum(rng.normal(0.2, 0.5, (15, 2)), axis=0)
+    gear = rng.choice([1, -1], 14)
+    ground = cost_map(distance=np.cumsum(rng.normal(0.0, 0.1, (80, 80)), axis=1) + 1.5)
+    shape, gradient = _band_kernels.new_shape(14), np.zeros_like(p)
+    ux, uy = cos(angle), sin(angle)
+    before = _band_kernels.band_cost(
+        ground, stops(), p, gear, NO_PIVOT[:14], ux, uy, shape, gradient
+    )
+    node = p.copy()
+    after = _relax_kernels.relax(ground, stops(), node, gear, NO_PIVOT[:14], ux, uy, 50)
+    assert after <= before
+    assert node[0].tolist() == p[0].tolist()
+    again = _band_kernels.band_cost(
+        ground, stops(), node, gear, NO_PIVOT[:14], ux, uy, shape, gradient
+    )
+    assert again == after

@@ -1,0 +1,156 @@
+"""Drafts: plans along tours without a tree."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mrmg
+from mrmg.energy.metering import battery_profile
+from mrmg.motion._kernels import USER
+from mrmg.planning import PlannerParams
+from mrmg.planning.path_following.following import (
+    LEAST_SOC_MARGIN,
+    can_follow,
+    follow_tours,
+    path_cost_J,
+    tour_path,
+)
+from mrmg.planning.problem.problem import state_mission
+from mrmg.planning.routing.routing import solve_routing
+from mrmg.plans import Plan
+from mrmg.scene.types import Scene
+
+PARAMS = PlannerParams(samples=600)
+
+
+def followed(scene: Scene) -> list[Plan]:
+    problem = state_mission(scene, 0, PARAMS).with_soc_margin(LEAST_SOC_MARGIN)
+    tours = solve_routing(problem.mission.routing, PARAMS.router, 0)
+    return list(follow_tours(problem, PARAMS, tours, 0, np.zeros(1, np.bool_)))
+
+
+@pytest.mark.parametrize("name", ["quickstart", "scene2", "diffdrive"])
+def test_drafts_are_valid_plans_and_the_same_again(name: str) -> None:
+    scene = mrmg.load_scene(name)
+    plans = followed(scene)
+    assert plans
+    for plan in plans:
+        assert mrmg.verify(scene, plan).violations == ()
+    assert [plan.digest for plan in followed(scene)] == [plan.digest for plan in plans]
+
+
+@pytest.mark.parametrize("name", ["quickstart", "hills"])
+def test_drafts_leave_something_of_every_battery(name: str) -> None:
+    scene = mrmg.load_scene(name)
+    for plan in followed(scene):
+        for trajectory in plan.trajectories:
+            battery = scene.robot(trajectory.robot).battery
+            visits = [one for one in plan.visits if one.robot == trajectory.robot]
+            least_J = battery_profile(scene, trajectory, visits).min()
+            assert least_J >= battery.reserve_J + LEAST_SOC_MARGIN * battery.capacity_J
+
+
+def test_tours_are_judged_nearly_by_what_driving_takes() -> None:
+    scene = mrmg.load_scene("quickstart")
+    problem = state_mission(scene, 0, PARAMS)
+    tours = solve_routing(problem.mission.routing, PARAMS.router, 0)
+    best_J = min(plan.cost_J for plan in followed(scene))
+    assert 0.9 * best_J < path_cost_J(problem, tours) < 1.02 * best_J
+
+
+def test_a_car_backs_out_of_a_target_that_lies_at_a_sharp_turn(
+    yard: Callable[..., Scene],
+) -> None:
+    goals = [
+        {"id": "g1", "circle": {"center": [24, 10], "radius": 1.5}},
+        {"id": "g2", "circle": {"center": [10, 10], "radius": 1.5}},
+    ]
+    problem = state_mission(yard(goals=goals), 0, PARAMS)
+    path = tour_path(problem, 0, [0, 1])
+    assert set(path.gear[: path.stop[0]]) == {1}
+    assert set(path.gear[path.stop[0] :]) == {-1}
+    assert len(path.pivot) == 0
+
+
+OUT_AND_BACK = {
+    "goals": [
+        {"id": "g1", "circle": {"center": [24, 10], "radius": 1.5}},
+        {"id": "g2", "circle": {"center": [4, 10], "radius": 1.5}},
+    ],
+    "robots": [{"id": "r1", "model": "car", "pose": [19, 10, 0]}],
+}
+
+
+def reversing_s(plan: Plan) -> float:
+    return sum(float((t.state[:, 3] < -0.1).sum()) * t.dt_s for t in plan.trajectories)
+
+
+def test_where_time_counts_cars_turn_round_if_there_is_room(
+    yard: Callable[..., Scene],
+) -> None:
+    cheap = followed(yard(**OUT_AND_BACK))[-1]
+    scene = yard(**OUT_AND_BACK, objective="makespan")
+    soon = followed(scene)[-1]
+    assert mrmg.verify(scene, soon).ok
+    assert reversing_s(cheap) > 5.0
+    assert reversing_s(soon) < 1.0
+    assert soon.makespan_s < cheap.makespan_s
+
+
+def test_where_time_counts_cars_back_out_of_what_is_too_narrow(
+    yard: Callable[..., Scene],
+) -> None:
+    walls = [
+        {"box": {"center": [18, y], "size": [22, 1]}, "id": f"w{y}"} for y in (7, 13)
+    ]
+    scene = yard(**OUT_AND_BACK, obstacles=walls, objective="makespan")
+    plans = followed(scene)
+    assert plans
+    assert mrmg.verify(scene, plans[-1]).ok
+    assert reversing_s(plans[-1]) > 3.0
+
+
+def test_halted_it_gives_nothing(yard: Callable[..., Scene]) -> None:
+    problem = state_mission(yard(), 0, PARAMS)
+    tours = solve_routing(problem.mission.routing, PARAMS.router, 0)
+    halted = np.ones(1, np.bool_)
+    assert not list(follow_tours(problem, PARAMS, tours, 0, halted))
+
+
+SWAP = [
+    {
+        "id": name,
+        "model": "diffdrive",
+        "pose": [x, 10, yaw],
+        "finish": {
+            "circle": {"center": [30 - x, 10], "radius": 0.8},
+            "heading": heading,
+        },
+    }
+    for name, x, yaw, heading in (("a", 8, 0.0, 1.5), ("b", 22, np.pi, 3.1))
+]
+
+
+def test_robots_that_turn_on_the_spot_end_as_they_must(
+    yard: Callable[..., Scene],
+) -> None:
+    scene = yard(goals=[], robots=SWAP)
+    plans = followed(scene)
+    assert plans
+    assert mrmg.verify(scene, plans[-1]).violations == ()
+    for trajectory, heading in zip(plans[-1].trajectories, (1.5, 3.1), strict=True):
+        lacking = np.angle(np.exp(1j * (trajectory.state[-1, 2] - heading)))
+        assert abs(lacking) < 0.15
+
+
+def test_models_of_users_are_not_drafted(yard: Callable[..., Scene]) -> None:
+    problem = state_mission(yard(), 0, PARAMS)
+    assert can_follow(problem)
+    fleet = problem.mission.fleet.copy()
+    fleet["model"] = USER
+    mission = problem.mission._replace(fleet=fleet)
+    assert not can_follow(replace(problem, mission=mission))
