@@ -41,7 +41,8 @@ class AckermannChassis:
         steer = part_ids(model, joint, robots, parts.steer)
         self._steer_q = model.jnt_qposadr[steer]
         servos = part_ids(model, actuator, robots, parts.servos)
-        self._steer_ctrl = model.actuator_ctrladr[servos]
+        self._steer_ctrl = model.actuator_ctrladr[servos].ravel()
+        self._control = data.ctrl
         self._find_drives(robots)
         # A servo with stiffness kp and damping kv follows a ramp kv / kp late.
         servo = servos[:, 0]
@@ -82,12 +83,13 @@ class AckermannChassis:
         lag = self._servo_lag_s / (steps * self._step_s)
         share = (np.arange(steps) / steps)[:, None] + lag
         tan_steer = np.tan(w_from + share * (w_to - w_from))[:, :, None]
-        self._angles = np.arctan(tan_steer / (1.0 - self._swing * tan_steer))
-        self._drives.command((force_N / self._drive_count)[self._driven])
+        angles = np.arctan(tan_steer / (1.0 - self._swing * tan_steer))
+        self._angles = angles.reshape(steps, -1)
+        self._drives.command(force_N[self._driven] / self._drive_count)
 
     def apply(self, step: int) -> None:
         """Give the servos the angles of physics step `step`."""
-        self._data.ctrl[self._steer_ctrl] = self._angles[step]
+        self._control.put(self._steer_ctrl, self._angles[step])
 
     def _find_drives(self, robots: Sequence[Robot]) -> None:
         """Find `drive`, and what shares its work, of every robot."""
@@ -104,7 +106,7 @@ class AckermannChassis:
             ids += [own, *others]
             owners += [place] * (1 + len(others))
         self._driven = np.array(owners)
-        self._drive_count = np.bincount(self._driven)
+        self._drive_count = np.bincount(self._driven)[self._driven]
         self._drives = ForceDrives(
             self._model,
             self._data,

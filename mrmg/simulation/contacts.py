@@ -25,7 +25,7 @@ class ContactWatch:
     def look(self, data: mujoco.MjData) -> None:
         """Record which touches of the present state are new."""
         geoms = data.contact.geom
-        owners = self._owner[geoms]
+        owners = self._owner.take(geoms)
         # Most often there are but tyres on the floor.
         if owners.max(initial=-1) < 0:
             self._touching.clear()

@@ -47,10 +47,13 @@ class ForceDrives:
         self._gain = model.actuator_gainprm[ids, 0]
         # Constant and damping terms of an affine bias, which the control makes up for.
         self._bias = model.actuator_biasprm[ids][:, [0, 2]].T
+        self._biased = bool(self._bias.any())
         self._velocity, self._control = data.actuator_velocity, data.ctrl
 
     def command(self, force_N: np.ndarray) -> None:
         """Set the controls that give the traction forces `force_N`, shape (D,)."""
-        constant, damping = self._bias
-        bias = constant + damping * self._velocity[self._out]
-        self._control[self._ctrl] = (force_N / self._traction - bias) / self._gain
+        force = force_N / self._traction
+        if self._biased:
+            constant, damping = self._bias
+            force = force - constant - damping * self._velocity[self._out]
+        self._control[self._ctrl] = force / self._gain

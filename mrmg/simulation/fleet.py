@@ -94,17 +94,14 @@ class Fleet:
 
     def drive(
         self, force_N: np.ndarray, w_from: np.ndarray, w_to: np.ndarray, steps: int
-    ) -> np.ndarray:
-        """Run `steps` physics steps under held force and a ramp of steering.
+    ) -> None:
+        """Run a tick of `steps` physics steps under held force and a ramp of steering.
 
         Args:
             force_N: traction force at the driven axle, shape (R,).
             w_from: psi [rad] or omega [rad/s] at the start, shape (R,).
             w_to: psi or omega at the end, shape (R,).
             steps: number of physics steps.
-
-        Returns:
-            Work of the drives, driving (>= 0) and braking (<= 0) [J], shape (R, 2).
         """
         for group in self._groups:
             own = group.index
@@ -115,7 +112,6 @@ class Fleet:
                 group.chassis.apply(step)
             mujoco.mj_step(self._model, self._data)
             self.work.look()
-        return self.work.work_J()
 
     def _gather(self, parts: list[np.ndarray]) -> np.ndarray:
         """Return the groups' values in the scene's order, shape (R, ...)."""

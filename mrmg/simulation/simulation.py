@@ -139,7 +139,6 @@ class _Run:
         self._plant = plant_of(plant, world, self.data, disturbance)
         self._contacts = ContactWatch(world)
         self._recording = Recording()
-        self._work_J = np.zeros((len(world.scene.robots), 2))
         self._calls = ControllerCalls(len(world.scene.robots))
         self._ending = Ending(self.data, self._is_speed)
         self._fleet = Fleet(world, self.data)
@@ -180,14 +179,13 @@ class _Run:
         resistance = self._plant.resistance(ground, level)
         self._fleet.set_resistance(*resistance, believed_swing_N)
         self._plant.resist()
-        work = self._fleet.drive(force, steer_from, steer_to, STEPS_PER_TICK)
+        self._fleet.drive(force, steer_from, steer_to, STEPS_PER_TICK)
         self._clock.advance(self._period_s)
         self.ticks += 1
-        self._work_J = work
         self._observe()
         # A state that is no number ends the run; the log keeps what came before it.
         if self._sound:
-            self._recording.add(force_N=force, work_J=work)
+            self._recording.add(force_N=force)
             self._contacts.look(self.data)
             self._record()
 
@@ -203,7 +201,7 @@ class _Run:
             rate=self._clock.rate,
             state=self._sensing.state,
             planned=self._planned,
-            work_J=self._work_J,
+            work_J=self._fleet.work.work_J,
             ended=self._completed(),
         )
 
@@ -228,6 +226,8 @@ class _Run:
         scene, recording = self._world.scene, self._recording
         robots = len(scene.robots)
         state = recording.by_robot("state", robots)
+        force_N = recording.by_robot("force_N", robots)
+        work_J = self._fleet.work.work_J()[: force_N.shape[1]]
         return ExecutionLog(
             scene_digest=scene.digest,
             plan_digest=self._plan.digest,
@@ -248,8 +248,8 @@ class _Run:
             reference=recording.by_robot("reference", robots),
             command=recording.by_robot("command", robots),
             multiplier=np.stack([multiplier_at(scene, way) for way in state[..., :2]]),
-            force_N=recording.by_robot("force_N", robots),
-            work_J=recording.by_robot("work_J", robots),
+            force_N=force_N,
+            work_J=np.ascontiguousarray(work_J.swapaxes(0, 1)),
             balance_J=self._fleet.work.balance_J() if self._sound else None,
             qpos=recording.in_time("qpos"),
             contacts=tuple(self._contacts.contacts),

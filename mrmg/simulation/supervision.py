@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any, Protocol
 
@@ -44,7 +45,8 @@ class Observation:
         rate: plan seconds per simulated second.
         state: true (x, y, theta, v, psi), shape (R, 5).
         planned: the plan at `clock_s`, shape (R, 5).
-        work_J: work of the drives during the tick, driving and braking, shape (R, 2).
+        work_J: returns the work of the drives in every tick so far, driving and
+            braking, shape (n, R, 2).
         ended: whether the fleet is at rest after the end of its plan.
     """
 
@@ -53,7 +55,7 @@ class Observation:
     rate: float
     state: np.ndarray
     planned: np.ndarray
-    work_J: np.ndarray
+    work_J: Callable[[], np.ndarray]
     ended: bool
 
 

@@ -32,7 +32,7 @@ BALANCE_TERMS = ("steering", "kinetic", "potential", "joints", "contacts")
 """Columns of `WorkMeter.balance_J`: one more work, two gains, and two losses."""
 
 _BATCH_STEPS = 50
-"""Physics steps whose losses are summed at once: small arrays cost calls, not sums."""
+"""Physics steps that are summed at once: small arrays cost calls, not sums."""
 
 _DENSE_SIZE = 4096
 """Entries of a matrix up to which a dense product is quicker than picking columns."""
@@ -53,11 +53,12 @@ class WorkMeter:
         """Find the actuators of `robots`."""
         self._model, self._data = model, data
         self._step_s = model.opt.timestep
-        self._forces = _Buffer(_BATCH_STEPS, data.actuator_force)
-        self._constraint = _Buffer(_BATCH_STEPS, data.qfrc_constraint)
-        self._passive = _Buffer(_BATCH_STEPS, data.qfrc_passive)
-        self._velocity = _Buffer(_BATCH_STEPS + 1, data.qvel)
+        sources = (data.actuator_force, data.qfrc_constraint, data.qfrc_passive)
+        self._noted = [(np.zeros((_BATCH_STEPS, len(of))), of) for of in sources]
+        self._velocity = np.zeros((_BATCH_STEPS + 1, model.nv))
         self._friction_N = np.zeros((_BATCH_STEPS, model.nv + model.ntendon))
+        self._own_J: list[np.ndarray] = []
+        self._begun: list[int] = []
         roots = [model.body(f"{robot.id}/{CHASSIS}").rootid[0] for robot in robots]
         self._roots = np.array(roots)[:, None]
         own = (model.body_rootid[model.dof_bodyid] == self._roots).astype(float)
@@ -71,72 +72,70 @@ class WorkMeter:
 
     def restart(self) -> None:
         """Begin the balance anew, with the present state."""
-        self._done_J = np.zeros(self._buses.rows)
+        self._own_J.clear()
+        self._steered_J = np.zeros(len(self._roots))
         self._lost_J = np.zeros((2, len(self._roots)))  # in joints, in contacts
         self._stored_J = self._energy_J()
-        self._used = self._begun = 0
-        self._velocity.rows[0] = self._data.qvel
+        self._used, self._begun = 0, []
+        self._velocity[0] = self._data.qvel
 
     def start(self, steps: int) -> None:
-        """Prepare for at most 50 physics steps under the present friction losses."""
+        """Begin a tick of at most 50 physics steps, under the present friction."""
         if self._used + steps > _BATCH_STEPS:
-            self._sum_losses()
-        self._begun = self._used
-        rows = self._friction_N[self._used : self._used + steps]
-        rows[:, : self._model.nv] = self._model.dof_frictionloss
-        rows[:, self._model.nv :] = self._model.tendon_frictionloss
+            self._sum()
+        row, number = self._friction_N[len(self._begun)], self._model.nv
+        row[:number] = self._model.dof_frictionloss
+        row[number:] = self._model.tendon_frictionloss
+        self._begun.append(self._used)
 
     def look(self) -> None:
         """Note what was done in the physics step that has just been made."""
         step = self._used
-        self._forces.take(step)
-        self._constraint.take(step)
-        self._passive.take(step)
+        for rows, source in self._noted:
+            rows[step] = source
         self._used = step + 1
-        self._velocity.take(step + 1)
+        self._velocity[step + 1] = self._data.qvel
 
     def work_J(self) -> np.ndarray:
-        """Return driving (>= 0) and braking (<= 0) work since `start`, (R, 2).
+        """Return driving (>= 0) and braking (<= 0) work of each tick, (n, R, 2).
 
         The motors of a robot's driven wheels share a bus, as in the energy model: in a
         turn the outer one uses what the inner one gains by braking. All other drives
         count by themselves.
         """
-        rows = slice(self._begun, self._used)
-        speeds = self._speeds(self._velocity.rows[self._begun : self._used + 1])
-        ways = (0.5 * self._step_s) * (speeds[1:] + speeds[:-1])
-        forces = self._forces.rows[rows].take(self._outputs, axis=1)
-        work_J = self._buses(forces * ways)
-        both_J = np.empty((2, work_J.shape[1]))
-        np.add.reduce(np.maximum(work_J, 0.0), out=both_J[0])
-        np.add.reduce(np.minimum(work_J, 0.0), out=both_J[1])
-        self._done_J += both_J[0]
-        self._done_J += both_J[1]
-        return self._drives(both_J).T
+        self._sum()
+        return np.concatenate([np.empty((0, len(self._roots), 2)), *self._own_J])
 
     def balance_J(self) -> np.ndarray:
         """Return the terms of the balance since `restart`, (R, len(BALANCE_TERMS))."""
-        self._sum_losses()
+        self._sum()
         gained_J = self._energy_J() - self._stored_J
-        steering_J = self._steers(self._done_J[None])[0]
-        return np.stack([steering_J, *gained_J, *self._lost_J], axis=1)
+        return np.stack([self._steered_J, *gained_J, *self._lost_J], axis=1)
 
-    def _sum_losses(self) -> None:
-        """Add up the losses of the steps noted, and make room for others."""
-        used, velocity = self._used, self._velocity.rows
+    def _sum(self) -> None:
+        """Add up the work and the losses of the ticks noted, and make room."""
+        used, begun, velocity = self._used, self._begun, self._velocity
+        if not begun:
+            return
+        forces, constraint, passive = (rows[:used] for rows, _ in self._noted)
         ways = 0.5 * self._step_s * (velocity[1 : used + 1] + velocity[:used])
+        work_J = self._buses(forces.take(self._outputs, axis=1) * self._speeds(ways))
+        both_J = [
+            self._drives(np.add.reduceat(part(work_J, 0.0), begun, axis=0))
+            for part in (np.maximum, np.minimum)
+        ]
+        self._own_J.append(np.stack(both_J, axis=2))
+        self._steered_J += self._steers(work_J).sum(axis=0)
         # Friction slides, or does no work: its force is the loss, against the way.
         all_ways = np.concatenate([ways, self._tendons(ways)], axis=1)
-        rubbed_J = (self._friction_N[:used] * np.abs(all_ways)).sum(axis=0)
-        taken_J = [
-            -(forces.rows[:used] * ways).sum(axis=0)
-            for forces in (self._passive, self._constraint)
-        ]
+        slid = np.add.reduceat(np.abs(all_ways), begun, axis=0)
+        rubbed_J = (self._friction_N[: len(begun)] * slid).sum(axis=0)
+        taken_J = [-(force * ways).sum(axis=0) for force in (passive, constraint)]
         damped_J, constrained_J = self._by_robot(np.array(taken_J))
         (in_joints_J,) = self._rubbed_by_robot(rubbed_J[None])
         self._lost_J += damped_J + in_joints_J, constrained_J - in_joints_J
         velocity[0] = velocity[used]
-        self._used = self._begun = 0
+        self._used, self._begun = 0, []
 
     def _energy_J(self) -> np.ndarray:
         """Return kinetic and potential energy of each robot now, shape (2, R)."""
@@ -177,18 +176,6 @@ class WorkMeter:
         self._buses = _Sums(_marked(number, [(b, at) for at, b in enumerate(buses)]))
         self._drives = _Sums(_marked(fleet, drives, number))
         self._steers = _Sums(_marked(fleet, steers, number))
-
-
-class _Buffer:
-    """Rows of one of MuJoCo's arrays, step by step."""
-
-    __slots__ = ("_source", "rows")
-
-    def __init__(self, rows: int, source: np.ndarray) -> None:
-        self._source, self.rows = source, np.zeros((rows, len(source)))
-
-    def take(self, row: int) -> None:
-        self.rows[row] = self._source
 
 
 class _Sums:

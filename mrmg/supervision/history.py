@@ -23,14 +23,13 @@ class History:
         self._robots = [robot.id for robot in scene.robots]
         self._time_s = [0.0]
         self._state = [np.array([(*robot.pose, 0.0, 0.0) for robot in scene.robots])]
-        self._work_J: list[np.ndarray] = []
         self._metered = 0
 
     def add(self, now: Observation) -> None:
         """Record a tick."""
         self._time_s.append(now.time_s)
         self._state.append(now.state)
-        self._work_J.append(now.work_J)
+        self._work_J = now.work_J
 
     @property
     def unmetered_s(self) -> float:
@@ -39,11 +38,11 @@ class History:
 
     def feed(self, meters: Mapping[str, RobotMeter]) -> None:
         """Feed the meters, in the order of robots, with ticks they have not seen."""
-        start, self._metered = self._metered, len(self._work_J)
+        start, self._metered = self._metered, len(self._time_s) - 1
         if start == self._metered:
             return
         time_s = np.array(self._time_s[start:])
-        state, work_J = np.stack(self._state[start:]), np.stack(self._work_J[start:])
+        state, work_J = np.stack(self._state[start:]), self._work_J()[start:]
         for index, meter in enumerate(meters.values()):
             meter.add(time_s, state[:, index], work_J[:, index])
 

@@ -65,8 +65,8 @@ def test_a_mixed_fleet_is_read_in_the_scenes_order(driving: SimpleNamespace) -> 
         fleet.set_resistance(resistance[own], swing[own])
         still = np.zeros(len(own))
         for _ in range(20):
-            work = fleet.drive(force[own], still, w[own], 5)
-        return fleet.state(), fleet.axle_speed_m_s(), work
+            fleet.drive(force[own], still, w[own], 5)
+        return fleet.state(), fleet.axle_speed_m_s(), fleet.work.work_J()[-1]
 
     together = driven(driving.open_ground(poses, models=kinds), np.arange(4))
     for index, (kind, pose) in enumerate(zip(kinds, poses, strict=True)):

@@ -99,14 +99,13 @@ def test_turning_on_the_spot_takes_what_the_model_says(
     fleet.set_resistance(true.force_N(still + 1.0, still), true.swing_N)
     ramp = np.arange(50) / 50
     rates = np.concatenate([ramp, np.ones(950), ramp[::-1], np.zeros(50)])
-    work = np.zeros(2)
     for now, following in zip(rates, rates[1:], strict=False):
-        work += fleet.drive(still, still + now, still + following, 5)[0]
+        fleet.drive(still, still + now, still + following, 5)
         x, y, theta, v, omega = fleet.state()[0]
     assert theta == pytest.approx(rates.sum() * TICK_S, rel=0.005)
     assert np.hypot(x, y) < 0.01
     lost_J = model.turning_coefficient * model.mass_kg * 9.81 * model.track_m * theta
-    assert work.sum() == pytest.approx(lost_J, rel=0.01)
+    assert fleet.work.work_J().sum() == pytest.approx(lost_J, rel=0.01)
     assert abs(v) < 1e-3
     assert abs(omega) < 1e-2
 
