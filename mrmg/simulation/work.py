@@ -65,7 +65,7 @@ class WorkMeter:
         tendon = _tendon_moment(model)
         self._by_robot, self._tendons = _Sums(own), _Sums(tendon)
         self._rubbed_by_robot = _Sums(
-            np.concatenate([own, own @ (tendon != 0.0).T], axis=1)
+            np.concatenate([own, (own @ np.abs(tendon.T) > 0.0).astype(float)], axis=1)
         )
         self._find_actuators(robots)
         self.restart()
