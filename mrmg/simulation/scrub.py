@@ -15,6 +15,10 @@ lengthways (traction) and sideways (cornering). A wheel loses F sigma on each me
 
     sigma = 3 mu / c (1 - (1 - F / (mu N))^(1/3))
 
+Sideways the tyres of an axle slip alike and share its force by their loads. MuJoCo's
+rigid contacts know no such slip: wheels toed by a hair, as on the edges of a floor's
+facets, push against each other with all their grip, which no tyre of stiffness c would.
+
 Scrub, the drilling torque of a round patch of radius a that slides at sigma |v| while
 it spins at the yaw rate omega (Zhuravlev 1998, uniform pressure). It is greatest on the
 spot and fades in wide turns:
@@ -100,6 +104,7 @@ class ScrubbingTyres:
         self._tyres, self._owner = tyres, owner[roots[tyres]]
         self._spin = np.array([_spin_dof(model, int(geom)) for geom in tyres])
         self._rolls = self._spin != _NO_SPIN
+        self._axles = _axles(model, tyres, self._owner)
         self._yaw = np.array(
             [model.joint(f"{robot.id}/{ROOT}").dofadr[0] + 5 for robot in robots]
         )
@@ -166,14 +171,22 @@ class ScrubbingTyres:
         other = np.where(geoms[:, 0] == self._floor, geoms[:, 1], geoms[:, 0])
         tyre = np.where((geoms == self._floor).any(axis=1), self._tyre_of[other], -1)
         at = np.flatnonzero((tyre >= 0) & (row >= 0))
-        tyre, row, has_friction = tyre[at], row[at], contact.dim[at] > 1
-        number = len(self._tyres)
+        tyre, row, number = tyre[at], row[at], len(self._tyres)
         load_N = np.bincount(tyre, weights=efc_N[row], minlength=number)
-        last = len(efc_N) - 1
-        along_N = [efc_N[np.minimum(row + side, last)] for side in (1, 2)]
-        force_N = np.where(has_friction, np.hypot(*along_N), 0.0)
-        along = np.bincount(tyre, weights=force_N, minlength=number)
-        return np.array([load_N, along])
+        rows = np.minimum(row[:, None] + [1, 2], len(efc_N) - 1)
+        grip_N = np.where(contact.dim[at, None] > 1, efc_N[rows], 0.0)
+        grip_N = np.einsum(
+            "kc,kcx->kx", grip_N, contact.frame[at].reshape(-1, 3, 3)[:, 1:]
+        )
+        force_N = np.zeros((number, 3))
+        np.add.at(force_N, tyre, grip_N)
+        spin = self._model.dof_jntid[np.maximum(self._spin, 0)]
+        sideways_N = (force_N * self._data.xaxis[spin]).sum(axis=1)
+        ahead_N = np.sqrt(np.maximum((force_N**2).sum(axis=1) - sideways_N**2, 0.0))
+        axle_N = np.bincount(self._axles, weights=sideways_N)
+        carried_N = np.maximum(np.bincount(self._axles, weights=load_N), 1.0)
+        share = load_N / carried_N[self._axles]
+        return np.array([load_N, np.hypot(ahead_N, share * axle_N[self._axles])])
 
     def _speeds_m_s(self) -> np.ndarray:
         """Return how fast each tyre rolls; a caster as fast as its chassis, (n,)."""
@@ -194,3 +207,14 @@ def _spin_dof(model: mujoco.MjModel, geom: int) -> int:
         if model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE and across:
             return int(model.jnt_dofadr[joint])
     return _NO_SPIN
+
+
+def _axles(model: mujoco.MjModel, tyres: np.ndarray, owner: np.ndarray) -> np.ndarray:
+    """Return the axle of each tyre: those of one robot that lie side by side, (n,)."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    root = model.body_rootid[model.geom_bodyid[tyres]]
+    forward = data.xmat[root].reshape(-1, 3, 3)[:, :, 0]
+    ahead_m = ((data.geom_xpos[tyres] - data.xpos[root]) * forward).sum(axis=1)
+    places = np.stack([owner, ahead_m.round(2)], axis=1)
+    return np.unique(places, axis=0, return_inverse=True)[1].ravel()

@@ -121,6 +121,20 @@ def test_a_radian_of_a_tight_turn_costs_more_than_one_of_a_wide_turn(
     assert 0.0 < wide < 0.85 * tight
 
 
+def test_wheels_toed_on_the_facets_of_a_hollow_lose_no_more_than_on_a_plain(
+    driving: SimpleNamespace,
+) -> None:
+    """In MuJoCo the front wheels push against each other there with all their grip."""
+    height_m = 0.32 * np.cos(2.0 * np.pi / 20.0 * np.arange(-60.0, 61.0))
+    controls = driving.straight(20.0, 1.2, 0.5)
+    lost_J = []
+    for parts in ({}, {"elevation": {"grid": [height_m.tolist()] * 2}}):
+        _, log = driven(driving, controls, **parts)
+        assert log.balance_J is not None
+        lost_J.append(log.balance_J[0, 3])
+    assert lost_J[1] == pytest.approx(lost_J[0], rel=0.03)
+
+
 def test_the_balance_holds_and_the_log_names_the_plant(
     driving: SimpleNamespace,
 ) -> None:
