@@ -45,10 +45,12 @@ def run(options: argparse.Namespace) -> int:
 def _scene(options: argparse.Namespace) -> Scene:
     """Return the scene of the command line, and warn of what it may not mean."""
     from mrmg.scene.loading import heading_hints, load_scene
+    from mrmg.scene.slopes import bend_warnings
 
     scene = load_scene(options.scene, trust_code=options.trust_code)
     more = f"mrmg scene check {shlex.quote(options.scene)}"
-    terminal.print_warnings(heading_hints(options.scene), more=more)
+    warnings = [*heading_hints(options.scene), *bend_warnings(scene)]
+    terminal.print_warnings(warnings, more=more)
     return scene
 
 

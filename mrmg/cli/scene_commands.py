@@ -58,6 +58,7 @@ def check(options: argparse.Namespace) -> int:
     from mrmg.planning.feasibility import mission_warnings
     from mrmg.runs.pipeline import rehearse
     from mrmg.scene.loading import heading_hints, load_scene
+    from mrmg.scene.slopes import bend_warnings
 
     warnings = heading_hints(options.scene)
     try:
@@ -69,6 +70,7 @@ def check(options: argparse.Namespace) -> int:
         else:
             terminal.print_warnings(warnings)
         raise
+    warnings += bend_warnings(scene)
     warnings += [Fault("", message) for message in mission_warnings(scene)]
     if options.json:
         _print_findings([], warnings, notes)

@@ -91,6 +91,21 @@ class Elevation:
             np.maximum(along[:, :-1], along[:, 1:]),
         )
 
+    def bends(self) -> np.ndarray:
+        """Return how much the slope changes at each node, at its most, shape (ny, nx).
+
+        It changes between the cells to both sides, or the nearest metre of them.
+        """
+        bend = np.zeros(self.height_m.shape)
+        for axis, cell_m in zip((1, 0), self.cell_m, strict=True):
+            reach = max(1, round(1.0 / cell_m))
+            height = np.moveaxis(self.height_m, axis, 0)
+            change = height[: -2 * reach] - 2.0 * height[reach:-reach]
+            change = np.abs(change + height[2 * reach :]) / (reach * cell_m)
+            inner = np.moveaxis(bend, axis, 0)[reach:-reach]
+            np.maximum(inner, change, out=inner)
+        return bend
+
     def cell_centres(self) -> np.ndarray:
         """Return the middle of each cell [m], shape (ny - 1, nx - 1, 2)."""
         x_min, y_min, _, _ = self.bounds

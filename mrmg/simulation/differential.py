@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from mrmg.energy.model import GRAVITY_M_S2
 from mrmg.scene.driven_parts import CHASSIS, PARTS, ROOT
 from mrmg.scene.types import Robot
 from mrmg.simulation.chassis import part_ids
@@ -21,6 +22,9 @@ from mrmg.simulation.drive import DriveParams, axle_grip_N
 from mrmg.simulation.driven_wheels import DrivenWheels
 from mrmg.simulation.drives import ForceDrives
 from mrmg.simulation.speed_loop import SpeedLoop
+
+_LEVEL = 1e-3
+"""Cross slope that dry friction holds."""
 
 
 class DifferentialChassis:
@@ -52,7 +56,9 @@ class DifferentialChassis:
         grip_N = params.grip_share * np.array([axle_grip_N(item) for item in models])
         spin = np.array([item.wheel_inertia_kg_m2 for item in models])
         wheels_kg_m2 = 0.5 * spin * (self._track_m / self._wheels.radius_m) ** 2
-        yaw_kg_m2, self._lead_kg_m = self._inertia_about_axle(robots)
+        body = part_ids(model, mujoco.mjtObj.mjOBJ_BODY, robots, (CHASSIS,))
+        self._body = body[:, 0]
+        yaw_kg_m2, self._lead_kg_m = self._inertia_about_axle()
         self._loop = SpeedLoop(
             inertia=yaw_kg_m2 + wheels_kg_m2,
             # Errors of the resistance to turning must be within reach, too.
@@ -85,15 +91,19 @@ class DifferentialChassis:
     ) -> None:
         """Hold the traction force, and the moment that follows the ramp of omega."""
         speed = self._wheel_speed_m_s()
+        # The vertical part of the axle: 0 on level ground, but for the tyres' give.
+        cross_slope = self._data.xmat[self._body, 7]
         moment_Nm = self._loop.force(
             (speed[:, 1] - speed[:, 0]) / self._track_m,
             w_from,
             w_to,
             self._turning_Nm,
             steps * self._model.opt.timestep,
+            brakes=np.abs(cross_slope) > _LEVEL,
         )
-        # A mass ahead of the axle wants to go straight on.
+        # A mass ahead of the axle wants to go straight on, and down a cross slope.
         moment_Nm += self._lead_kg_m * speed.mean(axis=1) * 0.5 * (w_from + w_to)
+        moment_Nm += self._lead_kg_m * GRAVITY_M_S2 * cross_slope
         swing_N = moment_Nm / self._track_m
         wheels_N = 0.5 * force_N[:, None] + np.stack([-swing_N, swing_N], axis=1)
         self._drives.command(wheels_N.ravel())
@@ -105,20 +115,17 @@ class DifferentialChassis:
         """Return the speed each wheel rolls at, left and right, shape (K, 2)."""
         return np.asarray(self._wheels.rate_rad_s() * self._wheels.radius_m[:, None])
 
-    def _inertia_about_axle(
-        self, robots: Sequence[Robot]
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def _inertia_about_axle(self) -> tuple[np.ndarray, np.ndarray]:
         """Return yaw inertias about the axles' middles, and masses times their leads.
 
         Returns:
             Inertia of each robot as a rigid body [kg m^2], shape (K,), and mass times
             the distance by which its centre is ahead of the axle [kg m], shape (K,).
         """
-        model, still = self._model, mujoco.MjData(self._model)
+        model, still, body = self._model, mujoco.MjData(self._model), self._body
         mujoco.mj_forward(model, still)
         inertia = np.zeros((model.nv, model.nv))
         mujoco.mj_fullM(model, still, inertia)
-        body = part_ids(model, mujoco.mjtObj.mjOBJ_BODY, robots, (CHASSIS,))[:, 0]
         forward = still.xmat[body].reshape(-1, 3, 3)[:, :, 0]
         lead_m = ((still.subtree_com[body] - still.xpos[body]) * forward).sum(axis=1)
         return inertia[self._yaw_v, self._yaw_v], model.body_subtreemass[body] * lead_m

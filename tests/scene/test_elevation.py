@@ -7,6 +7,8 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 
 from mrmg.scene.elevation import Elevation
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.slopes import bend_warnings
 
 BOUNDS = (-3.0, 2.0, 9.0, 10.0)
 
@@ -100,3 +102,27 @@ def test_the_slope_at_one_point_is_that_of_many(rough: Elevation) -> None:
 def test_a_place_that_is_no_number_has_some_slope(rough: Elevation) -> None:
     """A simulation that diverged is ended by whoever looks at its state."""
     assert np.shape(rough.slope_at(np.nan, np.nan)) == (2,)
+
+
+@pytest.mark.parametrize("fine", [1, 8])
+@pytest.mark.parametrize(("slope", "warned"), [(0.09, False), (0.17, True)])
+def test_ground_that_bends_sharply_is_warned_of_with_its_limit(
+    fine: int, slope: float, warned: bool
+) -> None:
+    """Level up to x = 10 and rising from there, whatever the cells: 2 m or 0.25 m."""
+    x = np.linspace(0.0, 20.0, 10 * fine + 1)
+    document = {
+        "format": 1,
+        "name": "kink",
+        "bounds": [0, 0, 20, 20],
+        "elevation": {"grid": [(slope * np.maximum(x - 10.0, 0.0)).tolist()] * 2},
+        "robots": [{"id": "r1", "model": "car", "pose": [3, 10, 0]}],
+    }
+    scene = scene_from_document(document, source="kink", base=None)
+    found = [str(fault) for fault in bend_warnings(scene)]
+    assert bool(found) == warned
+    if warned:
+        assert "the slope changes by 17 % at (10.0, " in found[0]
+        assert "more than 10 %" in found[0]
+    wall = {"id": "w", "polygon": [[8, 0], [12, 0], [12, 20], [8, 20]]}
+    assert not bend_warnings(scene.with_(obstacles=[wall]))

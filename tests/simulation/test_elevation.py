@@ -224,3 +224,18 @@ def test_marks_lie_on_the_ground(driving: SimpleNamespace) -> None:
         there = {tuple(edge) for edge in edges.tolist()}
         assert len(there) == len(edges)
         assert {edge[::-1] for edge in there} == there
+
+
+@pytest.mark.parametrize("model", ["diffdrive", "husky"])
+def test_a_differential_drive_crosses_a_slope_and_stands_on_it(
+    driving: SimpleNamespace, model: str
+) -> None:
+    """Its mass ahead of the axle pulls it downhill: that neither turns nor costs."""
+    across = {"grid": [[-10.2] * 2, [10.2] * 2]}  # 17 %
+    scene = driving.open_ground([(-10.0, 0.0, 0.0)], models=[model], elevation=across)
+    log, planned_J, measured_J = driven(
+        driving, scene, driving.straight(14.0, 0.8, 0.4)
+    )
+    assert measured_J == pytest.approx(planned_J, rel=0.01)
+    assert np.abs(log.state[0, :, 1]).max() < 0.02
+    assert np.abs(log.state[0, :, 2]).max() < 0.02
