@@ -103,8 +103,8 @@ class WorkMeter:
         turn the outer one uses what the inner one gains by braking. All other drives
         count by themselves.
         """
-        self._sum()
-        return np.concatenate([np.empty((0, len(self._roots), 2)), *self._own_J])
+        # What is noted is not summed up: asking changes no bit of the balance.
+        return np.concatenate([*self._own_J, self._by_tick(self._noted_work_J())])
 
     def balance_J(self) -> np.ndarray:
         """Return the terms of the balance since `restart`, (R, len(BALANCE_TERMS))."""
@@ -117,25 +117,39 @@ class WorkMeter:
         used, begun, velocity = self._used, self._begun, self._velocity
         if not begun:
             return
-        forces, constraint, passive = (rows[:used] for rows, _ in self._noted)
-        ways = 0.5 * self._step_s * (velocity[1 : used + 1] + velocity[:used])
-        work_J = self._buses(forces.take(self._outputs, axis=1) * self._speeds(ways))
-        both_J = [
-            self._drives(np.add.reduceat(part(work_J, 0.0), begun, axis=0))
-            for part in (np.maximum, np.minimum)
-        ]
-        self._own_J.append(np.stack(both_J, axis=2))
+        ways, work_J = self._ways(), self._noted_work_J()
+        self._own_J.append(self._by_tick(work_J))
         self._steered_J += self._steers(work_J).sum(axis=0)
         # Friction slides, or does no work: its force is the loss, against the way.
         all_ways = np.concatenate([ways, self._tendons(ways)], axis=1)
         slid = np.add.reduceat(np.abs(all_ways), begun, axis=0)
         rubbed_J = (self._friction_N[: len(begun)] * slid).sum(axis=0)
-        taken_J = [-(force * ways).sum(axis=0) for force in (passive, constraint)]
-        damped_J, constrained_J = self._by_robot(np.array(taken_J))
+        taken_J = [-(rows[:used] * ways).sum(axis=0) for rows, _ in self._noted[1:]]
+        constrained_J, damped_J = self._by_robot(np.array(taken_J))
         (in_joints_J,) = self._rubbed_by_robot(rubbed_J[None])
         self._lost_J += damped_J + in_joints_J, constrained_J - in_joints_J
         velocity[0] = velocity[used]
         self._used, self._begun = 0, []
+
+    def _ways(self) -> np.ndarray:
+        """Return the way of each joint in the steps noted, (steps, nv)."""
+        velocity = self._velocity[: self._used + 1]
+        return np.asarray(0.5 * self._step_s * (velocity[1:] + velocity[:-1]))
+
+    def _noted_work_J(self) -> np.ndarray:
+        """Return the work on each bus in the steps noted, (steps, buses)."""
+        forces = self._noted[0][0][: self._used].take(self._outputs, axis=1)
+        return self._buses(forces * self._speeds(self._ways()))
+
+    def _by_tick(self, work_J: np.ndarray) -> np.ndarray:
+        """Return driving and braking work of the drives in each tick, (n, R, 2)."""
+        if not self._begun:
+            return np.empty((0, len(self._roots), 2))
+        both_J = [
+            self._drives(np.add.reduceat(part(work_J, 0.0), self._begun, axis=0))
+            for part in (np.maximum, np.minimum)
+        ]
+        return np.stack(both_J, axis=2)
 
     def _energy_J(self) -> np.ndarray:
         """Return kinetic and potential energy of each robot now, shape (2, R)."""
