@@ -99,8 +99,8 @@ def verify(options: argparse.Namespace) -> int:
 
     work = _make(options, Step.VERIFY)
     verdict = work.folder.read_json("verdict.json", remedy="mrmg verify")
-    lines = ["valid" if verdict["ok"] else "not valid:"]
-    lines += [f"  {violation['message']}" for violation in verdict["violations"]]
+    found = [violation["message"] for violation in verdict["violations"]]
+    lines = terminal.because("valid" if verdict["ok"] else "not valid", found)
     _print(options, verdict, "\n".join(lines))
     return ExitCode.OK if verdict["ok"] else ExitCode.MISSION_FAILED
 
@@ -115,8 +115,7 @@ def execute(options: argparse.Namespace) -> int:
     events = [f"{item['time_s']:>7.1f} s  {item['message']}" for item in log["events"]]
     account = work.account(work.plan_in_force(), work.log())
     lines = [
-        f"{ended}, {len(log['contacts'])} contacts",
-        *(f"  {reason}" for reason in account.reasons),
+        *terminal.because(f"{ended}, {len(log['contacts'])} contacts", account.reasons),
         *events,
         f"  {note}",
     ]
@@ -170,8 +169,8 @@ def audit(options: argparse.Namespace) -> int:
 
     work = _make(options, Step.AUDIT, **given(options))
     account = work.folder.read_json("audit.json", remedy="mrmg audit")
-    lines = ["mission done" if account["mission_ok"] else "mission failed:"]
-    lines += [f"  {reason}" for reason in account["reasons"]]
+    outcome = "mission done" if account["mission_ok"] else "mission failed"
+    lines = terminal.because(outcome, account["reasons"])
     _print(options, account, "\n".join(lines))
     return ExitCode.OK if account["mission_ok"] else ExitCode.MISSION_FAILED
 

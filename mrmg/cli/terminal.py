@@ -171,9 +171,17 @@ def print_table(rows: Sequence[Sequence[str]]) -> None:
         print("  ".join(cells).rstrip())
 
 
+def because(outcome: str, reasons: Sequence[str]) -> list[str]:
+    """Return lines of an outcome: its first reason in the first one, others below."""
+    first = ": ".join([outcome, *reasons[:1]])
+    return [first, *(f"  {reason}" for reason in reasons[1:])]
+
+
 def print_summary(summary: dict[str, Any], reason: str) -> None:
     """Print the outcome of a run in a few lines."""
     outcome = "done" if summary["mission_ok"] else f"not done ({summary['status']})"
+    if summary["verdict"] and not summary["mission_ok"]:
+        outcome = "failed"
     why = f"; {reason}" if reason else ""
     print(f"{summary['scene']}, seed {summary['seed']}: mission {outcome}{why}")
     for line in _summary_lines(summary):

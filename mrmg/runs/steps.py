@@ -126,18 +126,30 @@ class Run:
         return ExecutionLog.load(self.folder.path)
 
     def account(self, plan: Plan, log: ExecutionLog) -> EnergyAudit:
-        """Return the audit of a drive of `plan`, the plan in force."""
+        """Return the audit of the drive in the folder, made once for its files.
+
+        Args:
+            plan: in force at its end.
+            log: of the drive.
+        """
         from mrmg.energy.audit import audit
 
         decided = self.arguments.deciding("audit")
-        return audit(self.scene, plan, log, **decided)
+        files = [self.folder.content(step) for step in (Step.PLAN, Step.EXECUTE)]
+        made_of = storage.canonical_json([self.scene.digest, decided, files])
+        if made_of not in _last_audit:
+            _last_audit.clear()
+            _last_audit[made_of] = audit(self.scene, plan, log, **decided)
+        return _last_audit[made_of]
 
     def reason(self) -> str:
         """Return why there is no plan, or why the mission failed; "" if it did not."""
         if self.status() is not PlanStatus.SOLVED or not self.folder.holds(Step.AUDIT):
             return str(self.planning()["reason"])
+        verdict = self.folder.read_json("verdict.json", remedy="mrmg verify")
         account = self.folder.read_json("audit.json", remedy="mrmg audit")
-        return "; ".join(account["reasons"])
+        broken = [violation["message"] for violation in verdict["violations"][:1]]
+        return "; ".join([*broken, *account["reasons"]])
 
     def summary(self) -> dict[str, Any]:
         """Return the content of `summary.json`."""
@@ -169,6 +181,10 @@ def taken_up(
         folder=folder,
         on_progress=on_progress,
     )
+
+
+_last_audit: dict[str, EnergyAudit] = {}
+"""The last audit by all that it was made of; several steps of a run need it."""
 
 
 @cache
