@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from markupsafe import Markup
+from matplotlib.ticker import MaxNLocator
 
 from mrmg.plans import Plan
 from mrmg.report.page import rendered
@@ -128,22 +128,10 @@ def _shares(row: TimelineRow) -> str:
 
 
 def _ticks(end_s: float) -> list[dict[str, str]]:
-    step_s = _step(end_s)
-    texts = [f"{number * step_s:g} s" for number in range(int(end_s / step_s) + 1)]
+    places = MaxNLocator(_MOST_TICKS, steps=(1, 2, 5, 10)).tick_values(0.0, end_s)
     return [
-        {
-            "left": _inside(100 * number * step_s / end_s, text_width_em(text)),
-            "text": text,
-        }
-        for number, text in enumerate(texts)
+        {"left": _inside(100 * at_s / end_s, text_width_em(text)), "text": text}
+        for at_s in places
+        for text in [f"{at_s:g} s"]
+        if at_s <= end_s
     ]
-
-
-def _step(end_s: float) -> float:
-    """Return the least of 1, 2, 5, 10, ... that divides the axis into a few pieces."""
-    power = 10.0 ** math.floor(math.log10(end_s / _MOST_TICKS))
-    return next(
-        factor * power
-        for factor in (1.0, 2.0, 5.0, 10.0)
-        if end_s / (factor * power) <= _MOST_TICKS
-    )

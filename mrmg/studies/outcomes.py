@@ -31,7 +31,6 @@ ROBUSTNESS_FORMAT = 1
 ROBUSTNESS_FILE = "robustness.json"
 
 CONFIDENCE = 0.95
-_Z = 1.959963984540054
 
 _QUANTILES = {"p05": 0.05, "median": 0.5, "p95": 0.95}
 
@@ -226,12 +225,10 @@ def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
         successes: between 0 and `trials`.
         trials: at least 1.
     """
-    share, spread = successes / trials, _Z * _Z / trials
-    middle = share + spread / 2.0
-    half = (spread * (share * (1.0 - share) + spread / 4.0)) ** 0.5
-    low, high = ((middle + side) / (1.0 + spread) for side in (-half, half))
-    # Rounding must not turn "none" and "all" into something more certain.
-    return max(low, 0.0), min(high, 1.0)
+    from scipy.stats import binomtest  # which takes long to import
+
+    found = binomtest(successes, trials).proportion_ci(CONFIDENCE, method="wilson")
+    return float(found.low), float(found.high)
 
 
 def save_study(folder: Path, scene: Scene, plan: Plan, study: Study) -> None:
