@@ -383,6 +383,48 @@ def test_stated_battery_content_must_be_the_recomputed_one(case: Any) -> None:
     assert kinds(verify(scene, replace(plan, visits=(rich,)))) == {Kind.VISIT}
 
 
+def test_stated_visits_are_at_their_time(case: Any) -> None:
+    scene, plan = case()
+    late = replace(plan.visits[0], time_s=plan.visits[0].time_s + 0.05)
+    violation = only(verify(scene, replace(plan, visits=(late,))), Kind.VISIT)
+    assert violation.amount == pytest.approx(0.05)
+
+
+def test_a_tour_with_a_target_that_is_none_is_refused(case: Any) -> None:
+    scene, plan = case()
+    verdict = verify(scene, replace(plan, tours={"r1": ("g", "nowhere")}))
+    violation = only(verdict, Kind.TOUR)
+    assert violation.message == (
+        "r1: the tour names nowhere, which the scene does not have"
+    )
+
+
+def test_a_robot_that_turns_on_the_spot_ends_without_turning(
+    make_scene: Any, make_plan: Any
+) -> None:
+    robot = {"id": "r1", "model": "diffdrive", "pose": [5, 10, 0]}
+    scene = make_scene(goals=[], robots=[robot])
+    plan = make_plan(scene, {"r1": [(0.0, 0.5), (0.0, 0.5)]}, {"r1": ()})
+    violation = only(verify(scene, plan), Kind.FINAL_REST)
+    assert violation.amount == pytest.approx(0.1)
+    assert "omega" in violation.message
+
+
+@pytest.mark.parametrize(("heading_rad", "amount"), [(0.05, None), (0.5, 0.4)])
+def test_a_finish_has_a_heading(
+    heading_rad: float, amount: float | None, case: Any
+) -> None:
+    scene, plan = case()
+    end = plan.trajectories[0].state[-1, :2]
+    region = Region(center=end, radius_m=0.1, corners=np.zeros((0, 2)))
+    finish = Finish(region=region, heading_rad=heading_rad, heading_tolerance_rad=0.1)
+    robot = replace(scene.robots[0], finish=finish)
+    verdict = verify(*asked(scene, plan, robots=(robot,)))
+    assert verdict.ok == (amount is None)
+    if amount is not None:
+        assert only(verdict, Kind.FINISH).amount == pytest.approx(amount)
+
+
 @settings(
     max_examples=150,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
