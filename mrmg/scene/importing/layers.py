@@ -130,7 +130,12 @@ def scene_of_layers(
         document["elevation"] = _elevation(heights)
     used: set[str] = {str(entry.get("id")) for entry in document["obstacles"]}
     used |= {str(entry.get("id")) for entry in document["terrain"]}
-    solid = shapely.union_all([area.shape for area in obstacles])
+    solid = shapely.disjoint_subset_union_all(
+        [area.shape for area in obstacles if "blocks" not in area.entry]
+    )
+    if box.difference(solid).area <= _SLIVER_M2:
+        message = "no free ground is left; --unknown free opens what was never seen"
+        raise SceneError(name, [Fault("obstacles", message)])
     for section in ("goals", "stations", "robots"):
         entries = [entry for layer in layers for entry in getattr(layer, section)]
         fitting = [
@@ -152,22 +157,32 @@ def _bounds(name: str, layers: Sequence[Layer], options: ImportOptions) -> Box:
     heights = next((layer.heights for layer in layers if layer.heights), None)
     if heights is not None:
         return heights.bounds
-    if options.crop is not None:
-        return layers[0].frame.box(options.crop, layers[0].crs)
-    stated = [layer.bounds for layer in layers if layer.bounds]
-    if stated:
-        low, high = np.array(stated)[:, :2], np.array(stated)[:, 2:]
-        return (*low.min(axis=0).tolist(), *high.max(axis=0).tolist())
-    shapes = [area.shape for layer in layers for area in layer.obstacles]
-    shapes += [area.shape for layer in layers for area in layer.terrain]
-    places = [
-        _point(entry).buffer(PLACE_MARGIN_M)
-        for layer in layers
-        for entry in (*layer.goals, *layer.stations, *layer.robots)
-    ]
-    if not shapes and not places:
+    shown = [shapely.box(*layer.bounds) for layer in layers if layer.bounds]
+    states_bounds = bool(shown)
+    if not states_bounds:
+        areas = [
+            area for layer in layers for area in (*layer.obstacles, *layer.terrain)
+        ]
+        shown = [area.shape for area in areas] + [
+            _point(entry).buffer(PLACE_MARGIN_M)
+            for layer in layers
+            for entry in (*layer.goals, *layer.stations, *layer.robots)
+        ]
+    if not shown:
         raise SceneError(name, [Fault("", "holds nothing that a scene could show")])
-    x_min, y_min, x_max, y_max = shapely.total_bounds([*shapes, *places]).tolist()
+    whole = shapely.box(*shapely.total_bounds(shown))
+    if options.crop is None:
+        return _box_of(whole)
+    cropped = shapely.box(*layers[0].frame.box(options.crop, layers[0].crs))
+    if not cropped.intersection(whole).area:
+        extent = ", ".join(f"{value:g}" for value in whole.bounds)
+        message = f"{options.crop} lies beside the map, which covers {extent} in metres"
+        raise SceneError(name, [Fault("--crop", message)])
+    return _box_of(cropped.intersection(whole) if states_bounds else cropped)
+
+
+def _box_of(shape: BaseGeometry) -> Box:
+    x_min, y_min, x_max, y_max = shape.bounds
     return x_min, y_min, x_max, y_max
 
 

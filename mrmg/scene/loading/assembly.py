@@ -318,7 +318,7 @@ class Assembly:
 
     def _regions(self, section: str) -> Iterator[tuple[Any, Region]]:
         walls = [wall.shape for wall in self.obstacles if wall.blocks is None]
-        blocked = shapely.union_all(walls)
+        blocked = shapely.disjoint_subset_union_all(walls)
         for _, path, entry in self._entries(section):
             region = region_of(entry, path)
             if isinstance(region, list):

@@ -99,7 +99,7 @@ def read_map(path: Path, options: ImportOptions) -> Layer:
         f"{int(grid.occupied.sum())} occupied cells and {int(unknown.sum())} unknown "
         f"ones (taken as {options.unknown}) became {len(shapes)} polygons, which reach "
         f"at most {tolerance_m:.3g} m beyond their cells",
-        *_notes(path, grid),
+        *_notes(grid),
     ]
     between = (grid.occupancy > 0) & ~grid.occupied
     if between.any():
@@ -128,7 +128,7 @@ def read_keepout(path: Path, options: ImportOptions, known: Sequence[Layer]) -> 
     return Layer(
         frame=options.frame or Frame(),
         obstacles=[Area(shape, {"id": "keepout"}) for shape in shapes],
-        notes=[note, *_notes(path, grid)],
+        notes=[note, *_notes(grid)],
     )
 
 
@@ -171,15 +171,15 @@ def read_mask(path: Path, options: ImportOptions, known: Sequence[Layer]) -> Lay
         frame=options.frame or Frame(),
         obstacles=[Area(grid.placed(s), {"id": "closed"}) for s in closed],
         terrain=terrain,
-        notes=[*notes, *_notes(path, grid)],
+        notes=[*notes, *_notes(grid)],
     )
 
 
-def _notes(path: Path, grid: OccupancyGrid) -> list[str]:
+def _notes(grid: OccupancyGrid) -> list[str]:
     document = grid.document
     lacking = [key for key in _ASSUMED if key not in document.model_fields_set]
     assumed = ", ".join(f"{key} {getattr(document, key)}" for key in lacking)
-    return [f"{path.name} leaves out {assumed}: assumed"] if lacking else []
+    return [f"states not all of its keys; assumed: {assumed}"] if lacking else []
 
 
 def read_grid(path: Path) -> OccupancyGrid:
