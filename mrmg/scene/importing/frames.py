@@ -76,7 +76,7 @@ class Frame:
 
 
 def frame_of(crs: str | None, points: Any) -> Frame:
-    """Return the frame for a first file: its own metres, or the UTM zone it is in.
+    """Return the frame of a first file: its own metres, or the UTM zone it is in.
 
     Args:
         crs: of the file; None for local metres.
@@ -131,11 +131,8 @@ def _utm(crs: str, points: np.ndarray) -> str:
     middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
     to_earth = pyproj.Transformer.from_crs(crs, "EPSG:4326", always_xy=True)
     longitude, latitude = to_earth.transform(*middle)
-    if not -80.0 <= latitude <= 84.0:
-        message = (
-            f"({middle[0]:g}, {middle[1]:g}) of {crs} has no UTM zone; state --crs"
-        )
-        raise SceneError("coordinates", [Fault("", message)])
+    if not -80.0 <= latitude <= 84.0:  # no zones there
+        return f"+proj=aeqd +lat_0={latitude:.4f} +lon_0={longitude:.4f}"
     zone = min(60, int((longitude + 180.0) // 6.0) + 1)
     return f"EPSG:{(32600 if latitude >= 0.0 else 32700) + zone}"
 

@@ -128,8 +128,8 @@ def scene_of_layers(
     }
     if heights is not None:
         document["elevation"] = _elevation(heights)
-    used: set[str] = {str(entry.get("id")) for entry in document["obstacles"]}
-    used |= {str(entry.get("id")) for entry in document["terrain"]}
+    areas = (*document["obstacles"], *document["terrain"])
+    used = {str(entry.get("id")): 1 for entry in areas}
     solid = shapely.disjoint_subset_union_all(
         [area.shape for area in obstacles if "blocks" not in area.entry]
     )
@@ -198,7 +198,7 @@ def _beside_lanes(
 
 def _entries(areas: Iterable[Area], box: Polygon) -> Iterable[Entry]:
     """Yield the entries of areas inside `box`, one a polygon."""
-    used: set[str] = set()
+    used: dict[str, int] = {}
     for area in areas:
         inside = area.shape if box.covers(area.shape) else area.shape & box
         for part in shapely.get_parts(inside):
@@ -237,7 +237,7 @@ def _region(entry: Entry) -> BaseGeometry:
     return _point(entry).buffer(entry["circle"]["radius"] if "circle" in entry else 0.0)
 
 
-def _with_own_id(entry: Entry, used: set[str], notes: list[str]) -> Entry:
+def _with_own_id(entry: Entry, used: dict[str, int], notes: list[str]) -> Entry:
     given = str(entry["id"])
     own = _unused(_as_id(given), used)
     if own != given:
@@ -250,10 +250,13 @@ def _as_id(given: Any) -> str:
     return text if re.match(r"[A-Za-z0-9_]", text) else f"_{text}"
 
 
-def _unused(wanted: str, used: set[str]) -> str:
-    names = (wanted, *(f"{wanted}_{number}" for number in range(2, len(used) + 3)))
-    name = next(name for name in names if name not in used)
-    used.add(name)
+def _unused(wanted: str, used: dict[str, int]) -> str:
+    """Return a name that is not used yet; `used` counts the names tried for each."""
+    name = wanted
+    while name in used:
+        used[wanted] += 1
+        name = f"{wanted}_{used[wanted]}"
+    used[name] = 1
     return name
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -12,7 +14,13 @@ import numpy as np
 from mrmg.errors import Fault, SceneError
 from mrmg.extras import import_extra
 from mrmg.scene.importing.frames import known_crs
-from mrmg.scene.importing.layers import ImportOptions
+from mrmg.scene.importing.layers import Box, ImportOptions
+
+_NOWHERE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+"""Transform of rasters that state none."""
+
+_NEARLY = 1e-6
+"""Share of a cell by which a box may miss its side."""
 
 MOST_CELLS = 25_000_000
 """Cells that are read at most."""
@@ -26,13 +34,14 @@ class Raster(NamedTuple):
     Attributes:
         crs: its coordinate system; None for local metres.
         values: of its cells, rows from the top; NaN where it has no data.
-        transform: from (column, row) to coordinates.
+        transform: from (column, row) to coordinates, as in GDAL: x = a column + b row
+            + c, y = d column + e row + f. Rows that run west to east lead south.
         notes: what was changed or assumed.
     """
 
     crs: str | None
     values: np.ndarray
-    transform: Any
+    transform: tuple[float, ...]
     notes: list[str]
 
     @property
@@ -43,9 +52,7 @@ class Raster(NamedTuple):
 
     def at(self, cells: Any) -> np.ndarray:
         """Return the coordinates of places (column, row), shape (n, 2)."""
-        column, row = np.asarray(cells, dtype=float).T
-        a, b, c, d, e, f = self.transform[:6]
-        return np.stack([a * column + b * row + c, d * column + e * row + f], axis=1)
+        return _at(self.transform, cells)
 
 
 def read_raster(path: Path, options: ImportOptions) -> Raster:
@@ -66,43 +73,73 @@ def read_raster(path: Path, options: ImportOptions) -> Raster:
 def _opened(path: Path) -> Iterator[Any]:
     rasterio = import_extra("rasterio", extra="geo", purpose="reads GeoTIFF")
     try:
-        with rasterio.open(path) as source:
-            yield source
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
+            with rasterio.open(path) as source:
+                yield source
     except rasterio.errors.RasterioError as error:
-        reason = " ".join(str(error).split())
+        reason = " ".join(str(error.__cause__ or error).split())
         message = f"no readable raster: {reason}"
         raise SceneError(str(path), [Fault("", message)]) from error
 
 
 def _window(
     source: Any, options: ImportOptions, name: str
-) -> tuple[np.ndarray, Any, list[str]]:
+) -> tuple[np.ndarray, tuple[float, ...], list[str]]:
     """Return the first band as numbers (NaN: no data), its transform, and notes."""
-    windows = import_extra("rasterio.windows", extra="geo", purpose="reads GeoTIFF")
-    window = windows.Window(0, 0, source.width, source.height)
+    transform, notes = tuple(source.transform[:6]), []
+    if transform == _NOWHERE and source.crs is None:
+        transform = (1.0, 0.0, 0.0, 0.0, -1.0, float(source.height))
+        notes.append("states no place: cells of 1 m, the first row in the north")
+    elif source.crs is None and options.crs is None:
+        notes.append("states no coordinate system: taken as metres")
+    first, end = np.zeros(2, dtype=int), np.array([source.width, source.height])
     if options.crop is not None and options.frame is None:
-        asked = source.window(*options.crop).round_offsets().round_lengths()
-        if not windows.intersect(window, asked):
-            extent = ", ".join(f"{value:g}" for value in source.bounds)
-            message = f"{options.crop} lies beside the raster, which covers {extent}"
-            raise SceneError(name, [Fault("--crop", message)])
-        window = window.intersection(asked)
-    if window.width * window.height > MOST_CELLS:
+        first, end = _cells_in(options.crop, transform, end, name)
+    if np.prod(end - first) > MOST_CELLS:
         message = (
-            f"{window.height} x {window.width} cells; at most {MOST_CELLS} are "
+            f"{' x '.join(map(str, end - first))} cells; at most {MOST_CELLS} are "
             "read: take a part of it by --crop X_MIN Y_MIN X_MAX Y_MAX"
         )
         raise SceneError(name, [Fault("", message)])
-    band = source.read(1, window=window, masked=True)
+    (left, top), (right, bottom) = first.tolist(), end.tolist()
+    band = source.read(1, window=((top, bottom), (left, right)), masked=True)
     values = band.astype(float).filled(np.nan) * source.scales[0] + source.offsets[0]
     values[~np.isfinite(values)] = np.nan
-    notes = []
     if source.count > 1:
         notes.append(f"the first of its {source.count} bands was read")
     unit = str(source.units[0] or "").lower()
     if unit in _METRES:
         values *= _METRES[unit]
         notes.append(f"heights in {unit} were turned into metres")
-    if source.crs is None and options.crs is None:
-        notes.append("states no coordinate system: taken as metres")
-    return values, source.window_transform(window), notes
+    a, b, _, d, e, _ = transform
+    c, f = _at(transform, [first])[0]
+    if b == d == 0.0:  # rows from north to south, columns from west to east
+        values = values[:: 1 if e < 0.0 else -1, :: 1 if a > 0.0 else -1]
+        c, f = min(c, c + a * values.shape[1]), max(f, f + e * values.shape[0])
+        a, e = abs(a), -abs(e)
+    return values, (a, b, c, d, e, f), notes
+
+
+def _cells_in(
+    crop: Box, transform: tuple[float, ...], size: np.ndarray, name: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first cell (column, row) of a box, and that after its last one."""
+    matrix = np.array([transform[:3], transform[3:], (0.0, 0.0, 1.0)])
+    corners = [(*corner, 1.0) for corner in product(crop[::2], crop[1::2])]
+    cells = np.linalg.solve(matrix, np.transpose(corners))[:2]
+    first = np.maximum(np.floor(cells.min(axis=1) + _NEARLY), 0).astype(int)
+    end = np.minimum(np.ceil(cells.max(axis=1) - _NEARLY), size).astype(int)
+    if (first >= end).any():
+        whole = _at(transform, list(product((0, size[0]), (0, size[1]))))
+        extent = np.concatenate([whole.min(axis=0), whole.max(axis=0)])
+        words = ", ".join(f"{value:.10g}" for value in extent)
+        message = f"{crop} lies beside the raster, which covers {words}"
+        raise SceneError(name, [Fault("--crop", message)])
+    return first, end
+
+
+def _at(transform: tuple[float, ...], cells: Any) -> np.ndarray:
+    column, row = np.asarray(cells, dtype=float).T
+    a, b, c, d, e, f = transform
+    return np.stack([a * column + b * row + c, d * column + e * row + f], axis=1)

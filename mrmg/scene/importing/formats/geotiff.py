@@ -6,6 +6,7 @@ resampled to metres; a coordinate system that is metric already keeps its cells.
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,9 @@ from mrmg.scene.loading.elevation import MOST_NODES
 _EDGE_POINTS = 21
 """Points of each side of a raster that decide what ground it covers elsewhere."""
 
+_NEARLY = 0.01
+"""Share of a cell that may lack at the edge."""
+
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 
@@ -32,7 +36,7 @@ def read_elevation(path: Path, options: ImportOptions) -> Layer:
     raster = read_raster(path, options)
     crs, heights, transform, notes = raster
     frame = options.frame or frame_of(crs, raster.corners)
-    upright = transform.b == transform.d == 0.0 and transform.e < 0.0 < transform.a
+    upright = transform[1] == transform[3] == 0.0
     if upright and (crs is None or frame.crs in (None, crs)):
         factor = int(np.ceil(np.sqrt(heights.size / MOST_NODES)))
         if factor > 1:
@@ -48,7 +52,7 @@ def read_elevation(path: Path, options: ImportOptions) -> Layer:
         raise SceneError(str(path), [Fault("transform", message)])
     else:
         heights, bounds = _resampled(raster, crs, frame)
-        notes.append(f"resampled from {crs} to {frame.crs}")
+        notes.append(f"resampled from {crs} to rows of {frame.crs}")
     if min(heights.shape) < 2:
         message = f"{heights.shape[0]} x {heights.shape[1]} heights; expected 2 x 2"
         raise SceneError(str(path), [Fault("", message)])
@@ -98,42 +102,26 @@ def _layer(
 
 
 def _resampled(raster: Raster, crs: str, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
-    """Return heights at nodes of `frame`, and the bounds of the nodes.
-
-    The box is the largest one about the middle of the raster that has data all over.
-    """
+    """Return heights at nodes of `frame`, NaN beside the raster, and their bounds."""
     warp = import_extra("rasterio.warp", extra="geo", purpose="reads GeoTIFF")
     affine = import_extra("affine", extra="geo", purpose="reads GeoTIFF")
     heights = raster.values
     rows, columns = heights.shape
-    ring = [
-        frame.metres(raster.at(_between(*ends)), crs)
-        for ends in (
-            ((0.5, 0.5), (0.5, rows - 0.5)),
-            ((0.5, rows - 0.5), (columns - 0.5, rows - 0.5)),
-            ((columns - 0.5, 0.5), (columns - 0.5, rows - 0.5)),
-            ((0.5, 0.5), (columns - 0.5, 0.5)),
-        )
-    ]
-    middle = np.concatenate(ring).mean(axis=0)
-    low, high = np.full(2, -np.inf), np.full(2, np.inf)
-    for side in ring:
-        axis = int(np.abs(side.mean(axis=0) - middle).argmax())
-        if side[:, axis].mean() < middle[axis]:
-            low[axis] = max(low[axis], side[:, axis].max())
-        else:
-            high[axis] = min(high[axis], side[:, axis].min())
-    area = np.prod(high - low)
-    cell = max(np.sqrt(area / heights.size), np.sqrt(area / MOST_NODES) * 1.01)
-    counts = np.maximum(2, np.floor((high - low) / cell).astype(int) + 1)
-    high = low + (counts - 1) * cell
+    corners = [(0, 0), (columns, 0), (columns, rows), (0, rows), (0, 0)]
+    sides = [np.linspace(*ends, _EDGE_POINTS) for ends in pairwise(corners)]
+    edge = frame.metres(raster.at(np.concatenate(sides)), crs)
+    low, high = edge.min(axis=0), edge.max(axis=0)
+    cell = np.sqrt(shapely.Polygon(edge).area / heights.size)
+    cell = max(cell, np.sqrt(np.prod(high - low) / MOST_NODES) * 1.01)
+    counts = np.maximum(2, ((high - low) / cell + _NEARLY).astype(int))
+    high = low + counts * cell
     origin = np.asarray(frame.origin_m)
-    left, top = low[0] + origin[0] - cell / 2, high[1] + origin[1] + cell / 2
+    left, top = low[0] + origin[0], high[1] + origin[1]
     found = np.full((counts[1], counts[0]), np.nan)
     warp.reproject(
         heights,
         found,
-        src_transform=raster.transform,
+        src_transform=affine.Affine(*raster.transform),
         src_crs=crs,
         src_nodata=np.nan,
         dst_transform=affine.Affine(cell, 0.0, left, 0.0, -cell, top),
@@ -141,11 +129,7 @@ def _resampled(raster: Raster, crs: str, frame: Frame) -> tuple[np.ndarray, np.n
         dst_nodata=np.nan,
         resampling=warp.Resampling.bilinear,
     )
-    return found, np.concatenate([low, high])
-
-
-def _between(start: Any, end: Any) -> np.ndarray:
-    return np.linspace(np.array(start), np.array(end), _EDGE_POINTS)
+    return found, np.concatenate([low + cell / 2, high - cell / 2])
 
 
 def _placed(shape: Any, bounds: Any, grid: tuple[int, ...]) -> Any:
@@ -163,12 +147,12 @@ def _box(bounds: Any) -> tuple[float, float, float, float]:
 
 
 def _recognises(head: Head) -> bool:
-    return head.start.startswith(_TIFF)
+    return head.start.startswith(_TIFF) or head.start[:5].lower() == b"ncols"
 
 
 FORMAT = Format(
     kind="elevation",
-    title="elevation model (GeoTIFF)",
+    title="elevation model (GeoTIFF, ESRI ASCII grid)",
     recognises=_recognises,
     read=read_elevation,
 )
