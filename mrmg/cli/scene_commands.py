@@ -176,9 +176,8 @@ def import_(options: argparse.Namespace) -> int:
         terrain_mask=options.terrain_mask,
         land_cover=options.land_cover,
     )
-    for note in found.notes:
-        print(f"mrmg: {note}", file=sys.stderr)
-    _write(found.document, options.out, found.notes)
+    source = ", ".join(str(file) for file in options.files)
+    _write(found.document, options.out, source, found.notes)
     return ExitCode.OK
 
 
@@ -209,7 +208,7 @@ def populate(options: argparse.Namespace) -> int:
         model=options.model,
         trust_code=options.trust_code,
     )
-    _write(document, options.out)
+    _write(document, options.out, options.scene)
     return ExitCode.OK
 
 
@@ -221,12 +220,14 @@ def _require_absent(options: argparse.Namespace) -> None:
 
 
 def _write(
-    document: dict[str, Any], out: Path | None, notes: Sequence[str] = ()
+    document: dict[str, Any], out: Path | None, source: str, notes: Sequence[str] = ()
 ) -> None:
     from mrmg.scene.loading import dump_scene, scene_from_document
 
     text = "".join(f"# {note}\n" for note in notes)
-    text += dump_scene(scene_from_document(document, source=document["name"]))
+    text += dump_scene(scene_from_document(document, source=source))
+    for note in notes:
+        print(f"mrmg: {note}", file=sys.stderr)
     if out is None:
         sys.stdout.write(text)
     else:

@@ -29,7 +29,7 @@ def example() -> ca.Function:
 
 
 def is_native(function: ca.Function) -> bool:
-    return bool(function.is_a("External"))
+    return bool(function.class_name() == "External")
 
 
 def without_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import shapely
 from shapely.errors import ShapelyError
-from shapely.geometry.base import BaseGeometry
+from shapely.geometry.base import BaseGeometry, BaseMultipartGeometry
 
 from mrmg.errors import Fault
 from mrmg.scene.importing.frames import known_crs
@@ -50,7 +50,10 @@ class Content:
 def features_of(
     document: Any, content: Content
 ) -> Iterator[tuple[str, dict[str, Any], BaseGeometry]]:
-    """Yield place, properties and geometry of the features that are well formed."""
+    """Yield place, properties and geometry of the features that are well formed.
+
+    One of several geometries is as many features.
+    """
     kind = document.get("type") if isinstance(document, dict) else None
     if kind == "FeatureCollection":
         items = document.get("features")
@@ -67,20 +70,18 @@ def features_of(
     empty = 0
     for index, item in enumerate(items):
         place = f"features.{index}"
-        if not isinstance(item, dict) or not isinstance(
-            item.get("properties") or {}, dict
-        ):
-            content.faults.append(
-                Fault(place, f"got {shown(item)}; expected a feature")
-            )
+        stated = item.get("properties", {}) if isinstance(item, dict) else None
+        if not isinstance(stated, dict):
+            message = f"got {shown(item)}; expected a feature"
+            content.faults.append(Fault(place, message))
         elif item.get("geometry") is None:
             empty += 1
         else:
-            keys = dict(item.get("properties") or {})
-            keys.setdefault("id", item.get("id"))
+            own_id = {"id": item["id"]} if "id" in item else {}
+            keys = own_id | stated
             shape = _geometry(item["geometry"], f"{place}.geometry", content)
-            if shape is not None:
-                yield place, keys, shape
+            for part in _parts(shape) if shape is not None else ():
+                yield place, keys, part
     if empty:
         content.notes.append(f"{empty} features without geometry were left out")
 
@@ -95,6 +96,13 @@ def _geometry(value: Any, place: str, content: Content) -> BaseGeometry | None:
         return shape
     content.faults.append(Fault(place, f"got {shown(value)}; expected a geometry"))
     return None
+
+
+def _parts(shape: BaseGeometry) -> list[BaseGeometry]:
+    """Return the points, lines and polygons of a geometry of several, at any depth."""
+    if not isinstance(shape, BaseMultipartGeometry):
+        return [shape]
+    return [inner for part in shape.geoms for inner in _parts(part)]
 
 
 def crs_of(

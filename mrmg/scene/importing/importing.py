@@ -73,7 +73,7 @@ def import_files(
     if land_cover is not None:
         reader = format_of(land_cover, "land-cover")
         add(land_cover, reader.read(land_cover, asked))
-    document, left = scene_of_layers(files[0].stem, layers, asked)
+    document, left = scene_of_layers(files[0], layers, asked)
     return Imported(document, (layers[0].frame.note(), *notes, *left))
 
 

@@ -23,8 +23,14 @@ Box = tuple[float, float, float, float]
 PLACE_MARGIN_M = 2.0
 """Ground around goals, stations and robots where no file states bounds."""
 
+MAX_SIDE_M = 100_000.0
+"""Side of the ground from which on a plane is no picture of the earth."""
+
 _DECIMALS = 6
 """Coordinates are rounded to micrometres: obstacles lose nothing that counts."""
+
+CHARGING = re.compile("(?<!dis)charg", re.IGNORECASE)
+"""What names of charging actions and places have in them, as startCharging."""
 
 _SLIVER_M2 = 1e-6
 _NOT_IN_IDS = re.compile(r"[^A-Za-z0-9_.\-]+")
@@ -104,14 +110,26 @@ class Layer:
 
 
 def scene_of_layers(
-    name: str, layers: Sequence[Layer], options: ImportOptions
+    first: Path, layers: Sequence[Layer], options: ImportOptions
 ) -> tuple[Entry, list[str]]:
     """Return the scene document of some layers, and notes on what did not fit in.
+
+    Args:
+        first: file that names the scene.
+        layers: of all files.
+        options: of the import.
 
     Raises:
         SceneError: if no layer states bounds or holds anything.
     """
-    bounds = _bounds(name, layers, options)
+    source = str(first)
+    bounds = _bounds(source, layers, options)
+    if max(bounds[2] - bounds[0], bounds[3] - bounds[1]) > MAX_SIDE_M:
+        message = (
+            f"the ground spans more than {MAX_SIDE_M / 1000.0:g} km; take a part of it "
+            "by --crop, or check that coordinates are longitude, latitude"
+        )
+        raise SceneError(source, [Fault("bounds", message)])
     notes: list[str]
     box, notes = shapely.box(*bounds), []
     obstacles = [area for layer in layers for area in layer.obstacles]
@@ -119,7 +137,7 @@ def scene_of_layers(
     heights = next((layer.heights for layer in layers if layer.heights), None)
     document: Entry = {
         "format": 1,
-        "name": _NOT_IN_IDS.sub("_", name),
+        "name": _NOT_IN_IDS.sub("_", first.stem),
         "bounds": [round(value, _DECIMALS) + 0.0 for value in bounds],
         "obstacles": list(_entries(obstacles, box)),
         "terrain": list(
@@ -135,7 +153,7 @@ def scene_of_layers(
     )
     if box.difference(solid).area <= _SLIVER_M2:
         message = "no free ground is left; --unknown free opens what was never seen"
-        raise SceneError(name, [Fault("obstacles", message)])
+        raise SceneError(source, [Fault("obstacles", message)])
     for section in ("goals", "stations", "robots"):
         entries = [entry for layer in layers for entry in getattr(layer, section)]
         fitting = [
@@ -153,7 +171,7 @@ def scene_of_layers(
     return {key: value for key, value in document.items() if value != []}, notes
 
 
-def _bounds(name: str, layers: Sequence[Layer], options: ImportOptions) -> Box:
+def _bounds(source: str, layers: Sequence[Layer], options: ImportOptions) -> Box:
     heights = next((layer.heights for layer in layers if layer.heights), None)
     if heights is not None:
         return heights.bounds
@@ -169,7 +187,7 @@ def _bounds(name: str, layers: Sequence[Layer], options: ImportOptions) -> Box:
             for entry in (*layer.goals, *layer.stations, *layer.robots)
         ]
     if not shown:
-        raise SceneError(name, [Fault("", "holds nothing that a scene could show")])
+        raise SceneError(source, [Fault("", "holds nothing that a scene could show")])
     whole = shapely.box(*shapely.total_bounds(shown))
     if options.crop is None:
         return _box_of(whole)
@@ -177,7 +195,7 @@ def _bounds(name: str, layers: Sequence[Layer], options: ImportOptions) -> Box:
     if not cropped.intersection(whole).area:
         extent = ", ".join(f"{value:g}" for value in whole.bounds)
         message = f"{options.crop} lies beside the map, which covers {extent} in metres"
-        raise SceneError(name, [Fault("--crop", message)])
+        raise SceneError(source, [Fault("--crop", message)])
     return _box_of(cropped.intersection(whole) if states_bounds else cropped)
 
 
@@ -258,6 +276,14 @@ def _unused(wanted: str, used: dict[str, int]) -> str:
         name = f"{wanted}_{used[wanted]}"
     used[name] = 1
     return name
+
+
+def lanes_note(count: int) -> str:
+    """Return what becomes of the edges of a graph or layout."""
+    return (
+        f"{count} edges are lanes: robots keep to them with --lanes WIDTH, in either "
+        "direction; otherwise they were left out"
+    )
 
 
 def polygons(shape: BaseGeometry) -> MultiPolygon:

@@ -135,16 +135,21 @@ def _not_known(head: Head, known: dict[str, Format]) -> str:
 
 
 def read_json(path: Path) -> Any:
-    """Read a JSON file.
+    """Read a JSON file; members that are null are left out, as if they were missing.
 
     Raises:
         SceneError: if it cannot be read or is no JSON; names the line.
     """
+    text = read_text(path, source=str(path)).removeprefix("\ufeff")
     try:
-        return json.loads(read_text(path, source=str(path)).removeprefix("\ufeff"))
+        return json.loads(text, object_hook=_stated)
     except json.JSONDecodeError as error:
         place = f"line {error.lineno}, column {error.colno}"
         message = f"no valid JSON: {error.msg}"
         raise SceneError(str(path), [Fault(place, message)]) from error
     except RecursionError as error:
         raise SceneError(str(path), [Fault("", "nested too deeply")]) from error
+
+
+def _stated(members: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in members.items() if value is not None}

@@ -19,7 +19,14 @@ from mrmg.errors import Fault, SceneError, nearest
 from mrmg.scene.importing.features import Content, crs_of, features_of, is_graph_edge
 from mrmg.scene.importing.frames import Frame, frame_of
 from mrmg.scene.importing.land_cover import LandCover, read_classes
-from mrmg.scene.importing.layers import Area, ImportOptions, Layer, polygons
+from mrmg.scene.importing.layers import (
+    CHARGING,
+    Area,
+    ImportOptions,
+    Layer,
+    lanes_note,
+    polygons,
+)
 from mrmg.scene.importing.registry import Format, Head, read_json
 from mrmg.scene.loading.faults import shown
 
@@ -78,10 +85,7 @@ def _counts(content: Content) -> Iterator[str]:
     counts |= {kind: len(found) for kind, found in content.entries.items()}
     yield "features: " + ", ".join(f"{n} {kind}" for kind, n in counts.items() if n)
     if content.lanes:
-        yield (
-            f"{len(content.lanes)} edges are lanes: robots keep to them with "
-            "--lanes WIDTH, in either direction; otherwise they were left out"
-        )
+        yield lanes_note(len(content.lanes))
 
 
 def _placed(
@@ -113,8 +117,8 @@ def _add(
     kind = keys.get("kind")
     if kind is None and is_graph_edge(keys):
         content.lanes.append(shape)
-    elif kind is None and shape.geom_type == "Point" and keys.get("id") is not None:
-        node = "station" if "charg" in str(keys).lower() else "goal"
+    elif kind is None and shape.geom_type == "Point" and "id" in keys:
+        node = "station" if CHARGING.search(str(keys)) else "goal"
         _add_place(node, place, keys, shape, content)
     elif kind in ("obstacle", "terrain"):
         _add_area(kind, place, keys, shape, content)
@@ -140,7 +144,7 @@ def _add_area(
     valid = polygons(shape)
     if not valid.equals(shape):
         content.notes.append(f"{place} crossed itself: repaired")
-    entry = {} if keys.get("id") is None else {"id": keys["id"]}
+    entry = {"id": keys["id"]} if "id" in keys else {}
     if kind == "terrain":
         if "multiplier" not in keys:
             message = "missing; expected the energy relative to plain ground"

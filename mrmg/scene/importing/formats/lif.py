@@ -6,6 +6,7 @@ serve, become stations; edges become lanes.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,16 +15,13 @@ from pydantic import Field, ValidationError
 
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.importing.frames import Frame
-from mrmg.scene.importing.layers import ImportOptions, Layer
+from mrmg.scene.importing.layers import CHARGING, ImportOptions, Layer, lanes_note
 from mrmg.scene.importing.registry import Format, Head, read_json
 from mrmg.scene.loading.faults import faults_of
 from mrmg.scene.loading.shape_schema import Number, Strict
 
 NODE_RADIUS_M = 0.5
 """Radius of goals and stations: LIF states none."""
-
-_CHARGING = "charg"
-"""What names of charging actions and stations have in them, as startCharging."""
 
 
 class _Open(Strict):
@@ -86,47 +84,56 @@ def read_lif(path: Path, options: ImportOptions) -> Layer:
         layouts = LifDocument.model_validate(document).layouts
     except ValidationError as error:
         raise SceneError(str(path), faults_of(error, LifDocument)) from error
-    nodes = {node.nodeId: node for layout in layouts for node in layout.nodes}
-    edges = [edge for layout in layouts for edge in layout.edges]
-    stations = [station for layout in layouts for station in layout.stations]
-    faults = [
-        Fault(f"edges.{edge.edgeId}", f"names the unknown node '{end}'")
-        for edge in edges
-        for end in (edge.startNodeId, edge.endNodeId)
-        if end not in nodes
-    ]
-    faults += [
-        Fault(f"stations.{station.stationId}", f"names the unknown node '{node}'")
-        for station in stations
-        for node in station.interactionNodeIds
-        if node not in nodes
-    ]
+    nodes: dict[str, NodeEntry] = {}
+    charging: set[str] = set()
+    pairs: set[frozenset[str]] = set()
+    faults: list[Fault] = []
+    keys = []  # of nodes, by their ids, which another layout may use again
+    for layout in layouts:
+        keys.append({node.nodeId: _key(node, layout, nodes) for node in layout.nodes})
+        nodes |= {keys[-1][node.nodeId]: node for node in layout.nodes}
+    everywhere = {node.nodeId: key for key, node in reversed(nodes.items())}
+    for layout, own in zip(layouts, keys, strict=True):
+        key_of = everywhere | own
+        ends = [
+            (f"edges.{edge.edgeId}", (edge.startNodeId, edge.endNodeId))
+            for edge in layout.edges
+        ]
+        served = [
+            (f"stations.{station.stationId}", station.interactionNodeIds)
+            for station in layout.stations
+        ]
+        faults += [
+            Fault(place, f"names the unknown node '{name}'")
+            for place, names in (*ends, *served)
+            for name in names
+            if name not in key_of
+        ]
+        if not faults:
+            pairs |= {frozenset(key_of[name] for name in names) for _, names in ends}
+            for station, (_, names) in zip(layout.stations, served, strict=True):
+                charging |= {key_of[name] for name in names if _charges(station)}
     if faults:
         raise SceneError(str(path), faults)
-    charging = {name for name, node in nodes.items() if _charges(node)}
-    for station in stations:
-        if _charges(station):
-            charging |= {*station.interactionNodeIds}
+    charging |= {
+        key for key, node in nodes.items() if _charges(node.vehicleTypeNodeProperties)
+    }
     places = {name: _place(name, node) for name, node in nodes.items()}
-    ways = {frozenset((edge.startNodeId, edge.endNodeId)) for edge in edges}
     notes = [
         f"{len(layouts)} layouts: {len(nodes) - len(charging)} nodes became goals, "
         f"{len(charging)} charging ones stations, of radius {NODE_RADIUS_M} m",
         "headings, loads, and limits of vehicle types were left out",
     ]
-    if edges:
-        notes.append(
-            f"{len(edges)} edges are lanes: robots keep to them with --lanes WIDTH, in "
-            "either direction; otherwise they were left out"
-        )
+    if pairs:
+        notes.append(lanes_note(len(pairs)))
     return Layer(
         frame=options.frame or Frame(),
         goals=[entry for name, entry in places.items() if name not in charging],
         stations=[entry for name, entry in places.items() if name in charging],
         lanes=[
-            shapely.LineString([places[end]["circle"]["center"] for end in way])
-            for way in ways
-            if len(way) == 2
+            shapely.LineString([places[end]["circle"]["center"] for end in pair])
+            for pair in pairs
+            if len(pair) == 2
         ],
         notes=notes,
     )
@@ -137,9 +144,13 @@ def _place(name: str, node: NodeEntry) -> dict[str, Any]:
     return {"id": name, "circle": {"center": center, "radius": NODE_RADIUS_M}}
 
 
-def _charges(part: NodeEntry | StationEntry) -> bool:
-    actions = part.vehicleTypeNodeProperties if isinstance(part, NodeEntry) else part
-    return _CHARGING in str(actions).lower()
+def _key(node: NodeEntry, layout: LayoutEntry, known: Collection[str]) -> str:
+    own = node.nodeId
+    return f"{layout.layoutId}_{own}" if own in known else own
+
+
+def _charges(part: Any) -> bool:
+    return bool(CHARGING.search(str(part)))
 
 
 def _recognises(head: Head) -> bool:
