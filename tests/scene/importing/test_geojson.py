@@ -197,3 +197,58 @@ def test_lif_layout(tmp_path: Path) -> None:
     closed = shapely.union_all([wall.shape for wall in lanes.obstacles])
     assert not closed.covers(shapely.Point(6, 2))
     assert closed.covers(shapely.Point(1, 5))  # no edge goes there
+
+
+def test_lif_layouts_may_use_an_id_again(tmp_path: Path) -> None:
+    """Each layout's edges and stations are of its own nodes; a load is no charge."""
+    (ground,) = LIF["layouts"]
+    actions = [{"vehicleTypeId": "agv", "actions": [{"actionType": "dischargeLoad"}]}]
+    nodes = [
+        {"nodeId": name, "nodePosition": {"x": x, "y": 50.0}, "edges": None}
+        | {"vehicleTypeNodeProperties": actions}
+        for name, x in (("N1", 1.0), ("N2", 30.0))
+    ]
+    edges = [{"edgeId": "E9", "startNodeId": "N1", "endNodeId": "N2"}]
+    upper = {"layoutId": "upper", "nodes": nodes, "edges": edges, "stations": None}
+    path = tmp_path / "hall.lif"
+    path.write_text(json.dumps({"layouts": [ground, upper]}))
+    scene = scene_of(path, lane_width_m=2.0)
+    assert [goal.id for goal in scene.goals] == ["N1", "N2", "upper_N1", "upper_N2"]
+    assert len(scene.stations) == 2
+    closed = shapely.union_all([wall.shape for wall in scene.obstacles])
+    assert not closed.intersects(shapely.LineString([(1, 50), (30, 50)]))
+
+
+def test_geometries_of_several_and_null_properties(tmp_path: Path) -> None:
+    square = [[[5, 5], [8, 5], [8, 8], [5, 8], [5, 5]]]
+    parts = [
+        {"type": "Point", "coordinates": [1, 9]},
+        {"type": "MultiPolygon", "coordinates": [square]},
+        {"type": "LineString", "coordinates": [[1, 1], [4, 1]]},
+    ]
+    features = [
+        ({"type": "MultiPoint", "coordinates": [[2, 3], [9, 3]]}, "goal"),
+        ({"type": "GeometryCollection", "geometries": parts}, "obstacle"),
+    ]
+    nothing = dict.fromkeys(("radius", "height", "blocks", "dwell", "id"))
+    path = tmp_path / "site.geojson"
+    path.write_text(
+        json.dumps(
+            {
+                "type": "FeatureCollection",
+                "features": [
+                    {
+                        "type": "Feature",
+                        "geometry": shape,
+                        "properties": {"kind": kind, **nothing},
+                    }
+                    for shape, kind in features
+                ],
+            }
+        )
+    )
+    scene = scene_of(path, crs="local")
+    centers = [list(goal.region.center) for goal in scene.goals]
+    assert centers == [[2.0, 3.0], [9.0, 3.0]]
+    assert len(scene.obstacles) == 3
+    assert max(wall.shape.area for wall in scene.obstacles) == pytest.approx(9.0)

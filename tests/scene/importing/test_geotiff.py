@@ -81,6 +81,62 @@ def test_geographic_model_in_metres(tmp_path: Path, write_tiff: Any) -> None:
     assert elevation(scene).height_at(points) == pytest.approx(wanted, abs=0.02)
 
 
+@pytest.mark.parametrize("crs", [None, "EPSG:32632"])
+def test_rows_and_columns_of_any_direction(
+    crs: str | None, tmp_path: Path, write_tiff: Any
+) -> None:
+    """The same ground in another order of rows and columns is the same scene."""
+    from affine import Affine
+
+    values = heights(20, 30)
+    west, north = (100.0, 240.0) if crs is None else (450_000.0, 5_300_000.0)
+    east, south = west + 60.0, north - 40.0
+    scenes = [
+        imported(write_tiff(tmp_path / "dem.tif", part, crs=crs, transform=place))
+        for part, place in (
+            (values, Affine(2.0, 0.0, west, 0.0, -2.0, north)),
+            (values[::-1], Affine(2.0, 0.0, west, 0.0, 2.0, south)),
+            (values[::-1, ::-1], Affine(-2.0, 0.0, east, 0.0, 2.0, south)),
+        )
+    ]
+    assert scenes[0].bounds == scenes[1].bounds == scenes[2].bounds
+    for scene in scenes:
+        assert (elevation(scene).height_m == elevation(scenes[0]).height_m).all()
+
+
+@pytest.mark.parametrize("degrees", [30.0, 45.0, 90.0])
+def test_turned_model(degrees: float, tmp_path: Path, write_tiff: Any) -> None:
+    """Places keep their heights; what lies beside the raster is no data."""
+    from affine import Affine
+
+    values, turn = heights(40, 60), np.deg2rad(degrees)
+    a, d = np.cos(turn), np.sin(turn)
+    place = Affine(a, d, 450_000.0, d, -a, 5_300_000.0)
+    path = write_tiff(tmp_path / "dem.tif", values, crs="EPSG:32632", transform=place)
+    found = import_files([path])
+    scene = scene_from_document(found.document, source="test")
+    (note,) = [note for note in found.notes if "less the origin" in note]
+    origin = np.array([float(x) for x in note.partition("(")[2].rstrip(")").split(",")])
+    column, row = np.random.default_rng(1).uniform((2, 2), (57, 37), (50, 2)).T
+    x, y = a * column + d * row + 450_000.0, d * column - a * row + 5_300_000.0
+    points = np.stack([x, y], axis=1) - origin
+    wanted = 430.0 + np.sin((column - 0.5) / 9.0) + 0.5 * np.cos((row - 0.5) / 7.0)
+    assert elevation(scene).height_at(points) == pytest.approx(wanted, abs=0.02)
+    closed = shapely.union_all([wall.shape for wall in scene.obstacles])
+    share = 1.0 - closed.area / shapely.box(*scene.bounds).area
+    extent = (60 * a + 40 * d) * (60 * d + 40 * a)
+    assert share == pytest.approx(40 * 60 / extent, abs=0.08)
+    assert not shapely.contains_xy(closed, points).any()
+
+
+def test_raster_without_a_place(tmp_path: Path, write_tiff: Any) -> None:
+    from affine import Affine
+
+    path, values = tmp_path / "dem.tif", heights(6, 9)
+    nowhere = imported(write_tiff(path, values, transform=Affine.identity()))
+    assert nowhere == imported(write_tiff(path, values))
+
+
 def test_cells_without_data(tmp_path: Path, write_tiff: Any) -> None:
     values = heights(20, 20)
     values[5:8, 10:14] = -9999.0

@@ -15,6 +15,7 @@ from shapely import affinity
 from mrmg.errors import SceneError
 from mrmg.scene.importing import import_files
 from mrmg.scene.importing.layers import ImportOptions
+from mrmg.scene.importing.raster_shapes import enclosing_polygons, polygons_of_cells
 from mrmg.scene.loading import dump_scene, scene_from_document
 from mrmg.scene.loading.yaml_text import parse_yaml
 from mrmg.scene.types import Scene
@@ -100,6 +101,36 @@ def test_no_cell_is_lost_and_little_added(
         allowed = shapely.union(wanted, outside.buffer(ROUNDING_M))
         grown = allowed.buffer(tolerance * 0.1 + ROUNDING_M, quad_segs=32)
         assert found.difference(grown).area < 1e-6
+
+
+@pytest.mark.parametrize("share", [0.03, 0.4, 0.6, 0.9])
+def test_cells_of_any_kind(share: float) -> None:
+    """Outlines are exact at no tolerance; at others all cells lie inside, near."""
+    rng = np.random.default_rng(int(100 * share))
+    for _ in range(15):
+        mask = rng.random(rng.integers(1, 18, 2)) < share
+        row, column = np.nonzero(mask)
+        cells = shapely.union_all(shapely.box(column, row, column + 1, row + 1))
+        exact = polygons_of_cells(mask)
+        assert shapely.is_valid(exact).all()
+        assert shapely.area(exact).sum() == pytest.approx(mask.sum())
+        assert shapely.symmetric_difference(cells, shapely.union_all(exact)).area < 1e-9
+        for tolerance in (0.3, 0.5, 1.0, 2.4):
+            found = enclosing_polygons(mask, tolerance)
+            assert shapely.is_valid(found).all()
+            whole = shapely.union_all(found)
+            assert cells.difference(whole).area < 1e-9
+            near = cells.buffer(tolerance + 1e-9, quad_segs=64)
+            assert whole.difference(near).area < 1e-6
+
+
+def test_nothing_free_is_refused(tmp_path: Path, write_map: Any) -> None:
+    path = write_map(tmp_path, np.full((8, 9), 205))
+    with pytest.raises(SceneError, match="no free ground.*--unknown free"):
+        imported(path)
+    assert not imported(path, unknown="free").obstacles
+    with pytest.raises(SceneError, match="lies beside the map, which covers 0, 0, 0.9"):
+        imported(path, crop=(5.0, 5.0, 6.0, 6.0))
 
 
 def test_bounds_are_the_picture(tmp_path: Path, write_map: Any) -> None:

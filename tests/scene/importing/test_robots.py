@@ -188,6 +188,54 @@ def test_wheels_that_cannot_be_told(tmp_path: Path) -> None:
     assert model.wheel_count == 2
 
 
+MJCF = """
+<mujoco><asset><hfield name="h" file="lost.png" size="1 1 1 1"/></asset><worldbody>
+  <geom type="hfield" hfield="h"/><geom type="box" pos="9 9 0" size="2 2 2"/>
+  <body pos="4 4 1"><freejoint/><geom size="0.5" mass="70"/></body>
+  <body name="{name}" pos="1 2 0" euler="0 0 {turn}"><freejoint/>
+    <geom type="box" pos="0 0 0.2" size="0.4 0.2 0.1" mass="20"/>
+    <body pos="0 0.3 0.1"><joint axis="0 1 0"/>
+      <geom type="cylinder" euler="90 0 0" size="0.1 0.02" mass="1"/></body>
+    <body pos="0 -0.3 0.1"><joint axis="0 1 0"/>
+      <geom type="cylinder" euler="90 0 0" size="0.1 0.02" mass="1"/></body>
+  </body>{more}</worldbody></mujoco>
+"""
+
+
+def test_robot_in_a_world(tmp_path: Path) -> None:
+    """Neither where it stands nor what else is there is part of a robot."""
+    path = tmp_path / "world.xml"
+    for turn in (0, 40):
+        path.write_text(MJCF.format(name="rover", turn=turn, more=""))
+        model, _ = imported(path, tmp_path / f"rover{turn}")
+        assert model.mass_kg == pytest.approx(22.0)
+        assert np.abs(model.footprint_m).max(axis=0) == pytest.approx((0.4, 0.32))
+    twin = MJCF[MJCF.index("<body name") : MJCF.index("{more}")]
+    both = MJCF.format(name="a", turn=0, more=twin.format(name="b", turn=0))
+    path.write_text(both)
+    with pytest.raises(SceneError, match=r"wheels of 2 robots \(a, b\)"):
+        imported(path, tmp_path / "twins")
+
+
+def test_packages_and_masses_that_are_missing(tmp_path: Path) -> None:
+    """A package is looked for beside and above the file; no mass is an assumed one."""
+    folder = tmp_path / "src" / "rover_description"
+    (folder / "urdf").mkdir(parents=True)
+    wheels = written(tmp_path, "fl fr").read_text().replace("<inertial>", "<!--", 1)
+    wheels = wheels.replace("</inertial>", "-->", 1)
+    (folder / "wheels.xacro").write_text(wheels)
+    path = folder / "urdf" / "rover.urdf.xacro"
+    include = "<xacro:include filename='$(find {})/wheels.xacro'/>"
+    space = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
+    path.write_text(f"<robot name='r' {space}>{include}</robot>".format(folder.name))
+    model, found = imported(path, tmp_path / "rover")
+    assert model.mass_kg == pytest.approx(0.9 * 0.5 * 0.2 * 1000 + 5.0)
+    assert any("of water: base" in note for note in found.notes)
+    path.write_text(f"<robot name='r' {space}>{include}</robot>".format("gone"))
+    with pytest.raises(SceneError, match="no folder of package 'gone'"):
+        imported(path, tmp_path / "other")
+
+
 def test_nothing_is_replaced(tmp_path: Path) -> None:
     path = written(tmp_path, "rl rr")
     (tmp_path / "there").mkdir()

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import io
 import math
+import sys
+import types
 import xml.etree.ElementTree as ET
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from unittest import mock
 from urllib.parse import unquote
+
+import numpy as np
 
 from mrmg.errors import Fault, SceneError
 from mrmg.extras import import_extra
@@ -82,7 +88,9 @@ def read_description(path: Path, arguments: Mapping[str, str]) -> Description:
         message = f"got <{root.tag}>; expected <robot> (URDF, xacro) or <mujoco> (MJCF)"
         raise SceneError(source, [Fault("", message)])
     is_urdf = root.tag == "robot"
-    notes = _without_lost_meshes(root, path.parent) if is_urdf else []
+    notes = []
+    if is_urdf:
+        notes = [*_without_lost_meshes(root, path.parent), *_assumed_masses(root)]
     try:
         with no_warning_file():
             model = _compiled_urdf(root) if is_urdf else _compiled_mjcf(path, notes)
@@ -100,10 +108,12 @@ def _expanded(path: Path, arguments: Mapping[str, str]) -> str:
     xacro = import_extra("xacro", extra="ros", purpose="expands macros of descriptions")
     said = io.StringIO()
     try:
-        with contextlib.redirect_stderr(said):
+        with contextlib.redirect_stderr(said), _packages_beside(path.parent):
             document = xacro.process_file(str(path), mappings=dict(arguments))
     except Exception as error:  # xacro raises what the expressions in a file raise
-        reason = " ".join(str(error).split()) or type(error).__name__
+        cause = getattr(error, "exc", None)  # of a file; xacro's own words repeat it
+        words = str(cause if isinstance(cause, OSError) else error).split()
+        reason = " ".join(words) or type(error).__name__
         message = f"xacro cannot expand it: {reason}; --arg NAME=VALUE sets arguments"
         raise SceneError(str(path), [Fault("", message)]) from error
     return str(document.toxml())
@@ -132,17 +142,56 @@ def _without_lost_meshes(root: ET.Element, folder: Path) -> list[str]:
     ]
 
 
+def _assumed_masses(root: ET.Element) -> list[str]:
+    lacking = [
+        str(link.get("name"))
+        for link in root.iter("link")
+        if link.find("inertial") is None and link.find("collision") is not None
+    ]
+    if not lacking:
+        return []
+    return [f"no <inertial>, shapes taken as of water: {', '.join(lacking)}"]
+
+
+@contextlib.contextmanager
+def _packages_beside(folder: Path) -> Iterator[None]:
+    """Let xacro find packages beside or above a folder where ROS is not installed."""
+    if importlib.util.find_spec("ament_index_python") is not None:
+        yield
+        return
+
+    def get_package_share_directory(name: str) -> str:
+        found = next(_package_folders(name, folder), None)
+        if found is None:
+            raise FileNotFoundError(
+                f"no folder of package '{name}' beside or above the file"
+            )
+        return str(found)
+
+    index = types.ModuleType("ament_index_python.packages")
+    index.__dict__["get_package_share_directory"] = get_package_share_directory
+    package = types.ModuleType("ament_index_python")
+    with mock.patch.dict(
+        sys.modules, {package.__name__: package, index.__name__: index}
+    ):
+        yield
+
+
+def _package_folders(name: str, folder: Path) -> Iterator[Path]:
+    for place in (folder.resolve(), *folder.resolve().parents):
+        for found in (place / name, place if place.name == name else None):
+            if found is not None and found.is_dir():
+                yield found
+
+
 def _mesh_file(name: str, folder: Path) -> Path | None:
     """Return the file of a mesh, in a package beside or above a folder, if there."""
     if name.startswith(("package://", "model://")):
         package, _, rest = name.partition("://")[2].partition("/")
-        for place in (folder, *folder.resolve().parents):
-            for base in (place / package, place if place.name == package else None):
-                if base is not None and (base / rest).is_file():
-                    return (base / rest).resolve()
-        return None
-    file = folder / unquote(name.removeprefix("file://"))
-    return file.resolve() if name and file.is_file() else None
+        files = [place / rest for place in _package_folders(package, folder)]
+    else:
+        files = [folder / unquote(name.removeprefix("file://"))]
+    return next((file.resolve() for file in files if name and file.is_file()), None)
 
 
 def _compiled_urdf(root: ET.Element) -> Any:
@@ -170,12 +219,18 @@ def _compiled_mjcf(path: Path, notes: list[str]) -> Any:
         spec.delete(mesh)
     if lost:
         notes.append(f"meshes left out, as their files are missing: {', '.join(lost)}")
-    textures = [item for item in spec.textures if item.file]
-    for texture in textures:  # surfaces are not taken over
-        spec.delete(texture)
+    # Neither surfaces nor grounds are taken over.
+    unused = [geom for geom in spec.geoms if geom.type == mujoco.mjtGeom.mjGEOM_HFIELD]
+    unused += [item for item in spec.textures if item.file]
+    for item in (*unused, *spec.hfields, *spec.skins):
+        spec.delete(item)
     for material in spec.materials:
         material.textures = [""] * len(material.textures)
-    return spec.compile()
+    model = spec.compile()
+    for joint in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE):
+        first = model.jnt_qposadr[joint]  # where it stands is no part of a robot
+        model.qpos0[first : first + 7] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    return model
 
 
 def _limits(root: ET.Element) -> dict[str, JointLimit]:

@@ -21,6 +21,9 @@ from mrmg.scene.importing.robots.parameters import Parameter, parameters_of
 from mrmg.scene.importing.robots.survey import Survey, survey
 from mrmg.scene.loading.models import load_model
 
+_BESIDE_AXLE_M = 1e-3
+"""Distance from the driven axle up to which a support is below it."""
+
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 
 
@@ -102,11 +105,10 @@ def import_robot(
 
 def _doubts(found: Survey) -> list[str]:
     """Return what of a robot the simulation does not show as it is."""
-    if found.steered or not found.supports_m:
+    reach_m = max(map(abs, found.supports_m), default=0.0)
+    if found.steered or abs(found.lead_m) <= 0.5 * reach_m or reach_m < _BESIDE_AXLE_M:
         return []
-    share = abs(found.lead_m) / max(abs(x) for x in found.supports_m)
-    if share <= 0.5:
-        return []
+    share = abs(found.lead_m) / reach_m
     return [
         f"{share:.0%} of the weight is on the casters: the driven wheels may slip, as "
         "half of it on them is counted on"
@@ -161,11 +163,16 @@ def _drawn(
     of_body = {body: index for index, w in enumerate(wheels) for body in w.bodies}
     seen = model.geom_contype | model.geom_conaffinity
     looks = {int(model.geom_bodyid[at]) for at in np.flatnonzero(seen == 0)}
+    own = np.flatnonzero(np.isin(model.geom_bodyid, found.bodies)).tolist()
     lines: dict[int, list[str]] = {}
     meshes: dict[int, str] = {}
-    for geom in range(model.ngeom):
+    for geom in own:
         body, kind = int(model.geom_bodyid[geom]), kinds(model.geom_type[geom])
-        if kind not in shapes or body == 0 or (seen[geom] and body in looks):
+        if (
+            kind not in shapes
+            or body not in found.bodies
+            or (seen[geom] and body in looks)
+        ):
             continue
         wheel = of_body.get(body, -1)
         center = found.origin_m + (wheels[wheel].place_m if wheel >= 0 else 0.0)

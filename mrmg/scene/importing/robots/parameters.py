@@ -23,6 +23,9 @@ RANGE_M = 500.0
 _GRIP_USED = 0.6
 """Share of what the tyres transmit that the assumed accelerations ask for."""
 
+_EFFORT_USED = 0.9
+"""Share of the joints' effort limits that the assumed accelerations ask for."""
+
 _START_TIME_S = 0.6
 """Time to the top speed, and to the full turning rate, where grip allows it."""
 
@@ -111,14 +114,19 @@ def _limits(
     read = None if math.isinf(rate) else "its joints' velocity limit"
     slow = f"wheels at {WHEEL_RATE_RAD_S:g} rad/s"
     grip = GRIP_SHARE * DRIVEN_LOAD_SHARE * friction * GRAVITY_M_S2
-    push = _GRIP_USED * (grip - _ROLLING * GRAVITY_M_S2)
-    effort = sum(limit.effort_Nm for limit in own)
-    push = min(push, 0.9 * effort / radius / found.mass_kg)
+    rolling_N = _ROLLING * found.mass_kg * GRAVITY_M_S2
+    push_N = _GRIP_USED * (grip * found.mass_kg - rolling_N)
+    effort_N = _EFFORT_USED * sum(limit.effort_Nm for limit in own) / radius - rolling_N
+    held = "what tyres hold"
+    if 0.0 < effort_N < push_N:
+        push_N, held = effort_N, "what tyres and its joints' effort limit hold"
+    turning = sum(w.inertia[0] + w.armature for w in (*found.driven, *found.steered))
+    push = push_N / (found.mass_kg + turning / radius**2)
     values = {
         "limits.v_min": Parameter(_rounded(-speed / 2), "m/s", None, "half as fast"),
         "limits.v_max": Parameter(_rounded(speed), "m/s", read, "" if read else slow),
         "limits.u1_max": Parameter(
-            _rounded(min(push, speed / _START_TIME_S)), "m/s^2", None, "what tyres hold"
+            _rounded(min(push, speed / _START_TIME_S)), "m/s^2", None, held
         ),
     }
     if found.steered:

@@ -7,7 +7,7 @@ the driven axle on the ground.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -54,6 +54,7 @@ class Survey:
     """A robot as measured in its description.
 
     Attributes:
+        bodies: of the robot, as numbered in its description.
         driven: left and right wheel of the fixed axle.
         steered: left and right steered wheel; none of a differential drive.
         steering_rad: least range of the steering joints to either side.
@@ -66,6 +67,7 @@ class Survey:
         notes: what was assumed of its parts.
     """
 
+    bodies: tuple[int, ...]
     driven: tuple[Wheel, Wheel]
     steered: tuple[Wheel, ...]
     steering_rad: float
@@ -225,14 +227,16 @@ def survey(
     radius = float(np.mean([wheel.radius_m for wheel in driven]))
     origin = middle - [0.0, 0.0, radius]
     turning = {body for wheel in (*fixed, *steered) for body in wheel.bodies}
-    still = [body for body in range(description.model.nbody) if body not in turning]
-    whole = scan.mass(range(1, description.model.nbody))
+    bodies = _tree_of(turning, description.model, source)
+    still = [body for body in bodies if body not in turning]
+    whole = scan.mass(bodies)
     own = scan.mass(still)
     if own[0] <= 0.0:
         message = "its chassis has no mass; state <inertial> of its links"
         raise SceneError(source, [Fault("mass", message)])
-    points = scan.corners(scan.geoms(range(description.model.nbody))) - origin
+    points = scan.corners(scan.geoms(bodies)) - origin
     return Survey(
+        bodies=bodies,
         driven=_moved(driven, origin),
         steered=_moved(sorted(steered, key=lambda wheel: -wheel.place_m[1]), origin),
         steering_rad=steering,
@@ -244,6 +248,16 @@ def survey(
         lead_m=float(whole[1][0] - origin[0]),
         notes=tuple(notes),
     )
+
+
+def _tree_of(bodies: Collection[int], model: Any, source: str) -> tuple[int, ...]:
+    """Return all bodies of the robot that some of them belong to."""
+    roots = {int(model.body_rootid[body]) for body in bodies}
+    if len(roots) > 1:
+        names = ", ".join(model.body(root).name or f"#{root}" for root in sorted(roots))
+        message = f"has the wheels of {len(roots)} robots ({names}); leave one in it"
+        raise SceneError(source, [Fault("bodies", message)])
+    return tuple(np.flatnonzero(np.isin(model.body_rootid, list(roots))).tolist())
 
 
 def _wheels(
