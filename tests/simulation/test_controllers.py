@@ -11,6 +11,7 @@ import pytest
 from mrmg.errors import UsageError
 from mrmg.motion.dynamics import DERIVATIVES, NU, NX, rk4_step
 from mrmg.scene.robot_model import RobotModel
+from mrmg.shipped import model_names
 from mrmg.simulation.controller import (
     HORIZON,
     HORIZON_STEP_S,
@@ -23,14 +24,14 @@ from mrmg.testing import ControllerContract
 from mrmg.testing.controller_contract import TICKS_A_STEP, reference_of, straight
 
 
-@pytest.fixture(scope="module", params=["car", "diffdrive", "hauler"])
+@pytest.fixture(scope="module", params=model_names())
 def model(request: pytest.FixtureRequest, driving: SimpleNamespace) -> RobotModel:
     scene = driving.open_ground([(0.0, 0.0, 0.4)], models=[request.param])
     return scene.robots[0].model
 
 
 class OfThisPackage(ControllerContract):
-    models = ("car", "diffdrive", "hauler")
+    models = tuple(model_names())
     name = ""
 
     def controller(self, model: RobotModel) -> Controller:
@@ -43,6 +44,8 @@ class TestMpc(OfThisPackage):
 
 class TestPurePursuit(OfThisPackage):
     name = "pure_pursuit"
+    # Not the Husky: turning at 0.36 rad/s at most, it does not get back from an offset.
+    models = ("car", "diffdrive", "hauler")
 
 
 class TestTvlqr(OfThisPackage):

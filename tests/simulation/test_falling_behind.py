@@ -13,6 +13,7 @@ from shapely.geometry import LineString, Polygon
 from mrmg.plans import Plan
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
+from mrmg.shipped import model_names
 from mrmg.simulation import simulate
 from mrmg.simulation.controller import controller_names
 from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
@@ -20,8 +21,12 @@ from mrmg.simulation.log import ExecutionLog
 
 pytestmark = pytest.mark.quick("car-mpc", "diffdrive-tvlqr", "hauler-pure_pursuit")
 
-DRAG = 0.43
-"""Rolling resistance over weight of which the drive can overcome hardly more."""
+DRAG = {"husky": 0.39}
+"""Rolling resistance over weight of which a drive can overcome hardly more; OTHERS
+where a robot has none of its own. A Husky needs half its grip for turning alone, and
+goes astray before it is much slower."""
+
+OTHERS = 0.43
 
 CLOSE_M = 0.5
 """Distance the planner keeps between robots."""
@@ -30,12 +35,20 @@ LOST_M = 0.3
 """How much of it may be lost until the fleet has slowed down."""
 
 
+def starting(model: RobotModel) -> tuple[float, int]:
+    """Return acceleration [m/s^2] and steps to three quarters of the top speed."""
+    speed = 0.75 * model.limits.v_max_m_s
+    most = min(1.0, model.planning_share * model.limits.u1_max_m_s2)
+    steps = round(speed / most / 0.1)
+    return speed / (0.1 * steps), steps
+
+
 def weaving(model: RobotModel, seconds: float) -> np.ndarray:
     """Drive at three quarters of the top speed in waves, and stop."""
-    speed = 0.75 * model.limits.v_max_m_s
-    steps, ramp = round(seconds / 0.1), round(speed / 0.1)
+    u1, ramp = starting(model)
+    steps = round(seconds / 0.1)
     control = np.zeros((steps, 2))
-    control[:ramp, 0], control[-ramp:, 0] = 1.0, -1.0
+    control[:ramp, 0], control[-ramp:, 0] = u1, -u1
     wave = np.repeat([1.0, -1.0, -1.0, 1.0], 10) * 0.4 * model.limits.w_max
     for start in range(ramp, steps - ramp - len(wave), len(wave)):
         control[start : start + len(wave), 1] = wave
@@ -44,10 +57,9 @@ def weaving(model: RobotModel, seconds: float) -> np.ndarray:
 
 def crossing(model: RobotModel, seconds: float, wait: int) -> np.ndarray:
     """Wait for so many steps, then drive straight on and stop."""
-    speed = 0.75 * model.limits.v_max_m_s
-    steps, ramp = round(seconds / 0.1), round(speed / 0.1)
-    control = np.zeros((steps, 2))
-    control[wait : wait + ramp, 0], control[-ramp:, 0] = 1.0, -1.0
+    u1, ramp = starting(model)
+    control = np.zeros((round(seconds / 0.1), 2))
+    control[wait : wait + ramp, 0], control[-ramp:, 0] = u1, -u1
     return control
 
 
@@ -70,7 +82,7 @@ def planned_apart_m(scene: Scene, plan: Plan) -> float:
     return apart_m(scene, np.stack([item.state for item in plan.trajectories]))
 
 
-@pytest.fixture(scope="module", params=["car", "diffdrive", "hauler"])
+@pytest.fixture(scope="module", params=model_names())
 def mission(
     request: pytest.FixtureRequest, driving: SimpleNamespace
 ) -> tuple[Scene, Plan]:
@@ -91,7 +103,8 @@ def mission(
 def log(request: pytest.FixtureRequest, mission: tuple[Scene, Plan]) -> ExecutionLog:
     """A dragging brake lets r1 speed up but slowly."""
     scene, plan = mission
-    dragging = DRAG / scene.robots[0].model.rolling_coefficient - 1.0
+    model = scene.robots[0].model
+    dragging = DRAG.get(model.name, OTHERS) / model.rolling_coefficient - 1.0
     disturbance = Disturbance(
         seed=0,
         robots=(
@@ -105,9 +118,10 @@ def log(request: pytest.FixtureRequest, mission: tuple[Scene, Plan]) -> Executio
 def test_the_fleet_waits_for_the_slow_one(
     mission: tuple[Scene, Plan], log: ExecutionLog
 ) -> None:
-    _, plan = mission
+    scene, plan = mission
+    late = 1.08 if scene.robots[0].model.name in DRAG else 1.2
     assert log.completed
-    assert log.time_s[-1] > 1.2 * plan.makespan_s
+    assert log.time_s[-1] > late * plan.makespan_s
 
 
 def test_it_cuts_no_corner(mission: tuple[Scene, Plan], log: ExecutionLog) -> None:

@@ -156,7 +156,9 @@ def test_ramming_leaves_everybody_on_their_wheels(
     resistance = believed_resistance(scene)
     fleet.set_resistance(resistance.rolling_N, resistance.swing_N)
     rng = np.random.default_rng(8)
-    grip_N = 0.5 * model.mass_kg * 9.81 + model.energy_model.rolling_force_N
+    energy = model.energy_model
+    ground_N = energy.rolling_force_N + energy.turning_force_N
+    grip_N = max(0.5 * model.mass_kg * 9.81, 2.0 * ground_N)
     w = np.zeros(2)
     for _ in range(300):
         force = rng.uniform(-0.7, 1.0, 2) * grip_N
@@ -166,11 +168,11 @@ def test_ramming_leaves_everybody_on_their_wheels(
             w = following
             watch.look(data)
             upright = data.xmat[world.chassis].reshape(2, 3, 3)[:, 2, 2]
-            assert upright.min() > np.cos(np.radians(25))
+            assert upright.min() > np.cos(np.radians(20))
             assert np.abs(data.xpos[world.chassis, 2]).max() < 0.15
     assert data.time == pytest.approx(60.0)
     assert np.isfinite(data.qpos).all()
-    assert len(watch.contacts) > 10
+    assert len(watch.contacts) > 20
     assert sum(warning.number for warning in data.warning) == 0
 
 
