@@ -1,9 +1,16 @@
-"""What all tests share: the order of tests, and one run of the shipped quickstart."""
+"""What all tests share: the order of tests, and one run of the shipped quickstart.
+
+Slow are the tests marked so, and those that `slow_tests.txt` lists: all that took more
+than `QUICK_S` of processor time. `pytest --list-slow` brings the list up to date with
+the tests that it runs.
+"""
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
@@ -14,6 +21,10 @@ pytest_plugins = ("handmade",)
 # Equal examples whenever the tests run, and none judged by its time.
 settings.register_profile("mrmg", derandomize=True, deadline=None)
 settings.load_profile("mrmg")
+
+SLOW_TESTS = Path(__file__).with_name("slow_tests.txt")
+QUICK_S = 0.4
+"""Processor time that a test of the fast part may take."""
 
 WALLED = """\
 format: 1
@@ -40,18 +51,38 @@ def pytest_configure() -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the option that measures which tests are slow."""
+    parser.addoption("--list-slow", action="store_true", help=f"update {SLOW_TESTS}")
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Run the slow tests last, so that a broken build is told early.
+    """Run the slow tests last, so that a broken build is reported early.
 
     Where a test is marked quick for some of its parameters, the others are slow.
     """
+    listed = set(SLOW_TESTS.read_text().splitlines())
     for item in items:
         quick = item.get_closest_marker("quick")
         called = getattr(item, "callspec", None)
-        if quick and called and called.id not in quick.args:
+        others = quick and called and called.id not in quick.args
+        if others or item.nodeid in listed:
             item.add_marker(pytest.mark.slow)
     items.sort(key=lambda item: item.get_closest_marker("slow") is not None)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    """Note a test as slow or quick, where that is measured."""
+    began_s = sum(os.times()[:4])
+    result = yield
+    if item.config.getoption("--list-slow"):
+        slow = {*SLOW_TESTS.read_text().splitlines()} - {item.nodeid}
+        if sum(os.times()[:4]) - began_s > QUICK_S:
+            slow.add(item.nodeid)
+        SLOW_TESTS.write_text("".join(f"{name}\n" for name in sorted(slow)))
+    return result
 
 
 @pytest.fixture(scope="session")

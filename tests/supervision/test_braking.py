@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrmg.planning.problem._safety_kernels import new_commitment, write_braking
+from mrmg.planning.problem._safety_kernels import new_contingency, write_braking
 from mrmg.planning.problem.targets import gate_arrays
 from mrmg.planning.roadmap.fleet import fleet_array
 from mrmg.scene.loading import scene_from_document
@@ -38,10 +38,10 @@ def test_braking_is_what_the_planner_committed_to(model: str, speed: float) -> N
         scene, World.from_scene(scene), obstacle_margin_m=0.25, robot_margin_m=0.5
     )
     # In Python: kernels may not return to it what they are handed by reference.
-    make = getattr(new_commitment, "py_func", new_commitment)
-    commitment = make(fleet.view(np.recarray), gate_arrays(scene), DT_S)
-    write_braking(fleet, 0, state, DT_S, commitment, 0)
-    promised = commitment.state[0, 0, : commitment.length[0, 0]]
+    make = getattr(new_contingency, "py_func", new_contingency)
+    contingency = make(fleet.view(np.recarray), gate_arrays(scene), DT_S)
+    write_braking(fleet, 0, state, DT_S, contingency, 0)
+    promised = contingency.state[0, 0, : contingency.length[0, 0]]
     np.testing.assert_allclose(states[: len(promised) - 1], promised[1:], atol=1e-12)
     assert len(states) == len(controls)
 

@@ -132,3 +132,50 @@ def test_one_more_goal_is_worth_what_the_longer_route_costs(
         if cost < np.inf:
             assert with_goal(cost + 1.0) == pytest.approx(cost)
             assert with_goal(cost - 1.0) == np.inf
+
+
+@pytest.mark.parametrize("slack_s", [0.1, -0.1])
+@pytest.mark.parametrize(
+    ("goal_m", "station_m", "finish_m", "energy_J", "charged_J"),
+    [
+        (25.0, 10.0, 25.0, 12.0, 28.0),  # the station comes before the goal
+        (10.0, 15.0, 35.0, 20.0, 25.0),  # and behind it, on the way to the finish
+    ],
+)
+def test_recharging_takes_its_time_and_routes_keep_their_limit(
+    goal_m: float,
+    station_m: float,
+    finish_m: float,
+    energy_J: float,
+    charged_J: float,
+    slack_s: float,
+) -> None:
+    """Along a line at 1 m/s and 1 J/m, with a battery of 30 J that is filled at 2 W."""
+    expected_s = finish_m + charged_J / 2.0
+    x = np.array([goal_m, station_m, 0.0])  # the start comes last
+    apart = np.abs(x[:, None] - x)
+    problem = routing_arrays(
+        goals=1,
+        distance=apart[None, :2, :2],
+        start_distance=apart[None, 2, :2],
+        finish_distance=np.abs(finish_m - x)[None],
+        plain=np.ones(1),
+        energy=np.array([energy_J]),
+        capacity=np.array([30.0]),
+        reserve=np.zeros(1),
+        time=apart[None, :, :2],
+        finish_time=np.abs(finish_m - x)[None],
+        limit=np.array([expected_s + slack_s]),
+        charge_power=np.array([2.0]),
+        makespan_weight=1.0,
+    )
+    legs = new_legs(problem)
+    labels = new_labels(legs)
+    goal, end = np.array([0]), legs.cost.shape[1] - 1
+    cost, time_s, _ = label_route(legs, labels, 0, goal, 1, 0, 0)
+    kept = slack_s > 0.0
+    assert (cost, time_s) == ((finish_m, expected_s) if kept else (np.inf, np.inf))
+    label_route(legs, labels, 0, goal, 0, 0, 0)
+    before, behind = ((row_of(legs, 0, side, 0), end) for side in range(2))
+    value = value_with(legs, labels, 0, before, 0, behind, 0.0, np.inf)
+    assert value == pytest.approx(finish_m + 1.001 * expected_s if kept else np.inf)
