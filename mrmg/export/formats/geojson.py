@@ -85,11 +85,12 @@ def _visit(visit: Visit) -> dict[str, Any]:
 def _robots(scene: Scene) -> Iterator[dict[str, Any]]:
     for robot in scene.robots:
         x_m, y_m, heading_rad = robot.pose
+        origin = robot.model.origin
         yield _feature(
             shapely.Point(x_m, y_m),
             kind="robot",
             id=robot.id,
-            model=robot.model.name,
+            model=origin.reference if origin else robot.model.name,
             heading=heading_rad,
             capacity_J=robot.battery.capacity_J,
         )

@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 import shlex
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pytest
+from pictures.stories import stories, write_field, write_hall
 
 from mrmg.cli import main
 
@@ -47,23 +46,22 @@ def test_occupancy_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-def test_elevation_model(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, write_tiff: Any
+@pytest.mark.parametrize("number", [0, 1], ids=["hall", "field"])
+def test_stories_of_the_readme(
+    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A field of 80 x 80 m at 430 m above the sea, in degrees."""
+    """Each is of five commands, from a map to a recording."""
     monkeypatch.chdir(tmp_path)
-    row, column = np.mgrid[0:80, 0:110]
-    heights = 430 + 1.5 * np.sin(column / 20) + np.cos(row / 15)
-    heights[60:66, 20:30] = -9999
-    keys = {"crs": "EPSG:4326", "nodata": -9999, "corner": (8.33, 47.85)}
-    write_tiff(Path("field.tif"), heights.astype("float32"), cell=9e-6, **keys)
-    run("""
-    mrmg scene import field.tif -o field.yaml
-    mrmg scene populate field.yaml --goals 4 --stations 2 -o mission.yaml
-    mrmg scene check mission.yaml
-    mrmg run mission.yaml --no-video --out runs/field
-    mrmg export runs/field --format geojson
-    """)
-    check(tmp_path / "runs" / "field", 4)
-    back = tmp_path / "runs" / "field" / "export" / "mission.geojson"
-    run(f"mrmg scene import {back} -o again.yaml")
+    (write_hall, write_field)[number](tmp_path)
+    story = stories()[number]
+    assert len(story) == 5
+    assert story[-1].endswith("--format mcap")
+    run(
+        "\n".join(f"mrmg {line}" for line in story).replace("--out", "--no-video --out")
+    )
+    (folder,) = (tmp_path / "runs").iterdir()
+    check(folder, 6)
+    assert (folder / "export" / "mission.mcap").stat().st_size > 10_000
+    assert main(["export", str(folder), "--format", "geojson"]) == 0
+    back = str(folder / "export" / "mission.geojson")
+    assert main(["scene", "import", back, "-o", "again.yaml"]) == 0

@@ -72,15 +72,13 @@ def _layer(
         raise SceneError(source, [Fault("", "holds no height in this area")])
     obstacles: list[Area] = []
     if empty.any():
-        from scipy.ndimage import distance_transform_edt
-
-        nearest = distance_transform_edt(
-            empty, return_distances=False, return_indices=True
+        fill = import_extra("rasterio.fill", extra="geo", purpose="reads GeoTIFF")
+        heights = fill.fillnodata(
+            heights, mask=~empty, max_search_distance=float(np.hypot(*heights.shape))
         )
-        heights = heights[tuple(nearest)]
         notes.append(
             f"{int(empty.sum())} cells without data were taken as {options.unknown}, "
-            "at the height of the nearest cell"
+            "at heights between those around them"
         )
     if empty.any() and options.unknown == "obstacle":
         obstacles = [
