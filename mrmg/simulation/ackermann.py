@@ -42,7 +42,7 @@ class AckermannChassis:
         self._steer_q = model.jnt_qposadr[steer]
         servos = part_ids(model, actuator, robots, parts.servos)
         self._steer_ctrl = model.actuator_ctrladr[servos].ravel()
-        self._control = data.ctrl
+        self._control, self._share = data.ctrl, np.empty((0, 1))
         self._find_drives(robots)
         # A servo with stiffness kp and damping kv follows a ramp kv / kp late.
         servo = servos[:, 0]
@@ -81,7 +81,9 @@ class AckermannChassis:
     ) -> None:
         """Hold the traction force; ramp psi so that the servos are on it in time."""
         lag = self._servo_lag_s / (steps * self._step_s)
-        share = (np.arange(steps) / steps)[:, None] + lag
+        if len(self._share) != steps:
+            self._share = (np.arange(steps) / steps)[:, None]
+        share = self._share + lag
         tan_steer = np.tan(w_from + share * (w_to - w_from))[:, :, None]
         angles = np.arctan(tan_steer / (1.0 - self._swing * tan_steer))
         self._angles = angles.reshape(steps, -1)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -26,16 +25,18 @@ class ControllerCalls:
         self.bounded_solves = [0] * robots
         self._call_s: dict[str, list[float]] = {}
 
-    def timed(self, robot: int, controller: Controller, call: Callable[[], Any]) -> Any:
-        """Return what a call of a robot's controller gives, and note how it went."""
+    def begin(self) -> None:
+        """Start the time of the next call, which ends where that after it starts."""
         # Of this thread: what other processes do on its processor does not count.
-        started = time.thread_time()
-        answer = call()
-        elapsed_s = time.thread_time() - started
+        self._since_s = time.thread_time()
+
+    def note(self, robot: int, controller: Controller) -> None:
+        """Note how long the call of a robot's controller took, and by which branch."""
+        now_s = time.thread_time()
         branch = getattr(controller, "branch", "")
-        self._call_s.setdefault(branch, []).append(elapsed_s)
+        self._call_s.setdefault(branch, []).append(now_s - self._since_s)
         self.bounded_solves[robot] += branch == "qp"
-        return answer
+        self._since_s = now_s
 
     def milliseconds(self) -> dict[str, Any]:
         """Return median and 99th percentile over all calls, and by branch.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 import numpy as np
 
 from mrmg.scene.types import Scene
@@ -67,13 +65,14 @@ class SetPoints:
         """
         horizon = self._reference.paced(clock_s, rate, HORIZON_STEP_S, HORIZON + 1)
         start = np.concatenate([state[:, :3], self.following], axis=1)
+        calls.begin()
         for index, controller in enumerate(self._controllers):
             own = horizon[:, index]
             if rate > 0.0 and _stands(own):
                 self._correction[index] = 0.0
             else:
-                call = partial(controller.correct, start[index], own)
-                self._correction[index] = calls.timed(index, controller, call)
+                self._correction[index] = controller.correct(start[index], own)
+                calls.note(index, controller)
 
     def advance(
         self,

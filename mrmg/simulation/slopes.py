@@ -18,6 +18,7 @@ class SlopesUnderfoot:
         """Look at the elevation of `scene`."""
         self._relief = scene.elevation
         self._lead_m = [robot.model.center_of_mass_m for robot in scene.robots]
+        self._flat = np.ones(len(scene.robots)), np.zeros(len(scene.robots))
 
     def under(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return cosine and sine of the slope along each heading, each (R,).
@@ -28,7 +29,7 @@ class SlopesUnderfoot:
             state: of the robots, shape (R, 5).
         """
         if self._relief is None:
-            return np.ones(len(state)), np.zeros(len(state))
+            return self._flat
         level, slope = [], []
         for (x, y, heading, _, _), lead_m in zip(
             state.tolist(), self._lead_m, strict=True
