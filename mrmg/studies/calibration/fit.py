@@ -49,7 +49,7 @@ def fit_linear(matrix: np.ndarray, measured: np.ndarray) -> LinearFit:
     length = np.linalg.norm(matrix, axis=0)
     scale = np.where(length > 0.0, length, 1.0)
     if rows <= parameters or np.linalg.matrix_rank(matrix / scale) < parameters:
-        raise ValueError(f"{rows} measurements do not separate {parameters} values")
+        raise ValueError(f"{rows} measurements do not tell {parameters} values apart")
     value = np.linalg.lstsq(matrix / scale, measured, rcond=None)[0] / scale
     fitted = matrix @ value
     residual = measured - fitted
