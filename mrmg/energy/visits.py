@@ -177,15 +177,14 @@ def battery_contents(
     Returns:
         Both [J], shape (n + 1,).
     """
-    before, after = np.zeros(len(draw_J) + 1), np.zeros(len(draw_J) + 1)
+    before, after = [], []
     content_J = battery.start_J
-    for step in range(len(draw_J) + 1):
+    gains_J = [*(given.offered_J - draw_J).tolist(), 0.0]
+    for step, gain_J in enumerate(gains_J):
         content_J = reckoned_J.get(step, content_J)
-        before[step] = content_J
+        before.append(content_J)
         if step in given.full_at:
             content_J = battery.capacity_J
-        after[step] = content_J
-        if step < len(draw_J):
-            rest_J = content_J - float(draw_J[step]) + float(given.offered_J[step])
-            content_J = min(rest_J, battery.capacity_J)
-    return before, after
+        after.append(content_J)
+        content_J = min(content_J + gain_J, battery.capacity_J)
+    return np.array(before), np.array(after)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cache
 from importlib.metadata import version
 
 from mrmg import extensions
@@ -71,11 +72,15 @@ def make_plan(
     )
 
 
+@cache
+def _own_versions() -> Mapping[str, str]:
+    names = ("mrmg", "numba", "numpy", "scipy", "shapely")
+    return {name: version(name) for name in names}
+
+
 def _versions(params: PlannerParams) -> dict[str, str]:
     """Return the versions of the packages that decide a plan."""
-    own = {
-        name: version(name) for name in ("mrmg", "numba", "numpy", "scipy", "shapely")
-    }
+    own = dict(_own_versions())
     added = (
         extensions.origin(extensions.PLANNERS, params.planner),
         extensions.origin(extensions.ROUTERS, params.router.method),
