@@ -7,7 +7,7 @@ from math import cos, sin, tan
 import numba
 
 from mrmg.compilation import kernel
-from mrmg.motion._pointer_kernels import steer_at, step_at
+from mrmg.motion._pointer_kernels import call_steer, call_step
 from mrmg.motion.dynamics import (
     car_derivative,
     car_turn_speed,
@@ -36,8 +36,8 @@ def step(robot, state, u1, u2, dt, out):
     `robot` is a record with `model`, `wheelbase` and, for a user's model, `step_at`.
     """
     if robot.model == USER:
-        x, y, theta, v, w = step_at(robot.step_at)(
-            (state[0], state[1], state[2], state[3], state[4]), (u1, u2),
+        x, y, theta, v, w = call_step(
+            robot.step_at, (state[0], state[1], state[2], state[3], state[4]), (u1, u2),
             robot.wheelbase, dt,
         )  # fmt: skip
     elif robot.model == CAR:
@@ -78,7 +78,7 @@ def steer_user(robot, state, wx, wy, share, dt):
 
     `share` of the top speed is wanted; 0 requires braking.
     """
-    return steer_at(robot.steer_at)(
-        (state[0], state[1], state[2], state[3], state[4]), (wx, wy),
+    return call_steer(
+        robot.steer_at, (state[0], state[1], state[2], state[3], state[4]), (wx, wy),
         share, robot.wheelbase, dt,
     )  # fmt: skip

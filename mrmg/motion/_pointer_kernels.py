@@ -7,8 +7,8 @@ stay as they are cached, whatever it points to.
 
 from __future__ import annotations
 
+from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
 _NUMBER = types.float64
@@ -21,22 +21,26 @@ STEER = _PAIR(_STATE, _PAIR, _NUMBER, _NUMBER, _NUMBER)
 """Signature of (state, waypoint, share, length, dt) -> control."""
 
 
-def _function_at(signature):
-    """Return what makes an address a function of a signature, for kernels to call."""
-    kind = types.FunctionType(signature)
+def _caller(signature):
+    """Return the type of a call of what lies at an address, and what generates it."""
 
-    @intrinsic
-    def function_at(typing, address):
-        def generate(context, builder, _, arguments):
-            function = cgutils.create_struct_proxy(kind)(context, builder)
-            pointer = context.get_value_type(types.voidptr)
-            function.c_addr = builder.inttoptr(arguments[0], pointer)
-            return function._getvalue()
+    def generate(context, builder, _, arguments):
+        address, *given = arguments
+        result = context.get_value_type(signature.return_type)
+        kinds = [context.get_value_type(kind) for kind in signature.args]
+        pointer = ir.FunctionType(result, kinds).as_pointer()
+        return builder.call(builder.inttoptr(address, pointer), given)
 
-        return kind(types.int64), generate
-
-    return function_at
+    return signature.return_type(types.int64, *signature.args), generate
 
 
-step_at = _function_at(STEP)
-steer_at = _function_at(STEER)
+@intrinsic
+def call_step(typing, address, state, control, length, dt):
+    """Call a step at an address; return the state."""
+    return _caller(STEP)
+
+
+@intrinsic
+def call_steer(typing, address, state, waypoint, share, length, dt):
+    """Call a steering at an address; return the control."""
+    return _caller(STEER)
