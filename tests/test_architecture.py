@@ -21,13 +21,10 @@ MODULES = sorted(PACKAGE.rglob("*.py"))
 DRAWERS = {"utils", "util", "common", "helpers", "helper", "misc", "tools"}
 HEAVY = {"av", "casadi", "matplotlib", "mujoco", "numba", "pydantic", "rich", "scipy"}
 
-LONG_MODULES = {
-    "band": 356,
-}
+LONG_MODULES = {}
 """Modules that are still too long, with their lines; the list may only shrink."""
 
 LONG_FUNCTIONS = {
-    "_tracking_kernels.drive": 99,
     "routing.routing_arrays": 65,
 }
 """Functions that are still too long, with their lines; the list may only shrink."""
@@ -37,7 +34,6 @@ WIDE_FUNCTIONS = {
     "_pointer_kernels.call_step": 11,
     "dynamics.rk4_step.step": 9,
     "_band_kernels.band_cost": 9,
-    "_tracking_kernels.drive": 11,
     "_roadmap_kernels.best_vertex": 9,
     "_roadmap_kernels.find_waypoint": 10,
     "routing.routing_arrays": 15,

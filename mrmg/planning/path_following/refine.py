@@ -22,16 +22,9 @@ from mrmg.motion._kernels import UNICYCLE, USER
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
-from mrmg.planning.path_following.band import (
-    SPACINGS_M,
-    Path,
-    cost_map_of,
-    inflated,
-    path_of,
-    smooth_terrain,
-    visit_steps,
-)
+from mrmg.planning.path_following.band import SPACINGS_M, Path, path_of, visit_steps
 from mrmg.planning.path_following.coordination.coordination import ROUNDS, coordinated
+from mrmg.planning.path_following.cost_map import cost_map_of, inflated, smooth_terrain
 from mrmg.planning.path_following.pauses import with_pauses
 from mrmg.planning.path_following.progress import in_the_way, no_progress
 from mrmg.planning.path_following.robot_task import RobotTask

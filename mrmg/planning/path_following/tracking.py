@@ -11,8 +11,10 @@ from mrmg.energy.model import EFFECTIVE_MASS_KG, ROLLING_N
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following import _tracking_kernels
-from mrmg.planning.path_following._tracking_kernels import Courses
-from mrmg.planning.path_following.band import Path, nimble_share, path_curvature
+from mrmg.planning.path_following._following_kernels import Courses
+from mrmg.planning.path_following._tracking_kernels import Driving, Progress
+from mrmg.planning.path_following.band import Path, nimble_share
+from mrmg.planning.path_following.cost_map import path_curvature
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.problem.time_weighting import brakes_hard
 from mrmg.plans import Trajectory
@@ -109,20 +111,25 @@ def redriven(
     control = np.zeros((_most_steps(problem, params, paths, given), len(paths), 2))
     for r, controls in enumerate(repeated):
         control[: len(controls), r] = controls
-    driven = np.empty(len(paths))
-    steps, stuck = _tracking_kernels.drive(
-        mission.fleet,
-        mission.spaces,
-        mission.zones,
-        courses_of(problem, paths, slow),
-        given,
-        problem.start,
-        np.arange(len(paths)),
-        params.dt_s,
-        control,
-        driven,
-        halt,
+    driving = Driving(
+        fleet=mission.fleet,
+        spaces=mission.spaces,
+        zones=mission.zones,
+        courses=courses_of(problem, paths, slow),
+        given=given,
+        start=problem.start,
+        dt=params.dt_s,
+        halt=halt,
     )
+    progress = Progress(
+        segment=np.zeros(len(paths), np.int64),
+        still=np.zeros(len(paths), np.int64),
+        stood=np.zeros(len(paths), np.int64),
+        done=driving.courses.nodes < 2,
+        driven=np.full(len(paths), -np.inf),
+        idle=np.zeros(1, np.int64),
+    )
+    steps, stuck = _tracking_kernels.drive(driving, progress, control)
     steps = max(steps, 1)
     states = []
     for r in range(len(paths)):
@@ -133,12 +140,12 @@ def redriven(
         states.append((own, state))
     last = np.array([state[-1] for _, state in states])
     if stuck >= 0:
-        return Drive((), int(stuck), last, driven)
+        return Drive((), int(stuck), last, progress.driven)
     trajectories = tuple(
         Trajectory(robot=robot.id, dt_s=params.dt_s, state=state, control=own)
         for robot, (own, state) in zip(problem.scene.robots, states, strict=True)
     )
-    return Drive(trajectories, -1, last, driven)
+    return Drive(trajectories, -1, last, progress.driven)
 
 
 def braking_places(problem: Problem, r: int, trajectory: Trajectory) -> list[SlowPlace]:

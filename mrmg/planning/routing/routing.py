@@ -98,12 +98,9 @@ def routing_arrays(
         makespan_weight: of the longest time of a route in the objective [J/s].
     """
     robots, targets = start_distance.shape
-    cost = np.concatenate([distance, start_distance[:, None, :]], axis=1)
-    cost = np.ascontiguousarray(cost * plain[:, None, None])
-    if finish_distance is None:
-        finish = np.zeros((robots, targets + 1))
-    else:
-        finish = np.ascontiguousarray(finish_distance * plain[:, None])
+    metres = np.concatenate([distance, start_distance[:, None, :]], axis=1)
+    cost = np.ascontiguousarray(metres * plain[:, None, None])
+    finish = _filled(finish_distance, 0.0, (robots, targets + 1)) * plain[:, None]
     return RoutingArrays(
         goals=goals,
         cost=cost,

@@ -13,7 +13,7 @@ import numpy as np
 
 from mrmg.compilation import by_reference, kernel
 from mrmg.motion._kernels import CAR, UNICYCLE, USER, copy_numbers, steer_user, step
-from mrmg.planning.path_following._tracking_kernels import (
+from mrmg.planning.path_following._following_kernels import (
     ARRIVED_M,
     follow,
     turned,

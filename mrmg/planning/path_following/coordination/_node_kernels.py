@@ -9,7 +9,7 @@ import numpy as np
 
 from mrmg.compilation import by_reference, kernel
 from mrmg.motion._kernels import CAR, copy_numbers
-from mrmg.planning.path_following._tracking_kernels import Courses, advance
+from mrmg.planning.path_following._following_kernels import Courses, advance
 from mrmg.planning.path_following.coordination._field_kernels import field_at
 from mrmg.planning.path_following.coordination._motion_kernels import (
     Traffic,

@@ -15,7 +15,7 @@ import numpy as np
 
 from mrmg.compilation import kernel
 from mrmg.motion._kernels import copy_numbers
-from mrmg.planning.path_following._tracking_kernels import advance
+from mrmg.planning.path_following._following_kernels import advance
 from mrmg.planning.path_following.coordination._end_kernels import (
     MOST_BRAKING_STEPS,
     brake,

@@ -19,7 +19,7 @@ import numpy as np
 
 from mrmg import seeding
 from mrmg.planning.path_following import _tracking_kernels
-from mrmg.planning.path_following._tracking_kernels import Courses
+from mrmg.planning.path_following._following_kernels import Courses
 from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.coordination import _search_kernels
 from mrmg.planning.path_following.coordination._node_kernels import (

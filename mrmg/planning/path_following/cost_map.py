@@ -1,0 +1,90 @@
+"""Cost maps of paths: terrain, clearance and curvature, for each robot."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mrmg.motion._kernels import UNICYCLE
+from mrmg.planning.path_following._band_kernels import CostMap
+from mrmg.planning.problem.problem import Problem
+
+DISCS_M = 0.4
+"""Distance of the discs that cover a footprint."""
+
+INFLATION_REACH_M = 4.0
+"""How far around a place a path is led farther from obstacles ..."""
+
+INFLATION_M = 0.06
+"""... and how much farther, at the place."""
+
+TRACKING_ROOM_M = 0.06
+"""Room beyond the margin that a path leaves for what tracking may be off: it costs next
+to nothing, and robots seldom get stuck."""
+
+CURVATURE_SHARE = 0.92
+"""Share of the steering that a path uses."""
+
+
+def cost_map_of(problem: Problem, r: int, smooth: np.ndarray) -> CostMap:
+    """Return the cost map of robot r's paths; `smooth` is `smooth_terrain`."""
+    robot = problem.mission.fleet[r]
+    spaces = problem.mission.spaces
+    model = problem.scene.robots[r].model
+    outline = robot["corner"][: robot["corners"]]
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    half = max(-low[1], high[1])
+    pieces = max(1, int(np.ceil((high[0] - low[0]) / DISCS_M)))
+    length = (high[0] - low[0]) / pieces
+    limit = robot["limit"]
+    if robot["model"] == UNICYCLE:
+        arm = float(robot["track"])
+        rate = 4.0 * limit[4] / limit[1] ** 2
+    else:
+        arm = float(robot["wheelbase"])
+        rate = limit[4] / (arm * limit[1])
+    energy = model.energy_model
+    return CostMap(
+        x_min=spaces.x_min,
+        y_min=spaces.y_min,
+        cell=spaces.cell,
+        distance=spaces.distance[robot["space"]],
+        multiplier=smooth,
+        disc=low[0] + length * (np.arange(pieces) + 0.5),
+        room=float(np.hypot(0.5 * length, half) + robot["margin"] + TRACKING_ROOM_M),
+        curvature=path_curvature(robot),
+        curvature_rate=float(CURVATURE_SHARE * rate),
+        scrub=arm * energy.turning_force_N / max(energy.rolling_force_N, 1e-9),
+    )
+
+
+def path_curvature(robot: np.ndarray) -> float:
+    """Return the curvature of the sharpest turn of a robot's paths [1/m].
+
+    Args:
+        robot: a record of FLEET.
+    """
+    limit, radius = robot["limit"], float(robot["turning_radius"])
+    if robot["model"] == UNICYCLE:
+        # Sharper than it can turn at full speed: it slows down there.
+        return float(CURVATURE_SHARE * 2.0 * limit[2] / limit[1])
+    return CURVATURE_SHARE / radius if radius > 0.0 else np.inf  # a user's motion
+
+
+def inflated(cost_map: CostMap, place: np.ndarray) -> CostMap:
+    """Return the surface with obstacles counted as nearer around a place."""
+    rows, columns = cost_map.distance.shape
+    x = cost_map.x_min + (np.arange(columns) + 0.5) * cost_map.cell - place[0]
+    y = cost_map.y_min + (np.arange(rows) + 0.5) * cost_map.cell - place[1]
+    near = np.maximum(0.0, 1.0 - np.hypot(x[None, :], y[:, None]) / INFLATION_REACH_M)
+    return cost_map._replace(distance=cost_map.distance - INFLATION_M * near)
+
+
+def smooth_terrain(multiplier: np.ndarray) -> np.ndarray:
+    """Return the terrain with its borders blurred over about a metre."""
+    weights = np.array([1.0, 4.0, 6.0, 4.0, 1.0]) / 16.0
+    for axis in (0, 1):
+        width = [(2, 2) if a == axis else (0, 0) for a in (0, 1)]
+        padded = np.pad(multiplier, width, "edge")
+        windows = np.lib.stride_tricks.sliding_window_view(padded, 5, axis=axis)
+        multiplier = windows @ weights
+    return np.ascontiguousarray(multiplier)
