@@ -34,8 +34,6 @@ WIDE_FUNCTIONS = {
     "_pointer_kernels.call_step": 11,
     "dynamics.rk4_step.step": 9,
     "_band_kernels.band_cost": 9,
-    "_roadmap_kernels.best_vertex": 9,
-    "_roadmap_kernels.find_waypoint": 10,
     "routing.routing_arrays": 15,
 }
 """Functions of too many parameters, with their number; the list may only shrink."""

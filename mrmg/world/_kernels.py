@@ -294,12 +294,6 @@ def segment_clearance(space, ax, ay, bx, by, needed, enough):
 
 
 @kernel
-def segment_is_clear(space, ax, ay, bx, by, needed):
-    """Return whether a segment keeps `needed` clearance [m]."""
-    return segment_clearance(space, ax, ay, bx, by, needed, needed) >= needed
-
-
-@kernel
 def sloped_length(way, rise, slope_price, floor):
     """Return what a way costs on a slope [m of plain ground]; see `planning.slopes`.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from math import hypot
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,6 +29,14 @@ def random_convex(rng: np.random.Generator) -> np.ndarray:
     cloud = rng.uniform(-3.0, 3.0, 2) + rng.normal(0.0, 1.0, (8, 2))
     hull = shapely.convex_hull(shapely.MultiPoint(cloud))
     return np.asarray(shapely.orient_polygons(hull).exterior.coords)[:-1]
+
+
+def is_clear(
+    space: Any, ax: float, ay: float, bx: float, by: float, needed: float
+) -> bool:
+    """Return whether a segment keeps `needed` clearance [m]."""
+    found = _kernels.segment_clearance(space, ax, ay, bx, by, needed, needed)
+    return bool(found >= needed)
 
 
 # --- distances of polygons ---------------------------------------------------------
@@ -312,7 +321,7 @@ def test_segments_are_clear_within_half_a_cell(maps: list) -> None:
         for a, b in world_map.random_points(rng, 60).reshape(-1, 2, 2):
             exact = exact_segment_clearance_m(world_map, a, b)
             for needed in (0.3, 0.85):
-                clear = _kernels.segment_is_clear(world_map.space, *a, *b, needed)
+                clear = is_clear(world_map.space, *a, *b, needed)
                 if abs(exact - needed) > 0.5 * CELL_M:
                     assert clear == (exact > needed)
                     output.append(clear)
@@ -322,7 +331,7 @@ def test_segments_are_clear_within_half_a_cell(maps: list) -> None:
 def test_segments_without_length_are_points(make_map: Callable) -> None:
     space = make_map((0.0, 0.0, 20.0, 20.0), shapely.box(8.0, 8.0, 12.0, 12.0)).space
     for x, expected in ((10.0, False), (4.0, True)):
-        assert _kernels.segment_is_clear(space, x, 10.0, x, 10.0, 0.5) == expected
+        assert is_clear(space, x, 10.0, x, 10.0, 0.5) == expected
     clearance = _kernels.segment_clearance(space, 4.0, 10.0, 4.0, 10.0, 0.0, 9.0)
     assert clearance == pytest.approx(4.0, abs=0.5 * CELL_M)
 
@@ -337,5 +346,5 @@ def test_segments_are_not_stepped_along_past_their_tightest_place(
         ends = (20.0 - ahead_m, 10.0, 26.0, 10.0)
         found = _kernels.segment_clearance(space, *ends, 0.0, 9.0)
         assert found == pytest.approx(2.5, abs=0.2 * CELL_M)
-        assert _kernels.segment_is_clear(space, *ends, 2.4)
-        assert not _kernels.segment_is_clear(space, *ends, 2.56)
+        assert is_clear(space, *ends, 2.4)
+        assert not is_clear(space, *ends, 2.56)

@@ -40,8 +40,6 @@ class Mission(NamedTuple):
         fleet, spaces, terrain, roadmap, targets: robots, world and where to go.
         zones: stations that one robot at a time may be at.
         routing: the routing problem at the start; costs include the route margin.
-        last_leg: energy from each place (the start last) to each robot's finish [J],
-            shape (R, G + S + 1); zero where a robot may end anywhere.
     """
 
     fleet: np.ndarray
@@ -51,7 +49,6 @@ class Mission(NamedTuple):
     targets: Targets
     zones: Zones
     routing: RoutingArrays
-    last_leg: np.ndarray
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,7 +215,6 @@ def state_problem(
             finish_distance=last_leg / fleet["plain"][:, None],
             **({} if times is None else times._asdict()),
         ),
-        last_leg=last_leg,
     )
     return Problem(
         scene=scene,

@@ -23,13 +23,6 @@ LONGER_S = 0.5
 """How much longer than asked for robots stay, so that one that lags stays enough."""
 
 
-def has_options(scene: Scene) -> bool:
-    """Return whether robots must stay somewhere, or more than energy counts."""
-    return any(target.dwell_s > 0.0 for target in scene.targets()) or any(
-        robot.battery.takes_time_to_fill for robot in scene.robots
-    )
-
-
 def finish_of(scene: Scene) -> np.ndarray:
     """Return the target in which each robot must end, -1 for none, shape (R,)."""
     must = np.array([robot.finish is not None for robot in scene.robots], bool)

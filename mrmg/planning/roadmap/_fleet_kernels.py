@@ -20,7 +20,6 @@ FLEET = np.dtype(
         ("steer_at", np.int64),  # address of a user's compiled steering, else 0
         ("wheelbase", np.float64),  # [m]
         ("track", np.float64),  # [m]
-        ("lead", np.float64),  # of the centre of mass before the reference point [m]
         ("limit", np.float64, (5,)),  # planner's v_min, v_max, w_max, u1_max, u2_max
         ("corner", np.float64, (MOST_CORNERS, 2)),  # footprint [m], padded
         ("corners", np.int64),  # number of corners

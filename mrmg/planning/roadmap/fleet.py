@@ -134,7 +134,6 @@ def fleet_array(
         one["step_at"], one["steer_at"] = motion_addresses(model)
         one["wheelbase"] = model.wheelbase_m
         one["track"] = model.track_m
-        one["lead"] = model.center_of_mass_m
         one["limit"] = limits.as_tuple()
         one["corner"][: len(outline)] = outline
         one["corners"] = len(outline)

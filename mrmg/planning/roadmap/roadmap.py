@@ -130,8 +130,6 @@ def build_roadmap(
             vertex=vertex,
             cost_to_go=np.stack([one.cost for one in paths]),
             successor=np.stack([one.successor for one in paths]),
-            slope_price=np.array([slope.price for slope in slopes]),
-            slope_floor=np.array([slope.floor for slope in slopes]),
             slope_refund=np.array([slope.refund for slope in slopes]),
             buckets=_buckets(vertex, (x_min, y_min), (x_max, y_max), BUCKET_M),
         ),

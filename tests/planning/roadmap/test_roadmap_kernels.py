@@ -1,4 +1,4 @@
-"""Finding the way from any place: waypoints in sight, and costlier tight edges."""
+"""Edges of the roadmap cost more where they are tight."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import shapely
 
 from mrmg import seeding
 from mrmg.planning.roadmap import _roadmap_kernels
@@ -17,7 +16,6 @@ from mrmg.scene.types import Scene
 from mrmg.world.world import CELL_M, World
 
 PASSAGE_M = 0.85
-VIEW_M = 15.0
 
 
 def rectangle(
@@ -57,88 +55,11 @@ class Place:
             margin_m=0.25,
             rng=seeding.stream(0, "roadmap"),
         )
-        frame = shapely.box(*self.scene.bounds)
-        self.lines = shapely.union_all([frame.exterior, self.world.obstacles[0]])
-
-    def waypoint(self, target: int, x: float, y: float) -> tuple[float, np.ndarray]:
-        """Return (cost to the target, waypoint)."""
-        out = np.full(2, np.nan)
-        cost = _roadmap_kernels.find_waypoint(
-            self.world.spaces[0],
-            self.world.terrain,
-            self.roadmap.arrays,
-            0,
-            target,
-            x,
-            y,
-            PASSAGE_M,
-            VIEW_M,
-            out,
-        )
-        return cost, out
-
-    def free_points(self, n: int) -> np.ndarray:
-        """Return random points where a car fits."""
-        points = np.random.default_rng(2).uniform((1, 1), (59, 39), (4 * n, 2))
-        room = shapely.distance(self.lines, shapely.points(points))
-        return points[room > PASSAGE_M + 0.1][:n]
 
 
 @pytest.fixture(scope="module")
 def place() -> Place:
     return Place()
-
-
-@pytest.mark.parametrize("target", [0, 1])
-def test_waypoints_are_in_sight_and_costs_reach_the_target(
-    place: Place, target: int
-) -> None:
-    goal = place.scene.targets()[target].region.center
-    for point in place.free_points(150):
-        cost, waypoint = place.waypoint(target, *point)
-        sight = shapely.LineString([point, waypoint])
-        assert sight.distance(place.lines) > 0.5 * PASSAGE_M
-        assert cost >= np.hypot(*(goal - point)) - 1e-9, "shorter than a straight line"
-
-
-@pytest.mark.parametrize("target", [0, 1])
-def test_going_from_waypoint_to_waypoint_ends_at_the_target(
-    place: Place, target: int
-) -> None:
-    goal = place.scene.targets()[target].region.center
-    for point in place.free_points(40):
-        cost, waypoint = place.waypoint(target, *point)
-        first_cost, driven, here = cost, 0.0, point
-        for _ in range(60):
-            step = waypoint - here
-            length = np.hypot(*step)
-            share = min(1.0, 3.0 / max(length, 1e-9))
-            driven += share * length
-            here = here + share * step
-            if np.hypot(*(goal - here)) < 0.5:
-                break
-            cost, waypoint = place.waypoint(target, *here)
-        assert np.hypot(*(goal - here)) < 0.5, point
-        assert driven <= 1.1 * first_cost + 1.0
-
-
-def test_a_target_that_is_cut_off_has_no_waypoint(place: Place) -> None:
-    arrays = place.roadmap.arrays
-    cut_off = arrays._replace(cost_to_go=np.full_like(arrays.cost_to_go, np.inf))
-    out = np.zeros(2)
-    cost = _roadmap_kernels.find_waypoint(
-        place.world.spaces[0],
-        place.world.terrain,
-        cut_off,
-        0,
-        0,
-        5.0,
-        20.0,
-        PASSAGE_M,
-        VIEW_M,
-        out,
-    )
-    assert cost == np.inf
 
 
 def edge_cost(place: Place, a: tuple[float, float], b: tuple[float, float]) -> float:

@@ -77,14 +77,6 @@ class Traffic(NamedTuple):
 
 
 @kernel
-def middle_of(robot, x, y, theta, out):
-    """Write the middle of a robot's footprint at a pose."""
-    c, s = cos(theta), sin(theta)
-    out[0] = x + c * robot.middle[0] - s * robot.middle[1]
-    out[1] = y + s * robot.middle[0] + c * robot.middle[1]
-
-
-@kernel
 def first_conflict(own, traffic, other, state, count, first, corner):
     """Return the first of some states in which two robots are too near, or -1.
 
