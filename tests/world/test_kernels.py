@@ -31,7 +31,7 @@ def random_convex(rng: np.random.Generator) -> np.ndarray:
     return np.asarray(shapely.orient_polygons(hull).exterior.coords)[:-1]
 
 
-def is_clear(
+def segment_is_clear(
     space: Any, ax: float, ay: float, bx: float, by: float, needed: float
 ) -> bool:
     """Return whether a segment keeps `needed` clearance [m]."""
@@ -321,7 +321,7 @@ def test_segments_are_clear_within_half_a_cell(maps: list) -> None:
         for a, b in world_map.random_points(rng, 60).reshape(-1, 2, 2):
             exact = exact_segment_clearance_m(world_map, a, b)
             for needed in (0.3, 0.85):
-                clear = is_clear(world_map.space, *a, *b, needed)
+                clear = segment_is_clear(world_map.space, *a, *b, needed)
                 if abs(exact - needed) > 0.5 * CELL_M:
                     assert clear == (exact > needed)
                     output.append(clear)
@@ -331,7 +331,7 @@ def test_segments_are_clear_within_half_a_cell(maps: list) -> None:
 def test_segments_without_length_are_points(make_map: Callable) -> None:
     space = make_map((0.0, 0.0, 20.0, 20.0), shapely.box(8.0, 8.0, 12.0, 12.0)).space
     for x, expected in ((10.0, False), (4.0, True)):
-        assert is_clear(space, x, 10.0, x, 10.0, 0.5) == expected
+        assert segment_is_clear(space, x, 10.0, x, 10.0, 0.5) == expected
     clearance = _kernels.segment_clearance(space, 4.0, 10.0, 4.0, 10.0, 0.0, 9.0)
     assert clearance == pytest.approx(4.0, abs=0.5 * CELL_M)
 
@@ -346,5 +346,5 @@ def test_segments_are_not_stepped_along_past_their_tightest_place(
         ends = (20.0 - ahead_m, 10.0, 26.0, 10.0)
         found = _kernels.segment_clearance(space, *ends, 0.0, 9.0)
         assert found == pytest.approx(2.5, abs=0.2 * CELL_M)
-        assert is_clear(space, *ends, 2.4)
-        assert not is_clear(space, *ends, 2.56)
+        assert segment_is_clear(space, *ends, 2.4)
+        assert not segment_is_clear(space, *ends, 2.56)
