@@ -1,4 +1,4 @@
-"""Missions are solved by following paths; the motion tree is for what is left."""
+"""Missions are solved by following paths; searching for motions is for the rest."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ INFEASIBLE = {"goal_enclosed", "goal_out_of_energy"}
 
 
 @pytest.mark.parametrize("scene", [f"scene{number}" for number in range(1, 7)])
-def test_table_one_needs_no_tree(scene: str) -> None:
+def test_table_one_needs_no_search(scene: str) -> None:
     for seed in range(5):
         result = mrmg.plan(mrmg.load_scene(scene), seed=seed, params=PARAMS)
         assert result.plan is not None
@@ -33,7 +33,7 @@ def test_table_one_needs_no_tree(scene: str) -> None:
     [path for path in SCENES if path.stem not in HARD | INFEASIBLE],
     ids=lambda path: path.stem,
 )
-def test_small_scenes_need_no_tree(path: Path) -> None:
+def test_small_scenes_need_no_search(path: Path) -> None:
     result = mrmg.plan(mrmg.load_scene(path), params=PARAMS)
     assert result.plan is not None
     assert result.statistics["coordinated"] == 0
