@@ -49,7 +49,12 @@ def _licences(options: argparse.Namespace) -> int:
         return ExitCode.OK
     rows = [("package", "version", "licence", "extra")]
     rows += [
-        (each.package, each.version or "-", each.licence or "not stated", each.extra)
+        (
+            each.package,
+            each.version or "-",
+            each.licence or ("not stated" if each.version else "not installed"),
+            each.extra,
+        )
         for each in found
     ]
     terminal.print_table(rows)
