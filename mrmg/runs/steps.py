@@ -126,12 +126,7 @@ class Run:
         return ExecutionLog.load(self.folder.path)
 
     def account(self, plan: Plan, log: ExecutionLog) -> EnergyAudit:
-        """Return the audit of the drive in the folder, made once for its files.
-
-        Args:
-            plan: in force at its end.
-            log: of the drive.
-        """
+        """Return the audit of the folder's drive of a plan, made once for its files."""
         from mrmg.energy.audit import audit
 
         decided = self.arguments.deciding("audit")
@@ -309,8 +304,9 @@ def _render(run: Run) -> Write:
 
     plan, log = run.plan_in_force(), run.log()
     asked = asdict(run.arguments.video) | {"on_progress": run.progress_of(Step.RENDER)}
+    with_gif = asked.pop("gif")
     made = {}
-    if run.arguments.video.gif:
+    if with_gif:
         made["mission.gif"] = run.folder.unfinished("mission.gif")
         render_gif(run.scene, plan, log, made["mission.gif"], **asked)
     made["mission.mp4"] = run.folder.unfinished("mission.mp4")

@@ -10,6 +10,7 @@ import av
 import numpy as np
 
 from mrmg import storage
+from mrmg.errors import UsageError
 from mrmg.plans import Plan
 from mrmg.runs.arguments import VideoArguments
 from mrmg.runs.options import documented
@@ -50,6 +51,8 @@ def render_video(
         UsageError: if an option is out of its range; names it.
         MachineError: if this machine has no OpenGL that draws offscreen.
     """
+    if options.get("gif"):
+        raise UsageError("gif: this writes an MP4; viz.gif.render_gif writes a GIF")
     made = video_options(scene, log, VideoArguments(**options), _FITTING_S)
     ticks = frame_ticks(log, made)
     with storage.atomic_path(Path(path)) as temporary:

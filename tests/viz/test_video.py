@@ -177,3 +177,8 @@ def test_options_out_of_range_are_refused(
     log = make_log(scene, make_plan(scene, controls, {"r1": ("g",), "r2": ()}))
     with pytest.raises(UsageError, match=words):
         video_options(scene, log, VideoArguments(**change), 30.0)
+
+
+def test_a_gif_is_no_video(mission, tmp_path) -> None:
+    with pytest.raises(UsageError, match="render_gif"):
+        render_video(*mission, tmp_path / "mission.mp4", gif=True)
