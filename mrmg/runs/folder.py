@@ -112,23 +112,30 @@ class RunFolder:
     def opened_for_writing(self) -> Iterator[RunFolder]:
         """Create the folder, keep other runs out of it, and clear what a kill left.
 
+        A folder that was created for nothing is removed.
+
         Raises:
             UsageError: if the folder holds something other than a run.
             RunFolderError: if another process is working in it.
         """
+        created = not self.path.exists()
         try:
             self.path.mkdir(parents=True, exist_ok=True)
         except (FileExistsError, NotADirectoryError) as error:
             raise UsageError(f"{error.filename} is a file; choose a folder") from error
-        with _exclusive(self.path):
-            if any(self.path.iterdir()) and not self.file("run.json").exists():
-                self._refuse_foreign_files()
-            self._remove_unfinished()
-            try:
-                with cleaned_up_by(self._remove_unfinished):
-                    yield self
-            finally:
+        try:
+            with _exclusive(self.path):
+                if any(self.path.iterdir()) and not self.file("run.json").exists():
+                    self._refuse_foreign_files()
                 self._remove_unfinished()
+                try:
+                    with cleaned_up_by(self._remove_unfinished):
+                        yield self
+                finally:
+                    self._remove_unfinished()
+        finally:
+            if created and not any(self.path.iterdir()):
+                self.path.rmdir()
 
     def _remove_unfinished(self) -> None:
         for place in (".", f"{TRIALS_FOLDER}/*/*"):

@@ -220,3 +220,10 @@ def test_render_leaves_a_video_as_asked(own_run: Path) -> None:
         assert (stream.width, stream.height) == (320, 240)
         assert stream.average_rate == 10
     assert "mission.mp4" in (own_run / "report.html").read_text()
+
+
+def test_a_run_that_is_refused_leaves_no_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    arguments = ["--planner", "guided_tree", "--router", "exact", "--out", str(folder)]
+    assert main(["plan", "quickstart", *arguments]) == ExitCode.USAGE
+    assert not folder.exists()
