@@ -179,9 +179,9 @@ def because(outcome: str, reasons: Sequence[str]) -> list[str]:
 
 def print_summary(summary: dict[str, Any], reason: str) -> None:
     """Print the outcome of a run in a few lines."""
-    outcome = "done" if summary["mission_ok"] else f"not done ({summary['status']})"
-    if summary["verdict"] and not summary["mission_ok"]:
-        outcome = "failed"
+    status = summary["status"]
+    failed = "failed" if status == "solved" else f"not done ({status})"
+    outcome = "done" if summary["mission_ok"] else failed
     why = f"; {reason}" if reason else ""
     print(f"{summary['scene']}, seed {summary['seed']}: mission {outcome}{why}")
     for line in _summary_lines(summary):
