@@ -194,13 +194,13 @@ def add_terrain_and_clearance(cost_map, p, gear, gradient):
 
 
 @kernel
-def write_turns(p, gear, ux, uy, shape):
+def write_turns(p, gear, nose, shape):
     """Write the length of each segment, and the turn and curvature at its first node.
 
     At a change of gear the turn is that of the heading. The first turn is that from the
-    robot's heading (ux, uy) at the start.
+    robot's heading at the start, along the unit vector `nose`.
     """
-    ax, ay, last = ux, uy, 1
+    ax, ay, last = nose[0], nose[1], 1
     for i in range(len(p) - 1):
         bx, by = p[i + 1, 0] - p[i, 0], p[i + 1, 1] - p[i, 1]
         shape.size[i] = max(hypot(bx, by), 1e-6)
@@ -300,10 +300,10 @@ def add_evenness(p, gear, size, gradient):
 
 
 @kernel
-def band_cost(cost_map, stops, p, gear, pivot, ux, uy, shape, gradient):
+def band_cost(cost_map, stops, p, gear, pivot, nose, shape, gradient):
     """Return a path's cost [m of plain ground] and write its gradient, shape (n, 2)."""
     gradient[:] = 0.0
-    write_turns(p, gear, ux, uy, shape)
+    write_turns(p, gear, nose, shape)
     total = add_terrain_and_clearance(cost_map, p, gear, gradient)
     total += add_bending(cost_map, p, gear, pivot, shape, gradient)
     total += add_evenness(p, gear, shape.size, gradient)

@@ -73,7 +73,7 @@ def longest_row(a):
 
 
 @kernel
-def relax(cost_map, stops, p, gear, pivot, ux, uy, rounds):
+def relax(cost_map, stops, p, gear, pivot, nose, rounds):
     """Let a path slip into the nearest minimum of its cost; return the cost.
 
     Args:
@@ -81,7 +81,7 @@ def relax(cost_map, stops, p, gear, pivot, ux, uy, rounds):
         p: nodes, the first one fixed; changed in place, shape (n, 2).
         gear: of each segment, 1 or -1, shape (n - 1,).
         pivot: whether the robot turns on the spot before it, shape (n - 1,).
-        ux, uy: the robot's heading at the start.
+        nose: unit vector of the robot's heading at the start, shape (2,).
         rounds: steps of L-BFGS at most.
     """
     n = len(p)
@@ -94,7 +94,7 @@ def relax(cost_map, stops, p, gear, pivot, ux, uy, rounds):
     changes = np.zeros((MEMORY, n, 2))
     scale = np.zeros(MEMORY)
     pairs = 0
-    cost = band_cost(cost_map, stops, p, gear, pivot, ux, uy, shape, gradient)
+    cost = band_cost(cost_map, stops, p, gear, pivot, nose, shape, gradient)
     before = cost
     for round in range(1, rounds + 1):
         descent(gradient, steps, changes, scale, pairs, direction)
@@ -111,7 +111,7 @@ def relax(cost_map, stops, p, gear, pivot, ux, uy, rounds):
         while after > cost + 1e-4 * length * slope and length * longest > LEAST_M:
             add_scaled(p, length, direction, trial)
             after = band_cost(
-                cost_map, stops, trial, gear, pivot, ux, uy, shape, trial_gradient
+                cost_map, stops, trial, gear, pivot, nose, shape, trial_gradient
             )
             length *= 0.4
         if after >= cost:

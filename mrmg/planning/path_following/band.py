@@ -251,8 +251,7 @@ def _relaxed(
             node,
             path.gear,
             pivot,
-            cos(path.heading),
-            sin(path.heading),
+            np.array([cos(path.heading), sin(path.heading)]),
             SERIES,
         )
         path = replace(path, node=node)

@@ -86,14 +86,12 @@ def routing_arrays(
         reserve: [J], shape (R,).
         open_goal: which goals are still to be visited; all if None.
         finish_distance: from each target, and last from its start, to each robot's
-            finish [m], shape (R, T + 1), inf where there is no way, 0 for robots that
-            may end anywhere, which is all of them if None.
+            finish [m], shape (R, T + 1); inf for no way, 0 (or None) to end anywhere.
         time: from each target, and last from the start, to each target with the dwell
             there [s], shape (R, T + 1, T); nothing takes time if None.
         finish_time: from there to the finish [s], shape (R, T + 1); 0 if None.
         limit: longest time of each robot's route [s], shape (R,); none if None.
-        charge_power: at which stations fill each battery [W], shape (R,); at once if
-            None.
+        charge_power: of stations for each battery [W], shape (R,); at once if None.
         energy_weight: of the summed energy in the objective.
         makespan_weight: of the longest time of a route in the objective [J/s].
     """

@@ -164,15 +164,15 @@ def test_relaxing_never_costs_more_and_keeps_the_start(seed: int) -> None:
     gear = rng.choice([1, -1], 14)
     ground = cost_map(distance=np.cumsum(rng.normal(0.0, 0.1, (80, 80)), axis=1) + 1.5)
     shape, gradient = _band_kernels.new_shape(14), np.zeros_like(p)
-    ux, uy = cos(angle), sin(angle)
+    nose = np.array([cos(angle), sin(angle)])
     before = _band_kernels.band_cost(
-        ground, stops(), p, gear, NO_PIVOT[:14], ux, uy, shape, gradient
+        ground, stops(), p, gear, NO_PIVOT[:14], nose, shape, gradient
     )
     node = p.copy()
-    after = _relax_kernels.relax(ground, stops(), node, gear, NO_PIVOT[:14], ux, uy, 50)
+    after = _relax_kernels.relax(ground, stops(), node, gear, NO_PIVOT[:14], nose, 50)
     assert after <= before
     assert node[0].tolist() == p[0].tolist()
     again = _band_kernels.band_cost(
-        ground, stops(), node, gear, NO_PIVOT[:14], ux, uy, shape, gradient
+        ground, stops(), node, gear, NO_PIVOT[:14], nose, shape, gradient
     )
     assert again == after
