@@ -62,6 +62,9 @@ SEARCH_SOC_SHARES = ((1.0, 0.0), (1.0, 0.0), (0.0,))
 """Multiples of the state-of-charge margin in the tours of successive searches: the next
 one counts where no tours leave so much."""
 
+Tours = tuple[tuple[int, ...], ...]
+"""Targets of each robot, in order."""
+
 LEAST_GAIN = 0.001
 """Share of the objective that a refinement must save to be followed by another."""
 
@@ -174,8 +177,10 @@ def path_following(problem: Problem, request: Request) -> Attempt:
 
 def _tries(problem: Problem, request: Request, schedule: Schedule) -> Iterator[Attempt]:
     """Yield what came of each entry of a schedule."""
+    tried: dict[float, set[Tours]] = {}
     for soc_margin, draws in schedule.followed:
-        yield follow_paths(problem.with_soc_margin(soc_margin), request, draws)
+        kept = problem.with_soc_margin(soc_margin)
+        yield follow_paths(kept, request, draws, tried.setdefault(soc_margin, set()))
     for soc_margin in schedule.search_soc_margins:
         kept = problem.with_soc_margin(soc_margin).with_margin(schedule.search_margin)
         searched = search_motions(kept, request)
@@ -235,12 +240,18 @@ def search_motions(problem: Problem, request: Request) -> Attempt:
 
 
 def follow_paths(
-    problem: Problem, request: Request, draws: tuple[Draw, ...]
+    problem: Problem, request: Request, draws: tuple[Draw, ...], tried: set[Tours]
 ) -> Attempt:
     """Drive straight along tours.
 
     The first attempt takes the router's tours as they are; others the best of several
     draws.
+
+    Args:
+        problem: the mission.
+        request: the attempt.
+        draws: of tours.
+        tried: tours that the attempt has followed, in vain; receives these.
     """
     began = time.perf_counter()
     choice = _drawn_tours(problem, request, draws)
@@ -254,8 +265,9 @@ def follow_paths(
     for tours, minimum_time in product(choice, (False, True)):
         if request.halted or (plans and not preference.late_s(plans[-1])):
             break
-        if minimum_time and not plans:
+        if not plans and (minimum_time or tours.tours in tried):
             continue
+        tried.add(tours.tours)
         driven += 1
         made = follow_tours(
             replace(problem, minimum_time=minimum_time),

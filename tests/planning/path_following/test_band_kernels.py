@@ -42,6 +42,7 @@ def stops(*circles: tuple[int, float, float, float], deeper: float = 0.0) -> Sto
     )
 
 
+EAST = np.array([1.0, 0.0])
 NO_PIVOT = np.zeros(40, np.bool_)
 """Of paths that never turn on the spot."""
 
@@ -51,7 +52,7 @@ def cost(ground: CostMap, marks: Stops, p: np.ndarray, gear: np.ndarray) -> Any:
     gradient = np.zeros_like(p)
     shape = _band_kernels.new_shape(len(p) - 1)
     value = _band_kernels.band_cost(
-        ground, marks, p, gear, NO_PIVOT[: len(gear)], 1.0, 0.0, shape, gradient
+        ground, marks, p, gear, NO_PIVOT[: len(gear)], EAST, shape, gradient
     )
     return value, gradient
 
@@ -126,7 +127,7 @@ def test_a_change_of_gear_turns_the_heading_not_the_way() -> None:
 def relaxed(ground: CostMap, marks: Stops, p: np.ndarray, gear: np.ndarray) -> Any:
     node = p.copy()
     value = _relax_kernels.relax(
-        ground, marks, node, gear, NO_PIVOT[: len(gear)], 1.0, 0.0, 400
+        ground, marks, node, gear, NO_PIVOT[: len(gear)], EAST, 400
     )
     return value, node
 
