@@ -1,7 +1,7 @@
 """Drafts: plans driven straight along tours.
 
 The roadmap's paths along tours are smoothed and followed in closed loop
-(`refine.follow_paths`). Where that succeeds, nearly always where there is room, that
+(`refine.drive_paths`). Where that succeeds, nearly always where there is room, that
 is all. Where robots get in each other's way, or a car must end with a heading, a
 search for motions starts from the paths (`coordination`).
 """
@@ -20,7 +20,7 @@ from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import TRACKING_M, Path, smooth_path
 from mrmg.planning.path_following.gears import with_best_gears
-from mrmg.planning.path_following.refine import OnFailure, cost_maps_of, follow_paths
+from mrmg.planning.path_following.refine import OnFailure, cost_maps_of, drive_paths
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.routing.routing import Routing
@@ -112,7 +112,7 @@ def follow_tours(
             ]
         tasks = [RobotTask(*one) for one in zip(stops, paths, cost_maps, strict=True)]
         found = False
-        for trajectories in follow_paths(problem, params, tasks, halt, on_failure):
+        for trajectories in drive_paths(problem, params, tasks, halt, on_failure):
             plan = make_plan(problem, seed, params, trajectories, tours)
             if plan is None:
                 on_failure(why_refused(problem, trajectories, tours))

@@ -114,10 +114,10 @@ def along_trajectories(
         tasks.append(
             RobotTask(tour, path, cost_maps[r], (trajectory, visits), repeated)
         )
-    yield from follow_paths(problem, params, tasks, halt)
+    yield from drive_paths(problem, params, tasks, halt)
 
 
-def follow_paths(
+def drive_paths(
     problem: Problem,
     params: PlannerParams,
     tasks: list[RobotTask],

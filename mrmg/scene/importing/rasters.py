@@ -19,7 +19,7 @@ from mrmg.scene.importing.layers import Box, ImportOptions
 _NOWHERE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
 """Transform of rasters that state none."""
 
-_NEARLY = 1e-6
+_SIDE_TOLERANCE = 1e-6
 """Share of a cell by which a box may miss its side."""
 
 MOST_CELLS = 25_000_000
@@ -128,8 +128,8 @@ def _cells_in(
     matrix = np.array([transform[:3], transform[3:], (0.0, 0.0, 1.0)])
     corners = [(*corner, 1.0) for corner in product(crop[::2], crop[1::2])]
     cells = np.linalg.solve(matrix, np.transpose(corners))[:2]
-    first = np.maximum(np.floor(cells.min(axis=1) + _NEARLY), 0).astype(int)
-    end = np.minimum(np.ceil(cells.max(axis=1) - _NEARLY), size).astype(int)
+    first = np.maximum(np.floor(cells.min(axis=1) + _SIDE_TOLERANCE), 0).astype(int)
+    end = np.minimum(np.ceil(cells.max(axis=1) - _SIDE_TOLERANCE), size).astype(int)
     if (first >= end).any():
         whole = _at(transform, list(product((0, size[0]), (0, size[1]))))
         extent = np.concatenate([whole.min(axis=0), whole.max(axis=0)])

@@ -25,7 +25,7 @@ from mrmg.scene.loading.elevation import MOST_NODES
 _EDGE_POINTS = 21
 """Points of each side of a raster that decide what ground it covers elsewhere."""
 
-_NEARLY = 0.01
+_EDGE_SHARE = 0.01
 """Share of a cell that may lack at the edge."""
 
 _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
@@ -111,7 +111,7 @@ def _resampled(raster: Raster, crs: str, frame: Frame) -> tuple[np.ndarray, np.n
     low, high = edge.min(axis=0), edge.max(axis=0)
     cell = np.sqrt(shapely.Polygon(edge).area / heights.size)
     cell = max(cell, np.sqrt(np.prod(high - low) / MOST_NODES) * 1.01)
-    counts = np.maximum(2, ((high - low) / cell + _NEARLY).astype(int))
+    counts = np.maximum(2, ((high - low) / cell + _EDGE_SHARE).astype(int))
     high = low + counts * cell
     origin = np.asarray(frame.origin_m)
     left, top = low[0] + origin[0], high[1] + origin[1]
