@@ -12,6 +12,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -25,6 +26,9 @@ MESSAGE = "mrmg: stopped; the same command takes it up again"
 
 GRACE_S = 1.0
 """Time in which the main thread may end in an orderly way."""
+
+_LOOK_S = 0.5
+"""How often a worker process looks whether its parent is still there [s]."""
 
 _cleanups: list[Callable[[], object]] = []
 _accepted = threading.Event()
@@ -89,16 +93,13 @@ def end(*, reported: bool = False) -> NoReturn:
 
 def end_with_parent() -> None:
     """Leave Ctrl-C to the parent of this worker process, and end when it has ended."""
-    import multiprocessing
-    from multiprocessing.connection import wait
-
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = multiprocessing.parent_process()
+    parent = os.getppid()
 
     def follow() -> None:
-        if parent is not None:
-            wait([parent.sentinel])
-            os._exit(EXIT_CODE)
+        while os.getppid() == parent:
+            time.sleep(_LOOK_S)
+        os._exit(EXIT_CODE)
 
     threading.Thread(target=follow, daemon=True).start()
 

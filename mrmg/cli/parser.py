@@ -8,6 +8,7 @@ from pathlib import Path
 from mrmg import __version__
 from mrmg.cli import (
     calibrate_command,
+    campaign_command,
     commands,
     completion,
     doctor_command,
@@ -48,6 +49,7 @@ def make_parser() -> Parser:
     _add_plan(verbs)
     _add_steps(verbs)
     robustness_commands.add_robustness(verbs)
+    campaign_command.add_campaign(verbs)
     replay_command.add_replay(verbs)
     _add_render(verbs)
     export_command.add_export(verbs)

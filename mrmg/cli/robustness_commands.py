@@ -17,7 +17,7 @@ from mrmg.runs.arguments import DISTURBANCE_HELP
 
 if TYPE_CHECKING:
     from mrmg.studies.outcomes import Study
-    from mrmg.studies.robustness.study import OnTrial
+    from mrmg.studies.trials import OnTrial
 
 _COLUMNS = ("worst", "p05", "median", "p95")
 

@@ -14,6 +14,7 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,8 @@ TRIALS_FOLDER = "trials"
 EXPORT_FOLDER = "export"
 """Where exports of the mission lie; they go with the drive that they show."""
 
-_UNFINISHED = ".part-"
+UNFINISHED = ".part-"
+"""Begins the name of what is not yet in its place."""
 
 
 class Step(StrEnum):
@@ -106,41 +108,14 @@ class RunFolder:
 
     def unfinished(self, name: str) -> Path:
         """Return where a large file may grow before it is put in its place."""
-        return self.path / f"{_UNFINISHED}{name}"
+        return self.path / f"{UNFINISHED}{name}"
 
     @contextmanager
     def opened_for_writing(self) -> Iterator[RunFolder]:
-        """Create the folder, keep other runs out of it, and clear what a kill left.
-
-        A folder that was created for nothing is removed.
-
-        Raises:
-            UsageError: if the folder holds something other than a run.
-            RunFolderError: if another process is working in it.
-        """
-        created = not self.path.exists()
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-        except (FileExistsError, NotADirectoryError) as error:
-            raise UsageError(f"{error.filename} is a file; choose a folder") from error
-        try:
-            with _exclusive(self.path):
-                if any(self.path.iterdir()) and not self.file("run.json").exists():
-                    self._refuse_foreign_files()
-                self._remove_unfinished()
-                try:
-                    with cleaned_up_by(self._remove_unfinished):
-                        yield self
-                finally:
-                    self._remove_unfinished()
-        finally:
-            if created and not any(self.path.iterdir()):
-                self.path.rmdir()
-
-    def _remove_unfinished(self) -> None:
-        for place in (".", f"{TRIALS_FOLDER}/*/*"):
-            for leftover in self.path.glob(f"{place}/{_UNFINISHED}*"):
-                leftover.unlink(missing_ok=True)
+        """Open the folder as `opened_folder` does."""
+        places = (f"{TRIALS_FOLDER}/*/*",)
+        with opened_folder(self.path, "run.json", kind="run", places=places):
+            yield self
 
     def arguments(self) -> dict[str, Any]:
         """Return the arguments its files were last made with; empty if none."""
@@ -226,18 +201,6 @@ class RunFolder:
             {"format": RUN_FORMAT, "arguments": arguments, "finished": marks},
         )
 
-    def _refuse_foreign_files(self) -> None:
-        foreign = [
-            item.name
-            for item in sorted(self.path.iterdir())
-            if not item.name.startswith(_UNFINISHED)
-        ]
-        if foreign:
-            raise UsageError(
-                f"{self.path} is not a run folder (it holds {foreign[0]!r} and no "
-                "run.json); choose an empty or a new folder with --out"
-            )
-
 
 def existing(path: Path) -> RunFolder:
     """Return the run folder at `path`.
@@ -249,6 +212,63 @@ def existing(path: Path) -> RunFolder:
     if not folder.file("run.json").exists():
         raise RunFolderError(str(path), [Fault("", why_no_run(path))])
     return folder
+
+
+@contextmanager
+def opened_folder(
+    path: Path, marker: str, *, kind: str, places: Collection[str] = ()
+) -> Iterator[None]:
+    """Create a folder, keep other commands out of it, and clear what a kill left.
+
+    A folder that was created for nothing is removed.
+
+    Args:
+        path: of the folder.
+        marker: file that a folder of this kind has.
+        kind: what errors call it: "run" for a run folder.
+        places: patterns of folders in it where unfinished files may lie, too.
+
+    Raises:
+        UsageError: if the folder holds something else.
+        RunFolderError: if another process is working in it.
+    """
+    created = not path.exists()
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError) as error:
+        raise UsageError(f"{error.filename} is a file; choose a folder") from error
+    remove = partial(_remove_unfinished, path, places)
+    try:
+        with _exclusive(path):
+            _refuse_foreign_files(path, marker, kind)
+            remove()
+            try:
+                with cleaned_up_by(remove):
+                    yield
+            finally:
+                remove()
+    finally:
+        if created and not any(path.iterdir()):
+            path.rmdir()
+
+
+def _remove_unfinished(path: Path, places: Collection[str]) -> None:
+    for place in (".", *places):
+        for leftover in path.glob(f"{place}/{UNFINISHED}*"):
+            if leftover.is_dir():
+                shutil.rmtree(leftover, ignore_errors=True)
+            else:
+                leftover.unlink(missing_ok=True)
+
+
+def _refuse_foreign_files(path: Path, marker: str, kind: str) -> None:
+    names = sorted(item.name for item in path.iterdir())
+    foreign = [name for name in names if not name.startswith(UNFINISHED)]
+    if foreign and marker not in names:
+        raise UsageError(
+            f"{path} is not a {kind} folder (it holds {foreign[0]!r} and no {marker}); "
+            "choose an empty or a new folder with --out"
+        )
 
 
 @contextmanager

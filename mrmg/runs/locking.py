@@ -10,8 +10,12 @@ from pathlib import Path
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[bool]:
+def locked(folder: Path, *, wait: bool = False) -> Iterator[bool]:
     """Lock a folder for this process.
+
+    Args:
+        folder: what is locked.
+        wait: whether to wait until it is free.
 
     Windows cannot open folders; there a file beside the folder stands for it.
 
@@ -20,7 +24,7 @@ def locked(folder: Path) -> Iterator[bool]:
     """
     handle = _opened(folder)
     try:
-        yield _lock(handle)
+        yield _lock(handle, wait)
     finally:
         os.close(handle)
 
@@ -31,16 +35,16 @@ def _opened(folder: Path) -> int:
     return os.open(folder, os.O_RDONLY)
 
 
-def _lock(handle: int) -> bool:
+def _lock(handle: int, wait: bool) -> bool:
     try:
         if sys.platform == "win32":
             import msvcrt
 
-            msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+            msvcrt.locking(handle, msvcrt.LK_LOCK if wait else msvcrt.LK_NBLCK, 1)
         else:
             import fcntl
 
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
     except (BlockingIOError, PermissionError):
         return False
     return True

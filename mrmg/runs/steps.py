@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from functools import cache
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import mrmg
 from mrmg import storage
 from mrmg.errors import ExitCode, MrmgError, RunFolderError
 from mrmg.plans import Plan, PlanStatus, plan_in_force
 from mrmg.runs.arguments import RunArguments
+from mrmg.runs.code_digest import code_digest
 from mrmg.runs.drive import drive
 from mrmg.runs.folder import NEEDS, RunFolder, Step, stale_after
 from mrmg.scene.loading import load_scene
@@ -22,7 +20,7 @@ from mrmg.scene.types import Scene
 
 if TYPE_CHECKING:
     from mrmg.energy.audit_record import EnergyAudit
-    from mrmg.planning import Improvement
+    from mrmg.planning import Improvement, PlannerParams
     from mrmg.runs.capsule import Failure
     from mrmg.simulation.log import ExecutionLog
 
@@ -98,7 +96,7 @@ class Run:
             Step.RENDER: asdict(self.arguments.video),
         }
         needs = [self.fingerprint(need) for need in NEEDS[step]]
-        own = [str(step), deciding.get(step), needs, _code_digest()]
+        own = [str(step), deciding.get(step), needs, code_digest()]
         return storage.digest(storage.canonical_json(own))
 
     def planning(self) -> dict[str, Any]:
@@ -182,30 +180,14 @@ _last_audit: dict[str, EnergyAudit] = {}
 """The last audit by all that it was made of; several steps of a run need it."""
 
 
-@cache
-def _code_digest() -> str:
-    # The version alone would keep results of code that has been edited since.
-    package = Path(mrmg.__file__).parent
-    sources = sorted(package.rglob("*.py"))
-    code = [storage.digest(path.read_text()) for path in sources]
-    return storage.digest("".join([mrmg.__version__, version("mujoco"), *code]))
-
-
 def _plan(run: Run) -> Write:
-    from mrmg.planning import plan_mission, profile_params
+    from mrmg.planning import plan_mission
 
     arguments, files = run.arguments, carried_files(run.scene)
     result = plan_mission(
         run.scene,
         seed=arguments.seed,
-        params=profile_params(
-            arguments.profile,
-            planner=arguments.planner,
-            router=arguments.router,
-            budget_s=arguments.budget_s,
-            trees=arguments.trees,
-            soc_margin=arguments.soc_margin,
-        ),
+        params=planner_params(arguments),
         workers=arguments.workers,
         with_bound=True,
         on_progress=run.progress_of(Step.PLAN),
@@ -219,6 +201,20 @@ def _plan(run: Run) -> Write:
     }
 
     return lambda: write_planning(run.folder, files, result.plan, outcome)
+
+
+def planner_params(arguments: RunArguments) -> PlannerParams:
+    """Return the parameters that the arguments of a run give the planner."""
+    from mrmg.planning import profile_params
+
+    return profile_params(
+        arguments.profile,
+        planner=arguments.planner,
+        router=arguments.router,
+        budget_s=arguments.budget_s,
+        trees=arguments.trees,
+        soc_margin=arguments.soc_margin,
+    )
 
 
 def write_planning(

@@ -21,6 +21,7 @@ import numpy as np
 
 from mrmg import storage
 from mrmg.energy.audit import audit
+from mrmg.energy.audit_record import EnergyAudit
 from mrmg.errors import Fault, RunFolderError
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
@@ -81,25 +82,23 @@ class Trial:
         return Trial(**{**data, **lists})
 
 
-def assess_trial(scene: Scene, plan: Plan, log: ExecutionLog) -> Trial:
-    """Return what one disturbed execution came to.
+def assess_trial(
+    scene: Scene, plan: Plan, log: ExecutionLog, account: EnergyAudit | None = None
+) -> Trial:
+    """Return what one execution came to; the seed of one without disturbance is 0.
 
     Args:
         scene: what the plan was made for.
         plan: what was to be driven.
-        log: of a simulation with a disturbance.
-
-    Raises:
-        ValueError: if the log is of one without.
+        log: of the simulation.
+        account: the audit of these; made if None.
     """
-    if log.disturbance is None:
-        raise ValueError("not a trial: the log knows of no disturbance")
-    account = audit(scene, plan, log)
-    actual = log.disturbance.actual_scene(scene)
+    account = account or audit(scene, plan, log)
+    actual = log.disturbance.actual_scene(scene) if log.disturbance else scene
     weakest = min(account.robots, key=lambda robot: robot.min_charge_fraction)
     capacity_J = actual.robot(weakest.robot).battery.capacity_J
     return Trial(
-        seed=log.disturbance.seed,
+        seed=log.disturbance.seed if log.disturbance else 0,
         feasible=account.mission_ok,
         causes=account.causes,
         reasons=account.reasons,

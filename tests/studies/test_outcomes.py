@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binomtest
 
+from mrmg.energy.audit import audit
 from mrmg.errors import RunFolderError
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
@@ -131,12 +132,16 @@ def test_failures_are_told_apart(driven: tuple[Scene, Plan, ExecutionLog]) -> No
     assert stuck.causes == ("stalled", "goal missed")
 
 
-def test_a_log_without_disturbance_is_no_trial(
+def test_a_drive_without_disturbance_is_judged_by_the_scene_s_batteries(
     driven: tuple[Scene, Plan, ExecutionLog],
 ) -> None:
     scene, plan, log = driven
-    with pytest.raises(ValueError, match="no disturbance"):
-        assess_trial(scene, plan, replace(log, disturbance=None))
+    account = audit(scene, plan, replace(log, disturbance=None))
+    trial = assess_trial(scene, plan, replace(log, disturbance=None), account)
+    robot = account.robot(trial.charge_robot)
+    assert trial.charge_fraction == robot.min_charge_fraction
+    battery = scene.robot(robot.robot).battery
+    assert trial.charge_J == trial.charge_fraction * battery.capacity_J
 
 
 def test_a_study_adds_its_trials_up() -> None:

@@ -5,11 +5,9 @@ A row is what one mission came to; a line of the table is what those of a scene 
 
 from __future__ import annotations
 
-import multiprocessing
 import statistics
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from importlib import import_module
 
@@ -18,10 +16,8 @@ from protocol import Row, Trials
 import mrmg
 from mrmg.planning import plan_mission
 from mrmg.simulation.controller import controller_maker
+from mrmg.studies.engine import Engine
 from physics.figures import Figure, verdict
-
-Job = tuple[str, int]
-"""Scene and seed."""
 
 MEDIAN_PCT = {"metered_pct": 1.0, "measured_pct": 2.0}
 WORST_PCT = {"metered_pct": 2.0, "measured_pct": 4.0}
@@ -44,9 +40,8 @@ PRINTED = {
 """Figures of a line by their keys, and how many decimals are printed."""
 
 
-def mission(job: Job) -> Row:
+def mission(source: str, seed: int) -> Row:
     """Return what came of one mission."""
-    source, seed = job
     scene = mrmg.load_scene(source)
     _warm(source)
     row: Row = {"scene": source, "seed": seed, "fleet": len(scene.robots)}
@@ -101,13 +96,14 @@ def mission_figures(
         return trials.get(scene=scene, digest=digests[scene], seed=seed)
 
     jobs = [(scene, seed) for scene in scenes for seed in seeds]
-    made = _made([job for job in jobs if finished(*job) is None], workers)
+    missing = [job for job in jobs if finished(*job) is None]
+    made = Engine(workers=workers).results(mission, missing)
     print("\n" + " | ".join(HEAD))
     rows: list[Row] = []
     lines: list[Row] = []
     for scene in scenes:
         while not all(finished(scene, seed) for seed in seeds):
-            row = next(made)
+            _, row = next(made)
             of = row["scene"]
             trials.add(row, scene=of, digest=digests[of], seed=row["seed"])
         own = [row for seed in seeds if (row := finished(scene, seed))]
@@ -117,25 +113,11 @@ def mission_figures(
     return [*figures_of(rows), _repeated(rows)], lines
 
 
-def _made(jobs: Sequence[Job], workers: int) -> Iterator[Row]:
-    """Yield the rows of jobs as they are finished."""
-    if workers == 1:
-        yield from map(mission, jobs)
-        return
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
-        try:
-            for future in as_completed([pool.submit(mission, job) for job in jobs]):
-                yield future.result()
-        finally:  # after an interruption nobody waits for missions not yet begun
-            pool.shutdown(cancel_futures=True)
-
-
 def _repeated(rows: Sequence[Row]) -> Figure:
     """Drive the first mission that was driven once more, here."""
     first = next((row for row in rows if row["robots"]), None)
     same = first is not None and (
-        mission((first["scene"], first["seed"]))["log_digest"] == first["log_digest"]
+        mission(first["scene"], first["seed"])["log_digest"] == first["log_digest"]
     )
     output = "same log" if same else "another log"
     return Figure("a mission driven again", output, "same log", same)

@@ -58,7 +58,7 @@ def _is_model(part: str | int) -> bool:
 def _fault(detail: dict[str, Any], model: type[BaseModel]) -> Fault:
     *inner, end = detail["loc"] or ("",)
     loc: tuple[str | int, ...] = tuple(part for part in inner if not _is_model(part))
-    loc += () if _is_word(end) else (end,)
+    loc += () if _is_word(end) or not detail["loc"] else (end,)
     kind: str = detail["type"]
     value = detail["input"]
     # A start energy is mostly spelt as a bare number, which means a fraction.

@@ -1,28 +1,26 @@
-"""Many trials of one plan: which are missing, who makes them, what they add up to."""
+"""Many trials of one plan under disturbances, and what they add up to."""
 
 from __future__ import annotations
 
-import multiprocessing
 import shutil
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
-from mrmg.errors import MachineError, UsageError
-from mrmg.interruption import end_with_parent, sheltered_children
-from mrmg.plans import PlanStatus
+from mrmg.errors import UsageError
+from mrmg.plans import Plan, PlanStatus
 from mrmg.runs.arguments import RunArguments
+from mrmg.runs.drive import drive
 from mrmg.runs.folder import TRIALS_FOLDER, Step
 from mrmg.runs.steps import Run
 from mrmg.scene.driven_parts import require_drivable
+from mrmg.scene.loading import load_scene
+from mrmg.scene.types import Scene
 from mrmg.simulation.disturbance_spec import written_out
-from mrmg.studies.outcomes import Study, Trial, save_study
-from mrmg.studies.robustness.trials import TrialJob, jobs_of, make_trial
-
-OnTrial = Callable[[int, int, int], None]
-"""Called with (trials done, trials in all, feasible ones) after each trial."""
+from mrmg.studies.engine import Engine
+from mrmg.studies.outcomes import Study, Trial, assess_trial, save_study
+from mrmg.studies.trials import Job, OnTrial, completed_trials
 
 
 def study_robustness(
@@ -61,14 +59,26 @@ def study_robustness(
     require_drivable(run.scene.robots)
     arguments = replace(run.arguments, disturb=written_out(disturb), disturb_seed=0)
     place = _trials_folder(run, arguments)
-    jobs = jobs_of(run.folder.path, arguments, place, range(seed, seed + trials))
-    done: list[Trial] = []
-    for trial in _all_trials(jobs, workers):
-        done.append(trial)
+    jobs = [
+        Job(
+            path=place / f"{number:06d}.json",
+            shared=run.folder.path,
+            item=replace(arguments, disturb_seed=number),
+        )
+        for number in range(seed, seed + trials)
+    ]
+    done: dict[int, Trial] = {}
+    for number, content in completed_trials(
+        jobs, make_trial, Engine(workers=workers), check=_read
+    ):
+        done[number] = Trial.from_json(content)
         if on_trial is not None:
-            on_trial(len(done), trials, sum(item.feasible for item in done))
-    done.sort(key=lambda trial: trial.seed)
-    study = Study(options=execute_options(arguments), trials=tuple(done))
+            feasible = sum(trial.feasible for trial in done.values())
+            on_trial(len(done), trials, feasible)
+    study = Study(
+        options=execute_options(arguments),
+        trials=tuple(done[number] for number in sorted(done)),
+    )
     save_study(run.folder.path, run.scene, run.plan(), study)
     return study
 
@@ -97,35 +107,17 @@ def _trials_folder(run: Run, arguments: RunArguments) -> Path:
     return own / mark
 
 
-def _all_trials(jobs: list[TrialJob], workers: int) -> Iterator[Trial]:
-    """Yield every trial: what is there already, then the others as they are made."""
-    missing = []
-    for job in jobs:
-        trial = job.outcome()
-        if trial is None:
-            missing.append(job)
-        else:
-            yield trial
-    if workers == 1:
-        yield from map(make_trial, missing)
-    elif missing:
-        yield from _made_by_workers(missing, workers)
+def make_trial(folder: Path, arguments: RunArguments) -> dict[str, Any]:
+    """Drive the plan of a run folder as the arguments want it, and judge the drive."""
+    scene, plan = _mission(folder)
+    driven = drive(scene, plan, arguments)
+    return assess_trial(scene, driven.plan, driven.log).to_json()
 
 
-def _made_by_workers(jobs: list[TrialJob], workers: int) -> Iterator[Trial]:
-    context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(
-        min(workers, len(jobs)), mp_context=context, initializer=end_with_parent
-    )
-    try:
-        with sheltered_children():
-            waiting = [pool.submit(make_trial, job) for job in jobs]
-        for future in as_completed(waiting):
-            yield future.result()
-    except BrokenProcessPool as error:
-        raise MachineError(
-            "a worker process was killed (out of memory?); the same command goes on "
-            "from the trials that are done, fewer --workers need less memory"
-        ) from error
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+@lru_cache(maxsize=1)
+def _mission(folder: Path) -> tuple[Scene, Plan]:
+    return load_scene(folder / "scene.yaml"), Plan.load(folder)
+
+
+def _read(job: Job, content: Any) -> Trial:
+    return Trial.from_json(content)

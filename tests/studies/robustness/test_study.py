@@ -49,14 +49,6 @@ def test_trials_have_the_seeds_asked_for(three: tuple[Study, str]) -> None:
     assert study.feasible == 3
 
 
-@pytest.mark.slow
-def test_the_number_of_workers_changes_no_byte(
-    run: Run, three: tuple[Study, str]
-) -> None:
-    study_robustness(run, trials=3, seed=5, workers=2)
-    assert run.folder.file("robustness.json").read_text() == three[1]
-
-
 def test_the_worst_case_is_repeated_by_its_seed(
     run: Run, three: tuple[Study, str]
 ) -> None:

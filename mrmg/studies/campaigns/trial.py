@@ -1,0 +1,225 @@
+"""One trial of a campaign, on whatever machine: planned, verified, driven, audited."""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field, fields
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mrmg.energy.audit import audit
+from mrmg.errors import MachineError, MrmgError
+from mrmg.plans import Plan, PlanResult
+from mrmg.runs.arguments import RunArguments
+from mrmg.runs.code_digest import code_digest
+from mrmg.runs.drive import drive
+from mrmg.runs.locking import locked
+from mrmg.runs.steps import planner_params
+from mrmg.scene.types import Scene
+from mrmg.studies.campaigns.scenes import SceneSource
+from mrmg.studies.outcomes import assess_trial
+from mrmg.supervision import Drive
+
+if TYPE_CHECKING:
+    from mrmg.energy.audit_record import EnergyAudit
+    from mrmg.verification.verdict import Verdict
+
+REFUSED, ERROR = "refused", "error"
+"""Statuses of trials whose scene or combination of factors is not allowed, and of those
+that something broke down in, which are made again by the next command."""
+
+_one_at_a_time = threading.Lock()
+"""A worker with several threads makes one trial after the other."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrialOrder:
+    """What one trial is made from, besides the source of its scene.
+
+    Attributes:
+        arguments: of the run, seeds included.
+        changes: keys of the scene file with other values.
+        code: `runs.steps.code_digest` of whoever asks.
+        with_run: whether the files of a run folder are wanted.
+    """
+
+    arguments: RunArguments
+    changes: Mapping[str, Any]
+    code: str
+    with_run: bool
+
+
+def make_trial(source: SceneSource, order: TrialOrder) -> dict[str, Any]:
+    """Make one trial.
+
+    Returns:
+        `result`, which is the same on every machine, `time_s` by part, and where they
+        are wanted `files` of a run folder.
+
+    Raises:
+        MachineError: if this worker has another version of mrmg, or no room.
+    """
+    if order.code != code_digest():
+        raise MachineError(
+            "a worker has another version of mrmg, MuJoCo or their sources than the "
+            "command that asks; install the same one wherever workers run"
+        )
+    began = time.perf_counter()
+    with _one_at_a_time:
+        try:
+            made = _made(source, order)
+        except (OSError, MemoryError) as error:
+            raise MachineError(f"a worker cannot go on: {error}") from error
+        except MachineError as error:
+            made = _failed(ERROR, str(error))
+        except MrmgError as error:
+            made = _failed(REFUSED, str(error))
+        except Exception as error:  # one trial of thousands is no reason to stop
+            made = _failed(ERROR, f"{type(error).__name__}: {error}")
+    made["time_s"]["total"] = time.perf_counter() - began
+    return made
+
+
+def _failed(status: str, reason: str) -> dict[str, Any]:
+    result = {"status": status, "feasible": False, "reason": " ".join(reason.split())}
+    return {"result": result, "time_s": {}}
+
+
+def _made(source: SceneSource, order: TrialOrder) -> dict[str, Any]:
+    from mrmg.scene.driven_parts import require_drivable
+    from mrmg.verification.verify import verify
+
+    arguments = order.arguments
+    scene = arguments.scene(source.scene(arguments.seed, order.changes))
+    require_drivable(scene.robots)
+    _compile_once(arguments)
+    if order.with_run:
+        return _made_by_run(scene, arguments)
+    planned, plan_s = _planned(_Planning(scene, arguments))
+    result = _of_planning(scene, planned.status.value, planned.reason)
+    if planned.plan is None:
+        return {"result": result, "time_s": {"plan": plan_s}}
+    began = time.perf_counter()
+    verdict = verify(scene, planned.plan)
+    verified = time.perf_counter()
+    driven = drive(scene, planned.plan, arguments)
+    account = audit(scene, driven.plan, driven.log, **arguments.deciding("audit"))
+    result |= _of_drive(scene, planned.plan, verdict, driven, account)
+    drive_s = time.perf_counter() - verified
+    times_s = {"plan": plan_s, "verify": verified - began, "drive": drive_s}
+    return {"result": result, "time_s": times_s}
+
+
+def _made_by_run(scene: Scene, arguments: RunArguments) -> dict[str, Any]:
+    """Make a trial by a whole run, whose folder is read into memory."""
+    from mrmg.runs import pipeline
+    from mrmg.runs.record import read_record
+
+    given = {each.name: getattr(arguments, each.name) for each in fields(arguments)}
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place) / "run"
+        pipeline.run(scene, out=folder, **{**given, "video": None})
+        record = read_record(folder, trust_code=scene.has_custom_motion)
+        found = sorted(path for path in folder.rglob("*") if path.is_file())
+        files = {str(path.relative_to(folder)): path.read_bytes() for path in found}
+        planning = record.planning
+        result = _of_planning(scene, planning["status"], planning["reason"])
+        if record.log and record.verdict and record.audit and record.plan:
+            first, driven = (
+                Plan.load(folder),
+                Drive(log=record.log, plan=record.plan, replans=()),
+            )
+            result |= _of_drive(scene, first, record.verdict, driven, record.audit)
+    times_s = {"plan": planning["statistics"]["time_s"].get("total")}
+    return {"result": result, "time_s": times_s, "files": files}
+
+
+def _of_planning(scene: Scene, status: str, reason: str) -> dict[str, Any]:
+    return {
+        "status": status,
+        "feasible": False,
+        "reason": " ".join(reason.split()),
+        "goals": len(scene.goals),
+    }
+
+
+def _of_drive(
+    scene: Scene, plan: Plan, verdict: Verdict, driven: Drive, account: EnergyAudit
+) -> dict[str, Any]:
+    """Return the figures of a mission that was driven.
+
+    Args:
+        scene: the mission.
+        plan: the first one.
+        verdict: on it.
+        driven: with the plan in force at each time.
+        account: the audit of it.
+    """
+    trial = assess_trial(scene, driven.plan, driven.log, account).to_json()
+    unused = ("seed", "reasons", "charge_J", "charge_robot", "goals_visited", "causes")
+    errors = [robot.measured_error_pct for robot in account.robots]
+    broken = [violation.message for violation in verdict.violations[:1]]
+    figures = {name: value for name, value in trial.items() if name not in unused}
+    return figures | {
+        "feasible": verdict.ok and account.mission_ok,
+        "reason": "; ".join([*broken, *account.reasons]),
+        "causes": [*(["not verified"] if broken else []), *account.causes],
+        "goals_visited": len(account.goals_visited),
+        "cost_J": plan.cost_J,
+        "makespan_s": plan.makespan_s,
+        "metered_J": account.metered.total_J(),
+        "measured_J": account.measured.total_J(),
+        "measured_error_pct": max(errors, key=abs),
+        "contacts": len(driven.log.contacts),
+        "recharges": len(account.recharges),
+        "replans": sum(event.action == "replan" for event in driven.log.events),
+        "plan_digest": plan.digest,
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class _Planning:
+    """What is planned; equal where the same plan comes of it."""
+
+    scene: Scene = field(compare=False)
+    arguments: RunArguments = field(compare=False)
+    digest: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        deciding = [self.scene.digest, *self.arguments.planning()]
+        object.__setattr__(self, "digest", str(deciding))
+
+
+@lru_cache(maxsize=8)
+def _planned(planning: _Planning) -> tuple[PlanResult, float]:
+    """Return a plan, which trials that differ in the drive share, and its time [s]."""
+    from mrmg.planning import plan_mission
+
+    began = time.perf_counter()
+    arguments = planning.arguments
+    found = plan_mission(
+        planning.scene, seed=arguments.seed, params=planner_params(arguments)
+    )
+    return found, time.perf_counter() - began
+
+
+def _compile_once(arguments: RunArguments) -> None:
+    """Compile the planner where this machine does not hold it compiled.
+
+    Workers with one cache compile once: the others wait for the one that does.
+    """
+    from mrmg.compilation import cache_folder
+    from mrmg.planning.preparation import compile_kernels
+
+    planner = planner_params(arguments).planner
+    with suppress(OSError):
+        cache_folder().mkdir(parents=True, exist_ok=True)
+    if not cache_folder().is_dir():
+        return
+    with locked(cache_folder(), wait=True):
+        compile_kernels(planner)

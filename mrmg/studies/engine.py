@@ -1,0 +1,188 @@
+"""The one door to other processes and machines: who makes trials.
+
+`local` makes them in this process, or by joblib in processes of this machine; `dask`
+has the workers of a Dask cluster make them. Calls and their arguments are sent to
+workers, results are sent back, and only this process writes to the study's folder: a
+worker needs no file of it, nor the same home.
+"""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any, TypeVar
+
+from mrmg.errors import MachineError, UsageError
+from mrmg.extras import import_extra
+from mrmg.interruption import end_with_parent, sheltered_children
+
+Shared = TypeVar("Shared")
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+ENGINES = ("local", "dask")
+
+CONNECT_S = 15.0
+"""How long a scheduler is waited for [s]."""
+
+_GO_ON = "the same command goes on from the trials that are done"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Engine:
+    """Who makes trials.
+
+    Attributes:
+        kind: one of `ENGINES`.
+        workers: trials under way at once; None for one on this machine, and as many as
+            a cluster has room for.
+        scheduler: address of a Dask scheduler; None starts a cluster on this machine.
+    """
+
+    kind: str = "local"
+    workers: int | None = None
+    scheduler: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in ENGINES:
+            raise UsageError(f"engine {self.kind!r}; allowed: {', '.join(ENGINES)}")
+        if self.workers is not None and self.workers < 1:
+            raise UsageError(f"workers = {self.workers}; at least 1 is needed")
+        if self.scheduler is not None and self.kind != "dask":
+            raise UsageError(
+                "a scheduler is one of Dask; use --engine dask with --scheduler"
+            )
+
+    def results(
+        self,
+        call: Callable[[Shared, Item], Result],
+        jobs: Sequence[tuple[Shared, Item]],
+    ) -> Iterator[tuple[int, Result]]:
+        """Yield the place of each job and what `call` returns for it, as they come.
+
+        Args:
+            call: function of a module.
+            jobs: arguments of the calls; what several of them share is sent to a
+                machine once.
+
+        Raises:
+            MachineError: if workers were killed, or the cluster is out of reach.
+        """
+        if not jobs:
+            return
+        if self.kind == "dask":
+            yield from self._by_dask(call, jobs)
+        elif (self.workers or 1) == 1:
+            for number, job in enumerate(jobs):
+                yield number, call(*job)
+        else:
+            yield from self._by_processes(call, jobs)
+
+    def _by_processes(
+        self,
+        call: Callable[[Shared, Item], Result],
+        jobs: Sequence[tuple[Shared, Item]],
+    ) -> Iterator[tuple[int, Result]]:
+        from joblib import Parallel, delayed, parallel_config
+        from joblib.externals.loky import get_reusable_executor
+
+        count = min(self.workers or 1, len(jobs))
+        # joblib warns where it replaces a process that has come to hold much memory.
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs")
+        try:
+            with (
+                parallel_config("loky", initializer=end_with_parent),
+                sheltered_children(),
+            ):
+                made = Parallel(
+                    count,
+                    return_as="generator_unordered",
+                    batch_size=1,
+                    pre_dispatch=2 * count,
+                    max_nbytes=None,
+                )(delayed(_numbered)(call, *job) for job in enumerate(jobs))
+            yield from made
+        except BrokenProcessPool as error:
+            raise MachineError(
+                f"a worker process was killed (out of memory?); {_GO_ON}, fewer "
+                "--workers need less memory"
+            ) from error
+        finally:
+            get_reusable_executor(max_workers=count, reuse=True).shutdown(
+                kill_workers=True
+            )
+
+    def _by_dask(
+        self,
+        call: Callable[[Shared, Item], Result],
+        jobs: Sequence[tuple[Shared, Item]],
+    ) -> Iterator[tuple[int, Result]]:
+        purpose = "has workers on other machines make trials"
+        dask = import_extra("distributed", extra="cluster", purpose=purpose)
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        client = self._client(dask)
+        try:
+            shared = {
+                id(part): client.submit(_itself, part, pure=False)
+                for part in {id(part): part for part, _ in jobs}.values()
+            }
+            waiting = enumerate(jobs)
+
+            def submitted(count: int | None) -> list[Any]:
+                return [
+                    client.submit(
+                        _numbered, call, number, (shared[id(part)], item), pure=False
+                    )
+                    for number, (part, item) in islice(waiting, count)
+                ]
+
+            running = dask.as_completed(submitted(self.workers))
+            for future in running:
+                yield future.result()
+                running.update(submitted(1))
+        except (CancelledError, OSError, TimeoutError) as error:
+            raise MachineError(f"the Dask scheduler was lost; {_GO_ON}") from error
+        except dask.scheduler.KilledWorker as error:
+            raise MachineError(
+                f"a trial ended one worker after the other (out of memory?); {_GO_ON}"
+            ) from error
+        except ModuleNotFoundError as error:
+            raise MachineError(
+                f"a worker has no package {error.name}; install the same packages "
+                "wherever workers run"
+            ) from error
+        finally:
+            with suppress(TimeoutError):  # of a scheduler that is gone
+                client.close(timeout=CONNECT_S)
+
+    def _client(self, dask: Any) -> Any:
+        """Return a client of the cluster."""
+        if self.scheduler is None:
+            return dask.Client(
+                n_workers=self.workers or 1,
+                threads_per_worker=1,
+                dashboard_address=None,
+            )
+        try:
+            return dask.Client(self.scheduler, timeout=CONNECT_S)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise MachineError(
+                f"no Dask scheduler answers at {self.scheduler}; 'dask scheduler' "
+                "starts one and prints its address, such as tcp://host:8786"
+            ) from error
+
+
+def _numbered(
+    call: Callable[[Any, Any], Result], number: int, job: tuple[Any, Any]
+) -> tuple[int, Result]:
+    return number, call(*job)
+
+
+def _itself(value: Shared) -> Shared:
+    return value

@@ -1,0 +1,55 @@
+"""Campaign files: every combination of their factors, and what is wrong with them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mrmg.errors import ExitCode, FileError
+from mrmg.studies.campaigns import read_campaign
+
+ZOO = Path(__file__).parent / "bad"
+FILES = sorted(path.name for path in ZOO.glob("*.yaml"))
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_message(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ZOO)
+    with pytest.raises(FileError) as caught:
+        read_campaign(Path(name))
+    assert f"{caught.value}\n" == (ZOO / name).with_suffix(".txt").read_text()
+    assert caught.value.exit_code == ExitCode.INVALID_FILE
+
+
+def test_there_is_a_trial_for_every_combination(tmp_path: Path) -> None:
+    file = tmp_path / "sweep.yaml"
+    file.write_text(
+        "scenes: [quickstart, scene1]\nseeds: 3-5\nrouters: [default, exact]\n"
+        "disturbances: [none, default, rolling=+30%]\n"
+        "parameters: {soc_margin: [0, 0.2], battery.capacity_m: [300, 400]}\n"
+    )
+    trials = read_campaign(file).trials
+    assert len(trials) == 2 * 3 * 2 * 3 * 2 * 2
+    assert len({trial.key for trial in trials}) == len(trials)
+    arguments = [trial.order.arguments for trial in trials]
+    assert {each.seed for each in arguments} == {3, 4, 5}
+    assert all(each.seed == each.disturb_seed for each in arguments)
+    assert {each.disturb for each in arguments} == {None, "", "rolling=+30%"}
+    assert {each.router for each in arguments} == {None, "exact"}
+    first = trials[0]
+    assert first.order.changes == {"battery": {"capacity_m": 300}}
+    assert first.factors["battery.capacity_m"] == 300
+
+
+def test_a_trial_keeps_its_key_in_a_larger_campaign(tmp_path: Path) -> None:
+    file = tmp_path / "sweep.yaml"
+    file.write_text("scenes: {scene: scene1, populate: {goals: 3}}\nseeds: 4-5\n")
+    few = {trial.key for trial in read_campaign(file).trials}
+    file.write_text(
+        "scenes: [{scene: scene1, populate: {goals: 3}}, quickstart]\n"
+        "seeds: 0-7\nplants: [scrub, default]\n"
+    )
+    many = {trial.key for trial in read_campaign(file).trials}
+    assert len(few) == 2
+    assert few < many
