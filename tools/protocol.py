@@ -6,7 +6,9 @@ one JSON document when it is through:
 
 - `bench`: name of the tool;
 - `protocol`: the tool's options by their names (`seeds` one by one), and `versions` by
-  package, `machine` and `state`, a fingerprint of code, models, scenes and versions;
+  package, `machine`, `date`, `command`, `commit` (null outside a checkout; `-changed`
+  where files differ from it) and `state`, a fingerprint of code, models, scenes and
+  versions;
 - `rows`: the rows of the table that it prints, numbers as numbers, null for none; a
   bench of several tables has one more key for each of the others;
 - `ok`: whether everything held; the exit code states the same.
@@ -20,8 +22,11 @@ import json
 import math
 import os
 import platform
+import shlex
+import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -37,6 +42,8 @@ Row = dict[str, Any]
 
 _FILES = ("json", "output", "figure", "runs")
 """Options that say where results go, and decide nothing."""
+
+_ROOT = Path(__file__).parents[1]
 
 _PACKAGES = ("mrmg", "mujoco", "casadi", "numpy", "scipy", "shapely", "numba")
 
@@ -80,6 +87,25 @@ def state() -> str:
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
+
+
+def commit() -> str | None:
+    """Return the commit of the checkout, marked where tracked files differ from it."""
+    call = [
+        "git",
+        "describe",
+        "--always",
+        "--abbrev=12",
+        "--exclude=*",
+        "--dirty=-changed",
+    ]
+    try:
+        found = subprocess.run(
+            call, cwd=Path(__file__).parent, capture_output=True, text=True, check=True
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return found.stdout.strip()
 
 
 def cpu() -> str:
@@ -158,9 +184,29 @@ def write_document(
     if options.json is None:
         return
     chosen = {name: x for name, x in vars(options).items() if name not in _FILES}
-    measured = {"versions": _versions(), "machine": cpu(), "state": state()}
+    measured = {
+        "versions": _versions(),
+        "machine": cpu(),
+        "date": datetime.now(UTC).date().isoformat(),
+        "command": _command(bench),
+        "commit": commit(),
+        "state": state(),
+    }
     document = {"bench": bench, "protocol": chosen | measured, "rows": rows, "ok": ok}
     storage.write_json(options.json, _plain(document | tables))
+
+
+def _command(bench: str) -> str:
+    """Return the command line without what says where results go."""
+    line, left = [f"tools/{bench}"], sys.argv[1:]
+    while left:
+        word = left.pop(0)
+        name, joined, _ = word.partition("=")
+        if name.removeprefix("--") in _FILES and name.startswith("--"):
+            del left[: 0 if joined else 1]
+            continue
+        line.append(os.path.relpath(word, _ROOT) if os.path.isabs(word) else word)
+    return shlex.join(line)
 
 
 def _plain(value: Any) -> Any:
@@ -173,7 +219,7 @@ def _plain(value: Any) -> Any:
         return [_plain(item) for item in value]
     if isinstance(value, float):
         return value if math.isfinite(value) else None
-    return str(value) if isinstance(value, Path) else value
+    return os.path.relpath(value, _ROOT) if isinstance(value, Path) else value
 
 
 class Trials:

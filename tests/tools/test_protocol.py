@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
+import json
 import platform
+import re
+import sys
+from pathlib import Path
 
+import protocol
 import pytest
 from protocol import seed_range, versions
 
@@ -30,3 +36,21 @@ def test_versions_name_packages_python_and_processor() -> None:
     assert "mujoco " in output
     assert f"Python {platform.python_version()}, " in output
     assert not output.endswith(", ")
+
+
+def test_a_document_names_its_command_and_no_place_of_the_machine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = tmp_path / "found.json"
+    map_file = Path(protocol.__file__).parents[2] / "shared" / "maps" / "a map.txt"
+    line = ["bench", str(map_file), "--seeds", "0-1", "--json", str(found)]
+    monkeypatch.setattr(sys, "argv", line)
+    options = argparse.Namespace(maps=[map_file], seeds=range(2), json=found)
+    protocol.write_document(options, "bench_maps", [], True)
+    reported = json.loads(found.read_text())["protocol"]
+    assert (
+        reported["command"] == "tools/bench_maps '../shared/maps/a map.txt' --seeds 0-1"
+    )
+    assert reported["maps"] == ["../shared/maps/a map.txt"]
+    assert str(map_file.parents[2]) not in found.read_text()
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d", reported["date"])
