@@ -244,7 +244,7 @@ class Plan:
                     f"format is {header['format']}, this version reads {PLAN_FORMAT}"
                 )
             return _plan_from(header, arrays)
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except storage.UNREADABLE as error:
             fault = Fault(
                 f"{name}.json", f"no readable plan ({error}); run 'mrmg plan'"
             )

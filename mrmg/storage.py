@@ -5,19 +5,31 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import math
 import os
 import tempfile
 import zipfile
-import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from mrmg.interruption import cleaned_up_by
+
+_Kind = TypeVar("_Kind")
+
+UNREADABLE = (
+    *(OSError, ValueError, LookupError, TypeError, AttributeError),
+    *(ArithmeticError, MemoryError, RecursionError),
+)
+"""What reading a file raises that is missing, damaged, or of another structure."""
+
+MAX_UNPACKED_BYTES = 2**28
+MAX_UNPACKED_RATIO = 100
+"""A packed file that is larger unpacked than both of these allow is not unpacked."""
 
 
 @contextmanager
@@ -72,8 +84,47 @@ def write_json(path: Path, value: Any) -> None:
 
 
 def read_json(path: Path) -> Any:
-    """Read a JSON file."""
-    return json.loads(path.read_text())
+    """Read a JSON file that `write_json` wrote.
+
+    Raises:
+        ValueError: if it is damaged: numbers that are not finite, half a character, or
+            levels of nesting that nobody wrote included.
+    """
+    return json_of(path.read_bytes())
+
+
+def json_of(content: bytes) -> Any:
+    """Return the value of JSON; see `read_json`."""
+    try:
+        value = json.loads(content, parse_float=_finite, parse_constant=_finite)
+        if b"\\ud" in content.lower():  # may stand for one half of a character alone
+            json.dumps(value, ensure_ascii=False).encode()
+    except RecursionError:
+        raise ValueError("nested too deeply") from None
+    return value
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text} is not a finite number")
+    return value
+
+
+def typed(kind: type[_Kind], data: Any) -> _Kind:
+    """Return plain data as a value of a dataclass, all of its fields checked.
+
+    Raises:
+        ValueError: if a field is missing, unknown or of another type; names the first.
+    """
+    from pydantic import TypeAdapter, ValidationError
+
+    try:
+        return TypeAdapter(kind).validate_python(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise ValueError(f"{place}: {first['msg']}") from error
 
 
 def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
@@ -108,11 +159,44 @@ def arrays_of(content: bytes, name: str) -> dict[str, np.ndarray]:
         ValueError: if it is damaged.
     """
     try:
-        with np.load(io.BytesIO(content), allow_pickle=False) as archive:
-            return {key: archive[key] for key in archive.files}
-    except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError) as error:
-        # RuntimeError covers a flipped flag that makes a member look encrypted.
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            return {
+                member.removesuffix(".npy"): _array_of(data)
+                for member, data in unpacked(archive, len(content)).items()
+            }
+    except Exception as error:  # readers raise anything, of tokens and of zlib, too
         raise ValueError(f"{name} is damaged: {error}") from error
+
+
+def unpacked(archive: zipfile.ZipFile, packed_bytes: int) -> dict[str, bytes]:
+    """Return the members of a zip by name, none of which lies about its size.
+
+    Raises:
+        ValueError: if they are far larger than a file of `packed_bytes` can mean.
+    """
+    unpacked_bytes = sum(info.file_size for info in archive.infolist())
+    if unpacked_bytes > max(MAX_UNPACKED_BYTES, MAX_UNPACKED_RATIO * packed_bytes):
+        raise ValueError(
+            f"{packed_bytes} bytes unpack to {unpacked_bytes}; allowed are "
+            f"{MAX_UNPACKED_BYTES}, or {MAX_UNPACKED_RATIO} times as many"
+        )
+    return {info.filename: archive.read(info) for info in archive.infolist()}
+
+
+def _array_of(data: bytes) -> np.ndarray:
+    """Return the array of an .npy, which must have the size that its header states."""
+    file = io.BytesIO(data)
+    version = np.lib.format.read_magic(file)
+    read = np.lib.format.read_array_header_1_0
+    if version != (1, 0):
+        read = np.lib.format.read_array_header_2_0
+    shape, _, dtype = read(file)
+    stated_bytes = math.prod(shape) * dtype.itemsize
+    fits = stated_bytes == len(data) - file.tell() and min(shape, default=0) >= 0
+    if not fits and not dtype.hasobject:
+        raise ValueError(f"an array of {stated_bytes} bytes is stated")
+    file.seek(0)
+    return np.lib.format.read_array(file, allow_pickle=False)
 
 
 def user_cache_folder() -> Path:

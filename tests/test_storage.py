@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -112,6 +113,41 @@ def test_pickled_content_is_refused_both_ways(tmp_path: Path) -> None:
     np.savez(tmp_path / "b.npz", a=np.array([{}], dtype=object))
     with pytest.raises(ValueError, match="allow_pickle"):
         storage.read_arrays(tmp_path / "b.npz")
+
+
+def test_a_file_that_unpacks_to_far_more_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    storage.write_arrays(tmp_path / "bomb.npz", {"a": np.zeros(2**18)})
+    assert storage.read_arrays(tmp_path / "bomb.npz")["a"].size == 2**18
+    monkeypatch.setattr(storage, "MAX_UNPACKED_BYTES", 2**20)
+    with pytest.raises(ValueError, match="unpack to 2097280; allowed are 1048576"):
+        storage.read_arrays(tmp_path / "bomb.npz")
+
+
+@pytest.mark.parametrize("shape", ["(10**9,)", "(1000000000000,)", "(-1,)", "(3, 2)"])
+def test_an_array_has_the_size_that_it_states(tmp_path: Path, shape: str) -> None:
+    storage.write_arrays(tmp_path / "a.npz", {"a": np.arange(5.0)})
+    with zipfile.ZipFile(tmp_path / "a.npz") as archive:
+        data = archive.read("a.npy").replace(b"(5,), ", f"{shape}, ".encode())
+    start = data.index(b"{")
+    line = data[start:].partition(b"}")[0] + b"}"
+    header = line.ljust(117) + b"\n"
+    with zipfile.ZipFile(tmp_path / "b.npz", "w") as archive:
+        head = data[:8] + len(header).to_bytes(2, "little")
+        archive.writestr("a.npy", head + header + np.arange(5.0).tobytes())
+    with pytest.raises(ValueError, match=r"b\.npz is damaged"):
+        storage.read_arrays(tmp_path / "b.npz")
+
+
+@pytest.mark.parametrize(
+    "text", ["[NaN]", "[1e999]", '["\\ud800"]', "[" * 9999, "9" * 5000, "{", "\xff"]
+)
+def test_json_that_nobody_wrote_is_a_value_error(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "a.json"
+    path.write_bytes(text.encode("latin-1"))
+    with pytest.raises(ValueError):
+        storage.read_json(path)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.9, 0.99])

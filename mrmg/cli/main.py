@@ -6,7 +6,10 @@ import errno
 import gc
 import os
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
 
 from mrmg import interruption
 from mrmg.cli.parser import make_parser
@@ -26,12 +29,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # What imports make stays: to search it for garbage again and again takes a tenth of
     # the time of a short command.
     gc.set_threshold(MOST_NEW_OBJECTS)
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")  # of libraries, to programmers
     try:
         code = options.command(options)
         sys.stdout.flush()
         return int(code)
     except MrmgError as error:
-        print(f"mrmg: {error}", file=sys.stderr)
+        print(f"mrmg: {_printable(str(error))}", file=sys.stderr)
         return int(error.exit_code)
     except KeyboardInterrupt:
         print(interruption.MESSAGE, file=sys.stderr)
@@ -42,5 +47,39 @@ def main(arguments: Sequence[str] | None = None) -> int:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return int(ExitCode.OK)
         about = f"{error.filename}: {error.strerror}" if error.filename else error
-        print(f"mrmg: cannot read or write {about}", file=sys.stderr)
+        print(_printable(f"mrmg: cannot read or write {about}"), file=sys.stderr)
         return int(ExitCode.MACHINE)
+    except Exception as error:
+        altered = [*_altered_files(vars(options).values())]
+        if not altered:
+            raise
+        reason = f"{type(error).__name__}: {error}".partition("\n")[0]
+        message = "not as this version of mrmg wrote it, and of no use"
+        remedy = "'mrmg run SCENE --out RUN --overwrite' makes all anew"
+        text = f"mrmg: {altered[0]}: {message} ({reason}); {remedy}"
+        print(_printable(text), file=sys.stderr)
+        return int(ExitCode.INVALID_FILE)
+
+
+def _altered_files(values: Iterable[Any]) -> Iterator[Path]:
+    """Yield the files of all run folders among `values` that their runs did not leave.
+
+    Files that people or disks changed may contradict each other in any way, which no
+    reader can foresee; what goes wrong with files that mrmg wrote is a fault of mrmg.
+    """
+    from mrmg.runs.folder import RunFolder
+
+    for value in values:
+        if isinstance(value, (str, Path)) and Path(value, "run.json").is_file():
+            folder = RunFolder(Path(value))
+            yield from (folder.file(name) for name in folder.altered())
+        elif isinstance(value, list):
+            yield from _altered_files(value)
+
+
+def _printable(text: str) -> str:
+    """Return a message without what a terminal would act on."""
+    return "".join(
+        sign if sign.isprintable() or sign == "\n" else repr(sign)[1:-1]
+        for sign in text
+    )

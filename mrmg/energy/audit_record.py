@@ -159,7 +159,7 @@ class EnergyAudit:
         """
         try:
             return _audit_from(storage.read_json(folder / "audit.json"))
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except storage.UNREADABLE as error:
             fault = Fault(
                 "audit.json", f"no readable audit ({error}); run 'mrmg audit'"
             )

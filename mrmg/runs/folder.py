@@ -10,12 +10,13 @@ file is put in place by renaming, so a killed run can be taken up at any moment.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from mrmg import storage
@@ -83,6 +84,9 @@ NEEDS: dict[Step, tuple[Step, ...]] = {
 """Steps whose outcome a step is made from."""
 
 
+_READ_AGAIN = (".json", ".npz", ".yaml")
+"""Endings of the outputs that other steps and commands read."""
+
 CLOCK_FILES = ("timing.json",)
 """Outputs that differ between equal executions: they hold readings of the clock."""
 
@@ -94,6 +98,24 @@ def stale_after(step: Step) -> list[Step]:
         if any(need in stale for need in NEEDS[later]):
             stale.append(later)
     return stale
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Record:
+    """Content of `run.json`.
+
+    Attributes:
+        arguments: that the files were last made with.
+        finished: fingerprint of each step that is.
+        files: digests of what each finished step left and is read again; versions
+            before 0.2 kept none.
+        format: of this record.
+    """
+
+    arguments: dict[str, Any] = field(default_factory=dict)
+    finished: dict[str, str] = field(default_factory=dict)
+    files: dict[str, dict[str, str]] = field(default_factory=dict)
+    format: int = RUN_FORMAT
 
 
 @dataclass(frozen=True)
@@ -119,11 +141,11 @@ class RunFolder:
 
     def arguments(self) -> dict[str, Any]:
         """Return the arguments its files were last made with; empty if none."""
-        return dict(self._record().get("arguments", {}))
+        return self._record().arguments
 
     def marks(self) -> dict[str, str]:
         """Return the fingerprints of the finished steps."""
-        return dict(self._record().get("finished", {}))
+        return self._record().finished
 
     def is_done(self, step: Step, fingerprint: str) -> bool:
         """Return whether the outcome of `step` under `fingerprint` is there."""
@@ -172,7 +194,30 @@ class RunFolder:
 
     def finish(self, step: Step, fingerprint: str) -> None:
         """Mark `step` as finished under `fingerprint`."""
-        self._write(self.arguments(), {**self.marks(), str(step): fingerprint})
+        names = {*OUTPUTS[step], *ON_REQUEST.get(step, ())}
+        made = {
+            name: storage.bytes_digest(self.file(name).read_bytes())
+            for name in sorted(names)
+            if name.endswith(_READ_AGAIN) and self.file(name).exists()
+        }
+        marks = {**self.marks(), str(step): fingerprint}
+        self._write(self.arguments(), marks, {str(step): made})
+
+    def altered(self) -> list[str]:
+        """Return the files that are not as the steps left them.
+
+        Of a run of an older version, which kept no digests, that is `run.json`.
+        """
+        left = self._record().files
+        if not left:
+            return ["run.json"]
+        return [
+            name
+            for files in left.values()
+            for name, digest in files.items()
+            if not self.file(name).exists()
+            or storage.bytes_digest(self.file(name).read_bytes()) != digest
+        ]
 
     def read_json(self, name: str, *, remedy: str) -> Any:
         """Read one of the folder's JSON files.
@@ -182,24 +227,35 @@ class RunFolder:
         """
         try:
             return storage.read_json(self.file(name))
-        except (OSError, ValueError) as error:
+        except storage.UNREADABLE as error:
             fault = Fault(name, f"not readable ({error}); run '{remedy}'")
             raise RunFolderError(str(self.path), [fault]) from error
 
-    def _record(self) -> dict[str, Any]:
+    def _record(self) -> _Record:
         if not self.file("run.json").exists():
-            return {}
+            return _Record()
         record = self.read_json("run.json", remedy="mrmg run")
-        if not isinstance(record, dict) or record.get("format") != RUN_FORMAT:
-            fault = Fault("run.json", f"this version reads format {RUN_FORMAT} only")
-            raise RunFolderError(str(self.path), [fault])
-        return record
+        try:
+            if record["format"] != RUN_FORMAT:
+                raise ValueError(f"this version reads format {RUN_FORMAT} only")
+            return storage.typed(_Record, record)
+        except storage.UNREADABLE as error:
+            fault = Fault("run.json", f"{error}; 'mrmg run' makes it in a new folder")
+            raise RunFolderError(str(self.path), [fault]) from error
 
-    def _write(self, arguments: dict[str, Any], marks: dict[str, str]) -> None:
-        storage.write_json(
-            self.file("run.json"),
-            {"format": RUN_FORMAT, "arguments": arguments, "finished": marks},
+    def _write(
+        self,
+        arguments: dict[str, Any],
+        marks: dict[str, str],
+        made: Mapping[str, dict[str, str]] = MappingProxyType({}),
+    ) -> None:
+        files = {**self._record().files, **made}
+        record = _Record(
+            arguments=arguments,
+            finished=marks,
+            files={step: files[step] for step in files if step in marks},
         )
+        storage.write_json(self.file("run.json"), asdict(record))
 
 
 def existing(path: Path) -> RunFolder:

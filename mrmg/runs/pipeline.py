@@ -12,8 +12,8 @@ from mrmg.runs.arguments import DEFAULT_VIDEO, RunArguments, VideoArguments, key
 from mrmg.runs.drive import checked_drive
 from mrmg.runs.folder import RunFolder, Step
 from mrmg.runs.options import documented
-from mrmg.runs.replacing import recorded, require_room
-from mrmg.runs.steps import OnImprovement, Run, StepProgress
+from mrmg.runs.replacing import require_room
+from mrmg.runs.steps import OnImprovement, Run, StepProgress, recorded
 from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.loading import load_scene
 from mrmg.scene.loading.reading import require_faithful

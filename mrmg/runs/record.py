@@ -102,6 +102,6 @@ def _why_no_record(folder: Path) -> Fault:
 def _read(folder: Path, name: str, remedy: str) -> dict[str, Any]:
     try:
         return dict(storage.read_json(folder / name))
-    except (OSError, ValueError) as error:
+    except storage.UNREADABLE as error:
         fault = Fault(name, f"cannot be read ({error}); run '{remedy}'")
         raise RunFolderError(str(folder), [fault]) from error

@@ -11,9 +11,9 @@ from pathlib import Path
 from mrmg.errors import FileError, UsageError
 from mrmg.plans import Plan, PlanStatus
 from mrmg.runs.arguments import RunArguments
-from mrmg.runs.folder import RunFolder, Step, stale_after
+from mrmg.runs.folder import Step, stale_after
 from mrmg.runs.options import options_of
-from mrmg.runs.steps import Run
+from mrmg.runs.steps import Run, recorded
 from mrmg.studies.outcomes import ROBUSTNESS_FILE
 
 _COSTLY = {Step.PLAN: "plan", Step.EXECUTE: "drive", Step.RENDER: "video"}
@@ -103,11 +103,6 @@ def require_absent(path: Path, *, overwrite: bool) -> None:
         raise UsageError(
             f"{path} exists; --overwrite replaces it, another name for -o keeps it"
         )
-
-
-def recorded(folder: RunFolder) -> RunArguments:
-    """Return the arguments that the folder's results were made with."""
-    return RunArguments.from_json(folder.arguments())
 
 
 def _shown(value: object) -> str:

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from mrmg import storage
 from mrmg.errors import Fault, FileError, UsageError
+from mrmg.plans import Plan
 from mrmg.runs.arguments import RunArguments
 from mrmg.runs.capsule import CAPSULE_FILE, Capsule, Failure
 from mrmg.runs.folder import RunFolder, Step
-from mrmg.runs.replacing import recorded, require_room
-from mrmg.runs.steps import StepProgress, taken_up
+from mrmg.runs.replacing import require_room
+from mrmg.runs.steps import StepProgress, recorded, taken_up
+from mrmg.scene.loading import load_scene
+from mrmg.simulation.log import require_same_mission
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -117,6 +122,7 @@ def reproduce(
     """
     capsule = Capsule.load(path)
     arguments = _arguments(capsule, path)
+    _require_usable(capsule, path, trust_code)
     folder = RunFolder(out)
     with folder.opened_for_writing():
         repeated = capsule.lies_in(out) and recorded(folder) == arguments
@@ -144,9 +150,20 @@ def reproduce(
     return Reproduction(before=capsule.failure, after=after)
 
 
+def _require_usable(capsule: Capsule, path: Path, trust_code: bool) -> None:
+    """Refuse a capsule whose scene or plan cannot be read, before there is a folder."""
+    with tempfile.TemporaryDirectory(prefix="mrmg-") as place:
+        capsule.unpack(Path(place))
+        try:
+            scene = load_scene(Path(place) / "scene.yaml", trust_code=trust_code)
+            require_same_mission(scene, Plan.load(Path(place)))
+        except FileError as error:
+            raise FileError(str(path), error.faults) from error
+
+
 def _arguments(capsule: Capsule, path: Path) -> RunArguments:
     try:
         return RunArguments.from_json(dict(capsule.arguments))
-    except (TypeError, ValueError, UsageError) as error:
+    except (*storage.UNREADABLE, UsageError) as error:
         fault = Fault("capsule.json", f"arguments this version does not know ({error})")
         raise FileError(str(path), [fault]) from error

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrmg import storage
-from mrmg.errors import ExitCode, MrmgError, RunFolderError
+from mrmg.errors import ExitCode, Fault, MrmgError, RunFolderError, UsageError
 from mrmg.plans import Plan, PlanStatus, plan_in_force
 from mrmg.runs.arguments import RunArguments
 from mrmg.runs.code_digest import code_digest
@@ -170,10 +170,24 @@ def taken_up(
     """Return the run that `folder` holds, with the arguments it was started with."""
     return Run(
         scene=load_scene(folder.file("scene.yaml"), trust_code=trust_code),
-        arguments=RunArguments.from_json(folder.arguments()),
+        arguments=recorded(folder),
         folder=folder,
         on_progress=on_progress,
     )
+
+
+def recorded(folder: RunFolder) -> RunArguments:
+    """Return the arguments that the folder's results were made with.
+
+    Raises:
+        RunFolderError: if they are damaged, or of a later version.
+    """
+    try:
+        return RunArguments.from_json(folder.arguments())
+    except (*storage.UNREADABLE, UsageError) as error:
+        message = f"arguments that this version does not know ({error})"
+        fault = Fault("run.json", f"{message}; run 'mrmg run' into another folder")
+        raise RunFolderError(str(folder.path), [fault]) from error
 
 
 _last_audit: dict[str, EnergyAudit] = {}

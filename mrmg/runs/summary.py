@@ -193,6 +193,6 @@ def _energy_figures(audit: EnergyAudit) -> dict[str, Any]:
 def _read(folder: Path, name: str) -> dict[str, Any]:
     try:
         return dict(storage.read_json(folder / name))
-    except (OSError, ValueError) as error:
+    except storage.UNREADABLE as error:
         fault = Fault(name, f"cannot be read ({error}); run 'mrmg plan'")
         raise RunFolderError(str(folder), [fault]) from error

@@ -231,7 +231,7 @@ class ExecutionLog:
             arrays: dict[str, Any] = storage.read_arrays(folder / "log.npz")
             timing = storage.read_json(folder / "timing.json")
             return ExecutionLog(**header, **arrays, timing=timing)
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except storage.UNREADABLE as error:
             fault = Fault("log.json", f"no readable log ({error}); run 'mrmg execute'")
             raise RunFolderError(str(folder), [fault]) from error
 

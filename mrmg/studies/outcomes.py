@@ -78,8 +78,7 @@ class Trial:
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> Trial:
         """Rebuild a trial from `to_json`."""
-        lists = {name: tuple(data[name]) for name in ("causes", "reasons")}
-        return Trial(**{**data, **lists})
+        return storage.typed(Trial, data)
 
 
 def assess_trial(
@@ -182,10 +181,8 @@ class Study:
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> Study:
         """Rebuild a study from `to_json`."""
-        return Study(
-            options=data["options"],
-            trials=tuple(Trial.from_json(row) for row in data["outcomes"]),
-        )
+        known = {"options": data["options"], "trials": data["outcomes"]}
+        return storage.typed(Study, known)
 
     def _failures(self) -> dict[str, int]:
         """Return how many trials failed by each cause; one may fail by several."""
@@ -266,7 +263,7 @@ def load_studies(folder: Path, plan: Plan) -> tuple[Study, ...]:
         if content["plan_digest"] != plan.digest:
             return ()
         return _studies(content["studies"])
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except storage.UNREADABLE as error:
         fault = Fault(
             ROBUSTNESS_FILE, f"not readable ({error}); delete it and run it again"
         )

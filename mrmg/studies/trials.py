@@ -47,7 +47,7 @@ def completed_trials(
         jobs: all trials.
         call: makes a trial of `shared` and `item` of its job.
         engine: who calls.
-        check: raises ValueError, TypeError or KeyError where the content of a trial's
+        check: raises one of `storage.UNREADABLE` where the content of a trial's
             file is not good, and the trial is to be made anew.
         keep: returns the content of the file from what `call` returned, as JSON data.
     """
@@ -56,7 +56,7 @@ def completed_trials(
         try:
             content = storage.read_json(job.path)
             check(job, content)
-        except (OSError, ValueError, TypeError, KeyError):
+        except storage.UNREADABLE:
             missing.append(number)
         else:
             yield number, content

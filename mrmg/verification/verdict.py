@@ -145,7 +145,7 @@ class Verdict:
             rows = content.pop("violations")
             violations = tuple(Violation.from_row(row) for row in rows)
             return Verdict(violations=violations, **content)
-        except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        except storage.UNREADABLE as error:
             fault = Fault(
                 "verdict.json", f"no readable verdict ({error}); run 'mrmg verify'"
             )

@@ -147,8 +147,10 @@ def read_json(path: Path) -> Any:
         place = f"line {error.lineno}, column {error.colno}"
         message = f"no valid JSON: {error.msg}"
         raise SceneError(str(path), [Fault(place, message)]) from error
-    except RecursionError as error:
-        raise SceneError(str(path), [Fault("", "nested too deeply")]) from error
+    except (ValueError, RecursionError) as error:
+        reason = str(error).partition(";")[0]
+        message = f"no JSON that can be read: {reason}"
+        raise SceneError(str(path), [Fault("", message)]) from error
 
 
 def _stated(members: dict[str, Any]) -> dict[str, Any]:

@@ -16,6 +16,13 @@ import yaml
 from yaml.composer import Composer
 
 from mrmg.errors import Fault, SceneError
+from mrmg.storage import UNREADABLE
+
+MAX_INTEGER_DIGITS = 400
+"""Longer integers are beyond every floating-point number."""
+
+MAX_ALIASED_VALUES = 100_000
+"""Values that aliases may repeat; a few lines of them can stand for billions."""
 
 
 class _CoreLoader(yaml.SafeLoader):  # type: ignore[misc]
@@ -23,6 +30,19 @@ class _CoreLoader(yaml.SafeLoader):  # type: ignore[misc]
 
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}
     keys_as_text = False
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        try:
+            return super().construct_object(node, deep)
+        except (ValueError, LookupError, AttributeError, TypeError) as error:
+            # PyYAML trusts that what is tagged as a number or a date is one.
+            kind = node.tag.rpartition(":")[2]
+            text = str(node.value)
+            shown = text if len(text) <= 20 else f"{text[:20]}... of {len(text)} signs"
+            message = f"got {shown}, which is no {kind}; write a plain value"
+            raise yaml.constructor.ConstructorError(
+                None, None, message, node.start_mark
+            ) from error
 
     def construct_mapping(
         self, node: yaml.MappingNode, deep: bool = False
@@ -46,6 +66,8 @@ class _CoreLoader(yaml.SafeLoader):  # type: ignore[misc]
 
 def _construct_core_int(loader: _CoreLoader, node: yaml.ScalarNode) -> int:
     text = str(loader.construct_scalar(node))
+    if len(text) > MAX_INTEGER_DIGITS:
+        raise ValueError("beyond all numbers that a scene can mean")
     return int(text, 0) if text[:2] in ("0o", "0x") else int(text)
 
 
@@ -137,11 +159,11 @@ def parse_yaml(text: str, *, source: str, keys_as_text: bool = False) -> Any:
         SceneError: if it is no YAML; names the line and column.
     """
     try:
-        if not keys_as_text:
-            with suppress(yaml.YAMLError):
-                return yaml.load(text, Loader=_FastLoader)  # noqa: S506 (a safe loader)
-        loader = _TextKeyLoader if keys_as_text else _CoreLoader
-        return yaml.load(text, Loader=loader)  # noqa: S506 (a safe loader)
+        document = _loaded(text, keys_as_text)
+        if "*" in text and _repeated(document, {}) > MAX_ALIASED_VALUES:
+            message = f"aliases repeat more than {MAX_ALIASED_VALUES} values"
+            raise SceneError(source, [Fault("", f"{message}; write them out")])
+        return document
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         place = f"line {mark.line + 1}, column {mark.column + 1}" if mark else ""
@@ -153,6 +175,36 @@ def parse_yaml(text: str, *, source: str, keys_as_text: bool = False) -> Any:
         raise SceneError(source, [Fault("", f"no valid YAML: {error}")]) from error
     except RecursionError as error:
         raise SceneError(source, [Fault("", "nested too deeply")]) from error
+
+
+def _loaded(text: str, keys_as_text: bool) -> Any:
+    if not keys_as_text:
+        with suppress(*UNREADABLE, yaml.YAMLError):  # read again for the message
+            return yaml.load(text, Loader=_FastLoader)  # noqa: S506 (a safe loader)
+    loader = _TextKeyLoader if keys_as_text else _CoreLoader
+    return yaml.load(text, Loader=loader)  # noqa: S506 (a safe loader)
+
+
+def _repeated(value: Any, sizes: dict[int, float]) -> float:
+    """Return how many values a document has that are given as aliases alone.
+
+    Args:
+        value: the document, or a part of it.
+        sizes: of the parts that were met, by identity.
+    """
+    items = value.values() if isinstance(value, dict) else value
+    if not isinstance(value, (dict, list)):
+        return 0.0
+    sizes[id(value)] = 1.0
+    repeated, size = 0.0, 1.0
+    for item in items:
+        if id(item) in sizes:
+            repeated += sizes[id(item)]
+        else:
+            repeated += _repeated(item, sizes)
+        size += sizes.get(id(item), 1.0)
+    sizes[id(value)] = size
+    return repeated
 
 
 class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
