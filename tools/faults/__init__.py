@@ -1,0 +1,1 @@
+"""Faults by the thousand: damaged files and plans, kills, hostile files, a long run."""
