@@ -12,11 +12,13 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, Self
 
-from mrmg import extensions
+from mrmg import extensions, storage
+from mrmg.errors import Fault, RunFolderError, UsageError
 from mrmg.runs import argument_values as values
 from mrmg.runs.options import Checked, option, options_of
 
 if TYPE_CHECKING:
+    from mrmg.runs.folder import RunFolder
     from mrmg.scene.types import Scene
 
 DISTURBANCE_HELP = (
@@ -260,6 +262,20 @@ class RunArguments(Checked):
         named = {keyword(name): value for name, value in data.items()}
         video = VideoArguments(**named.pop("video", {}))
         return RunArguments(**named, video=video)
+
+
+def recorded(folder: RunFolder) -> RunArguments:
+    """Return the arguments that the folder's results were made with.
+
+    Raises:
+        RunFolderError: if they are damaged, or of a later version.
+    """
+    try:
+        return RunArguments.from_json(folder.arguments())
+    except (*storage.UNREADABLE, UsageError) as error:
+        message = f"arguments that this version does not know ({error})"
+        fault = Fault("run.json", f"{message}; run 'mrmg run' into another folder")
+        raise RunFolderError(str(folder.path), [fault]) from error
 
 
 def keyword(name: str) -> str:

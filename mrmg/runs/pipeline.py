@@ -8,12 +8,18 @@ from typing import Any
 
 from mrmg.errors import ExitCode, UsageError
 from mrmg.plans import PlanStatus
-from mrmg.runs.arguments import DEFAULT_VIDEO, RunArguments, VideoArguments, keyword
+from mrmg.runs.arguments import (
+    DEFAULT_VIDEO,
+    RunArguments,
+    VideoArguments,
+    keyword,
+    recorded,
+)
 from mrmg.runs.drive import checked_drive
 from mrmg.runs.folder import RunFolder, Step
 from mrmg.runs.options import documented
 from mrmg.runs.replacing import require_room
-from mrmg.runs.steps import OnImprovement, Run, StepProgress, recorded
+from mrmg.runs.steps import OnImprovement, Run, StepProgress
 from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.loading import load_scene
 from mrmg.scene.loading.reading import require_faithful

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from mrmg.errors import FileError, UsageError
 from mrmg.plans import Plan, PlanStatus
-from mrmg.runs.arguments import RunArguments
+from mrmg.runs.arguments import RunArguments, recorded
 from mrmg.runs.folder import Step, stale_after
 from mrmg.runs.options import options_of
-from mrmg.runs.steps import Run, recorded
+from mrmg.runs.steps import Run
 from mrmg.studies.outcomes import ROBUSTNESS_FILE
 
 _COSTLY = {Step.PLAN: "plan", Step.EXECUTE: "drive", Step.RENDER: "video"}

@@ -12,11 +12,11 @@ import numpy as np
 from mrmg import storage
 from mrmg.errors import Fault, FileError, UsageError
 from mrmg.plans import Plan
-from mrmg.runs.arguments import RunArguments
+from mrmg.runs.arguments import RunArguments, recorded
 from mrmg.runs.capsule import CAPSULE_FILE, Capsule, Failure
 from mrmg.runs.folder import RunFolder, Step
 from mrmg.runs.replacing import require_room
-from mrmg.runs.steps import StepProgress, recorded, taken_up
+from mrmg.runs.steps import StepProgress, taken_up
 from mrmg.scene.loading import load_scene
 from mrmg.simulation.log import require_same_mission
 

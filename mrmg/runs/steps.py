@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrmg import storage
-from mrmg.errors import ExitCode, Fault, MrmgError, RunFolderError, UsageError
+from mrmg.errors import ExitCode, MrmgError, RunFolderError
 from mrmg.plans import Plan, PlanStatus, plan_in_force
-from mrmg.runs.arguments import RunArguments
+from mrmg.runs.arguments import RunArguments, recorded
 from mrmg.runs.code_digest import code_digest
 from mrmg.runs.drive import drive
 from mrmg.runs.folder import NEEDS, RunFolder, Step, stale_after
@@ -174,20 +174,6 @@ def taken_up(
         folder=folder,
         on_progress=on_progress,
     )
-
-
-def recorded(folder: RunFolder) -> RunArguments:
-    """Return the arguments that the folder's results were made with.
-
-    Raises:
-        RunFolderError: if they are damaged, or of a later version.
-    """
-    try:
-        return RunArguments.from_json(folder.arguments())
-    except (*storage.UNREADABLE, UsageError) as error:
-        message = f"arguments that this version does not know ({error})"
-        fault = Fault("run.json", f"{message}; run 'mrmg run' into another folder")
-        raise RunFolderError(str(folder.path), [fault]) from error
 
 
 _last_audit: dict[str, EnergyAudit] = {}
