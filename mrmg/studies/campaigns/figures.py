@@ -23,7 +23,7 @@ RESULTS = (
 )  # fmt: skip
 """Columns of a table after those of the factors."""
 
-PARTS = ("plan", "verify", "drive", "total")
+PARTS = ("compile", "plan", "verify", "drive", "total")
 """Parts of a trial whose times on the clock are kept, in a table of their own."""
 
 MEASURES = {

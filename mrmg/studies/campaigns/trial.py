@@ -97,7 +97,7 @@ def _made(source: SceneSource, order: TrialOrder) -> dict[str, Any]:
     arguments = order.arguments
     scene = arguments.scene(source.scene(arguments.seed, order.changes))
     require_drivable(scene.robots)
-    _compile_once(arguments)
+    compile_s = _compile_once(arguments)
     if order.with_run:
         return _made_by_run(scene, arguments)
     planned, plan_s = _planned(_Planning(scene, arguments))
@@ -111,8 +111,8 @@ def _made(source: SceneSource, order: TrialOrder) -> dict[str, Any]:
     account = audit(scene, driven.plan, driven.log, **arguments.deciding("audit"))
     result |= _of_drive(scene, planned.plan, verdict, driven, account)
     drive_s = time.perf_counter() - verified
-    times_s = {"plan": plan_s, "verify": verified - began, "drive": drive_s}
-    return {"result": result, "time_s": times_s}
+    parts_s = {"compile": compile_s, "plan": plan_s, "verify": verified - began}
+    return {"result": result, "time_s": {**parts_s, "drive": drive_s}}
 
 
 def _made_by_run(scene: Scene, arguments: RunArguments) -> dict[str, Any]:
@@ -208,18 +208,22 @@ def _planned(planning: _Planning) -> tuple[PlanResult, float]:
     return found, time.perf_counter() - began
 
 
-def _compile_once(arguments: RunArguments) -> None:
+def _compile_once(arguments: RunArguments) -> float:
     """Compile the planner where this machine does not hold it compiled.
 
     Workers with one cache compile once: the others wait for the one that does.
+
+    Returns:
+        How long that took [s].
     """
     from mrmg.compilation import cache_folder
     from mrmg.planning.preparation import compile_kernels
 
+    began = time.perf_counter()
     planner = planner_params(arguments).planner
     with suppress(OSError):
         cache_folder().mkdir(parents=True, exist_ok=True)
-    if not cache_folder().is_dir():
-        return
-    with locked(cache_folder(), wait=True):
-        compile_kernels(planner)
+    if cache_folder().is_dir():
+        with locked(cache_folder(), wait=True):
+            compile_kernels(planner)
+    return time.perf_counter() - began
