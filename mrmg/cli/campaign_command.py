@@ -5,20 +5,21 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from mrmg.cli import terminal
 from mrmg.cli.run_options import add_trust, reader
 from mrmg.errors import ExitCode
 from mrmg.runs import argument_values as values
 
-if TYPE_CHECKING:
-    from mrmg.studies.trials import OnTrial
-
 _LINE_EVERY_S = 10.0
-"""How often progress is printed where there is no terminal."""
+"""How often progress is printed where there is no terminal [s]."""
+
+_MOST_LEVELS = 12
+"""Values of a factor that are listed; the page and the table have all."""
 
 
 def add_campaign(verbs: Any) -> None:
@@ -77,7 +78,7 @@ def campaign(options: argparse.Namespace) -> int:
         options.file, trust_code=options.trust_code, with_runs=options.runs
     )
     folder = options.out or Path("campaigns") / found.name
-    counts = [0, len(found.trials)]
+    report = _Progress(len(found.trials))
     try:
         with terminal.progress_of("trials") as on_progress:
             figures = run_campaign(
@@ -85,45 +86,78 @@ def campaign(options: argparse.Namespace) -> int:
                 folder,
                 engine=engine,
                 parquet=options.parquet,
-                on_trial=_reporter(on_progress, counts),
+                on_trial=partial(report, on_progress),
             )
     except KeyboardInterrupt:
-        print(
-            f"mrmg: {counts[0]} of {counts[1]} trials are kept in {folder}",
-            file=sys.stderr,
-        )
+        print(report.kept(folder), file=sys.stderr)
         raise
     if options.json:
         terminal.print_json(figures)
-        return ExitCode.OK
-    print(_outcome(figures))
-    print(f"  table      {folder / 'trials.csv'}")
-    print(f"  page       {folder / 'summary.html'}")
+    else:
+        print("\n".join([*_lines(figures), *_places(folder, options.parquet)]))
     return ExitCode.OK
 
 
-def _reporter(
-    report: Callable[[float, str], None] | None, counts: list[int]
-) -> OnTrial:
-    """Return a callback that shows progress, and notes how many trials are done."""
-    last = time.monotonic()
-    first = 0
+class _Progress:
+    """Shows how far a campaign has got, and notes it for the end."""
 
-    def on_trial(done: int, trials: int, feasible: int) -> None:
-        nonlocal last, first
-        now = time.monotonic()
-        counts[:] = done, trials
+    def __init__(self, trials: int) -> None:
+        self._done, self._trials = 0, trials
+        self._printed = time.monotonic()
+
+    def __call__(
+        self,
+        report: Callable[[float, str], None] | None,
+        done: int,
+        trials: int,
+        feasible: int,
+        left_s: float | None,
+    ) -> None:
+        """Show that one more trial is done; on a line now and then, off a terminal."""
+        self._done = done
         text = f"{done} of {trials} trials, {feasible} feasible"
+        if left_s:
+            text += f", {terminal.about(left_s)} left"
         if report is not None:
             report(done / trials, text)
-        elif now - last > _LINE_EVERY_S or done == trials:
-            last = now
+            return
+        now = time.monotonic()
+        if left_s is not None and now - self._printed > _LINE_EVERY_S:
+            self._printed = now
             print(f"mrmg: {text}", file=sys.stderr)
 
-    return on_trial
+    def kept(self, folder: Path) -> str:
+        """Return what a user may want to know of a campaign that was stopped."""
+        return (
+            f"mrmg: {self._done} of {self._trials} trials are done and kept in {folder}"
+        )
 
 
-def _outcome(figures: dict[str, Any]) -> str:
-    return (
-        f"{figures['campaign']}: {figures['feasible']} of {figures['trials']} feasible"
-    )
+def _lines(figures: dict[str, Any]) -> Iterator[str]:
+    yield f"{figures['campaign']}: {_share(figures)}"
+    for cause, count in figures["failures"].items():
+        yield f"  failed     {count} x {cause}"
+    for factor, levels in figures["by"].items():
+        if 1 < len(levels) <= _MOST_LEVELS:
+            yield from (
+                f"  {factor:<10} {level['value']}: {_share(level)}" for level in levels
+            )
+
+
+def _share(figures: dict[str, Any]) -> str:
+    counted = figures["trials"] - figures["refused"] - figures["errors"]
+    text = f"{figures['feasible']} of {counted} trials feasible"
+    if counted:
+        low, high = figures["interval"]
+        text += f" ({figures['share']:.1%}, 95 % interval {low:.1%} to {high:.1%})"
+    if figures["refused"]:
+        text += f"; {figures['refused']} more refused, see their reasons in the table"
+    if figures["errors"]:
+        text += f"; {figures['errors']} more broke down, the same command tries again"
+    return text
+
+
+def _places(folder: Path, parquet: bool) -> list[str]:
+    names = [("table", "trials.csv"), ("page", "summary.html")]
+    names[1:1] = [("", "trials.parquet")] if parquet else []
+    return [f"  {what:<10} {folder / name}" for what, name in names]

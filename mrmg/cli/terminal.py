@@ -171,6 +171,15 @@ def print_table(rows: Sequence[Sequence[str]]) -> None:
         print("  ".join(cells).rstrip())
 
 
+def about(duration_s: float) -> str:
+    """Return a duration that is not known exactly, in words."""
+    units = (("h", 3600.0), ("min", 60.0), ("s", 1.0))
+    name, unit_s = next(
+        (each for each in units if duration_s >= 2.0 * each[1]), units[2]
+    )
+    return f"about {duration_s / unit_s:.0f} {name}"
+
+
 def because(outcome: str, reasons: Sequence[str]) -> list[str]:
     """Return lines of an outcome: its first reason in the first one, others below."""
     first = ": ".join([outcome, *reasons[:1]])

@@ -1,8 +1,8 @@
 """The one door to other processes and machines: who makes trials.
 
-`local` makes them in this process, or by joblib in processes of this machine; `dask`
-has the workers of a Dask cluster make them. Calls and their arguments are sent to
-workers, results are sent back, and only this process writes to the study's folder: a
+`local` makes them in this process, or by loky, which comes with joblib, in processes of
+this machine; `dask` has the workers of a Dask cluster make them. Calls and their
+arguments are sent to workers, results are sent back, and only this process writes to the study's folder: a
 worker needs no file of it, nor the same home.
 """
 
@@ -11,7 +11,7 @@ from __future__ import annotations
 import logging
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import CancelledError
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass
@@ -89,34 +89,36 @@ class Engine:
         call: Callable[[Shared, Item], Result],
         jobs: Sequence[tuple[Shared, Item]],
     ) -> Iterator[tuple[int, Result]]:
-        from joblib import Parallel, delayed, parallel_config
-        from joblib.externals.loky import get_reusable_executor
+        from joblib.externals.loky import ProcessPoolExecutor
 
-        count = min(self.workers or 1, len(jobs))
-        # joblib warns where it replaces a process that has come to hold much memory.
+        # loky warns where it replaces a process that has come to hold much memory.
         warnings.filterwarnings("ignore", "A worker stopped while some jobs")
+        pool = ProcessPoolExecutor(
+            min(self.workers or 1, len(jobs)), initializer=end_with_parent
+        )
+        waiting = enumerate(jobs)
+
+        def submitted(count: int) -> set[Future[tuple[int, Result]]]:
+            return {
+                pool.submit(_numbered, call, number, job)
+                for number, job in islice(waiting, count)
+            }
+
         try:
-            with (
-                parallel_config("loky", initializer=end_with_parent),
-                sheltered_children(),
-            ):
-                made = Parallel(
-                    count,
-                    return_as="generator_unordered",
-                    batch_size=1,
-                    pre_dispatch=2 * count,
-                    max_nbytes=None,
-                )(delayed(_numbered)(call, *job) for job in enumerate(jobs))
-            yield from made
+            with sheltered_children():
+                running = submitted(2 * (self.workers or 1))
+            while running:
+                done, running = wait(running, return_when=FIRST_COMPLETED)
+                running |= submitted(len(done))
+                for future in done:
+                    yield future.result()
         except BrokenProcessPool as error:
             raise MachineError(
                 f"a worker process was killed (out of memory?); {_GO_ON}, fewer "
                 "--workers need less memory"
             ) from error
         finally:
-            get_reusable_executor(max_workers=count, reuse=True).shutdown(
-                kill_workers=True
-            )
+            pool.shutdown(kill_workers=True)
 
     def _by_dask(
         self,

@@ -6,6 +6,7 @@ ended that had it made. Files are put in their place by renaming.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,8 +41,8 @@ def completed_trials(
     *,
     check: Callable[[Job, Any], object],
     keep: Callable[[Job, Any], Any] = lambda job, made: made,
-) -> Iterator[tuple[int, Any]]:
-    """Yield all trials by their place: those of earlier commands, then others as made.
+) -> Iterator[tuple[int, Any, float | None]]:
+    """Yield all trials: those of earlier commands, then others as they are made.
 
     Args:
         jobs: all trials.
@@ -50,6 +51,10 @@ def completed_trials(
         check: raises one of `storage.UNREADABLE` where the content of a trial's
             file is not good, and the trial is to be made anew.
         keep: returns the content of the file from what `call` returned, as JSON data.
+
+    Yields:
+        place in `jobs`, content of its file, and an estimate of the time that the
+        trials still missing take [s]; None before any was made.
     """
     missing = []
     for number, job in enumerate(jobs):
@@ -59,10 +64,12 @@ def completed_trials(
         except storage.UNREADABLE:
             missing.append(number)
         else:
-            yield number, content
+            yield number, content, None
     wanted = [(jobs[number].shared, jobs[number].item) for number in missing]
-    for place, made in engine.results(call, wanted):
+    began = time.monotonic()
+    for count, (place, made) in enumerate(engine.results(call, wanted), start=1):
         job = jobs[missing[place]]
         content = keep(job, made)
         storage.write_json(job.path, content)
-        yield missing[place], content
+        each_s = (time.monotonic() - began) / count
+        yield missing[place], content, each_s * (len(missing) - count)

@@ -6,7 +6,7 @@ import csv
 import io
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,10 @@ from mrmg.studies.campaigns.figures import campaign_figures, table_row, times_ro
 from mrmg.studies.campaigns.reading import Campaign
 from mrmg.studies.campaigns.trial import ERROR, make_trial
 from mrmg.studies.engine import Engine
-from mrmg.studies.trials import Job, OnTrial, completed_trials
+from mrmg.studies.trials import Job, completed_trials
+
+OnCampaignTrial = Callable[[int, int, int, float | None], None]
+"""Called with (trials done, trials in all, feasible ones, time left [s] or None)."""
 
 TRIAL_FORMAT = 1
 
@@ -36,7 +39,7 @@ def run_campaign(
     *,
     engine: Engine | None = None,
     parquet: bool = False,
-    on_trial: OnTrial | None = None,
+    on_trial: OnCampaignTrial | None = None,
 ) -> dict[str, Any]:
     """Make what is missing of a campaign, and its tables and summary page.
 
@@ -81,7 +84,7 @@ def run_campaign(
 
 
 def _all_made(
-    campaign: Campaign, folder: Path, engine: Engine, on_trial: OnTrial | None
+    campaign: Campaign, folder: Path, engine: Engine, on_trial: OnCampaignTrial | None
 ) -> list[dict[str, Any]]:
     """Return the content of the files of all trials, in their order."""
     trials = {trial.key: trial for trial in campaign.trials}
@@ -108,13 +111,13 @@ def _all_made(
 
     found: dict[str, dict[str, Any]] = {}
     feasible = 0
-    for number, content in completed_trials(
+    for number, content, left_s in completed_trials(
         jobs, make_trial, engine, check=check, keep=keep
     ):
         found[jobs[number].path.stem] = content
         feasible += content["result"]["feasible"]
         if on_trial is not None:
-            on_trial(len(found), len(jobs), feasible)
+            on_trial(len(found), len(jobs), feasible, left_s)
     return [found[trial.key] for trial in campaign.trials]
 
 

@@ -68,7 +68,7 @@ def study_robustness(
         for number in range(seed, seed + trials)
     ]
     done: dict[int, Trial] = {}
-    for number, content in completed_trials(
+    for number, content, _ in completed_trials(
         jobs, make_trial, Engine(workers=workers), check=_read
     ):
         done[number] = Trial.from_json(content)

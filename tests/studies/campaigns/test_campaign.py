@@ -50,7 +50,7 @@ def test_the_table_has_a_row_for_each_trial(made: Path, campaign: Campaign) -> N
 def test_a_stopped_campaign_is_taken_up(
     campaign: Campaign, made: Path, tmp_path: Path
 ) -> None:
-    def stop(done: int, trials: int, feasible: int) -> None:
+    def stop(done: int, trials: int, feasible: int, left_s: float | None) -> None:
         if done == 3:
             raise KeyboardInterrupt
 
@@ -60,10 +60,11 @@ def test_a_stopped_campaign_is_taken_up(
     kept = sorted((tmp_path / "trials").iterdir())
     assert len(kept) == 3
     before = [path.stat().st_mtime_ns for path in kept]
-    output: list[tuple[int, int, int]] = []
+    output: list[tuple[int, int, int, float | None]] = []
     run_campaign(campaign, tmp_path, on_trial=lambda *now: output.append(now))
     assert [path.stat().st_mtime_ns for path in kept] == before
-    assert output == [(1, 4, 1), (2, 4, 2), (3, 4, 2), (4, 4, 2)]
+    kept_before = [(1, 4, 1, None), (2, 4, 2, None), (3, 4, 2, None)]
+    assert output == [*kept_before, (4, 4, 2, 0.0)]
     table = (tmp_path / "trials.csv").read_bytes()
     assert table == (made / "trials.csv").read_bytes()
 
