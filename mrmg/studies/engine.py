@@ -2,8 +2,8 @@
 
 `local` makes them in this process, or by loky, which comes with joblib, in processes of
 this machine; `dask` has the workers of a Dask cluster make them. Calls and their
-arguments are sent to workers, results are sent back, and only this process writes to the study's folder: a
-worker needs no file of it, nor the same home.
+arguments are sent to workers, results are sent back, and only this process writes to
+the study's folder: a worker needs no file of it, nor the same home.
 """
 
 from __future__ import annotations

@@ -26,15 +26,8 @@ RESULTS = (
 PARTS = ("compile", "plan", "verify", "drive", "total")
 """Parts of a trial whose times on the clock are kept, in a table of their own."""
 
-MEASURES = {
-    "cost_J": "planned energy",
-    "measured_J": "measured energy",
-    "makespan_s": "planned makespan",
-    "duration_s": "driven time",
-    "plan_s": "time to plan",
-    "total_s": "time of the trial",
-}
-"""Figures whose medians and quartiles are given, with what pages call them."""
+MEASURES = ("cost_J", "measured_J", "makespan_s", "duration_s", "plan_s", "total_s")
+"""Figures whose medians and quartiles are given; the last two are on the clock."""
 
 _QUANTILES = {"min": 0.0, "p25": 0.25, "median": 0.5, "p75": 0.75, "max": 1.0}
 
@@ -64,13 +57,37 @@ def campaign_figures(
         times: of `times_row`.
     """
     merged = [{**row, **time} for row, time in zip(rows, times, strict=True)]
-    by: dict[str, list[dict[str, Any]]] = {}
-    for factor in factors[0]:
-        levels: dict[Any, list[Row]] = {}
-        for own, row in zip(factors, merged, strict=True):
-            levels.setdefault(own[factor], []).append(row)
-        by[factor] = [{"value": at, **_of(own)} for at, own in levels.items()]
+    by = {factor: _by_value(factor, factors, merged) for factor in factors[0]}
     return {"campaign": name, "confidence": CONFIDENCE, **_of(merged), "by": by}
+
+
+def _by_value(
+    factor: str, factors: Sequence[Row], rows: Sequence[Row]
+) -> list[dict[str, Any]]:
+    """Return the figures of the trials with each value of a factor."""
+    levels: dict[Any, dict[str, Row]] = {}
+    for own, row in zip(factors, rows, strict=True):
+        others = str({name: value for name, value in own.items() if name != factor})
+        levels.setdefault(own[factor], {})[others] = row
+    first = next(iter(levels.values()))
+    return [
+        {"value": value, **_of([*own.values()]), "cost_to_first": _ratio(own, first)}
+        for value, own in levels.items()
+    ]
+
+
+def _ratio(own: Mapping[str, Row], first: Mapping[str, Row]) -> dict[str, Any] | None:
+    """Return the median ratio of planned energy in trials equal in all other factors.
+
+    Args:
+        own: trials with one value, by the other factors.
+        first: those with the factor's first value.
+    """
+    pairs = [(row["cost_J"], first[others]["cost_J"]) for others, row in own.items()]
+    ratios = [cost_J / first_J for cost_J, first_J in pairs if cost_J and first_J]
+    if not ratios:
+        return None
+    return {"median": float(np.median(ratios)), "pairs": len(ratios)}
 
 
 def _of(rows: Sequence[Row]) -> dict[str, Any]:
