@@ -135,6 +135,8 @@ class _Progress:
 
 def _lines(figures: dict[str, Any]) -> Iterator[str]:
     yield f"{figures['campaign']}: {_share(figures)}"
+    if figures["refused"] or figures["errors"]:
+        yield "  reasons    of trials that are refused or broke down are in the table"
     for cause, count in figures["failures"].items():
         yield f"  failed     {count} x {cause}"
     for factor, levels in figures["by"].items():
@@ -151,9 +153,9 @@ def _share(figures: dict[str, Any]) -> str:
         low, high = figures["interval"]
         text += f" ({figures['share']:.1%}, 95 % interval {low:.1%} to {high:.1%})"
     if figures["refused"]:
-        text += f"; {figures['refused']} more refused, see their reasons in the table"
+        text += f"; {figures['refused']} more refused"
     if figures["errors"]:
-        text += f"; {figures['errors']} more broke down, the same command tries again"
+        text += f"; {figures['errors']} more broke down; the same command tries again"
     return text
 
 

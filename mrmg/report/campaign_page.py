@@ -14,6 +14,15 @@ _MOST_LEVELS = 30
 
 _plots = macros("campaign.html.jinja")
 
+_NOTE = (
+    "Plots show medians, quartiles and extremes of the trials that have the figure; "
+    "energy to first is the median ratio to the trials with the first value that are "
+    "equal in all other factors, and in brackets their number. Shares have Wilson "
+    "intervals of {confidence:.0%}; refused trials, which are combinations that are not "
+    "allowed, do not count. trials.csv has every trial, times.csv their times on the "
+    "clock, which depend on the machines, and summary.json all figures here."
+)
+
 Figures = Mapping[str, Any]
 
 
@@ -37,19 +46,16 @@ _MEASURES = (
     _Measure("makespan_s", "Planned makespan", "s", 1.0, 1),
     _Measure("duration_s", "Driven time", "s", 1.0, 1),
     _Measure("plan_s", "Time to plan", "s", 1.0, 2),
-    _Measure("total_s", "Time of a trial", "s", 1.0, 2),
 )
 
 
 def campaign_html(figures: Figures) -> str:
     """Return the page of the content of a campaign's `summary.json`."""
     title = f"Campaign {figures['campaign']}"
-    varied = {name: own for name, own in figures["by"].items() if len(own) > 1}
-    fixed = [
-        f"{name} {own[0]['value']}"
-        for name, own in figures["by"].items()
-        if name not in varied
-    ]
+    by = figures["by"]
+    varied = {name: own for name, own in by.items() if len(own) > 1}
+    same = [f"{name} {own[0]['value']}" for name, own in by.items() if len(own) == 1]
+    everything = [{"value": "all", **figures}]
     return page(
         title,
         [
@@ -57,15 +63,10 @@ def campaign_html(figures: Figures) -> str:
             html.tiles(_tiles(figures)),
             html.section(
                 "All trials",
-                _table("", [{"value": "all", **figures}]),
-                html.note(f"The same in all trials: {', '.join(fixed)}."),
-                html.note(
-                    "Medians are of the trials that have the figure. Shares have "
-                    f"Wilson intervals of {figures['confidence']:.0%}; refused trials, "
-                    "which are combinations that are not allowed, do not count. "
-                    "trials.csv has every trial, times.csv their times on the clock, "
-                    "which depend on the machines, and summary.json all figures here."
-                ),
+                _table("", everything),
+                _all_plots(everything),
+                html.note(f"The same in all: {', '.join(same)}.") if same else "",
+                html.note(_NOTE.format(**figures)),
             ),
             *(_by_factor(name, own) for name, own in varied.items()),
         ],
@@ -101,21 +102,20 @@ def _by_factor(name: str, levels: Sequence[Figures]) -> str:
         rest = html.note(
             f"The first {len(shown)} of {len(levels)} values; summary.json has all."
         )
+    return html.section(f"By {name}", _table(name, shown), rest, _all_plots(shown))
+
+
+def _all_plots(levels: Sequence[Figures]) -> str:
     shares = [
         (
             level["value"],
             _percent(level["share"]),
             *((None,) * 5 if level["share"] is None else _share_places(level)),
         )
-        for level in shown
+        for level in levels
     ]
     share = _plots.ranges("Share feasible", shares, ("0 %", "100 %"))
-    measured = [_plot(measure, shown) for measure in _MEASURES]
-    return str(
-        html.section(
-            f"By {name}", _table(name, shown), rest, _plots.plots(share, *measured)
-        )
-    )
+    return _plots.plots(share, *(_plot(measure, levels) for measure in _MEASURES))
 
 
 def _share_places(level: Figures) -> tuple[float | None, ...]:
@@ -141,21 +141,17 @@ def _plot(measure: _Measure, levels: Sequence[Figures]) -> str:
         ]
         rows.append((level["value"], text, *places))
     ends = (measure.text(low), measure.text(low + span))
-    return str(_plots.ranges(f"{measure.title}: median, quartiles, range", rows, ends))
+    return _plots.ranges(measure.title, rows, ends)
 
 
 def _table(name: str, levels: Sequence[Figures]) -> str:
     head = [name, "Trials", "Feasible", "Share", "Interval"]
-    head += [f"{measure.title} [{measure.unit}]" for measure in _MEASURES]
     relative = any(level.get("cost_to_first") for level in levels)
-    head += ["Energy to first"] * relative + ["Failures"]
+    head += [*["Planned energy to first"] * relative, "Failures"]
     rows = []
     for level in levels:
         cells = [str(level["value"]), str(level["trials"]), str(level["feasible"])]
         cells += [_percent(level["share"]), _interval(level)]
-        for measure in _MEASURES:
-            own = level[measure.key]
-            cells.append(measure.text(own["median"]).split()[0] if own else "–")
         if relative:
             ratio = level.get("cost_to_first")
             cells.append(f"{ratio['median']:.4f} ({ratio['pairs']})" if ratio else "–")
@@ -164,7 +160,7 @@ def _table(name: str, levels: Sequence[Figures]) -> str:
             f"{key} {level[key]}" for key in ("refused", "errors") if level[key]
         ]
         rows.append([*cells, ", ".join(failures) or "none"])
-    return str(html.table(head, rows, text_columns=(0, len(head) - 1)))
+    return html.table(head, rows, text_columns=(0, len(head) - 1))
 
 
 def _percent(share: float | None) -> str:
