@@ -18,8 +18,8 @@ _NOTE = (
     "Plots show medians, quartiles and extremes of the trials that have the figure; "
     "energy to first is the median ratio to the trials with the first value that are "
     "equal in all other factors, and in brackets their number. Shares have Wilson "
-    "intervals of {confidence:.0%}; refused trials, combinations that are not allowed, do "
-    "not count. trials.csv has every trial, times.csv their times on the "
+    "intervals of {confidence:.0%}; refused trials, combinations that are not allowed, "
+    "do not count. trials.csv has every trial, times.csv their times on the "
     "clock, which depend on the machines, and summary.json all figures here."
 )
 
