@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -129,6 +129,25 @@ class Visit:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class NarrowPassage:
+    """A stretch of a robot's motion on which it keeps less than its margin.
+
+    Attributes:
+        robot: id of the robot.
+        start_s, end_s: when it begins and ends.
+        x_m, y_m: the robot's reference point where the margin is smallest.
+        margin_m: distance kept from obstacles at the time steps in between.
+    """
+
+    robot: str
+    start_s: float
+    end_s: float
+    x_m: float
+    y_m: float
+    margin_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Plan:
     """A solved mission; all trajectories have the same number of steps.
 
@@ -137,6 +156,10 @@ class Plan:
         seed, profile, parameters_digest, versions: how it was made; versions include
             those of packages that added planner or router.
         planner, router: names of what made it; "" in plans of older versions.
+        margins: distances from obstacles and from other robots that each robot keeps at
+            the time steps [m]; empty in plans of older versions.
+        narrow: where only a smaller margin from obstacles opened a passage.
+        skipped: goals that are proven out of reach and left out, with their proofs.
         dt_s: step length of all trajectories.
         trajectories: one per robot, in the scene's order.
         tours: targets of each robot in the order of its visits.
@@ -164,6 +187,9 @@ class Plan:
     rolling_factor: Mapping[str, np.ndarray] = field(default_factory=dict)
     planner: str = ""
     router: str = ""
+    margins: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    narrow: tuple[NarrowPassage, ...] = ()
+    skipped: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def cost_J(self) -> float:
@@ -203,8 +229,16 @@ class Plan:
         storage.write_arrays(folder / f"{name}.npz", arrays)
         # Not part of the digest: the scene decides it, and older plans lack it.
         motions = {each.robot: each.motion for each in self.trajectories}
-        header = {**self._header(), "motions": motions}
+        header = {**self._header(), "motions": motions, **self._kept()}
         storage.write_json(folder / f"{name}.json", header)
+
+    def _kept(self) -> dict[str, Any]:
+        kept = {
+            robot: {"obstacle": obstacle_m, "robot": robot_m}
+            for robot, (obstacle_m, robot_m) in self.margins.items()
+        }
+        narrow = [asdict(each) for each in self.narrow]
+        return {"margins": kept, "narrow": narrow, "skipped": dict(self.skipped)}
 
     def _makers(self) -> dict[str, str]:
         return {"planner": self.planner, "router": self.router}
@@ -287,6 +321,12 @@ def _plan_from(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Plan:
         router=header.get("router", ""),
         content_J=_by_robot(arrays, _CONTENT),
         rolling_factor=_by_robot(arrays, _FACTOR),
+        margins={
+            robot: (kept["obstacle"], kept["robot"])
+            for robot, kept in header.get("margins", {}).items()
+        },
+        narrow=tuple(NarrowPassage(**each) for each in header.get("narrow", ())),
+        skipped=header.get("skipped", {}),
     )
 
 

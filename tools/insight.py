@@ -56,7 +56,7 @@ def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
         world,
         samples=params.samples,
         neighbours=params.neighbours,
-        margin_m=params.obstacle_margin_m,
+        margins=params.margins,
         rng=seeding.stream(seed, "roadmap", 0),
     )
     problem = state_problem(scene, world, roadmap, params)

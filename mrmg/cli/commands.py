@@ -86,11 +86,13 @@ def plan(options: argparse.Namespace) -> int:
         text += f"\n  {terminal.quality(outcome['statistics']['improvements'][-1])}"
         if "iteration_cap" in outcome["statistics"]:
             text += f"\n  {terminal.iterations(outcome['statistics'])}"
+    skipped = outcome.get("skipped", {})
+    text += "".join(f"\n  left out {goal}: {why}" for goal, why in skipped.items())
     text += "".join(f"\n  hint: {hint}" for hint in outcome.get("hints", ()))
     text += f"\n  in {folder.path}"
     text += "; planned before, --overwrite plans again" if kept else ""
     _print(options, outcome, text)
-    return work.status().exit_code
+    return ExitCode.MISSION_FAILED if skipped else work.status().exit_code
 
 
 def verify(options: argparse.Namespace) -> int:
@@ -101,6 +103,7 @@ def verify(options: argparse.Namespace) -> int:
     verdict = work.folder.read_json("verdict.json", remedy="mrmg verify")
     found = [violation["message"] for violation in verdict["violations"]]
     lines = terminal.because("valid" if verdict["ok"] else "not valid", found)
+    lines += [f"  {goal} is left out" for goal in verdict["skipped"]]
     _print(options, verdict, "\n".join(lines))
     return ExitCode.OK if verdict["ok"] else ExitCode.MISSION_FAILED
 

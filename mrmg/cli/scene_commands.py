@@ -131,7 +131,7 @@ def roadmap(options: argparse.Namespace) -> int:
         World.from_scene(scene),
         samples=params.samples,
         neighbours=params.neighbours,
-        margin_m=params.obstacle_margin_m,
+        margins=params.margins,
         rng=seeding.stream(options.seed, "roadmap", 0),
     ).graph()
     out = options.out or Path(f"{scene.name}.graphml")

@@ -126,7 +126,7 @@ def audit(
     )
     least_J = {item.motion.robot: item.least_J for item in measured}
     failures = {
-        **mission_failures(scene, log, goals_visited, least_J),
+        **mission_failures(scene, log, goals_visited, least_J, plan.skipped),
         **_energy_failures(scene, plan, log, robots, energy_tolerance_pct),
     }
     reasons = tuple(reason for found in failures.values() for reason in found)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from mrmg.simulation.log import ExecutionLog
 
 AT_REST = 0.02
 """Speed below which a simulated robot is at rest [m/s], and rate of turning [rad/s]."""
+
+GOAL_SKIPPED = "goal skipped"
+"""Cause of the failure of a mission whose plan leaves goals out."""
 
 _TROUBLE = {
     "lost": "a robot was too far from its plan",
@@ -28,6 +31,7 @@ def mission_failures(
     log: ExecutionLog,
     goals_visited: tuple[str, ...],
     least_J: Mapping[str, float],
+    skipped: Mapping[str, str],
 ) -> dict[str, list[str]]:
     """Return one sentence for each failure by its cause, as `EnergyAudit` has them.
 
@@ -36,11 +40,16 @@ def mission_failures(
         log: what was driven.
         goals_visited: ids of the goals that some robot visited.
         least_J: least measured content of each robot's battery.
+        skipped: goals that the plan leaves out, with the proofs that no plan serves
+            them.
     """
     return {
         log.gave_up or "unfinished": _unfinished(log),
         "ended": _given_up(log, missed=len(goals_visited) < len(scene.goals)),
-        "goal missed": _goals_missed(scene, goals_visited),
+        "goal missed": _goals_missed(scene, {*goals_visited, *skipped}),
+        GOAL_SKIPPED: [
+            f"goal {goal} was left out: {proof}" for goal, proof in skipped.items()
+        ],
         "contact": _contacts(log),
         "station shared": _crowded(scene, log),
         "late": _late(scene, log),
@@ -65,7 +74,7 @@ def _given_up(log: ExecutionLog, *, missed: bool) -> list[str]:
     ]
 
 
-def _goals_missed(scene: Scene, visited: tuple[str, ...]) -> list[str]:
+def _goals_missed(scene: Scene, visited: Set[str]) -> list[str]:
     return [
         f"goal {goal.id} was visited by no robot"
         for goal in scene.goals

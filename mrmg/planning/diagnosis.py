@@ -183,7 +183,7 @@ def _obstacle(
     unjoined = unjoined_goals(scene, roadmap) + _unjoined_finishes(scene, roadmap)
     if unjoined:
         return endings.NO_PATH.reason(
-            places=listed(unjoined), margin_m=params.obstacle_margin_m
+            places=listed(unjoined), margin_m=params.obstacle_margin_m or 0.25
         )
     if not search.tours_found:
         return _missing_tours(problem, params, seed)

@@ -33,6 +33,7 @@ def hints_on(scene: Scene, plan: Plan, gap: float | None) -> Iterator[str]:
             wish = "a larger weight of the makespan shares the work among more robots"
         visit = "visits" if len(unused) == 1 else "visit"
         yield f"{listed(unused)} {visit} no goal, as that takes less energy; {wish}"
+    yield from _on_narrow_passages(plan)
     if gap is None or gap <= LARGE_GAP:
         return
     if len(goals) > MOST_GOALS:
@@ -52,3 +53,21 @@ def hints_on(scene: Scene, plan: Plan, gap: float | None) -> Iterator[str]:
             "robots drive at top speed and turn in no time, while plans use "
             f"{share:.0%} of it"
         )
+
+
+def _on_narrow_passages(plan: Plan) -> Iterator[str]:
+    """Yield where robots keep less than their margins, and how much they keep."""
+    for robot in plan.margins:
+        own = [passage for passage in plan.narrow if passage.robot == robot]
+        if own:
+            places = listed(
+                [
+                    f"{one.margin_m:.3f} m near ({one.x_m:.1f}, {one.y_m:.1f}) at "
+                    f"{one.start_s:.1f}-{one.end_s:.1f} s"
+                    for one in own
+                ]
+            )
+            yield (
+                f"{robot} keeps less than its margin of {plan.margins[robot][0]:g} m "
+                f"from obstacles where no wider way leads on: {places}"
+            )

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field, replace
 from mrmg import extensions, storage
 from mrmg.errors import UsageError
 from mrmg.planning.routing.routing import RouterParams
+from mrmg.scene.margins import STATES_NONE, Margins
 
 PROFILES = ("default", "paper")
 
@@ -100,11 +101,12 @@ class PlannerParams:
             tenth, a robot that uses all it may on one charge can take 12 % more.
         refinements: times that the plan of each tree is smoothed and driven again,
             as long as that saves energy.
-        obstacle_margin_m: distance kept from obstacles at the time steps [m]. Between
-            two steps of 0.1 s no corner of the car moves more than 0.16 m from both
-            ends, so the default also keeps the motion in between clear, and leaves room
-            for tracking errors.
-        robot_margin_m: distance kept between robots at the time steps [m].
+        obstacle_margin_m: distance kept from obstacles at the time steps [m], by every
+            robot; None for each robot's own (`kept_margins`). Between two steps
+            of 0.1 s no corner of the car moves more than 0.16 m from both ends, so its
+            default also keeps the motion in between clear, and leaves room for
+            tracking errors.
+        robot_margin_m: distance kept between robots at the time steps [m], likewise.
         route_margin: surcharge on roadmap energies in routing, for what the roadmap
             does
             not see: turns, corrections, speed changes.
@@ -124,8 +126,8 @@ class PlannerParams:
     follow_paths: bool = True
     soc_margin: float = 0.1
     refinements: int = 2
-    obstacle_margin_m: float = 0.25
-    robot_margin_m: float = 0.5
+    obstacle_margin_m: float | None = None
+    robot_margin_m: float | None = None
     route_margin: float = 0.08
     budget_s: float | None = None
 
@@ -139,8 +141,8 @@ class PlannerParams:
             "improvements": self.improvements >= 0,
             "refinements": self.refinements >= 0,
             "soc_margin": 0.0 <= self.soc_margin < 1.0,
-            "obstacle_margin_m": 0.0 <= self.obstacle_margin_m <= 1.0,
-            "robot_margin_m": 0.0 <= self.robot_margin_m <= 2.0,
+            "obstacle_margin_m": 0.0 <= (self.obstacle_margin_m or 0.0) <= 1.0,
+            "robot_margin_m": 0.0 <= (self.robot_margin_m or 0.0) <= 2.0,
             "route_margin": 0.0 <= self.route_margin <= 1.0,
             "budget_s": self.budget_s is None or self.budget_s > 0.0,
         }
@@ -156,6 +158,18 @@ class PlannerParams:
                 f"profile paper is planner {GUIDED_TREE} with router nrpa; leave the "
                 f"profile out to plan with {self.planner}"
             )
+
+    @property
+    def margins(self) -> Margins:
+        """The margins that are stated for every robot."""
+        return Margins(obstacle_m=self.obstacle_margin_m, robot_m=self.robot_margin_m)
+
+    def with_margins(self, margins: Margins) -> PlannerParams:
+        """Return the parameters with margins for every robot, as far as stated."""
+        stated = margins.over(self.margins)
+        return replace(
+            self, obstacle_margin_m=stated.obstacle_m, robot_margin_m=stated.robot_m
+        )
 
     @property
     def digest(self) -> str:
@@ -178,6 +192,7 @@ def profile_params(
     budget_s: float | None = None,
     trees: int | None = None,
     soc_margin: float | None = None,
+    margins: Margins = STATES_NONE,
 ) -> PlannerParams:
     """Return the parameters of a profile.
 
@@ -189,6 +204,7 @@ def profile_params(
         trees: number of trees to grow, all of them; None for the profile's.
         soc_margin: share of every battery's capacity that plans leave above the reserve
             where they can; None for the profile's.
+        margins: distances that every robot keeps, in place of its own.
 
     Raises:
         UsageError: if a name is unknown, names contradict each other, or a number is
@@ -206,7 +222,7 @@ def profile_params(
         params = replace(params, planner=planner)
     if router is not None:
         params = replace(params, router=replace(params.router, method=router))
-    params = replace(params, budget_s=budget_s)
+    params = replace(params, budget_s=budget_s).with_margins(margins)
     if params.refinements and (budget_s is not None or trees is not None):
         params = replace(params, refinements=THOROUGH)
     if soc_margin is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -21,6 +21,7 @@ from mrmg.planning.diagnosis import Proofs, why_in_short, why_no_plan, why_no_ro
 from mrmg.planning.feasibility import require_robots
 from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.hints import INTERRUPTED, hints_on
+from mrmg.planning.margins_kept import with_margins
 from mrmg.planning.parameters import PlannerParams, profile_params
 from mrmg.planning.planners import Planner
 from mrmg.planning.preference import Preference
@@ -29,8 +30,10 @@ from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.planning.roadmap.fleet import motion_addresses
 from mrmg.planning.routers import Router
 from mrmg.planning.search import GRACE_S, OnImprovement, Progress, Search
+from mrmg.planning.skipping import plan_reachable
 from mrmg.planning.statistics import UNKNOWN, Statistics
 from mrmg.plans import PlanResult, PlanStatus
+from mrmg.scene.margins import STATES_NONE, Margins, margins_from
 from mrmg.scene.types import Scene
 
 
@@ -53,6 +56,8 @@ def plan_mission(
     params: PlannerParams | None = None,
     planner: str | Planner | None = None,
     router: str | Router | None = None,
+    margins: Margins | Mapping[str, float] | str = STATES_NONE,
+    skip_unreachable: bool = False,
     workers: int = 1,
     with_bound: bool = False,
     **callbacks: Unpack[Callbacks],
@@ -70,6 +75,10 @@ def plan_mission(
         params: parameters; the default profile's if None.
         planner: name of a planner, or one of your own; that of `params` if None.
         router: name of a router, or one of your own; that of `params` if None.
+        margins: distances in m that all robots keep in place of their own, such as
+            {"obstacle": 0.1, "robot": 0.3}.
+        skip_unreachable: plan without the goals that are proven out of reach; the plan
+            names them (`Plan.skipped`).
         workers: threads that make attempts.
         with_bound: bound the objective of all plans, too, beside the search; statistics
             of a plan then hold `bound_J` or `bound_s`, and `gap`.
@@ -86,13 +95,21 @@ def plan_mission(
     if workers < 1:
         raise UsageError(f"workers = {workers}; planning needs at least 1")
     params, made_by, routed_by = _resolved(params, planner, router)
-    compile_kernels(params.planner)
-    request = Request(params=params, router=routed_by, seed=seed)
-    planning = _Planning(scene, made_by, request, workers, callbacks)
     try:
-        return planning.result(with_bound)
-    finally:
-        request.halt[0] = True  # nobody waits any longer for what is still under way
+        params = params.with_margins(margins_from(margins))
+    except ValueError as error:
+        raise UsageError(f"margins: {error}") from error
+    compile_kernels(params.planner)
+
+    def plan(mission: Scene) -> PlanResult:
+        request = Request(params=params, router=routed_by, seed=seed)
+        planning = _Planning(mission, made_by, request, workers, callbacks)
+        try:
+            return planning.result(with_bound)
+        finally:
+            request.halt[0] = True  # nobody waits for what is still under way
+
+    return plan_reachable(scene, params.dt_s, plan) if skip_unreachable else plan(scene)
 
 
 def _resolved(
@@ -174,6 +191,7 @@ class _Planning:
             return self._unsolved(proof, why or why_in_short(self.params, search))
         if bounding is not None:
             self._in_time(bounding.result)
+        best = with_margins(self.scene, best, self.params.margins)
         return PlanResult(
             status=PlanStatus.SOLVED,
             plan=best,

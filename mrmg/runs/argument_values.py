@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from mrmg.scene.margins import margins_from
 from mrmg.scene.objective import Objective
 
 LAST_PORT = 65535
@@ -124,6 +125,13 @@ def objective(value: Any) -> str | dict[str, float]:
             f"{value!r} is neither energy nor makespan nor two weights such as 1:50"
         )
     return {"energy": energy, "makespan": makespan}
+
+
+def margins(value: Any) -> dict[str, float]:
+    """Read margins: "obstacle=0.1,robot=0.3", or a mapping of these keys."""
+    read = margins_from(value)
+    stated = {"obstacle": read.obstacle_m, "robot": read.robot_m}
+    return {key: margin_m for key, margin_m in stated.items() if margin_m is not None}
 
 
 def size(value: Any) -> tuple[int, int]:

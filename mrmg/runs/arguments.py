@@ -142,6 +142,22 @@ class RunArguments(Checked):
         metavar="SHARE",
         formerly=("spare",),
     )
+    margins: Mapping[str, float] | None = option(
+        None,
+        "distances in m that plans keep from obstacles and between robots, such as "
+        "obstacle=0.1,robot=0.3, in place of those of the scene and its robots; where "
+        "only a smaller one opens a passage, that one is used there",
+        decides="plan",
+        read=values.margins,
+        metavar="KEY=M,...",
+    )
+    skip_unreachable: bool = option(
+        False,
+        "plan without the goals that are proven out of reach; the mission then ends "
+        "with exit code 6, and they are listed with their proofs",
+        decides="plan",
+        read=values.switch,
+    )
     workers: int = option(
         1,
         "threads that plan; default 1",

@@ -79,6 +79,8 @@ class Option:
 
 
 def _text(value: Any) -> str:
+    if isinstance(value, Mapping) and "makespan" not in value:  # margins
+        return ",".join(f"{key}={_text(number)}" for key, number in value.items())
     if isinstance(value, Mapping):  # the weights of an objective
         return f"{_text(value['energy'])}:{_text(value['makespan'])}"
     if isinstance(value, tuple):

@@ -16,6 +16,7 @@ from mrmg.runs.drive import drive
 from mrmg.runs.folder import NEEDS, RunFolder, Step, stale_after
 from mrmg.scene.loading import load_scene
 from mrmg.scene.loading.carrying import carried_files
+from mrmg.scene.margins import STATES_NONE, margins_from
 from mrmg.scene.types import Scene
 
 if TYPE_CHECKING:
@@ -188,6 +189,7 @@ def _plan(run: Run) -> Write:
         run.scene,
         seed=arguments.seed,
         params=planner_params(arguments),
+        skip_unreachable=arguments.skip_unreachable,
         workers=arguments.workers,
         with_bound=True,
         on_progress=run.progress_of(Step.PLAN),
@@ -198,6 +200,7 @@ def _plan(run: Run) -> Write:
         "reason": result.reason,
         "hints": list(result.hints),
         "statistics": dict(result.statistics),
+        "skipped": dict(result.plan.skipped) if result.plan else {},
     }
 
     return lambda: write_planning(run.folder, files, result.plan, outcome)
@@ -214,6 +217,7 @@ def planner_params(arguments: RunArguments) -> PlannerParams:
         budget_s=arguments.budget_s,
         trees=arguments.trees,
         soc_margin=arguments.soc_margin,
+        margins=margins_from(arguments.margins or STATES_NONE),
     )
 
 
@@ -253,11 +257,12 @@ def _execute(run: Run) -> Write:
 
     def write() -> None:
         from mrmg.energy.audit_record import MODEL_MISMATCH
+        from mrmg.energy.mission_failures import GOAL_SKIPPED
 
         driven.save(run.folder.path)
         account = run.account(driven.plan, driven.log)
         # A drive that only took another energy has nothing to be repeated for.
-        if {*account.causes} - {MODEL_MISMATCH}:
+        if {*account.causes} - {MODEL_MISMATCH, GOAL_SKIPPED}:
             _keep(run, Failure.of(driven.log, account.causes, account.reasons))
 
     return write

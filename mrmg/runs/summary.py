@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import asdict
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -89,6 +90,10 @@ def summary_of(
         "goals": len(scene.goals),
         "stations": len(scene.stations),
         "hints": list(planning.get("hints", ())),
+        "skipped_goals": [
+            {"goal": goal, "proof": proof}
+            for goal, proof in (plan.skipped if plan else {}).items()
+        ],
         "plan": _plan_figures(scene, plan, planning["statistics"]) if plan else None,
         "verdict": _verdict_figures(verdict) if verdict else None,
         "execution": _execution_figures(log, audit) if log and audit else None,
@@ -129,6 +134,11 @@ def _plan_figures(
             "value": scene.objective.value(plan.cost_J, plan.makespan_s),
             "bound": statistics.get("bound"),
         },
+        "margins": {
+            robot: {"obstacle_m": obstacle_m, "robot_m": robot_m}
+            for robot, (obstacle_m, robot_m) in plan.margins.items()
+        },
+        "narrow_passages": [asdict(passage) for passage in plan.narrow],
         "improvements": list(statistics.get("improvements", [])),
         "path_following_plans": statistics.get(
             "path_following_plans",

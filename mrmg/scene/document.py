@@ -18,7 +18,7 @@ import shapely
 
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.elevation import Elevation
-from mrmg.scene.motor import Motor
+from mrmg.scene.margins import STATES_NONE
 from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
 from mrmg.scene.robot_model import RobotModel
 
@@ -163,6 +163,9 @@ def robot_entry(robot: Robot) -> _Entry:
         "pose": [float(value) for value in robot.pose],
         **_battery(robot.battery),
     }
+    if robot.margins != STATES_NONE:
+        stated = robot.margins.entry.items()
+        entry["margins"] = {key: value for key, value in stated if value is not None}
     if robot.finish is not None:
         entry["finish"] = _finish(robot.finish)
     return entry
@@ -313,18 +316,9 @@ def model_parameters(model: RobotModel) -> _Entry:
         "energy": model.energy_preset,
         "battery_capacity": float(model.battery_capacity_J),
         "skid_track": model.skid_track_m,
-        "motor": None if model.motor is None else _motor_entry(model.motor),
-    }
-
-
-def _motor_entry(motor: Motor) -> _Entry:
-    return {
-        "torque_constant": float(motor.torque_constant_Nm_A),
-        "back_emf_constant": float(motor.back_emf_constant_V_s),
-        "resistance": float(motor.resistance_Ohm),
-        "gear_ratio": float(motor.gear_ratio),
-        "gear_efficiency": float(motor.gear_efficiency),
-        "no_load_current": float(motor.no_load_current_A),
+        "motor": model.motor and model.motor.entry,
+        "tracking_error": model.tracking_error and model.tracking_error.entry,
+        "margins": model.margins.entry,
     }
 
 

@@ -18,6 +18,13 @@ from numpy.typing import ArrayLike
 from mrmg.energy.model import GRAVITY_M_S2, EnergyModel, EnergyPreset
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.content import ByContent, content, contents
+from mrmg.scene.margins import (
+    MOST_DEFAULT_M,
+    STATES_NONE,
+    Margins,
+    TrackingError,
+    default_margins,
+)
 from mrmg.scene.model_files import ModelFiles
 from mrmg.scene.motor import Motor
 
@@ -122,6 +129,9 @@ class RobotModel(ByContent):
             skid in turns; None if they do not. Logs of wheel speeds are read by it.
         motor: of each side; None where nobody states it. Logs of currents are read by
             it.
+        margins: that plans keep, as `robot.yaml` states them.
+        tracking_error: largest one that the model has shown in MuJoCo; None where
+            nobody measured it. The default margins follow from it.
         files: what the MJCF and a custom motion consist of, read when the model was
             made.
         origin: where it was loaded from; None for one made in memory.
@@ -152,6 +162,8 @@ class RobotModel(ByContent):
     mjcf: Path | None
     skid_track_m: float | None = None
     motor: Motor | None = None
+    margins: Margins = STATES_NONE
+    tracking_error: TrackingError | None = None
     files: ModelFiles = ModelFiles((), ())
     origin: ModelOrigin | None = None
 
@@ -175,8 +187,14 @@ class RobotModel(ByContent):
 
     def content(self) -> dict[str, Any]:
         """Return what counts for a digest: what the model states, not where it lies."""
-        known = contents(self, without=("name", "mjcf", "origin"))
+        known = contents(self, without=("name", "mjcf", "origin", "tracking_error"))
         outline = content(shapely.Polygon(self.footprint_m))
+        default = default_margins(self)
+        if default.obstacle_m != MOST_DEFAULT_M:  # what models kept before they had any
+            known["default_margins"] = content(default)
+        as_loaded = self.origin.model.tracking_error if self.origin else None
+        if self.tracking_error != as_loaded:
+            known["tracking_error"] = content(self.tracking_error)
         return {**known, "motion_model": self.motion_name, "footprint_m": outline}
 
     @property

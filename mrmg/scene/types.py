@@ -13,6 +13,7 @@ from shapely.geometry import Polygon
 from mrmg.scene.content import ByContent, content, content_digest, contents
 from mrmg.scene.document import is_as_loaded, scene_document
 from mrmg.scene.elevation import Elevation
+from mrmg.scene.margins import STATES_NONE, Margins
 from mrmg.scene.objective import ENERGY, Objective
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.slopes import STEEP, steep_ground
@@ -203,6 +204,7 @@ class Robot:
         pose: start (x [m], y [m], yaw [rad]) of the reference point, at rest.
         battery: its energy store.
         finish: where it must end; None for anywhere.
+        margins: distances that plans keep, as its entry or the fleet's states them.
     """
 
     id: str
@@ -210,6 +212,7 @@ class Robot:
     pose: tuple[float, float, float]
     battery: Battery
     finish: Finish | None = None
+    margins: Margins = STATES_NONE
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -285,7 +288,7 @@ class Scene:
             trust_code: whether robot models may bring Python code; those that this
                 scene has already may.
             changes: name, bounds, obstacles, terrain, elevation, goals, stations,
-                battery, objective, time_limit, robots.
+                battery, margins, objective, time_limit, robots.
 
         Raises:
             SceneError: naming every fault, unknown keys among them.

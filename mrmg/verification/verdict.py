@@ -28,6 +28,7 @@ class ViolationKind(Enum):
     OBSTACLE = "obstacle"
     BOUNDS = "bounds"
     ROBOT = "robot"
+    MARGIN = "margin"
     OCCUPIED = "occupied"
     GOAL_MISSED = "goal_missed"
     DWELL = "dwell"
@@ -53,6 +54,7 @@ class ViolationKind(Enum):
             ViolationKind.OBSTACLE: "m^2",
             ViolationKind.BOUNDS: "m",
             ViolationKind.ROBOT: "m^2",
+            ViolationKind.MARGIN: "m",
             ViolationKind.OCCUPIED: "s",
             ViolationKind.GOAL_MISSED: "m",
             ViolationKind.DWELL: "s",
@@ -111,12 +113,14 @@ class Verdict:
             measured because the plan is malformed.
         min_robot_distance_m: at no time are two footprints closer; None also where
             there is one robot only.
+        skipped: goals that the plan leaves out, as proven out of reach.
     """
 
     ok: bool
     violations: tuple[Violation, ...]
     min_obstacle_clearance_m: float | None
     min_robot_distance_m: float | None
+    skipped: tuple[str, ...] = ()
 
     def save(self, folder: Path) -> None:
         """Write `verdict.json`."""
@@ -128,6 +132,7 @@ class Verdict:
                 "violations": [violation.to_row() for violation in self.violations],
                 "min_obstacle_clearance_m": self.min_obstacle_clearance_m,
                 "min_robot_distance_m": self.min_robot_distance_m,
+                "skipped": list(self.skipped),
             },
         )
 
@@ -144,7 +149,8 @@ class Verdict:
                 raise ValueError(f"this version reads format {VERDICT_FORMAT} only")
             rows = content.pop("violations")
             violations = tuple(Violation.from_row(row) for row in rows)
-            return Verdict(violations=violations, **content)
+            skipped = tuple(content.pop("skipped", ()))
+            return Verdict(violations=violations, skipped=skipped, **content)
         except storage.UNREADABLE as error:
             fault = Fault(
                 "verdict.json", f"no readable verdict ({error}); run 'mrmg verify'"

@@ -13,6 +13,7 @@ from mrmg.motion.dynamics import NU, NX
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.verification.contact_rules import check_obstacles, check_robots
+from mrmg.verification.margin_rules import check_margins
 from mrmg.verification.mission_rules import check_mission
 from mrmg.verification.motion_rules import check_motion
 from mrmg.verification.swept_footprint import SweptFootprint
@@ -47,12 +48,19 @@ def verify(scene: Scene, plan: Plan) -> Verdict:
     space = [found for pair in own for found in check_obstacles(scene, *pair)]
     pairs = check_robots(scene, plan.trajectories)
     contacts = [found for check in (*space, *pairs) for found in check.violations]
-    violations = (*mismatch, *motion, *contacts, *check_mission(scene, plan))
+    violations = (
+        *mismatch,
+        *motion,
+        *contacts,
+        *check_margins(scene, plan),
+        *check_mission(scene, plan),
+    )
     return Verdict(
         ok=not violations,
         violations=violations,
         min_obstacle_clearance_m=min(check.clearance_m for check in space),
         min_robot_distance_m=min((check.clearance_m for check in pairs), default=None),
+        skipped=tuple(plan.skipped),
     )
 
 

@@ -30,6 +30,10 @@ class FreeSpace(NamedTuple):
         bucket_edge: indices of the edges within `reach` of the bucket.
         reach: every edge within this distance of a point is in the point's bucket [m].
         edge: (x0, y0, x1, y1) [m], shape (n, 4).
+        allowance: by how much the margin is smaller in a cell of an opening [m],
+            negative in other cells, shape (ny, nx) or (0, 0); `distance` counts it as
+            clearance.
+        guide: what `distance` counts as clearance in openings besides [m].
     """
 
     x_min: float
@@ -43,6 +47,8 @@ class FreeSpace(NamedTuple):
     bucket_edge: np.ndarray
     reach: float
     edge: np.ndarray
+    allowance: np.ndarray
+    guide: float
 
 
 NO_RELIEF = np.zeros((0, 0))
@@ -165,7 +171,10 @@ def place_footprint(footprint, x, y, theta, out):
 
 @kernel
 def clearance_at_least(space, x, y):
-    """Return a lower bound of the signed distance from obstacles [m]; -inf off grid."""
+    """Return a lower bound of the signed distance from obstacles [m]; -inf off grid.
+
+    In openings the distance is larger by their allowance.
+    """
     rows, columns = space.distance.shape
     column = int(floor((x - space.x_min) / space.cell))
     row = int(floor((y - space.y_min) / space.cell))
@@ -173,7 +182,10 @@ def clearance_at_least(space, x, y):
         return -np.inf
     dx = x - space.x_min - (column + 0.5) * space.cell
     dy = y - space.y_min - (row + 0.5) * space.cell
-    return space.distance[row, column] - sqrt(dx * dx + dy * dy)
+    bound = space.distance[row, column] - sqrt(dx * dx + dy * dy)
+    if space.allowance.shape[0] > 0 and space.allowance[row, column] >= 0.0:
+        bound -= space.guide
+    return bound
 
 
 @kernel
@@ -212,7 +224,8 @@ def footprint_is_clear(space, placed, cx, cy, radius, margin):
         cx: x of the footprint's middle in the world.
         cy: y of it.
         radius: distance of the farthest corner from the middle.
-        margin: required distance; with half the robot's width it exceeds a cell.
+        margin: required distance; with half the robot's width it exceeds a cell. In
+            openings it is smaller by their allowance.
     """
     bound = clearance_at_least(space, cx, cy)
     if bound > radius + margin:
@@ -229,6 +242,13 @@ def footprint_is_clear(space, placed, cx, cy, radius, margin):
     ):
         return False
     b = row * space.bucket_columns + column
+    raised = 0.0
+    if space.allowance.shape[0] > 0:
+        row = int(floor((cy - space.y_min) / space.cell))
+        column = int(floor((cx - space.x_min) / space.cell))
+        if space.allowance[row, column] >= 0.0:
+            raised = space.guide + space.allowance[row, column]
+            margin -= space.allowance[row, column]
     for i in range(space.bucket_start[b], space.bucket_start[b + 1]):
         e = space.bucket_edge[i]
         ax, ay = space.edge[e, 0], space.edge[e, 1]
@@ -239,6 +259,8 @@ def footprint_is_clear(space, placed, cx, cy, radius, margin):
         ):
             return False
     # No edge is near, so the footprint lies wholly inside or wholly outside.
+    if raised > 0.0:
+        return space.distance[row, column] > raised
     return clearance_estimate(space, cx, cy) > 0.0
 
 

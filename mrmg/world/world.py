@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
+from shapely.geometry.base import BaseGeometry
 
 from mrmg.scene.types import Scene
 from mrmg.world import _raster_kernels
@@ -17,6 +19,26 @@ CELL_M = 0.25
 
 BUCKET_M = 2.0
 """Side of a bucket of obstacle edges."""
+
+NO_ALLOWANCE = np.zeros((0, 0))
+"""The allowances of a space without openings."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Opening:
+    """A place where one robot keeps less than its margin from obstacles.
+
+    Attributes:
+        shape: where its body's middle is meanwhile.
+        margin_m: what it keeps there.
+        allowance_m: by how much that is less than its margin.
+        robot: number of the robot.
+    """
+
+    shape: BaseGeometry
+    margin_m: float
+    allowance_m: float
+    robot: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,35 +58,57 @@ class World:
     terrain: TerrainGrid
 
     @staticmethod
-    def from_scene(scene: Scene, *, margin_m: float = 1.0) -> World:
+    def from_scene(
+        scene: Scene,
+        *,
+        margin_m: float = 1.0,
+        cell_m: float = CELL_M,
+        openings: Sequence[Opening] = (),
+        guide_m: float = 0.0,
+    ) -> World:
         """Prepare `scene`.
 
         Args:
             scene: the scene.
             margin_m: largest clearance that footprint tests will use.
+            cell_m: side of a cell of the grids.
+            openings: places where robots keep less than their margins.
+            guide_m: what distances in openings count for besides their allowances.
         """
         reach = margin_m + max(
             robot.model.circumscribed_radius_m for robot in scene.robots
         )
         keys = [
-            tuple(i for i, o in enumerate(scene.barriers) if o.stops(robot.id))
-            for robot in scene.robots
+            (
+                tuple(i for i, o in enumerate(scene.barriers) if o.stops(robot.id)),
+                tuple(i for i, o in enumerate(openings) if o.robot == number),
+            )
+            for number, robot in enumerate(scene.robots)
         ]
         distinct = list(dict.fromkeys(keys))
         unions = tuple(
             shapely.union_all([scene.barriers[i].shape for i in key])
-            for key in distinct
+            for key, _ in distinct
         )
+        spaces = [free_space(scene.bounds, union, reach, cell_m) for union in unions]
+        if openings:
+            spaces = [
+                with_openings(space, [openings[i] for i in own], guide_m)
+                for space, (_, own) in zip(spaces, distinct, strict=True)
+            ]
         return World(
-            spaces=tuple(free_space(scene.bounds, union, reach) for union in unions),
+            spaces=tuple(spaces),
             space_of_robot=np.array([distinct.index(key) for key in keys]),
             obstacles=unions,
-            terrain=_terrain_grid(scene),
+            terrain=_terrain_grid(scene, cell_m),
         )
 
 
 def free_space(
-    bounds: tuple[float, float, float, float], obstacles: shapely.Geometry, reach: float
+    bounds: tuple[float, float, float, float],
+    obstacles: shapely.Geometry,
+    reach: float,
+    cell_m: float = CELL_M,
 ) -> FreeSpace:
     """Return the free space inside `bounds` outside `obstacles`.
 
@@ -72,6 +116,7 @@ def free_space(
         bounds: (x_min, y_min, x_max, y_max) [m].
         obstacles: a polygon or multipolygon, possibly empty.
         reach: largest radius plus margin a footprint test will use [m].
+        cell_m: side of a cell of the distance field.
     """
     x_min, y_min, x_max, y_max = bounds
     ring_start, points = _rings(obstacles)
@@ -80,15 +125,15 @@ def free_space(
     edge = np.concatenate(
         [np.hstack([ring, np.roll(ring, -1, axis=0)]) for ring in rings]
     )
-    columns, rows = _cells(bounds, CELL_M)
+    columns, rows = _cells(bounds, cell_m)
     distance = _raster_kernels.edge_distance_field(
-        edge, x_min, y_min, CELL_M, rows, columns
+        edge, x_min, y_min, cell_m, rows, columns
     )
     inside = _raster_kernels.fill_rings(
-        ring_start, points, x_min, y_min, CELL_M, rows, columns
+        ring_start, points, x_min, y_min, cell_m, rows, columns
     )
-    inside[:, x_min + (np.arange(columns) + 0.5) * CELL_M > x_max] = True
-    inside[y_min + (np.arange(rows) + 0.5) * CELL_M > y_max] = True
+    inside[:, x_min + (np.arange(columns) + 0.5) * cell_m > x_max] = True
+    inside[y_min + (np.arange(rows) + 0.5) * cell_m > y_max] = True
     bucket_columns, bucket_rows = _cells(bounds, BUCKET_M)
     bucket_start, bucket_edge = _raster_kernels.bucket_edges(
         edge, x_min, y_min, BUCKET_M, bucket_columns, bucket_rows, reach
@@ -96,7 +141,7 @@ def free_space(
     return FreeSpace(
         x_min=float(x_min),
         y_min=float(y_min),
-        cell=CELL_M,
+        cell=cell_m,
         distance=np.where(inside, -distance, distance),
         bucket=BUCKET_M,
         bucket_columns=bucket_columns,
@@ -105,6 +150,36 @@ def free_space(
         bucket_edge=bucket_edge,
         reach=float(reach),
         edge=edge,
+        allowance=NO_ALLOWANCE.copy(),
+        guide=0.0,
+    )
+
+
+def with_openings(
+    space: FreeSpace, openings: Sequence[Opening], guide_m: float
+) -> FreeSpace:
+    """Return a free space whose distances count allowances in openings as clearance.
+
+    Args:
+        space: without openings.
+        openings: of the robots that it is for; of two at a place the larger allowance
+            counts.
+        guide_m: what distances in them count for besides.
+    """
+    rows, columns = space.distance.shape
+    x = space.x_min + (np.arange(columns) + 0.5) * space.cell
+    y = space.y_min + (np.arange(rows) + 0.5) * space.cell
+    allowance = np.full((rows, columns), -1.0)
+    for opening in openings:
+        x_low, y_low, x_high, y_high = opening.shape.bounds
+        across = slice(*np.searchsorted(x, (x_low, x_high)))
+        up = slice(*np.searchsorted(y, (y_low, y_high)))
+        inside = shapely.contains_xy(opening.shape, x[None, across], y[up, None])
+        own = np.where(inside, opening.allowance_m, -1.0)
+        allowance[up, across] = np.maximum(allowance[up, across], own)
+    raised = np.where(allowance >= 0.0, allowance + guide_m, 0.0)
+    return space._replace(
+        distance=space.distance + raised, allowance=allowance, guide=float(guide_m)
     )
 
 
@@ -128,21 +203,21 @@ def _rings(geometry: shapely.Geometry) -> tuple[np.ndarray, np.ndarray]:
     return np.cumsum([0, *(len(ring) for ring in rings)]), points
 
 
-def _terrain_grid(scene: Scene) -> TerrainGrid:
+def _terrain_grid(scene: Scene, cell_m: float) -> TerrainGrid:
     x_min, y_min, _, _ = scene.bounds
-    columns, rows = _cells(scene.bounds, CELL_M)
+    columns, rows = _cells(scene.bounds, cell_m)
     multiplier = np.ones((rows, columns))
     turning = np.ones((rows, columns))
     for area in scene.terrain:
         inside = _raster_kernels.fill_rings(
-            *_rings(area.shape), float(x_min), float(y_min), CELL_M, rows, columns
+            *_rings(area.shape), float(x_min), float(y_min), cell_m, rows, columns
         )
         multiplier[inside] = area.multiplier
         turning[inside] = area.turning_multiplier
     flat = TerrainGrid(
         x_min=float(x_min),
         y_min=float(y_min),
-        cell=CELL_M,
+        cell=cell_m,
         multiplier=multiplier,
         turning=UNIFORM_TURNING if np.all(turning == 1.0) else turning,
     )

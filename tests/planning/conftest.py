@@ -183,7 +183,7 @@ def state_scene(scene: Scene, seed: int = 0, **changes: Any) -> Problem:
         world,
         samples=params.samples,
         neighbours=params.neighbours,
-        margin_m=params.obstacle_margin_m,
+        margins=params.margins,
         rng=seeding.stream(seed, "roadmap"),
     )
     return state_problem(scene, world, roadmap, params)

@@ -31,6 +31,8 @@ OTHER: dict[str, Any] = {
     "budget_s": 2.5,
     "trees": 3,
     "soc_margin": 0.25,
+    "margins": {"obstacle": 0.1, "robot": 0.3},
+    "skip_unreachable": True,
     "workers": 2,
     "profile": "paper",
     "planner": "guided_tree",

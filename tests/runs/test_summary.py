@@ -27,6 +27,8 @@ SECTIONS = {
         "bound_s",
         "time_limit_s",
         "objective",
+        "margins",
+        "narrow_passages",
         "improvements",
         "path_following_plans",
         "vertices",
@@ -63,7 +65,17 @@ SECTIONS = {
         "recharges",
     },
 }
-TOP = {"hints", "status", "mission_ok", "scene", "seed", "robots", "goals", "stations"}
+TOP = {
+    "skipped_goals",
+    "hints",
+    "status",
+    "mission_ok",
+    "scene",
+    "seed",
+    "robots",
+    "goals",
+    "stations",
+}
 STATISTICS = {
     "path_following_plans": 2,
     "vertices": 100,

@@ -129,6 +129,8 @@ MISSING: dict[str, Any] = {
     "blocks": ("r1",),
     "heading_rad": 0.3,
     "skid_track_m": 0.7,
+    "obstacle_m": 0.1,
+    "robot_m": 0.3,
     "motor": Motor(
         torque_constant_Nm_A=0.05,
         back_emf_constant_V_s=0.05,

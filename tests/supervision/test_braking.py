@@ -9,6 +9,7 @@ from mrmg.planning.problem._safety_kernels import new_contingency, write_braking
 from mrmg.planning.problem.targets import gate_arrays
 from mrmg.planning.roadmap.fleet import fleet_array
 from mrmg.scene.loading import scene_from_document
+from mrmg.scene.margins import Margins
 from mrmg.scene.types import Scene
 from mrmg.supervision.braking import brake_to_rest
 from mrmg.world.world import World
@@ -34,9 +35,7 @@ def test_braking_is_what_the_planner_committed_to(model: str, speed: float) -> N
     scene = one_robot(model)
     state = np.array([10.0, 10.0, 0.4, speed, 0.37])
     states, controls = brake_to_rest(scene.robots[0].model, state, DT_S)
-    fleet = fleet_array(
-        scene, World.from_scene(scene), obstacle_margin_m=0.25, robot_margin_m=0.5
-    )
+    fleet = fleet_array(scene, World.from_scene(scene), Margins())
     # In Python: kernels may not return to it what they are handed by reference.
     make = getattr(new_contingency, "py_func", new_contingency)
     contingency = make(fleet.view(np.recarray), gate_arrays(scene), DT_S)

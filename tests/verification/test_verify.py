@@ -172,6 +172,13 @@ def broken_late(case: Any, drive: Any) -> Case:
     return asked(scene, plan, time_limit_s=plan.makespan_s - 0.5)
 
 
+def broken_margin(case: Any, drive: Any) -> Case:
+    """The wall ends 1.5 m beside the path; a plan begins with any distance."""
+    beside = {"id": "wall", "box": {"center": [13, 12.5], "size": [1, 1]}}
+    scene, plan = case(obstacles=[beside])
+    return scene, replace(plan, margins={"r1": (1.46, 0.5)})
+
+
 def broken_ledger(case: Any, drive: Any) -> Case:
     scene, plan = case()
     first, *rest = plan.ledger.entries

@@ -18,18 +18,20 @@ from mrmg.planning.preference import Preference
 from mrmg.planning.problem._safety_kernels import Zones
 from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.problem.leg_times import routing_times
+from mrmg.planning.problem.openings import LEAST_CELL_M, cell_m, guide_m, openings_to
 from mrmg.planning.problem.targets import finish_of, gate_arrays, target_arrays
 from mrmg.planning.problem.time_weighting import priced_world, with_energies
 from mrmg.planning.roadmap._fleet_kernels import Spaces
 from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
 from mrmg.planning.roadmap.fleet import fleet_array, stack_spaces
 from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
+from mrmg.planning.roadmap.vertices import planned_regions
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import routing_arrays
 from mrmg.plans import Trajectory
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Region, Scene
 from mrmg.world._kernels import TerrainGrid
-from mrmg.world.world import World
+from mrmg.world.world import Opening, World
 
 
 @by_reference
@@ -63,6 +65,7 @@ class Problem:
         start_energy: battery contents at the start [J], shape (R,).
         dt_s: time step of plans [s].
         route_margin: surcharge on the roadmap's energies in `mission.routing`.
+        openings: places where robots keep less than their margins.
         minimum_time: whether plans must take less time at any cost.
         soc_margin: share of every battery's capacity that plans leave above the
             reserve.
@@ -75,6 +78,7 @@ class Problem:
     start_energy: np.ndarray
     dt_s: float
     route_margin: float
+    openings: tuple[Opening, ...] = ()
     minimum_time: bool = False
     soc_margin: float = 0.0
 
@@ -180,12 +184,7 @@ def state_problem(
     scene: Scene, world: World, roadmap: Roadmap, params: PlannerParams
 ) -> Problem:
     """Return the scene's problem; routing costs include the route margin."""
-    fleet = fleet_array(
-        scene,
-        world,
-        obstacle_margin_m=params.obstacle_margin_m,
-        robot_margin_m=params.robot_margin_m,
-    )
+    fleet = fleet_array(scene, world, params.margins)
     places = len(scene.targets())
     targets = target_arrays(scene)
     # What robots draw while they stay counts as way.
@@ -244,25 +243,57 @@ ROADMAPS = 3
 
 
 def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
-    """Build the roadmap, denser while it does not join all goals, and the problem."""
-    world = World.from_scene(scene)
+    """Build the roadmap, denser while it does not join all goals, and the problem.
+
+    Where it joins some target because ways there are narrow, robots keep less than
+    their margins on these ways.
+    """
+    world = World.from_scene(scene, cell_m=cell_m(scene, params.margins))
+    problem = _joined(scene, seed, params, world, ROADMAPS)
+    openings = openings_to(scene, params.margins, _unjoined(scene, problem.roadmap))
+    if not openings:
+        return problem
+    fine_m = cell_m(scene, params.margins, LEAST_CELL_M)
+    world = World.from_scene(
+        scene, cell_m=fine_m, openings=openings, guide_m=guide_m(fine_m)
+    )
+    opened = _joined(scene, seed, params, world, ROADMAPS)
+    return replace(opened, openings=openings)
+
+
+def _joined(
+    scene: Scene, seed: int, params: PlannerParams, world: World, most: int
+) -> Problem:
+    """Return the problem with the first roadmap of several that joins all goals."""
     priced = priced_world(scene, world)
     samples = params.samples
-    for attempt in range(ROADMAPS):
+    for attempt in range(most):
         roadmap = build_roadmap(
             scene,
             priced,
             samples=samples,
             neighbours=params.neighbours,
-            margin_m=params.obstacle_margin_m,
+            margins=params.margins,
             rng=seeding.stream(seed, "roadmap", attempt),
         )
         if not unjoined_goals(scene, roadmap):
             break
         samples *= 3
     if priced is not world:
-        roadmap = with_energies(roadmap, scene, world, params.obstacle_margin_m)
+        roadmap = with_energies(roadmap, scene, world, params.margins)
     return state_problem(scene, world, roadmap, params)
+
+
+def _unjoined(scene: Scene, roadmap: Roadmap) -> list[tuple[int, Region]]:
+    """Return robots and regions they may have to get to, but know no path to."""
+    joined = np.isfinite(roadmap.start_distance)
+    regions, finish = planned_regions(scene), finish_of(scene)
+    robots = range(len(scene.robots))
+    shared = range(len(scene.targets()))
+    return [
+        *((r, regions[t]) for t in shared if not joined[:, t].any() for r in robots),
+        *((r, regions[t]) for r, t in enumerate(finish) if t >= 0 and not joined[r, t]),
+    ]
 
 
 def unjoined_goals(scene: Scene, roadmap: Roadmap) -> list[str]:

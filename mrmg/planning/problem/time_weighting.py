@@ -13,6 +13,7 @@ import numpy as np
 from mrmg.planning.roadmap import _roadmap_kernels
 from mrmg.planning.roadmap.fleet import travel_classes
 from mrmg.planning.roadmap.roadmap import Roadmap
+from mrmg.scene.margins import Margins
 from mrmg.scene.objective import Objective
 from mrmg.scene.types import Robot, Scene
 from mrmg.world.world import World
@@ -59,7 +60,7 @@ def priced_world(scene: Scene, world: World) -> World:
 
 
 def with_energies(
-    roadmap: Roadmap, scene: Scene, world: World, margin_m: float
+    roadmap: Roadmap, scene: Scene, world: World, margins: Margins
 ) -> Roadmap:
     """Return a roadmap of a priced world with distances that are energies.
 
@@ -67,10 +68,10 @@ def with_energies(
         roadmap: of `priced_world`.
         scene: the mission.
         world: its geometry, not priced.
-        margin_m: distance robots keep from obstacles.
+        margins: stated for all robots.
     """
     vertex, successors = roadmap.arrays.vertex, roadmap.arrays.successor
-    classes, class_of_robot = travel_classes(scene, world, margin_m)
+    classes, class_of_robot = travel_classes(scene, world, margins)
     cost = np.zeros(successors.shape)
     for (space, passage, slope), after, own in zip(
         classes, successors, cost, strict=True

@@ -56,6 +56,8 @@ class Spaces(NamedTuple):
     bucket_edge: np.ndarray
     reach: float
     edge: np.ndarray
+    allowance: np.ndarray
+    guide: float
 
 
 @kernel
@@ -73,4 +75,6 @@ def space_of(spaces, index):
         spaces.bucket_edge,
         spaces.reach,
         spaces.edge,
+        spaces.allowance[index],
+        spaces.guide,
     )

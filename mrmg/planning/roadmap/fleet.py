@@ -12,12 +12,16 @@ from mrmg.motion._kernels import MODEL_ID, USER
 from mrmg.motion.user_motion import motion_of
 from mrmg.planning.roadmap._fleet_kernels import FLEET, MOST_CORNERS, Spaces
 from mrmg.planning.roadmap.slopes import SlopeCost
+from mrmg.scene.margins import Margins, kept_margins
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Robot, Scene
 from mrmg.world.world import World
 
 RESERVE_MARGIN = 0.01
 """Share of the capacity the planner keeps above the reserve, for execution to use."""
+
+LEAST_MARGIN_M = 1e-6
+"""Margin that tells a touch from an overlap [m]."""
 
 PASSAGE_SLACK_M = 0.05
 """Clearance of roadmap edges beyond half the robot's width and its margin."""
@@ -46,12 +50,27 @@ def stack_spaces(world: World) -> Spaces:
         bucket_edge=np.concatenate(index),
         reach=first.reach,
         edge=np.concatenate(edges),
+        allowance=np.stack([space.allowance for space in world.spaces]),
+        guide=first.guide,
     )
 
 
-def passage_m(robot: Robot, margin_m: float) -> float:
-    """Return the clearance the line of a robot's reference point needs [m]."""
-    return round(robot.model.half_width_m + margin_m + PASSAGE_SLACK_M, 6)
+def passage_m(robot: Robot, margins: Margins) -> float:
+    """Return the clearance the line of a robot's reference point needs [m].
+
+    Args:
+        robot: the robot.
+        margins: stated for all robots; the robot's own count where they state none.
+    """
+    kept_m = margins_of(robot, margins)[0]
+    return round(robot.model.half_width_m + kept_m + PASSAGE_SLACK_M, 6)
+
+
+def margins_of(robot: Robot, margins: Margins) -> tuple[float, float]:
+    """Return the distances that a robot keeps from obstacles and from others [m]."""
+    kept = margins.over(kept_margins(robot))
+    assert kept.obstacle_m is not None and kept.robot_m is not None
+    return kept.obstacle_m, kept.robot_m
 
 
 class TravelClass(NamedTuple):
@@ -69,19 +88,19 @@ class TravelClass(NamedTuple):
 
 
 def travel_classes(
-    scene: Scene, world: World, margin_m: float
+    scene: Scene, world: World, margins: Margins
 ) -> tuple[list[TravelClass], list[int]]:
     """Return the distinct travel classes and each robot's index among them.
 
     Args:
         scene: the scene.
         world: its geometry.
-        margin_m: distance robots keep from obstacles.
+        margins: stated for all robots.
     """
     keys = [
         TravelClass(
             space=int(world.space_of_robot[i]),
-            passage=passage_m(robot, margin_m),
+            passage=passage_m(robot, margins),
             slope=SlopeCost.of(scene, robot.model),
         )
         for i, robot in enumerate(scene.robots)
@@ -104,23 +123,20 @@ def motion_addresses(model: RobotModel) -> tuple[int, int]:
     return motion_of(model).compiled(limits.as_tuple())
 
 
-def fleet_array(
-    scene: Scene, world: World, *, obstacle_margin_m: float, robot_margin_m: float
-) -> np.ndarray:
+def fleet_array(scene: Scene, world: World, margins: Margins) -> np.ndarray:
     """Return the scene's robots as records of FLEET, shape (R,).
 
     Args:
         scene: the scene.
         world: its geometry.
-        obstacle_margin_m: distance robots keep from obstacles.
-        robot_margin_m: distance robots keep from each other.
+        margins: stated for all robots.
 
     Raises:
         SceneError: if a footprint has more corners than the kernels hold, or a user's
             motion model cannot be used.
     """
     fleet = np.zeros(len(scene.robots), FLEET)
-    _, fields = travel_classes(scene, world, obstacle_margin_m)
+    _, fields = travel_classes(scene, world, margins)
     for r, robot in enumerate(scene.robots):
         model, battery = robot.model, robot.battery
         limits = model.limits.scaled(model.planning_share)
@@ -140,9 +156,10 @@ def fleet_array(
         one["middle"] = middle
         one["radius"] = np.hypot(*(outline - middle).T).max()
         one["turning_radius"] = model.turning_radius_m
-        one["passage"] = passage_m(robot, obstacle_margin_m)
-        one["margin"] = obstacle_margin_m
-        one["spacing"] = robot_margin_m
+        one["passage"] = passage_m(robot, margins)
+        one["margin"], one["spacing"] = np.maximum(
+            margins_of(robot, margins), LEAST_MARGIN_M
+        )
         one["space"] = world.space_of_robot[r]
         one["field"] = fields[r]
         one["energy"] = model.energy_model.coefficients()

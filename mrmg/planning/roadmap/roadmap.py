@@ -26,6 +26,7 @@ from mrmg.planning.roadmap.vertices import (
     reach_m,
     roadmap_vertices,
 )
+from mrmg.scene.margins import Margins
 from mrmg.scene.types import Scene
 from mrmg.world.elevation import height_at
 from mrmg.world.world import World
@@ -101,7 +102,7 @@ def build_roadmap(
     *,
     samples: int,
     neighbours: int,
-    margin_m: float,
+    margins: Margins,
     rng: np.random.Generator,
 ) -> Roadmap:
     """Build the roadmap of a scene.
@@ -111,10 +112,10 @@ def build_roadmap(
         world: its geometry.
         samples: number of free samples tried.
         neighbours: number of nearest vertices each vertex is joined to.
-        margin_m: distance robots keep from obstacles.
+        margins: stated for all robots; each one's own count where they state none.
         rng: source of the samples.
     """
-    classes, class_of_robot = travel_classes(scene, world, margin_m)
+    classes, class_of_robot = travel_classes(scene, world, margins)
     vertex = roadmap_vertices(scene, world, classes, samples, rng)
     height_m = None if scene.elevation is None else height_at(scene, vertex)
     ends = _candidate_edges(vertex, neighbours)

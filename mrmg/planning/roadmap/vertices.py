@@ -19,6 +19,9 @@ start it covers the square evenly; scipy's own sequences take 0.6 s to import.""
 ENTRY_DEPTH_M = 0.3
 """How deep inside a region a vertex lies that stands for having entered it [m]."""
 
+OPENING_SPACING_M = 0.3
+"""Distance of the vertices in the middle of openings [m]."""
+
 NARROW_M = 2.5
 """Clearance below which the middle of a place gets vertices of its own [m]."""
 
@@ -107,7 +110,12 @@ def _ridge(space: FreeSpace) -> np.ndarray:
     along = (inner >= d[:-2, 1:-1]) & (inner > d[2:, 1:-1])
     row, column = np.nonzero((across | along) & (inner > 0.0) & (inner < NARROW_M))
     points = np.stack([column + 1.5, row + 1.5], axis=1) * space.cell
-    _, first = np.unique(np.floor(points).astype(int), axis=0, return_index=True)
+    side_m = np.ones(len(points))
+    if space.allowance.size:
+        side_m[space.allowance[row + 1, column + 1] >= 0.0] = OPENING_SPACING_M
+    places = np.floor(points / side_m[:, None]).astype(int)
+    keys = np.column_stack([side_m, places])
+    _, first = np.unique(keys, axis=0, return_index=True)
     return np.asarray(points[np.sort(first)] + (space.x_min, space.y_min))
 
 

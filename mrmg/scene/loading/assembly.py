@@ -23,6 +23,7 @@ from mrmg.scene.loading.elevation import elevation_of
 from mrmg.scene.loading.elevation_schema import ElevationEntry
 from mrmg.scene.loading.faults import parsed
 from mrmg.scene.loading.geometry import region_of, shape_of
+from mrmg.scene.loading.margins_schema import MarginsEntry
 from mrmg.scene.loading.models import load_model, model_folder
 from mrmg.scene.loading.schema import (
     SECTIONS,
@@ -182,6 +183,7 @@ class Assembly:
     def _robots(self) -> Iterator[Robot]:
         fleet = self._document.get("battery", {})
         default = parsed(BatteryEntry, fleet) or BatteryEntry()
+        stated = parsed(MarginsEntry, self._document.get("margins")) or MarginsEntry()
         for _, path, entry in self._entries("robots"):
             model = self._model(entry.id, entry.model, path)
             if model is None:
@@ -203,6 +205,7 @@ class Assembly:
                 pose=(x, y, yaw),
                 battery=battery,
                 finish=finish,
+                margins=(entry.margins or MarginsEntry()).margins.over(stated.margins),
             )
 
     def _finish(self, entry: Any, model: RobotModel, path: str) -> Finish | None:

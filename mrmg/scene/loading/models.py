@@ -23,6 +23,7 @@ from mrmg.energy.model import EnergyPreset
 from mrmg.errors import Fault, SceneError, nearest
 from mrmg.scene.loading.consistency import mjcf_faults
 from mrmg.scene.loading.faults import faults_of
+from mrmg.scene.loading.margins_schema import MarginsEntry, TrackingErrorEntry
 from mrmg.scene.loading.places import lines_of
 from mrmg.scene.loading.shape_schema import NotNegative, Positive, Ring, Strict
 from mrmg.scene.loading.trust import file_within, refusal_of_code
@@ -125,6 +126,13 @@ class ModelDocument(Strict):
     battery_capacity: Positive = Field(
         description="capacity of the standard battery in J"
     )
+    margins: MarginsEntry | None = Field(
+        default=None,
+        description="distances that plans keep; default: by tracking_error",
+    )
+    tracking_error: TrackingErrorEntry | None = Field(
+        default=None, description="largest tracking errors shown in MuJoCo"
+    )
     motor: MotorEntry | None = Field(
         default=None, description="motors of each side, for logs of currents"
     )
@@ -216,6 +224,7 @@ def _checked_model(
     if faults:
         raise SceneError(source, faults)
     parameters = _parameters(entry)
+    parameters.pop("tracking_error", None)  # versions that took such digests had none
     if entry.motion_model not in SHIPPED_MOTIONS:
         # The content of the file counts for a digest, not its name.
         source_text = (folder / entry.motion_model).read_text(encoding="utf-8")
@@ -317,6 +326,8 @@ def _model(folder: Path, entry: ModelDocument) -> RobotModel:
         mjcf=None if entry.mjcf is None else folder / entry.mjcf,
         skid_track_m=entry.skid_track,
         motor=None if entry.motor is None else _motor(entry.motor),
+        margins=(entry.margins or MarginsEntry()).margins,
+        tracking_error=entry.tracking_error.value if entry.tracking_error else None,
     )
 
 

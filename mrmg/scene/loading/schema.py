@@ -19,6 +19,7 @@ A scene is one YAML file (scalars as in YAML 1.2; metres, radians, joules):
     stations:                         # convex; entering one fills the battery
       - {id: s1, polygon: [[40, 40], [43, 40], [43, 43], [40, 43]]}
     battery: {capacity_m: 240, reserve: 0.05}
+    margins: {obstacle: 0.2, robot: 0.4}   # m; default: from the models
     objective: energy                 # or makespan, or {energy: w, makespan: w}
     time_limit: 300                   # s; default: none
     robots:
@@ -60,6 +61,11 @@ Details:
 - `start_energy` is a share of the capacity (0..1), or one of {J: }, {Wh: }, {m: }.
 - `rolling_factor` multiplies the rolling resistance a robot is reckoned with, as one
   measures it of a loaded or worn one; metres in `battery` stay those of the model.
+- `margins` are the distances in m that plans keep from obstacles and bounds, and
+  between robots (of two robots the larger one counts); a robot's own replace what they
+  name. Where none is stated, in `robot.yaml` neither, they follow from the tracking
+  error that the model has shown in MuJoCo. Where only a smaller margin opens a passage,
+  that one is used there.
 - `finish` is where a robot must be at rest when the mission ends: `start` (within 1 m
   of where it started), or one of circle, polygon, with `heading` (and
   `heading_tolerance`, default 0.2) if it matters.
@@ -87,6 +93,7 @@ from pydantic_core import PydanticCustomError
 from mrmg import shipped
 from mrmg.energy.model import EnergyPreset
 from mrmg.scene.loading.elevation_schema import ElevationEntry
+from mrmg.scene.loading.margins_schema import MarginsEntry
 from mrmg.scene.loading.shape_schema import (
     DISC,
     ID,
@@ -265,6 +272,9 @@ class RobotEntry(Strict):
         default=None,
         description="rolling resistance to reckon with, relative to the model",
     )
+    margins: MarginsEntry | None = Field(
+        default=None, description="its own margins; replace what they name"
+    )
     finish: Literal["start"] | FinishEntry | None = Field(
         default=None, description="start, or a circle or polygon to end in"
     )
@@ -297,6 +307,9 @@ class SceneDocument(Strict):
     )
     battery: BatteryEntry = Field(
         default=BatteryEntry(), description="capacity and reserve of every robot"
+    )
+    margins: MarginsEntry | None = Field(
+        default=None, description="distances in m that plans keep; default: by model"
     )
     objective: Literal["energy", "makespan"] | BlendEntry | None = Field(
         default=None, description="energy, makespan, or {energy: w, makespan: w}"

@@ -16,6 +16,7 @@ from shapely.geometry import Polygon
 from mrmg.errors import UsageError
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.loading.models import load_model, model_folder
+from mrmg.scene.margins import default_margins
 from mrmg.scene.populating.ground import Ground
 from mrmg.scene.populating.placement import RESERVE, Placement, Sites, place_mission
 from mrmg.scene.robot_model import RobotModel
@@ -29,8 +30,8 @@ STATION_RADIUS_M = 2.0
 _MARGINS_M = (1.3, 0.9, 0.6, 0.4)
 """Added to half the robot's width: the widest roads that span the map are used."""
 
-_LEAST_MARGIN_M = 0.4
-"""Margin that also small robots get: what the planner keeps clear, and its slack."""
+_PLANNING_SLACK_M = 0.15
+"""What roads have at least beyond a robot's margin from obstacles."""
 
 _USUAL_RADIUS_M = 1.5
 """Reach of the robots that lengths here are made for; all shrink for smaller ones."""
@@ -137,7 +138,9 @@ def _drivable(scene: Scene, model: RobotModel) -> Ground:
         margin_m=0.0,
         cell_m=max(_CELL_M * size, math.sqrt(extent_m2 / _MOST_POINTS)),
     )
-    margins_m = [max(_LEAST_MARGIN_M, size * margin_m) for margin_m in _MARGINS_M]
+    kept_m = model.margins.over(default_margins(model)).obstacle_m or 0.0
+    least_m = kept_m + _PLANNING_SLACK_M
+    margins_m = [max(least_m, size * margin_m) for margin_m in _MARGINS_M]
     grounds = [
         replace(bare, margin_m=model.half_width_m + margin_m) for margin_m in margins_m
     ]

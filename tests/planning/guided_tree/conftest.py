@@ -159,7 +159,7 @@ class Replay:
                 return False
             if abs(state[r, 4]) > psi + 1e-6:
                 return False
-            need = self.params.obstacle_margin_m - slack
+            need = float(self.fleet[r]["margin"]) - slack
             walls = [item.shape for item in self.scene.obstacles]
             if any(outline.distance(item) < need for item in walls):
                 return False
@@ -168,7 +168,7 @@ class Replay:
             if outline.distance(frame.exterior) < need:
                 return False
             for other in outlines[:r]:
-                if outline.distance(other) < self.params.robot_margin_m - slack:
+                if outline.distance(other) < float(self.fleet[r]["spacing"]) - slack:
                     return False
         return True
 

@@ -13,7 +13,6 @@ import pytest
 import shapely
 
 from mrmg.motion._kernels import CAR, UNICYCLE, step
-from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.problem._control_kernels import control_towards
 from mrmg.planning.problem._safety_kernels import (
     Contingency,
@@ -29,8 +28,8 @@ from mrmg.planning.problem._safety_kernels import (
 from mrmg.planning.problem.problem import Problem
 from mrmg.scene.types import Scene
 
-PLANNING_MARGIN_M = PlannerParams().obstacle_margin_m
-ROBOT_MARGIN_M = PlannerParams().robot_margin_m
+PLANNING_MARGIN_M = 0.25
+ROBOT_MARGIN_M = 0.5
 
 DT_S = 0.1
 OBSTACLES = [

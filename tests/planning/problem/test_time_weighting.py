@@ -75,7 +75,7 @@ def test_energies_of_ways_that_are_not_priced_are_the_distances(yard: Any) -> No
     world = World.from_scene(scene)
     assert priced_world(scene, world) is world
     roadmap = state_mission(scene, 0, PARAMS).roadmap
-    again = with_energies(roadmap, scene, world, PARAMS.obstacle_margin_m)
+    again = with_energies(roadmap, scene, world, PARAMS.margins)
     assert again.distance == pytest.approx(roadmap.distance, rel=2e-3)
     assert again.start_distance == pytest.approx(roadmap.start_distance, rel=2e-3)
 

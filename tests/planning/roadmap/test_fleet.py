@@ -11,6 +11,7 @@ from mrmg.planning.roadmap._fleet_kernels import space_of
 from mrmg.planning.roadmap.fleet import stack_spaces, travel_classes
 from mrmg.planning.roadmap.slopes import SlopeCost
 from mrmg.scene.loading import scene_from_document
+from mrmg.scene.margins import Margins
 from mrmg.scene.types import Scene
 from mrmg.world import _kernels
 from mrmg.world.world import World
@@ -79,7 +80,7 @@ def test_robots_that_meet_the_same_obstacles_travel_alike(
     blocks: list[list[str] | None], expected: list[int]
 ) -> None:
     scene = make_scene(blocks)
-    classes, of_robot = travel_classes(scene, World.from_scene(scene), 0.25)
+    classes, of_robot = travel_classes(scene, World.from_scene(scene), Margins())
     assert all(item.slope == SlopeCost() for item in classes)
     assert of_robot == expected
     assert len(classes) == max(expected) + 1

@@ -15,6 +15,7 @@ from mrmg import seeding, shipped
 from mrmg.planning.roadmap.fleet import travel_classes
 from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
 from mrmg.scene.loading import scene_from_document
+from mrmg.scene.margins import Margins
 from mrmg.scene.types import Scene
 from mrmg.world.elevation import height_at
 from mrmg.world.world import CELL_M, World
@@ -54,7 +55,7 @@ def make_roadmap(
         World.from_scene(scene),
         samples=samples,
         neighbours=neighbours,
-        margin_m=0.25,
+        margins=Margins(),
         rng=seeding.stream(seed, "roadmap"),
     )
 
@@ -223,7 +224,7 @@ def test_successors_lead_to_the_target_at_the_stated_cost(
 def test_edges_keep_the_passage_clear(walled: tuple[Scene, Roadmap]) -> None:
     scene, roadmap = walled
     world = World.from_scene(scene)
-    (_, passage, _), *_ = travel_classes(scene, world, 0.25)[0]
+    (_, passage, _), *_ = travel_classes(scene, world, Margins())[0]
     walls = shapely.union_all([world.obstacles[0], shapely.box(*scene.bounds).exterior])
     first, second, weight = roadmap.edges[0]
     lines = shapely.linestrings(

@@ -12,6 +12,7 @@ from mrmg.planning.roadmap import _roadmap_kernels
 from mrmg.planning.roadmap._roadmap_kernels import TIGHT_SHARE
 from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
 from mrmg.scene.loading import scene_from_document
+from mrmg.scene.margins import Margins
 from mrmg.scene.types import Scene
 from mrmg.world.world import CELL_M, World
 
@@ -52,7 +53,7 @@ class Place:
             self.world,
             samples=800,
             neighbours=12,
-            margin_m=0.25,
+            margins=Margins(),
             rng=seeding.stream(0, "roadmap"),
         )
 

@@ -29,7 +29,10 @@ def changed_car(tmp_path: Path, old: str, new: str) -> Path:
 def test_car_is_what_its_file_says() -> None:
     car, parameters = load_model(CAR)
     raw = yaml.safe_load((CAR / "robot.yaml").read_text())
+    shown = raw.pop("tracking_error")
     assert parameters == raw
+    assert car.tracking_error is not None
+    assert car.tracking_error.entry == shown
     assert car.name == "car"
     assert car.mass_kg == raw["mass"]
     assert car.limits.v_max_m_s == raw["limits"]["v_max"]

@@ -1,0 +1,67 @@
+"""The margins that a plan states to keep, and where it keeps less."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from mrmg.planning.roadmap.fleet import margins_of
+from mrmg.plans import NarrowPassage, Plan, Trajectory
+from mrmg.scene.margins import Margins
+from mrmg.scene.types import Robot, Scene
+
+ROUNDING_M = 1e-7
+"""Distance that a margin may be missed by for rounding alone [m]."""
+
+
+def with_margins(scene: Scene, plan: Plan, margins: Margins) -> Plan:
+    """Return a plan that states its margins, and where robots keep less.
+
+    Args:
+        scene: the mission.
+        plan: of it.
+        margins: stated for all robots.
+    """
+    kept = {robot.id: margins_of(robot, margins) for robot in scene.robots}
+    narrow = [
+        passage
+        for trajectory in plan.trajectories
+        for passage in _narrow(
+            scene,
+            scene.robot(trajectory.robot),
+            trajectory,
+            kept[trajectory.robot][0],
+        )
+    ]
+    return replace(plan, margins=kept, narrow=tuple(narrow))
+
+
+def _narrow(
+    scene: Scene, robot: Robot, trajectory: Trajectory, margin_m: float
+) -> Iterator[NarrowPassage]:
+    """Yield the stretches on which a robot keeps less than its margin."""
+    bounds = shapely.box(*scene.bounds).boundary
+    near = [bounds, *(item.shape for item in scene.barriers if item.stops(robot.id))]
+    bodies = shapely.polygons(robot.model.footprint_at(trajectory.state))
+    tree = shapely.STRtree(near)
+    found, distance = tree.query_nearest(
+        bodies, return_distance=True, all_matches=False
+    )
+    distance_m = np.zeros(len(bodies))
+    distance_m[found[0]] = distance
+    less = np.flatnonzero(distance_m < margin_m - ROUNDING_M)
+    for run in np.split(less, np.flatnonzero(np.diff(less) > 1) + 1):
+        if len(run):
+            tightest = int(run[distance_m[run].argmin()])
+            x_m, y_m = trajectory.state[tightest, :2].tolist()
+            yield NarrowPassage(
+                robot=robot.id,
+                start_s=round(float(run[0] * trajectory.dt_s), 9),
+                end_s=round(float(run[-1] * trajectory.dt_s), 9),
+                x_m=x_m,
+                y_m=y_m,
+                margin_m=float(distance_m[tightest]),
+            )

@@ -1,0 +1,166 @@
+"""Margins: the distances that plans keep from obstacles and between robots.
+
+The default follows from the tracking error that a robot's model has shown in MuJoCo
+under default disturbances (`tracking_error` in `robot.yaml`, which states the source):
+`ERRORS_KEPT` times that, as errors grow with what nobody modelled. Of a model that
+nobody drove it is reckoned from its top speed. Where only a smaller margin opens a
+passage, that margin is used there, down to the certified minimum, which holds the
+tracking error without disturbances (`mrmg.planning.problem.openings`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from mrmg.scene.robot_model import RobotModel
+    from mrmg.scene.types import Robot
+
+ERRORS_KEPT = 10.0
+"""Default margin from obstacles as a multiple of the disturbed tracking error."""
+
+LEAST_DEFAULT_M = 0.05
+"""Least default margin from obstacles [m]: 2.5 standard deviations of the noise of
+positions under default disturbances."""
+
+MOST_DEFAULT_M = 0.25
+"""Largest default margin from obstacles; what cars have always kept [m]."""
+
+BETWEEN_STEPS_S = 0.015
+"""Time at top speed that margins at time steps leave for turning in between [s]."""
+
+NOMINAL_S, DISTURBED_S = 0.013, 0.0225
+"""Tracking errors of a model that nobody drove, as time at its top speed [s]: as of the
+shipped car, 0.026 and 0.045 m at 2 m/s."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Margins:
+    """Margins as a file or a user states them; None where it does not.
+
+    Attributes:
+        obstacle_m: distance kept from obstacles and bounds.
+        robot_m: distance kept from other robots; of two robots the larger one counts.
+    """
+
+    obstacle_m: float | None = None
+    robot_m: float | None = None
+
+    @property
+    def entry(self) -> dict[str, float | None]:
+        """The margins by their keys in files."""
+        return {"obstacle": self.obstacle_m, "robot": self.robot_m}
+
+    def over(self, other: Margins) -> Margins:
+        """Return these margins, with another's where these state none."""
+        return Margins(
+            **{
+                each.name: getattr(other, each.name)
+                if getattr(self, each.name) is None
+                else getattr(self, each.name)
+                for each in fields(self)
+            }
+        )
+
+
+STATES_NONE = Margins()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrackingError:
+    """The largest tracking errors that a model has shown in MuJoCo [m].
+
+    Attributes:
+        nominal_m: as modelled: the certified minimum of margins from obstacles.
+        disturbed_m: under default disturbances.
+    """
+
+    nominal_m: float
+    disturbed_m: float
+
+    @property
+    def entry(self) -> dict[str, float]:
+        """The errors by their keys in files."""
+        return {"nominal": self.nominal_m, "disturbed": self.disturbed_m}
+
+
+LARGEST_M = {"obstacle": 1.0, "robot": 2.0}
+"""Largest margins that can be asked for, by their keys in files [m]."""
+
+
+def margins_from(value: Any) -> Margins:
+    """Return margins from a text such as "obstacle=0.1,robot=0.3", or a mapping.
+
+    Raises:
+        ValueError: stating what is allowed.
+    """
+    if isinstance(value, Margins):
+        return value
+    stated: dict[str, float] = {}
+    try:
+        pairs = (
+            [part.split("=") for part in value.split(",")]
+            if isinstance(value, str)
+            else list(value.items())
+        )
+        for key, number in pairs:
+            stated[key.strip()] = float(number)
+    except (AttributeError, TypeError, ValueError):
+        stated = {}
+    fine = all(0.0 <= stated[key] <= LARGEST_M.get(key, -1.0) for key in stated)
+    if not stated or not fine:
+        raise ValueError(
+            f"{value!r} are no margins such as obstacle=0.1,robot=0.3: in m, at most "
+            f"{LARGEST_M['obstacle']:g} from obstacles and {LARGEST_M['robot']:g} "
+            "between robots"
+        )
+    return Margins(obstacle_m=stated.get("obstacle"), robot_m=stated.get("robot"))
+
+
+def tracking_error(model: RobotModel) -> TrackingError:
+    """Return the tracking error of a model: as shown in MuJoCo, or by its speed."""
+    if model.tracking_error is not None:
+        return model.tracking_error
+    return TrackingError(
+        nominal_m=NOMINAL_S * model.top_speed_m_s,
+        disturbed_m=DISTURBED_S * model.top_speed_m_s,
+    )
+
+
+def certified_minimum_m(model: RobotModel) -> float:
+    """Return the least distance from obstacles that a passage is driven with."""
+    nominal_m = tracking_error(model).nominal_m
+    return max(nominal_m, BETWEEN_STEPS_S * model.top_speed_m_s)
+
+
+def default_margins(model: RobotModel) -> Margins:
+    """Return the margins of a robot for which nobody states any."""
+    wanted_m = round(ERRORS_KEPT * tracking_error(model).disturbed_m, 3)
+    obstacle_m = min(max(wanted_m, LEAST_DEFAULT_M), MOST_DEFAULT_M)
+    return Margins(obstacle_m=obstacle_m, robot_m=2.0 * obstacle_m)
+
+
+def kept_margins(robot: Robot) -> Margins:
+    """Return the margins of a robot: as stated for it, by its model, or by default."""
+    stated = robot.margins.over(robot.model.margins)
+    return stated.over(default_margins(robot.model))
+
+
+def source_of_margins(model: RobotModel, stated: Margins) -> str:
+    """Return in words where a robot's margins come from.
+
+    Args:
+        model: of the robot.
+        stated: margins of its entry or of the fleet.
+    """
+    named = stated.over(model.margins)
+    if named.obstacle_m is not None and named.robot_m is not None:
+        return "as stated"
+    error = f"tracking error of {tracking_error(model).disturbed_m:.3f} m"
+    shown = f"that {model.name} has shown in MuJoCo under default disturbances"
+    if model.tracking_error is None:
+        shown = f"assumed for {model.name} by its top speed, as nobody measured it"
+    limits = f"{LEAST_DEFAULT_M:g} to {MOST_DEFAULT_M:g} m"
+    default = f"{ERRORS_KEPT:g} times the {error} {shown}, within {limits}"
+    return f"{default}; twice that between robots"

@@ -1,0 +1,93 @@
+"""Rules of margins: what a plan states to keep at its time steps, it keeps.
+
+A plan may keep less than its margins only on stretches that it names, and there no less
+than the certified minimum of the robot's model. How a plan begins is the scene's doing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+import shapely
+
+from mrmg.plans import Plan, Trajectory
+from mrmg.scene.margins import certified_minimum_m
+from mrmg.scene.types import Scene
+from mrmg.verification.distances import obstacle_distance
+from mrmg.verification.motion_rules import violation_at, worst_of_runs
+from mrmg.verification.verdict import Violation, ViolationKind
+
+ROUNDING_M = 1e-6
+"""Missing distance that is forgiven: rounding of coordinates and of sums [m]."""
+
+
+def check_margins(scene: Scene, plan: Plan) -> list[Violation]:
+    """Return where a plan keeps less than the margins it states."""
+    violations = _stated_too_small(scene, plan)
+    own = [item for item in plan.trajectories if item.robot in plan.margins]
+    for trajectory in own:
+        robot = scene.robot(trajectory.robot)
+        distance_m = obstacle_distance(scene, robot, trajectory.state)
+        needed_m = np.full(len(distance_m), plan.margins[robot.id][0])
+        for narrow in plan.narrow:
+            if narrow.robot == robot.id:
+                first, last = (
+                    round(time_s / plan.dt_s)
+                    for time_s in (narrow.start_s, narrow.end_s)
+                )
+                needed_m[first : last + 1] = narrow.margin_m
+        violations += _violations(trajectory, distance_m, needed_m, "an obstacle")
+    for one, other in combinations(own, 2):
+        spacing_m = max(plan.margins[item.robot][1] for item in (one, other))
+        shapes = [
+            shapely.polygons(scene.robot(item.robot).model.footprint_at(item.state))
+            for item in (one, other)
+        ]
+        distance_m = np.asarray(shapely.distance(*shapes))
+        needed_m = np.full(len(distance_m), spacing_m)
+        violations += _violations(one, distance_m, needed_m, other.robot)
+    return violations
+
+
+def _stated_too_small(scene: Scene, plan: Plan) -> list[Violation]:
+    """Return the stretches that keep less than the certified minimum."""
+    violations = []
+    for narrow in plan.narrow:
+        model = scene.robot(narrow.robot).model
+        wanted_m = plan.margins.get(narrow.robot, (np.inf, np.inf))[0]
+        least_m = min(certified_minimum_m(model), wanted_m)
+        if narrow.start_s > 0.0 and narrow.margin_m < least_m - ROUNDING_M:
+            violations.append(
+                Violation(
+                    kind=ViolationKind.MARGIN,
+                    robot=narrow.robot,
+                    time_s=narrow.start_s,
+                    x_m=narrow.x_m,
+                    y_m=narrow.y_m,
+                    amount=least_m - narrow.margin_m,
+                    message=f"{narrow.robot}: keeps {narrow.margin_m:.3f} m in a "
+                    f"passage, less than the certified minimum of {least_m:.3f} m",
+                )
+            )
+    return violations
+
+
+def _violations(
+    trajectory: Trajectory, distance_m: np.ndarray, needed_m: np.ndarray, other: str
+) -> Sequence[Violation]:
+    missing_m = needed_m - distance_m
+    broken = missing_m > ROUNDING_M
+    broken[: int(np.argmin(broken)) if not broken.all() else len(broken)] = False
+    return [
+        violation_at(
+            trajectory,
+            step,
+            ViolationKind.MARGIN,
+            f"is {distance_m[step]:.3f} m from {other}, and its margin there is "
+            f"{needed_m[step]:.3f} m",
+            amount=float(missing_m[step]),
+        )
+        for step in worst_of_runs(missing_m, broken)
+    ]
