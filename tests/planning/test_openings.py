@@ -1,0 +1,174 @@
+"""Gaps little wider than the robot are found, and margins are kept and stated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+import shapely
+import shapely.affinity
+
+import mrmg
+from mrmg.errors import UsageError
+from mrmg.planning import plan_mission
+from mrmg.plans import Plan, PlanStatus
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.margins import certified_minimum_m, default_margins, kept_margins
+from mrmg.scene.types import Scene
+from mrmg.verification.verify import verify
+
+SIZE_M = (24.0, 14.0)
+
+
+def corners(shape: shapely.Polygon) -> list[list[float]]:
+    return [list(point) for point in shape.exterior.coords[:-1]]
+
+
+def gap(width_m: float, model: Any = "car", turn: float = 0.0) -> Scene:
+    """Return a mission beyond a wall with one gap in its middle."""
+    length, height = SIZE_M
+    middle = (length / 2, height / 2)
+    half = [
+        shapely.box(middle[0] - 0.15, -9.0, middle[0] + 0.15, middle[1] - width_m / 2),
+        shapely.box(middle[0] - 0.15, middle[1] + width_m / 2, middle[0] + 0.15, 30.0),
+    ]
+    walls = [
+        shapely.affinity.rotate(one, turn, origin=middle, use_radians=True)
+        & shapely.box(0.0, 0.0, length, height)
+        for one in half
+    ]
+    return scene_from_document(
+        {
+            "format": 1,
+            "name": "gap",
+            "bounds": [0, 0, length, height],
+            "obstacles": [
+                {"id": f"wall{i}", "polygon": corners(one)}
+                for i, one in enumerate(walls)
+            ],
+            "goals": [{"id": "g", "circle": {"center": [20, 9], "radius": 1}}],
+            "battery": {"capacity_m": 200},
+            "robots": [{"id": "r1", "model": model, "pose": [4, 4, 0.3]}],
+        },
+        source="gap",
+    )
+
+
+def planned(scene: Scene, **options: Any) -> Plan:
+    result = plan_mission(scene, **options)
+    assert result.plan is not None, result.reason
+    return result.plan
+
+
+@pytest.mark.parametrize(
+    ("model", "width_m", "turn"),
+    [
+        ("car", 1.25, 0.0),
+        ("car", 1.3, 0.7),
+        ("hauler", 1.55, -0.6),
+        ("diffdrive", 0.85, 0.3),
+    ],
+)
+def test_gap_little_wider_than_the_robot(
+    model: str, width_m: float, turn: float
+) -> None:
+    scene = gap(width_m, model, turn)
+    plan = planned(scene)
+    verdict = verify(scene, plan)
+    assert verdict.ok, verdict.violations
+    least_m = certified_minimum_m(scene.robots[0].model)
+    assert plan.narrow
+    for passage in plan.narrow:
+        assert passage.robot == "r1"
+        assert least_m - 1e-6 <= passage.margin_m < plan.margins["r1"][0]
+        assert abs(passage.x_m - 12.0) < 6.0
+    assert verdict.min_obstacle_clearance_m > 0.3 * least_m
+
+
+def test_wide_gaps_keep_the_margin() -> None:
+    scene = gap(2.2)
+    plan = planned(scene)
+    assert plan.narrow == ()
+    assert verify(scene, plan).min_obstacle_clearance_m > 0.2
+
+
+def test_too_narrow_a_gap_is_no_way() -> None:
+    result = plan_mission(gap(1.12))
+    assert result.plan is None
+    assert result.status is PlanStatus.NO_PLAN_FOUND
+    assert plan_mission(gap(1.05)).status is PlanStatus.INFEASIBLE
+
+
+def test_narrow_passages_are_saved_and_checked(tmp_path: Any) -> None:
+    scene = gap(1.25)
+    plan = planned(scene)
+    plan.save(tmp_path)
+    back = Plan.load(tmp_path)
+    assert (back.narrow, back.margins) == (plan.narrow, plan.margins)
+    unstated = verify(scene, replace(plan, narrow=()))
+    assert [found.kind.value for found in unstated.violations] == ["margin"]
+    closer = tuple(replace(one, margin_m=0.001) for one in plan.narrow)
+    assert (
+        "certified minimum"
+        in verify(scene, replace(plan, narrow=closer)).violations[0].message
+    )
+
+
+@pytest.mark.parametrize("stated", [{"obstacle": 0.4}, {"obstacle": 0.4, "robot": 0.1}])
+def test_margins_of_file_and_of_the_call_count_alike(stated: dict[str, float]) -> None:
+    scene = gap(3.0)
+    in_file, in_call = scene.with_(margins=stated), planned(scene, margins=stated)
+    plan = planned(in_file)
+    assert plan.margins == in_call.margins
+    assert plan.margins["r1"] == (0.4, stated.get("robot", 0.5))
+    for made, mission in ((plan, in_file), (in_call, scene)):
+        verdict = verify(mission, made)
+        assert verdict.ok
+        assert verdict.min_obstacle_clearance_m > 0.35
+
+
+def test_own_margins_replace_what_they_name() -> None:
+    scene = gap(3.0).with_(margins={"obstacle": 0.3, "robot": 0.9})
+    own = scene.with_robot("r1", margins={"obstacle": 0.1})
+    kept = kept_margins(own.robots[0])
+    assert (kept.obstacle_m, kept.robot_m) == (0.1, 0.9)
+    assert scene_from_document(own.document, source="again") == own
+
+
+def test_small_robots_have_small_margins() -> None:
+    limits = {"v_max": 0.2, "v_min": -0.1}
+    slow = gap(3.0, {"like": "diffdrive", "limits": limits, "tracking_error": None})
+    small, large = (
+        default_margins(scene.robots[0].model) for scene in (slow, gap(3.0))
+    )
+    assert small.obstacle_m == pytest.approx(0.05)
+    assert (large.obstacle_m, large.robot_m) == (0.25, 0.5)
+
+
+@pytest.mark.parametrize("wrong", ["0.1", "obstacle=x", {"wall": 0.1}, "robot=3", ""])
+def test_wrong_margins_are_refused(wrong: Any) -> None:
+    with pytest.raises(UsageError, match=r"margins: .* at most 1 from obstacles"):
+        plan_mission(gap(3.0), margins=wrong)
+
+
+def test_goals_out_of_reach_are_left_out_with_their_proofs() -> None:
+    scene = gap(3.0)
+    room = shapely.Point(20, 3).buffer(1.6)
+    cell = {
+        "id": "cell",
+        "polygon": [[17, 0.5], [23, 0.5], [23, 5.5], [17, 5.5]],
+        "holes": [corners(room)],
+    }
+    more = scene.with_(
+        obstacles=[*scene.obstacles, cell],
+        goals=[*scene.goals, {"id": "h", "circle": {"center": [20, 3], "radius": 1}}],
+    )
+    assert plan_mission(more).status is PlanStatus.INFEASIBLE
+    plan = planned(more, skip_unreachable=True)
+    assert {*plan.skipped} == {"h"}
+    assert "cut off" in plan.skipped["h"]
+    verdict = mrmg.verify(more, plan)
+    assert verdict.ok
+    assert verdict.skipped == ("h",)
+    assert planned(scene, skip_unreachable=True).skipped == {}
