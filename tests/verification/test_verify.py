@@ -207,6 +207,18 @@ def test_valid_plan_has_no_violation(case: Any) -> None:
     assert verdict.violations == ()
 
 
+@pytest.mark.parametrize(("kept_m", "ok"), [(1.8, True), (2.0, False)])
+def test_robots_keep_the_larger_of_their_margins(
+    kept_m: float, ok: bool, case: Any
+) -> None:
+    """Two cars 1.1 m wide pass each other on lines 3 m apart."""
+    facing = {"id": "r2", "model": "car", "pose": [20, 13, 3.141592653589793]}
+    scene, plan = case(robots=[TWO_ROBOTS[0], facing])
+    plan = replace(plan, margins={"r1": (0.1, 0.5), "r2": (0.1, kept_m)})
+    found = verify(scene, plan).violations
+    assert [one.kind for one in found] == ([] if ok else [Kind.MARGIN])
+
+
 @pytest.mark.parametrize("kind", Kind)
 def test_broken_rule_is_found_alone(kind: Kind, case: Any, drive: Any) -> None:
     verdict = verify(*BROKEN[kind](case, drive))
