@@ -224,7 +224,6 @@ def _checked_model(
     if faults:
         raise SceneError(source, faults)
     parameters = _parameters(entry)
-    parameters.pop("tracking_error", None)  # versions that took such digests had none
     if entry.motion_model not in SHIPPED_MOTIONS:
         # The content of the file counts for a digest, not its name.
         source_text = (folder / entry.motion_model).read_text(encoding="utf-8")
@@ -233,8 +232,11 @@ def _checked_model(
 
 
 def _parameters(entry: ModelDocument) -> dict[str, Any]:
-    # Keys left at their defaults stay out: files without them keep their digests.
-    return entry.model_dump(mode="json", exclude_defaults=True)
+    # Keys left at their defaults stay out: files without them keep their digests. How
+    # well a model was tracked is no part of what it is.
+    return entry.model_dump(
+        mode="json", exclude_defaults=True, exclude={"tracking_error"}
+    )
 
 
 def _differences(model: RobotModel, mjcf: Path, entry: ModelDocument) -> list[Fault]:
