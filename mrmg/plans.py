@@ -14,6 +14,7 @@ from mrmg import storage
 from mrmg.columns import control_columns, data_frame, named, state_columns
 from mrmg.energy.ledger import EnergyLedger
 from mrmg.errors import ExitCode, Fault, RunFolderError
+from mrmg.scene.margins import NarrowPassage
 
 PLAN_FORMAT = 1
 
@@ -126,25 +127,6 @@ class Visit:
     step: int
     time_s: float
     energy_J: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class NarrowPassage:
-    """A stretch of a robot's motion on which it keeps less than its margin.
-
-    Attributes:
-        robot: id of the robot.
-        start_s, end_s: when it begins and ends.
-        x_m, y_m: the robot's reference point where the margin is smallest.
-        margin_m: distance kept from obstacles at the time steps in between.
-    """
-
-    robot: str
-    start_s: float
-    end_s: float
-    x_m: float
-    y_m: float
-    margin_m: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

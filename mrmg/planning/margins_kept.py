@@ -9,8 +9,8 @@ import numpy as np
 import shapely
 
 from mrmg.planning.roadmap.fleet import margins_of
-from mrmg.plans import NarrowPassage, Plan, Trajectory
-from mrmg.scene.margins import Margins
+from mrmg.plans import Plan, Trajectory
+from mrmg.scene.margins import Margins, NarrowPassage
 from mrmg.scene.types import Robot, Scene
 
 ROUNDING_M = 1e-7

@@ -68,6 +68,25 @@ STATES_NONE = Margins()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class NarrowPassage:
+    """A stretch of a robot's motion on which it keeps less than its margin.
+
+    Attributes:
+        robot: id of the robot.
+        start_s, end_s: when it begins and ends.
+        x_m, y_m: the robot's reference point where the margin is smallest.
+        margin_m: distance kept from obstacles at the time steps in between.
+    """
+
+    robot: str
+    start_s: float
+    end_s: float
+    x_m: float
+    y_m: float
+    margin_m: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class TrackingError:
     """The largest tracking errors that a model has shown in MuJoCo [m].
 
