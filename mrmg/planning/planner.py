@@ -95,10 +95,7 @@ def plan_mission(
     if workers < 1:
         raise UsageError(f"workers = {workers}; planning needs at least 1")
     params, made_by, routed_by = _resolved(params, planner, router)
-    try:
-        params = params.with_margins(margins_from(margins))
-    except ValueError as error:
-        raise UsageError(f"margins: {error}") from error
+    params = params.with_margins(margins_from(margins))
     compile_kernels(params.planner)
 
     def plan(mission: Scene) -> PlanResult:

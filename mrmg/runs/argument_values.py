@@ -10,6 +10,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from mrmg.errors import UsageError
 from mrmg.scene.margins import margins_from
 from mrmg.scene.objective import Objective
 
@@ -129,7 +130,10 @@ def objective(value: Any) -> str | dict[str, float]:
 
 def margins(value: Any) -> dict[str, float]:
     """Read margins: "obstacle=0.1,robot=0.3", or a mapping of these keys."""
-    read = margins_from(value)
+    try:
+        read = margins_from(value)
+    except UsageError as error:
+        raise ValueError(str(error).removeprefix("margins: ")) from error
     stated = {"obstacle": read.obstacle_m, "robot": read.robot_m}
     return {key: margin_m for key, margin_m in stated.items() if margin_m is not None}
 

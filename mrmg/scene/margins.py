@@ -13,6 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
+from mrmg.errors import UsageError
+
 if TYPE_CHECKING:
     from mrmg.scene.robot_model import RobotModel
     from mrmg.scene.types import Robot
@@ -112,7 +114,7 @@ def margins_from(value: Any) -> Margins:
     """Return margins from a text such as "obstacle=0.1,robot=0.3", or a mapping.
 
     Raises:
-        ValueError: stating what is allowed.
+        UsageError: stating what is allowed.
     """
     if isinstance(value, Margins):
         return value
@@ -129,10 +131,10 @@ def margins_from(value: Any) -> Margins:
         stated = {}
     fine = all(0.0 <= stated[key] <= LARGEST_M.get(key, -1.0) for key in stated)
     if not stated or not fine:
-        raise ValueError(
-            f"{value!r} are no margins such as obstacle=0.1,robot=0.3: in m, at most "
-            f"{LARGEST_M['obstacle']:g} from obstacles and {LARGEST_M['robot']:g} "
-            "between robots"
+        raise UsageError(
+            f"margins: {value!r} are no margins such as obstacle=0.1,robot=0.3: in m, "
+            f"at most {LARGEST_M['obstacle']:g} from obstacles and "
+            f"{LARGEST_M['robot']:g} between robots"
         )
     return Margins(obstacle_m=stated.get("obstacle"), robot_m=stated.get("robot"))
 
