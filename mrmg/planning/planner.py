@@ -37,13 +37,19 @@ from mrmg.scene.margins import STATES_NONE, Margins, margins_from
 from mrmg.scene.types import Scene
 
 
-class Callbacks(TypedDict, total=False):
-    """Callbacks of planning.
+class Options(TypedDict, total=False):
+    """What else may be asked of planning.
 
     Attributes:
+        margins: distances in m that all robots keep in place of their own, such as
+            {"obstacle": 0.1, "robot": 0.3}.
+        skip_unreachable: plan without the goals that are proven out of reach.
         on_progress: receives how far planning has got.
         on_improvement: receives every plan that is better than all before it.
     """
+
+    margins: Margins | Mapping[str, float] | str
+    skip_unreachable: bool
 
     on_progress: Progress | None
     on_improvement: OnImprovement | None
@@ -56,11 +62,9 @@ def plan_mission(
     params: PlannerParams | None = None,
     planner: str | Planner | None = None,
     router: str | Router | None = None,
-    margins: Margins | Mapping[str, float] | str = STATES_NONE,
-    skip_unreachable: bool = False,
     workers: int = 1,
     with_bound: bool = False,
-    **callbacks: Unpack[Callbacks],
+    **options: Unpack[Options],
 ) -> PlanResult:
     """Plan a mission.
 
@@ -75,15 +79,14 @@ def plan_mission(
         params: parameters; the default profile's if None.
         planner: name of a planner, or one of your own; that of `params` if None.
         router: name of a router, or one of your own; that of `params` if None.
-        margins: distances in m that all robots keep in place of their own, such as
-            {"obstacle": 0.1, "robot": 0.3}.
-        skip_unreachable: plan without the goals that are proven out of reach; the plan
-            names them (`Plan.skipped`).
         workers: threads that make attempts.
         with_bound: bound the objective of all plans, too, beside the search; statistics
             of a plan then hold `bound_J` or `bound_s`, and `gap`.
-        **callbacks: `on_progress` receives how far planning has got, `on_improvement`
-            every plan that is better than all before it.
+        **options: `margins`, such as {"obstacle": 0.1, "robot": 0.3} in m, that all
+            robots keep in place of their own; `skip_unreachable` to plan without the
+            goals that are proven out of reach (`Plan.skipped`); `on_progress` receives
+            how far planning has got, `on_improvement` every plan that is better than
+            all before it.
 
     Raises:
         SceneError: if the scene has no robots.
@@ -92,21 +95,30 @@ def plan_mission(
         MachineError: if a planner or router of another package is broken.
     """
     require_robots(scene)
+    _require_known(options)
     if workers < 1:
         raise UsageError(f"workers = {workers}; planning needs at least 1")
     params, made_by, routed_by = _resolved(params, planner, router)
-    params = params.with_margins(margins_from(margins))
+    params = params.with_margins(margins_from(options.get("margins", STATES_NONE)))
     compile_kernels(params.planner)
 
     def plan(mission: Scene) -> PlanResult:
         request = Request(params=params, router=routed_by, seed=seed)
-        planning = _Planning(mission, made_by, request, workers, callbacks)
+        planning = _Planning(mission, made_by, request, workers, options)
         try:
             return planning.result(with_bound)
         finally:
             request.halt[0] = True  # nobody waits for what is still under way
 
-    return plan_reachable(scene, params.dt_s, plan) if skip_unreachable else plan(scene)
+    if options.get("skip_unreachable"):
+        return plan_reachable(scene, params.dt_s, plan)
+    return plan(scene)
+
+
+def _require_known(options: Mapping[str, object]) -> None:
+    for name in options:
+        if name not in Options.__optional_keys__:
+            raise TypeError(f"plan() takes no argument {name!r}")
 
 
 def _resolved(
@@ -145,7 +157,7 @@ class _Planning:
         planner: makes the attempts.
         request: that of the first attempt; its flag ends what is under way beside them.
         workers: threads that make attempts.
-        callbacks: of whoever waits.
+        options: what else is asked for.
         statistics: receives counts and times.
     """
 
@@ -153,7 +165,7 @@ class _Planning:
     planner: Planner
     request: Request
     workers: int
-    callbacks: Callbacks
+    options: Options
     statistics: Statistics = field(default_factory=Statistics)
 
     @property
@@ -229,8 +241,8 @@ class _Planning:
             params=self.params,
             statistics=self.statistics,
             workers=self.workers,
-            on_progress=self.callbacks.get("on_progress") or (lambda *_: None),
-            on_improvement=self.callbacks.get("on_improvement") or (lambda _: None),
+            on_progress=self.options.get("on_progress") or (lambda *_: None),
+            on_improvement=self.options.get("on_improvement") or (lambda _: None),
             proof=proof,
             preference=Preference.of(self.scene),
         )
