@@ -83,7 +83,10 @@ def main() -> int:
         and len(laws) >= LEAST_LAWS
     )
     print(f"\n{'PASS' if ok else 'FAIL'}: {len(runs)} runs, {len(laws)} laws")
-    written = [item.to_json() for item in found.runs]
+    written = [
+        {**row, "file": Path(row["file"])}
+        for row in (item.to_json() for item in found.runs)
+    ]
     write_document(options, "bench_logs", laws, ok, terrains=terrains, runs=written)
     return 0 if ok else 1
 

@@ -6,9 +6,9 @@ one JSON document when it is through:
 
 - `bench`: name of the tool;
 - `protocol`: the tool's options by their names (`seeds` one by one), and `versions` by
-  package, `machine`, `date`, `command`, `commit` (null outside a checkout; `-changed`
-  where files differ from it) and `state`, a fingerprint of code, models, scenes and
-  versions;
+  package, `machine`, its `load` (average of processes that want a core, over the last
+  5 min), `date`, `command`, `commit` (null outside a checkout; `-changed` where files
+  differ from it) and `state`, a fingerprint of code, models, scenes and versions;
 - `rows`: the rows of the table that it prints, numbers as numbers, null for none; a
   bench of several tables has one more key for each of the others;
 - `ok`: whether everything held; the exit code states the same.
@@ -188,6 +188,7 @@ def write_document(
         "versions": _versions(),
         "machine": cpu(),
         "date": datetime.now(UTC).date().isoformat(),
+        "load": os.getloadavg()[1],
         "command": _command(bench),
         "commit": commit(),
         "state": state(),

@@ -53,4 +53,5 @@ def test_a_document_names_its_command_and_no_place_of_the_machine(
     )
     assert reported["maps"] == ["../shared/maps/a map.txt"]
     assert str(map_file.parents[2]) not in found.read_text()
+    assert reported["load"] >= 0.0
     assert re.fullmatch(r"\d{4}-\d\d-\d\d", reported["date"])

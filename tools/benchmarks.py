@@ -1,0 +1,171 @@
+"""Make BENCHMARKS.md of stored results; with --run, run the benches that store them.
+
+Results are what benches write with --json: `tools/results/VERSION/NAME.json`, where
+`unreleased` is the version at work (a release renames that folder), and
+`tools/results/published.json` has figures of others with their sources. Each section of
+the page names the command, commit, date and machine of its result; every version is a
+row of its history. The page is a function of these files alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from benchmark_history import history
+from benchmark_tables import TABLES, Documents
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from packaging.version import Version
+
+TOOLS = Path(__file__).parent
+RESULTS = TOOLS / "results"
+PAGE = TOOLS.parent / "BENCHMARKS.md"
+UNRELEASED = "unreleased"
+
+SHIPPED = (
+    "quickstart scene1 scene2 scene3 scene4 scene5 scene6 scene6_r1 scene6_r2 "
+    "scene6_r6 scene6_r8 mixed diffdrive hills"
+)
+
+COMMANDS = {
+    "first_plans": "bench --seeds 0-49",
+    "bounds": "bench --bound --budget 30 --seeds 0-9",
+    "table_1": "bench --seeds 0-49 --profile default paper --energy paper",
+    "missions": f"bench --scenes {SHIPPED} --seeds 0-4 --execute",
+    "maps": "bench_maps",
+    "clmapf": "bench_clmapf --seeds 0-2",
+    "kinodynamic": "bench_kinodynamic",
+    "routing": "bench_routing",
+    "growth": "bench_growth --figure tools/pictures/growth.svg",
+    "physics": "bench_physics --disturb",
+    "controllers": "bench_controllers --trials 2",
+    "foreign_tyre": "bench_plant",
+    "energy_logs": "bench_logs",
+    "peers": "peers",
+} | {
+    f"nrpa_{depth}": "bench --scenes scene1 scene2 --seeds 1000-1009 --profile paper "
+    f"--energy paper --nrpa {depth}"
+    for depth in ("2x6", "2x12", "2x25", "2x50")
+}  # fmt: skip
+"""The whole bench of each result; what is stored may be a part of it."""
+
+
+def main() -> int:
+    """Make the page, or run benches; return the exit code of the last that failed."""
+    options = parse_options()
+    code = 0
+    for name in options.run or ():
+        target = RESULTS / UNRELEASED / f"{name}.json"
+        line = [*COMMANDS[name].split(), *options.arguments.split()]
+        print(f"tools/{' '.join(line)}", flush=True)
+        # The environment is there already, except that of the peers.
+        tool = (
+            ["tools/peers"]
+            if name == "peers"
+            else [sys.executable, f"tools/{line[0]}.py"]
+        )
+        call = [*tool, *line[1:], "--json", str(target)]
+        code = subprocess.run(call, cwd=TOOLS.parent, check=False).returncode or code
+    PAGE.write_text(page())
+    print(PAGE.name)
+    return code
+
+
+def parse_options() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__,
+        prog="tools/benchmarks",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--run", nargs="+", choices=COMMANDS, metavar="NAME",
+        help=f"results to measure anew: {', '.join(COMMANDS)}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--arguments",
+        default="",
+        metavar="TEXT",
+        help='more arguments of these benches, such as "--seeds 0-1" for a part',
+    )
+    return parser.parse_args()
+
+
+def versions() -> list[str]:
+    """Return the versions that have results, newest first."""
+    released = {path.name for path in RESULTS.iterdir() if path.is_dir()} - {UNRELEASED}
+    found = sorted(released, key=Version, reverse=True)
+    return [UNRELEASED, *found] if (RESULTS / UNRELEASED).is_dir() else found
+
+
+def read(version: str) -> Documents:
+    """Return the stored results of a version by name."""
+    files = sorted((RESULTS / version).glob("*.json"))
+    return {path.stem: json.loads(path.read_text()) for path in files}
+
+
+def page() -> str:
+    """Return the page of all stored results."""
+    names = versions()
+    stored = {name: read(name) for name in names}
+    documents: dict[str, Any] = {}
+    for name in reversed(names):  # what a version has not measured is of one before
+        documents |= stored[name]
+    published = json.loads((RESULTS / "published.json").read_text())
+    environment = Environment(
+        loader=FileSystemLoader(TOOLS),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    return environment.get_template("benchmarks.md.j2").render(
+        version=names[0],
+        documents=documents,
+        published=published,
+        machines=machines(documents),
+        stored=lambda *wanted: set(wanted) <= set(documents),
+        measured=partial(measured, documents),
+        table=lambda name: markdown(*TABLES[name](documents, published)),
+        history=lambda: markdown(*history(stored)),
+    )
+
+
+def machines(documents: Documents) -> list[str]:
+    """Return the distinct machines with versions that results were measured with."""
+    found = dict.fromkeys(
+        f"{each['protocol']['machine']}; "
+        + ", ".join(
+            f"{name} {number}"
+            for name, number in sorted(each["protocol"]["versions"].items())
+        )
+        for each in documents.values()
+        if "versions" in each["protocol"]
+    )
+    return list(found)
+
+
+def measured(documents: Documents, *names: str) -> str:
+    """Return the commands of results with commit and date."""
+    lines = []
+    for name in names:
+        of = documents[name]["protocol"]
+        made = [f"commit {of['commit']}", of["date"]]
+        made += [f"load {of['load']:.1f}"] if "load" in of else []
+        lines.append(f"`{of['command']}` ({', '.join(made)})")
+    return "; ".join(lines)
+
+
+def markdown(head: list[str], rows: list[list[Any]]) -> str:
+    """Return a table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
