@@ -13,12 +13,11 @@ import argparse
 import json
 import subprocess
 import sys
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
 
-from benchmark_history import history
-from benchmark_tables import TABLES, Documents
+from benchmark_history import HISTORY, Documents, Row, named, num
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from packaging.version import Version
 
@@ -111,12 +110,10 @@ def read(version: str) -> Documents:
 
 def page() -> str:
     """Return the page of all stored results."""
-    names = versions()
-    stored = {name: read(name) for name in names}
-    documents: dict[str, Any] = {}
-    for name in reversed(names):  # what a version has not measured is of one before
-        documents |= stored[name]
-    published = json.loads((RESULTS / "published.json").read_text())
+    stored = {version: read(version) for version in versions()}
+    documents: dict[str, Row] = {}
+    for each in reversed(stored.values()):  # newer results replace older ones
+        documents |= each
     environment = Environment(
         loader=FileSystemLoader(TOOLS),
         undefined=StrictUndefined,
@@ -124,34 +121,36 @@ def page() -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    return environment.get_template("benchmarks.md.j2").render(
-        version=names[0],
-        documents=documents,
-        published=published,
-        machines=machines(documents),
-        stored=lambda *wanted: set(wanted) <= set(documents),
-        measured=partial(measured, documents),
-        table=lambda name: markdown(*TABLES[name](documents, published)),
-        history=lambda: markdown(*history(stored)),
-    )
+    environment.globals |= {
+        "published": json.loads((RESULTS / "published.json").read_text()),
+        "versions": list(stored.items()),
+        "documents": documents,
+        "machines": machines(documents),
+        "stored": lambda *names: set(names) <= set(documents),
+        "measured": partial(measured, documents),
+        "history": HISTORY,
+        "num": num,
+        "named": named,
+        "ratio": ratio,
+        "causes": causes,
+    }
+    return environment.get_template("benchmarks.md.j2").render()
 
 
 def machines(documents: Documents) -> list[str]:
     """Return the distinct machines with versions that results were measured with."""
-    found = dict.fromkeys(
-        f"{each['protocol']['machine']}; "
-        + ", ".join(
-            f"{name} {number}"
-            for name, number in sorted(each["protocol"]["versions"].items())
-        )
-        for each in documents.values()
-        if "versions" in each["protocol"]
-    )
+    protocols = [each["protocol"] for each in documents.values()]
+    found = {
+        f"{of['machine']}; "
+        + ", ".join(f"{name} {it}" for name, it in sorted(of["versions"].items())): None
+        for of in protocols
+        if "versions" in of
+    }
     return list(found)
 
 
 def measured(documents: Documents, *names: str) -> str:
-    """Return the commands of results with commit and date."""
+    """Return the commands of results with commit, date and load."""
     lines = []
     for name in names:
         of = documents[name]["protocol"]
@@ -161,10 +160,17 @@ def measured(documents: Documents, *names: str) -> str:
     return "; ".join(lines)
 
 
-def markdown(head: list[str], rows: list[list[Any]]) -> str:
-    """Return a table."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
+def ratio(row: Row, name: str, decimals: int | None = None) -> str:
+    """Return a ratio with its interval, in three digits or so many decimals."""
+    numbers = [row[name], *row[f"{name}_interval"]]
+    shown = ".3g" if decimals is None else f".{decimals}f"
+    texts = [f"{number:{shown}}" for number in numbers if number is not None]
+    return texts[0] + f" [{', '.join(texts[1:])}]" * (len(texts) > 1) if texts else "-"
+
+
+def causes(failures: Mapping[str, int]) -> str:
+    """Return failures by cause."""
+    return ", ".join(f"{x.replace('_', ' ')}: {n}" for x, n in failures.items()) or "-"
 
 
 if __name__ == "__main__":
