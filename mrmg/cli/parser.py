@@ -226,9 +226,11 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
     roadmap.set_defaults(command=scene_commands.roadmap)
 
     schema = acts.add_parser("schema", help="print the JSON Schema of scene files")
-    schema.add_argument(
-        "--robot", action="store_true", help="print that of robot.yaml instead"
-    )
+    kinds = schema.add_mutually_exclusive_group()
+    for kind, what in (("robot", "robot.yaml"), ("campaign", "campaign files")):
+        kinds.add_argument(
+            f"--{kind}", action="store_true", help=f"print that of {what} instead"
+        )
     schema.set_defaults(command=scene_commands.schema)
 
     imported = import_options.add_import(acts)

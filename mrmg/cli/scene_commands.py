@@ -146,11 +146,13 @@ def roadmap(options: argparse.Namespace) -> int:
 
 
 def schema(options: argparse.Namespace) -> int:
-    """Print the JSON Schema of scene files or of robot models."""
+    """Print the JSON Schema of scene files, robot models or campaign files."""
     from mrmg.scene.loading import robot_schema, scene_schema
+    from mrmg.studies.campaigns.schema import campaign_schema
 
-    found = robot_schema() if options.robot else scene_schema()
-    print(json.dumps(found, indent=2))
+    found = robot_schema if options.robot else scene_schema
+    made = campaign_schema if options.campaign else found
+    print(json.dumps(made(), indent=2))
     return ExitCode.OK
 
 

@@ -52,6 +52,8 @@ VERBS = {
     "scene draw": "scene draw quickstart -o {new}.png",
     "scene roadmap": "scene roadmap quickstart -o {new}.graphml",
     "calibrate": "calibrate car -o {new}",
+    "campaign": "campaign {campaign} --out {new}",
+    "campaign in processes": "campaign {campaign} --workers 2 --out {new}",
     "doctor": "doctor",
 }
 ERRAND = """\
@@ -87,6 +89,8 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """One robot with one goal nearby, so that a run takes few seconds."""
     path = tmp_path_factory.mktemp("scene") / "short.yaml"
     path.write_text(ERRAND)
+    campaign = "scenes: short.yaml\nseeds: 0-5\ndisturbances: [none, default]\n"
+    path.with_name("campaign.yaml").write_text(campaign)
     return path
 
 
@@ -215,6 +219,7 @@ def words_of(scene: Path, reference: Path) -> Callable[[str, Path], list[str]]:
         if not run.exists():
             shutil.copytree(reference, run)
         places = {"scene": scene, "reference": reference, "new": folder / "new"}
+        places["campaign"] = scene.with_name("campaign.yaml")
         return VERBS[verb].format(run=run, **places).split()
 
     return words

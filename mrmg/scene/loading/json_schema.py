@@ -15,7 +15,7 @@ DIALECT = "http://json-schema.org/draft-07/schema#"
 
 def scene_schema() -> dict[str, Any]:
     """Return the format of scene files."""
-    schema = _schema(SceneDocument)
+    schema = schema_of(SceneDocument)
     # A file may leave its name out: it is then called after the file.
     schema["required"] = [key for key in schema["required"] if key != "name"]
     return schema
@@ -23,10 +23,11 @@ def scene_schema() -> dict[str, Any]:
 
 def robot_schema() -> dict[str, Any]:
     """Return the format of `robot.yaml`."""
-    return _schema(ModelDocument)
+    return schema_of(ModelDocument)
 
 
-def _schema(model: type[BaseModel]) -> dict[str, Any]:
+def schema_of(model: type[BaseModel]) -> dict[str, Any]:
+    """Return the format of files that a model reads."""
     schema: dict[str, Any] = _without_noise(model.model_json_schema())
     return {"$schema": DIALECT, **schema}
 

@@ -37,6 +37,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, Field
 
 from mrmg.runs import argument_values as values
+from mrmg.scene.loading.json_schema import schema_of
 from mrmg.scene.loading.shape_schema import NotNegative, Strict
 
 MOST_TRIALS = 1_000_000
@@ -66,28 +67,33 @@ def _scene(value: Any) -> Any:
     return {"scene": value} if isinstance(value, str) else value
 
 
-Names = Annotated[list[str], BeforeValidator(_listed), Field(min_length=1)]
+Names = Annotated[
+    list[str],
+    BeforeValidator(_listed, json_schema_input_type=str | list[str]),
+    Field(min_length=1),
+]
+SEED = "one seed for all trials, in place of each trial's"
 
 
 class PopulateEntry(Strict):
     """Robots, goals and stations that are placed on a map."""
 
-    robots: Count = 2
-    goals: Count = 14
-    stations: Count = 5
+    robots: Count = Field(default=2, description="how many, at least 1")
+    goals: Count = Field(default=14, description="how many, at least 1")
+    stations: Count = Field(default=5, description="how many, at least 1")
     model: str = Field(default="car", description="a shipped model, or a folder")
-    seed: Seed | None = None
+    seed: Seed | None = Field(default=None, description=SEED)
 
 
 class PerturbEntry(Strict):
     """How far what a scene has is moved."""
 
-    goals: NotNegative = Field(default=0.0, description="m")
-    stations: NotNegative = Field(default=0.0, description="m")
-    starts: NotNegative = Field(default=0.0, description="m")
-    headings: NotNegative = Field(default=0.0, description="degrees")
-    obstacles: NotNegative = Field(default=0.0, description="m")
-    seed: Seed | None = None
+    goals: NotNegative = Field(default=0.0, description="largest distance in m")
+    stations: NotNegative = Field(default=0.0, description="largest distance in m")
+    starts: NotNegative = Field(default=0.0, description="largest distance in m")
+    headings: NotNegative = Field(default=0.0, description="largest turn in degrees")
+    obstacles: NotNegative = Field(default=0.0, description="largest distance in m")
+    seed: Seed | None = Field(default=None, description=SEED)
 
 
 class SourceEntry(Strict):
@@ -98,19 +104,32 @@ class SourceEntry(Strict):
     change: dict[str, Any] | None = Field(
         default=None, description="keys of the scene file with other values"
     )
-    populate: PopulateEntry | None = None
-    perturb: PerturbEntry | None = None
+    populate: PopulateEntry | None = Field(
+        default=None, description="places a mission on the map, anew for each seed"
+    )
+    perturb: PerturbEntry | None = Field(
+        default=None, description="moves what the scene has, anew for each seed"
+    )
+
+
+Source = Annotated[
+    SourceEntry, BeforeValidator(_scene, json_schema_input_type=str | SourceEntry)
+]
 
 
 class CampaignDocument(Strict):
     """Factors of a campaign, with the values each of them takes."""
 
     scenes: Annotated[
-        list[Annotated[SourceEntry, BeforeValidator(_scene)]],
-        BeforeValidator(_listed),
+        list[Source],
+        BeforeValidator(_listed, json_schema_input_type=Source | list[Source]),
         Field(min_length=1),
     ] = Field(description="at least one scene")
-    seeds: Annotated[list[Seed], BeforeValidator(_seeds), Field(min_length=1)] = Field(
+    seeds: Annotated[
+        list[Seed],
+        BeforeValidator(_seeds, json_schema_input_type=int | str | list[Seed]),
+        Field(min_length=1),
+    ] = Field(
         default=[0], description="whole numbers of at least 0, or a range such as 0-49"
     )
     planners: Names = Field(default=["default"], description="names of planners")
@@ -121,5 +140,15 @@ class CampaignDocument(Strict):
         default=["none"], description="none, default, or as --disturb takes them"
     )
     parameters: dict[
-        str, Annotated[list[Any], BeforeValidator(_listed), Field(min_length=1)]
+        str,
+        Annotated[
+            list[Any],
+            BeforeValidator(_listed, json_schema_input_type=Any),
+            Field(min_length=1),
+        ],
     ] = Field(default={}, description="options of mrmg run, each with its values")
+
+
+def campaign_schema() -> dict[str, Any]:
+    """Return the format of campaign files as a JSON Schema, for editors."""
+    return schema_of(CampaignDocument)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import jsonschema
 import pytest
 
 from mrmg.errors import ExitCode, FileError
 from mrmg.studies.campaigns import read_campaign
+from mrmg.studies.campaigns.schema import CampaignDocument, campaign_schema
 
 ZOO = Path(__file__).parent / "bad"
 FILES = sorted(path.name for path in ZOO.glob("*.yaml"))
@@ -53,3 +55,19 @@ def test_a_trial_keeps_its_key_in_a_larger_campaign(tmp_path: Path) -> None:
     many = {trial.key for trial in read_campaign(file).trials}
     assert len(few) == 2
     assert few < many
+
+
+def test_the_schema_for_editors_takes_what_is_read() -> None:
+    schema = campaign_schema()
+    validator = jsonschema.validators.validator_for(schema)
+    validator.check_schema(schema)
+    good = [
+        {"scenes": "quickstart", "seeds": "0-3", "plants": ["default", "scrub"]},
+        {"scenes": ["a.yaml", {"scene": "b", "perturb": {"goals": 1}}], "seeds": [1]},
+        {"scenes": "a", "parameters": {"soc_margin": 0.1, "replan": [True, False]}},
+    ]
+    bad = [{"seeds": 1}, {"scenes": "a", "planner": "x"}, {"scenes": {"name": "a"}}]
+    assert [validator(schema).is_valid(each) for each in good] == [True] * 3
+    assert [validator(schema).is_valid(each) for each in bad] == [False] * 3
+    for each in good:
+        CampaignDocument.model_validate(each)
