@@ -170,6 +170,7 @@ def _of_drive(
         "reason": "; ".join([*broken, *account.reasons]),
         "causes": [*(["not verified"] if broken else []), *account.causes],
         "goals_visited": len(account.goals_visited),
+        "goals_skipped": len(plan.skipped),
         "cost_J": plan.cost_J,
         "makespan_s": plan.makespan_s,
         "metered_J": account.metered.total_J(),
@@ -203,7 +204,10 @@ def _planned(planning: _Planning) -> tuple[PlanResult, float]:
     began = time.perf_counter()
     arguments = planning.arguments
     found = plan_mission(
-        planning.scene, seed=arguments.seed, params=planner_params(arguments)
+        planning.scene,
+        seed=arguments.seed,
+        params=planner_params(arguments),
+        skip_unreachable=arguments.skip_unreachable,
     )
     return found, time.perf_counter() - began
 

@@ -71,3 +71,13 @@ def test_the_schema_for_editors_takes_what_is_read() -> None:
     assert [validator(schema).is_valid(each) for each in bad] == [False] * 3
     for each in good:
         CampaignDocument.model_validate(each)
+
+
+def test_an_unknown_parameter_is_refused_with_those_there_are(tmp_path: Path) -> None:
+    file = tmp_path / "sweep.yaml"
+    file.write_text("scenes: quickstart\nparameters: {sock_margin: 1}\n")
+    with pytest.raises(
+        FileError, match=r"line 2: .*did you mean 'soc_margin'"
+    ) as caught:
+        read_campaign(file)
+    assert all(name in str(caught.value) for name in ("budget_s", "replan", "battery"))
