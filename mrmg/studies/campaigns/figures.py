@@ -17,9 +17,9 @@ Row = Mapping[str, Any]
 
 RESULTS = (
     "status", "feasible", "causes", "reason", "goals", "goals_visited", "goals_skipped",
-    "cost_J", "makespan_s", "duration_s", "metered_J", "measured_J", "measured_error_pct",
-    "charge_fraction", "obstacle_clearance_m", "robot_distance_m", "tracking_max_m",
-    "contacts", "recharges", "replans", "plan_digest", "log_digest",
+    "cost_J", "makespan_s", "duration_s", "metered_J", "measured_J",
+    "measured_error_pct", "charge_fraction", "obstacle_clearance_m", "robot_distance_m",
+    "tracking_max_m", "contacts", "recharges", "replans", "plan_digest", "log_digest",
 )  # fmt: skip
 """Columns of a table after those of the factors."""
 
