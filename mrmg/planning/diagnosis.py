@@ -19,12 +19,17 @@ from mrmg.planning.bound.joint_bound import Divisions
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.bound.tour_existence import NoTours, proof_of_no_tours
 from mrmg.planning.endings import counted, listed
-from mrmg.planning.feasibility import energy_and_metres, proof_of_infeasibility
+from mrmg.planning.feasibility import (
+    energy_and_metres,
+    proof_of_infeasibility,
+    widest_gap,
+)
 from mrmg.planning.halting import NEVER, Halted
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following.strategy import easiest
 from mrmg.planning.preference import TIME_MARGIN_S
-from mrmg.planning.problem.problem import Problem, unjoined_goals
+from mrmg.planning.problem.openings import passages_missing
+from mrmg.planning.problem.problem import Problem, unjoined_goals, unjoined_places
 from mrmg.planning.problem.targets import finish_of
 from mrmg.planning.roadmap.roadmap import Roadmap
 from mrmg.planning.routing.shortfall import shortfall
@@ -95,9 +100,14 @@ def _sentence(scene: Scene, proof: NoTours) -> str:
     """Return the reason that a proof gives."""
     names = [goal.id for goal in scene.goals]
     if proof.unreachable:
-        return endings.GOAL_CUT_OFF.reason(goal=names[proof.unreachable[0]])
+        goal = scene.goals[proof.unreachable[0]]
+        gap = widest_gap(scene, scene.robots, goal.region)
+        return endings.GOAL_CUT_OFF.reason(goal=goal.id, gap=gap)
     if proof.cut_off:
-        return endings.FINISH_CUT_OFF.reason(robot=scene.robots[proof.cut_off[0]].id)
+        robot = scene.robots[proof.cut_off[0]]
+        assert robot.finish is not None
+        gap = widest_gap(scene, [robot], robot.finish.region)
+        return endings.FINISH_CUT_OFF.reason(robot=robot.id, gap=gap)
     if proof.homeless:
         robot = scene.robots[proof.homeless[0]]
         more = _more_energy(robot, proof.share)
@@ -182,8 +192,9 @@ def _obstacle(
     scene, roadmap = problem.scene, problem.roadmap
     unjoined = unjoined_goals(scene, roadmap) + _unjoined_finishes(scene, roadmap)
     if unjoined:
+        passages = passages_missing(scene, params.margins, unjoined_places(problem))
         return endings.NO_PATH.reason(
-            places=listed(unjoined), margin_m=params.obstacle_margin_m or 0.25
+            places=listed(unjoined), passages="; ".join(passages)
         )
     if not search.tours_found:
         return _missing_tours(problem, params, seed)

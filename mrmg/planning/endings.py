@@ -40,7 +40,7 @@ GOAL_CUT_OFF = Ending(
     "a goal is cut off",
     PlanStatus.INFEASIBLE,
     "goal {goal} is unreachable: for every robot it is cut off from the start by "
-    "obstacles with no gap as wide as the robot",
+    "obstacles with no gap as wide as the robot{gap}",
 )
 GOAL_OUT_OF_ENERGY = Ending(
     "a goal is out of every battery's reach",
@@ -53,7 +53,7 @@ FINISH_CUT_OFF = Ending(
     "a finish is cut off",
     PlanStatus.INFEASIBLE,
     "the finish of {robot} is unreachable: it is cut off from the start by obstacles "
-    "with no gap as wide as the robot",
+    "with no gap as wide as the robot{gap}",
 )
 FINISH_OUT_OF_ENERGY = Ending(
     "a finish is out of its battery's reach",
@@ -91,8 +91,7 @@ NO_TIMELY_TOURS = Ending(
 NO_PATH = Ending(
     "the roadmap finds no path",
     PlanStatus.NO_PLAN_FOUND,
-    "the roadmap found no path to {places}, and no proof that there is none; its paths "
-    "keep {margin_m:g} m between a robot and every obstacle",
+    "no path was found to {places}, and no proof that there is none: {passages}",
 )
 NO_TOURS_FOUND = Ending(
     "the router finds no tours",

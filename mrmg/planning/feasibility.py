@@ -23,6 +23,7 @@ from mrmg.planning.endings import (
     GOAL_OUT_OF_ENERGY,
     listed,
 )
+from mrmg.planning.free_ground import FreeGround, bottleneck
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.path_bounds import Walls, outer_polygon, shortest_way_m
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
@@ -136,10 +137,39 @@ def _reaches(scene: Scene, halt: np.ndarray = NEVER) -> list[_Reach]:
 def _cut_off(scene: Scene, reaches: Sequence[_Reach]) -> dict[str, str]:
     """Return the goals that no robot of a fleet gets into, as far as obstacles go."""
     return {
-        goal.id: GOAL_CUT_OFF.reason(goal=goal.id)
+        goal.id: GOAL_CUT_OFF.reason(
+            goal=goal.id, gap=widest_gap(scene, scene.robots, goal.region)
+        )
         for goal in scene.goals
         if reaches and not any(reach.is_connected(goal.region) for reach in reaches)
     }
+
+
+def widest_gap(scene: Scene, robots: Sequence[Robot], region: Region) -> str:
+    """Return in words how wide the widest gap on the way to a region is, and where.
+
+    Args:
+        scene: the mission.
+        robots: that cannot get there; the one that lacks least is named.
+        region: where they are to get.
+    """
+    wanted = outer_polygon(region)
+    kinds = {(robot.model.name, robot.pose): robot for robot in robots}
+    found: list[tuple[float, str]] = []
+    for robot in [*kinds.values()][:MOST_LOOKED_AT]:
+        half_m = robot.model.half_width_m
+        start, ground = Point(*robot.pose[:2]), FreeGround.of(scene, robot)
+        gap = bottleneck(ground, start, wanted, half_m)
+        if gap is not None and gap.width_m < 2.0 * half_m:
+            text = f"the widest one is {gap}, {robot.id} is {2.0 * half_m:.2f} m wide"
+            found.append((2.0 * half_m - gap.width_m, text))
+        elif gap is not None:
+            return ""
+    return f": {min(found)[1]}" if found else ": there is none at all"
+
+
+MOST_LOOKED_AT = 4
+"""Robots for which gaps are measured at most."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +219,8 @@ def _unreachable_finish(scene: Scene) -> str | None:
         if robot.finish and not _Reach.of(scene, robot).is_connected(
             robot.finish.region
         ):
-            return FINISH_CUT_OFF.reason(robot=robot.id)
+            gap = widest_gap(scene, [robot], robot.finish.region)
+            return FINISH_CUT_OFF.reason(robot=robot.id, gap=gap)
     return None
 
 

@@ -195,7 +195,13 @@ class _Planning:
         if best is None:
             proof = search.proof(search.tours_missing)
             why = self._in_time(
-                partial(why_no_plan, problem, self.params, self.request.seed, search)
+                partial(
+                    why_no_plan,
+                    replace(problem, scene=self.scene),
+                    self.params,
+                    self.request.seed,
+                    search,
+                )
             )
             return self._unsolved(proof, why or why_in_short(self.params, search))
         if bounding is not None:

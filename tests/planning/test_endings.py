@@ -146,7 +146,11 @@ ROWS = (
         },
         ("13 s",),
     ),
-    Row(endings.NO_PATH, {"obstacles": wall_with_gap(1.2)}, ("to g", "0.25 m")),
+    Row(
+        endings.NO_PATH,
+        {"obstacles": wall_with_gap(1.2)},
+        ("to g", "1.20 m wide near (15.0, 10.0)", "r1"),
+    ),
     Row(
         endings.NO_TOURS_FOUND,
         {

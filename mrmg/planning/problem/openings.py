@@ -1,23 +1,18 @@
 """Openings: passages that only a smaller margin opens, and where that margin counts.
 
-A robot is taken for a disc as wide as itself about its reference point, and its free
-ground for what is left of the map without obstacles grown by some clearance. Ground
-that is lost between a small clearance and a large one, and does not come back when the
-rest is grown again (a morphological opening), is narrow. Of its pieces those count that
-lie on the way to a target that there is no wide way to.
+Of the narrow places of a map (`free_ground`) those count that lie on the way to a
+target that there is no wide way to.
 """
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
-import shapely
 from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
+from mrmg.planning.free_ground import FreeGround, bottleneck
 from mrmg.planning.problem.targets import TARGET_MARGIN_M
 from mrmg.planning.roadmap.fleet import PASSAGE_SLACK_M, margins_of
 from mrmg.scene.margins import Margins, certified_minimum_m
@@ -34,132 +29,17 @@ planned motions stray from its middle."""
 RASTER_SHARE = 0.6
 """Share of a cell by which distances between cells are read too small, at most."""
 
-WIDTH_ACCURACY_M = 0.002
-"""How exactly the clearance of the widest way is found [m]."""
-
-JOINED_M = 0.01
-"""Distance of two pieces of ground below which they touch."""
-
 LEAST_CELL_M = 0.05
 """Side of the cells of the distance field of a map with openings [m]."""
 
 MOST_CELLS = 4_000_000
 """Cells of a distance field at most."""
 
-LEAST_AREA_M2 = 1e-4
-"""Area of narrow ground below which it is rounding."""
-
-
-@dataclass(frozen=True)
-class FreeGround:
-    """Where the middle of a disc may be among some obstacles.
-
-    Attributes:
-        bounds: of the map [m].
-        obstacles: their union.
-    """
-
-    bounds: tuple[float, float, float, float]
-    obstacles: BaseGeometry
-    _known: dict[tuple[float, ...], list[BaseGeometry]] = field(default_factory=dict)
-
-    @staticmethod
-    def of(scene: Scene, robot: Robot) -> FreeGround:
-        """Return the ground of the obstacles that stop a robot."""
-        shapes = [item.shape for item in scene.barriers if item.stops(robot.id)]
-        return FreeGround(scene.bounds, shapely.union_all(shapes))
-
-    def pieces(self, clearance_m: float) -> list[BaseGeometry]:
-        """Return the pieces of ground at least so far from obstacles and bounds."""
-        key = (clearance_m,)
-        if key not in self._known:
-            x_min, y_min, x_max, y_max = self.bounds
-            inner = shapely.box(
-                x_min + clearance_m,
-                y_min + clearance_m,
-                max(x_max - clearance_m, x_min + clearance_m),
-                max(y_max - clearance_m, y_min + clearance_m),
-            )
-            free = inner.difference(self.obstacles.buffer(clearance_m))
-            self._known[key] = [one for one in shapely.get_parts(free) if one.area > 0]
-        return self._known[key]
-
-    def reaches(self, start: Point, wanted: BaseGeometry, clearance_m: float) -> bool:
-        """Return whether a way of so much clearance leads from a start to a region.
-
-        The start itself may lie closer to an obstacle, but not across one.
-        """
-        return any(
-            piece.distance(start) < clearance_m and piece.intersects(wanted)
-            for piece in self.pieces(clearance_m)
-        )
-
-    def widest_m(self, start: Point, wanted: BaseGeometry, high_m: float) -> float:
-        """Return the clearance of the widest way, at most `high_m`; 0 without a way."""
-        low_m = 0.0
-        if self.reaches(start, wanted, high_m):
-            return high_m
-        while high_m - low_m > WIDTH_ACCURACY_M:
-            middle_m = 0.5 * (low_m + high_m)
-            if self.reaches(start, wanted, middle_m):
-                low_m = middle_m
-            else:
-                high_m = middle_m
-        return low_m
-
-    def narrows(
-        self, start: Point, wanted: BaseGeometry, narrow_m: float, wide_m: float
-    ) -> list[BaseGeometry]:
-        """Return the narrow ground on the way of fewest narrow pieces to a region.
-
-        Args:
-            start: where the way begins.
-            wanted: region that is reached with a clearance of `narrow_m`.
-            narrow_m: clearance from which on ground counts.
-            wide_m: clearance from which on it is wide.
-        """
-        key = (narrow_m, wide_m)
-        wide = [one.buffer(wide_m - narrow_m) for one in self.pieces(wide_m)]
-        if key not in self._known:
-            ground = shapely.union_all(self.pieces(narrow_m))
-            left = ground.difference(shapely.union_all(wide)) if wide else ground
-            parts = shapely.get_parts(left)
-            self._known[key] = [one for one in parts if one.area > LEAST_AREA_M2]
-        narrow = self._known[key]
-        nodes = [*narrow, *wide]
-        first = [i for i, node in enumerate(nodes) if node.distance(start) < narrow_m]
-        last = {i for i, node in enumerate(nodes) if node.intersects(wanted)}
-        way = _fewest(nodes, len(narrow), first, last)
-        return [nodes[i] for i in way if i < len(narrow)]
-
 
 def entered(region: Region) -> BaseGeometry:
     """Return where a region counts as entered for planning."""
     inner = region.shape.buffer(-TARGET_MARGIN_M, join_style="mitre")
     return region.shape.centroid if inner.is_empty else inner
-
-
-def _fewest(
-    nodes: Sequence[BaseGeometry], narrow: int, first: Sequence[int], last: set[int]
-) -> list[int]:
-    """Return the nodes on a way with the fewest narrow ones; the first are narrow."""
-    tree = shapely.STRtree(nodes)
-    before = dict.fromkeys(first, -1)
-    waiting = deque(sorted(first, reverse=True))  # wide ones come last: take them first
-    while waiting:
-        node = waiting.popleft()
-        if node in last:
-            way = []
-            while node >= 0:
-                way.append(node)
-                node = before[node]
-            return way
-        near = tree.query(nodes[node], predicate="dwithin", distance=JOINED_M)
-        for other in sorted(near.tolist()):
-            if other not in before:
-                before[other] = node
-                (waiting.append if other < narrow else waiting.appendleft)(other)
-    return []
 
 
 def openings_to(
@@ -245,3 +125,44 @@ def _openings(
                     robot=number,
                 )
             return
+
+
+def passages_missing(
+    scene: Scene, margins: Margins, wanted: Sequence[tuple[int, Region]]
+) -> list[str]:
+    """Return in words what keeps robots from regions: passages, how wide and where.
+
+    Args:
+        scene: the mission.
+        margins: stated for all robots.
+        wanted: numbers of robots, and regions that they know no path to; of each region
+            the robot that lacks least is named.
+    """
+    least: dict[int, tuple[float, str]] = {}
+    for number, region in wanted[:MOST_MEASURED]:
+        robot = scene.robots[number]
+        ground = FreeGround.of(scene, robot)
+        start = Point(*robot.pose[:2])
+        kept_m = least_margin_m(robot, margins_of(robot, margins)[0])
+        needed_m = clearance_needed_m(robot, kept_m)
+        gap = bottleneck(ground, start, entered(region), needed_m)
+        if gap is None:
+            lacking_m, text = 2.0 * needed_m, f"there is no way at all for {robot.id}"
+        elif gap.width_m >= 2.0 * needed_m:
+            lacking_m = 0.0
+            text = f"{robot.id} has ways wide enough that no samples of the map joined"
+        else:
+            lacking_m = 2.0 * needed_m - gap.width_m
+            text = (
+                f"the widest way of {robot.id} leads through a passage {gap}, and it "
+                f"needs {2.0 * needed_m:.2f} m: its width of "
+                f"{2.0 * robot.model.half_width_m:.2f} m, and on each side a margin of "
+                f"at least {kept_m:.3f} m and {STEERING_M:g} m to steer"
+            )
+        known = least.get(id(region), (np.inf, ""))
+        least[id(region)] = min(known, (lacking_m, text))
+    return [*dict.fromkeys(text for _, text in least.values())]
+
+
+MOST_MEASURED = 8
+"""Ways that are measured at most."""

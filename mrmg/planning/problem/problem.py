@@ -250,7 +250,7 @@ def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
     """
     world = World.from_scene(scene, cell_m=cell_m(scene, params.margins))
     problem = _joined(scene, seed, params, world, ROADMAPS)
-    openings = openings_to(scene, params.margins, _unjoined(scene, problem.roadmap))
+    openings = openings_to(scene, params.margins, unjoined_places(problem))
     if not openings:
         return problem
     fine_m = cell_m(scene, params.margins, LEAST_CELL_M)
@@ -284,9 +284,10 @@ def _joined(
     return state_problem(scene, world, roadmap, params)
 
 
-def _unjoined(scene: Scene, roadmap: Roadmap) -> list[tuple[int, Region]]:
+def unjoined_places(problem: Problem) -> list[tuple[int, Region]]:
     """Return robots and regions they may have to get to, but know no path to."""
-    joined = np.isfinite(roadmap.start_distance)
+    scene = problem.scene
+    joined = np.isfinite(problem.roadmap.start_distance)
     regions, finish = planned_regions(scene), finish_of(scene)
     robots = range(len(scene.robots))
     shared = range(len(scene.targets()))
