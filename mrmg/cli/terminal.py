@@ -206,6 +206,8 @@ def _summary_lines(summary: dict[str, Any]) -> Iterator[str]:
             f"planned in {plan['time_s']['total']:.2f} s"
         )
         yield f"quality    {quality(plan)}"
+        for sentence in plan.get("margins_kept", ()):
+            yield f"margins    {sentence}"
         if plan.get("iteration_cap"):
             yield f"search     {iterations(plan)}"
     for hint in summary.get("hints", ()):

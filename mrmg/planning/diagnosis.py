@@ -25,6 +25,7 @@ from mrmg.planning.feasibility import (
     widest_gap,
 )
 from mrmg.planning.halting import NEVER, Halted
+from mrmg.planning.meetings import narrowest_meeting
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following.strategy import easiest
 from mrmg.planning.preference import TIME_MARGIN_S
@@ -32,7 +33,8 @@ from mrmg.planning.problem.openings import passages_missing
 from mrmg.planning.problem.problem import Problem, unjoined_goals, unjoined_places
 from mrmg.planning.problem.targets import finish_of
 from mrmg.planning.roadmap.roadmap import Roadmap
-from mrmg.planning.routing.shortfall import shortfall
+from mrmg.planning.routing.routing import solve_routing
+from mrmg.planning.routing.shortfall import MAX_SHARE, shortfall
 from mrmg.planning.search import Search
 from mrmg.planning.statistics import Statistics
 from mrmg.plans import PlanStatus
@@ -205,10 +207,18 @@ def _obstacle(
             limit_s=scene.time_limit_s,
             margin_s=TIME_MARGIN_S,
         )
+    routing = solve_routing(
+        easiest(problem, params).mission.routing,
+        params.router,
+        seeding.stream_seed(seed, "meeting"),
+    )
+    blocked = [search.blocked] if search.blocked else []
+    if any(routing.tours) or not blocked:
+        blocked.append(narrowest_meeting(problem, routing.tours))
     rounds = search.statistics.counts.get("coordinated", 0)
     searched = f", and {counted(rounds, 'search')} for motions found none"
     return endings.NO_PROGRESS.reason(
-        blocked=search.blocked or "no motions were found that do not meet",
+        blocked="; ".join(blocked),
         searched=searched if rounds else "",
     )
 
@@ -231,9 +241,34 @@ def _missing_tours(problem: Problem, params: PlannerParams, seed: int) -> str:
         more = _more_energy(robot, missing.battery_share)
         remedy = f"they need batteries with about {more}"
         if math.isinf(missing.battery_share):
-            remedy = "larger batteries do not help"
+            remedy = _no_battery_helps(scene)
+    remedy = "; ".join([remedy, *_stations_missing(problem, params)])
     if math.isinf(scene.time_limit_s):
         return endings.NO_TOURS_FOUND.reason(left_out=left_out, remedy=remedy)
     return endings.NO_TOURS_IN_TIME.reason(
         limit_s=scene.time_limit_s, left_out=left_out, remedy=remedy
     )
+
+
+def _no_battery_helps(scene: Scene) -> str:
+    """Return why batteries of many times the capacity do not help, in words."""
+    empty = [
+        robot.id
+        for robot in scene.robots
+        if robot.battery.start_J <= robot.battery.reserve_J
+    ]
+    if empty:
+        return f"{listed(empty)} start with no energy above the reserve"
+    return f"not even {1.0 + MAX_SHARE:.0f} times the usable energy is enough"
+
+
+def _stations_missing(problem: Problem, params: PlannerParams) -> list[str]:
+    """Return in words which stations no path leads to, and why."""
+    scene, goals = problem.scene, len(problem.scene.goals)
+    joined = np.isfinite(problem.roadmap.start_distance).any(axis=0)
+    missing = [s for t, s in enumerate(scene.stations, goals) if not joined[t]]
+    if not missing:
+        return []
+    wanted = [(r, s.region) for s in missing for r in range(len(scene.robots))]
+    why = "; ".join(passages_missing(scene, params.margins, wanted))
+    return [f"no path was found to {listed([s.id for s in missing])}: {why}"]

@@ -87,6 +87,17 @@ class Frame:
         # -0.0 and 0.0 would be different bits.
         return np.round(np.stack(moved, axis=1), DECIMALS) + 0.0
 
+    def on_the_map(self, point: tuple[float, float]) -> tuple[float, float]:
+        """Return where a point of the frame is on the map [m]."""
+        x_min, y_min, x_max, y_max = self.bounds
+        across, up = point
+        return (
+            (across + x_min, up + y_min),
+            (up + x_min, y_max - across),
+            (x_max - across, y_max - up),
+            (x_max - up, across + y_min),
+        )[self.quarters]
+
     def heading(self, yaw: float) -> float:
         """Return the heading in the frame that is `yaw` on the map [rad]."""
         turned = yaw + 0.5 * pi * self.quarters

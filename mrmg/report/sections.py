@@ -9,6 +9,7 @@ from mrmg.energy.model import PARTS
 from mrmg.plans import Plan
 from mrmg.report.page import elements as html
 from mrmg.runs.record import RunRecord
+from mrmg.scene.margins import sentences_on_margins
 from mrmg.scene.types import Scene
 from mrmg.viz.activities import lengths_along, shown_motions, standing_of
 from mrmg.viz.style import terrain_classes
@@ -223,6 +224,9 @@ def checks(record: RunRecord) -> list[str]:
             contacts = str(len(log.contacts)) if log.contacts else "none"
             rows.append(["Contacts in the simulation", contacts])
         parts.append(html.table(["Check", "Result"], rows))
+        if record.plan is not None:
+            kept = sentences_on_margins(record.scene.robots, record.plan.margins)
+            parts.append(html.bullets([f"Margins kept by {one}" for one in kept]))
         parts.append(html.bullets(_shortened([v.message for v in verdict.violations])))
     if audit is not None:
         parts.append(html.bullets(_shortened(list(audit.reasons))))

@@ -17,6 +17,7 @@ from mrmg import storage
 from mrmg.energy.audit_record import ENERGY_IMBALANCE, MODEL_MISMATCH, EnergyAudit
 from mrmg.errors import Fault, RunFolderError
 from mrmg.plans import Plan, PlanStatus
+from mrmg.scene.margins import sentences_on_margins
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, log_in_force, require_same_mission
 from mrmg.verification.verdict import Verdict
@@ -138,6 +139,7 @@ def _plan_figures(
             robot: {"obstacle_m": obstacle_m, "robot_m": robot_m}
             for robot, (obstacle_m, robot_m) in plan.margins.items()
         },
+        "margins_kept": sentences_on_margins(scene.robots, plan.margins),
         "narrow_passages": [asdict(passage) for passage in plan.narrow],
         "improvements": list(statistics.get("improvements", [])),
         "path_following_plans": statistics.get(

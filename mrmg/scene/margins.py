@@ -10,6 +10,7 @@ tracking error without disturbances (`mrmg.planning.problem.openings`).
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
@@ -168,20 +169,39 @@ def kept_margins(robot: Robot) -> Margins:
     return stated.over(default_margins(robot.model))
 
 
-def source_of_margins(model: RobotModel, stated: Margins) -> str:
-    """Return in words where a robot's margins come from.
+def source_of_margins(model: RobotModel, obstacle_m: float) -> str:
+    """Return in words where a robot's margin from obstacles comes from.
 
     Args:
         model: of the robot.
-        stated: margins of its entry or of the fleet.
+        obstacle_m: the margin.
     """
-    named = stated.over(model.margins)
-    if named.obstacle_m is not None and named.robot_m is not None:
+    if obstacle_m != default_margins(model).obstacle_m:
         return "as stated"
     error = f"tracking error of {tracking_error(model).disturbed_m:.3f} m"
     shown = f"that {model.name} has shown in MuJoCo under default disturbances"
     if model.tracking_error is None:
         shown = f"assumed for {model.name} by its top speed, as nobody measured it"
     limits = f"{LEAST_DEFAULT_M:g} to {MOST_DEFAULT_M:g} m"
-    default = f"{ERRORS_KEPT:g} times the {error} {shown}, within {limits}"
-    return f"{default}; twice that between robots"
+    return f"by default: {ERRORS_KEPT:g} times the {error} {shown}, within {limits}"
+
+
+def sentences_on_margins(
+    robots: Sequence[Robot], kept: Mapping[str, tuple[float, float]]
+) -> list[str]:
+    """Return which robots keep which margins, and why, one sentence for equal ones.
+
+    Args:
+        robots: of the scene.
+        kept: distances from obstacles and from other robots by the robots' ids [m].
+    """
+    found: dict[str, list[str]] = {}
+    for robot in robots:
+        if robot.id in kept:
+            obstacle_m, robot_m = kept[robot.id]
+            margins = (
+                f"{obstacle_m:g} m from obstacles, {robot_m:g} m from other robots"
+            )
+            source = source_of_margins(robot.model, obstacle_m)
+            found.setdefault(f"{margins} ({source})", []).append(robot.id)
+    return [f"{', '.join(ids)}: {text}" for text, ids in found.items()]

@@ -28,6 +28,13 @@ _CROSS: Any = {
     "markeredgecolor": "white",
 }
 
+_NARROW: Any = {
+    "marker": "D",
+    "markersize": 6,
+    "markerfacecolor": "none",
+    "markeredgecolor": style.RESERVE,
+}
+
 
 def draw_overview(
     scene: Scene,
@@ -72,6 +79,8 @@ def draw_mission(
             _draw_path(axes, state, colors[robot], style.DRIVEN, 4.4)
         _draw_contacts(axes, log)
     _draw_targets(axes, scene, plan)
+    if plan is not None:
+        _draw_narrow(axes, plan)
     scene_drawing.draw_robots(axes, scene)
     handles = _legend(scene, plan, log)
     scene_drawing.add_legend(axes, handles)
@@ -121,6 +130,23 @@ def _draw_arrows(axes: Axes, state: np.ndarray, color: str) -> None:
 def _draw_contacts(axes: Axes, log: ExecutionLog) -> None:
     for contact in log.contacts:
         _draw_cross(axes, contact.x_m, contact.y_m)
+
+
+def _draw_narrow(axes: Axes, plan: Plan) -> None:
+    """Mark where robots keep less than their margins, with what they keep."""
+    for one in plan.narrow:
+        axes.plot(one.x_m, one.y_m, zorder=9, **_NARROW)
+        axes.annotate(
+            f"{one.margin_m:.2f} m",
+            (one.x_m, one.y_m),
+            xytext=(0.0, 9.0),
+            textcoords="offset points",
+            ha="center",
+            fontsize=7,
+            color=style.INK,
+            zorder=9,
+            path_effects=[withStroke(linewidth=2.5, foreground="white")],
+        )
 
 
 def _draw_cross(axes: Axes, x_m: float, y_m: float) -> None:
@@ -220,6 +246,9 @@ def _legend(
         for label, shown in crosses.items()
         if shown
     ]
+    if plan is not None and plan.narrow:
+        label = "less than the margin kept"
+        handles.append(Line2D([], [], linestyle="none", label=label, **_NARROW))
     return handles + scene_drawing.map_legend(scene)
 
 

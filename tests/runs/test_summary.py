@@ -28,6 +28,7 @@ SECTIONS = {
         "time_limit_s",
         "objective",
         "margins",
+        "margins_kept",
         "narrow_passages",
         "improvements",
         "path_following_plans",

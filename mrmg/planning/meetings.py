@@ -1,0 +1,89 @@
+"""Where robots get in each other's way: the narrowest place that two paths share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+import shapely
+
+from mrmg.planning.endings import listed
+from mrmg.planning.frame import Frame
+from mrmg.planning.problem.problem import Problem
+
+MOST_ROBOTS = 40
+"""Robots whose paths are compared at most."""
+
+SPACING_M = 0.2
+"""Distance of the points of paths that are looked at [m]."""
+
+
+def narrowest_meeting(problem: Problem, tours: Sequence[Sequence[int]]) -> str:
+    """Return which robots' ways meet where there is least room, in words.
+
+    Args:
+        problem: the mission as it lies, with arrays in its frame.
+        tours: numbers of each robot's targets, without finishes.
+    """
+    scene = problem.scene
+    finish = problem.mission.targets.finish
+    paths = [
+        _points(problem.path(r, [*tour, *[int(finish[r])] * int(finish[r] >= 0)]))
+        for r, tour in enumerate(tours)
+    ]
+    names = [robot.id for robot in scene.robots]
+    found: list[tuple[float, tuple[int, ...], tuple[float, ...]]] = []
+    for one, other in combinations(range(min(len(paths), MOST_ROBOTS)), 2):
+        lines = [shapely.MultiPoint(paths[r]) for r in (one, other)]
+        reach_m = _apart_m(problem, one, other)
+        if lines[0].distance(lines[1]) < reach_m:
+            far = shapely.distance(shapely.points(paths[one]), lines[1])
+            for point in paths[one][far < reach_m]:
+                width_m = _width_m(problem, one, point)
+                found.append((width_m, (one, other), tuple(point)))
+    if found:
+        width_m, pair, at = min(found)
+        who = " and ".join(names[r] for r in pair)
+        what = f"the ways of {who} meet"
+    else:
+        moving = [r for r, path in enumerate(paths) if len(path) > 1]
+        found = [
+            (_width_m(problem, r, point), (r,), tuple(point))
+            for r in moving
+            for point in paths[r]
+        ]
+        if not found:
+            return f"no motions were found of {listed(names)}"
+        width_m, pair, at = min(found)
+        what = f"the narrowest place on the way of {names[pair[0]]} is"
+    x, y = Frame.of(scene).on_the_map((at[0], at[1]))
+    return f"{what} near ({x:.1f}, {y:.1f}), where it is {width_m:.2f} m wide"
+
+
+def _points(path: np.ndarray) -> np.ndarray:
+    if len(path) < 2:
+        return path
+    line = shapely.segmentize(shapely.LineString(path), SPACING_M)
+    return np.asarray(shapely.get_coordinates(line))
+
+
+def _apart_m(problem: Problem, one: int, other: int) -> float:
+    """Return how far apart two robots' paths must be not to matter to each other."""
+    fleet, robots = problem.mission.fleet, problem.scene.robots
+    spacing_m = float(max(fleet["spacing"][one], fleet["spacing"][other]))
+    widths_m = [robots[r].model.half_width_m for r in (one, other)]
+    return sum(widths_m) + spacing_m
+
+
+def _width_m(problem: Problem, r: int, point: np.ndarray) -> float:
+    """Return the width of the ground about a point, without allowances."""
+    spaces = problem.mission.spaces
+    index = problem.mission.fleet[r]["space"]
+    distance = spaces.distance[index]
+    at = ((point - (spaces.x_min, spaces.y_min)) / spaces.cell).astype(int)
+    column, row = np.clip(at, 0, np.array(distance.shape)[::-1] - 1)
+    raised_m = 0.0
+    if spaces.allowance.size and spaces.allowance[index, row, column] >= 0.0:
+        raised_m = spaces.guide + spaces.allowance[index, row, column]
+    return 2.0 * max(0.0, float(distance[row, column]) - raised_m)
