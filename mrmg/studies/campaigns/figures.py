@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 Row = Mapping[str, Any]
 
 RESULTS = (
-    "status", "feasible", "causes", "reason", "goals", "goals_visited", "goals_skipped",
-    "cost_J", "makespan_s", "duration_s", "metered_J", "measured_J",
+    "status", "feasible", "causes", "reason", "goals_total", "goals_visited",
+    "goals_skipped", "cost_J", "makespan_s", "duration_s", "metered_J", "measured_J",
     "measured_error_pct", "charge_fraction", "obstacle_clearance_m", "robot_distance_m",
     "tracking_max_m", "contacts", "recharges", "replans", "plan_digest", "log_digest",
 )  # fmt: skip

@@ -30,14 +30,15 @@ from mrmg.studies.campaigns.trial import TrialOrder
 
 DEFAULT, UNDISTURBED = "default", "none"
 
-_OWN_KEYS = {
+_METHODS = {
     "planner": "planners",
     "router": "routers",
     "controller": "controllers",
     "plant": "plants",
-    "seed": "seeds",
-    "disturb": "disturbances",
 }
+"""Options of a run with a key of their own, whose values are names."""
+
+_OWN_KEYS = {**_METHODS, "seed": "seeds", "disturb": "disturbances"}
 """Options of a run that are no parameters, as a key of the campaign is for them."""
 
 _CHOICES = {each.name: each.choices or () for each in options_of(RunArguments)}
@@ -174,12 +175,8 @@ class _Factors:
         for key in (*allowed, "seeds", "disturbances"):
             yield from _repeated(key, document[key])
         yield from self._faults_of_parameters()
-        count = prod(len(value) for value in (*document.values(),) if value != {})
-        count = (
-            count
-            // max(1, len(self._parameters))
-            * prod(map(len, self._parameters.values()))
-        )
+        factors = {**document, **self._parameters, "parameters": [1]}
+        count = prod(map(len, factors.values()))
         if count > MOST_TRIALS:
             message = f"these are {count} trials; allowed: {MOST_TRIALS} in a campaign"
             yield Fault("", message)
@@ -193,6 +190,9 @@ class _Factors:
         for name, levels in self._parameters.items():
             place, option = f"parameters.{name}", keyword(name)
             yield from _repeated(place, levels)
+            for outer in self._parameters:
+                if name.startswith(f"{outer}."):
+                    yield Fault(place, f"is part of {outer}, which is given, too")
             if option in _OWN_KEYS:
                 yield Fault(place, f"has a key of its own: {_OWN_KEYS[option]}")
             elif option in options:
@@ -252,47 +252,39 @@ class _Factors:
     ) -> Iterator[CampaignTrial]:
         """Yield every combination of the values of all factors."""
         document = self._document
-        own = [document[key] for key in list(_OWN_KEYS.values())[:4]]
         disturb = {spec: self._disturb(spec) for spec in document["disturbances"]}
-        levels = (sources, document["seeds"], *own, disturb, *self._parameters.values())
-        names = ("scene", "seed", *_OWN_KEYS)[:6]
-        for source, seed, *rest in product(*levels):
-            chosen = dict(zip((*names[2:], "disturbance"), rest, strict=False))
-            parameters = dict(zip(self._parameters, rest[5:], strict=True))
-            of_scene = {
-                name: value
-                for name, value in parameters.items()
-                if self._is_of_scene(name)
-            }
-            given = {
-                keyword(name): value
-                for name, value in parameters.items()
-                if name not in of_scene
-            }
-            named = {
-                name: value
-                for name, value in chosen.items()
-                if name != "disturbance" and value != DEFAULT
-            }
+        of_scene = {name for name in self._parameters if self._is_of_scene(name)}
+        levels = {
+            "scene": sources,
+            "seed": document["seeds"],
+            **{name: document[key] for name, key in _METHODS.items()},
+            "disturbance": document["disturbances"],
+            **self._parameters,
+        }
+        for values in product(*levels.values()):
+            chosen = dict(zip(levels, values, strict=True))
+            source, seed = chosen["scene"], chosen["seed"]
+            named: dict[str, Any] = {"disturb_seed": seed}
+            for name in (*_METHODS, *self._parameters):
+                if name not in of_scene and not (
+                    name in _METHODS and chosen[name] == DEFAULT
+                ):
+                    named[keyword(name)] = chosen[name]
             arguments = RunArguments(
-                **{
-                    "seed": seed,
-                    "disturb": disturb[chosen["disturbance"]],
-                    "disturb_seed": seed,
-                    **named,
-                    **given,
-                }
+                seed=seed, disturb=disturb[chosen["disturbance"]], **named
             )
             order = TrialOrder(
                 arguments=arguments,
-                changes=_nested(of_scene),
+                changes=_nested({name: chosen[name] for name in of_scene}),
                 code=code_digest(),
                 with_run=with_runs,
             )
-            factors = {"scene": source.name, "seed": seed, **chosen}
-            factors |= {name: _plain(value) for name, value in parameters.items()}
+            chosen["scene"] = source.name
             yield CampaignTrial(
-                factors=factors, source=source, order=order, key=_key(source, order)
+                factors={name: _plain(value) for name, value in chosen.items()},
+                source=source,
+                order=order,
+                key=_key(source, order),
             )
 
 

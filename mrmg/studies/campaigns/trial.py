@@ -97,7 +97,7 @@ def _made(source: SceneSource, order: TrialOrder) -> dict[str, Any]:
     arguments = order.arguments
     scene = arguments.scene(source.scene(arguments.seed, order.changes))
     require_drivable(scene.robots)
-    compile_s = _compile_once(arguments)
+    compile_s = compile_once(arguments)
     if order.with_run:
         return _made_by_run(scene, arguments)
     planned, plan_s = _planned(_Planning(scene, arguments))
@@ -144,7 +144,7 @@ def _of_planning(scene: Scene, status: str, reason: str) -> dict[str, Any]:
         "status": status,
         "feasible": False,
         "reason": " ".join(reason.split()),
-        "goals": len(scene.goals),
+        "goals_total": len(scene.goals),
     }
 
 
@@ -212,7 +212,7 @@ def _planned(planning: _Planning) -> tuple[PlanResult, float]:
     return found, time.perf_counter() - began
 
 
-def _compile_once(arguments: RunArguments) -> float:
+def compile_once(arguments: RunArguments) -> float:
     """Compile the planner where this machine does not hold it compiled.
 
     Workers with one cache compile once: the others wait for the one that does.

@@ -1,0 +1,85 @@
+"""Whoever makes trials: every result once, and one message where workers are lost."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+import pytest
+
+from mrmg.errors import MachineError, UsageError
+from mrmg.studies import engine as module
+from mrmg.studies.engine import Engine
+
+
+def doubled(shared: int, item: int) -> int:
+    if item < 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return shared + 2 * item
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_every_job_has_its_result(workers: int) -> None:
+    jobs = [(100 * (item % 2), item) for item in range(10)]
+    found = dict(Engine(workers=workers).results(doubled, jobs))
+    assert found == {item: 100 * (item % 2) + 2 * item for item in range(10)}
+    assert dict(Engine(workers=workers).results(doubled, [])) == {}
+
+
+def test_a_killed_worker_is_one_message() -> None:
+    made = Engine(workers=2).results(doubled, [(0, 1), (0, -1), (0, 2)])
+    with pytest.raises(MachineError, match="killed .* goes on from the trials"):
+        list(made)
+
+
+def test_a_scheduler_that_does_not_answer_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(module, "CONNECT_S", 0.3)
+    made = Engine(kind="dask", scheduler="tcp://127.0.0.1:9").results(doubled, [(0, 1)])
+    with pytest.raises(MachineError, match=r"answers at tcp://127\.0\.0\.1:9"):
+        list(made)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"kind": "slurm"}, "allowed: local, dask"),
+        ({"workers": 0}, "at least 1"),
+        ({"scheduler": "tcp://host:1"}, "--engine dask"),
+    ],
+)
+def test_contradictions_are_refused(given: dict, message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        Engine(**given)
+
+
+def test_workers_with_one_cache_compile_one_after_the_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from mrmg.planning import preparation
+    from mrmg.runs.arguments import RunArguments
+    from mrmg.studies.campaigns import trial
+
+    running, overlaps, calls = [], [], []
+
+    def compile_kernels(planner: str) -> None:
+        overlaps.append(bool(running))
+        running.append(planner)
+        calls.append(threading.get_ident())
+        threading.Event().wait(0.05)
+        running.pop()
+
+    monkeypatch.setattr(preparation, "compile_kernels", compile_kernels)
+    threads = [
+        threading.Thread(target=trial.compile_once, args=(RunArguments(),))
+        for _ in range(3)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(set(calls)) == 3
+    assert overlaps == [False] * 3
