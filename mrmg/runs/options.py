@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, field, fields
+from functools import cache
 from typing import Any, TypeVar
 
 from mrmg.errors import UsageError
@@ -97,13 +98,14 @@ def option(default: Any, help: str, **details: Any) -> Any:
     return field(default=default, metadata=metadata)
 
 
-def options_of(arguments: type[Checked]) -> list[Option]:
+@cache
+def options_of(arguments: type[Checked]) -> tuple[Option, ...]:
     """Return the options of a class of arguments, in the order of their fields."""
-    return [
+    return tuple(
         _option_of(each)
         for each in fields(arguments)  # type: ignore[arg-type]
         if each.metadata.get(_OPTION)
-    ]
+    )
 
 
 def _option_of(each: Field[Any]) -> Option:

@@ -40,7 +40,7 @@ from mrmg.runs import argument_values as values
 from mrmg.scene.loading.json_schema import schema_of
 from mrmg.scene.loading.shape_schema import NotNegative, Strict
 
-MOST_TRIALS = 1_000_000
+MOST_TRIALS = 100_000
 
 Count = Annotated[int, Field(ge=1)]
 Seed = Annotated[int, Field(ge=0)]

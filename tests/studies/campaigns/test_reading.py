@@ -47,11 +47,11 @@ def test_there_is_a_trial_for_every_combination(tmp_path: Path) -> None:
 def test_a_trial_keeps_its_key_in_a_larger_campaign(tmp_path: Path) -> None:
     file = tmp_path / "sweep.yaml"
     file.write_text(
-        "scenes: {scene: quickstart, name: placed, populate: {goals: 3}}\nseeds: 4-5\n"
+        "scenes: {scene: quickstart, name: other, populate: {goals: 3}}\nseeds: 4-5\n"
     )
     few = {trial.key for trial in read_campaign(file).trials}
     file.write_text(
-        "scenes: [{scene: quickstart, name: placed, populate: {goals: 3}}, quickstart]\n"
+        "scenes: [{scene: quickstart, name: other, populate: {goals: 3}}, scene1]\n"
         "seeds: 0-7\nplants: [scrub, default]\n"
     )
     many = {trial.key for trial in read_campaign(file).trials}
