@@ -98,13 +98,16 @@ def option(default: Any, help: str, **details: Any) -> Any:
     return field(default=default, metadata=metadata)
 
 
-@cache
 def options_of(arguments: type[Checked]) -> tuple[Option, ...]:
     """Return the options of a class of arguments, in the order of their fields."""
+    by_class: Any = arguments  # classes of dataclasses are hashable, mypy doubts it
+    return _options_of(by_class)
+
+
+@cache
+def _options_of(arguments: Any) -> tuple[Option, ...]:
     return tuple(
-        _option_of(each)
-        for each in fields(arguments)  # type: ignore[arg-type]
-        if each.metadata.get(_OPTION)
+        _option_of(each) for each in fields(arguments) if each.metadata.get(_OPTION)
     )
 
 
