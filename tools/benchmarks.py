@@ -156,6 +156,7 @@ def measured(documents: Documents, *names: str) -> str:
         of = documents[name]["protocol"]
         made = [f"commit {of['commit']}", of["date"]]
         made += [f"load {of['load']:.1f}"] if "load" in of else []
+        made += [of["source"]] if "source" in of else []
         lines.append(f"`{of['command']}` ({', '.join(made)})")
     return "; ".join(lines)
 

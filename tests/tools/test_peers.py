@@ -6,7 +6,7 @@ import numpy as np
 import peer_routing
 import pytest
 from peer_baseline import plain_plan
-from peers import compared
+from peers import compared, leg_of
 
 import mrmg
 from mrmg.planning import RoutingProblem, faults_of_tours
@@ -76,3 +76,22 @@ def test_a_solvers_matrix_has_start_nodes_and_end() -> None:
     routing = peer_routing.routing_of(problem, [[0]])
     assert routing.cost_J == pytest.approx(4.0)
     assert list(faults_of_tours(problem, routing)) == []
+
+
+@pytest.mark.slow
+def test_a_leg_ends_at_rest_where_the_verifier_has_it() -> None:
+    scene, leg = leg_of("quickstart, 2 cars")
+    states = leg.start()
+    assert leg.clear(states)
+    assert leg.miss_m(states) > leg.radius_m
+    states[:, :2] = leg.centres
+    assert leg.miss_m(states) == 0.0
+    states[0, :2] = states[1, :2]
+    assert not leg.clear(states)
+    hurried = np.tile([[0.5, 0.1]], (20, 2, 1))  # half a metre a second more, steering
+    states = leg.start()
+    for control in hurried:
+        leg.advance(states, control.ravel())
+    controls = np.concatenate([hurried, leg.braking(states)])
+    verdict = mrmg.verify(scene, leg.plan(controls))
+    assert {found.kind.value for found in verdict.violations} == {"finish"}
