@@ -84,6 +84,17 @@ class FreeGround:
                 high_m = middle_m
         return low_m
 
+    def narrow_pieces(self, narrow_m: float, wide_m: float) -> list[BaseGeometry]:
+        """Return the pieces of all narrow ground; see `narrows`."""
+        key = (narrow_m, wide_m)
+        if key not in self._known:
+            wide = [one.buffer(wide_m - narrow_m) for one in self.pieces(wide_m)]
+            ground = shapely.union_all(self.pieces(narrow_m))
+            left = ground.difference(shapely.union_all(wide)) if wide else ground
+            parts = shapely.get_parts(left)
+            self._known[key] = [one for one in parts if one.area > LEAST_AREA_M2]
+        return self._known[key]
+
     def narrows(
         self, start: Point, wanted: BaseGeometry, narrow_m: float, wide_m: float
     ) -> list[BaseGeometry]:
@@ -95,14 +106,8 @@ class FreeGround:
             narrow_m: clearance from which on ground counts.
             wide_m: clearance from which on it is wide.
         """
-        key = (narrow_m, wide_m)
+        narrow = self.narrow_pieces(narrow_m, wide_m)
         wide = [one.buffer(wide_m - narrow_m) for one in self.pieces(wide_m)]
-        if key not in self._known:
-            ground = shapely.union_all(self.pieces(narrow_m))
-            left = ground.difference(shapely.union_all(wide)) if wide else ground
-            parts = shapely.get_parts(left)
-            self._known[key] = [one for one in parts if one.area > LEAST_AREA_M2]
-        narrow = self._known[key]
         nodes = [*narrow, *wide]
         first = [i for i, node in enumerate(nodes) if node.distance(start) < narrow_m]
         last = {i for i, node in enumerate(nodes) if node.intersects(wanted)}

@@ -7,6 +7,8 @@ from itertools import combinations
 
 import numpy as np
 import shapely
+from shapely.geometry import Point
+from shapely.geometry.base import BaseGeometry
 
 from mrmg.planning.endings import listed
 from mrmg.planning.frame import Frame
@@ -14,6 +16,9 @@ from mrmg.planning.problem.problem import Problem
 
 MOST_ROBOTS = 40
 """Robots whose paths are compared at most."""
+
+FAR_M = 1e4
+"""Length of lines that surely end beyond a wall [m]."""
 
 SPACING_M = 0.2
 """Distance of the points of paths that are looked at [m]."""
@@ -43,7 +48,7 @@ def narrowest_meeting(problem: Problem, tours: Sequence[Sequence[int]]) -> str:
                 width_m = _width_m(problem, one, point)
                 found.append((width_m, (one, other), tuple(point)))
     if found:
-        width_m, pair, at = min(found)
+        _, pair, at = min(found)
         who = " and ".join(names[r] for r in pair)
         what = f"the ways of {who} meet"
     else:
@@ -55,10 +60,25 @@ def narrowest_meeting(problem: Problem, tours: Sequence[Sequence[int]]) -> str:
         ]
         if not found:
             return f"no motions were found of {listed(names)}"
-        width_m, pair, at = min(found)
+        _, pair, at = min(found)
         what = f"the narrowest place on the way of {names[pair[0]]} is"
     x, y = Frame.of(scene).on_the_map((at[0], at[1]))
+    stopping = [o.shape for o in scene.barriers if o.stops(names[pair[0]])]
+    walls = shapely.union_all([shapely.box(*scene.bounds).boundary, *stopping])
+    width_m = _width_between(walls, Point(x, y))
     return f"{what} near ({x:.1f}, {y:.1f}), where it is {width_m:.2f} m wide"
+
+
+def _width_between(walls: BaseGeometry, point: Point) -> float:
+    """Return the distance of the walls on two sides of a point, across the nearest."""
+    nearest = shapely.shortest_line(point, walls)
+    if not nearest.length:
+        return 0.0
+    (x, y), (wall_x, wall_y) = nearest.coords
+    scale = FAR_M / nearest.length
+    beyond = Point(x + (x - wall_x) * scale, y + (y - wall_y) * scale)
+    across = shapely.LineString([point, beyond]).intersection(walls)
+    return float(nearest.length + point.distance(across))
 
 
 def _points(path: np.ndarray) -> np.ndarray:

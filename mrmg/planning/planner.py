@@ -26,7 +26,7 @@ from mrmg.planning.parameters import PlannerParams, profile_params
 from mrmg.planning.planners import Planner
 from mrmg.planning.preference import Preference
 from mrmg.planning.preparation import compile_kernels, load_bounds, load_kernels
-from mrmg.planning.problem.problem import Problem, state_mission
+from mrmg.planning.problem.problem import Problem, state_mission, tightened
 from mrmg.planning.roadmap.fleet import motion_addresses
 from mrmg.planning.routers import Router
 from mrmg.planning.search import GRACE_S, OnImprovement, Progress, Search
@@ -192,8 +192,11 @@ class _Planning:
         search = self._search(problem, proofs)
         search.on_progress(0.1, "roadmap built")
         best = search.run()
+        proof = None if best else search.proof(search.tours_missing)
+        if best is None and not proof:
+            problem, search = self._tightened(own, problem, search, proofs)
+            best = search.best
         if best is None:
-            proof = search.proof(search.tours_missing)
             why = self._in_time(
                 partial(
                     why_no_plan,
@@ -217,6 +220,17 @@ class _Planning:
                 *hints_on(self.scene, best, self.statistics.gap),
             ),
         )
+
+    def _tightened(
+        self, own: Scene, problem: Problem, search: Search, proofs: Proofs
+    ) -> tuple[Problem, Search]:
+        """Search with the least margins in narrow ground; return what counts then."""
+        tight = self._in_time(partial(tightened, own, self.request.seed, self.params))
+        if tight is None:
+            return problem, search
+        again = self._search(tight, proofs)
+        again.run()
+        return (tight, again) if again.best else (problem, search)
 
     def _bounding(self, own: Scene) -> Future[None]:
         """Begin to prove bounds of the mission in its frame."""

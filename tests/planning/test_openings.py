@@ -5,13 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 import shapely
 import shapely.affinity
 
 import mrmg
 from mrmg.errors import UsageError
-from mrmg.planning import plan_mission
+from mrmg.planning import PlannerParams, plan_mission
+from mrmg.planning.frame import Frame
 from mrmg.plans import Plan, PlanStatus
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.margins import certified_minimum_m, default_margins, kept_margins
@@ -172,3 +174,43 @@ def test_goals_out_of_reach_are_left_out_with_their_proofs() -> None:
     assert verdict.ok
     assert verdict.skipped == ("h",)
     assert planned(scene, skip_unreachable=True).skipped == {}
+
+
+@pytest.mark.parametrize("quarters", range(4))
+def test_places_of_the_frame_are_found_on_the_map(quarters: int) -> None:
+    frame = Frame((3.0, -2.0, 13.0, 5.0), quarters)
+    for point in [(3.0, -2.0), (12.0, 4.5)]:
+        moved = frame.points(np.array(point))[0]
+        assert frame.on_the_map(tuple(moved)) == pytest.approx(point)
+
+
+def test_narrow_corners_are_turned_in_with_the_certified_minimum() -> None:
+    """A differential drive 0.85 m long turns in the corner of a corridor 1.2 m wide."""
+    walls = {"a": (6, 0, 20, 5.5), "b": (0, 6.7, 12, 20), "c": (13.2, 5.5, 20, 13)}
+    scene = scene_from_document(
+        {
+            "format": 1,
+            "name": "corner",
+            "bounds": [0, 0, 20, 20],
+            "obstacles": [
+                {"id": name, "polygon": corners(shapely.box(*wall))}
+                for name, wall in walls.items()
+            ],
+            "goals": [{"id": "g", "circle": {"center": [13, 17], "radius": 1}}],
+            "battery": {"capacity_m": 200},
+            "robots": [{"id": "r1", "model": "diffdrive", "pose": [3, 3, 0]}],
+        },
+        source="corner",
+    )
+    plan = planned(scene, params=PlannerParams(trees=1))
+    assert verify(scene, plan).ok
+    assert min(passage.margin_m for passage in plan.narrow) < 0.1
+
+
+def test_passages_are_named_with_place_and_width() -> None:
+    reason = plan_mission(gap(1.2)).reason
+    assert "widest way of r1" in reason
+    assert "1.20 m wide near (12.0, 7.0)" in reason
+    assert "at least 0.030 m" in reason
+    proof = plan_mission(gap(1.05, turn=0.4)).reason
+    assert "1.05 m wide near (12.0, 7.0), r1 is 1.10 m wide" in proof

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+import shapely
 from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
@@ -60,6 +61,34 @@ def openings_to(
         ground = grounds.setdefault(key, FreeGround.of(scene, robot))
         margin_m = margins_of(robot, margins)[0]
         found += _openings(ground, robot, number, margin_m, entered(region))
+    return tuple(found)
+
+
+def tightest_openings(scene: Scene, margins: Margins) -> tuple[Opening, ...]:
+    """Return all ground that is too narrow to turn in, at the certified minimum.
+
+    Args:
+        scene: the mission.
+        margins: stated for all robots.
+    """
+    found: list[Opening] = []
+    for number, robot in enumerate(scene.robots):
+        margin_m = margins_of(robot, margins)[0]
+        least_m = least_margin_m(robot, margin_m)
+        wide_m = robot.model.circumscribed_radius_m + margin_m
+        needed_m = min(clearance_needed_m(robot, least_m), wide_m)
+        pieces = FreeGround.of(scene, robot).narrow_pieces(needed_m, wide_m)
+        reach_m = robot.model.circumscribed_radius_m + wide_m - needed_m
+        shape = shapely.union_all(pieces).buffer(reach_m)
+        if not shape.is_empty and least_m < margin_m:
+            found.append(
+                Opening(
+                    shape=shape,
+                    margin_m=least_m,
+                    allowance_m=margin_m - least_m,
+                    robot=number,
+                )
+            )
     return tuple(found)
 
 

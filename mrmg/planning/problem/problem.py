@@ -18,7 +18,13 @@ from mrmg.planning.preference import Preference
 from mrmg.planning.problem._safety_kernels import Zones
 from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.problem.leg_times import routing_times
-from mrmg.planning.problem.openings import LEAST_CELL_M, cell_m, guide_m, openings_to
+from mrmg.planning.problem.openings import (
+    LEAST_CELL_M,
+    cell_m,
+    guide_m,
+    openings_to,
+    tightest_openings,
+)
 from mrmg.planning.problem.targets import finish_of, gate_arrays, target_arrays
 from mrmg.planning.problem.time_weighting import priced_world, with_energies
 from mrmg.planning.roadmap._fleet_kernels import Spaces
@@ -251,8 +257,22 @@ def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
     world = World.from_scene(scene, cell_m=cell_m(scene, params.margins))
     problem = _joined(scene, seed, params, world, ROADMAPS)
     openings = openings_to(scene, params.margins, unjoined_places(problem))
-    if not openings:
-        return problem
+    return _opened(scene, seed, params, openings) if openings else problem
+
+
+def tightened(scene: Scene, seed: int, params: PlannerParams) -> Problem | None:
+    """Return the problem with the certified minimum in all narrow ground, if any is.
+
+    Where robots have to turn they may need it though they get through without.
+    """
+    openings = tightest_openings(scene, params.margins)
+    return _opened(scene, seed, params, openings) if openings else None
+
+
+def _opened(
+    scene: Scene, seed: int, params: PlannerParams, openings: tuple[Opening, ...]
+) -> Problem:
+    """Return the problem with openings."""
     fine_m = cell_m(scene, params.margins, LEAST_CELL_M)
     world = World.from_scene(
         scene, cell_m=fine_m, openings=openings, guide_m=guide_m(fine_m)
