@@ -91,10 +91,13 @@ def end(*, reported: bool = False) -> NoReturn:
     os._exit(EXIT_CODE)
 
 
-def end_with_parent() -> None:
-    """Leave Ctrl-C to the parent of this worker process, and end when it has ended."""
+def end_with_parent(parent: int) -> None:
+    """Leave Ctrl-C to the parent of this worker process, and end when it has ended.
+
+    Args:
+        parent: its process id; it may have ended before this is called.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = os.getppid()
 
     def follow() -> None:
         while os.getppid() == parent:

@@ -9,6 +9,7 @@ the study's folder: a worker needs no file of it, nor the same home.
 from __future__ import annotations
 
 import logging
+import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
@@ -94,7 +95,9 @@ class Engine:
         # loky warns where it replaces a process that has come to hold much memory.
         warnings.filterwarnings("ignore", "A worker stopped while some jobs")
         pool = ProcessPoolExecutor(
-            min(self.workers or 1, len(jobs)), initializer=end_with_parent
+            min(self.workers or 1, len(jobs)),
+            initializer=end_with_parent,
+            initargs=(os.getpid(),),
         )
         waiting = enumerate(jobs)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 
 import pytest
@@ -83,3 +85,27 @@ def test_workers_with_one_cache_compile_one_after_the_other(
         thread.join()
     assert len(set(calls)) == 3
     assert overlaps == [False] * 3
+
+
+def test_workers_end_with_the_command_whenever_it_is_killed() -> None:
+    code = (
+        "import os, time\n"
+        "from multiprocessing import Process\n"
+        "from mrmg.interruption import end_with_parent\n"
+        "def work(parent):\n"
+        "    print(flush=True)\n"
+        "    time.sleep(0.5)\n"  # its parent is dead by now
+        "    end_with_parent(parent)\n"
+        "    time.sleep(5)\n"
+        "    print('still here', flush=True)\n"
+        "Process(target=work, args=(os.getpid(),)).start()\n"
+        "time.sleep(60)\n"
+    )
+    parent = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=subprocess.PIPE, text=True
+    )
+    assert parent.stdout is not None
+    parent.stdout.readline()
+    parent.kill()
+    assert parent.stdout.read() == ""
+    parent.wait()
