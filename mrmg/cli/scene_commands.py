@@ -56,8 +56,10 @@ def list_(options: argparse.Namespace) -> int:
 def check(options: argparse.Namespace) -> int:
     """Report what `mrmg run` would refuse of a scene, and what it warns of."""
     from mrmg.planning.feasibility import mission_warnings
+    from mrmg.planning.roadmap.fleet import margins_of
     from mrmg.runs.pipeline import rehearse
     from mrmg.scene.loading import heading_hints, load_scene
+    from mrmg.scene.margins import STATES_NONE, sentences_on_margins
     from mrmg.scene.slopes import bend_warnings
 
     warnings = heading_hints(options.scene)
@@ -84,6 +86,9 @@ def check(options: argparse.Namespace) -> int:
     }
     held = ", ".join(f"{n} {name}{'' if n == 1 else 's'}" for name, n in counts.items())
     print("\n  warning: ".join([f"{scene.name}: valid; {held}", *map(str, warnings)]))
+    kept = {robot.id: margins_of(robot, STATES_NONE) for robot in scene.robots}
+    for sentence in sentences_on_margins(scene.robots, kept):
+        print(f"  margins: {sentence}")
     for note in notes:
         print(f"  note: {note}")
     return ExitCode.OK

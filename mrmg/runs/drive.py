@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from mrmg.plans import Plan
 from mrmg.runs.arguments import RunArguments
+from mrmg.scene.margins import STATES_NONE, margins_from
 from mrmg.scene.types import Scene
 
 if TYPE_CHECKING:
@@ -55,6 +56,6 @@ def drive(
         replan=arguments.replan,
         faults=arguments.faults,
         seed=arguments.seed,
-        planner=profile_params(),
+        planner=profile_params(margins=margins_from(arguments.margins or STATES_NONE)),
         on_progress=on_progress,
     )

@@ -148,7 +148,9 @@ def test_check_warns_of_degrees_and_of_batteries(
     path = tmp_path / "turned.yaml"
     path.write_text(DEGREES)
     assert main(["scene", "check", str(path)]) == ExitCode.OK
-    first, *warnings = capsys.readouterr().out.splitlines()
+    first, *lines = capsys.readouterr().out.splitlines()
+    warnings = [line for line in lines if not line.startswith("  margins: ")]
+    assert [line for line in lines if "m from obstacles" in line] == lines[-2:]
     assert first.startswith("turned: valid; 2 robots, 1 goal, 0 stations")
     looks = "rad looks like degrees;"
     assert warnings[:3] == [
