@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from mrmg.planning.problem._safety_kernels import new_contingency, write_braking
+
 from mrmg.planning.problem.targets import gate_arrays
 from mrmg.planning.roadmap.fleet import fleet_array
 from mrmg.scene.loading import scene_from_document

@@ -23,8 +23,12 @@ from mrmg.planning.guided_tree._tree_kernels import (
     find_group,
     weigh,
 )
-from mrmg.planning.problem._control_kernels import control_towards, wrap
-from mrmg.planning.problem._safety_kernels import braking_control, stands
+from mrmg.planning.problem._control_kernels import (
+    braking_control,
+    control_towards,
+    stands,
+    wrap,
+)
 from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.planning.routing._random_kernels import random_unit

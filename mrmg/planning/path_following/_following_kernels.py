@@ -1,4 +1,4 @@
-"""What a robot wants that follows its path: its place on it, speed and steering."""
+"""The law by which a robot follows its path: its place, speed, steering, control."""
 
 from __future__ import annotations
 
@@ -9,7 +9,12 @@ import numpy as np
 
 from mrmg.compilation import by_reference, kernel
 from mrmg.motion._kernels import UNICYCLE
-from mrmg.planning.problem._control_kernels import wrap
+from mrmg.planning.problem._control_kernels import (
+    braking_control,
+    control_towards,
+    stands,
+    wrap,
+)
 
 PREVIEW_S = 0.2
 """How far ahead the path's curvature is read."""
@@ -31,24 +36,25 @@ TURNING_SHARE = 0.5
 
 
 @by_reference
-class Courses(NamedTuple):
-    """The fleet's paths, padded to one length.
+class Course(NamedTuple):
+    """A path, and what its robot must know of it.
 
     Attributes:
-        node: shape (R, N, 2).
-        gear: of each segment, shape (R, N).
-        bend: curvature at each node, left positive in the direction of travel (R, N).
-        way: way to each node [m], shape (R, N).
+        node: shape (N, 2).
+        gear: of each segment, shape (N,).
+        bend: curvature at each node, left positive in the direction of travel (N,).
+        way: way to each node [m], shape (N,).
         end: number of the node at which the segment's stretch ends, where the gear
-            changes or the robot turns on the spot, shape (R, N).
-        fastest: speed at which each node is passed at most [m/s], shape (R, N).
-        pause: steps that a robot stands at each node where a stretch ends (R, N).
-        nodes: number of nodes of each path, shape (R,).
-        ease: deceleration that costs nothing [m/s^2], shape (R,).
-        stiffness: how fast each robot returns to its path: errors decay over about
-            its inverse [1/m], shape (R,).
-        heading: in which robots that turn on the spot end [rad], shape (R,).
-        tolerance: allowed deviation from that [rad]; inf for any, shape (R,).
+            changes or the robot turns on the spot, shape (N,).
+        fastest: speed at which each node is passed at most [m/s], shape (N,).
+        pause: steps that it stands at each node where a stretch ends, shape (N,).
+        rest_s: what is left from each node on, as time on plain ground [s], shape (N,).
+        size: number of nodes, shape (1,).
+        ease: deceleration that costs nothing [m/s^2].
+        stiffness: how fast it returns to its path: errors decay over about its inverse
+            [1/m].
+        heading: in which a robot that turns on the spot ends [rad], shape (1,).
+        tolerance: allowed deviation from that [rad]; inf for any, shape (1,).
     """
 
     node: np.ndarray
@@ -58,88 +64,124 @@ class Courses(NamedTuple):
     end: np.ndarray
     fastest: np.ndarray
     pause: np.ndarray
-    nodes: np.ndarray
-    ease: np.ndarray
-    stiffness: np.ndarray
+    rest_s: np.ndarray
+    size: np.ndarray
+    ease: float
+    stiffness: float
     heading: np.ndarray
     tolerance: np.ndarray
 
 
 @kernel
-def advance(courses, r, i, x, y):
+def advance(course, i, x, y):
     """Return (segment, way along the path) nearest to a point, from segment i on."""
     while True:
-        ax, ay = courses.node[r, i, 0], courses.node[r, i, 1]
-        bx, by = courses.node[r, i + 1, 0] - ax, courses.node[r, i + 1, 1] - ay
+        ax, ay = course.node[i, 0], course.node[i, 1]
+        bx, by = course.node[i + 1, 0] - ax, course.node[i + 1, 1] - ay
         size = hypot(bx, by)
         along = ((x - ax) * bx + (y - ay) * by) / max(size, 1e-9)
-        if along < size or i + 1 >= courses.end[r, i]:
-            return i, courses.way[r, i] + along
+        if along < size or i + 1 >= course.end[i]:
+            return i, course.way[i] + along
         i += 1
 
 
 @kernel
-def bend_at(courses, r, i, s):
+def bend_at(course, i, s):
     """Return the curvature of the path at a way, within the stretch of segment i."""
-    last = courses.end[r, i]
-    while i + 1 < last and courses.way[r, i + 1] < s:
+    last = course.end[i]
+    while i + 1 < last and course.way[i + 1] < s:
         i += 1
-    size = courses.way[r, i + 1] - courses.way[r, i]
-    t = min(1.0, max(0.0, (s - courses.way[r, i]) / max(size, 1e-9)))
-    return courses.bend[r, i] + t * (courses.bend[r, i + 1] - courses.bend[r, i])
+    size = course.way[i + 1] - course.way[i]
+    t = min(1.0, max(0.0, (s - course.way[i]) / max(size, 1e-9)))
+    return course.bend[i] + t * (course.bend[i + 1] - course.bend[i])
 
 
 @kernel
-def turned(courses, r, state):
+def turned(course, state):
     """Return whether a robot has the heading that it must end with."""
-    return abs(wrap(courses.heading[r] - state[2])) < 0.5 * courses.tolerance[r]
+    return abs(wrap(course.heading[0] - state[2])) < 0.5 * course.tolerance[0]
 
 
 @kernel
-def turning_rate(fleet, r, lacking):
+def turning_rate(own, lacking):
     """Return the rate at which a robot turns on the spot by an angle [rad/s]."""
-    w = sqrt(2.0 * TURNING_SHARE * fleet[r].limit[4] * abs(lacking))
+    w = sqrt(2.0 * TURNING_SHARE * own[0].limit[4] * abs(lacking))
     return w if lacking > 0.0 else -w
 
 
 @kernel
-def follow(fleet, courses, r, i, state):
+def follow(own, course, i, state):
     """Return (segment, way, way left in this gear, off the path, wanted v and w)."""
-    i, s = advance(courses, r, i, state[0], state[1])
-    ax, ay = courses.node[r, i, 0], courses.node[r, i, 1]
-    bx, by = courses.node[r, i + 1, 0] - ax, courses.node[r, i + 1, 1] - ay
+    i, s = advance(course, i, state[0], state[1])
+    ax, ay = course.node[i, 0], course.node[i, 1]
+    bx, by = course.node[i + 1, 0] - ax, course.node[i + 1, 1] - ay
     size = max(hypot(bx, by), 1e-9)
     tx, ty = bx / size, by / size
-    gear = courses.gear[r, i]
+    gear = course.gear[i]
     off = tx * (state[1] - ay) - ty * (state[0] - ax)
     heading = state[2] if gear > 0 else state[2] + pi
     # The chord's direction, turned to the tangent's at this place.
-    t = min(1.0, max(0.0, (s - courses.way[r, i]) / size))
-    first, second = courses.bend[r, i], courses.bend[r, i + 1]
+    t = min(1.0, max(0.0, (s - course.way[i]) / size))
+    first, second = course.bend[i], course.bend[i + 1]
     swing = 0.5 * size * (t * t * second - (1.0 - t) ** 2 * first)
     tangent = atan2(ty, tx) + swing
     askew = wrap(heading - tangent)
-    left = courses.way[r, courses.end[r, i]] - s
-    top = fleet[r].limit[1] if gear > 0 else -fleet[r].limit[0]
-    ease = courses.ease[r]
+    left = course.way[course.end[i]] - s
+    top = own[0].limit[1] if gear > 0 else -own[0].limit[0]
+    ease = course.ease
     v = min(top, sqrt(2.0 * ease * max(left - 0.5 * ARRIVED_M, 0.0)) + 0.02)
-    near = max(courses.way[r, i + 1] - s, 0.0)
-    v = min(v, sqrt(courses.fastest[r, i + 1] ** 2 + 2.0 * ease * near))
+    near = max(course.way[i + 1] - s, 0.0)
+    v = min(v, sqrt(course.fastest[i + 1] ** 2 + 2.0 * ease * near))
     ahead = s + max(abs(state[3]), 0.2) * PREVIEW_S
-    bend = bend_at(courses, r, i, ahead)
+    bend = bend_at(course, i, ahead)
     standing = abs(state[3]) < 0.05
-    stiffness = courses.stiffness[r]
+    stiffness = course.stiffness
     bend -= stiffness * stiffness * off + 2.0 * stiffness * sin(askew)
-    if fleet[r].model == UNICYCLE:
-        v = min(v, fleet[r].limit[2] / max(abs(bend), 1e-9))
+    if own[0].model == UNICYCLE:
+        v = min(v, own[0].limit[2] / max(abs(bend), 1e-9))
         # w is the rate of turning, which grows with v and not with the gear.
         w = bend * v
         if abs(askew) > (ASKEW if standing else FAR_ASKEW):
             v = 0.0
-            w = turning_rate(fleet, r, -askew)
+            w = turning_rate(own, -askew)
     else:
-        w = atan(gear * fleet[r].wheelbase * bend)
-    w = max(-fleet[r].limit[2], min(fleet[r].limit[2], w))
-    if standing and fleet[r].model != UNICYCLE and abs(w - state[4]) > ALIGNED:
+        w = atan(gear * own[0].wheelbase * bend)
+    w = max(-own[0].limit[2], min(own[0].limit[2], w))
+    if standing and own[0].model != UNICYCLE and abs(w - state[4]) > ALIGNED:
         v = 0.0
     return i, s, left, off, gear * v, w
+
+
+@kernel
+def track_control(own, course, segment, stood, state, dt):
+    """Return (u1, u2, segment, stood, off the path) of a robot that follows its path.
+
+    Args:
+        own: the robot, shape (1,).
+        course: its path.
+        segment: that it is on; the number of nodes once it stands at the path's end.
+        stood: steps for which it has stood at the end of its stretch.
+        state: its state.
+        dt: step [s].
+    """
+    size = course.size[0]
+    if segment >= size or size < 2:
+        if turned(course, state):
+            u1, u2 = braking_control(own, 0, state, dt)
+            return u1, u2, segment, stood, 0.0
+        rate = turning_rate(own, wrap(course.heading[0] - state[2]))
+        u1, u2 = control_towards(own, 0, state, 0.0, rate, dt)
+        return u1, u2, segment, stood, 0.0
+    i, _, left, off, v, w = follow(own, course, segment, state)
+    if left < ARRIVED_M:
+        v = 0.0
+        if own[0].model == UNICYCLE:
+            w = 0.0
+        if stands(own, 0, state):
+            last = course.end[i]
+            stood += 1
+            if stood > course.pause[last]:
+                stood = 0
+                i = size if last + 1 >= size else last
+    u1, u2 = control_towards(own, 0, state, v, w, dt)
+    return u1, u2, i, stood, off

@@ -102,14 +102,12 @@ class Path:
         )
 
 
-def visit_steps(
-    targets: Targets, tour: Sequence[int], trajectory: Trajectory
-) -> list[int]:
-    """Return the steps at which a trajectory enters its targets as deep as planned.
+def visit_steps(targets: Targets, tour: Sequence[int], state: np.ndarray) -> list[int]:
+    """Return the steps at which states, shape (n, 5), enter targets as deep as planned.
 
-    The list ends before the first target that it does not.
+    The list ends before the first target that they do not.
     """
-    state = np.ascontiguousarray(trajectory.state)
+    state = np.ascontiguousarray(state)
     visits: list[int] = []
     step = 0
     for t in tour:
@@ -120,31 +118,27 @@ def visit_steps(
     return visits
 
 
-def path_of(
-    tour: Sequence[int], visits: Sequence[int], trajectory: Trajectory, first: int = 0
-) -> Path:
-    """Return the way a trajectory goes from step `first` up to its last target.
+def path_of(tour: Sequence[int], visits: Sequence[int], trajectory: Trajectory) -> Path:
+    """Return the way a trajectory goes up to its last target.
 
     Args:
         tour: numbers of its targets.
         visits: steps at which they are visited.
         trajectory: of one robot.
-        first: where the path begins.
     """
-    left = [(t, v - first) for t, v in zip(tour, visits, strict=True) if v >= first]
-    last = left[-1][1] if left else 0
-    state = trajectory.state[first : first + last + 1]
+    last = visits[-1] if visits else 0
+    state = trajectory.state[: last + 1]
     speed = 0.5 * (state[:-1, 3] + state[1:, 3])
     gear = _gears(speed * trajectory.dt_s)
     path = Path(
         node=state[:, :2],
         gear=gear,
-        stop=np.array([v for _, v in left], np.int64),
-        target=np.array([t for t, _ in left], np.int64),
-        deeper=np.full(len(left), TRACKING_M),
+        stop=np.array(visits, np.int64),
+        target=np.array(tour, np.int64),
+        deeper=np.full(len(visits), TRACKING_M),
         pivot=_pivots(state),
         heading=float(state[0, 2]),
-        pause_s=np.zeros(len(left)),
+        pause_s=np.zeros(len(visits)),
     )
     return respaced(path)
 

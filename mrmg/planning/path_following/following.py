@@ -1,4 +1,4 @@
-"""Drafts: plans driven straight along tours.
+"""Plans driven straight along tours.
 
 The roadmap's paths along tours are smoothed and followed in closed loop
 (`refine.drive_paths`). Where that succeeds, nearly always where there is room, that
@@ -8,7 +8,7 @@ search for motions starts from the paths (`coordination`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import cos, pi, radians, sin
 
@@ -72,12 +72,11 @@ def follow_tours(
     *,
     soon: bool = False,
     on_failure: OnFailure = lambda reason: None,
-) -> Iterator[Plan]:
-    """Yield plans along tours, in the order found; none if driving them fails.
+) -> Plan | None:
+    """Return a plan along tours; None if driving them fails.
 
-    The first one is driven without regard to braking. Where time counts, cars that are
-    slower backwards turn round rather than change gear, if there is room. What fails
-    with one way of turning is tried with the others.
+    Where time counts, cars that are slower backwards turn round rather than change
+    gear, if there is room. What fails with one way of turning is tried with the others.
 
     Args:
         problem: the mission.
@@ -111,16 +110,15 @@ def follow_tours(
                 _geared(problem, r, cost_maps[r], path) for r, path in enumerate(paths)
             ]
         tasks = [RobotTask(*one) for one in zip(stops, paths, cost_maps, strict=True)]
-        found = False
-        for trajectories in drive_paths(problem, params, tasks, halt, on_failure):
+        trajectories = drive_paths(problem, tasks, halt, on_failure)
+        plan = None
+        if trajectories:
             plan = make_plan(problem, seed, params, trajectories, tours)
             if plan is None:
                 on_failure(why_refused(problem, trajectories, tours))
-            else:
-                found = True
-                yield plan
-        if found or halt[0]:
-            return
+        if plan is not None or halt[0]:
+            return plan
+    return None
 
 
 def _same_gears(paths: Sequence[Path], others: Sequence[Path]) -> bool:

@@ -9,9 +9,8 @@ import numpy as np
 
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import SPACINGS_M, Path, smooth_path
-from mrmg.planning.path_following.tracking import SlowPlace
+from mrmg.planning.path_following.tracking import Drive
 from mrmg.planning.problem.problem import Problem
-from mrmg.plans import Trajectory
 
 WALL_SHARE = 0.5
 """Share of the room it needs that a path lacks only where it leads through a wall."""
@@ -25,21 +24,16 @@ class RobotTask:
         tour: numbers of its targets.
         path: its way.
         cost_map: what the way is priced on.
-        before: how the robot drove before, and the steps of its visits; None if it did
-            not.
-        repeated: number of steps that it drives as before.
-        swerves: places that it was led round.
-        slow: places that it passes slowly.
+        before: how the robot drove before; None if it did not.
+        inflations: places that it was led round.
         cost_m: what the way takes, in metres of plain ground.
     """
 
     tour: list[int]
     path: Path
     cost_map: CostMap
-    before: tuple[Trajectory, list[int]] | None = None
-    repeated: int = 0
+    before: Drive | None = None
     inflations: list[np.ndarray] = field(default_factory=list)
-    slow: list[SlowPlace] = field(default_factory=list)
     cost_m: float = 0.0
 
     def smooth(self, problem: Problem, spacings_m: Sequence[float]) -> None:
@@ -56,12 +50,6 @@ class RobotTask:
             self.smooth(problem, SPACINGS_M[-1:])  # few nodes slip through thin walls
         else:
             self.path = path
-
-    def controls(self) -> np.ndarray:
-        """Return the controls that it repeats, shape (n, 2)."""
-        if self.before is None:
-            return np.zeros((0, 2))
-        return self.before[0].control[: self.repeated]
 
 
 def clearance_deficit_m(cost_map: CostMap, path: Path) -> float:

@@ -218,11 +218,8 @@ def search_motions(problem: Problem, request: Request) -> Attempt:
     found_at = []
     plan = request.plan(problem, trajectories, tours) if trajectories else None
     if trajectories and plan is None:  # batteries may suffice along smoother paths
-        drawn = along_trajectories(
-            problem, request.params, targets, trajectories, request.halt
-        )
-        plans_of = (request.plan(problem, one, tours) for one in drawn)
-        plan = next((one for one in plans_of if one is not None), None)
+        smooth = along_trajectories(problem, targets, trajectories, request.halt)
+        plan = request.plan(problem, smooth, tours) if smooth else None
     left = request.params.refinements
     while plan is not None:
         plans.append(plan)
@@ -269,7 +266,7 @@ def follow_paths(
             continue
         tried.add(tours.tours)
         driven += 1
-        made = follow_tours(
+        plan = follow_tours(
             replace(problem, minimum_time=minimum_time),
             request.params,
             tours,
@@ -278,10 +275,12 @@ def follow_paths(
             soon=request.number == 0,
             on_failure=failures.append,
         )
-        for plan in made:
-            if not plans or preference.rank(plan) < preference.rank(plans[-1]):
-                plans.append(plan)
-                found_at.append(time.perf_counter())
+        better = not plans or (
+            plan is not None and preference.rank(plan) < preference.rank(plans[-1])
+        )
+        if plan is not None and better:
+            plans.append(plan)
+            found_at.append(time.perf_counter())
     counts = {"path_following_plans": driven, "router_calls": len(draws)}
     return Attempt(plans, found_at, routing_s, counts, bool(choice), failures[-1])
 

@@ -1,10 +1,14 @@
-"""Angles, and controls towards a wanted speed and steering."""
+"""Angles, and controls towards a wanted speed and steering, or to rest."""
 
 from __future__ import annotations
 
 from math import pi
 
 from mrmg.compilation import kernel
+from mrmg.motion._kernels import CAR, USER, steer_user
+
+REST = 1e-9
+"""Speed below which a robot counts as standing [m/s]."""
 
 
 @kernel
@@ -25,3 +29,29 @@ def control_towards(fleet, r, state, v, w, dt):
     u1 = max(-fleet[r].limit[3], min(fleet[r].limit[3], (v - state[3]) / dt))
     u2 = max(-fleet[r].limit[4], min(fleet[r].limit[4], (w - state[4]) / dt))
     return u1, u2
+
+
+@kernel
+def toward_zero(value, bound, dt):
+    """Return the rate that brings `value` to 0 as fast as `bound` allows."""
+    if abs(value) < REST:
+        return 0.0
+    return max(-bound, min(bound, -value / dt))
+
+
+@kernel
+def braking_control(fleet, r, state, dt):
+    """Return the control (u1, u2) of full braking; a car holds its steering."""
+    if fleet[r].model == USER:
+        return steer_user(fleet[r], state, state[0], state[1], 0.0, dt)
+    u1 = toward_zero(state[3], fleet[r].limit[3], dt)
+    u2 = 0.0
+    if fleet[r].model != CAR:
+        u2 = toward_zero(state[4], fleet[r].limit[4], dt)
+    return u1, u2
+
+
+@kernel
+def stands(fleet, r, state):
+    """Return whether a robot is at rest."""
+    return abs(state[3]) < REST and (fleet[r].model == CAR or abs(state[4]) < REST)

@@ -15,7 +15,7 @@ from mrmg.motion._kernels import CAR
 from mrmg.motion._kernels import step as motion_step
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
-from mrmg.planning.problem._safety_kernels import Zones
+from mrmg.planning.problem._clearance_kernels import Zones
 from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.problem.leg_times import routing_times
 from mrmg.planning.problem.openings import (

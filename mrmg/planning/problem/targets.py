@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mrmg.planning.problem._safety_kernels import Zones
+from mrmg.planning.problem._clearance_kernels import Zones
 from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.roadmap.vertices import planned_regions
 from mrmg.scene.types import Scene, Station

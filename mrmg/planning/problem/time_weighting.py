@@ -32,17 +32,12 @@ def energy_share(objective: Objective, robot: Robot) -> float:
     return energy / (energy + objective.makespan_weight)
 
 
-def brakes_hard(scene: Scene, minimum_time: bool) -> np.ndarray:
-    """Tell which robots brake instead of rolling to a stop, shape (R,).
+def brakes_hard(scene: Scene, r: int) -> bool:
+    """Return whether robot r brakes instead of rolling to a stop.
 
     Rolling saves the power of driving for as long as it takes longer.
-
-    Args:
-        scene: gives robots and objective.
-        minimum_time: whether plans must take less time at any cost.
     """
-    shares = [energy_share(scene.objective, robot) for robot in scene.robots]
-    return np.asarray(minimum_time | (np.array(shares) < 0.5))
+    return energy_share(scene.objective, scene.robots[r]) < 0.5
 
 
 def priced_world(scene: Scene, world: World) -> World:

@@ -83,7 +83,7 @@ def test_the_same_targets_in_the_same_order_as_deep(mission: Refined) -> None:
     tours = tour_numbers(mission.problem, mission.after)
     targets = mission.scene.targets()
     for tour, trajectory in zip(tours, mission.after.trajectories, strict=True):
-        steps = visit_steps(mission.problem.mission.targets, tour, trajectory)
+        steps = visit_steps(mission.problem.mission.targets, tour, trajectory.state)
         assert len(steps) == len(tour)
         assert steps == sorted(steps)
         for t, step in zip(tour, steps, strict=True):

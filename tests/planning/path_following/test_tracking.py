@@ -7,11 +7,7 @@ import pytest
 
 import mrmg
 from mrmg.planning import PlannerParams
-from mrmg.planning.path_following.following import tour_path
-from mrmg.planning.path_following.tracking import (
-    courses_of,
-    steerable_speeds,
-)
+from mrmg.planning.path_following.tracking import deceleration, steerable_speeds
 from mrmg.planning.problem.problem import state_mission
 
 
@@ -24,8 +20,7 @@ def test_slowing_down_leaves_rolling_to_be_overcome(
     """Cars nearly roll; robots that turn by their wheels keep both of them pushing."""
     scene = mrmg.load_scene(name)
     problem = state_mission(scene, 0, PlannerParams(samples=300))
-    paths = [tour_path(problem, r, [r]) for r in range(len(scene.robots))]
-    ease = courses_of(problem, paths, [[] for _ in paths]).ease
+    ease = np.array([deceleration(problem, r) for r in range(len(scene.robots))])
     ground = min([1.0, *(area.multiplier for area in scene.terrain)])
     energy = [robot.model.energy_model for robot in scene.robots]
     rolling = np.array(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.path_following.tracking import HARD_SHARE, courses_of
+from mrmg.planning.path_following.tracking import HARD_SHARE, deceleration
 from mrmg.planning.problem.problem import state_mission
 from mrmg.planning.problem.time_weighting import (
     along_ways,
@@ -37,15 +37,14 @@ def test_the_share_falls_as_seconds_get_worth_more(yard: Any) -> None:
 
 def test_robots_brake_hard_where_time_is_worth_more_than_driving(yard: Any) -> None:
     scene = yard()
-    assert not brakes_hard(replace(scene, objective=ENERGY), minimum_time=False).any()
-    assert brakes_hard(replace(scene, objective=ENERGY), minimum_time=True).all()
-    assert brakes_hard(replace(scene, objective=MAKESPAN), minimum_time=False).all()
+    assert not brakes_hard(replace(scene, objective=ENERGY), 0)
+    assert brakes_hard(replace(scene, objective=MAKESPAN), 0)
 
 
 def test_decelerations_follow_from_the_objective(yard: Any) -> None:
     def ease(**changes: Any) -> float:
         problem = state_mission(yard(**changes), 0, PARAMS)
-        return float(courses_of(problem, [], []).ease[0])
+        return deceleration(problem, 0)
 
     hard = yard().robots[0].model.limits.scaled(yard().robots[0].model.planning_share)
     assert ease(objective="makespan") == pytest.approx(HARD_SHARE * hard.u1_max_m_s2)

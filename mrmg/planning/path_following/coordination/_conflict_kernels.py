@@ -9,8 +9,8 @@ import numpy as np
 from mrmg.compilation import kernel
 from mrmg.planning.path_following.coordination._motion_kernels import (
     first_conflict,
-    in_zone,
 )
+from mrmg.planning.problem._clearance_kernels import in_zone
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 
 

@@ -17,8 +17,7 @@ from mrmg.planning.path_following.coordination._motion_kernels import (
     first_conflict,
     write_curve,
 )
-from mrmg.planning.problem._control_kernels import wrap
-from mrmg.planning.problem._safety_kernels import braking_control, stands
+from mrmg.planning.problem._control_kernels import braking_control, stands, wrap
 from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.roadmap._heap_kernels import push
 

@@ -12,37 +12,33 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import by_reference, kernel
-from mrmg.motion._kernels import CAR, UNICYCLE, USER, copy_numbers, steer_user, step
-from mrmg.planning.path_following._following_kernels import (
-    ARRIVED_M,
-    follow,
-    turned,
-    turning_rate,
-)
+from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, step
+from mrmg.planning.path_following._following_kernels import track_control, turned
 from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
     MOST_PIECES,
     reeds_shepp,
 )
-from mrmg.planning.problem._control_kernels import control_towards, wrap
-from mrmg.planning.problem._safety_kernels import braking_control, stands
-from mrmg.planning.roadmap._fleet_kernels import space_of
-from mrmg.world._kernels import (
-    clearance_at_least,
-    convex_convex_distance,
-    footprint_is_clear,
-    place_footprint,
-    point_in_convex,
+from mrmg.planning.problem._clearance_kernels import clear_of_obstacles, in_zone
+from mrmg.planning.problem._control_kernels import (
+    braking_control,
+    control_towards,
+    stands,
 )
+from mrmg.world._kernels import convex_convex_distance, place_footprint
 
-BRAKE, HOME, STAY, TRACK, HOLD, MOVE = range(-3, 3)
-"""Brake, or drive home, and be through; stand in a target; follow the path; brake, and
-stand; hold a speed and a steering, numbered from MOVE on."""
+BRAKE, HOME, STAY, WAIT, TRACK, HOLD, MOVE = range(-4, 3)
+"""Brake, or drive home, and be through; stand in a target, or until others set out;
+follow the path; brake, and stand; hold a speed and a steering, numbered from MOVE on.
+"""
 
 SETTLING_SHARE = 0.45
 """Share of a turn's radius that a car may drive while it steers into the turn."""
 
 SPACING_M = 0.3
 """Distance of the nodes of a curve that is driven along."""
+
+LONG = 1 << 40
+"""Steps after which no stay keeps a robot: motions end stays themselves."""
 
 REACH_STEPS = 80
 """Steps that driving along a curve may take beyond its length at full speed."""
@@ -62,6 +58,8 @@ class Traffic(NamedTuple):
         hard: robots with which no conflict may be, shape (R,).
         soft: robots with which conflicts cost, shape (R,).
         busy: whether such a robot is in a mutual-exclusion zone, shape (G, K).
+        busy_left: in how many of the steps from one on it is, shape (G, K).
+        release: steps at which such a robot sets out or leaves a zone, sorted.
         end: step from which on all of them stand.
     """
 
@@ -73,6 +71,8 @@ class Traffic(NamedTuple):
     hard: np.ndarray
     soft: np.ndarray
     busy: np.ndarray
+    busy_left: np.ndarray
+    release: np.ndarray
     end: int
 
 
@@ -141,15 +141,6 @@ def blocked_for_good(own, traffic, state, first, corner):
 
 
 @kernel
-def in_zone(zones, zone, x, y):
-    """Return whether a point lies in a mutual-exclusion zone."""
-    n = zones.corners[zone]
-    if hypot(x - zones.center[zone, 0], y - zones.center[zone, 1]) > zones.reach[zone]:
-        return False
-    return n == 0 or point_in_convex(x, y, zones.corner[zone, :n])
-
-
-@kernel
 def clear(own, spaces, zones, traffic, state, count, first, corner):
     """Return whether states 1 to `count` keep clear of obstacles and occupied zones.
 
@@ -162,48 +153,14 @@ def clear(own, spaces, zones, traffic, state, count, first, corner):
         first: step of state 0.
         corner: room for a footprint, shape (2, M, 2).
     """
-    space = space_of(spaces, own[0].space)
-    n, radius, margin = own[0].corners, own[0].radius, own[0].margin
-    mx, my = own[0].middle[0], own[0].middle[1]
     for k in range(1, count + 1):
-        x, y, theta = state[k, 0], state[k, 1], state[k, 2]
-        c, s = cos(theta), sin(theta)
-        cx, cy = x + c * mx - s * my, y + s * mx + c * my
-        if clearance_at_least(space, cx, cy) <= radius + margin:
-            place_footprint(own[0].corner[:n], x, y, theta, corner[0, :n])
-            if not footprint_is_clear(space, corner[0, :n], cx, cy, radius, margin):
-                return False
+        if not clear_of_obstacles(own, spaces, state[k], corner[0]):
+            return False
         for zone in range(len(zones.reach)):
             j = min(first + k, traffic.busy.shape[1] - 1)
-            if traffic.busy[zone, j] and in_zone(zones, zone, x, y):
+            if traffic.busy[zone, j] and in_zone(zones, zone, state[k, 0], state[k, 1]):
                 return False
     return True
-
-
-@kernel
-def track_control(own, courses, segment, state, dt):
-    """Return (u1, u2, segment) of a robot that follows its path.
-
-    The segment is the number of nodes once it stands at the path's end.
-    """
-    nodes = courses.nodes[0]
-    if segment >= nodes or nodes < 2:
-        if turned(courses, 0, state):
-            u1, u2 = braking_control(own, 0, state, dt)
-            return u1, u2, segment
-        rate = turning_rate(own, 0, wrap(courses.heading[0] - state[2]))
-        u1, u2 = control_towards(own, 0, state, 0.0, rate, dt)
-        return u1, u2, segment
-    i, _, left, _, v, w = follow(own, courses, 0, segment, state)
-    if left < ARRIVED_M:
-        v = 0.0
-        if own[0].model == UNICYCLE:
-            w = 0.0
-        if stands(own, 0, state):
-            last = courses.end[0, i]
-            i = nodes if last + 1 >= nodes else last
-    u1, u2 = control_towards(own, 0, state, v, w, dt)
-    return u1, u2, i
 
 
 @kernel
@@ -230,7 +187,9 @@ def move(search, motion, segment, steps, state, control):
         x, y = state[0, 0] + c * v - s * w, state[0, 1] + s * v + c * w
     for k in range(steps):
         if motion == TRACK:
-            u1, u2, segment = track_control(own, search.courses, segment, state[k], dt)
+            u1, u2, segment, _, _ = track_control(
+                own, search.course, segment, LONG, state[k], dt
+            )
         elif motion == HOLD:
             u1, u2 = braking_control(own, 0, state[k], dt)
         elif own[0].model == USER:
@@ -277,22 +236,22 @@ def write_curve(own, state, x, y, theta, course):
     else:
         total = length[0] = hypot(dx, dy)
         heading = np.arctan2(dy, dx)
-    if not total < SPACING_M * (course.node.shape[1] - 2 * MOST_PIECES):
+    if not total < SPACING_M * (len(course.node) - 2 * MOST_PIECES):
         return np.inf
     px, py = state[0], state[1]
-    course.node[0, 0, 0], course.node[0, 0, 1] = px, py
+    course.node[0, 0], course.node[0, 1] = px, py
     n = stretch = 0
     for p in range(MOST_PIECES):
         if abs(length[p]) < 1e-6:
             continue
         gear = 1 if length[p] > 0.0 else -1
         bend = gear * turn[p] / radius
-        if n > 0 and course.gear[0, n - 1] != gear:
-            course.end[0, stretch:n] = n
+        if n > 0 and course.gear[n - 1] != gear:
+            course.end[stretch:n] = n
             stretch = n
-            course.bend[0, n] = bend
+            course.bend[n] = bend
         if n == 0:
-            course.bend[0, 0] = bend
+            course.bend[0] = bend
         pieces = int(abs(length[p]) / SPACING_M) + 1
         way = length[p] / pieces
         for _ in range(pieces):
@@ -302,28 +261,28 @@ def write_curve(own, state, x, y, theta, course):
             px += chord * cos(heading + swing)
             py += chord * sin(heading + swing)
             heading += 2.0 * swing
-            course.gear[0, n] = gear
+            course.gear[n] = gear
             n += 1
-            course.node[0, n, 0], course.node[0, n, 1] = px, py
-            course.way[0, n] = course.way[0, n - 1] + abs(chord)
-            course.bend[0, n] = bend
-    course.end[0, stretch : n + 1] = n
-    course.nodes[0] = n + 1 if n > 0 else 0
+            course.node[n, 0], course.node[n, 1] = px, py
+            course.way[n] = course.way[n - 1] + abs(chord)
+            course.bend[n] = bend
+    course.end[stretch : n + 1] = n
+    course.size[0] = n + 1 if n > 0 else 0
     return total
 
 
 @kernel
 def drive_curve(own, course, dt, state, control):
     """Drive along a path until the robot rests at its end; return the steps, or -1."""
-    way = course.way[0, max(course.nodes[0] - 1, 0)]
+    way = course.way[max(course.size[0] - 1, 0)]
     most = int(way / (own[0].limit[1] * dt)) + REACH_STEPS
     most = min(most, len(control) - 1)
-    segment = 0 if course.nodes[0] > 1 else course.nodes[0]
+    segment = 0 if course.size[0] > 1 else course.size[0]
     for k in range(most):
-        done = segment >= course.nodes[0] and turned(course, 0, state[k])
+        done = segment >= course.size[0] and turned(course, state[k])
         if done and stands(own, 0, state[k]):
             return k
-        u1, u2, segment = track_control(own, course, segment, state[k], dt)
+        u1, u2, segment, _, _ = track_control(own, course, segment, LONG, state[k], dt)
         control[k, 0], control[k, 1] = u1, u2
         step(own[0], state[k], u1, u2, dt, state[k + 1])
     return -1

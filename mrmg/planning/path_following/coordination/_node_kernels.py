@@ -9,7 +9,7 @@ import numpy as np
 
 from mrmg.compilation import by_reference, kernel
 from mrmg.motion._kernels import CAR, copy_numbers
-from mrmg.planning.path_following._following_kernels import Courses, advance
+from mrmg.planning.path_following._following_kernels import Course, advance
 from mrmg.planning.path_following.coordination._field_kernels import field_at
 from mrmg.planning.path_following.coordination._motion_kernels import (
     Traffic,
@@ -18,8 +18,8 @@ from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
     MOST_PIECES,
     reeds_shepp,
 )
+from mrmg.planning.problem._clearance_kernels import Zones
 from mrmg.planning.problem._control_kernels import wrap
-from mrmg.planning.problem._safety_kernels import Zones
 from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.roadmap._fleet_kernels import Spaces
 from mrmg.planning.roadmap._heap_kernels import push
@@ -42,6 +42,7 @@ class Task(NamedTuple):
         along: way along the path to each of them [m]; inf where it leads to none, (L,).
         rest_s: time from each of them to the end by the fields, shape (L + 1,); the
             last entry is that from the end of the path.
+        stays_s: cost of the stays from each leg on, shape (L + 1,).
         finish: target to end in, or -1.
         home_along: whether the path leads to the finish.
         heading, tolerance: to end with [rad]; a tolerance of at least pi for any.
@@ -60,6 +61,7 @@ class Task(NamedTuple):
     stay: np.ndarray
     along: np.ndarray
     rest_s: np.ndarray
+    stays_s: np.ndarray
     finish: int
     home_along: bool
     heading: float
@@ -82,7 +84,7 @@ class Setting(NamedTuple):
     Attributes:
         own: the robot, shape (1,).
         spaces, terrain, targets, zones: its surroundings.
-        courses: its path, which may be empty.
+        course: its path, which may be empty.
         traffic: how the others move.
         task: what it is to do.
         dt: step [s].
@@ -93,7 +95,7 @@ class Setting(NamedTuple):
     terrain: TerrainGrid
     targets: Targets
     zones: Zones
-    courses: Courses
+    course: Course
     traffic: Traffic
     task: Task
     dt: float
@@ -140,7 +142,7 @@ class Scratch(NamedTuple):
     control: np.ndarray
     corner: np.ndarray
     near: np.ndarray
-    curve: Courses
+    curve: Course
 
 
 @kernel
@@ -180,22 +182,21 @@ def cost_to_go_s(search, leg, segment, left, state):
         segment, left: of its path that it is on, and was on last.
         state: its state.
     """
-    own, courses, task = search.own, search.courses, search.task
+    own, course, task = search.own, search.course, search.task
     top = own[0].limit[1]
-    legs, nodes = len(task.leg), courses.nodes[0]
+    legs, nodes = len(task.leg), course.size[0]
     on_path = task.home_along if leg == legs else task.along[leg] < np.inf
     if on_path and segment < nodes:
-        i, s = advance(courses, 0, left, state[0], state[1])
-        size = courses.way[0, i + 1] - courses.way[0, i]
-        t = min(1.0, max(0.0, (s - courses.way[0, i]) / max(size, 1e-9)))
-        px = (1.0 - t) * courses.node[0, i, 0] + t * courses.node[0, i + 1, 0]
-        py = (1.0 - t) * courses.node[0, i, 1] + t * courses.node[0, i + 1, 1]
-        s = courses.way[0, i] + t * size
-        way = courses.way[0, nodes - 1] - s
-        way += SIDEWAYS * hypot(state[0] - px, state[1] - py)
+        i, s = advance(course, left, state[0], state[1])
+        size = course.way[i + 1] - course.way[i]
+        t = min(1.0, max(0.0, (s - course.way[i]) / max(size, 1e-9)))
+        px = (1.0 - t) * course.node[i, 0] + t * course.node[i + 1, 0]
+        py = (1.0 - t) * course.node[i, 1] + t * course.node[i + 1, 1]
+        rest_s = (1.0 - t) * course.rest_s[i] + t * course.rest_s[i + 1]
+        way = SIDEWAYS * hypot(state[0] - px, state[1] - py)
         if leg < legs:
-            way += 2.0 * max(0.0, s - task.along[leg])
-        return way / top + task.rest_s[legs]
+            way += 2.0 * max(0.0, course.way[i] + t * size - task.along[leg])
+        return rest_s + way / top + task.rest_s[legs] + task.stays_s[leg]
     if leg == legs and task.finish < 0:
         return 0.0
     target = task.leg[leg] if leg < legs else task.finish
@@ -203,7 +204,7 @@ def cost_to_go_s(search, leg, segment, left, state):
     x, y = state[0], state[1]
     time_s = field_at(task.field, leg, x_min, y_min, task.field_cell, x, y)
     if leg < legs:
-        return time_s + task.rest_s[leg]
+        return time_s + task.rest_s[leg] + task.stays_s[leg]
     if task.tolerance < pi and own[0].model == CAR:
         turn, length = np.empty(MOST_PIECES), np.empty(MOST_PIECES)
         dx = search.targets.center[target, 0] - x
@@ -217,6 +218,19 @@ def cost_to_go_s(search, leg, segment, left, state):
         off = abs(wrap(task.heading - state[2])) - task.tolerance
         time_s += max(0.0, off) / own[0].limit[2]
     return time_s
+
+
+@kernel
+def queueing_s(search, leg, step_number):
+    """Return the cost of waiting until the zone of the next target is free [s].
+
+    Without it waits of minutes would be put off until all that takes less is tried.
+    """
+    task = search.task
+    if leg == len(task.leg) or search.targets.zone[task.leg[leg]] < 0:
+        return 0.0
+    left = search.traffic.busy_left[search.targets.zone[task.leg[leg]]]
+    return task.hold_share * search.dt * left[min(step_number, len(left) - 1)]
 
 
 @kernel
@@ -242,5 +256,5 @@ def add(search, nodes, a, motion, state, place, cost):
     nodes.parent[b], nodes.motion[b], nodes.step[b] = a, motion, step_number
     nodes.leg[b], nodes.segment[b], nodes.left[b] = leg, segment, left
     nodes.cost[b] = cost
-    value = cost + search.task.weight * rest_s
+    value = cost + search.task.weight * rest_s + queueing_s(search, leg, step_number)
     nodes.size[1] = push(nodes.key, nodes.entry, nodes.size[1], value, 2 * b)

@@ -32,6 +32,7 @@ from mrmg.planning.path_following.coordination._motion_kernels import (
     MOVE,
     STAY,
     TRACK,
+    WAIT,
     clear,
     move,
 )
@@ -68,21 +69,21 @@ def legs_done(targets, task, leg, state, first, last):
 
 
 @kernel
-def rejoined(courses, left, state):
+def rejoined(course, left, state):
     """Return (segment or OFF_PATH, least segment it may rejoin) of a state."""
-    i, s = advance(courses, 0, left, state[0], state[1])
+    i, s = advance(course, left, state[0], state[1])
     for _ in range(2):
-        dx = courses.node[0, i + 1, 0] - courses.node[0, i, 0]
-        dy = courses.node[0, i + 1, 1] - courses.node[0, i, 1]
+        dx = course.node[i + 1, 0] - course.node[i, 0]
+        dy = course.node[i + 1, 1] - course.node[i, 1]
         size = max(hypot(dx, dy), 1e-9)
-        ex, ey = state[0] - courses.node[0, i, 0], state[1] - courses.node[0, i, 1]
+        ex, ey = state[0] - course.node[i, 0], state[1] - course.node[i, 1]
         along, off = (ex * dx + ey * dy) / size, (dx * ey - dy * ex) / size
-        ahead = atan2(dy, dx) + (0.0 if courses.gear[0, i] > 0 else pi)
+        ahead = atan2(dy, dx) + (0.0 if course.gear[i] > 0 else pi)
         near = abs(off) < REJOIN_M and -REJOIN_M < along < size + REJOIN_M
         if near and abs(wrap(state[2] - ahead)) < REJOIN_ANGLE:
             return i, i
-        last = courses.end[0, i]
-        if last + 1 >= courses.nodes[0] or s < courses.way[0, last] - REJOIN_M:
+        last = course.end[i]
+        if last + 1 >= course.size[0] or s < course.way[last] - REJOIN_M:
             break
         i = last  # from the next stretch on
     return OFF_PATH, left
@@ -91,7 +92,7 @@ def rejoined(courses, left, state):
 @kernel
 def expand(search, nodes, room, a, motion, nears):
     """Add what a motion leads to from node a, if it is free and new."""
-    task, courses, state = search.task, search.courses, room.state
+    task, course, state = search.task, search.course, room.state
     own, dt, steps = search.own, search.dt, task.steps
     segment, left, first = nodes.segment[a], nodes.left[a], nodes.step[a]
     segment = move(search, motion, segment, steps, state, room.control)
@@ -106,9 +107,9 @@ def expand(search, nodes, room, a, motion, nears):
     leg = legs_done(search.targets, task, nodes.leg[a], state, 1, steps)
     after = state[steps]
     if motion == TRACK:
-        left = min(segment, courses.nodes[0] - 2)
-    elif motion >= MOVE and courses.nodes[0] > 1:
-        segment, left = rejoined(courses, left, after)
+        left = min(segment, course.size[0] - 2)
+    elif motion >= MOVE and course.size[0] > 1:
+        segment, left = rejoined(course, left, after)
     stamp = first + steps if first < search.traffic.end else 0
     if not is_new(nodes.table, cell_of(task, after, leg, stamp)) and motion != TRACK:
         return
@@ -121,24 +122,47 @@ def expand(search, nodes, room, a, motion, nears):
 
 
 @kernel
-def stay(search, nodes, room, a):
-    """Add a stay in the leg's target, if braking from node a ends in it."""
-    task, targets, leg = search.task, search.targets, nodes.leg[a]
-    tail = brake(search.own, search.dt, room.state, room.control)
-    x, y = room.state[tail, 0], room.state[tail, 1]
-    if not in_target(targets, task.leg[leg], x, y):
-        return
-    last = tail + task.stay[leg]
-    first = nodes.step[a]
+def stand(search, nodes, room, a, motion, tail, last):
+    """Add a node that stands, after braking for `tail` steps, until step `last`.
+
+    Args:
+        search, nodes, room: the search.
+        a: the node before it.
+        motion: STAY, which ends the leg, or WAIT.
+        tail, last: steps from node a on.
+    """
+    task, first = search.task, nodes.step[a]
     if first + last + MOST_BRAKING_STEPS >= len(room.control):
         return
     for k in range(tail, last):
         copy_numbers(room.state[k], room.state[k + 1])
+    leg = nodes.leg[a] + (1 if motion == STAY else 0)
+    if not is_new(nodes.table, cell_of(task, room.state[last], leg, first + last)):
+        return
     conflict_s = passing_cost(search, room, last, first)
     if conflict_s < np.inf:
         cost = nodes.cost[a] + task.hold_share * last * search.dt + conflict_s
-        place = (first + last, leg + 1, nodes.segment[a], nodes.left[a])
-        add(search, nodes, a, STAY, room.state[last], place, cost)
+        place = (first + last, leg, nodes.segment[a], nodes.left[a])
+        add(search, nodes, a, motion, room.state[last], place, cost)
+
+
+@kernel
+def stay(search, nodes, room, a):
+    """Open a stay in the leg's target, if braking from node a ends in it."""
+    task, targets, leg = search.task, search.targets, nodes.leg[a]
+    tail = brake(search.own, search.dt, room.state, room.control)
+    if in_target(targets, task.leg[leg], room.state[tail, 0], room.state[tail, 1]):
+        stand(search, nodes, room, a, STAY, tail, tail + task.stay[leg])
+
+
+@kernel
+def wait(search, nodes, room, a):
+    """Open a wait until a robot that must not be met sets out, or leaves a zone."""
+    tail = brake(search.own, search.dt, room.state, room.control)
+    release = search.traffic.release
+    i = np.searchsorted(release, nodes.step[a] + tail, side="right")
+    if i < len(release):
+        stand(search, nodes, room, a, WAIT, tail, release[i] - nodes.step[a])
 
 
 @kernel
@@ -155,7 +179,7 @@ def write_controls(search, nodes, room, a, control):
         p, motion = nodes.parent[b], nodes.motion[b]
         first, steps = nodes.step[p], nodes.step[b] - nodes.step[p]
         copy_numbers(nodes.state[p], room.state[0])
-        held = HOLD if motion == STAY else motion
+        held = HOLD if motion == STAY or motion == WAIT else motion
         segment = nodes.segment[p]
         move(search, held, segment, steps, room.state, control[first:])
     p = nodes.parent[a]
@@ -181,7 +205,7 @@ def find_motion(search, nodes, room, start, control):
     task, legs = search.task, len(search.task.leg)
     copy_numbers(start, room.state[0])
     leg = legs_done(search.targets, task, 0, room.state, 0, 0)
-    begin = 0 if search.courses.nodes[0] > 1 else OFF_PATH
+    begin = 0 if search.course.size[0] > 1 else OFF_PATH
     add(search, nodes, -1, HOLD, start, (0, leg, begin, 0), 0.0)
     motions, tries, most = len(task.motion), 0, task.most
     while nodes.size[1] > 0 and nodes.size[0] + motions + 4 < task.most:
@@ -200,12 +224,13 @@ def find_motion(search, nodes, room, start, control):
             stay(search, nodes, room, a)
         copy_numbers(nodes.state[a], room.state[0])
         nears = list_near(search, room, nodes.step[a])
-        if widened == 0 and 0 <= nodes.segment[a] < search.courses.nodes[0]:
+        if widened == 0 and 0 <= nodes.segment[a] < search.course.size[0]:
             expand(search, nodes, room, a, TRACK, nears)
             later = value + WIDENING_SHARE * task.steps * search.dt
             entry = 2 * a + 1
             nodes.size[1] = push(nodes.key, nodes.entry, nodes.size[1], later, entry)
             continue
+        wait(search, nodes, room, a)
         for motion in range(HOLD, MOVE + motions):
             expand(search, nodes, room, a, motion, nears)
     if nodes.size[2] >= 0:  # the best there is, if not good enough to end sooner

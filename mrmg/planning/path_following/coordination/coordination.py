@@ -19,7 +19,7 @@ import numpy as np
 
 from mrmg import seeding
 from mrmg.planning.path_following import _tracking_kernels
-from mrmg.planning.path_following._following_kernels import Courses
+from mrmg.planning.path_following._following_kernels import Course
 from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.coordination import _search_kernels
 from mrmg.planning.path_following.coordination._node_kernels import (
@@ -34,8 +34,8 @@ from mrmg.planning.path_following.coordination.tasks import (
     stays_s,
     task_of,
 )
-from mrmg.planning.path_following.coordination.traffic import FleetTraffic, Motion
-from mrmg.planning.path_following.tracking import courses_of
+from mrmg.planning.path_following.coordination.traffic import FleetTraffic
+from mrmg.planning.path_following.tracking import Drive, Motion, course_of
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.plans import Trajectory
@@ -67,19 +67,20 @@ LEAST_STEPS = 1500
 """... and so many steps more."""
 
 
-def empty_course(most: int) -> Courses:
-    """Return room for the path of one robot."""
-    return Courses(
-        node=np.zeros((1, most, 2)),
-        gear=np.ones((1, most), np.int64),
-        bend=np.zeros((1, most)),
-        way=np.zeros((1, most)),
-        end=np.zeros((1, most), np.int64),
-        fastest=np.full((1, most), np.inf),
-        pause=np.zeros((1, most), np.int64),
-        nodes=np.zeros(1, np.int64),
-        ease=np.zeros(1),
-        stiffness=np.ones(1),
+def empty_course(most: int) -> Course:
+    """Return room for a path."""
+    return Course(
+        node=np.zeros((most, 2)),
+        gear=np.ones(most, np.int64),
+        bend=np.zeros(most),
+        way=np.zeros(most),
+        end=np.zeros(most, np.int64),
+        fastest=np.full(most, np.inf),
+        pause=np.zeros(most, np.int64),
+        rest_s=np.zeros(most),
+        size=np.zeros(1, np.int64),
+        ease=0.0,
+        stiffness=1.0,
         heading=np.zeros(1),
         tolerance=np.full(1, np.inf),
     )
@@ -111,11 +112,15 @@ class _Planning:
         problem: Problem,
         tours: Sequence[Sequence[int]],
         paths: Sequence[Path],
+        drives: Sequence[Drive | None],
         horizon: int,
     ) -> None:
         self._problem = problem
         self._tours, self._paths = tours, paths
-        self._courses = courses_of(problem, paths, [()] * len(paths))
+        self._courses = [
+            _course_with_rest(problem, r, path, drive)
+            for r, (path, drive) in enumerate(zip(paths, drives, strict=True))
+        ]
         self._fields = Fields(problem)
         self._traffic = FleetTraffic(problem, horizon)
         self._control = np.zeros((horizon, 2))
@@ -145,14 +150,13 @@ class _Planning:
         if yielding:
             now = replace(now, weight=YIELDING_WEIGHT, soft_s=YIELDING_S)
         own = slice(r, r + 1)
-        courses = Courses(*(np.ascontiguousarray(part[own]) for part in self._courses))
         search = Setting(
             own=mission.fleet[own],
             spaces=mission.spaces,
             terrain=mission.terrain,
             targets=mission.targets,
             zones=mission.zones,
-            courses=courses,
+            course=self._courses[r],
             traffic=self._traffic.around(r, motions, above),
             task=task_of(
                 self._problem,
@@ -164,12 +168,14 @@ class _Planning:
             ),
             dt=dt_s,
         )
-        self._room.curve.ease[0] = BRAKING_SHARE * mission.fleet["limit"][r, 3]
-        self._room.curve.stiffness[0] = courses.stiffness[0]
+        curve = self._room.curve._replace(
+            ease=float(BRAKING_SHARE * mission.fleet["limit"][r, 3]),
+            stiffness=self._courses[r].stiffness,
+        )
         count, nodes = _search_kernels.find_motion(
             search,
             empty_nodes(now.most),
-            self._room,
+            self._room._replace(curve=curve),
             self._problem.start[r],
             self._control,
         )
@@ -205,6 +211,7 @@ def coordinated(
     *,
     seed: int = 0,
     rounds: Sequence[Round] = ROUNDS,
+    drives: Sequence[Drive | None] | None = None,
 ) -> tuple[Trajectory, ...]:
     """Return trajectories of all robots along their tours; empty if none were found.
 
@@ -215,13 +222,19 @@ def coordinated(
         halt: shape (1,); the search ends soon after it has turned true.
         seed: of the orders in which robots are looked at.
         rounds: that are made one after the other.
+        drives: along their paths, of robots that have driven them alone.
     """
     robots = len(tours)
-    planning = _Planning(problem, tours, paths, _horizon(problem, tours, paths))
+    drives = [None] * robots if drives is None else drives
+    lasting = [0 if drive is None else len(drive.motion.control) for drive in drives]
+    horizon = max(_horizon(problem, tours, paths), 2 * max(lasting))
+    planning = _Planning(problem, tours, paths, drives, horizon)
     rng = seeding.stream(seed, "coordination")
     for now in rounds:
-        motions: list[Motion | None] = [None] * robots
+        motions = [None if drive is None else drive.motion for drive in drives]
         for r in rng.permutation(robots).tolist():
+            if motions[r] is not None:
+                continue
             motions[r] = planning.find_alone(r, motions, now, halt)
             if motions[r] is None:
                 return ()
@@ -229,27 +242,33 @@ def coordinated(
         planning.round = now
         found = search_priorities(alone, planning, now.orders, halt)
         if found is not None:
-            return _trajectories(problem, found)
+            return trajectories_of(problem, found)
     return ()
 
 
-def _trajectories(
+def _course_with_rest(
+    problem: Problem, r: int, path: Path, drive: Drive | None
+) -> Course:
+    """Return robot r's path with what is left of it as its drive alone tells."""
+    course = course_of(problem, r, path)
+    if drive is None or len(drive.spent_s) == 0:
+        return course
+    course.rest_s[: len(path.node)] = drive.spent_s[-1] - drive.spent_s
+    return course
+
+
+def trajectories_of(
     problem: Problem, motions: Sequence[Motion]
 ) -> tuple[Trajectory, ...]:
     """Return motions as trajectories of one length: who is through stands."""
     steps = max(1, *(len(motion.control) for motion in motions))
     trajectories = []
-    dt_s = problem.dt_s
-    for r, (robot, motion) in enumerate(
-        zip(problem.scene.robots, motions, strict=True)
-    ):
-        control = np.zeros((steps, 2))
-        control[: len(motion.control)] = motion.control
-        state = np.zeros((steps + 1, 5))
-        state[0] = problem.start[r]
-        _tracking_kernels.write_states(problem.mission.fleet, r, dt_s, control, state)
+    for robot, motion in zip(problem.scene.robots, motions, strict=True):
+        rest = steps - len(motion.control)
+        control = np.pad(motion.control, ((0, rest), (0, 0)))
+        state = np.pad(motion.state, ((0, rest), (0, 0)), mode="edge")
         trajectories.append(
-            Trajectory(robot=robot.id, dt_s=dt_s, state=state, control=control)
+            Trajectory(robot=robot.id, dt_s=problem.dt_s, state=state, control=control)
         )
     return tuple(trajectories)
 

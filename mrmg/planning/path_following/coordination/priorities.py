@@ -16,7 +16,7 @@ from typing import Protocol
 
 import numpy as np
 
-from mrmg.planning.path_following.coordination.traffic import Motion
+from mrmg.planning.path_following.tracking import Motion
 
 YIELDS = 2
 """Times that each of two robots makes room for the other one."""

@@ -211,12 +211,11 @@ def task_of(
     rest_s = after_s[: len(legs) + 1].copy()
     # Of the last entry, what is left behind the end of the path.
     rest_s[-1] = 0.0 if home_along or finish < 0 or not legs else after_s[len(legs) - 1]
-    # Stays yet to come cost what they cost, whatever the weight of the rest.
-    ahead_s = np.cumsum(stay_s[::-1])[::-1]
     standing = (
         LONG_HOLD_SHARE if problem.mission.targets.zone.max() >= 0 else HOLD_SHARE
     )
-    rest_s[: len(legs)] += standing / effort.weight * ahead_s
+    # Stays yet to come cost what they cost, whatever the weight of the rest.
+    ahead_s = np.append(np.cumsum(stay_s[::-1])[::-1], 0.0)
     steps = motion_steps(robot, dt_s, effort.fineness)
     top, turn = float(robot["limit"][1]), max(float(robot["limit"][2]), 1e-6)
     headings = round(HEADINGS * min(2.0, effort.fineness))
@@ -226,6 +225,7 @@ def task_of(
         stay=np.ceil(stay_s / dt_s).astype(np.int64),
         along=along,
         rest_s=rest_s,
+        stays_s=standing / effort.weight * ahead_s,
         finish=finish,
         home_along=bool(home_along),
         heading=float(targets.heading[r]),

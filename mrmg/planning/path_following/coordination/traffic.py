@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from mrmg.planning.path_following.coordination import _conflict_kernels
 from mrmg.planning.path_following.coordination._motion_kernels import Traffic
+from mrmg.planning.path_following.tracking import Motion
 from mrmg.planning.problem.problem import Problem
 
 CLOSING_SHARE = 1.5
 """How much faster than the reference point at most the middle of a footprint moves."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Motion:
-    """One robot's motion.
-
-    Attributes:
-        state: shape (n + 1, 5).
-        control: shape (n, 2).
-    """
-
-    state: np.ndarray
-    control: np.ndarray
+STANDING_STEPS = 20
+"""Steps after which a robot that stands is worth waiting for."""
 
 
 class FleetTraffic:
@@ -46,6 +37,7 @@ class FleetTraffic:
         self._problem = problem
         self._closing = (speed[:, None] + speed) * problem.dt_s
         self._noted: list[Motion | None] = [None] * robots
+        self._starts = [np.zeros(0, np.int64)] * robots
         self._inside = np.zeros((robots, zones, horizon), bool)
         self._traffic = Traffic(
             fleet=mission.fleet,
@@ -56,6 +48,8 @@ class FleetTraffic:
             hard=np.zeros(robots, bool),
             soft=np.zeros(robots, bool),
             busy=np.zeros((zones, horizon), bool),
+            busy_left=np.zeros((zones, horizon), np.int64),
+            release=np.zeros(0, np.int64),
             end=0,
         )
 
@@ -69,6 +63,7 @@ class FleetTraffic:
             _conflict_kernels.note_motion(
                 mission.fleet, mission.zones, self._traffic, self._inside, r, count
             )
+            self._starts[r] = starts_of(motion)
             self._noted[r] = motion
 
     def around(
@@ -80,11 +75,16 @@ class FleetTraffic:
         known[r] = False
         hard = above & known
         lasting = self._traffic.last[known]
+        busy = self._inside[hard].any(axis=0)
+        free = np.flatnonzero((busy[:, :-1] & ~busy[:, 1:]).any(axis=0)) + 1
+        starts = [self._starts[other] for other in np.flatnonzero(hard)]
         return self._traffic._replace(
             closing=np.ascontiguousarray(self._closing[r]),
             hard=hard,
             soft=known & ~hard,
-            busy=self._inside[hard].any(axis=0),
+            busy=busy,
+            busy_left=np.ascontiguousarray(busy[:, ::-1].cumsum(axis=1)[:, ::-1]),
+            release=np.unique(np.concatenate([*starts, free])),
             end=int(lasting.max()) if len(lasting) else 0,
         )
 
@@ -96,3 +96,10 @@ class FleetTraffic:
         conflict = np.full(len(fleet), np.inf)
         _conflict_kernels.conflicts_of(fleet, traffic, self._inside, r, conflict)
         return conflict
+
+
+def starts_of(motion: Motion) -> np.ndarray:
+    """Return the steps at which a robot sets out after it has stood for a while."""
+    moves = np.append((np.diff(motion.state[:, :3], axis=0) != 0.0).any(axis=1), True)
+    ways = np.flatnonzero(moves)
+    return ways[np.diff(ways, prepend=-1) > STANDING_STEPS]

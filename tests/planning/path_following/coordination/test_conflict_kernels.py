@@ -59,6 +59,8 @@ def traffic_of(problem: Problem, states: np.ndarray, *, hard: bool = True) -> Tr
         hard=np.array([False, hard]),
         soft=np.zeros(2, bool),
         busy=np.zeros((1, len(states)), bool),
+        busy_left=np.zeros((1, len(states)), np.int64),
+        release=np.zeros(0, np.int64),
         end=len(states) - 1,
     )
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from mrmg.planning.path_following.coordination.priorities import search_priorities
-from mrmg.planning.path_following.coordination.traffic import Motion
+from mrmg.planning.path_following.tracking import Motion
 
 LONG = 40
 

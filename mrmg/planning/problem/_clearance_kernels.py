@@ -1,0 +1,65 @@
+"""Whether a robot keeps clear of obstacles, and where only one robot may be."""
+
+from __future__ import annotations
+
+from math import cos, hypot, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.compilation import by_reference, kernel
+from mrmg.planning.roadmap._fleet_kernels import space_of
+from mrmg.world._kernels import (
+    clearance_at_least,
+    footprint_is_clear,
+    place_footprint,
+    point_in_convex,
+)
+
+
+@by_reference
+class Zones(NamedTuple):
+    """Convex mutual-exclusion zones.
+
+    Attributes:
+        center: shape (S, 2).
+        reach: radius of the circle about the centre that holds the region, shape (S,).
+        corner: padded corners of polygons, shape (S, M, 2).
+        corners: number of corners; 0 for a circle, shape (S,).
+    """
+
+    center: np.ndarray
+    reach: np.ndarray
+    corner: np.ndarray
+    corners: np.ndarray
+
+
+@kernel
+def in_zone(zones, zone, x, y):
+    """Return whether a point lies in a mutual-exclusion zone."""
+    n = zones.corners[zone]
+    if hypot(x - zones.center[zone, 0], y - zones.center[zone, 1]) > zones.reach[zone]:
+        return False
+    return n == 0 or point_in_convex(x, y, zones.corner[zone, :n])
+
+
+@kernel
+def clear_of_obstacles(own, spaces, state, corner):
+    """Return whether a robot keeps its margin from obstacles.
+
+    Args:
+        own: the robot, shape (1,).
+        spaces: free spaces of the fleet.
+        state: its state.
+        corner: room for a footprint, shape (M, 2).
+    """
+    space = space_of(spaces, own[0].space)
+    n, radius, margin = own[0].corners, own[0].radius, own[0].margin
+    x, y, theta = state[0], state[1], state[2]
+    c, s = cos(theta), sin(theta)
+    cx = x + c * own[0].middle[0] - s * own[0].middle[1]
+    cy = y + s * own[0].middle[0] + c * own[0].middle[1]
+    if clearance_at_least(space, cx, cy) > radius + margin:
+        return True
+    place_footprint(own[0].corner[:n], x, y, theta, corner[:n])
+    return footprint_is_clear(space, corner[:n], cx, cy, radius, margin)
