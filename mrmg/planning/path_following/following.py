@@ -9,7 +9,7 @@ search for motions starts from the paths (`coordination`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import cos, pi, radians, sin
 
 import numpy as np
@@ -20,7 +20,7 @@ from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import TRACKING_M, Path, smooth_path
 from mrmg.planning.path_following.gears import with_best_gears
-from mrmg.planning.path_following.refine import OnFailure, cost_maps_of, drive_paths
+from mrmg.planning.path_following.refine import cost_maps_of, drive_paths
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.routing.routing import Routing
@@ -63,6 +63,21 @@ def can_follow(problem: Problem) -> bool:
     return bool(known.all())
 
 
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """What following tours gave.
+
+    Attributes:
+        plan: along them, None if there is none.
+        failure: why there is none, in words.
+        driven: whether they could be driven, if not on the charge there is.
+    """
+
+    plan: Plan | None
+    failure: str = ""
+    driven: bool = True
+
+
 def follow_tours(
     problem: Problem,
     params: PlannerParams,
@@ -71,12 +86,12 @@ def follow_tours(
     halt: np.ndarray,
     *,
     soon: bool = False,
-    on_failure: OnFailure = lambda reason: None,
-) -> Plan | None:
-    """Return a plan along tours; None if driving them fails.
+) -> Followed:
+    """Plan along tours.
 
     Where time counts, cars that are slower backwards turn round rather than change
-    gear, if there is room. What fails with one way of turning is tried with the others.
+    gear, if there is room. Where a robot does not get through with one way of turning,
+    the others are tried.
 
     Args:
         problem: the mission.
@@ -85,7 +100,6 @@ def follow_tours(
         seed: of the search that the plan belongs to.
         halt: shape (1,); following ends soon after it has turned true.
         soon: find the first plan soon rather than a cheap one.
-        on_failure: receives why driving failed, in words, each time it does.
     """
     cost_maps = cost_maps_of(problem)
     stops = [whole_tour(problem, routing, r) for r in range(len(cost_maps))]
@@ -96,6 +110,7 @@ def follow_tours(
     timed = problem.minimum_time or problem.preference.objective.makespan_weight > 0.0
     deeper_m = FIRST_PLAN_DEPTH_M if soon else TRACKING_M
     tried: list[list[Path]] = []
+    failed = Followed(None, driven=False)
     lenient_first = timed and slower.any()
     for sharp in (*LENIENT_TURNS, SHARP) if lenient_first else (SHARP, *LENIENT_TURNS):
         paths = [
@@ -110,15 +125,17 @@ def follow_tours(
                 _geared(problem, r, cost_maps[r], path) for r, path in enumerate(paths)
             ]
         tasks = [RobotTask(*one) for one in zip(stops, paths, cost_maps, strict=True)]
-        trajectories = drive_paths(problem, tasks, halt, on_failure)
-        plan = None
-        if trajectories:
-            plan = make_plan(problem, seed, params, trajectories, tours)
-            if plan is None:
-                on_failure(why_refused(problem, trajectories, tours))
-        if plan is not None or halt[0]:
-            return plan
-    return None
+        drive = drive_paths(problem, tasks, halt)
+        if drive.trajectories:
+            plan = make_plan(problem, seed, params, drive.trajectories, tours)
+            if plan is not None:
+                return Followed(plan)
+            failed = Followed(None, why_refused(problem, drive.trajectories, tours))
+        else:
+            failed = Followed(None, drive.failure, failed.driven)
+        if drive.meeting or halt[0]:
+            break
+    return failed
 
 
 def _same_gears(paths: Sequence[Path], others: Sequence[Path]) -> bool:

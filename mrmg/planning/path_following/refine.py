@@ -12,8 +12,8 @@ keeps every battery above its reserve, and is better by the scene's objective.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -48,8 +48,20 @@ SWERVES = 3
 NEAR_M = 3.0
 """How near to each other two places are the same."""
 
-OnFailure = Callable[[str], None]
-"""Receives why driving along paths failed, in words."""
+
+@dataclass(frozen=True, slots=True)
+class FleetDrive:
+    """What driving the fleet along its paths gave.
+
+    Attributes:
+        trajectories: of all robots; empty if it failed.
+        failure: why it did, in words.
+        meeting: whether robots met, each of which could drive alone.
+    """
+
+    trajectories: tuple[Trajectory, ...]
+    failure: str = ""
+    meeting: bool = False
 
 
 def refine(
@@ -105,16 +117,13 @@ def along_trajectories(
             path = path_of(tour[:stops], visits[:stops], trajectory)
         before = Drive(Motion(trajectory.state, trajectory.control), True, np.zeros(0))
         tasks.append(RobotTask(tour, path, cost_maps[r], before))
-    return drive_paths(problem, tasks, halt)
+    return drive_paths(problem, tasks, halt).trajectories
 
 
 def drive_paths(
-    problem: Problem,
-    tasks: Sequence[RobotTask],
-    halt: np.ndarray,
-    on_failure: OnFailure = lambda reason: None,
-) -> tuple[Trajectory, ...]:
-    """Return the trajectories of all robots along smoothed paths; empty without any.
+    problem: Problem, tasks: Sequence[RobotTask], halt: np.ndarray
+) -> FleetDrive:
+    """Smooth paths and drive the fleet along them.
 
     Each robot drives as if it were alone; where robots get in each other's way, or have
     to end with a heading, a search for motions starts from their paths.
@@ -123,18 +132,16 @@ def drive_paths(
         problem: the mission.
         tasks: what each robot drives; changed as its path is.
         halt: shape (1,); driving ends soon after it has turned true.
-        on_failure: receives why there are none, in words.
     """
     drives = []
     for r, task in enumerate(tasks):
         if halt[0]:
-            return ()
-        drive, reason = _driven(problem, r, task)
+            return FleetDrive(())
+        drive, failure = _driven(problem, r, task)
         if drive is None and not problem.steered_home[r]:
-            on_failure(reason)
-            return ()
+            return FleetDrive((), failure)
         drives.append(drive)
-    return coordinated(
+    trajectories = coordinated(
         problem,
         [task.tour for task in tasks],
         [with_pauses(problem, r, task.path) for r, task in enumerate(tasks)],
@@ -142,6 +149,9 @@ def drive_paths(
         rounds=ROUNDS[:1],
         drives=drives,
     )
+    if trajectories:
+        return FleetDrive(trajectories)
+    return FleetDrive((), "no motions were found that keep the robots apart", True)
 
 
 def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, str]:
@@ -181,10 +191,10 @@ def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, st
 def _on_its_way(problem: Problem, task: RobotTask, drive: Drive) -> str:
     """Return in words between which targets a drive ended."""
     ahead = np.flatnonzero(np.isinf(drive.spent_s[task.path.stop]))
-    if len(ahead) == 0:
-        return "at its last target"
-    target = int(task.path.target[ahead[0]])
-    return f"on its way to {problem.scene.targets()[target].id}"
+    places = problem.scene.targets()
+    target = int(task.path.target[ahead[0]]) if len(ahead) else len(places)
+    name = places[target].id if target < len(places) else "where it must end"
+    return f"on its way to {name}"
 
 
 def cost_maps_of(problem: Problem) -> list[CostMap]:

@@ -177,10 +177,10 @@ def path_following(problem: Problem, request: Request) -> Attempt:
 
 def _tries(problem: Problem, request: Request, schedule: Schedule) -> Iterator[Attempt]:
     """Yield what came of each entry of a schedule."""
-    tried: dict[float, set[Tours]] = {}
+    tried: dict[Tours, float] = {}
     for soc_margin, draws in schedule.followed:
         kept = problem.with_soc_margin(soc_margin)
-        yield follow_paths(kept, request, draws, tried.setdefault(soc_margin, set()))
+        yield follow_paths(kept, request, draws, soc_margin, tried)
     for soc_margin in schedule.search_soc_margins:
         kept = problem.with_soc_margin(soc_margin).with_margin(schedule.search_margin)
         searched = search_motions(kept, request)
@@ -237,7 +237,11 @@ def search_motions(problem: Problem, request: Request) -> Attempt:
 
 
 def follow_paths(
-    problem: Problem, request: Request, draws: tuple[Draw, ...], tried: set[Tours]
+    problem: Problem,
+    request: Request,
+    draws: tuple[Draw, ...],
+    soc_margin: float,
+    tried: dict[Tours, float],
 ) -> Attempt:
     """Drive straight along tours.
 
@@ -248,7 +252,9 @@ def follow_paths(
         problem: the mission.
         request: the attempt.
         draws: of tours.
-        tried: tours that the attempt has followed, in vain; receives these.
+        soc_margin: state-of-charge margin that plans must leave.
+        tried: least margin at which tours that the attempt has followed are of no use;
+            receives those of these.
     """
     began = time.perf_counter()
     choice = _drawn_tours(problem, request, draws)
@@ -257,32 +263,32 @@ def follow_paths(
     preference = problem.preference
     plans: list[Plan] = []
     found_at: list[float] = []
-    failures = [""]
+    failure = ""
     driven = 0
     for tours, minimum_time in product(choice, (False, True)):
         if request.halted or (plans and not preference.late_s(plans[-1])):
             break
-        if not plans and (minimum_time or tours.tours in tried):
+        useless = soc_margin >= tried.get(tours.tours, np.inf)
+        if not plans and (minimum_time or useless):
             continue
-        tried.add(tours.tours)
         driven += 1
-        plan = follow_tours(
+        followed = follow_tours(
             replace(problem, minimum_time=minimum_time),
             request.params,
             tours,
             request.seed,
             request.halt,
             soon=request.number == 0,
-            on_failure=failures.append,
         )
-        better = not plans or (
-            plan is not None and preference.rank(plan) < preference.rank(plans[-1])
-        )
-        if plan is not None and better:
+        tried[tours.tours] = soc_margin if followed.driven else 0.0
+        plan, failure = followed.plan, followed.failure or failure
+        if plan is not None and (
+            not plans or preference.rank(plan) < preference.rank(plans[-1])
+        ):
             plans.append(plan)
             found_at.append(time.perf_counter())
     counts = {"path_following_plans": driven, "router_calls": len(draws)}
-    return Attempt(plans, found_at, routing_s, counts, bool(choice), failures[-1])
+    return Attempt(plans, found_at, routing_s, counts, bool(choice), failure)
 
 
 def _drawn_tours(

@@ -30,7 +30,7 @@ PARAMS = PlannerParams(samples=600)
 def followed(scene: Scene) -> Plan:
     problem = state_mission(scene, 0, PARAMS).with_soc_margin(LEAST_SOC_MARGIN)
     tours = solve_routing(problem.mission.routing, PARAMS.router, 0)
-    plan = follow_tours(problem, PARAMS, tours, 0, np.zeros(1, np.bool_))
+    plan = follow_tours(problem, PARAMS, tours, 0, np.zeros(1, np.bool_)).plan
     assert plan is not None
     return plan
 
@@ -108,17 +108,16 @@ def test_where_time_counts_cars_back_out_of_what_is_too_narrow(
         {"box": {"center": [18, y], "size": [22, 1]}, "id": f"w{y}"} for y in (7, 13)
     ]
     scene = yard(**OUT_AND_BACK, obstacles=walls, objective="makespan")
-    plans = followed(scene)
-    assert plans
-    assert mrmg.verify(scene, plans[-1]).ok
-    assert reversing_s(plans[-1]) > 3.0
+    plan = followed(scene)
+    assert mrmg.verify(scene, plan).ok
+    assert reversing_s(plan) > 3.0
 
 
 def test_halted_it_gives_nothing(yard: Callable[..., Scene]) -> None:
     problem = state_mission(yard(), 0, PARAMS)
     tours = solve_routing(problem.mission.routing, PARAMS.router, 0)
     halted = np.ones(1, np.bool_)
-    assert not list(follow_tours(problem, PARAMS, tours, 0, halted))
+    assert follow_tours(problem, PARAMS, tours, 0, halted).plan is None
 
 
 SWAP = [
@@ -139,15 +138,14 @@ def test_robots_that_turn_on_the_spot_end_as_they_must(
     yard: Callable[..., Scene],
 ) -> None:
     scene = yard(goals=[], robots=SWAP)
-    plans = followed(scene)
-    assert plans
-    assert mrmg.verify(scene, plans[-1]).violations == ()
-    for trajectory, heading in zip(plans[-1].trajectories, (1.5, 3.1), strict=True):
+    plan = followed(scene)
+    assert mrmg.verify(scene, plan).violations == ()
+    for trajectory, heading in zip(plan.trajectories, (1.5, 3.1), strict=True):
         lacking = np.angle(np.exp(1j * (trajectory.state[-1, 2] - heading)))
         assert abs(lacking) < 0.15
 
 
-def test_models_of_users_are_not_drafted(yard: Callable[..., Scene]) -> None:
+def test_models_of_users_do_not_follow_paths(yard: Callable[..., Scene]) -> None:
     problem = state_mission(yard(), 0, PARAMS)
     assert can_follow(problem)
     fleet = problem.mission.fleet.copy()

@@ -28,7 +28,9 @@ PARAMS = PlannerParams(samples=600)
 def followed(scene: Scene) -> Plan:
     problem = state_mission(scene, 0, PARAMS).with_soc_margin(LEAST_SOC_MARGIN)
     tours = solve_routing(problem.mission.routing, PARAMS.router, 0)
-    return list(follow_tours(problem, PARAMS, tours, 0, np.zeros(1, np.bool_)))[-1]
+    plan = follow_tours(problem, PARAMS, tours, 0, np.zeros(1, np.bool_)).plan
+    assert plan is not None
+    return plan
 
 
 def test_robots_stand_for_the_dwell_time_of_each_stop() -> None:
@@ -44,7 +46,7 @@ def test_robots_stand_for_the_dwell_time_of_each_stop() -> None:
 
 
 @pytest.mark.parametrize("name", ["dwell", "charging"])
-def test_drafts_stay_long_enough(name: str) -> None:
+def test_plans_stay_long_enough(name: str) -> None:
     scene = mrmg.load_scene(SCENES / f"{name}.yaml")
     assert mrmg.verify(scene, followed(scene)).violations == ()
 

@@ -5,7 +5,7 @@ Both refine what they find: plans of one attempt are each better than the one be
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -19,6 +19,7 @@ import mrmg
 from mrmg.energy.metering import battery_profile
 from mrmg.planning import Attempt, PlannerParams, Problem, Request
 from mrmg.planning.path_following import strategy
+from mrmg.planning.path_following.following import Followed
 from mrmg.planning.path_following.strategy import (
     Schedule,
     follow_paths,
@@ -41,7 +42,8 @@ def request(number: int = 0, params: PlannerParams = PARAMS) -> Request:
 
 def along_paths(problem: Problem, asked: Request) -> Attempt:
     schedule = Schedule.of(problem, asked.params, asked.number)
-    return follow_paths(problem, asked, schedule.followed[0][1], set())
+    soc_margin, draws = schedule.followed[0]
+    return follow_paths(problem, asked, draws, soc_margin, {})
 
 
 Way = Callable[[Problem, Request], Attempt]
@@ -114,9 +116,9 @@ def test_other_tours_are_followed_before_motions_are_searched_for(
     driven: list[tuple[tuple[int, ...], ...]] = []
     drive = strategy.follow_tours
 
-    def failing_at_first(*given: Any, **options: Any) -> Iterator[Plan]:
+    def failing_at_first(*given: Any, **options: Any) -> Followed:
         driven.append(given[2].tours)
-        return drive(*given, **options) if len(driven) > 2 else iter(())
+        return drive(*given, **options) if len(driven) > 2 else Followed(None)
 
     monkeypatch.setattr(strategy, "follow_tours", failing_at_first)
     found = attempted(path_following, "scene1")
@@ -129,7 +131,7 @@ def test_tours_that_failed_are_counted_with_the_search(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The only tours there are, with more and less charge left; then the search."""
-    monkeypatch.setattr(strategy, "follow_tours", lambda *_, **__: iter(()))
+    monkeypatch.setattr(strategy, "follow_tours", lambda *_, **__: Followed(None))
     found = attempted(path_following, "quickstart")
     assert found.counts["path_following_plans"] == 2
     assert found.counts["router_calls"] >= 5

@@ -179,7 +179,7 @@ def write_controls(search, nodes, room, a, control):
         p, motion = nodes.parent[b], nodes.motion[b]
         first, steps = nodes.step[p], nodes.step[b] - nodes.step[p]
         copy_numbers(nodes.state[p], room.state[0])
-        held = HOLD if motion == STAY or motion == WAIT else motion
+        held = HOLD if motion in (STAY, WAIT) else motion
         segment = nodes.segment[p]
         move(search, held, segment, steps, room.state, control[first:])
     p = nodes.parent[a]
