@@ -1,9 +1,4 @@
-"""How a fleet comes to rest: the committed braking that every plan keeps possible.
-
-The planner lets a robot be only where all robots could at once brake in full, steering
-held, and stay clear of obstacles and of each other. So a fleet that tracks its plan can
-be stopped at any step of it, whatever made it stop.
-"""
+"""How one robot comes to rest soonest: full braking, steering held."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """Choosing how a fleet comes to rest, so that nobody touches anything on the way.
 
-Committed braking is what the planner keeps possible. Where a plan does not (one by
-another planner, or a robot that is off its plan), robots in service may stop along
-their planned paths instead, later but without leaving the places they were given.
+All robots brake in full, steering held, if that keeps them clear. Else robots in
+service may stop along their planned paths instead, all at one rate, later but without
+leaving the places they were given.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from mrmg.supervision.braking import brake_to_rest
 from mrmg.verification.distances import obstacle_distance, robot_distance
 
 ENOUGH_M = 0.1
-"""Clearance with which committed braking needs no alternative."""
+"""Clearance with which full braking needs no alternative."""
 
 Motion = tuple[np.ndarray, np.ndarray]
 """States, shape (n + 1, 5), and controls, shape (n, 2)."""
@@ -46,17 +46,17 @@ class Departing:
 
     def motions_to_rest(self) -> dict[str, Motion]:
         """Return how each robot comes to rest; motions differ in length."""
-        committed = {item.robot: self._braking(item) for item in self.trajectories}
-        clear_m = self._clearance_m(committed)
+        braked = {item.robot: self._braking(item) for item in self.trajectories}
+        clear_m = self._clearance_m(braked)
         if clear_m >= ENOUGH_M:
-            return committed
+            return braked
         along = {
-            item.robot: committed[item.robot]
+            item.robot: braked[item.robot]
             if item.robot in self.broken
             else self._along_plan(item)
             for item in self.trajectories
         }
-        return along if self._clearance_m(along) > clear_m else committed
+        return along if self._clearance_m(along) > clear_m else braked
 
     def _model(self, item: Trajectory) -> RobotModel:
         return self.scene.robot(item.robot).model

@@ -2,6 +2,6 @@
 
 Every strategy takes it. `problem` states it from a scene and a roadmap; `targets` has
 where robots must go and the margins kept there, `leg_times` how long legs take,
-`time_weighting` what a second is worth against energy. `_safety_kernels` keeps braking
-possible.
+`time_weighting` what a second is worth against energy, `_clearance_kernels` whether a
+robot keeps its margins.
 """

@@ -1,14 +1,24 @@
-"""How fast robots slow down while they follow paths."""
+"""Driving alone along a path: speeds, margins against shapely, and where it ends."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
+import shapely
+from shapely.affinity import rotate, translate
 
 import mrmg
 from mrmg.planning import PlannerParams
-from mrmg.planning.path_following.tracking import deceleration, steerable_speeds
-from mrmg.planning.problem.problem import state_mission
+from mrmg.planning.path_following.band import Path
+from mrmg.planning.path_following.tracking import (
+    deceleration,
+    drive_alone,
+    steerable_speeds,
+)
+from mrmg.planning.problem.problem import Problem, state_mission
+from mrmg.scene.types import Scene
 
 
 @pytest.mark.parametrize(
@@ -46,3 +56,55 @@ def test_robots_can_steer_along_an_arc_as_fast_as_is_said(name: str) -> None:
         steering = np.arctan(float(robot["wheelbase"]) * bend)
         rate = v * np.diff(steering[1:]) / np.diff(way[1:])
     assert rate == pytest.approx(np.full(len(v), robot["limit"][4]), rel=0.03)
+
+
+def straight_path(problem: Problem, end_x: float) -> Path:
+    """Return a straight path from a robot's start."""
+    x0, y0, heading = problem.start[0, :3]
+    x = np.linspace(x0, end_x, 30)
+    none = np.zeros(0, np.int64)
+    return Path(
+        node=np.stack([x, np.full(30, y0)], axis=1),
+        gear=np.ones(29, np.int64),
+        stop=none,
+        target=none,
+        deeper=np.zeros(0),
+        pivot=none,
+        heading=float(heading),
+        pause_s=np.zeros(0),
+    )
+
+
+@pytest.mark.parametrize("model", ["car", "diffdrive"])
+@pytest.mark.parametrize("south", np.linspace(9.6, 12.0, 9))
+def test_a_drive_keeps_its_margin_or_ends_where_it_would_not(
+    yard: Callable[..., Scene],
+    state: Callable[..., Problem],
+    model: str,
+    south: float,
+) -> None:
+    """Oracle: every footprint placed and measured by shapely."""
+    box = shapely.box(14.0, south, 16.0, south + 3.0)
+    corners = list(box.exterior.coords)[:-1]
+    wall = {"id": "wall", "polygon": [list(corner) for corner in corners]}
+    robots = [{"id": "r1", "model": model, "pose": [4, 10, 0]}]
+    problem = state(yard(obstacles=[wall], robots=robots))
+    drive = drive_alone(problem, 0, straight_path(problem, 25.0))
+    footprint = shapely.Polygon(problem.scene.robots[0].model.footprint_m)
+    margin_m = float(problem.mission.fleet["margin"][0])
+    clear_m = np.array(
+        [
+            translate(rotate(footprint, pose[2], (0, 0), use_radians=True), *pose[:2])
+            .distance(box)
+            for pose in drive.motion.state
+        ]
+    )  # fmt: skip
+    assert clear_m[:-1].min() >= margin_m - 1e-9
+    assert drive.arrived == (clear_m[-1] >= margin_m)
+    if drive.arrived:
+        assert np.hypot(*(drive.motion.state[-1, :2] - (25.0, 10.0))) < 0.1
+        assert (np.diff(drive.spent_s) >= 0.0).all()
+        lasting_s = len(drive.motion.control) * problem.dt_s
+        assert drive.spent_s[-1] == pytest.approx(lasting_s, abs=2.0)
+    else:
+        assert np.isinf(drive.spent_s[-1])
