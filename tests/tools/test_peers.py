@@ -88,10 +88,10 @@ def test_a_leg_ends_at_rest_where_the_verifier_has_it() -> None:
     assert leg.miss_m(states) == 0.0
     states[0, :2] = states[1, :2]
     assert not leg.clear(states)
-    hurried = np.tile([[0.5, 0.1]], (20, 2, 1))  # half a metre a second more, steering
+    faster = np.tile([[0.5, 0.1]], (20, 2, 1))  # half a metre a second more, steering
     states = leg.start()
-    for control in hurried:
+    for control in faster:
         leg.advance(states, control.ravel())
-    controls = np.concatenate([hurried, leg.braking(states)])
+    controls = np.concatenate([faster, leg.braking(states)])
     verdict = mrmg.verify(scene, leg.plan(controls))
     assert {found.kind.value for found in verdict.violations} == {"finish"}
