@@ -46,6 +46,7 @@ COMMANDS = {
     "foreign_tyre": "bench_plant",
     "energy_logs": "bench_logs",
     "peers": "peers",
+    "faults": "bench_faults",
 } | {
     f"nrpa_{depth}": "bench --scenes scene1 scene2 --seeds 1000-1009 --profile paper "
     f"--energy paper --nrpa {depth}"
