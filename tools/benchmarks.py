@@ -45,6 +45,7 @@ COMMANDS = {
     "controllers": "bench_controllers --trials 2",
     "foreign_tyre": "bench_plant",
     "energy_logs": "bench_logs",
+    "campaigns": "bench_campaign --cluster",
     "peers": "peers",
     "faults": "bench_faults",
 } | {
