@@ -42,6 +42,7 @@ def cluster_figures(folder: Path, *, cold: bool) -> list[Figure]:
         folder: of the campaign and of the workers' homes; emptied first.
         cold: whether the workers' caches are empty at first.
     """
+    folder = folder.resolve()  # workers have other working folders
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     file = folder / "campaign.yaml"

@@ -79,6 +79,13 @@ def campaign(options: argparse.Namespace) -> int:
     )
     folder = options.out or Path("campaigns") / found.name
     report = _Progress(len(found.trials))
+    if options.engine == "local":
+        arguments = {
+            (each.profile, each.planner): each
+            for each in (trial.order.arguments for trial in found.trials)
+        }
+        for each in arguments.values():
+            terminal.compile_kernels(each)
     try:
         with terminal.progress_of("trials") as on_progress:
             figures = run_campaign(

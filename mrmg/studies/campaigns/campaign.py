@@ -97,7 +97,8 @@ def _all_made(
         return folder / RUNS / job.path.stem
 
     def check(job: Job, content: Any) -> None:
-        if content["format"] != TRIAL_FORMAT or content["result"]["status"] == ERROR:
+        damaged = content["digest"] != _digest(content)
+        if damaged or content["result"]["status"] == ERROR:
             raise ValueError("to be made anew")
         if job.item.with_run and not run_folder(job).exists():
             raise ValueError("its run folder is missing")
@@ -107,7 +108,8 @@ def _all_made(
         if files:
             _write_run(run_folder(job), files)
         factors = trials[job.path.stem].factors
-        return {"format": TRIAL_FORMAT, "factors": factors, **made}
+        content = {"format": TRIAL_FORMAT, "factors": factors, **made}
+        return {**content, "digest": _digest(content)}
 
     found: dict[str, dict[str, Any]] = {}
     feasible = 0
@@ -119,6 +121,12 @@ def _all_made(
         if on_trial is not None:
             on_trial(len(found), len(jobs), feasible, left_s)
     return [found[trial.key] for trial in campaign.trials]
+
+
+def _digest(content: Mapping[str, Any]) -> str:
+    """Return a fingerprint of what a trial's file states."""
+    stated = [content[name] for name in ("format", "result", "time_s")]
+    return storage.digest(storage.canonical_json(stated))
 
 
 def _write_run(folder: Path, files: Mapping[str, bytes]) -> None:

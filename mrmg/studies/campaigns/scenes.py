@@ -77,7 +77,9 @@ class SceneSource:
         placed = entry["populate"]
         if placed:
             model = placed["model"]
-            model = str((models / model).resolve()) if "/" in model else model
+            if "/" in model:
+                beside = models / model
+                model = str((beside if beside.exists() else Path(model)).resolve())
             first = {**placed, "model": model, "seed": placed["seed"] or 0}
             scene = _populated(scene, first, trust_code)
         return SceneSource(

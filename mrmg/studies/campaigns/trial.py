@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 import threading
 import time
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from mrmg.energy.audit import audit
 from mrmg.errors import MachineError, MrmgError
-from mrmg.plans import Plan, PlanResult
+from mrmg.plans import Plan, PlanResult, PlanStatus
 from mrmg.runs.arguments import RunArguments
 from mrmg.runs.code_digest import code_digest
 from mrmg.runs.drive import drive
@@ -82,6 +83,9 @@ def make_trial(source: SceneSource, order: TrialOrder) -> dict[str, Any]:
         except Exception as error:  # one trial of thousands is no reason to stop
             made = _failed(ERROR, f"{type(error).__name__}: {error}")
     made["time_s"]["total"] = time.perf_counter() - began
+    for name, value in made["result"].items():
+        if isinstance(value, float) and not math.isfinite(value):
+            made["result"][name] = None  # JSON has no such numbers
     return made
 
 
@@ -143,6 +147,7 @@ def _of_planning(scene: Scene, status: str, reason: str) -> dict[str, Any]:
     return {
         "status": status,
         "feasible": False,
+        "causes": [] if status == PlanStatus.SOLVED.value else [status],
         "reason": " ".join(reason.split()),
         "goals_total": len(scene.goals),
     }

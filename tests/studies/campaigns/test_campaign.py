@@ -45,6 +45,7 @@ def test_the_table_has_a_row_for_each_trial(made: Path, campaign: Campaign) -> N
     assert float(rows[0]["measured_J"]) != float(rows[1]["measured_J"]) > 0.0
     assert rows[0]["plan_digest"] == rows[1]["plan_digest"]
     assert "g1" in rows[2]["reason"]
+    assert [row["causes"] for row in rows] == ["", "", "infeasible", "infeasible"]
 
 
 def test_a_stopped_campaign_is_taken_up(
@@ -99,11 +100,14 @@ def test_what_is_damaged_is_made_again(
     (tmp_path / "campaign.json").write_text("{}")
     for path in (made / "trials").iterdir():
         (trials / path.name).write_bytes(path.read_bytes())
-    broken, failed, whole, _ = sorted(trials.iterdir())
+    broken, failed, whole, edited = sorted(trials.iterdir())
     broken.write_text('{"format": 1, "resu')
     content = json.loads(failed.read_text())
     content["result"]["status"] = "error"
     failed.write_text(json.dumps(content))
+    edited.write_text(
+        edited.read_text().replace('"goals_total": 1', '"goals_total": "x"')
+    )
     before = whole.stat().st_mtime_ns
     run_campaign(campaign, tmp_path)
     assert whole.stat().st_mtime_ns == before
