@@ -22,7 +22,7 @@ from mrmg.planning.feasibility import require_robots
 from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.hints import INTERRUPTED, hints_on
 from mrmg.planning.margins_kept import with_margins
-from mrmg.planning.parameters import PlannerParams, profile_params
+from mrmg.planning.parameters import GUIDED_TREE, PlannerParams, profile_params
 from mrmg.planning.planners import Planner
 from mrmg.planning.preference import Preference
 from mrmg.planning.preparation import compile_kernels, load_bounds, load_kernels
@@ -224,7 +224,12 @@ class _Planning:
     def _tightened(
         self, own: Scene, problem: Problem, search: Search, proofs: Proofs
     ) -> tuple[Problem, Search]:
-        """Search with the least margins in narrow ground; return what counts then."""
+        """Search with the least margins in narrow ground; return what counts then.
+
+        The paper's method has one search, of so many iterations.
+        """
+        if self.params.planner == GUIDED_TREE:
+            return problem, search
         tight = self._in_time(partial(tightened, own, self.request.seed, self.params))
         if tight is None:
             return problem, search
