@@ -49,7 +49,7 @@ def compile_in_processes(
     compiles it then, and learns of it.
 
     Args:
-        calls: functions of modules, without arguments, the longest first.
+        calls: functions of modules, without arguments, begun in this order.
         on_progress: receives the number of kernels compiled so far, now and then.
     """
     path = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])

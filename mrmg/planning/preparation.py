@@ -7,6 +7,8 @@ from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
+
 from mrmg.compilation import (
     compile_in_processes,
     kernels_are_compiled,
@@ -27,6 +29,8 @@ from mrmg.planning.parameters import (
     kernels_of,
     paper_params,
 )
+from mrmg.planning.path_following.coordination.coordination import coordinated
+from mrmg.planning.path_following.coordination.tasks import no_path
 from mrmg.planning.path_following.strategy import path_following
 from mrmg.planning.planners import Planner
 from mrmg.planning.problem.problem import Problem, state_mission
@@ -66,12 +70,14 @@ def load_kernels(planner: str) -> None:
         guide_smallest()
     elif planner == PATH_FOLLOWING:
         follow_smallest()
-        search_smallest()
+        coordinate_smallest()
 
 
-def search_smallest() -> None:
-    """Search for motions in the smallest mission."""
-    _plan_smallest(path_following, replace(SMALL_PARAMS, follow_paths=False))
+def coordinate_smallest() -> None:
+    """Search for motions in the smallest mission, along a tour that is known."""
+    _, problem = _smallest_mission()
+    never = np.zeros(1, np.bool_)
+    assert coordinated(problem, [[0]], [no_path(problem, 0)], never)
 
 
 def follow_smallest() -> None:
@@ -99,11 +105,11 @@ def bound_smallest() -> None:
 
 
 _CALLS = {
-    PATH_FOLLOWING: (search_smallest, follow_smallest, bound_smallest),
+    PATH_FOLLOWING: (follow_smallest, bound_smallest, coordinate_smallest),
     GUIDED_TREE: (guide_smallest, bound_smallest),
 }
-"""What compiles all kernels of a part, the longest first; the same kernels in two of
-them are compiled twice, side by side."""
+"""What compiles all kernels of a part; the same kernels in two that run side by side
+are compiled twice, so those that share some are not next to each other."""
 
 SMALL_PARAMS = PlannerParams(samples=20, trees=1)
 """What suffices to plan the smallest mission."""
