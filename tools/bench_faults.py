@@ -24,13 +24,14 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from faults import files, plans
+from faults import files, kills, plans
 from faults.rows import Options
 from protocol import Row, Trials, add_file_options, run, state, versions, write_document
 
 ROWS: dict[str, Callable[[Options], Iterator[Row]]] = {
     "files": files.rows,
     "plans": plans.rows,
+    "kills": kills.rows,
 }
 
 

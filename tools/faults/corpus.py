@@ -275,7 +275,7 @@ _READING = (
 
 def _runs(folder: Path) -> Iterator[Source]:
     folder.mkdir()
-    (folder / "site.yaml").write_text(_SITE)
+    (folder / "site.yaml").write_text(SITE)
     for command in (
         "run site.yaml --no-video --out run",
         "robustness run --trials 2",
@@ -306,7 +306,7 @@ def _runs(folder: Path) -> Iterator[Source]:
     yield from _sources("capsules", folder, names, "replay FILE --out new")
 
 
-_SITE = """format: 1
+SITE = """format: 1
 name: site
 objective: makespan
 bounds: [0, 0, 24, 16]
