@@ -165,7 +165,8 @@ def arrays_of(content: bytes, name: str) -> dict[str, np.ndarray]:
                 for member, data in unpacked(archive, len(content)).items()
             }
     except Exception as error:  # readers raise anything, of tokens and of zlib, too
-        raise ValueError(f"{name} is damaged: {error}") from error
+        reason = str(error).partition("\n")[0]
+        raise ValueError(f"{name} is damaged: {reason}") from error
 
 
 def unpacked(archive: zipfile.ZipFile, packed_bytes: int) -> dict[str, bytes]:

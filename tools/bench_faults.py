@@ -24,7 +24,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from faults import files, kills, plans
+from faults import files, hostile, kills, long_run, plans
 from faults.rows import Options
 from protocol import Row, Trials, add_file_options, run, state, versions, write_document
 
@@ -32,6 +32,8 @@ ROWS: dict[str, Callable[[Options], Iterator[Row]]] = {
     "files": files.rows,
     "plans": plans.rows,
     "kills": kills.rows,
+    "hostile": hostile.rows,
+    "long": long_run.rows,
 }
 
 

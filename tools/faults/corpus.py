@@ -123,8 +123,8 @@ def _robots(folder: Path) -> Iterator[Source]:
         yield from _sources(
             "models", own, names, *check, "robot check mine -o a.png", imported
         )
-    (folder / "a.urdf").write_text(_urdf())
-    (folder / "a.xacro").write_text(_urdf().replace("<robot", f"<robot {_XACRO}"))
+    (folder / "a.urdf").write_text(URDF)
+    (folder / "a.xacro").write_text(URDF.replace("<robot", f"<robot {_XACRO}"))
     names = ["a.urdf", "a.xacro"]
     yield from _sources("models", folder, names, "robot import FILE -o new")
 
@@ -152,6 +152,9 @@ def _urdf() -> str:
     <inertial><mass value="40"/>
     <inertia ixx="0.6" iyy="1.7" izz="2.0" ixy="0" ixz="0" iyz="0"/></inertial></link>
     {"".join(wheels)}</robot>"""
+
+
+URDF = _urdf()
 
 
 def _maps(folder: Path) -> Iterator[Source]:

@@ -17,7 +17,7 @@ from faults.named import run_cases
 from faults.review import REVIEW
 from faults.rows import Options, row_of
 
-CHUNK = 50
+CHUNK = 250
 """Files that make one trial, which an interruption does not lose."""
 
 PROCESS_SHARE = 100

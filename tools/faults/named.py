@@ -23,11 +23,13 @@ class Case:
     Attributes:
         write: writes the input into a folder; returns the words of the command.
         codes: exit codes that the command may end by.
+        leaves: whether the command may leave files whatever its end.
         check: what else must hold in the folder; returns the fault, or "".
     """
 
     write: Callable[[Path], tuple[str, ...]]
     codes: tuple[int, ...] = (3,)
+    leaves: bool = False
     check: Callable[[Path, Outcome], str] = _nothing
 
 
@@ -42,7 +44,8 @@ def run_cases(cases: Mapping[str, Case], folder: Path) -> Row:
             words = case.write(place)
             before = {*place.rglob("*")}
             outcome = commands.run(place, words)
-            fault = outcome.fault() or left_over(place, before, outcome)
+            left = "" if case.leaves else left_over(place, before, outcome)
+            fault = outcome.fault() or left
             if not fault and outcome.code not in case.codes:
                 fault = f"exit code {outcome.code}: {outcome.err or outcome.out}"
             fault = fault or case.check(place, outcome)
