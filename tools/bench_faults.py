@@ -3,16 +3,28 @@
 Rows, each PASS or FAIL; the exit code is 1 if any fails:
 
 - files: damaged files of all formats that are read, in one process through the door of
-  the command line, a share as processes of their own, too. No traceback, nothing that
-  takes 5 s of the processor or a gigabyte, a documented exit code, and one message.
+  the command line, one of a hundred as a process of its own, too: no traceback, at most
+  5 s of the processor and a gigabyte, a documented exit code, one message, nothing left;
+- plans: damaged plans, each to be caught by the rule that should;
+- kills: run, robustness, campaign and calibrate, ended by SIGKILL, SIGTERM or Ctrl-C at
+  random moments, some twice: all files whole, and the next command leaves what it leaves
+  when nothing disturbs it. Most are forked from a process that has loaded everything.
+  Then two at once, a full disk, a read-only folder (both by mounts; skipped where those
+  are not permitted), a cache that is cut off or deleted, and a clock set back (Python's
+  own, and files of the future);
+- hostile: bombs, absurd sizes, markup in all texts of all files of a run, paths that
+  climb, and code, which runs with --trust-code alone;
+- long: missions in one process, whose memory and file handles are read.
 
---only selects rows by the first word of their names. Everything that is drawn is drawn
-by --seed. With --output FILE the same command goes on after an interruption. --keep DIR
-keeps the files that something failed on.
+--only selects rows. Everything that is drawn is drawn by --seed. With --output FILE the
+same command goes on after an interruption. --keep DIR keeps files that something failed
+on.
 
-Rows of --json: `row`, `required`, `cases`, `failed`, `holds`, `failures` (`case`,
-`fault`; up to 50), and figures of the row (files: `codes` by exit code, `cpu_s` and
-`peak_bytes` of the worst command).
+Rows of --json: `row` (`files: scenes`), `required`, `cases`, `failed`, `holds`,
+`failures` (`case`, `fault`; up to 50), `took_s`, and figures of some rows: of files
+`codes` (commands by exit code), `cpu_s` and `peak_bytes` of the worst command; of plans
+the `rules` that must catch them; of the long run `bytes_a_mission`, `memory_bytes` and
+`handles` (first, last).
 """
 
 from __future__ import annotations

@@ -15,6 +15,9 @@ from mrmg import interruption
 from mrmg.cli.parser import make_parser
 from mrmg.errors import ExitCode, MrmgError
 
+LONGEST_LINE = 450
+"""Characters of a message's line; a damaged file may have names of thousands."""
+
 MOST_NEW_OBJECTS = 50_000
 """New objects after which there is a search for garbage."""
 
@@ -78,8 +81,12 @@ def _altered_files(values: Iterable[Any]) -> Iterator[Path]:
 
 
 def _printable(text: str) -> str:
-    """Return a message without what a terminal would act on."""
-    return "".join(
+    """Return a message in lines to be read, without what a terminal would act on."""
+    shown = "".join(
         sign if sign.isprintable() or sign == "\n" else repr(sign)[1:-1]
         for sign in text
+    )
+    return "\n".join(
+        line if len(line) <= LONGEST_LINE else f"{line[:300]} ... {line[-100:]}"
+        for line in shown.split("\n")
     )

@@ -47,6 +47,14 @@ def test_files_that_contradict_each_other_are_named(
         main(["figure", str(run)])
 
 
+def test_messages_are_lines_to_be_read(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["scene", "check", "\x1b[31m" + "9" * 5000]) != ExitCode.OK
+    message = capsys.readouterr().err
+    assert "\x1b" not in message
+    assert "x1b[31m999" in message
+    assert max(map(len, message.splitlines())) < 450
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "change",

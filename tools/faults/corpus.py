@@ -323,9 +323,33 @@ goals:
 """
 
 
+_CAMPAIGN = """scenes:
+  - s.yaml
+  - {scene: s.yaml, name: moved, perturb: {goals: 0.5, starts: 0.3, headings: 10}}
+  - {scene: s.yaml, name: short, change: {battery: {capacity_m: 300}}}
+  - {scene: s.yaml, name: more, populate: {robots: 1, goals: 2, stations: 1}}
+seeds: 0-3
+planners: [path_following, guided_tree]
+routers: [search, nrpa]
+controllers: [mpc, tvlqr]
+plants: [default, scrub]
+disturbances: [none, default, rolling=+30%, d.yaml]
+parameters:
+  soc_margin: [0, 0.1]
+  battery.capacity_m: [200, 300]
+"""
+
+
 def _others(folder: Path) -> Iterator[Source]:
-    """Yield logs of real robots and descriptions of disturbances."""
+    """Yield campaigns, disturbances and logs of real robots."""
     folder.mkdir()
+    (folder / "s.yaml").write_text(SITE)
+    (folder / "d.yaml").write_text("mass: +-5%\nlag: 0..80ms\nstart_x: 2cm\n")
+    (folder / "c.yaml").write_text(_CAMPAIGN)
+    (folder / "taken").write_text("")
+    # The file that is in the way ends a campaign that is valid, before its trials.
+    names = ["c.yaml", "c.yaml", "c.yaml", "d.yaml", "s.yaml"]
+    yield from _sources("campaigns", folder, names, "campaign c.yaml --out taken")
     time_s = np.arange(0.0, 40.0, 0.2)
     left, right = 0.6 + 0.3 * np.sin(time_s), 0.6 + 0.3 * np.sin(1.3 * time_s)
     power = 40.0 + 90.0 * (left + right) + 20.0 * np.abs(left - right)

@@ -424,7 +424,10 @@ def _code(runs: Path) -> Mapping[str, Case]:
     own = partial(_own_motion, evil)
     cases["motion of a model"] = Case(write=own, check=stayed)
     cases["motion of a model, trusted"] = Case(
-        write=lambda place: (*own(place), "--trust-code"), codes=(0, 3), leaves=True, check=ran
+        write=lambda place: (*own(place), "--trust-code"),
+        codes=(0, 3),
+        leaves=True,
+        check=ran,
     )
     return cases
 
