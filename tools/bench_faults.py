@@ -2,13 +2,13 @@
 
 Rows, each PASS or FAIL; the exit code is 1 if any fails:
 
-- files: damaged files of all formats that are read, in one process through the door of
-  the command line, one of a hundred as a process of its own, too: no traceback, at most
-  5 s of the processor and a gigabyte, a documented exit code, one message, nothing left;
+- files: damaged files of all formats that are read, in one process through the door
+  of the command line, one of a hundred as a process of its own, too: no traceback, at
+  most 5 s of the processor and a gigabyte, a documented exit code, one message;
 - plans: damaged plans, each to be caught by the rule that should;
 - kills: run, robustness, campaign and calibrate, ended by SIGKILL, SIGTERM or Ctrl-C at
-  random moments, some twice: all files whole, and the next command leaves what it leaves
-  when nothing disturbs it. Most are forked from a process that has loaded everything.
+  random moments, some twice: all files whole, and the next command leaves what it
+  leaves when nothing disturbs it. Most are forked from a process that has loaded everything.
   Then two at once, a full disk, a read-only folder (both by mounts; skipped where those
   are not permitted), a cache that is cut off or deleted, and a clock set back (Python's
   own, and files of the future);
