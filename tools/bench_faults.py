@@ -8,10 +8,10 @@ Rows, each PASS or FAIL; the exit code is 1 if any fails:
 - plans: damaged plans, each to be caught by the rule that should;
 - kills: run, robustness, campaign and calibrate, ended by SIGKILL, SIGTERM or Ctrl-C at
   random moments, some twice: all files whole, and the next command leaves what it
-  leaves when nothing disturbs it. Most are forked from a process that has loaded everything.
-  Then two at once, a full disk, a read-only folder (both by mounts; skipped where those
-  are not permitted), a cache that is cut off or deleted, and a clock set back (Python's
-  own, and files of the future);
+  leaves when nothing disturbs it. Most are forked from a process that has loaded all.
+  Then two at once, a full disk, a read-only folder (both by mounts; skipped where
+  those are not permitted), a cache that is cut off or deleted, and a clock set back
+  (Python's own, and files of the future);
 - hostile: bombs, absurd sizes, markup in all texts of all files of a run, paths that
   climb, and code, which runs with --trust-code alone;
 - long: missions in one process, whose memory and file handles are read.
