@@ -221,11 +221,17 @@ def _false_recharge(scene: Scene, plan: Plan, random: Random) -> Case:
 
 
 def _low_battery(scene: Scene, plan: Plan, random: Random) -> Case:
-    visit = min(plan.visits, key=lambda item: item.energy_J)
-    robot = scene.robot(visit.robot)
-    drawn_J = robot.battery.start_J - visit.energy_J
-    start_J = drawn_J * random.uniform(0.05, 0.95)
-    battery = replace(robot.battery, start_J=start_J)
+    """Let a battery hold less at the start than the way to its first target takes."""
+    robots = sorted({visit.robot for visit in plan.visits})
+    robot = scene.robot(random.choice(robots))
+    first = min(
+        (visit for visit in plan.visits if visit.robot == robot.id),
+        key=lambda visit: visit.step,
+    )
+    drawn_J = robot.battery.start_J - first.energy_J
+    if drawn_J < 1.0:
+        raise InapplicableError
+    battery = replace(robot.battery, start_J=drawn_J * random.uniform(0.05, 0.95))
     return _with_robot(scene, plan, robot.id, battery=battery)
 
 
