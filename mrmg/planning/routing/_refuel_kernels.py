@@ -42,12 +42,14 @@ class Labels(NamedTuple):
         ways: their number, shape (rows,).
         full: to each station next to it, recharged, shape (rows * S, F, 6).
         fulls: their number, shape (rows * S,).
+        arrival: room for ways to one station, shape (1, F, 6).
     """
 
     way: np.ndarray
     ways: np.ndarray
     full: np.ndarray
     fulls: np.ndarray
+    arrival: np.ndarray
 
 
 @kernel
@@ -59,11 +61,13 @@ def new_labels(legs):
     for r in range(robots):
         timed |= legs.robot[r, LIMIT] < np.inf
     rows = 2 * robots * (legs.goals + 2)
+    most = TIMED_WAYS if timed else 1
     return Labels(
         np.zeros((rows, stations + MORE_WAYS, 6)),
         np.zeros(rows, np.int64),
-        np.zeros((rows * stations, TIMED_WAYS if timed else 1, 6)),
+        np.zeros((rows * stations, most, 6)),
         np.zeros(rows * stations, np.int64),
+        np.zeros((1, most, 6)),
     )
 
 
@@ -122,18 +126,25 @@ def recharge(legs, labels, r, end, place, row):
     for f in range(stations):
         leg = towards(legs.cost, r, end, place, legs.goals + f)
         time = towards(legs.time, r, end, place, legs.goals + f)
+        # Recharged, ways differ in cost and time alone: few are worth leading on.
+        n = 0
         for k in range(labels.ways[row]):
             drawn = labels.way[row, k, DRAW] + leg
-            if drawn > usable * (1.0 + ROUNDING):
-                continue
-            cost = labels.way[row, k, COST] + leg
-            begun = labels.way[row, k, TIME] + time + labels.way[row, k, RATE] * drawn
-            for e in range(stations):
-                hop = towards(legs.hop, r, end, f, e)
-                if hop < np.inf:
-                    at = row * stations + e
-                    late = begun + towards(legs.hop_time, r, end, f, e)
-                    new = (cost + hop, late, 0.0, rate, 1.0 * k, 1.0 * f)
+            if drawn <= usable * (1.0 + ROUNDING):
+                cost = labels.way[row, k, COST] + leg
+                late = labels.way[row, k, TIME] + time
+                late += labels.way[row, k, RATE] * drawn
+                new = (cost, late, 0.0, rate, 1.0 * k, 1.0 * f)
+                n = add_label(labels.arrival, 0, n, new)
+        for e in range(stations if n > 0 else 0):
+            hop = towards(legs.hop, r, end, f, e)
+            if hop < np.inf:
+                hop_time = towards(legs.hop_time, r, end, f, e)
+                at = row * stations + e
+                for k in range(n):
+                    one = labels.arrival[0, k]
+                    new = (one[COST] + hop, one[TIME] + hop_time, 0.0, rate,
+                           one[ORIGIN], 1.0 * f)  # fmt: skip
                     labels.fulls[at] = add_label(labels.full, at, labels.fulls[at], new)
 
 
@@ -237,7 +248,9 @@ def value_with(legs, labels, r, before, goal, behind, longest, ceiling):
     """
     stations = legs.hop.shape[1]
     row, place = before
-    best = np.inf
+    best = least = np.inf
+    for k in range(labels.ways[behind[0]]):
+        least = min(least, labels.way[behind[0], k, COST])
     for f in range(-1, stations):
         a = place if f < 0 else legs.goals + f
         leg, time = legs.cost[r, a, goal], legs.time[r, a, goal]
@@ -249,8 +262,10 @@ def value_with(legs, labels, r, before, goal, behind, longest, ceiling):
                 label[at, k, TIME] + time,
                 label[at, k, DRAW] + leg,
             )
+            worth = min(best, ceiling)
+            if legs.energy_weight * (begun[0] + least) >= worth:
+                continue  # whatever comes behind the goal
             if begun[2] <= legs.robot[r, USABLE]:
-                worth = min(best, ceiling)
                 value = least_on(legs, labels, r, begun, goal, behind, longest, worth)
                 best = min(best, value)
     return best
