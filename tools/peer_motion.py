@@ -123,12 +123,7 @@ class Leg:
     def of(scene: Scene, params: PlannerParams) -> Leg:
         """Return the leg of a scene, with the margins of parameters."""
         world = World.from_scene(scene)
-        fleet = fleet_array(
-            scene,
-            world,
-            obstacle_margin_m=params.obstacle_margin_m,
-            robot_margin_m=params.robot_margin_m,
-        )
+        fleet = fleet_array(scene, world, params.margins)
         spaces = tuple(world.spaces[at] for at in world.space_of_robot)
         finishes = [robot.finish.region for robot in scene.robots]
         centres = np.array([region.center for region in finishes])

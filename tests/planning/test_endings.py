@@ -164,7 +164,7 @@ ROWS = (
     Row(
         endings.NO_PROGRESS,
         SWAP,
-        ("makes no progress", "in its way", "r1 and r2 meet near", "2.40 m wide"),
+        ("no motions", "keep the robots apart", "r1 and r2 meet near", "2.40 m wide"),
         NARROW,
     ),
     Row(endings.BUDGET_FOR_ROADMAP, {}, ("1e-06 s",), options=("--budget", "1e-6")),
