@@ -108,3 +108,16 @@ def test_a_drive_keeps_its_margin_or_ends_where_it_would_not(
         assert drive.spent_s[-1] == pytest.approx(lasting_s, abs=2.0)
     else:
         assert np.isinf(drive.spent_s[-1])
+
+
+def test_a_drive_ends_at_rest_with_the_heading_asked_for(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    finish = {"circle": {"center": [25, 10], "radius": 1}, "heading": 1.5}
+    robot = {"id": "r1", "model": "diffdrive", "pose": [4, 10, 0], "finish": finish}
+    problem = state(yard(robots=[robot]))
+    drive = drive_alone(problem, 0, straight_path(problem, 25.0))
+    assert drive.arrived
+    assert np.abs(drive.motion.state[-1, 3:]).max() < 1e-9
+    tolerance = float(problem.mission.targets.tolerance[0])
+    assert abs(drive.motion.state[-1, 2] - 1.5) <= tolerance
