@@ -83,8 +83,9 @@ def watch(
     from mrmg.viz.browser_view import BrowserView
 
     page = BrowserView(scene, replay, host=host, port=port)
-    print(f"{scene.name}: open {page.address} in a browser; Ctrl-C ends", flush=True)
     try:
+        address = f"open {page.address} in a browser"
+        print(f"{scene.name}: {address}; Ctrl-C ends", flush=True)
         page.run()
     except KeyboardInterrupt:
         interruption.accept()

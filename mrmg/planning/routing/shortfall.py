@@ -41,11 +41,11 @@ def shortfall(problem: RoutingArrays, params: RouterParams, seed: int) -> Shortf
     """Return what a routing problem without tours is short of."""
 
     def tours(battery_share: float, time_share: float) -> Routing:
-        endless = np.full_like(problem.limit, math.inf)  # also where the limit is 0
-        limit = problem.limit * (1.0 + time_share)
-        eased = with_batteries(problem, battery_share)._replace(
-            limit=endless if math.isinf(time_share) else limit
-        )
+        if math.isinf(time_share):
+            limit = np.full_like(problem.limit, math.inf)  # also where the limit is 0
+        else:
+            limit = problem.limit * (1.0 + time_share)
+        eased = with_batteries(problem, battery_share)._replace(limit=limit)
         return solve_routing(eased, params, seed)
 
     visited = {target for tour in tours(0.0, 0.0).tours for target in tour}
