@@ -2,40 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import shutil
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
-from faults.commands import run_process
+from faults.runs import SITE, make_runs, run_command
+from faults.sources import Source, sources_of
+from faults.valid_maps import map_sources
 from mrmg import shipped
-from mrmg.scene.loading.yaml_text import dump_yaml
-
-Command = tuple[str, ...]
-
-FIRST_RUN_S = 900.0
-"""Time for a run that may compile kernels first."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Source:
-    """A file to damage.
-
-    Attributes:
-        format: what is read.
-        folder: holds the file and what belongs to it.
-        name: of the file in the folder.
-        commands: that read it, run in a copy of the folder.
-    """
-
-    format: str
-    folder: Path
-    name: str
-    commands: tuple[Command, ...]
 
 
 def make_corpus(folder: Path) -> list[Source]:
@@ -44,26 +20,10 @@ def make_corpus(folder: Path) -> list[Source]:
     return [
         *_scenes(folder / "scenes"),
         *_robots(folder / "robots"),
-        *_maps(folder / "maps"),
+        *map_sources(folder / "maps"),
         *_runs(folder / "runs"),
         *_others(folder / "others"),
     ]
-
-
-def _sources(
-    format: str, folder: Path, names: Sequence[str], *commands: str
-) -> Iterator[Source]:
-    """Yield a source for each name, which stands for FILE in the commands."""
-    for name in names:
-        yield Source(
-            format=format,
-            folder=folder,
-            name=name,
-            commands=tuple(
-                tuple(name if word == "FILE" else word for word in command.split())
-                for command in commands
-            ),
-        )
 
 
 def _scenes(folder: Path) -> Iterator[Source]:
@@ -75,9 +35,9 @@ def _scenes(folder: Path) -> Iterator[Source]:
     names = sorted(path.name for path in folder.iterdir())
     check = ("scene check FILE",) * 9
     draw = ("scene draw FILE -o a.png", "scene populate FILE -o a.yaml --goals 2")
-    yield from _sources("scenes", folder, names, *check, *draw)
+    yield from sources_of("scenes", folder, names, *check, *draw)
     small = ["hill.yaml", "curves.yaml", "quickstart.yaml"] * 4
-    yield from _sources("scenes", folder, small, *check)
+    yield from sources_of("scenes", folder, small, *check)
 
 
 _HILL = """format: 1
@@ -116,20 +76,17 @@ def _robots(folder: Path) -> Iterator[Source]:
         scene = _HILL.replace("model: car", "model: ./mine").replace("elevation", "# ")
         (own / "s.yaml").write_text(scene)
         names = ["mine/robot.yaml"]
-        yield from _sources("models", own, names, "scene check s.yaml")
+        yield from sources_of("models", own, names, "scene check s.yaml")
         names = [f"mine/{model}.xml"]
         check = ("scene check s.yaml",) * 6
         imported = "robot import FILE -o new"
-        yield from _sources(
+        yield from sources_of(
             "models", own, names, *check, "robot check mine -o a.png", imported
         )
     (folder / "a.urdf").write_text(URDF)
-    (folder / "a.xacro").write_text(URDF.replace("<robot", f"<robot {_XACRO}"))
+    (folder / "a.xacro").write_text(XACRO)
     names = ["a.urdf", "a.xacro"]
-    yield from _sources("models", folder, names, "robot import FILE -o new")
-
-
-_XACRO = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'
+    yield from sources_of("models", folder, names, "robot import FILE -o new")
 
 
 def _urdf() -> str:
@@ -156,117 +113,8 @@ def _urdf() -> str:
 
 URDF = _urdf()
 
+XACRO = URDF.replace("<robot", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"')
 
-def _maps(folder: Path) -> Iterator[Source]:
-    folder.mkdir()
-    _write_occupancy(folder)
-    square = "[SCALE]\n1\n[BORDER]\n0 0\n200 0\n200 150\n0 150\n"
-    (folder / "a.txt").write_text(f"{square}[OBSTACLE]\n20 20\n40 20\n40 45\n")
-    (folder / "b.txt").write_text(
-        "[SCALE]\n0.5\n[MAP_POINTS]\n1 0 0\n2 900 0\n3 900 500\n4 0 500\n5 100 100\n"
-        "6 200 100\n7 200 200\n[MAP_BORDER]\n1 2 3 4\n[MAP_OBSTACLE]\n5 6 7\n"
-    )
-    (folder / "a.tri").write_text(
-        "0 0 9 0 9 1\n0 0 0 9 1 9\n3 3 5 3 4 6\n2 2 3 3\n7 7\n"
-    )
-    (folder / "a.geojson").write_text(json.dumps(_features()))
-    (folder / "lif.json").write_text(json.dumps(_LIF))
-    (folder / "classes.yaml").write_text("10: {multiplier: 1.5}\n20: obstacle\n")
-    _write_tiffs(folder)
-    vector = ["a.txt", "b.txt", "a.tri", "a.geojson", "lif.json", "a.yaml"]
-    into = "-o new.yaml"
-    yield from _sources("maps", folder, vector, f"scene import FILE {into}")
-    yield from _sources(
-        "maps", folder, ["lif.json", "a.geojson"], f"scene import FILE --lanes 2 {into}"
-    )
-    pictures = ["a.pgm", "a.png"]
-    yield from _sources(
-        "maps", folder, pictures[:1], f"scene import a.yaml --keepout k.yaml {into}"
-    )
-    yield from _sources("maps", folder, pictures[1:], f"scene import k.yaml {into}")
-    yield from _sources(
-        "maps", folder, ["k.yaml"], f"scene import a.yaml --terrain-mask FILE {into}"
-    )
-    land = f"scene import e.tif --land-cover c.tif --classes classes.yaml {into}"
-    yield from _sources("maps", folder, ["e.tif", "c.tif", "classes.yaml"], land)
-
-
-def _write_occupancy(folder: Path) -> None:
-    grey = np.full((20, 30), 254, dtype=np.uint8)
-    grey[:, 12:14], grey[:4] = 0, 205
-    stated = {
-        "resolution": 0.5,
-        "origin": [0.0, 0.0, 0.0],
-        "negate": 0,
-        "occupied_thresh": 0.65,
-        "free_thresh": 0.196,
-    }
-    for name, picture in (("a", "a.pgm"), ("k", "a.png")):
-        Image.fromarray(grey).save(folder / picture)
-        (folder / f"{name}.yaml").write_text(dump_yaml({"image": picture, **stated}))
-
-
-def _write_tiffs(folder: Path) -> None:
-    import rasterio
-    from rasterio.transform import from_origin
-
-    heights = np.add.outer(np.arange(12.0), np.zeros(16)).astype("float32")
-    classes = np.full((12, 16), 10, dtype="uint8")
-    classes[3:6, 4:8] = 20
-    for name, values in (("e.tif", heights), ("c.tif", classes)):
-        rows, columns = values.shape
-        shape = {"height": rows, "width": columns, "count": 1, "dtype": values.dtype}
-        place = from_origin(0.0, float(rows), 1.0, 1.0)
-        path = folder / name
-        with rasterio.open(path, "w", driver="GTiff", transform=place, **shape) as file:
-            file.write(values, 1)
-
-
-def _features() -> dict[str, object]:
-    shapes = {
-        "goal": ("Point", [5.0, 5.0]),
-        "obstacle": ("Polygon", [[[10, 10], [14, 10], [14, 14], [10, 10]]]),
-        "terrain": ("Polygon", [[[0, 0], [5, 0], [5, 5], [0, 0]]]),
-        "station": ("Point", [18.0, 3.0]),
-        "lane": ("LineString", [[0, 0], [5, 5], [18, 3]]),
-    }
-    features = [
-        {
-            "type": "Feature",
-            "properties": {"kind": kind, "id": kind},
-            "geometry": {"type": shape, "coordinates": coordinates},
-        }
-        for kind, (shape, coordinates) in shapes.items()
-    ]
-    crs = {"type": "name", "properties": {"name": "EPSG:32632"}}
-    return {"type": "FeatureCollection", "crs": crs, "features": features}
-
-
-_LIF = {
-    "layouts": [
-        {
-            "layoutId": "hall",
-            "nodes": [
-                {"nodeId": "a", "nodePosition": {"x": 1, "y": 2}},
-                {"nodeId": "b", "nodePosition": {"x": 11, "y": 2}},
-            ],
-            "edges": [{"edgeId": "e1", "startNodeId": "a", "endNodeId": "b"}],
-            "stations": [{"stationId": "s", "interactionNodeIds": ["b"]}],
-        }
-    ]
-}
-
-_RUN_JSON = [
-    "run.json",
-    "planning.json",
-    "plan.json",
-    "log.json",
-    "timing.json",
-    "verdict.json",
-    "audit.json",
-    "summary.json",
-    "robustness.json",
-]
 
 _READING = (
     *("verify RUN", "audit RUN", "report RUN", "compare RUN other -o a.html"),
@@ -277,50 +125,27 @@ _READING = (
 
 
 def _runs(folder: Path) -> Iterator[Source]:
-    folder.mkdir()
-    (folder / "site.yaml").write_text(SITE)
-    for command in (
-        "run site.yaml --no-video --out run",
-        "robustness run --trials 2",
-        "execute run --fault r1@2s --replan --out other",
-        "execute run --fault r1@2s --out failed",
-    ):
-        made = run_process(folder, command.split(), longest_s=FIRST_RUN_S)
-        if made.code not in (0, 6):
-            raise RuntimeError(f"mrmg {command}: {made.err}")
+    make_runs(folder)
+    run_command(folder, "execute run --fault r1@2s --out failed")
     shutil.move(folder / "failed" / "capsule.zip", folder / "capsule.zip")
     shutil.rmtree(folder / "failed")
     for run in ("run", "other"):
         reading = [command.replace("RUN", run) for command in _READING]
         reading = [command.replace("run other", "other run") for command in reading]
         for name in sorted(path.name for path in (folder / run).glob("*.json")):
-            yield from _sources("run folders", folder, [f"{run}/{name}"], *reading)
-        yield from _sources("run folders", folder, [f"{run}/scene.yaml"], *reading)
+            yield from sources_of("run folders", folder, [f"{run}/{name}"], *reading)
+        yield from sources_of("run folders", folder, [f"{run}/scene.yaml"], *reading)
         format_of = {"plan": "plans", "log": "logs", "driven_plan": "plans"}
         for path in sorted((folder / run).glob("*.npz")):
             kind = format_of[path.stem]
             for _ in range(3):
-                yield from _sources(kind, folder, [f"{run}/{path.name}"], *reading)
+                yield from sources_of(kind, folder, [f"{run}/{path.name}"], *reading)
     trials = (folder / "run" / "trials").rglob("*.json")
     names = [str(path.relative_to(folder)) for path in trials]
-    yield from _sources("run folders", folder, names, "robustness run --trials 2")
-    yield from _sources("run folders", folder, ["run/robustness.json"], "report run")
+    yield from sources_of("run folders", folder, names, "robustness run --trials 2")
+    yield from sources_of("run folders", folder, ["run/robustness.json"], "report run")
     names = ["capsule.zip"] * 4
-    yield from _sources("capsules", folder, names, "replay FILE --out new")
-
-
-SITE = """format: 1
-name: site
-objective: makespan
-bounds: [0, 0, 24, 16]
-stations: [{id: s1, circle: {center: [12, 13], radius: 1.5}}]
-robots:
-  - {id: r1, model: car, pose: [3, 4, 0]}
-  - {id: r2, model: diffdrive, pose: [3, 12, 0]}
-goals:
-  - {id: g1, circle: {center: [18, 4], radius: 1}}
-  - {id: g2, circle: {center: [18, 12], radius: 1}}
-"""
+    yield from sources_of("capsules", folder, names, "replay FILE --out new")
 
 
 _CAMPAIGN = """scenes:
@@ -349,7 +174,7 @@ def _others(folder: Path) -> Iterator[Source]:
     (folder / "taken").write_text("")
     # The file that is in the way ends a campaign that is valid, before its trials.
     names = ["c.yaml", "c.yaml", "c.yaml", "d.yaml", "s.yaml"]
-    yield from _sources("campaigns", folder, names, "campaign c.yaml --out taken")
+    yield from sources_of("campaigns", folder, names, "campaign c.yaml --out taken")
     time_s = np.arange(0.0, 40.0, 0.2)
     left, right = 0.6 + 0.3 * np.sin(time_s), 0.6 + 0.3 * np.sin(1.3 * time_s)
     power = 40.0 + 90.0 * (left + right) + 20.0 * np.abs(left - right)
@@ -358,4 +183,4 @@ def _others(folder: Path) -> Iterator[Source]:
     for name in ("a.csv", "b.csv"):
         (folder / name).write_text("\n".join(["time,velL,velR,power", *lines]) + "\n")
     fit = "calibrate husky --log a.csv b.csv --terrain mud -o new"
-    yield from _sources("logs", folder, ["a.csv", "b.csv"], fit)
+    yield from sources_of("logs", folder, ["a.csv", "b.csv"], fit)

@@ -11,11 +11,12 @@ from random import Random
 from protocol import Row
 
 from faults.commands import Commands, Outcome, left_over, run_process
-from faults.corpus import Source, make_corpus
+from faults.corpus import make_corpus
 from faults.mutations import mutated
 from faults.named import run_cases
 from faults.review import REVIEW
 from faults.rows import Options, row_of
+from faults.sources import Source
 
 CHUNK = 250
 """Files that make one trial, which an interruption does not lose."""

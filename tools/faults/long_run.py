@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from protocol import Row
 
-from faults.review import SCENE
+from faults.inputs import SCENE
 from faults.rows import Options, row_of
 
 EVERY = 20

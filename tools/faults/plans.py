@@ -8,7 +8,8 @@ from random import Random
 from protocol import Row
 
 import mrmg
-from faults.damage import DAMAGES, Damage, InapplicableError
+from faults.changes import InapplicableError
+from faults.damage import DAMAGES, Damage
 from faults.rows import Options, row_of
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene

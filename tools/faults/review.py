@@ -2,75 +2,19 @@
 
 from __future__ import annotations
 
-import shutil
 import zipfile
-from collections.abc import Callable
 from pathlib import Path
 
-import yaml
-
-from faults.mutations import LONG_INTEGER, claimed_array, zipped
+from faults.inputs import ALIASES, Write, capsule, claimed, model, scene
+from faults.mutations import LONG_INTEGER
 from faults.named import Case
-from mrmg import shipped
-
-Write = Callable[[Path], tuple[str, ...]]
-
-SCENE = """format: 1
-bounds: [0, 0, 20, 10]
-robots: [{id: r1, model: car, pose: [3, 5, 0]}]
-goals: [{id: g1, circle: {center: [16, 5], radius: 1}}]
-"""
-
-ALIASES = "\n".join(
-    ["a0: &a0 [x, x, x, x, x, x, x, x, x]"]
-    + [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 9)}]" for n in range(1, 12)]
-)
-"""A few lines that stand for 9^12 values."""
-
-
-def scene(old: str, new: str) -> Write:
-    """Return what writes the scene with a piece of it replaced, and checks it."""
-
-    def write(place: Path) -> tuple[str, ...]:
-        assert old in SCENE
-        (place / "s.yaml").write_text(SCENE.replace(old, new))
-        return ("scene", "check", "s.yaml")
-
-    return write
-
-
-def model(**changes: object) -> Write:
-    """Return what writes a scene with a model of its own, some keys of it changed."""
-
-    def write(place: Path) -> tuple[str, ...]:
-        shutil.copytree(shipped.models_folder() / "car", place / "mine")
-        file = place / "mine" / "robot.yaml"
-        file.write_text(yaml.safe_dump(yaml.safe_load(file.read_text()) | changes))
-        (place / "s.yaml").write_text(SCENE.replace("model: car", "model: ./mine"))
-        (place / "evil.py").write_text("open('ran', 'w').write('yes')\n")
-        return ("scene", "check", "s.yaml")
-
-    return write
-
-
-def capsule(**members: bytes) -> Write:
-    """Return what writes a capsule of small members, and replays it."""
-
-    def write(place: Path) -> tuple[str, ...]:
-        names = ("capsule.json", "scene.yaml", "planning.json", "plan.json", "plan.npz")
-        content = {name: b"{}" for name in (*names, "last.npz")}
-        given = {name.replace("_", "."): data for name, data in members.items()}
-        (place / "c.zip").write_bytes(zipped(content | given))
-        return ("replay", "c.zip")
-
-    return write
 
 
 def bomb(name: str) -> Write:
     """Return what writes a capsule one member of which unpacks to a gigabyte."""
 
     def write(place: Path) -> tuple[str, ...]:
-        words = capsule()(place)
+        words = capsule({})(place)
         with zipfile.ZipFile(place / "c.zip") as archive:
             members = {each: archive.read(each) for each in archive.namelist()}
         kind = zipfile.ZIP_DEFLATED
@@ -83,11 +27,6 @@ def bomb(name: str) -> Write:
         return words
 
     return write
-
-
-def claimed(shape: str, kind: str = "<f8") -> bytes:
-    """Return an .npz whose only array claims a shape."""
-    return zipped({"time_s.npy": claimed_array(shape, kind)})
 
 
 REVIEW: dict[str, Case] = {
@@ -125,9 +64,9 @@ REVIEW: dict[str, Case] = {
     "a capsule whose plan unpacks to a gigabyte": Case(write=bomb("plan.npz")),
     "a capsule whose model unpacks to a gigabyte": Case(write=bomb("models/a/a.xml")),
     "a capsule's array of 10^12 numbers": Case(
-        write=capsule(last_npz=claimed("(1000000000000,)"))
+        write=capsule({"last.npz": claimed("(1000000000000,)")})
     ),
     "a capsule's array of long texts": Case(
-        write=capsule(last_npz=claimed("(1000,)", "<U99999999"))
+        write=capsule({"last.npz": claimed("(1000,)", "<U99999999")})
     ),
 }

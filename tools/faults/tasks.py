@@ -25,7 +25,7 @@ from typing import Any
 import yaml
 from PIL import Image
 
-from faults.corpus import FIRST_RUN_S, SITE
+from faults.runs import FIRST_RUN_S, SITE
 from mrmg import storage
 
 

@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 from faults import kills  # noqa: F401 (and all that its children import)
-from faults.corpus import SITE
+from faults.runs import SITE
 from mrmg.cli.main import main
 
 with (
