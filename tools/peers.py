@@ -39,23 +39,22 @@ interruption. Rows of --json: `peer`, `problem`, `limit_s`, `ok` and `mrmg_ok` o
 from __future__ import annotations
 
 import argparse
-import statistics
-import time
-from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import cache, partial
 from importlib.metadata import version
-from typing import Any
 
 import numpy as np
-import peer_motion
-import peer_routing
+import peer_frvcpy
+import peer_ompl
+import peer_ortools
+import peer_pyvrp
 from bench import TABLE, charged
 from bench_routing import generate, uneven_mission
 from examples.own_router import nearest_goal
-from mission_tables import median_interval
-from peer_baseline import StuckError, plain_plan
+from peer_comparison import tabulate
+from peer_legs import LEGS, leg_of
+from peer_trials import ompl_row, plain_row, planned, tour_row
 from protocol import (
     Row,
     Trials,
@@ -67,19 +66,9 @@ from protocol import (
 )
 
 import mrmg
-from mrmg.planning import (
-    PlannerParams,
-    Routing,
-    RoutingProblem,
-    faults_of_tours,
-    plan_mission,
-    profile_params,
-)
+from mrmg.planning import Routing, RoutingProblem, plan_mission, profile_params
 from mrmg.planning.routers import find_router
 from mrmg.planning.routing.routing import RouterParams
-from mrmg.plans import Plan
-from mrmg.scene.loading import scene_from_document
-from mrmg.scene.types import Scene
 
 PEERS = ("ompl", "pyvrp", "ortools", "frvcpy", "baseline", "paper")
 
@@ -90,16 +79,6 @@ LICENCES = {
     "frvcpy": "Apache-2.0",
 }
 """Of the packages, as their projects state them."""
-
-LEGS = {
-    "quickstart, 1 car": ("quickstart", ("g2",)),
-    "quickstart, 2 cars": ("quickstart", ("g2", "g3")),
-    "scene1, 1 car": ("scene1", ("g5",)),
-}
-"""Scene of each leg, and the goals where its first cars end."""
-
-AMPLE_M = 10_000.0
-"""Range of the batteries on a leg [m]: no limit."""
 
 LEG_LIMIT_S, SST_LIMITS_S = 20.0, (5.0, 20.0)
 
@@ -187,54 +166,10 @@ def leg_cases(problem: str, seed: int) -> Iterator[Case]:
     scene, leg = leg_of(problem)
     same = {"problem": problem, "instance": str(seed)}
     yield Case(peer="mrmg", solve=partial(planned, scene, seed), **same)
-    for planner in peer_motion.PLANNERS:
+    for planner in peer_ompl.PLANNERS:
         for limit_s in SST_LIMITS_S if planner == "SST" else (LEG_LIMIT_S,):
             solve = partial(ompl_row, leg, planner, seed, limit_s)
             yield Case(peer=f"OMPL {planner}", limit_s=limit_s, solve=solve, **same)
-
-
-@cache
-def leg_of(problem: str) -> tuple[Scene, peer_motion.Leg]:
-    """Return a leg as a scene, planned once to load kernels, and for OMPL."""
-    name, goals = LEGS[problem]
-    document = dict(mrmg.load_scene(name).document)
-    regions = {goal["id"]: goal for goal in document["goals"]}
-    robots = [
-        {**robot, "finish": {"circle": regions[goal]["circle"]}}
-        for robot, goal in zip(document["robots"], goals, strict=False)
-    ]
-    for left_out in ("goals", "stations", "terrain"):
-        document.pop(left_out, None)
-    document |= {"robots": robots, "battery": {"capacity_m": AMPLE_M}}
-    scene = scene_from_document(document, source=problem)
-    plan_mission(scene)
-    return scene, peer_motion.Leg.of(scene, PlannerParams())
-
-
-def planned(scene: Scene, seed: int, router: Any = None, **profile: Any) -> Row:
-    """Return the row of mrmg's first plan, or of what a profile or router gives."""
-    params = replace(profile_params(**profile), improvements=0)
-    own = {} if router is None else {"router": router}
-    began = time.perf_counter()
-    result = plan_mission(scene, seed=seed, params=params, **own)
-    took_s = time.perf_counter() - began
-    return judged(scene, result.plan, took_s, result.reason)
-
-
-def judged(scene: Scene, plan: Plan | None, took_s: float, why: str) -> Row:
-    """Return the row of a plan, judged by the verifier."""
-    if plan is None:
-        return {"ok": False, "time_s": took_s, "cost": None, "why": [why]}
-    verdict = mrmg.verify(scene, plan)
-    causes = sorted({violation.kind.value for violation in verdict.violations})
-    return {"ok": verdict.ok, "time_s": took_s, "cost": plan.cost_J, "why": causes}
-
-
-def ompl_row(leg: peer_motion.Leg, planner: str, seed: int, limit_s: float) -> Row:
-    """Return the row of one of OMPL's planners."""
-    controls, took_s = peer_motion.solve(leg, planner, seed, limit_s)
-    plan = None if controls is None else leg.plan(controls)
-    return judged(leg.scene, plan, took_s, "time over")
 
 
 def tour_cases(seed: int, chosen: set[str]) -> Iterator[Case]:
@@ -288,41 +223,19 @@ def routed(
     yield case(peer="mrmg, 10,000 rounds", solve=partial(row, longer))
     for limit_s in TOUR_LIMITS_S:
         if "pyvrp" in chosen:
-            solve = partial(by_pyvrp, problem, seed, limit_s)
+            solve = partial(peer_pyvrp.solve, problem, seed, limit_s)
             peer = "PyVRP, then frvcpy" if stations else "PyVRP"
             yield case(peer=peer, limit_s=limit_s, solve=partial(row, solve))
         if "ortools" in chosen:
             first = nearest_goal(problem, seed).tours
-            solve = partial(peer_routing.ortools, problem, limit_s, first)
+            solve = partial(peer_ortools.solve, problem, limit_s, first)
             yield case(peer="OR-Tools", limit_s=limit_s, solve=partial(row, solve))
     if "frvcpy" in chosen and stations:
         orders = [
             [node for node in tour if node < problem.goals] for tour in best.tours
         ]
-        solve = partial(peer_routing.frvcpy, problem, orders)
+        solve = partial(peer_frvcpy.solve, problem, orders)
         yield case(peer="frvcpy, orders given", solve=partial(row, solve))
-
-
-def by_pyvrp(problem: RoutingProblem, seed: int, limit_s: float) -> Routing:
-    """Return PyVRP's tours, with charging stops by frvcpy where there are stations."""
-    stations = problem.targets > problem.goals
-    found = peer_routing.pyvrp(problem, seed, limit_s, battery=not stations)
-    if not stations or not found.feasible:
-        return found
-    return peer_routing.frvcpy(problem, found.tours)
-
-
-def tour_row(problem: RoutingProblem, solve: Callable[[], Routing]) -> Row:
-    """Return the row of tours, judged by mrmg's rules of tours."""
-    began = time.perf_counter()
-    routing = solve()
-    took_s = time.perf_counter() - began
-    if not routing.feasible:
-        return {"ok": False, "time_s": took_s, "cost": None, "why": ["no tours"]}
-    faults = list(faults_of_tours(problem, routing))
-    return {
-        "ok": not faults, "time_s": took_s, "cost": routing.cost_J, "why": faults[:1]
-    }  # fmt: skip
 
 
 @cache
@@ -350,95 +263,6 @@ def mission_cases(name: str, seed: int, chosen: set[str]) -> Iterator[Case]:
         yield case(peer="mrmg", solve=partial(planned, scene, seed))
         paper = partial(planned, scene, seed, profile="paper")
         yield case(peer="paper", solve=paper)
-
-
-def plain_row(scene: Scene) -> Row:
-    """Return the row of the plain baseline."""
-    began = time.perf_counter()
-    try:
-        plan, why = plain_plan(scene), ""
-    except StuckError as error:
-        plan, why = None, str(error)
-    return judged(scene, plan, time.perf_counter() - began, why)
-
-
-def tabulate(rows: Sequence[Row]) -> list[Row]:
-    """Print and return a row for each peer, problem and limit."""
-    own = {
-        (row["problem"], row["instance"]): row for row in rows if row["peer"] == "mrmg"
-    }
-    keys = dict.fromkeys(
-        (row["problem"], row["peer"], row["limit_s"])
-        for row in rows
-        if row["peer"] != "mrmg"
-    )
-    print(
-        "\nproblem | peer | limit s | ok | time s | / mrmg | cost / mrmg | better | "
-        "failures"
-    )
-    table = []
-    for problem, peer, limit_s in keys:
-        found = [
-            (row, own[problem, row["instance"]])
-            for row in rows
-            if (row["problem"], row["peer"], row["limit_s"]) == (problem, peer, limit_s)
-        ]
-        line = compared(found)
-        table.append({"peer": peer, "problem": problem, "limit_s": limit_s, **line})
-        print_row(table[-1])
-    return table
-
-
-def compared(pairs: Sequence[tuple[Row, Row]]) -> Row:
-    """Return a peer's line: pairs of its trials and mrmg's."""
-    both = [(peer, own) for peer, own in pairs if peer["ok"] and own["ok"]]
-    causes = Counter(
-        cause for peer, _ in pairs if not peer["ok"] for cause in peer["why"]
-    )
-    line: Row = {
-        "ok": sum(peer["ok"] for peer, _ in pairs),
-        "mrmg_ok": sum(own["ok"] for _, own in pairs),
-        "runs": len(pairs),
-        "failures": dict(causes.most_common()),
-    }
-    better = ["success"] if line["ok"] > line["mrmg_ok"] else []
-    for key, name in (("time_s", "time"), ("cost", "cost")):
-        ratios = [peer[key] / own[key] for peer, own in both]
-        interval = median_interval(ratios)
-        line |= {
-            key: statistics.median(peer[key] for peer, _ in both) if both else None,
-            f"mrmg_{key}": statistics.median(own[key] for _, own in both)
-            if both
-            else None,
-            f"{name}_ratio": statistics.median(ratios) if ratios else None,
-            f"{name}_ratio_interval": interval,
-        }
-        if interval[1] is not None and interval[1] < 1.0:
-            better.append(name)
-    return {**line, "better": better}
-
-
-def print_row(row: Row) -> None:
-    """Print a line of the table."""
-
-    def ratio(name: str) -> str:
-        low, high = row[f"{name}_interval"]
-        if row[name] is None:
-            return "-"
-        return f"{row[name]:.4g}" + (f" [{low:.4g}, {high:.4g}]" if low else "")
-
-    cells = [
-        row["problem"],
-        row["peer"],
-        "-" if row["limit_s"] is None else f"{row['limit_s']:g}",
-        f"{row['ok']}/{row['runs']} (mrmg {row['mrmg_ok']})",
-        "-" if row["time_s"] is None else f"{row['time_s']:.3f}",
-        ratio("time_ratio"),
-        ratio("cost_ratio"),
-        ", ".join(row["better"]) or "-",
-        ", ".join(f"{cause}: {n}" for cause, n in row["failures"].items()) or "-",
-    ]
-    print(" | ".join(cells))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,8 @@ import numpy as np
 import peer_routing
 import pytest
 from peer_baseline import plain_plan
-from peers import compared, leg_of
+from peer_comparison import compared
+from peer_legs import leg_of
 
 import mrmg
 from mrmg.planning import RoutingProblem, faults_of_tours
