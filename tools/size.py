@@ -1,6 +1,7 @@
 """Count the lines of code by package, and list modules and functions that are long.
 
-Lines of code are those without blanks, comments and docstrings. Keys of --json:
+Lines of code are those without blanks, comments and docstrings. They are counted of
+mrmg alone; the lists are of mrmg and of the tools. Keys of --json:
 `packages` (lines of code by package; the modules of mrmg itself are one entry), `core`
 (the sum of planning, compilation, motion and world), `total`, and three lists:
 `long_modules` (`module` and its `lines`, blanks and comments included),
@@ -19,7 +20,8 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-PACKAGE = Path(__file__).resolve().parents[1] / "mrmg"
+TOOLS = Path(__file__).resolve().parent
+PACKAGE = TOOLS.with_name("mrmg")
 
 CORE = ("planning", "compilation", "motion", "world")
 """Packages whose sum is reported."""
@@ -84,15 +86,16 @@ def _parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
     return len(named) - own + bool(given.vararg) + bool(given.kwarg)
 
 
-def measure(package: Path) -> dict[str, Any]:
-    """Return the document of --json for the package in a folder."""
+def measure(package: Path, tools: Path) -> dict[str, Any]:
+    """Return the document of --json for the package and the tools in two folders."""
     lines: Counter[str] = Counter()
     modules, lengthy, wide = [], [], []
-    for path in sorted(package.rglob("*.py")):
-        source, place = path.read_text(), path.relative_to(package)
-        module = ".".join([package.name, *place.with_suffix("").parts])
-        owner = place.parts[0] if len(place.parts) > 1 else package.name
-        lines[owner] += code_lines(source)
+    for path in (*sorted(package.rglob("*.py")), *sorted(tools.rglob("*.py"))):
+        source, place = path.read_text(), path.relative_to(package.parent)
+        module = ".".join(place.with_suffix("").parts)
+        if path.is_relative_to(package):
+            owner = place.parts[1] if len(place.parts) > 2 else package.name
+            lines[owner] += code_lines(source)
         length = len(source.splitlines())
         if length > LONGEST_MODULE:
             modules.append({"module": module, "lines": length})
@@ -113,13 +116,13 @@ def measure(package: Path) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Measure the package, print the tables, and write the document."""
+    """Measure package and tools, print the tables, and write the document."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
         "--json", type=Path, metavar="FILE", help="write the figures as JSON, too"
     )
     arguments = parser.parse_args()
-    found = measure(PACKAGE)
+    found = measure(PACKAGE, TOOLS)
     for package, lines in found["packages"].items():
         print(f"{lines:7,d}  {package}")
     print(f"{found['core']:7,d}  {' + '.join(CORE)}")
