@@ -9,8 +9,10 @@ of a kernel's cache, so that nobody else's functions are kept there.
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import platform
+import shutil
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -75,9 +77,28 @@ def compilation_digest() -> str:
 
 @cache
 def cache_folder() -> Path:
-    """Return the folder of this machine's compiled kernels: numba's, if one is set."""
+    """Return the folder of this machine's compiled kernels: numba's, if one is set.
+
+    Where a crash or a full disk cut off kernels, all are given up, as numba cannot read
+    what is left of them.
+    """
     own = storage.user_cache_folder() / "kernels"
-    return Path(numba.config.CACHE_DIR or own) / compilation_digest()
+    folder = Path(numba.config.CACHE_DIR or own) / compilation_digest()
+    if any(map(_is_cut_off, folder.glob("complete-*"))):
+        shutil.rmtree(folder, ignore_errors=True)
+    return folder
+
+
+def _is_cut_off(complete: Path) -> bool:
+    """Return whether a file that was there with all kernels of a part is cut off."""
+    try:
+        sizes = json.loads(complete.read_text())
+        return any(
+            (complete.parent / name).stat().st_size < size
+            for name, size in sizes.items()
+        )
+    except (OSError, ValueError):
+        return True
 
 
 @contextmanager
@@ -119,7 +140,12 @@ def kernels_are_compiled(part: str) -> bool:
 def note_kernels_are_compiled(part: str) -> None:
     """Have the next process know that this machine holds all kernels of a part."""
     if not kernels_are_compiled(part):
-        storage.write_text(_complete(part), f"{compiled_kernels()} kernels\n")
+        folder = cache_folder()
+        sizes = {
+            str(path.relative_to(folder)): path.stat().st_size
+            for path in folder.rglob("*.nb?")
+        }
+        storage.write_text(_complete(part), json.dumps(sizes))
 
 
 def _complete(part: str) -> Path:

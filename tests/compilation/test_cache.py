@@ -81,6 +81,27 @@ def test_a_part_is_complete_when_that_is_noted(
     assert not cache.kernels_are_compiled("other")
 
 
+def test_kernels_that_were_cut_off_are_given_up(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(numba.config, "DISABLE_JIT", False)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    kernel = cache.cache_folder.__wrapped__() / "world" / "kernel.1.nbc"
+    kernel.parent.mkdir(parents=True)
+
+    kernel.write_bytes(b"compiled")
+    folder = kernel.parents[1]
+    with monkeypatch.context() as patch:
+        patch.setattr(cache, "cache_folder", lambda: folder)
+        cache.note_kernels_are_compiled("one")
+    again = cache.cache_folder.__wrapped__
+    assert again() == folder and kernel.exists()
+    kernel.write_bytes(b"compiled for one type more")
+    assert again() == folder and kernel.exists()
+    kernel.write_bytes(b"comp")
+    assert again() == folder and not kernel.exists()
+
+
 def test_without_a_writable_folder_nothing_is_kept(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
