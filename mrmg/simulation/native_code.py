@@ -1,8 +1,9 @@
 """CasADi functions as machine code, where a C compiler is at hand.
 
 The C code of a function is compiled once and its library kept in the user's cache,
-named by a digest of the code. The library is used only if it answers a probe bit by bit
-as the interpreted function does, so that logs do not depend on there being a compiler;
+named by a digest of the code, beside a digest of itself: to load one that was cut off
+would end the process. The library is used only if it answers a probe bit by bit as the
+interpreted function does, so that logs do not depend on there being a compiler;
 whatever fails on the way, the interpreted function drives.
 """
 
@@ -44,7 +45,9 @@ def _library(source: str) -> Path | None:
     """Return the library of some C code, compiled if need be; None without compiler."""
     key = storage.digest("\n".join((platform.machine(), *_FLAGS, source)))
     library = storage.user_cache_folder() / "controllers" / f"{key}.so"
-    if library.is_file():
+    whole = library.with_suffix(".digest")
+    noted = whole.read_text() if whole.is_file() else ""
+    if library.is_file() and noted == _digest_of(library):
         return library
     compiler = shutil.which("cc")
     if compiler is None:
@@ -58,7 +61,13 @@ def _library(source: str) -> Path | None:
             capture_output=True,
             timeout=_LONGEST_S,
         )
+        digest = _digest_of(made)
+    storage.write_text(whole, digest)
     return library
+
+
+def _digest_of(library: Path) -> str:
+    return storage.bytes_digest(library.read_bytes())
 
 
 def _agree(function: ca.Function, native: ca.Function) -> bool:

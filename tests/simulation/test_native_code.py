@@ -77,11 +77,23 @@ def test_what_is_compiled_once_needs_no_compiler_again(
     cache: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     assert is_native(compiled(example()))
-    (library,) = cache.iterdir()
+    (library,) = cache.glob("*.so")
     before = library.stat().st_mtime_ns
     without_compiler(monkeypatch, tmp_path)
     assert is_native(compiled(example()))
     assert library.stat().st_mtime_ns == before
+
+
+@needs_cc
+def test_a_library_that_was_cut_off_is_made_anew(cache: Path, tmp_path: Path) -> None:
+    kept = compiled(example())  # by this process, of which the file is taken away
+    (library,) = cache.glob("*.so")
+    whole = library.read_bytes()
+    library.rename(tmp_path / "loaded.so")
+    library.write_bytes(whole[: len(whole) // 2])
+    assert is_native(compiled(example()))
+    assert library.read_bytes() == whole
+    assert is_native(kept)
 
 
 def test_without_a_compiler_the_function_itself_drives(
