@@ -202,16 +202,22 @@ class PairGap:
         differences = one[:, :, None, :] - other[:, None, :, :]
         return np.asarray(differences.reshape(len(step), -1, 2))
 
+    def least_apart_m(self) -> float:
+        """Return what both are apart at all times at least, judged by circles alone."""
+        return float(self._apart().min())
+
     def close_steps(self) -> np.ndarray:
         """Return the steps that can hold the minimum, judged by circles alone."""
+        apart = self._apart()
+        known = self.at(np.array([apart.argmin()]), np.zeros(1))
+        return np.flatnonzero(apart <= known)
+
+    def _apart(self) -> np.ndarray:
         separation = self._other.state[:, :2] - self._one.state[:, :2]
-        apart = np.hypot(separation[:, 0], separation[:, 1])
         models = (self._one.model, self._other.model)
         reach = sum(model.circumscribed_radius_m for model in models)
         travel = self._travel(self._one) + self._travel(self._other)
-        nearest = np.array([apart.argmin()])
-        known = self.at(nearest, np.zeros(1))
-        return np.flatnonzero(apart - reach - travel <= known)
+        return np.asarray(np.hypot(separation[:, 0], separation[:, 1]) - reach - travel)
 
     @staticmethod
     def _travel(footprint: SweptFootprint) -> np.ndarray:

@@ -59,6 +59,9 @@ def check_obstacles(
 def check_robots(scene: Scene, trajectories: Sequence[Trajectory]) -> list[Contacts]:
     """Return the contacts of every pair of robots.
 
+    Of pairs that are farther apart than another pair comes to each other, the clearance
+    is what circles around their footprints are apart.
+
     Args:
         scene: gives the footprints.
         trajectories: of equal length, one per robot.
@@ -67,11 +70,18 @@ def check_robots(scene: Scene, trajectories: Sequence[Trajectory]) -> list[Conta
         (item.robot, SweptFootprint.of(scene.robot(item.robot).model, item))
         for item in trajectories
     ]
-    contacts = []
-    for (robot, one), (other, another) in combinations(footprints, 2):
-        gap = PairGap(one, another)
+    pairs = list(combinations(footprints, 2))
+    gaps = [PairGap(one, another) for (_, one), (_, another) in pairs]
+    apart_m = [gap.least_apart_m() for gap in gaps]
+    contacts = [Contacts(clearance_m=least_m) for least_m in apart_m]
+    nearest_m = np.inf
+    for i in np.argsort(apart_m, kind="stable").tolist():
+        if apart_m[i] > nearest_m:
+            break  # all others are farther apart
+        ((robot, one), (other, another)), gap = pairs[i], gaps[i]
         touched = bounded_minimum(gap, gap.close_steps(), one.dt_s)
-        contacts.append(_pair_contacts((robot, other), (one, another), touched))
+        contacts[i] = _pair_contacts((robot, other), (one, another), touched)
+        nearest_m = min(nearest_m, contacts[i].clearance_m)
     return contacts
 
 

@@ -41,14 +41,29 @@ def check_margins(scene: Scene, plan: Plan) -> list[Violation]:
         violations += _violations(trajectory, distance_m, needed_m, "an obstacle")
     for one, other in combinations(own, 2):
         spacing_m = max(plan.margins[item.robot][1] for item in (one, other))
-        shapes = [
-            shapely.polygons(scene.robot(item.robot).model.footprint_at(item.state))
-            for item in (one, other)
-        ]
-        distance_m = np.asarray(shapely.distance(*shapes))
+        distance_m = _distance_m(scene, one, other, spacing_m)
         needed_m = np.full(len(distance_m), spacing_m)
         violations += _violations(one, distance_m, needed_m, other.robot)
     return violations
+
+
+def _distance_m(
+    scene: Scene, one: Trajectory, other: Trajectory, needed_m: float
+) -> np.ndarray:
+    """Return the distance of two robots at each step [m].
+
+    Where circles around their footprints are apart as far as is needed, it is theirs.
+    """
+    models = [scene.robot(item.robot).model for item in (one, other)]
+    reach_m = sum(model.circumscribed_radius_m for model in models)
+    distance_m = np.hypot(*(one.state[:, :2] - other.state[:, :2]).T) - reach_m
+    near = distance_m < needed_m
+    shapes = [
+        shapely.polygons(model.footprint_at(item.state[near]))
+        for model, item in zip(models, (one, other), strict=True)
+    ]
+    distance_m[near] = shapely.distance(*shapes)
+    return np.asarray(distance_m)
 
 
 def _stated_too_small(scene: Scene, plan: Plan) -> list[Violation]:
