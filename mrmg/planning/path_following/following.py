@@ -19,6 +19,7 @@ from mrmg.planning.assembly import make_plan, why_refused
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import TRACKING_M, Path, smooth_path
+from mrmg.planning.path_following.coordination.coordination import rounds_of
 from mrmg.planning.path_following.gears import with_best_gears
 from mrmg.planning.path_following.refine import cost_maps_of, drive_paths
 from mrmg.planning.path_following.robot_task import RobotTask
@@ -71,11 +72,13 @@ class Followed:
         plan: along them, None if there is none.
         failure: why there is none, in words.
         driven: whether they could be driven, if not on the charge there is.
+        meeting: whether robots met, each of which could drive alone.
     """
 
     plan: Plan | None
     failure: str = ""
     driven: bool = True
+    meeting: bool = False
 
 
 def follow_tours(
@@ -84,8 +87,7 @@ def follow_tours(
     routing: Routing,
     seed: int,
     halt: np.ndarray,
-    *,
-    soon: bool = False,
+    number: int = 0,
 ) -> Followed:
     """Plan along tours.
 
@@ -99,7 +101,8 @@ def follow_tours(
         routing: the tours.
         seed: of the search that the plan belongs to.
         halt: shape (1,); following ends soon after it has turned true.
-        soon: find the first plan soon rather than a cheap one.
+        number: of the attempt; the first one finds a plan soon rather than a cheap one,
+            and later ones try harder where robots meet.
     """
     cost_maps = cost_maps_of(problem)
     stops = [whole_tour(problem, routing, r) for r in range(len(cost_maps))]
@@ -107,6 +110,7 @@ def follow_tours(
     tours = problem.visits(routing.tours)
     limit = problem.mission.fleet["limit"]
     slower = -limit[:, 0] < REVERSE_SPEED_SHARE * limit[:, 1]  # backwards than forwards
+    soon = number == 0
     timed = problem.minimum_time or problem.preference.objective.makespan_weight > 0.0
     deeper_m = FIRST_PLAN_DEPTH_M if soon else TRACKING_M
     tried: list[list[Path]] = []
@@ -125,14 +129,14 @@ def follow_tours(
                 _geared(problem, r, cost_maps[r], path) for r, path in enumerate(paths)
             ]
         tasks = [RobotTask(*one) for one in zip(stops, paths, cost_maps, strict=True)]
-        drive = drive_paths(problem, tasks, halt)
+        drive = drive_paths(problem, tasks, halt, rounds_of(number))
         if drive.trajectories:
             plan = make_plan(problem, seed, params, drive.trajectories, tours)
             if plan is not None:
                 return Followed(plan)
             failed = Followed(None, why_refused(problem, drive.trajectories, tours))
         else:
-            failed = Followed(None, drive.failure, failed.driven)
+            failed = Followed(None, drive.failure, failed.driven, drive.meeting)
         if drive.meeting or halt[0]:
             break
     return failed

@@ -23,7 +23,7 @@ from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import SPACINGS_M, path_of, visit_steps
 from mrmg.planning.path_following.coordination.coordination import ROUNDS, coordinated
-from mrmg.planning.path_following.coordination.tasks import no_path
+from mrmg.planning.path_following.coordination.tasks import Round, no_path
 from mrmg.planning.path_following.cost_map import cost_map_of, inflated, smooth_terrain
 from mrmg.planning.path_following.pauses import with_pauses
 from mrmg.planning.path_following.robot_task import RobotTask
@@ -121,7 +121,10 @@ def along_trajectories(
 
 
 def drive_paths(
-    problem: Problem, tasks: Sequence[RobotTask], halt: np.ndarray
+    problem: Problem,
+    tasks: Sequence[RobotTask],
+    halt: np.ndarray,
+    rounds: Sequence[Round] = ROUNDS[:1],
 ) -> FleetDrive:
     """Smooth paths and drive the fleet along them.
 
@@ -132,6 +135,7 @@ def drive_paths(
         problem: the mission.
         tasks: what each robot drives; changed as its path is.
         halt: shape (1,); driving ends soon after it has turned true.
+        rounds: of the search where robots meet.
     """
     drives = []
     for r, task in enumerate(tasks):
@@ -146,7 +150,7 @@ def drive_paths(
         [task.tour for task in tasks],
         [with_pauses(problem, r, task.path) for r, task in enumerate(tasks)],
         halt,
-        rounds=ROUNDS[:1],
+        rounds=rounds,
         drives=drives,
     )
     if trajectories:

@@ -18,7 +18,10 @@ import numpy as np
 from mrmg import seeding
 from mrmg.planning.attempt import Attempt, Request
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.path_following.coordination.coordination import ROUNDS, coordinated
+from mrmg.planning.path_following.coordination.coordination import (
+    coordinated,
+    rounds_of,
+)
 from mrmg.planning.path_following.coordination.tasks import no_path
 from mrmg.planning.path_following.following import (
     LEAST_SOC_MARGIN,
@@ -178,12 +181,15 @@ def path_following(problem: Problem, request: Request) -> Attempt:
 def _tries(problem: Problem, request: Request, schedule: Schedule) -> Iterator[Attempt]:
     """Yield what came of each entry of a schedule."""
     tried: dict[Tours, float] = {}
+    met = False
     for soc_margin, draws in schedule.followed:
         kept = problem.with_soc_margin(soc_margin)
-        yield follow_paths(kept, request, draws, soc_margin, tried)
+        followed, meeting = follow_paths(kept, request, draws, soc_margin, tried)
+        met |= meeting
+        yield followed
     for soc_margin in schedule.search_soc_margins:
         kept = problem.with_soc_margin(soc_margin).with_margin(schedule.search_margin)
-        searched = search_motions(kept, request)
+        searched = search_motions(kept, request, met)
         yield searched
         if searched.tours_found:
             return
@@ -196,8 +202,14 @@ def _tours(problem: Problem, request: Request, seed: int | None = None) -> Routi
     return request.tours(problem, seed)
 
 
-def search_motions(problem: Problem, request: Request) -> Attempt:
-    """Search for motions along tours, and refine their plan."""
+def search_motions(problem: Problem, request: Request, met: bool = False) -> Attempt:
+    """Search for motions along tours, and refine their plan.
+
+    Args:
+        problem: the mission.
+        request: the attempt.
+        met: whether such a search has failed to keep robots apart on their paths.
+    """
     began = time.perf_counter()
     routing = _tours(problem, request)
     routing_s = time.perf_counter() - began
@@ -211,7 +223,7 @@ def search_motions(problem: Problem, request: Request) -> Attempt:
         [no_path(problem, r) for r in robots],
         request.halt,
         seed=request.stream_seed("coordination"),
-        rounds=ROUNDS[min(request.number, len(ROUNDS) - 1) :][:1],
+        rounds=rounds_of(request.number + met),
     )
     tours = problem.visits(routing.tours)
     plans: list[Plan] = []
@@ -242,8 +254,8 @@ def follow_paths(
     draws: tuple[Draw, ...],
     soc_margin: float,
     tried: dict[Tours, float],
-) -> Attempt:
-    """Drive straight along tours.
+) -> tuple[Attempt, bool]:
+    """Drive straight along tours; tell, too, whether robots met on them.
 
     The first attempt takes the router's tours as they are; others the best of several
     draws.
@@ -263,7 +275,7 @@ def follow_paths(
     preference = problem.preference
     plans: list[Plan] = []
     found_at: list[float] = []
-    failure = ""
+    failure, met = "", False
     driven = 0
     for tours, minimum_time in product(choice, (False, True)):
         if request.halted or (plans and not preference.late_s(plans[-1])):
@@ -278,17 +290,19 @@ def follow_paths(
             tours,
             request.seed,
             request.halt,
-            soon=request.number == 0,
+            request.number,
         )
         tried[tours.tours] = soc_margin if followed.driven else 0.0
         plan, failure = followed.plan, followed.failure or failure
+        met |= followed.meeting
         if plan is not None and (
             not plans or preference.rank(plan) < preference.rank(plans[-1])
         ):
             plans.append(plan)
             found_at.append(time.perf_counter())
     counts = {"path_following_plans": driven, "router_calls": len(draws)}
-    return Attempt(plans, found_at, routing_s, counts, bool(choice), failure)
+    found = Attempt(plans, found_at, routing_s, counts, bool(choice), failure)
+    return found, met
 
 
 def _drawn_tours(

@@ -43,7 +43,8 @@ def request(number: int = 0, params: PlannerParams = PARAMS) -> Request:
 def along_paths(problem: Problem, asked: Request) -> Attempt:
     schedule = Schedule.of(problem, asked.params, asked.number)
     soc_margin, draws = schedule.followed[0]
-    return follow_paths(problem, asked, draws, soc_margin, {})
+    found, _ = follow_paths(problem, asked, draws, soc_margin, {})
+    return found
 
 
 Way = Callable[[Problem, Request], Attempt]

@@ -1,46 +1,69 @@
-"""Cost-to-go over a grid: what a point robot's shortest way to a target takes."""
+"""Costs-to-go over grids: what a point robot's cheapest way through its targets takes.
+
+Static ones know obstacles alone; timed ones also know where the other robots are when.
+"""
 
 from __future__ import annotations
 
-from math import floor, sqrt
+from math import floor, hypot, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import by_reference, kernel
+from mrmg.planning.problem._target_kernels import in_target
+from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.planning.roadmap._heap_kernels import pop, push
+from mrmg.world._kernels import convex_segment_distance, place_footprint
+
+DIAGONAL = sqrt(2.0)
+
+
+@by_reference
+class Guide(NamedTuple):
+    """Costs-to-go through all targets of a tour.
+
+    Attributes:
+        field: from each cell on each leg in each layer of time to the end [s], shape
+            (L, T, ny, nx); the last layer lasts.
+        cell: side of a cell [m].
+        layer: steps that a layer of time lasts.
+    """
+
+    field: np.ndarray
+    cell: float
+    layer: int
 
 
 @kernel
-def cost_to_go(free, price, row, column):
-    """Return the cost from each cell to one of them, in sides of a cell (Dijkstra).
+def cost_to_go(price, seed):
+    """Return the least cost from each cell to a seed and on (Dijkstra).
 
     Args:
-        free: whether a cell may be passed, shape (ny, nx).
-        price: cost of a cell's side, shape (ny, nx).
-        row, column: of the cell to reach; it counts as free.
+        price: cost of a cell's side, inf where it may not be passed, shape (ny, nx).
+        seed: cost from a cell on where the way may end, else inf, shape (ny, nx).
 
     Returns:
-        Shape (ny, nx); inf where the cell cannot be reached from.
+        Shape (ny, nx); inf where no seed can be reached from.
     """
-    rows, columns = free.shape
-    cost = np.full((rows, columns), np.inf)
+    rows, columns = price.shape
+    cost = seed.copy()
     room = 8 * rows * columns + 8
     key, entry = np.empty(room), np.empty(room, np.int64)
-    cost[row, column] = 0.0
-    size = push(key, entry, 0, 0.0, row * columns + column)
-    diagonal = sqrt(2.0)
+    size = 0
+    for i in range(rows):
+        for j in range(columns):
+            if cost[i, j] < np.inf:
+                size = push(key, entry, size, cost[i, j], i * columns + j)
     while size > 0:
         value, node = key[0], entry[0]
         size = pop(key, entry, size)
         i, j = node // columns, node % columns
         if value > cost[i, j]:
             continue
-        for di in range(-1, 2):
-            for dj in range(-1, 2):
-                a, b = i + di, j + dj
-                if a < 0 or b < 0 or a >= rows or b >= columns or not free[a, b]:
-                    continue
-                way = diagonal if di != 0 and dj != 0 else 1.0
+        for a in range(max(0, i - 1), min(rows, i + 2)):
+            for b in range(max(0, j - 1), min(columns, j + 2)):
+                way = DIAGONAL if a != i and b != j else 1.0
                 there = value + 0.5 * way * (price[i, j] + price[a, b])
                 if there < cost[a, b]:
                     cost[a, b] = there
@@ -49,9 +72,109 @@ def cost_to_go(free, price, row, column):
 
 
 @kernel
-def field_at(field, f, x_min, y_min, cell, x, y):
-    """Return field f at a point: bilinear, of the cells around it that have a value."""
-    rows, columns = field.shape[1], field.shape[2]
+def timed_cost_to_go(price, seed, penalty, hold, field):
+    """Fill in the costs-to-go of all layers of time but the last one, latest first.
+
+    In the time of a layer a point robot moves to a cell beside its own, or holds.
+
+    Args:
+        price: cost of a cell's side, inf where it may not be passed, shape (ny, nx).
+        seed: cost from a cell on where the way may end, else inf, (T, ny, nx).
+        penalty: cost of being in a cell, inf where other robots are, (T, ny, nx).
+        hold: cost of holding for the time of a layer, shape (ny, nx).
+        field: receives the costs; the last layer is there, shape (T, ny, nx).
+    """
+    rows, columns = price.shape
+    for t in range(len(field) - 2, -1, -1):
+        later = field[t + 1]
+        for i in range(rows):
+            for j in range(columns):
+                field[t, i, j] = np.inf
+                if not (price[i, j] < np.inf and penalty[t, i, j] < np.inf):
+                    continue
+                best = min(seed[t, i, j], hold[i, j] + later[i, j])
+                for a in range(max(0, i - 1), min(rows, i + 2)):
+                    for b in range(max(0, j - 1), min(columns, j + 2)):
+                        if later[a, b] < best and (a != i or b != j):
+                            way = DIAGONAL if a != i and b != j else 1.0
+                            cost = 0.5 * way * (price[i, j] + price[a, b])
+                            best = min(best, cost + later[a, b])
+                field[t, i, j] = penalty[t, i, j] + best
+
+
+@kernel
+def add_others(own, traffic, inner, x_min, y_min, cell, layer, soft_s, penalty):
+    """Add to penalties where the other robots are in each layer of time.
+
+    Where the robot cannot be whatever its heading, penalties are inf; of robots of
+    lower priority they grow with the nearness.
+
+    Args:
+        own: the robot, shape (1,).
+        traffic: the others.
+        inner: radius of the circle around its reference point in its footprint [m].
+        x_min, y_min: corner of the grid [m].
+        cell: side of its cells [m].
+        layer: steps that a layer lasts.
+        soft_s: cost of a layer in conflict with a robot of lower priority.
+        penalty: of cells, shape (T, ny, nx).
+    """
+    rows, columns = penalty.shape[1], penalty.shape[2]
+    corner = np.empty((MOST_CORNERS, 2))
+    for other in range(len(traffic.last)):
+        if not (traffic.hard[other] or traffic.soft[other]):
+            continue
+        it = traffic.fleet[other]
+        placed = corner[: it.corners]
+        near = inner + max(own[0].spacing, it.spacing) - 0.5 * cell
+        reach = own[0].radius + it.radius
+        far = near + it.radius
+        for t in range(len(penalty)):
+            k = min(t * layer, traffic.last[other])
+            pose, middle = traffic.pose[other, k], traffic.middle[other, k]
+            place_footprint(it.corner[: it.corners], pose[0], pose[1], pose[2], placed)
+            first_row = max(0, int(floor((middle[1] - far - y_min) / cell)))
+            last_row = min(rows - 1, int(floor((middle[1] + far - y_min) / cell)))
+            first = max(0, int(floor((middle[0] - far - x_min) / cell)))
+            last = min(columns - 1, int(floor((middle[0] + far - x_min) / cell)))
+            for i in range(first_row, last_row + 1):
+                for j in range(first, last + 1):
+                    x, y = x_min + (j + 0.5) * cell, y_min + (i + 0.5) * cell
+                    if not convex_segment_distance(placed, x, y, x, y) < near:
+                        continue
+                    if traffic.hard[other]:
+                        penalty[t, i, j] = np.inf
+                    else:
+                        apart = hypot(x - middle[0], y - middle[1])
+                        penalty[t, i, j] += soft_s * max(0.0, 1.0 - apart / reach)
+
+
+@kernel
+def add_region(targets, t, x_min, y_min, cell, region):
+    """Mark the cells of a grid whose middles are in a target, and the one of its own.
+
+    Args:
+        targets: all targets.
+        t: number of one.
+        x_min, y_min, cell: corner of the grid and side of its cells [m].
+        region: receives them, shape (ny, nx).
+    """
+    rows, columns = region.shape
+    column = int(floor((targets.center[t, 0] - x_min) / cell))
+    row = int(floor((targets.center[t, 1] - y_min) / cell))
+    more = int(targets.reach[t] / cell) + 1
+    for i in range(max(0, row - more), min(rows, row + more + 1)):
+        for j in range(max(0, column - more), min(columns, column + more + 1)):
+            x, y = x_min + (j + 0.5) * cell, y_min + (i + 0.5) * cell
+            if in_target(targets, t, x, y):
+                region[i, j] = True
+    region[min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)] = True
+
+
+@kernel
+def field_at(field, x_min, y_min, cell, x, y):
+    """Return a field at a point: bilinear, of the cells around it that have a value."""
+    rows, columns = field.shape
     fx, fy = (x - x_min) / cell - 0.5, (y - y_min) / cell - 0.5
     column = min(max(int(floor(fx)), 0), columns - 1)
     row = min(max(int(floor(fy)), 0), rows - 1)
@@ -59,9 +182,16 @@ def field_at(field, f, x_min, y_min, cell, x, y):
     total = weight = 0.0
     for i in range(2):
         for j in range(2):
-            value = field[f, min(row + i, rows - 1), min(column + j, columns - 1)]
+            value = field[min(row + i, rows - 1), min(column + j, columns - 1)]
             share = (v if i else 1.0 - v) * (u if j else 1.0 - u)
             if value < np.inf and share > 0.0:
                 total += share * value
                 weight += share
     return total / weight if weight > 0.0 else np.inf
+
+
+@kernel
+def guide_at(guide, leg, step, x_min, y_min, x, y):
+    """Return the cost-to-go of a point on a leg at a step [s]."""
+    layer = min(step // guide.layer, guide.field.shape[1] - 1)
+    return field_at(guide.field[leg, layer], x_min, y_min, guide.cell, x, y)

@@ -10,7 +10,7 @@ import numpy as np
 from mrmg.compilation import by_reference, kernel
 from mrmg.motion._kernels import CAR, copy_numbers
 from mrmg.planning.path_following._following_kernels import Course, advance
-from mrmg.planning.path_following.coordination._field_kernels import field_at
+from mrmg.planning.path_following.coordination._field_kernels import Guide, guide_at
 from mrmg.planning.path_following.coordination._motion_kernels import (
     Traffic,
 )
@@ -40,14 +40,12 @@ class Task(NamedTuple):
         leg: targets to visit, in order, shape (L,).
         stay: steps to stand in each of them, shape (L,).
         along: way along the path to each of them [m]; inf where it leads to none, (L,).
-        rest_s: time from each of them to the end by the fields, shape (L + 1,); the
-            last entry is that from the end of the path.
+        rest_s: time from the end of the path on.
         stays_s: cost of the stays from each leg on, shape (L + 1,).
         finish: target to end in, or -1.
         home_along: whether the path leads to the finish.
         heading, tolerance: to end with [rad]; a tolerance of at least pi for any.
-        field: cost-to-go to each leg's target and to the finish [s], (L + 1, ny, nx).
-        field_cell: side of their cells [m].
+        guide: costs-to-go on each leg.
         motion: (v, w) of each MOVE, shape (P, 2).
         steps: that a motion lasts.
         resolution: sides of cells: position [m], heading [rad], speed [m/s], steering.
@@ -60,14 +58,13 @@ class Task(NamedTuple):
     leg: np.ndarray
     stay: np.ndarray
     along: np.ndarray
-    rest_s: np.ndarray
+    rest_s: float
     stays_s: np.ndarray
     finish: int
     home_along: bool
     heading: float
     tolerance: float
-    field: np.ndarray
-    field_cell: float
+    guide: Guide
     motion: np.ndarray
     steps: int
     resolution: np.ndarray
@@ -173,51 +170,57 @@ def is_new(table, key):
 
 
 @kernel
-def cost_to_go_s(search, leg, segment, left, state):
+def cost_to_go_s(search, place, state):
     """Return an estimate of the time from a state to the end of the task [s].
 
     Args:
         search: the search.
-        leg: that the robot is on.
-        segment, left: of its path that it is on, and was on last.
+        place: (step, leg, segment, last segment) that it is at.
         state: its state.
     """
-    own, course, task = search.own, search.course, search.task
+    own, task = search.own, search.task
+    step_number, leg, segment, left = place
     top = own[0].limit[1]
-    legs, nodes = len(task.leg), course.size[0]
+    legs = len(task.leg)
     on_path = task.home_along if leg == legs else task.along[leg] < np.inf
-    if on_path and segment < nodes:
-        i, s = advance(course, left, state[0], state[1])
-        size = course.way[i + 1] - course.way[i]
-        t = min(1.0, max(0.0, (s - course.way[i]) / max(size, 1e-9)))
-        px = (1.0 - t) * course.node[i, 0] + t * course.node[i + 1, 0]
-        py = (1.0 - t) * course.node[i, 1] + t * course.node[i + 1, 1]
-        rest_s = (1.0 - t) * course.rest_s[i] + t * course.rest_s[i + 1]
-        way = SIDEWAYS * hypot(state[0] - px, state[1] - py)
-        if leg < legs:
-            way += 2.0 * max(0.0, course.way[i] + t * size - task.along[leg])
-        return rest_s + way / top + task.rest_s[legs] + task.stays_s[leg]
-    if leg == legs and task.finish < 0:
-        return 0.0
-    target = task.leg[leg] if leg < legs else task.finish
-    x_min, y_min = search.spaces.x_min, search.spaces.y_min
     x, y = state[0], state[1]
-    time_s = field_at(task.field, leg, x_min, y_min, task.field_cell, x, y)
-    if leg < legs:
-        return time_s + task.rest_s[leg] + task.stays_s[leg]
-    if task.tolerance < pi and own[0].model == CAR:
-        turn, length = np.empty(MOST_PIECES), np.empty(MOST_PIECES)
-        dx = search.targets.center[target, 0] - x
-        dy = search.targets.center[target, 1] - y
-        radius = 1.05 * own[0].turning_radius
-        curve = reeds_shepp(dx, dy, state[2], task.heading, radius, turn, length)
-        if curve < np.inf:
-            reach = search.targets.reach[target]
-            time_s = max(time_s, max(0.0, curve - reach) / top)
-    elif task.tolerance < pi:
-        off = abs(wrap(task.heading - state[2])) - task.tolerance
-        time_s += max(0.0, off) / own[0].limit[2]
-    return time_s
+    spaces, time_s = search.spaces, 0.0
+    if leg < legs or task.finish >= 0:
+        time_s = guide_at(
+            task.guide, leg, step_number, spaces.x_min, spaces.y_min, x, y
+        )
+    if on_path and segment < search.course.size[0]:
+        time_s = along_path_s(search, leg, left, state)
+    elif leg == legs and task.finish >= 0 and task.tolerance < pi:
+        if own[0].model == CAR:
+            turn, length = np.empty(MOST_PIECES), np.empty(MOST_PIECES)
+            dx = search.targets.center[task.finish, 0] - x
+            dy = search.targets.center[task.finish, 1] - y
+            radius = 1.05 * own[0].turning_radius
+            curve = reeds_shepp(dx, dy, state[2], task.heading, radius, turn, length)
+            if curve < np.inf:
+                reach = search.targets.reach[task.finish]
+                time_s = max(time_s, max(0.0, curve - reach) / top)
+        else:
+            off = abs(wrap(task.heading - state[2])) - task.tolerance
+            time_s += max(0.0, off) / own[0].limit[2]
+    return time_s + task.stays_s[leg]
+
+
+@kernel
+def along_path_s(search, leg, left, state):
+    """Return the time to the end of the task along the path [s]."""
+    course, task = search.course, search.task
+    i, s = advance(course, left, state[0], state[1])
+    size = course.way[i + 1] - course.way[i]
+    t = min(1.0, max(0.0, (s - course.way[i]) / max(size, 1e-9)))
+    px = (1.0 - t) * course.node[i, 0] + t * course.node[i + 1, 0]
+    py = (1.0 - t) * course.node[i, 1] + t * course.node[i + 1, 1]
+    rest_s = (1.0 - t) * course.rest_s[i] + t * course.rest_s[i + 1]
+    way = SIDEWAYS * hypot(state[0] - px, state[1] - py)
+    if leg < len(task.leg):
+        way += 2.0 * max(0.0, course.way[i] + t * size - task.along[leg])
+    return rest_s + way / search.own[0].limit[1] + task.rest_s
 
 
 @kernel
@@ -248,7 +251,7 @@ def add(search, nodes, a, motion, state, place, cost):
     """
     step_number, leg, segment, left = place
     b = nodes.size[0]
-    rest_s = cost_to_go_s(search, leg, segment, left, state)
+    rest_s = cost_to_go_s(search, place, state)
     if not rest_s < np.inf:
         return
     nodes.size[0] = b + 1

@@ -12,8 +12,9 @@ before, and begins with other motions.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -22,15 +23,19 @@ from mrmg.planning.path_following import _tracking_kernels
 from mrmg.planning.path_following._following_kernels import Course
 from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.coordination import _search_kernels
+from mrmg.planning.path_following.coordination._motion_kernels import Traffic
 from mrmg.planning.path_following.coordination._node_kernels import (
     Nodes,
     Scratch,
     Setting,
+    Task,
 )
+from mrmg.planning.path_following.coordination.fields import NO_GUIDE, Fields
 from mrmg.planning.path_following.coordination.priorities import search_priorities
 from mrmg.planning.path_following.coordination.tasks import (
-    Fields,
     Round,
+    guided,
+    no_path,
     stays_s,
     task_of,
 )
@@ -47,6 +52,9 @@ ROUNDS = (
     Round(most=64_000, orders=400, weight=2.0, fineness=3.0, soft_s=4.0),
 )
 """Rounds one after the other."""
+
+FIRST_MOST = 300
+"""Nodes of a robot's first search, at most."""
 
 YIELDING_WEIGHT = 1.1
 """Weight of its cost-to-go."""
@@ -65,6 +73,11 @@ SLOWEST = 4.0
 
 LEAST_STEPS = 1500
 """... and so many steps more."""
+
+
+def rounds_of(number: int) -> Sequence[Round]:
+    """Return the round of an attempt: later ones try harder."""
+    return ROUNDS[min(number, len(ROUNDS) - 1) :][:1]
 
 
 def empty_course(most: int) -> Course:
@@ -143,29 +156,60 @@ class _Planning:
         yielding: bool = False,
     ) -> Motion | None:
         """Return a motion of robot r without conflicts with the robots marked."""
-        mission, now, dt_s = self._problem.mission, self.round, self._problem.dt_s
-        led = len(self._paths[r].target) == len(self._tours[r])
-        steered = self._problem.steered_home[r] and len(self._tours[r]) == 1
-        quick = now is ROUNDS[0] and (led or steered)
+        traffic = self._traffic.around(r, motions, above)
+        for task, course in islice(
+            self._tasks(r, traffic, yielding), int(yielding), None
+        ):
+            found = self._search(r, task, traffic, course)
+            if found is not None:
+                return found
+        return None
+
+    def _tasks(
+        self, r: int, traffic: Traffic, yielding: bool
+    ) -> Iterator[tuple[Task, Course]]:
+        """Yield what to search for, and along which path.
+
+        First comes a short search that does not know when the others are where. The
+        next one does, if there is room for it, and then does without a path.
+        """
+        problem, path, tour = self._problem, self._paths[r], self._tours[r]
+        now, course = self.round, self._courses[r]
         if yielding:
             now = replace(now, weight=YIELDING_WEIGHT, soft_s=YIELDING_S)
-        own = slice(r, r + 1)
+        task = task_of(problem, r, tour, path, now)
+        led = len(path.target) == len(tour) or (
+            problem.steered_home[r] and not tour[1:]
+        )
+        guide = NO_GUIDE
+        if not (led and self.round is ROUNDS[0]):
+            guide = self._fields.static(r, tour)
+        along = guided(problem, task, path, guide)
+        yield along._replace(most=min(FIRST_MOST, now.most)), course
+        costs = task.hold_share, task.soft_s / (task.steps * problem.dt_s)
+        timed = self._fields.timed(r, tour, task.stay, traffic, costs)
+        if timed is None:
+            yield along, course
+        else:
+            nowhere = no_path(problem, r)
+            free = task_of(problem, r, tour, nowhere, now)._replace(
+                stay=task.stay, stays_s=task.stays_s
+            )
+            yield guided(problem, free, nowhere, timed), course_of(problem, r, nowhere)
+
+    def _search(
+        self, r: int, task: Task, traffic: Traffic, course: Course
+    ) -> Motion | None:
+        mission, dt_s, own = self._problem.mission, self._problem.dt_s, slice(r, r + 1)
         search = Setting(
             own=mission.fleet[own],
             spaces=mission.spaces,
             terrain=mission.terrain,
             targets=mission.targets,
             zones=mission.zones,
-            course=self._courses[r],
-            traffic=self._traffic.around(r, motions, above),
-            task=task_of(
-                self._problem,
-                r,
-                self._tours[r],
-                self._paths[r],
-                None if quick else self._fields,
-                now,
-            ),
+            course=course,
+            traffic=traffic,
+            task=task,
             dt=dt_s,
         )
         curve = self._room.curve._replace(
@@ -174,7 +218,7 @@ class _Planning:
         )
         count, nodes = _search_kernels.find_motion(
             search,
-            empty_nodes(now.most),
+            empty_nodes(task.most),
             self._room._replace(curve=curve),
             self._problem.start[r],
             self._control,

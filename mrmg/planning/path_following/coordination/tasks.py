@@ -11,8 +11,9 @@ import numpy as np
 from mrmg.energy.model import CONSUMERS_W
 from mrmg.motion._kernels import USER
 from mrmg.planning.path_following.band import Path
-from mrmg.planning.path_following.coordination import _field_kernels
+from mrmg.planning.path_following.coordination._field_kernels import Guide, guide_at
 from mrmg.planning.path_following.coordination._node_kernels import Task
+from mrmg.planning.path_following.coordination.fields import NO_GUIDE
 from mrmg.planning.problem.problem import Problem
 
 MOTION_SHARE = 0.6
@@ -39,14 +40,8 @@ LEVELS = 2
 HOLD_SHARE = 0.3
 """Cost of standing, as a share of that of moving: it takes time, but no energy."""
 
-TIGHT_PRICE = 2.0
-"""Factor on the cost of a metre where a robot cannot turn round."""
-
 LONG_HOLD_SHARE = 0.02
 """The same where robots wait for each other at stations, which takes minutes."""
-
-MOST_CELLS = 60_000
-"""Cells of a field of costs-to-go, about."""
 
 
 def motion_steps(robot: np.ndarray, dt_s: float, fineness: float) -> int:
@@ -118,85 +113,16 @@ class Round:
     soft_s: float
 
 
-class Fields:
-    """Costs-to-go over grids, made when they are asked for."""
-
-    def __init__(self, problem: Problem) -> None:
-        """Keep the problem; no field is made yet."""
-        self._problem = problem
-        self._known: dict[tuple[int, float, int], np.ndarray] = {}
-        spaces = problem.mission.spaces
-        cells = spaces.distance[0].size
-        self._coarser = max(1, round((cells / MOST_CELLS) ** 0.5))
-
-    def cell_m(self, r: int) -> float:
-        """Return the side of a cell of robot r's fields."""
-        return float(self._problem.mission.spaces.cell * self._coarser)
-
-    def of(self, r: int, target: int) -> np.ndarray:
-        """Return the way from each cell to a target [m], inf where there is none."""
-        mission = self._problem.mission
-        robot = mission.fleet[r]
-        needed_m = float(robot["passage"])
-        key = (int(robot["space"]), needed_m, target)
-        if key not in self._known:
-            spaces, n = mission.spaces, self._coarser
-            cell_m = self.cell_m(r)
-            distance = spaces.distance[robot["space"]]
-            rows, columns = (-(-size // n) for size in distance.shape)
-            padded = np.full((rows * n, columns * n), -np.inf)
-            padded[: distance.shape[0], : distance.shape[1]] = distance
-            nearest = padded.reshape(rows, n, columns, n).max(axis=(1, 3))
-            at = mission.targets.center[target] - (spaces.x_min, spaces.y_min)
-            column, row = np.clip((at / cell_m).astype(int), 0, (columns - 1, rows - 1))
-            roomy_m = float(robot["radius"] + robot["margin"])
-            lacking = (roomy_m - nearest) / max(roomy_m - needed_m, cell_m)
-            self._known[key] = cell_m * _field_kernels.cost_to_go(
-                nearest > needed_m - 0.5 * cell_m,
-                1.0 + TIGHT_PRICE * np.clip(lacking, 0.0, 1.0),
-                int(row),
-                int(column),
-            )
-        return self._known[key]
-
-
-def _guidance(
-    problem: Problem, r: int, goals: Sequence[int], fields: Fields | None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return costs-to-go to each target, and from each target to the last one [s].
-
-    Shapes (L, ny, nx) and (L,); all zero without fields.
-    """
-    mission = problem.mission
-    if fields is None or not goals:
-        return np.zeros((max(1, len(goals)), 1, 1)), np.zeros(len(goals) + 1)
-    top = float(mission.fleet["limit"][r, 1])
-    field = np.stack([fields.of(r, t) / top for t in goals])
-    cell_m, rest_s = fields.cell_m(r), np.zeros(len(goals) + 1)
-    x_min, y_min = mission.spaces.x_min, mission.spaces.y_min
-    for i in range(len(goals) - 2, -1, -1):
-        x, y = mission.targets.center[goals[i]]
-        there_s = _field_kernels.field_at(field, i + 1, x_min, y_min, cell_m, x, y)
-        rest_s[i] = there_s + rest_s[i + 1]
-    return field, rest_s
-
-
 def task_of(
-    problem: Problem,
-    r: int,
-    tour: Sequence[int],
-    path: Path,
-    fields: Fields | None,
-    effort: Round,
+    problem: Problem, r: int, tour: Sequence[int], path: Path, effort: Round
 ) -> Task:
-    """Return what robot r is to do.
+    """Return what robot r is to do, without costs-to-go but along its path.
 
     Args:
         problem: the mission.
         r: robot.
         tour: its targets; a finish comes last.
         path: along them, or an empty one.
-        fields: costs-to-go; None to do without.
         effort: how hard it is searched for.
     """
     robot, targets = problem.mission.fleet[r], problem.mission.targets
@@ -206,11 +132,6 @@ def task_of(
     led = min(len(legs), len(path.stop))
     along[:led] = path.way[path.stop[:led]]
     stay_s[:led] = path.pause_s[:led]
-    field, after_s = _guidance(problem, r, [*legs, *[finish] * (finish >= 0)], fields)
-    home_along = finish >= 0 and finish in path.target[-1:]
-    rest_s = after_s[: len(legs) + 1].copy()
-    # Of the last entry, what is left behind the end of the path.
-    rest_s[-1] = 0.0 if home_along or finish < 0 or not legs else after_s[len(legs) - 1]
     standing = (
         LONG_HOLD_SHARE if problem.mission.targets.zone.max() >= 0 else HOLD_SHARE
     )
@@ -224,14 +145,13 @@ def task_of(
         leg=np.array(legs, np.int64),
         stay=np.ceil(stay_s / dt_s).astype(np.int64),
         along=along,
-        rest_s=rest_s,
+        rest_s=0.0,
         stays_s=standing / effort.weight * ahead_s,
         finish=finish,
-        home_along=bool(home_along),
+        home_along=finish >= 0 and finish in path.target[-1:],
         heading=float(targets.heading[r]),
         tolerance=float(targets.tolerance[r]),
-        field=field,
-        field_cell=fields.cell_m(r) if fields is not None else 1e9,
+        guide=NO_GUIDE,
         motion=motions(robot, steps, dt_s),
         steps=steps,
         resolution=np.array(sides),
@@ -240,3 +160,13 @@ def task_of(
         soft_s=effort.soft_s,
         most=effort.most,
     )
+
+
+def guided(problem: Problem, task: Task, path: Path, guide: Guide) -> Task:
+    """Return a task with costs-to-go through its targets."""
+    rest_s, legs = 0.0, len(task.leg)
+    if task.finish >= 0 and not task.home_along:
+        x, y = path.node[-1]
+        spaces = problem.mission.spaces
+        rest_s = guide_at(guide, legs, 0, spaces.x_min, spaces.y_min, x, y)
+    return task._replace(guide=guide, rest_s=float(rest_s))

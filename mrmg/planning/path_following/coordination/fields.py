@@ -1,0 +1,157 @@
+"""Costs-to-go of robots over grids, made when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from mrmg.planning.path_following.coordination import _field_kernels
+from mrmg.planning.path_following.coordination._field_kernels import Guide
+from mrmg.planning.path_following.coordination._motion_kernels import Traffic
+from mrmg.planning.problem.problem import Problem
+from mrmg.world._kernels import point_in_convex, point_segment_distance
+
+TIGHT_PRICE = 2.0
+"""Factor on the cost of a metre where a robot cannot turn round."""
+
+MOST_CELLS = 60_000
+"""Cells of a field, about."""
+
+MOST_TIMED_CELLS = 3_000_000
+"""Cells of fields that know where the other robots are when, over all layers and legs,
+at most: more take longer than they save."""
+
+
+NO_GUIDE = Guide(np.zeros((1, 1, 1, 1)), 1e9, 1 << 30)
+"""Costs-to-go of those who do without."""
+
+
+class Fields:
+    """Costs-to-go over grids of one problem."""
+
+    def __init__(self, problem: Problem) -> None:
+        """Keep the problem; no field is made yet."""
+        self._problem = problem
+        self._known: dict[tuple[int, float, tuple[int, ...]], np.ndarray] = {}
+        spaces = problem.mission.spaces
+        cells = spaces.distance[0].size
+        self._coarser = max(1, round((cells / MOST_CELLS) ** 0.5))
+        self._cell_m = float(spaces.cell * self._coarser)
+
+    def static(self, r: int, targets: Sequence[int]) -> Guide:
+        """Return robot r's costs-to-go among obstacles alone."""
+        top = float(self._problem.mission.fleet["limit"][r, 1])
+        legs = [
+            self._way(r, tuple(targets[i:]), targets) / top for i in range(len(targets))
+        ]
+        if not legs:
+            return NO_GUIDE
+        return Guide(np.stack(legs)[:, None], self._cell_m, 1 << 30)
+
+    def timed(
+        self,
+        r: int,
+        targets: Sequence[int],
+        stay: np.ndarray,
+        traffic: Traffic,
+        costs: tuple[float, float],
+    ) -> Guide | None:
+        """Return robot r's costs-to-go among the other robots; None if they are many.
+
+        Args:
+            r: robot.
+            targets: of its tour; a finish comes last.
+            stay: steps to stand in each of them but a finish, shape (L,) or (L - 1,).
+            traffic: how the others move.
+            costs: of a second of holding, and of a second in conflict with a robot of
+                lower priority.
+        """
+        mission, dt_s, cell_m = self._problem.mission, self._problem.dt_s, self._cell_m
+        own = mission.fleet[r : r + 1]
+        top = float(own[0]["limit"][1])
+        layer = max(1, int(cell_m / (top * dt_s)))
+        layers = -(-traffic.end // layer) + 1
+        price = self._price(r, targets) * cell_m / top
+        if not 0 < len(targets) * layers * price.size <= MOST_TIMED_CELLS:
+            return None
+        hold_share, soft_share = costs
+        penalty = np.zeros((layers, *price.shape))
+        _field_kernels.add_others(
+            own, traffic, inner_m(own[0]), mission.spaces.x_min, mission.spaces.y_min,
+            cell_m, layer, soft_share * layer * dt_s, penalty,
+        )  # fmt: skip
+        lasting = np.where(penalty[-1] < np.inf, price, np.inf)
+        legs: list[np.ndarray] = []
+        for i in range(len(targets) - 1, -1, -1):
+            region = self._region(targets[i : i + 1])
+            hold = np.full(price.shape, hold_share * layer * dt_s)
+            seed = np.full(penalty.shape, np.inf)
+            last = np.where(region, 0.0, np.inf)
+            if i < len(stay):
+                later = legs[-1] if legs else np.zeros(penalty.shape)
+                ahead = np.arange(layers) + -(-int(stay[i]) // layer)
+                seed[:, region] = later[np.minimum(ahead, layers - 1)][:, region]
+                last = seed[-1]
+            else:
+                hold[region] = 0.0
+            last = np.where(lasting < np.inf, last, np.inf)
+            field = np.empty(penalty.shape)
+            field[-1] = _field_kernels.cost_to_go(lasting, last)
+            _field_kernels.timed_cost_to_go(price, seed, penalty, hold, field)
+            legs.append(field)
+        return Guide(np.stack(legs[::-1]), cell_m, layer)
+
+    def _way(self, r: int, targets: tuple[int, ...], tour: Sequence[int]) -> np.ndarray:
+        """Return the way from each cell through targets [m], inf if there is none."""
+        robot = self._problem.mission.fleet[r]
+        key = (int(robot["space"]), float(robot["passage"]), targets)
+        if key not in self._known:
+            later = np.zeros(self._price(r, tour).shape)
+            if len(targets) > 1:
+                later = self._way(r, targets[1:], tour)
+            seed = np.where(self._region(targets[:1]), later, np.inf)
+            price = self._cell_m * self._price(r, tour)
+            self._known[key] = _field_kernels.cost_to_go(price, seed)
+        return self._known[key]
+
+    def _price(self, r: int, targets: Sequence[int]) -> np.ndarray:
+        """Return what a metre costs robot r in each cell, inf where it has no room.
+
+        In its targets it has.
+        """
+        robot, n = self._problem.mission.fleet[r], self._coarser
+        distance = self._problem.mission.spaces.distance[robot["space"]]
+        rows, columns = (-(-size // n) for size in distance.shape)
+        padded = np.full((rows * n, columns * n), -np.inf)
+        padded[: distance.shape[0], : distance.shape[1]] = distance
+        nearest = padded.reshape(rows, n, columns, n).max(axis=(1, 3))
+        needed_m = float(robot["passage"])
+        roomy_m = float(robot["radius"] + robot["margin"])
+        lacking = (roomy_m - nearest) / max(roomy_m - needed_m, self._cell_m)
+        free = nearest > needed_m - 0.5 * self._cell_m
+        passable = free | self._region(targets)
+        return np.where(
+            passable, 1.0 + TIGHT_PRICE * np.clip(lacking, 0.0, 1.0), np.inf
+        )
+
+    def _region(self, targets: Sequence[int]) -> np.ndarray:
+        """Return which cells lie in one of some targets, shape (ny, nx)."""
+        mission, n = self._problem.mission, self._coarser
+        shape = [-(-size // n) for size in mission.spaces.distance[0].shape]
+        region = np.zeros(shape, bool)
+        for t in targets:
+            _field_kernels.add_region(
+                mission.targets, t, mission.spaces.x_min, mission.spaces.y_min,
+                self._cell_m, region,
+            )  # fmt: skip
+        return region
+
+
+def inner_m(robot: np.ndarray) -> float:
+    """Return how far a robot reaches from its reference point whatever its heading."""
+    corner = robot["corner"][: robot["corners"]]
+    if not point_in_convex(0.0, 0.0, corner):
+        return 0.0
+    sides = zip(corner, np.roll(corner, -1, axis=0), strict=True)
+    return min(float(point_segment_distance(0.0, 0.0, *a, *b)) for a, b in sides)
