@@ -16,6 +16,9 @@ USABLE, MISSING, CHARGE_TIME, LIMIT = range(4)
 """Columns of robots: energy of a full battery above the reserve, how much of it is
 missing at the start [J], time that recharging takes [s/J], longest time [s]."""
 
+ROUNDING = 1e-12
+"""Share by which sums in another order may differ."""
+
 
 class Legs(NamedTuple):
     """What the routes of a problem are made of.
@@ -26,6 +29,8 @@ class Legs(NamedTuple):
         hop, hop_time: from station to station over any others, shape (R, S, S).
         follower: next station on that way, shape (R, S, S).
         robot: shape (R, 4).
+        metric: whether no way over a station is shorter than the way past it, as on
+            roadmaps, shape (R,).
         energy_weight, makespan_weight: of the objective.
     """
 
@@ -36,6 +41,7 @@ class Legs(NamedTuple):
     hop_time: np.ndarray
     follower: np.ndarray
     robot: np.ndarray
+    metric: np.ndarray
     energy_weight: float
     makespan_weight: float
 
@@ -53,6 +59,7 @@ def new_legs(problem):
         np.zeros((robots, stations, stations)),
         np.zeros((robots, stations, stations)),
         np.zeros((robots, 4)),
+        np.ones(robots, np.bool_),
         problem.energy_weight,
         problem.makespan_weight,
     )
@@ -87,4 +94,10 @@ def new_legs(problem):
                             legs.hop_time[r, s, over] + legs.hop_time[r, over, e]
                         )
                         legs.follower[r, s, e] = legs.follower[r, s, over]
+        for s in range(goals, targets):
+            for a in range(places):
+                for b in range(targets):
+                    way = legs.cost[r, a, s] + legs.cost[r, s, b]
+                    if a != b and way < legs.cost[r, a, b] * (1.0 - ROUNDING):
+                        legs.metric[r] = False
     return legs

@@ -16,16 +16,19 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.planning.routing._legs_kernels import CHARGE_TIME, LIMIT, MISSING, USABLE
+from mrmg.planning.routing._legs_kernels import (
+    CHARGE_TIME,
+    LIMIT,
+    MISSING,
+    ROUNDING,
+    USABLE,
+)
 
 COST, TIME, DRAW, RATE, ORIGIN, STATION = range(6)
 """Columns of labels: energy [J], time [s], energy drawn since the last recharge [J],
 time that recharging that takes [s/J], number of the label it continues, and station
 that is next to that one (-1: none). Of two labels of a node, one is of no use if it is
 no better in any of the first four."""
-
-ROUNDING = 1e-12
-"""Share by which sums in another order may differ."""
 
 MORE_WAYS = 8
 """Labels kept at a place beside one for each station."""
@@ -120,10 +123,9 @@ def towards(table, r, end, a, b):
 def recharge(legs, labels, r, end, place, row):
     """Lead the ways of a row, to a place, on to each station by the cheapest hops."""
     stations = legs.hop.shape[1]
+    left = recharge_cheapest(legs, labels, r, end, place, row)
     usable, rate = legs.robot[r, USABLE], legs.robot[r, CHARGE_TIME]
-    for e in range(stations):
-        labels.fulls[row * stations + e] = 0
-    for f in range(stations):
+    for f in range(stations if left > 0 else 0):
         leg = towards(legs.cost, r, end, place, legs.goals + f)
         time = towards(legs.time, r, end, place, legs.goals + f)
         # Recharged, ways differ in cost and time alone: few are worth leading on.
@@ -143,9 +145,43 @@ def recharge(legs, labels, r, end, place, row):
                 at = row * stations + e
                 for k in range(n):
                     one = labels.arrival[0, k]
+                    if labels.fulls[at] == labels.full.shape[1] == 1:
+                        if labels.full[at, 0, COST] <= one[COST] + hop:
+                            continue
                     new = (one[COST] + hop, one[TIME] + hop_time, 0.0, rate,
                            one[ORIGIN], 1.0 * f)  # fmt: skip
                     labels.fulls[at] = add_label(labels.full, at, labels.fulls[at], new)
+
+
+@kernel
+def recharge_cheapest(legs, labels, r, end, place, row):
+    """Lead the cheapest way to a place on to stations; return how many it leaves out.
+
+    Where time does not count and no way over a station is shorter, nothing is cheaper
+    for the stations that it gets to without recharging.
+    """
+    stations = legs.hop.shape[1]
+    for e in range(stations):
+        labels.fulls[row * stations + e] = 0
+    if labels.full.shape[1] > 1 or not legs.metric[r] or labels.ways[row] == 0:
+        return stations
+    k = 0
+    for other in range(labels.ways[row]):
+        if labels.way[row, other, COST] < labels.way[row, k, COST]:
+            k = other
+    left = stations
+    for e in range(stations):
+        leg = towards(legs.cost, r, end, place, legs.goals + e)
+        drawn = labels.way[row, k, DRAW] + leg
+        if drawn <= legs.robot[r, USABLE] * (1.0 + ROUNDING):
+            late = towards(legs.time, r, end, place, legs.goals + e)
+            late += labels.way[row, k, TIME] + labels.way[row, k, RATE] * drawn
+            rate = legs.robot[r, CHARGE_TIME]
+            new = (labels.way[row, k, COST] + leg, late, 0.0, rate, 1.0 * k, 1.0 * e)
+            at = row * stations + e
+            labels.fulls[at] = add_label(labels.full, at, 0, new)
+            left -= 1
+    return left
 
 
 @kernel
@@ -249,8 +285,12 @@ def value_with(legs, labels, r, before, goal, behind, longest, ceiling):
     stations = legs.hop.shape[1]
     row, place = before
     best = least = np.inf
-    for k in range(labels.ways[behind[0]]):
-        least = min(least, labels.way[behind[0], k, COST])
+    for s in range(-1, stations):
+        b = behind[1] if s < 0 else legs.goals + s
+        label = labels.way if s < 0 else labels.full
+        at = behind[0] if s < 0 else behind[0] * stations + s
+        for k in range(labels.ways[at] if s < 0 else labels.fulls[at]):
+            least = min(least, legs.cost[r, goal, b] + label[at, k, COST])
     for f in range(-1, stations):
         a = place if f < 0 else legs.goals + f
         leg, time = legs.cost[r, a, goal], legs.time[r, a, goal]
