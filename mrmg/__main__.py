@@ -15,20 +15,21 @@ def command() -> None:
         signal.signal(signal.SIGINT, lambda number, frame: os._exit(130))
     from mrmg import interruption
 
-    interruption.install()
     try:
+        interruption.install()
         from mrmg.cli.main import main
 
         code = main()
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # what is left takes no time
+        if interruption.is_pending():
+            interruption.end(reported=code == interruption.EXIT_CODE)
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError):
+                stream.flush()
     except BaseException:
         if interruption.is_pending():
             interruption.end()  # whatever became of the interrupt on its way
         raise
-    if interruption.is_pending():
-        interruption.end(reported=code == interruption.EXIT_CODE)
-    for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError):
-            stream.flush()
     # All is written. To take Python apart would be another tenth of a second, in which
     # Ctrl-C could not be answered.
     os._exit(code)

@@ -8,6 +8,7 @@ it. A second thread, which the system wakes at once, therefore gives the main th
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import sys
@@ -113,6 +114,8 @@ def sheltered_children() -> Iterator[None]:
     if sys.platform == "win32":  # has no such masks
         yield
         return
+    # The first lock starts Python's resource tracker, which lifts such masks.
+    multiprocessing.get_context("spawn").Lock()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield

@@ -7,6 +7,7 @@ import io
 import json
 import math
 import os
+import shutil
 import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -32,13 +33,26 @@ MAX_UNPACKED_RATIO = 100
 """A packed file that is larger unpacked than both of these allow is not unpacked."""
 
 
+UNFINISHED = ".part-"
+"""Begins the name of what is not yet in its place."""
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Remove what a kill left of files, and of folders, that were made in a folder."""
+    for leftover in folder.glob(f"{UNFINISHED}*"):
+        if leftover.is_dir():
+            shutil.rmtree(leftover, ignore_errors=True)
+        else:
+            leftover.unlink(missing_ok=True)
+
+
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
     """Yield a temporary path; rename it onto `path` when all went well."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with _errors_about(path):
         handle, name = tempfile.mkstemp(
-            dir=path.parent, prefix=".part-", suffix=f"-{path.name}"
+            dir=path.parent, prefix=UNFINISHED, suffix=f"-{path.name}"
         )
     os.close(handle)
     temporary = Path(name)

@@ -34,9 +34,6 @@ TRIALS_FOLDER = "trials"
 EXPORT_FOLDER = "export"
 """Where exports of the mission lie; they go with the drive that they show."""
 
-UNFINISHED = ".part-"
-"""Begins the name of what is not yet in its place."""
-
 
 class Step(StrEnum):
     """The steps of a run, in their order."""
@@ -130,7 +127,7 @@ class RunFolder:
 
     def unfinished(self, name: str) -> Path:
         """Return where a large file may grow before it is put in its place."""
-        return self.path / f"{UNFINISHED}{name}"
+        return self.path / f"{storage.UNFINISHED}{name}"
 
     @contextmanager
     def opened_for_writing(self) -> Iterator[RunFolder]:
@@ -309,17 +306,15 @@ def opened_folder(
 
 
 def _remove_unfinished(path: Path, places: Collection[str]) -> None:
-    for place in (".", *places):
-        for leftover in path.glob(f"{place}/{UNFINISHED}*"):
-            if leftover.is_dir():
-                shutil.rmtree(leftover, ignore_errors=True)
-            else:
-                leftover.unlink(missing_ok=True)
+    storage.remove_unfinished(path)
+    for place in places:
+        for folder in path.glob(place):
+            storage.remove_unfinished(folder)
 
 
 def _refuse_foreign_files(path: Path, marker: str, kind: str) -> None:
     names = sorted(item.name for item in path.iterdir())
-    foreign = [name for name in names if not name.startswith(UNFINISHED)]
+    foreign = [name for name in names if not name.startswith(storage.UNFINISHED)]
     if foreign and marker not in names:
         raise UsageError(
             f"{path} is not a {kind} folder (it holds {foreign[0]!r} and no {marker}); "

@@ -14,6 +14,7 @@ from mrmg.errors import Fault, FileError, UsageError
 from mrmg.plans import Plan
 from mrmg.runs.arguments import RunArguments, recorded
 from mrmg.runs.capsule import CAPSULE_FILE, Capsule, Failure
+from mrmg.runs.drive import checked_drive
 from mrmg.runs.folder import RunFolder, Step
 from mrmg.runs.replacing import require_room
 from mrmg.runs.steps import StepProgress, taken_up
@@ -122,7 +123,7 @@ def reproduce(
     """
     capsule = Capsule.load(path)
     arguments = _arguments(capsule, path)
-    _require_usable(capsule, path, trust_code)
+    _require_usable(capsule, path, arguments, trust_code)
     folder = RunFolder(out)
     with folder.opened_for_writing():
         repeated = capsule.lies_in(out) and recorded(folder) == arguments
@@ -150,15 +151,20 @@ def reproduce(
     return Reproduction(before=capsule.failure, after=after)
 
 
-def _require_usable(capsule: Capsule, path: Path, trust_code: bool) -> None:
-    """Refuse a capsule whose scene or plan cannot be read, before there is a folder."""
+def _require_usable(
+    capsule: Capsule, path: Path, arguments: RunArguments, trust_code: bool
+) -> None:
+    """Refuse a capsule that cannot be driven from, before there is a folder."""
     with tempfile.TemporaryDirectory(prefix="mrmg-") as place:
         capsule.unpack(Path(place))
         try:
             scene = load_scene(Path(place) / "scene.yaml", trust_code=trust_code)
             require_same_mission(scene, Plan.load(Path(place)))
+            checked_drive(scene, arguments)
         except FileError as error:
             raise FileError(str(path), error.faults) from error
+        except UsageError as error:
+            raise FileError(str(path), [Fault("capsule.json", str(error))]) from error
 
 
 def _arguments(capsule: Capsule, path: Path) -> RunArguments:

@@ -44,6 +44,18 @@ def test_a_failed_run_leaves_a_capsule(failed: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("change", [{"controller": "nobody"}, {"faults": ["r1"]}])
+def test_a_capsule_that_nothing_can_be_driven_from_leaves_no_folder(
+    failed: Path, tmp_path: Path, change: dict[str, object]
+) -> None:
+    capsule = Capsule.load(failed / CAPSULE_FILE)
+    altered = replace(capsule, arguments={**capsule.arguments, **change})
+    altered.save(tmp_path / CAPSULE_FILE)
+    with pytest.raises(FileError, match="capsule.json: .*(allowed|expected)"):
+        reproduce(tmp_path / CAPSULE_FILE, tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
 def capsule_ticks(capsule: Capsule) -> int:
     return len(capsule.failure.last["time_s"])
 

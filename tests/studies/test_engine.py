@@ -109,3 +109,24 @@ def test_workers_end_with_the_command_whenever_it_is_killed() -> None:
     parent.kill()
     assert parent.stdout.read() == ""
     parent.wait()
+
+
+INTERRUPTS_HELD_BACK = """
+import signal
+from mrmg.studies.engine import Engine
+
+def held_back(_, item):
+    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+found = Engine(workers=2).results(held_back, [((), 1), ((), 2)])
+print(sorted(found))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such masks")
+def test_an_interrupt_does_not_reach_workers_while_they_start() -> None:
+    """In a fresh process, where Python's resource tracker does not run yet."""
+    done = subprocess.run(
+        [sys.executable, "-c", INTERRUPTS_HELD_BACK], capture_output=True, text=True
+    )
+    assert done.stdout == "[(0, True), (1, True)]\n", done.stderr

@@ -145,9 +145,9 @@ def recharge(legs, labels, r, end, place, row):
                 at = row * stations + e
                 for k in range(n):
                     one = labels.arrival[0, k]
-                    if labels.fulls[at] == labels.full.shape[1] == 1:
-                        if labels.full[at, 0, COST] <= one[COST] + hop:
-                            continue
+                    lone = labels.fulls[at] == labels.full.shape[1] == 1
+                    if lone and labels.full[at, 0, COST] <= one[COST] + hop:
+                        continue
                     new = (one[COST] + hop, one[TIME] + hop_time, 0.0, rate,
                            one[ORIGIN], 1.0 * f)  # fmt: skip
                     labels.fulls[at] = add_label(labels.full, at, labels.fulls[at], new)

@@ -13,7 +13,7 @@ from typing import Any
 from mrmg import storage
 from mrmg.extras import import_extra
 from mrmg.report.campaign_page import campaign_html
-from mrmg.runs.folder import UNFINISHED, opened_folder
+from mrmg.runs.folder import opened_folder
 from mrmg.studies.campaigns.figures import campaign_figures, table_row, times_row
 from mrmg.studies.campaigns.reading import Campaign
 from mrmg.studies.campaigns.trial import ERROR, make_trial
@@ -132,7 +132,7 @@ def _digest(content: Mapping[str, Any]) -> str:
 def _write_run(folder: Path, files: Mapping[str, bytes]) -> None:
     """Put a run folder in its place as a whole."""
     folder.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = Path(tempfile.mkdtemp(dir=folder.parent, prefix=UNFINISHED))
+    unfinished = Path(tempfile.mkdtemp(dir=folder.parent, prefix=storage.UNFINISHED))
     for name, content in files.items():
         storage.write_bytes(unfinished / name, content)
     shutil.rmtree(folder, ignore_errors=True)

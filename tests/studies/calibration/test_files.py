@@ -36,7 +36,10 @@ def test_the_copy_is_a_model_with_the_new_values(
 ) -> None:
     before = (model_folder / "robot.yaml").read_text()
     out = tmp_path / "out"
+    out.mkdir()
+    (out / ".part-killed-calibration.png").write_bytes(b"half")
     write_calibration(calibration, model_folder, out, in_place=False)
+    assert not list(out.glob(".part-*"))
     found, _ = load_model(out)
     assert found.rolling_coefficient == pytest.approx(0.05, rel=1e-3)
     assert found.turning_coefficient == pytest.approx(0.02, rel=1e-3)
