@@ -7,13 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
+from mrmg.planning.routing._insertion_kernels import value_with
 from mrmg.planning.routing._pool_kernels import pool_route
 from mrmg.planning.routing._random_kernels import random_unit
 from mrmg.planning.routing._refuel_kernels import (
     label_route,
     route_value,
     row_of,
-    value_with,
 )
 
 IMPOSSIBLE = 1e12

@@ -103,7 +103,7 @@ def timed_cost_to_go(price, seed, penalty, hold, field):
 
 
 @kernel
-def add_others(own, traffic, inner, x_min, y_min, cell, layer, soft_s, penalty):
+def add_others(own, traffic, inner, grid, layer, soft_s, penalty):
     """Add to penalties where the other robots are in each layer of time.
 
     Where the robot cannot be whatever its heading, penalties are inf; of robots of
@@ -113,13 +113,13 @@ def add_others(own, traffic, inner, x_min, y_min, cell, layer, soft_s, penalty):
         own: the robot, shape (1,).
         traffic: the others.
         inner: radius of the circle around its reference point in its footprint [m].
-        x_min, y_min: corner of the grid [m].
-        cell: side of its cells [m].
+        grid: corner (x, y) of the grid and side of its cells [m].
         layer: steps that a layer lasts.
         soft_s: cost of a layer in conflict with a robot of lower priority.
         penalty: of cells, shape (T, ny, nx).
     """
     rows, columns = penalty.shape[1], penalty.shape[2]
+    x_min, y_min, cell = grid
     corner = np.empty((MOST_CORNERS, 2))
     for other in range(len(traffic.last)):
         if not (traffic.hard[other] or traffic.soft[other]):

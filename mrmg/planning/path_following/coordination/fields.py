@@ -77,10 +77,16 @@ class Fields:
             return None
         hold_share, soft_share = costs
         penalty = np.zeros((layers, *price.shape))
+        grid = float(mission.spaces.x_min), float(mission.spaces.y_min), cell_m
         _field_kernels.add_others(
-            own, traffic, inner_m(own[0]), mission.spaces.x_min, mission.spaces.y_min,
-            cell_m, layer, soft_share * layer * dt_s, penalty,
-        )  # fmt: skip
+            own,
+            traffic,
+            inner_m(own[0]),
+            grid,
+            layer,
+            soft_share * layer * dt_s,
+            penalty,
+        )
         lasting = np.where(penalty[-1] < np.inf, price, np.inf)
         legs: list[np.ndarray] = []
         for i in range(len(targets) - 1, -1, -1):
