@@ -14,11 +14,13 @@ from collections.abc import Callable, Sequence
 from mrmg.compilation.cache import PACKAGE, compiled_kernels
 
 _CALL = (
+    "from mrmg.interruption import end_with_parent; end_with_parent({}); "
     "import gc, importlib; gc.set_threshold(50_000, 20, 100); "
     "getattr(importlib.import_module({!r}), {!r})()"
 )
-"""To compile is to make a million small objects that all remain: to look through them
-for garbage as often as Python usually does takes a tenth of the time."""
+"""Ends with whoever waits for it. To compile is to make a million small objects that
+all remain: to look through them for garbage as often as Python usually does takes a
+tenth of the time."""
 
 _SETTINGS = {
     "NUMBA_OPT": "1",
@@ -54,7 +56,8 @@ def compile_in_processes(
     """
     path = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
     environment = {**_SETTINGS, **os.environ, "PYTHONPATH": path.rstrip(os.pathsep)}
-    waiting = [_CALL.format(call.__module__, call.__name__) for call in calls]
+    own = os.getpid()
+    waiting = [_CALL.format(own, call.__module__, call.__name__) for call in calls]
     running: list[subprocess.Popen[bytes]] = []
     try:
         while waiting or running:
