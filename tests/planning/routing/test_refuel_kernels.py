@@ -8,13 +8,13 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from mrmg.planning.routing._insertion_kernels import value_with
 from mrmg.planning.routing._legs_kernels import new_legs
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing._refuel_kernels import (
     label_route,
     new_labels,
     row_of,
-    value_with,
     write_tour,
 )
 from mrmg.planning.routing.routing import routing_arrays
@@ -46,8 +46,11 @@ def test_stations_are_placed_as_enumeration_would(
     stations: int,
 ) -> None:
     outcomes = []
-    for seed in range(25):
+    for seed in range(40):
         problem = mission(seed, goals=goals, stations=stations, range_m=(50.0, 120.0))
+        if seed >= 25:  # ways over stations may be shorter
+            factor = np.random.default_rng(seed).uniform(0.3, 1.5, problem.cost.shape)
+            problem = problem._replace(cost=problem.cost * factor)
         route = tuple(range(goals))
         exact = min(
             (
