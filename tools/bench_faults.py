@@ -16,9 +16,9 @@ Rows, each PASS or FAIL; the exit code is 1 if any fails:
   climb, and code, which runs with --trust-code alone;
 - long: missions in one process, whose memory and file handles are read.
 
---only selects rows. Everything that is drawn is drawn by --seed. With --output FILE the
-same command goes on after an interruption. --keep DIR keeps files that something failed
-on.
+--only selects rows; --files, --plans, --kills and --missions take other numbers.
+Everything that is drawn is drawn by --seed. With --output FILE the same command goes on
+after an interruption. --keep DIR keeps files that something failed on.
 
 Rows of --json: `row` (`files: scenes`), `required`, `cases`, `failed`, `holds`,
 `failures` (`case`, `fault`; up to 50), `took_s`, and figures of some rows: of files
