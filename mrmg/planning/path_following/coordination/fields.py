@@ -20,8 +20,7 @@ MOST_CELLS = 60_000
 
 MOST_TIMED_CELLS = 3_000_000
 """Cells of fields that know where the other robots are when, over all layers and legs,
-at most: more take longer than they save."""
-
+at most: it bounds their time and memory."""
 
 NO_GUIDE = Guide(np.zeros((1, 1, 1, 1)), 1e9, 1 << 30)
 """Costs-to-go of those who do without."""
@@ -38,13 +37,12 @@ class Fields:
         cells = spaces.distance[0].size
         self._coarser = max(1, round((cells / MOST_CELLS) ** 0.5))
         self._cell_m = float(spaces.cell * self._coarser)
+        self._shape = [-(-n // self._coarser) for n in spaces.distance[0].shape]
 
     def static(self, r: int, targets: Sequence[int]) -> Guide:
         """Return robot r's costs-to-go among obstacles alone."""
         top = float(self._problem.mission.fleet["limit"][r, 1])
-        legs = [
-            self._way(r, tuple(targets[i:]), targets) / top for i in range(len(targets))
-        ]
+        legs = [self._way(r, tuple(targets[i:])) / top for i in range(len(targets))]
         if not legs:
             return NO_GUIDE
         return Guide(np.stack(legs)[:, None], self._cell_m, 1 << 30)
@@ -57,7 +55,7 @@ class Fields:
         traffic: Traffic,
         costs: tuple[float, float],
     ) -> Guide | None:
-        """Return robot r's costs-to-go among the other robots; None if they are many.
+        """Return robot r's costs-to-go among the others; None for too many cells.
 
         Args:
             r: robot.
@@ -72,9 +70,10 @@ class Fields:
         top = float(own[0]["limit"][1])
         layer = max(1, int(cell_m / (top * dt_s)))
         layers = -(-traffic.end // layer) + 1
-        price = self._price(r, targets) * cell_m / top
-        if not 0 < len(targets) * layers * price.size <= MOST_TIMED_CELLS:
+        cells = len(targets) * layers * self._shape[0] * self._shape[1]
+        if not 0 < cells <= MOST_TIMED_CELLS:
             return None
+        price = self._price(r, targets) * cell_m / top
         hold_share, soft_share = costs
         penalty = np.zeros((layers, *price.shape))
         grid = float(mission.spaces.x_min), float(mission.spaces.y_min), cell_m
@@ -108,16 +107,14 @@ class Fields:
             legs.append(field)
         return Guide(np.stack(legs[::-1]), cell_m, layer)
 
-    def _way(self, r: int, targets: tuple[int, ...], tour: Sequence[int]) -> np.ndarray:
+    def _way(self, r: int, targets: tuple[int, ...]) -> np.ndarray:
         """Return the way from each cell through targets [m], inf if there is none."""
         robot = self._problem.mission.fleet[r]
         key = (int(robot["space"]), float(robot["passage"]), targets)
         if key not in self._known:
-            later = np.zeros(self._price(r, tour).shape)
-            if len(targets) > 1:
-                later = self._way(r, targets[1:], tour)
+            later = self._way(r, targets[1:]) if targets[1:] else np.zeros(self._shape)
             seed = np.where(self._region(targets[:1]), later, np.inf)
-            price = self._cell_m * self._price(r, tour)
+            price = self._cell_m * self._price(r, targets)
             self._known[key] = _field_kernels.cost_to_go(price, seed)
         return self._known[key]
 
@@ -128,7 +125,7 @@ class Fields:
         """
         robot, n = self._problem.mission.fleet[r], self._coarser
         distance = self._problem.mission.spaces.distance[robot["space"]]
-        rows, columns = (-(-size // n) for size in distance.shape)
+        rows, columns = self._shape
         padded = np.full((rows * n, columns * n), -np.inf)
         padded[: distance.shape[0], : distance.shape[1]] = distance
         nearest = padded.reshape(rows, n, columns, n).max(axis=(1, 3))
@@ -143,9 +140,7 @@ class Fields:
 
     def _region(self, targets: Sequence[int]) -> np.ndarray:
         """Return which cells lie in one of some targets, shape (ny, nx)."""
-        mission, n = self._problem.mission, self._coarser
-        shape = [-(-size // n) for size in mission.spaces.distance[0].shape]
-        region = np.zeros(shape, bool)
+        mission, region = self._problem.mission, np.zeros(self._shape, bool)
         for t in targets:
             _field_kernels.add_region(
                 mission.targets, t, mission.spaces.x_min, mission.spaces.y_min,
