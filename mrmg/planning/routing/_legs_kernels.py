@@ -29,7 +29,7 @@ class Legs(NamedTuple):
         hop, hop_time: from station to station over any others, shape (R, S, S).
         follower: next station on that way, shape (R, S, S).
         robot: shape (R, 4).
-        metric: whether no way over a station is shorter than the way past it, as on
+        metric: whether no way to or from a station is shorter over another one, as on
             roadmaps, shape (R,).
         energy_weight, makespan_weight: of the objective.
     """
@@ -95,9 +95,12 @@ def new_legs(problem):
                         )
                         legs.follower[r, s, e] = legs.follower[r, s, over]
         for s in range(goals, targets):
-            for a in range(places):
-                for b in range(targets):
-                    way = legs.cost[r, a, s] + legs.cost[r, s, b]
-                    if a != b and way < legs.cost[r, a, b] * (1.0 - ROUNDING):
+            for e in range(goals, targets):
+                for a in range(places):
+                    there = legs.cost[r, a, s] + legs.cost[r, s, e]
+                    back = legs.cost[r, e, s] + legs.cost[r, s, a]
+                    shorter = there < legs.cost[r, a, e] * (1.0 - ROUNDING)
+                    shorter |= back < legs.cost[r, e, a] * (1.0 - ROUNDING)
+                    if a != e and shorter:
                         legs.metric[r] = False
     return legs
