@@ -23,7 +23,8 @@ after an interruption. --keep DIR keeps files that something failed on.
 Rows of --json: `row` (`files: scenes`), `required`, `cases`, `failed`, `holds`,
 `failures` (`case`, `fault`; up to 50), `took_s`, and figures of some rows: of files
 `codes` (commands by exit code), `cpu_s` and `peak_bytes` of the worst command; of plans
-the `rules` that must catch them; of the long run `bytes_a_mission`, `memory_bytes` and
+the `rules` that must catch them; of the long run `bytes_a_mission`, `memory_bytes`
+(every twenty missions, free memory given back; before it `untrimmed_bytes`) and
 `handles` (first, last).
 """
 
