@@ -227,9 +227,18 @@ def _add_scene(verbs: _Verbs) -> None:  # type: ignore[type-arg]
 
     schema = acts.add_parser("schema", help="print the JSON Schema of scene files")
     kinds = schema.add_mutually_exclusive_group()
-    for kind, what in (("robot", "robot.yaml"), ("campaign", "campaign files")):
+    for kind, what in (
+        ("robot", "robot.yaml"),
+        ("campaign", "campaign files"),
+        ("summary", "summary.json"),
+    ):
         kinds.add_argument(
-            f"--{kind}", action="store_true", help=f"print that of {what} instead"
+            f"--{kind}",
+            action="store_const",
+            dest="kind",
+            const=kind,
+            default="scene",
+            help=f"print that of {what} instead",
         )
     schema.set_defaults(command=scene_commands.schema)
 

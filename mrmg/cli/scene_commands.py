@@ -151,13 +151,18 @@ def roadmap(options: argparse.Namespace) -> int:
 
 
 def schema(options: argparse.Namespace) -> int:
-    """Print the JSON Schema of scene files, robot models or campaign files."""
+    """Print the JSON Schema of scenes, robot models, campaigns or summaries."""
+    from mrmg.runs.summary_model import summary_schema
     from mrmg.scene.loading import robot_schema, scene_schema
     from mrmg.studies.campaigns.schema import campaign_schema
 
-    found = robot_schema if options.robot else scene_schema
-    made = campaign_schema if options.campaign else found
-    print(json.dumps(made(), indent=2))
+    made = {
+        "scene": scene_schema,
+        "robot": robot_schema,
+        "campaign": campaign_schema,
+        "summary": summary_schema,
+    }
+    print(json.dumps(made[options.kind](), indent=2))
     return ExitCode.OK
 
 

@@ -1,14 +1,10 @@
-"""The figures of a run on one page, for people and machines.
-
-`summary.schema.json` beside this module documents every key; a test holds them equal.
-"""
+"""The figures of a run on one page, for people and machines."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import asdict
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +13,11 @@ from mrmg import storage
 from mrmg.energy.audit_record import ENERGY_IMBALANCE, MODEL_MISMATCH, EnergyAudit
 from mrmg.errors import Fault, RunFolderError
 from mrmg.plans import Plan, PlanStatus
+from mrmg.runs.summary_model import Summary
 from mrmg.scene.margins import sentences_on_margins
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, log_in_force, require_same_mission
 from mrmg.verification.verdict import Verdict
-
-
-def summary_schema() -> dict[str, Any]:
-    """Return the JSON Schema of `summary.json`."""
-    return dict(
-        storage.read_json(Path(str(files(__package__) / "summary.schema.json")))
-    )
 
 
 def summarize(scene: Scene, folder: Path) -> dict[str, Any]:
@@ -82,7 +72,7 @@ def summary_of(
         log: None if the plan was not executed.
         audit: None if the execution was not audited.
     """
-    return {
+    figures = {
         "status": _status(audit) or planning["status"],
         "mission_ok": bool(verdict and verdict.ok and audit and audit.mission_ok),
         "scene": scene.name,
@@ -105,6 +95,7 @@ def summary_of(
             **(log.versions if log else {}),
         },
     }
+    return Summary.model_validate(figures).model_dump(exclude_unset=True)
 
 
 def _status(audit: EnergyAudit | None) -> str:

@@ -15,7 +15,7 @@ from mrmg.plans import Plan, plan_in_force
 from mrmg.report.compare import compare_runs
 from mrmg.runs import pipeline
 from mrmg.runs.arguments import RunArguments
-from mrmg.runs.summary import summary_schema
+from mrmg.runs.summary_model import summary_schema
 from mrmg.scene.loading import scene_from_document
 from mrmg.simulation.log import ExecutionLog
 from mrmg.viz.figure import draw_figure

@@ -14,7 +14,7 @@ import pytest
 from mrmg import storage
 from mrmg.cli import main
 from mrmg.errors import ExitCode
-from mrmg.runs.summary import summary_schema
+from mrmg.runs.summary_model import summary_schema
 from mrmg.scene.loading import load_scene
 from mrmg.scene.objective import Objective
 

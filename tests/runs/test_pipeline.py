@@ -12,7 +12,7 @@ from mrmg.runs import pipeline
 from mrmg.runs.arguments import RunArguments, VideoArguments
 from mrmg.runs.folder import OUTPUTS, RunFolder, Step
 from mrmg.runs.steps import taken_up
-from mrmg.runs.summary import summary_schema
+from mrmg.runs.summary_model import summary_schema
 from mrmg.scene.loading import load_scene
 
 MADE_WITHOUT_VIDEO = [step for step in Step if step is not Step.RENDER]

@@ -14,7 +14,8 @@ from mrmg.energy.audit import audit
 from mrmg.errors import RunFolderError
 from mrmg.planning.statistics import Bounds, Improvement
 from mrmg.plans import PlanStatus
-from mrmg.runs.summary import summarize, summary_of, summary_schema
+from mrmg.runs.summary import summarize, summary_of
+from mrmg.runs.summary_model import summary_schema
 from mrmg.simulation.disturbance import DEFAULT_RANGES
 from mrmg.verification.verify import verify
 
@@ -113,11 +114,10 @@ def check(summary: dict[str, Any]) -> None:
 def test_schema_is_a_schema_and_describes_every_key() -> None:
     schema = summary_schema()
     jsonschema.Draft202012Validator.check_schema(schema)
-    nodes = [schema]
-    while nodes:
-        node = nodes.pop()
-        assert len(node["description"]) > 5
-        nodes += node.get("properties", {}).values()
+    sections = [schema, *schema["$defs"].values()]
+    assert all(len(section["description"]) > 5 for section in sections)
+    keys = [key for section in sections for key in section["properties"].values()]
+    assert all("$ref" in key or len(key["description"]) > 5 for key in keys)
 
 
 def test_whole_run_has_exactly_the_promised_keys(parts: Any) -> None:

@@ -14,7 +14,7 @@ import yaml
 from mrmg.cli.parser import make_parser
 from mrmg.errors import ExitCode
 from mrmg.runs.folder import OUTPUTS
-from mrmg.runs.summary import summary_schema
+from mrmg.runs.summary_model import summary_schema
 from mrmg.scene.loading import scene_from_document
 
 ROOT = Path(__file__).parents[2]

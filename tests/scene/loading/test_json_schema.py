@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from mrmg import shipped
 from mrmg.cli import main
 from mrmg.errors import SceneError
+from mrmg.runs import summary_model
 from mrmg.scene.loading import robot_schema, scene_from_document, scene_schema
 from mrmg.scene.loading.models import ModelDocument
 from mrmg.scene.loading.schema import SceneDocument
@@ -51,12 +52,13 @@ def test_shipped_files_follow_the_schema_that_they_name(path: Path) -> None:
     [
         ([], shipped.scene_schema_file()),
         (["--robot"], shipped.robot_schema_file()),
+        (["--summary"], Path(summary_model.__file__).with_name("summary.schema.json")),
     ],
 )
 def test_the_shipped_schemas_are_those_that_are_printed(
     words: list[str], file: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """After a change of the format: mrmg scene schema [--robot] > FILE."""
+    """After a change of the format: mrmg scene schema [--robot|--summary] > FILE."""
     assert main(["scene", "schema", *words]) == 0
     assert file.read_text() == capsys.readouterr().out
 
