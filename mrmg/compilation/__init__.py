@@ -10,10 +10,8 @@ from mrmg.compilation.cache import (
 from mrmg.compilation.clock import now_ns
 from mrmg.compilation.decorators import kernel
 from mrmg.compilation.parallel import compile_in_processes
-from mrmg.compilation.references import by_reference
 
 __all__ = [
-    "by_reference",
     "cache_folder",
     "compile_in_processes",
     "compiled_kernels",

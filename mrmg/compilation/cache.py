@@ -2,8 +2,10 @@
 
 numba's cache does not notice edits in other files: a cached caller keeps the old
 callee. Kernels are therefore kept in a folder named after a digest of everything that
-compiled code depends on. numba is told of that folder only while it looks for the place
-of a kernel's cache, so that nobody else's functions are kept there.
+compiled code depends on. Copies of the sources lie in it, and kernels are compiled as
+if they had been read from there: numba keeps what it compiles beside the source or,
+where `NUMBA_CACHE_DIR` is set, in a folder there that is named after the source's. So
+no setting of numba is changed.
 """
 
 from __future__ import annotations
@@ -13,11 +15,11 @@ import json
 import os
 import platform
 import shutil
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
+from types import FunctionType
+from typing import Any
 
 import numba
 from llvmlite import binding
@@ -31,13 +33,12 @@ _SOURCES = (
     "compilation/*.py",
     "energy/model.py",
     "motion/dynamics.py",
+    "planning/problem/problem.py",  # named tuples that kernels take
     "**/*_kernels.py",
 )
 
-_LOCK = threading.Lock()
-"""Held while numba's setting is another."""
 
-
+@cache
 def kernel_sources() -> list[Path]:
     """Return every source file whose code is compiled into a kernel."""
     return sorted({path for name in _SOURCES for path in PACKAGE.glob(name)})
@@ -77,7 +78,7 @@ def compilation_digest() -> str:
 
 @cache
 def cache_folder() -> Path:
-    """Return the folder of this machine's compiled kernels: numba's, if one is set.
+    """Return the folder of this machine's kernels: below numba's, if one is set.
 
     Where a crash or a full disk cut off kernels, all are given up, as numba cannot read
     what is left of them.
@@ -85,51 +86,63 @@ def cache_folder() -> Path:
     own = storage.user_cache_folder() / "kernels"
     folder = Path(numba.config.CACHE_DIR or own) / compilation_digest()
     if any(map(_is_cut_off, folder.glob("complete-*"))):
-        shutil.rmtree(folder, ignore_errors=True)
+        for kept in _folders(folder):
+            shutil.rmtree(kept, ignore_errors=True)
     return folder
+
+
+def _folders(folder: Path) -> Iterator[Path]:
+    """Return the folder of kernels, and where numba keeps them if it has a folder."""
+    return folder.parent.glob(f"{folder.name}*")
 
 
 def _is_cut_off(complete: Path) -> bool:
     """Return whether a file that was there with all kernels of a part is cut off."""
+    root = complete.parents[1]
     try:
         sizes = json.loads(complete.read_text())
-        return any(
-            (complete.parent / name).stat().st_size < size
-            for name, size in sizes.items()
-        )
+        return any((root / name).stat().st_size < size for name, size in sizes.items())
     except (OSError, ValueError):
         return True
 
 
-@contextmanager
-def cache_setting() -> Iterator[bool]:
-    """Have numba keep what is decorated meanwhile in the folder of kernels.
+def to_be_kept(function: Callable[..., Any]) -> Callable[..., Any] | None:
+    """Return a kernel whose source lies in the folder of kernels, if that can be.
 
-    Yields:
-        whether that folder can be written to; kernels are not kept elsewhere.
+    Args:
+        function: a kernel; those that are no part of this package are not kept.
     """
-    folder = cache_folder()
-    with _LOCK:
-        before = numba.config.CACHE_DIR
-        numba.config.CACHE_DIR = str(folder)
-        try:
-            yield _is_writable(folder)
-        finally:
-            numba.config.CACHE_DIR = before
-
-
-@cache
-def _is_writable(folder: Path) -> bool:
+    source = Path(function.__code__.co_filename).resolve()
+    if source not in kernel_sources():
+        return None
+    copy = cache_folder() / ".".join(source.relative_to(PACKAGE).parts)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        if not copy.exists():
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            written = copy.with_suffix(f".{os.getpid()}")
+            shutil.copy2(source, written)  # with its date: some numba go by that
+            written.replace(copy)
     except OSError:
-        return False
-    return os.access(folder, os.W_OK)
+        return None
+    code = function.__code__.replace(co_filename=str(copy))
+    return FunctionType(
+        code,
+        function.__globals__,
+        function.__name__,
+        function.__defaults__,
+        function.__closure__,
+    )
+
+
+def _kernels() -> Iterator[Path]:
+    """Return the files of compiled kernels and of their index."""
+    for folder in _folders(cache_folder()):
+        yield from folder.rglob("*.nb?")
 
 
 def compiled_kernels() -> int:
     """Return how many kernels this machine holds compiled."""
-    return sum(1 for _ in cache_folder().rglob("*.nbc"))
+    return sum(path.suffix == ".nbc" for path in _kernels())
 
 
 def kernels_are_compiled(part: str) -> bool:
@@ -140,10 +153,9 @@ def kernels_are_compiled(part: str) -> bool:
 def note_kernels_are_compiled(part: str) -> None:
     """Have the next process know that this machine holds all kernels of a part."""
     if not kernels_are_compiled(part):
-        folder = cache_folder()
+        root = cache_folder().parent
         sizes = {
-            str(path.relative_to(folder)): path.stat().st_size
-            for path in folder.rglob("*.nb?")
+            str(path.relative_to(root)): path.stat().st_size for path in _kernels()
         }
         storage.write_text(_complete(part), json.dumps(sizes))
 

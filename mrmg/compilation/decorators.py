@@ -1,4 +1,8 @@
-"""The decorator of kernels."""
+"""The decorator of kernels.
+
+Kernels copy arrays element by element: with a slice that an array is assigned to, numba
+compiles its message about shapes that do not fit, which takes 2.5 s of processor time.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +13,12 @@ from typing import Any, TypeVar
 import numba
 from numba.extending import overload
 
-from mrmg.compilation.cache import cache_setting
+from mrmg.compilation.cache import to_be_kept
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_OPTIONS = {"error_model": "numpy"}
+_OPTIONS = {"error_model": "numpy", "no_cfunc_wrapper": True}
+"""Kernels are never handed on as values, which is what the C wrapper is for."""
 
 
 class Kernel:
@@ -38,8 +43,9 @@ class Kernel:
     @functools.cached_property
     def for_python(self) -> Any:
         """Return the function as Python calls it, kept in the cache."""
-        with cache_setting() as cached:
-            return numba.njit(cache=cached, nogil=True, **_OPTIONS)(self.py_func)
+        kept = to_be_kept(self.py_func)
+        options = {"cache": kept is not None, "nogil": True, **_OPTIONS}
+        return numba.njit(**options)(kept or self.py_func)
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the function from Python."""

@@ -2,7 +2,8 @@
 
 A compiled function that is an argument would be a type of its own, and every kernel
 above it would be compiled anew for each user's model. An address is a number: kernels
-stay as they are cached, whatever it points to.
+stay as they are cached, whatever it points to. numba documents intrinsics as the way to
+llvmlite's builder; the type of what lies at the address is one of llvmlite's own.
 """
 
 from __future__ import annotations

@@ -138,7 +138,7 @@ def _addresses(motion: UserMotion, limits: tuple[float, ...]) -> tuple[int, int]
     ):
         try:
             compiled = numba.cfunc(signature)(function)
-        except numba.core.errors.NumbaError as error:
+        except Exception as error:  # of numba, or of what it meets in a user's file
             reason = " ".join(str(error).split())
             message = f"cannot be compiled by numba: {reason[:400]}"
             raise SceneError(motion.source, [Fault(name, message)]) from error

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_reference, kernel
+from mrmg.compilation import kernel
 
 
 class FreeSpace(NamedTuple):
@@ -58,7 +58,6 @@ UNIFORM_TURNING = np.ones((1, 1))
 """The multipliers of turning where all terrain resists it alike."""
 
 
-@by_reference
 class TerrainGrid(NamedTuple):
     """What the ground costs.
 

@@ -102,7 +102,8 @@ def edge_distance_field(edge, x_min, y_min, cell, rows, columns):
     near = np.empty((levels + 1, len(edge)), np.int64)  # by level, of the last square
     count = np.zeros(levels + 1, np.int64)
     away = np.empty(len(edge))
-    near[0] = np.arange(len(edge))
+    for e in range(len(edge)):
+        near[0, e] = e
     count[0] = len(edge)
     square = np.zeros((3 * levels + 1, 3), np.int64)  # level, row, column
     waiting = 1

@@ -15,6 +15,19 @@ import pytest
 
 import mrmg
 from mrmg.compilation import cache
+from mrmg.motion import _kernels
+
+COUNT = """
+from mrmg.compilation import (
+    cache_folder, compiled_kernels, kernels_are_compiled, note_kernels_are_compiled
+)
+from mrmg.motion._kernels import turn_speed
+
+before = compiled_kernels()
+turn_speed(0, 1.0, 0.1, 2.0)
+print(cache_folder().name, before, compiled_kernels(), kernels_are_compiled("one"))
+note_kernels_are_compiled("one")
+"""
 
 FOLDER = "from mrmg.compilation import cache_folder; print(cache_folder())"
 
@@ -102,13 +115,48 @@ def test_kernels_that_were_cut_off_are_given_up(
     assert again() == folder and not kernel.exists()
 
 
+def test_kernels_are_kept_in_the_folder_that_numba_is_given(tmp_path: Path) -> None:
+    kept = tmp_path / "numba"
+    environment = {
+        **os.environ,
+        "XDG_CACHE_HOME": str(tmp_path / "unused"),
+        "NUMBA_CACHE_DIR": str(kept),
+    }
+    counted = [
+        subprocess.run(
+            [sys.executable, "-c", COUNT],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout.split()
+        for _ in range(2)
+    ]
+    digest = counted[0][0]
+    assert counted == [[digest, "0", "1", "False"], [digest, "1", "1", "True"]]
+    found = {path.relative_to(kept).parts[0] for path in tmp_path.rglob("*.nb?")}
+    assert found and all(name.startswith(digest) for name in found)
+
+    next(kept.rglob("*.nbc")).write_bytes(b"cut off")
+    asked = [sys.executable, "-c", FOLDER]
+    subprocess.run(asked, env=environment, capture_output=True, check=True)
+    assert list(tmp_path.rglob("*.nb?")) == []
+
+
 def test_without_a_writable_folder_nothing_is_kept(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("")
+    kernel = _kernels.turn_speed.py_func  # type: ignore[attr-defined]
+    kept = cache.to_be_kept(kernel)
+    assert kept is not None and kept.__code__.co_code == kernel.__code__.co_code
     monkeypatch.setattr(cache, "cache_folder", lambda: blocked / "kernels")
-    before = numba.config.CACHE_DIR
-    with cache.cache_setting() as cached:
-        assert not cached
-    assert before == numba.config.CACHE_DIR
+    assert cache.to_be_kept(kernel) is None
+
+
+def test_kernels_of_others_are_not_kept() -> None:
+    def kernel() -> None:
+        """Do nothing."""
+
+    assert cache.to_be_kept(kernel) is None

@@ -44,12 +44,14 @@ def certified_field(price, cell, seed, rounds, band):
         it is linear between them.
     """
     step = np.full((price.shape[0] + 2, price.shape[1] + 2), np.inf)
-    step[1:-1, 1:-1] = price * cell
+    for row in range(price.shape[0]):
+        for column in range(price.shape[1]):
+            step[row + 1, column + 1] = price[row, column] * cell
     field = seed.copy()
     _march(step.ravel(), field)
     for _ in range(rounds - 1):
         _lower_where_steep(field, price, cell, step)
-        field[:] = seed
+        field = seed.copy()
         _march(step.ravel(), field)
     low, high = np.inf, -np.inf
     for value in field.ravel():

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_reference, kernel
+from mrmg.compilation import kernel
 from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.roadmap._fleet_kernels import Spaces, space_of
 from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
@@ -23,7 +23,6 @@ STATE_ROUNDING = 1e-9
 """Rounding of summed steps that is forgiven in the limits of speed and steering."""
 
 
-@by_reference
 class Setting(NamedTuple):
     """A mission as the method sees it.
 
@@ -43,7 +42,6 @@ class Setting(NamedTuple):
     routing: RoutingArrays
 
 
-@by_reference
 class Rules(NamedTuple):
     """Parameters of the method; see `parameters.GuidedTreeParams`."""
 

@@ -9,10 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_reference, kernel
+from mrmg.compilation import kernel
 
 
-@by_reference
 class Vertices(NamedTuple):
     """Vertices of the motion tree; N at most, R robots.
 
@@ -39,7 +38,6 @@ class Vertices(NamedTuple):
     to_target_m: np.ndarray
 
 
-@by_reference
 class Groups(NamedTuple):
     """Vertices with the same region of every robot and the same visited goals.
 
@@ -69,7 +67,6 @@ class Groups(NamedTuple):
     scale: np.ndarray
 
 
-@by_reference
 class Tours(NamedTuple):
     """Tours that vertices carry; a row for each call of CreateNewTour that found some.
 
@@ -85,7 +82,6 @@ class Tours(NamedTuple):
     need: np.ndarray
 
 
-@by_reference
 class Trace(NamedTuple):
     """What happened in each iteration; I at most.
 
@@ -111,7 +107,6 @@ class Trace(NamedTuple):
     ended: np.ndarray
 
 
-@by_reference
 class MotionTree(NamedTuple):
     """A motion tree and all that changes as it grows.
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_reference, kernel
+from mrmg.compilation import kernel
 
 SOFT_TURN = 0.05
 """Angle below which the scrub of turning is rounded off [rad]."""
@@ -33,7 +33,6 @@ EVENNESS_WEIGHT = 0.3
 """Cost of neighbouring segments of unequal length [m/m^2]."""
 
 
-@by_reference
 class CostMap(NamedTuple):
     """What a path is priced on: grids of one robot's clearance and of the terrain.
 
@@ -61,7 +60,6 @@ class CostMap(NamedTuple):
     scrub: float
 
 
-@by_reference
 class Stops(NamedTuple):
     """The targets at a path's nodes.
 

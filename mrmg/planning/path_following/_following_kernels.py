@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_reference, kernel
+from mrmg.compilation import kernel
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.problem._control_kernels import (
     braking_control,
@@ -35,7 +35,6 @@ TURNING_SHARE = 0.5
 """Share of the acceleration of turning with which a turn on the spot is slowed down."""
 
 
-@by_reference
 class Course(NamedTuple):
     """A path, and what its robot must know of it.
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_reference, kernel
+from mrmg.compilation import kernel
 from mrmg.planning.roadmap._fleet_kernels import space_of
 from mrmg.world._kernels import (
     clearance_at_least,
@@ -17,7 +17,6 @@ from mrmg.world._kernels import (
 )
 
 
-@by_reference
 class Zones(NamedTuple):
     """Convex mutual-exclusion zones.
 

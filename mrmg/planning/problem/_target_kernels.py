@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_reference, kernel
+from mrmg.compilation import kernel
 from mrmg.world._kernels import point_in_convex
 
 
-@by_reference
 class Targets(NamedTuple):
     """Goals, stations and finishes: convex regions; T targets, in that order.
 

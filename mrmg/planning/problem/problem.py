@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg import seeding
-from mrmg.compilation import by_reference
 from mrmg.energy.model import CONSUMERS_W
 from mrmg.motion._kernels import CAR
 from mrmg.motion._kernels import step as motion_step
@@ -40,7 +39,6 @@ from mrmg.world._kernels import TerrainGrid
 from mrmg.world.world import Opening, World
 
 
-@by_reference
 class Mission(NamedTuple):
     """A planning problem as arrays.
 

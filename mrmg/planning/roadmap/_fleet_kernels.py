@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_reference, kernel
+from mrmg.compilation import kernel
 from mrmg.energy.model import N_COEFFICIENTS
 from mrmg.world._kernels import FreeSpace
 
@@ -41,7 +41,6 @@ FLEET = np.dtype(
 """One robot as a record; a fleet is an array of them, shape (R,)."""
 
 
-@by_reference
 class Spaces(NamedTuple):
     """The free spaces of a world stacked: their number is not part of a type."""
 

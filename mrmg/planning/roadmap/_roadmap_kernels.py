@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_reference, kernel
+from mrmg.compilation import kernel
 from mrmg.planning.roadmap._bucket_kernels import Buckets
 from mrmg.world._kernels import (
     segment_clearance,
@@ -14,7 +14,6 @@ from mrmg.world._kernels import (
 )
 
 
-@by_reference
 class RoadmapArrays(NamedTuple):
     """The roadmap as the kernels see it; V vertices, T targets, F travel classes.
 

@@ -275,21 +275,25 @@ def nrpa(problem, levels, iterations, alpha, random, sequence):
             level = 1
         elif done[level] < iterations:
             if level > 1:
-                policy[level - 1] = policy[level]
+                lower, upper = policy[level - 1].ravel(), policy[level].ravel()
+                for i in range(len(upper)):
+                    lower[i] = upper[i]
                 best[level - 1] = np.inf
                 done[level - 1] = 0
             level -= 1
             continue
         else:
             result, result_length = best[level], best_length[level]
-            sequence[:] = best_sequence[level]
+            for i in range(size):
+                sequence[i] = best_sequence[level, i]
             if level == levels:
                 return result, result_length
             level += 1
         if result <= best[level]:
             best[level] = result
             best_length[level] = result_length
-            best_sequence[level, :result_length] = sequence[:result_length]
+            for i in range(result_length):
+                best_sequence[level, i] = sequence[i]
         done[level] += 1
         adapt(
             problem,

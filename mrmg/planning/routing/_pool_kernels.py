@@ -85,7 +85,9 @@ def combine(pool, routes):
     least[0] = 0.0
     own = np.zeros((robots, sets), np.int64)
     for r in range(robots):
-        least, own[r] = join_robot(least, pool.cost[r], False)
+        least, share = join_robot(least, pool.cost[r], False)
+        for part in range(sets):
+            own[r, part] = share[part]
     done = sets - 1
     if least[done] == np.inf:
         return

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_reference, kernel
+from mrmg.compilation import kernel
 from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.planning.roadmap._heap_kernels import pop, push
@@ -19,7 +19,6 @@ from mrmg.world._kernels import convex_segment_distance, place_footprint
 DIAGONAL = sqrt(2.0)
 
 
-@by_reference
 class Guide(NamedTuple):
     """Costs-to-go through all targets of a tour.
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_reference, kernel
+from mrmg.compilation import kernel
 from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, step
 from mrmg.planning.path_following._following_kernels import track_control, turned
 from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
@@ -44,7 +44,6 @@ REACH_STEPS = 80
 """Steps that driving along a curve may take beyond its length at full speed."""
 
 
-@by_reference
 class Traffic(NamedTuple):
     """The other robots' motions; after its last state a robot stays.
 

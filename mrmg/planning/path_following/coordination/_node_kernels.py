@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import by_reference, kernel
+from mrmg.compilation import kernel
 from mrmg.motion._kernels import CAR, copy_numbers
 from mrmg.planning.path_following._following_kernels import Course, advance
 from mrmg.planning.path_following.coordination._field_kernels import Guide, guide_at
@@ -32,7 +32,6 @@ SIDEWAYS = 2.0
 """Metres of way that a metre off the path counts as."""
 
 
-@by_reference
 class Task(NamedTuple):
     """What one robot is to do, and how it is searched for.
 
@@ -74,7 +73,6 @@ class Task(NamedTuple):
     most: int
 
 
-@by_reference
 class Setting(NamedTuple):
     """One robot's search.
 
@@ -98,7 +96,6 @@ class Setting(NamedTuple):
     dt: float
 
 
-@by_reference
 class Nodes(NamedTuple):
     """Nodes of a search, and what led to each.
 
@@ -131,7 +128,6 @@ class Nodes(NamedTuple):
     size: np.ndarray
 
 
-@by_reference
 class Scratch(NamedTuple):
     """Room for one motion: states, controls, two footprints, near robots, a curve."""
 
