@@ -14,6 +14,7 @@ from typing import Any
 from packaging.requirements import Requirement
 
 from mrmg import __version__, shipped
+from mrmg.counted import counted
 from mrmg.errors import MachineError
 
 
@@ -92,7 +93,9 @@ def _shipped_files() -> Finding:
     complete = bool(scenes and models)
     return Finding(
         name="shipped files",
-        found=f"{len(scenes)} scenes, {len(models)} robot models",
+        found=", ".join(
+            (counted(len(scenes), "scene"), counted(len(models), "robot model"))
+        ),
         ok=complete,
         remedy="" if complete else "install mrmg again: its scenes or models are gone",
     )

@@ -10,6 +10,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
+from mrmg.counted import counted
+
 
 class ExitCode(IntEnum):
     """What a command's exit status means."""
@@ -64,7 +66,7 @@ class FileError(MrmgError):
     def __init__(self, source: str, faults: Sequence[Fault]) -> None:
         self.source = source
         self.faults = tuple(faults)
-        count = "1 fault" if len(self.faults) == 1 else f"{len(self.faults)} faults"
+        count = counted(len(self.faults), "fault")
         lines = [f"{source}: {count}", *(f"  {fault}" for fault in self.faults)]
         super().__init__("\n".join(lines))
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from mrmg.cli import log_options, terminal
 from mrmg.cli.run_options import add_options, add_overwrite, add_trust, given
+from mrmg.counted import counted
 from mrmg.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
@@ -146,7 +147,9 @@ def folder_of_model(reference: str) -> Path:
 
 
 def _lines(calibration: Calibration) -> list[str]:
-    lines = [f"{calibration.model.name}: {len(calibration.legs)} legs driven"]
+    lines = [
+        f"{calibration.model.name}: {counted(len(calibration.legs), 'leg')} driven"
+    ]
     for name, item in calibration.estimates.items():
         low, high = item.interval
         was = "not in the model" if item.was is None else f"model: {item.was:.6g}"
@@ -159,7 +162,10 @@ def _lines(calibration: Calibration) -> list[str]:
 
 
 def _log_lines(calibration: LogCalibration) -> list[str]:
-    lines = [f"{calibration.model.name}: {len(calibration.runs)} runs, laws compared:"]
+    lines = [
+        f"{calibration.model.name}: {counted(len(calibration.runs), 'run')}, "
+        "laws compared:"
+    ]
     lines += [
         f"  {law['name']:<11} median error {law['median_error_pct']:5.1f} %, 90 % "
         f"intervals hold {law['intervals_hold_pct']:3.0f} %, "

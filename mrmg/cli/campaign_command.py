@@ -12,6 +12,7 @@ from typing import Any
 
 from mrmg.cli import terminal
 from mrmg.cli.run_options import add_trust, reader
+from mrmg.counted import counted
 from mrmg.errors import ExitCode
 from mrmg.runs import argument_values as values
 
@@ -122,7 +123,7 @@ class _Progress:
     ) -> None:
         """Show that one more trial is done; on a line now and then, off a terminal."""
         self._done = done
-        text = f"{done} of {trials} trials, {feasible} feasible"
+        text = f"{done} of {counted(trials, 'trial')}, {feasible} feasible"
         if left_s:
             text += f", {terminal.about(left_s)} left"
         if report is not None:
@@ -136,7 +137,8 @@ class _Progress:
     def kept(self, folder: Path) -> str:
         """Return what a user may want to know of a campaign that was stopped."""
         return (
-            f"mrmg: {self._done} of {self._trials} trials are done and kept in {folder}"
+            f"mrmg: done and kept in {folder}: {self._done} of "
+            f"{counted(self._trials, 'trial')}"
         )
 
 
@@ -154,9 +156,9 @@ def _lines(figures: dict[str, Any]) -> Iterator[str]:
 
 
 def _share(figures: dict[str, Any]) -> str:
-    counted = figures["trials"] - figures["refused"] - figures["errors"]
-    text = f"{figures['feasible']} of {counted} trials feasible"
-    if counted:
+    trials = figures["trials"] - figures["refused"] - figures["errors"]
+    text = f"{figures['feasible']} of {counted(trials, 'trial')} feasible"
+    if trials:
         low, high = figures["interval"]
         text += f" ({figures['share']:.1%}, 95 % interval {low:.1%} to {high:.1%})"
     if figures["refused"]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from mrmg.cli import terminal
 from mrmg.cli.run_options import given
+from mrmg.counted import counted
 from mrmg.errors import ExitCode
 from mrmg.runs.arguments import DEFAULT_VIDEO, RunArguments, VideoArguments
 
@@ -117,8 +118,9 @@ def execute(options: argparse.Namespace) -> int:
     ended = "driven to the end" if driven else "given up on the way"
     events = [f"{item['time_s']:>7.1f} s  {item['message']}" for item in log["events"]]
     account = work.account(work.plan_in_force(), work.log())
+    contacts = counted(len(log["contacts"]), "contact")
     lines = [
-        *terminal.because(f"{ended}, {len(log['contacts'])} contacts", account.reasons),
+        *terminal.because(f"{ended}, {contacts}", account.reasons),
         *events,
         f"  {note}",
     ]

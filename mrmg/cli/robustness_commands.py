@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from mrmg.cli import terminal
 from mrmg.cli.run_options import add_options, add_trust, given, reader
+from mrmg.counted import counted
 from mrmg.errors import ExitCode
 from mrmg.runs import argument_values as values
 from mrmg.runs.arguments import DISTURBANCE_HELP
@@ -106,7 +107,7 @@ def _trial_reporter(report: Callable[[float, str], None] | None) -> OnTrial | No
     if report is None:
         return None
     return lambda done, trials, feasible: report(
-        done / trials, f"{done} of {trials} trials, {feasible} feasible"
+        done / trials, f"{done} of {counted(trials, 'trial')}, {feasible} feasible"
     )
 
 
@@ -114,9 +115,9 @@ def _lines(study: Study, run: Path) -> Iterator[str]:
     figures = study.to_json()
     low, high = figures["interval"]
     yield (
-        f"{figures['feasible']} of {figures['trials']} trials feasible: probability "
-        f"{figures['probability']:.1%}, {figures['confidence']:.0%} interval "
-        f"{low:.1%} to {high:.1%}"
+        f"{figures['feasible']} of {counted(figures['trials'], 'trial')} feasible: "
+        f"probability {figures['probability']:.1%}, {figures['confidence']:.0%} "
+        f"interval {low:.1%} to {high:.1%}"
     )
     for cause, count in sorted(figures["failures"].items()):
         yield f"  failed     {count} x {cause}"

@@ -14,6 +14,7 @@ from typing import Any
 
 from mrmg import storage
 from mrmg.cli import terminal
+from mrmg.counted import counted
 from mrmg.errors import ExitCode, Fault, FileError, UsageError
 
 
@@ -144,8 +145,9 @@ def roadmap(options: argparse.Namespace) -> int:
         nx.write_graphml(graph, temporary)
     parts = nx.number_connected_components(graph.to_undirected(as_view=True))
     print(
-        f"{out}: {graph.number_of_nodes()} vertices, {graph.number_of_edges()} edges, "
-        f"{parts} connected parts"
+        f"{out}: {counted(graph.number_of_nodes(), 'vertex', 'vertices')}, "
+        f"{counted(graph.number_of_edges(), 'edge')}, "
+        f"{counted(parts, 'connected part')}"
     )
     return ExitCode.OK
 

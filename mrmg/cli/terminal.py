@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from mrmg import storage
+from mrmg.counted import counted
 from mrmg.errors import Fault
 
 if TYPE_CHECKING:
@@ -113,7 +114,8 @@ def quality(found: Mapping[str, Any]) -> str:
 
 def iterations(found: Mapping[str, Any]) -> str:
     """Return the iterations of the guided tree and their hard cap in words."""
-    return f"{found['iterations']} of at most {found['iteration_cap']} iterations"
+    cap = counted(found["iteration_cap"], "iteration")
+    return f"{found['iterations']} of at most {cap}"
 
 
 def compile_kernels(arguments: RunArguments) -> None:
@@ -134,14 +136,15 @@ def compile_kernels(arguments: RunArguments) -> None:
         from mrmg.planning.preparation import compile_kernels
 
         task = bars.add_task("compiling", total=None, note="")
-        note = "{} kernels, once for this version"
         began = time.perf_counter()
+        once = "once for this version"
         compile_kernels(
-            chosen.planner, lambda n: bars.update(task, note=note.format(n))
+            chosen.planner,
+            lambda n: bars.update(task, note=f"{counted(n, 'kernel')}, {once}"),
         )
         took_s = time.perf_counter() - began
-    text = f"compiled {compiled_kernels()} kernels in {took_s:.0f} s"
-    print(f"{text}, once for this version", file=sys.stderr)
+    text = f"compiled {counted(compiled_kernels(), 'kernel')} in {took_s:.0f} s"
+    print(f"{text}, {once}", file=sys.stderr)
 
 
 def print_warnings(warnings: Sequence[Fault], *, more: str = "") -> None:
@@ -214,15 +217,16 @@ def _summary_lines(summary: dict[str, Any]) -> Iterator[str]:
         yield f"hint       {hint}"
     if verdict:
         yield (
-            f"verdict    {verdict['violations']} violations; clearance to obstacles "
-            f"{_metres(verdict['min_obstacle_clearance_m'])}, between robots "
-            f"{_metres(verdict['min_robot_distance_m'])}"
+            f"verdict    {counted(verdict['violations'], 'violation')}; "
+            f"clearance to obstacles {_metres(verdict['min_obstacle_clearance_m'])}, "
+            f"between robots {_metres(verdict['min_robot_distance_m'])}"
         )
     if execution:
         tracking = execution["tracking"]
         yield (
-            f"driven     {execution['goals_visited']} of {summary['goals']} "
-            f"goals, {execution['contacts']} contacts, tracking "
+            f"driven     {execution['goals_visited']} of "
+            f"{counted(summary['goals'], 'goal')}, "
+            f"{counted(execution['contacts'], 'contact')}, tracking "
             f"{tracking['rms_m']:.3f} m rms, {tracking['max_m']:.3f} m max, "
             f"{execution['realtime_factor']:.0f} x real time"
         )
@@ -233,7 +237,7 @@ def _summary_lines(summary: dict[str, Any]) -> Iterator[str]:
             f"energy     metered {energy['metered_error_pct']:+.2f} %, measured "
             f"{energy['measured_error_pct']:+.2f} % against the plan; charge never "
             f"below {energy['min_charge_fraction']:.0%}, "
-            f"{energy['recharges']} recharges"
+            f"{counted(energy['recharges'], 'recharge')}"
         )
         residual_pct = energy["balance_residual_pct"]
         if residual_pct is not None:

@@ -14,11 +14,12 @@ import numpy as np
 
 from mrmg import seeding
 from mrmg.compared import compared
+from mrmg.counted import counted
 from mrmg.planning import endings
 from mrmg.planning.bound.joint_bound import Divisions
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.bound.tour_existence import NoTours, proof_of_no_tours
-from mrmg.planning.endings import counted, listed
+from mrmg.planning.endings import listed
 from mrmg.planning.feasibility import (
     energy_and_metres,
     proof_of_infeasibility,
@@ -117,7 +118,7 @@ def _sentence(scene: Scene, proof: NoTours) -> str:
     robot = max(scene.robots, key=_usable_J)
     return endings.NO_TOURS.reason(
         served=len(proof.goals) - len(proof.left_out),
-        goals=f"{len(proof.goals)} goals"
+        goals=counted(len(proof.goals), "goal")
         if len(proof.goals) == len(names)
         else f"the {len(proof.goals)} most remote goals",
         left_out=listed([names[g] for g in proof.left_out]),
@@ -216,7 +217,7 @@ def _obstacle(
     if any(routing.tours) or not blocked:
         blocked.append(narrowest_meeting(problem, routing.tours))
     rounds = search.statistics.counts.get("coordinated", 0)
-    searched = f", and {counted(rounds, 'search')} for motions found none"
+    searched = f", and {counted(rounds, 'search', 'searches')} for motions found none"
     return endings.NO_PROGRESS.reason(
         blocked="; ".join(blocked),
         searched=searched if rounds else "",

@@ -156,9 +156,3 @@ def listed(names: Sequence[str]) -> str:
     """Return names in words, the first ones of many."""
     more = len(names) - MAX_LISTED
     return ", ".join(names[:MAX_LISTED]) + (f" and {more} more" if more > 0 else "")
-
-
-def counted(number: int, noun: str) -> str:
-    """Return a number with its noun, such as "1 attempt" or "3 attempts"."""
-    plural = "es" if noun.endswith("ch") else "s"
-    return f"{number} {noun}" + ("" if number == 1 else plural)

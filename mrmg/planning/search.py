@@ -21,6 +21,7 @@ import numpy as np
 
 from mrmg import interruption
 from mrmg.background import finished, in_background
+from mrmg.counted import counted
 from mrmg.planning.attempt import Attempt
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
@@ -103,7 +104,7 @@ class Search:
                     times = attempt.found_at or repeat(time.perf_counter())
                     plans = zip(times, attempt.plans, strict=False)
                     found += any([self._take(*each) for each in plans])
-                    self.on_progress(self._fraction(found), f"{found} plans")
+                    self.on_progress(self._fraction(found), counted(found, "plan"))
                     if self._enough(found):
                         break
                     if (

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from mrmg import shipped, storage
+from mrmg.counted import counted
 from mrmg.plans import Plan
 from mrmg.report import sections
 from mrmg.report.charts import chart_data
@@ -166,7 +167,8 @@ def _verdict_line(record: RunRecord) -> str:
 def _fleet(plan: Plan, robots: int) -> str:
     """Return how many robots have a tour, of how many."""
     used = sum(bool(tour) for tour in plan.tours.values())
-    return _count(robots, "robot") if used == robots else f"{used} of {robots} robots"
+    fleet = counted(robots, "robot")
+    return fleet if used == robots else f"{used} of {fleet}"
 
 
 def _breakdowns(record: RunRecord) -> str:
@@ -188,7 +190,7 @@ def _times(number: int) -> str:
 
 def _main_figures(record: RunRecord) -> list[tuple[str, str, str]]:
     summary, scene = record.summary, record.scene
-    kinds = f"{_count(len(scene.robots), 'robot')}, seed {summary['seed']}"
+    kinds = f"{counted(len(scene.robots), 'robot')}, seed {summary['seed']}"
     if record.plan is None:
         return [("Goals", str(len(scene.goals)), kinds)]
     execution, energy = summary["execution"], summary["energy"]
@@ -208,7 +210,7 @@ def _main_figures(record: RunRecord) -> list[tuple[str, str, str]]:
             (
                 "Lowest charge",
                 f"{100 * energy['min_charge_fraction']:.1f} %",
-                _count(energy["recharges"], "recharge"),
+                counted(energy["recharges"], "recharge"),
             ),
             (
                 "Tracking error",
@@ -270,7 +272,3 @@ def _source(scene: Scene, arguments: RunArguments) -> str:
         same = arguments.scene(load_scene(scene.name)).digest == scene.digest
         return scene.name if same else "scene.yaml"
     return "scene.yaml"
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

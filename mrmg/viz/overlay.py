@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from mrmg.counted import counted
 from mrmg.scene.types import Robot, Scene
 from mrmg.viz import style
 from mrmg.viz.tags import draw_bar, font, text_width_em
@@ -165,7 +166,8 @@ class Panel:
             fill=_TEXT,
             anchor="ra",
         )
-        goals = f"{len(reading.visited)} of {len(self._scene.goals)} goals visited"
+        goals = counted(len(self._scene.goals), "goal")
+        goals = f"{len(reading.visited)} of {goals} visited"
         pen.text((left, self._px(90)), goals, font=self._font(16), fill=_TEXT)
 
     def _draw_goals(self, pen: ImageDraw.ImageDraw, reading: Reading) -> None:

@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch
 from matplotlib.patheffects import withStroke
 
+from mrmg.counted import counted
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
@@ -277,6 +278,6 @@ def _title(scene: Scene, plan: Plan | None) -> str:
     if plan is None:
         return scene.name
     return (
-        f"{scene.name}: {len(scene.goals)} goals, "
+        f"{scene.name}: {counted(len(scene.goals), 'goal')}, "
         f"{plan.cost_J / 1000:.1f} kJ, {plan.makespan_s:.0f} s"
     )

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mrmg.counted import counted
 from mrmg.errors import Fault, RunFolderError
 from mrmg.plans import Plan, plan_in_force
 from mrmg.scene.loading import load_scene
@@ -86,7 +87,7 @@ def spoken(scene: Scene, reading: Reading) -> tuple[str, list[tuple[str, str]]]:
     minutes, seconds = divmod(reading.time_s, 60.0)
     mission = (
         f"{int(minutes):02d}:{seconds:04.1f}, {len(reading.visited)} of "
-        f"{len(scene.goals)} goals, {reading.used_J / 1000.0:.1f} kJ used"
+        f"{counted(len(scene.goals), 'goal')}, {reading.used_J / 1000.0:.1f} kJ used"
     )
     lines = []
     for robot in reading.robots:

@@ -15,7 +15,7 @@ import mrmg
 from mrmg.cli.main import main
 from mrmg.errors import ExitCode, SceneError
 from mrmg.planning import PlannerParams, endings
-from mrmg.planning.endings import ENDINGS, Ending, counted, listed
+from mrmg.planning.endings import ENDINGS, Ending, listed
 from mrmg.plans import PlanStatus
 from mrmg.scene.loading import dump_scene
 from mrmg.scene.types import Scene
@@ -214,8 +214,6 @@ def test_only_a_proof_is_called_infeasible_and_only_a_budget_a_timeout() -> None
         assert ("budget" in one.sentence) == (one.status is PlanStatus.TIMEOUT)
 
 
-def test_numbers_and_lists_in_words() -> None:
-    assert counted(1, "tree") == "1 tree"
-    assert counted(2, "tree") == "2 trees"
+def test_lists_in_words() -> None:
     assert listed(["a", "b"]) == "a, b"
     assert listed([str(n) for n in range(11)]).endswith("7 and 3 more")

@@ -11,6 +11,7 @@ import shapely
 from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry, BaseMultipartGeometry
 
+from mrmg.counted import counted
 from mrmg.errors import Fault
 from mrmg.scene.importing.frames import known_crs
 from mrmg.scene.importing.layers import Area, ImportOptions
@@ -83,7 +84,7 @@ def features_of(
             for part in _parts(shape) if shape is not None else ():
                 yield place, keys, part
     if empty:
-        content.notes.append(f"{empty} features without geometry were left out")
+        content.notes.append(f"{counted(empty, 'feature')} without geometry left out")
 
 
 def _geometry(value: Any, place: str, content: Content) -> BaseGeometry | None:

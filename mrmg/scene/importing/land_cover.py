@@ -9,6 +9,7 @@ from typing import Any, Literal
 from pydantic import RootModel, ValidationError
 from shapely.geometry.base import BaseGeometry
 
+from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError, UsageError
 from mrmg.scene.importing.frames import Frame
 from mrmg.scene.importing.layers import Area, Box, Layer
@@ -86,7 +87,8 @@ class LandCover:
 
     def layer(self, frame: Frame, bounds: Box | None, notes: Sequence[str]) -> Layer:
         """Return what was added."""
-        count = f"{len(self._terrain)} terrain areas, {len(self._obstacles)} obstacles"
+        areas = counted(len(self._terrain), "terrain area")
+        count = f"{areas}, {counted(len(self._obstacles), 'obstacle')}"
         return Layer(
             frame=frame,
             bounds=bounds,

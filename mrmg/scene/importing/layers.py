@@ -13,6 +13,7 @@ import shapely
 from shapely.geometry import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.document import PACKED_M, packed_heights
 from mrmg.scene.importing.frames import Frame
@@ -281,8 +282,8 @@ def _unused(wanted: str, used: dict[str, int]) -> str:
 def lanes_note(count: int) -> str:
     """Return what becomes of the edges of a graph or layout."""
     return (
-        f"{count} edges are lanes: robots keep to them with --lanes WIDTH, in either "
-        "direction; otherwise they were left out"
+        f"lanes of {counted(count, 'edge')}: robots keep to them with --lanes WIDTH, "
+        "in either direction; otherwise they were left out"
     )
 
 

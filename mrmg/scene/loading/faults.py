@@ -10,6 +10,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from mrmg.counted import counted
 from mrmg.errors import Fault, nearest
 
 _KINDS = {
@@ -69,8 +70,7 @@ def _fault(detail: dict[str, Any], model: type[BaseModel]) -> Fault:
     if kind == "missing":
         return Fault(path, "missing" + (f"; expected {wanted}" if wanted else ""))
     if kind in ("too_short", "too_long"):
-        count = len(value)
-        items = "1 item" if count == 1 else f"{count} items"
+        items = counted(len(value), "item")
         allowed = wanted or f"{_allowed(detail)} items"
         return Fault(path, f"got {items}, {shown(value)}; expected {allowed}")
     if kind in ("model_type", "model_attributes_type", "dict_type"):

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mrmg.counted import counted
 from mrmg.errors import UsageError
 
 RESERVE = 0.05
@@ -93,8 +94,8 @@ def place_mission(
         easy = easy or Placement(starts, sites, posts, math.ceil(least))
     if easy is not None:
         return easy
-    message = f"found no place where {robots} robots can start; ask for fewer robots"
-    raise UsageError(message)
+    wanted = counted(robots, "robot")
+    raise UsageError(f"found no place where {wanted} can start; ask for fewer robots")
 
 
 def _depot(places: Sites, robots: int, rng: np.random.Generator) -> list[int]:

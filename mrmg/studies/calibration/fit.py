@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import stdtrit
 
+from mrmg.counted import counted
+
 CONFIDENCE = 0.95
 """Probability that an interval holds the true value, if the residuals are noise."""
 
@@ -49,7 +51,9 @@ def fit_linear(matrix: np.ndarray, measured: np.ndarray) -> LinearFit:
     length = np.linalg.norm(matrix, axis=0)
     scale = np.where(length > 0.0, length, 1.0)
     if rows <= parameters or np.linalg.matrix_rank(matrix / scale) < parameters:
-        raise ValueError(f"{rows} measurements do not tell {parameters} values apart")
+        raise ValueError(
+            f"{counted(rows, 'measurement')} cannot tell {parameters} values apart"
+        )
     value = np.linalg.lstsq(matrix / scale, measured, rcond=None)[0] / scale
     fitted = matrix @ value
     residual = measured - fitted

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from mrmg.counted import counted
 from mrmg.energy.model import GRAVITY_M_S2
 from mrmg.errors import UsageError
 from mrmg.scene.loading.editing import KeyPath, NewValue
@@ -111,7 +112,8 @@ class LogCalibration:
             if estimate.half_width != estimate.half_width:
                 continue  # not determined by these runs
             value, half = estimate.value / unit, estimate.half_width / unit
-            source = f": {files} runs, on {plain.name}, law {self.fits[0].law.name}"
+            law = self.fits[0].law.name
+            source = f": {counted(files, 'run')}, on {plain.name}, law {law}"
             width = f" +-{half:.1g} ({CONFIDENCE:.0%})"
             unit_text = "W" if key == "idle_power" else "1"
             changes[(key,)] = NewValue(

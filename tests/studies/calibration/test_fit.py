@@ -53,5 +53,5 @@ def test_units_do_not_matter() -> None:
     ],
 )
 def test_what_cannot_be_told_apart_is_refused(matrix: np.ndarray) -> None:
-    with pytest.raises(ValueError, match="do not tell 2 values apart"):
+    with pytest.raises(ValueError, match="cannot tell 2 values apart"):
         fit_linear(matrix, np.ones(len(matrix)))

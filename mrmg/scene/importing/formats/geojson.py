@@ -15,6 +15,7 @@ import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError, nearest
 from mrmg.scene.importing.features import Content, crs_of, features_of, is_graph_edge
 from mrmg.scene.importing.frames import Frame, frame_of
@@ -107,7 +108,9 @@ def _land_cover(
             unnamed += 1
     for name, shapes in by_class.items():
         cover.add(name, shapes)
-    notes = [f"{unnamed} features without 'class' were left out"] if unnamed else []
+    notes = []
+    if unnamed:
+        notes = [f"{counted(unnamed, 'feature')} without 'class' left out"]
     return cover.layer(frame, None, notes)
 
 

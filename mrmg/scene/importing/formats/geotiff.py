@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError
 from mrmg.extras import import_extra
 from mrmg.scene.importing.frames import Frame, frame_of
@@ -77,8 +78,8 @@ def _layer(
             heights, mask=~empty, max_search_distance=float(np.hypot(*heights.shape))
         )
         notes.append(
-            f"{int(empty.sum())} cells without data were taken as {options.unknown}, "
-            "at heights between those around them"
+            f"{counted(int(empty.sum()), 'cell')} without data taken as "
+            f"{options.unknown}, at heights between those around them"
         )
     if empty.any() and options.unknown == "obstacle":
         obstacles = [

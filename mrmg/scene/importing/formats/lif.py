@@ -13,6 +13,7 @@ from typing import Annotated, Any
 import shapely
 from pydantic import Field, ValidationError
 
+from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.importing.frames import Frame
 from mrmg.scene.importing.layers import CHARGING, ImportOptions, Layer, lanes_note
@@ -120,8 +121,8 @@ def read_lif(path: Path, options: ImportOptions) -> Layer:
     }
     places = {name: _place(name, node) for name, node in nodes.items()}
     notes = [
-        f"{len(layouts)} layouts: {len(nodes) - len(charging)} nodes became goals, "
-        f"{len(charging)} charging ones stations, of radius {NODE_RADIUS_M} m",
+        f"{counted(len(layouts), 'layout')}: radius {NODE_RADIUS_M} m for stations at "
+        f"charging nodes ({len(charging)}), goals at {len(nodes) - len(charging)} more",
         "headings, loads, and limits of vehicle types were left out",
     ]
     if pairs:

@@ -16,6 +16,7 @@ import shapely
 from pydantic import Field, ValidationError
 from shapely import affinity
 
+from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.importing.frames import Frame
 from mrmg.scene.importing.layers import Area, ImportOptions, Layer
@@ -95,17 +96,18 @@ def read_map(path: Path, options: ImportOptions) -> Layer:
     if beside.area > 1e-6 * extent.area:  # turned: nothing is known beside it
         shapes += list(shapely.get_parts(beside))
     tolerance_m = options.tolerance * grid.document.resolution
+    cells = counted(int(grid.occupied.sum()), "occupied cell")
     notes = [
-        f"{int(grid.occupied.sum())} occupied cells and {int(unknown.sum())} unknown "
-        f"ones (taken as {options.unknown}) became {len(shapes)} polygons, which reach "
-        f"at most {tolerance_m:.3g} m beyond their cells",
+        f"{cells} and {int(unknown.sum())} unknown (taken as {options.unknown}) became "
+        f"{counted(len(shapes), 'polygon')}, reaching at most {tolerance_m:.3g} m "
+        "beyond their cells",
         *_notes(grid),
     ]
     between = (grid.occupancy > 0) & ~grid.occupied
     if between.any():
         notes.append(
-            f"{int(between.sum())} cells of occupancy between free and occupied were "
-            "taken as free"
+            f"{counted(int(between.sum()), 'cell')} of occupancy between free and "
+            "occupied taken as free"
         )
     return Layer(
         frame=options.frame or Frame(),
@@ -124,7 +126,8 @@ def read_keepout(path: Path, options: ImportOptions, known: Sequence[Layer]) -> 
     grid = read_grid(path)
     closed = grid.occupied & ~_covered(grid, known)
     shapes = [grid.placed(s) for s in enclosing_polygons(closed, options.tolerance)]
-    note = f"{int(closed.sum())} cells became {len(shapes)} obstacles"
+    cells = counted(int(closed.sum()), "cell")
+    note = f"{cells} became {counted(len(shapes), 'obstacle')}"
     return Layer(
         frame=options.frame or Frame(),
         obstacles=[Area(shape, {"id": "keepout"}) for shape in shapes],
@@ -162,8 +165,9 @@ def read_mask(path: Path, options: ImportOptions, known: Sequence[Layer]) -> Lay
     ]
     closed = enclosing_polygons(grid.occupied & ~covered, options.tolerance)
     notes = [
-        f"{len(values)} values of 1 to 99 became {len(terrain)} terrain areas of "
-        f"multiplier 100 / (100 - value); {len(closed)} areas of value 100 obstacles"
+        f"{counted(len(values), 'value')} of 1 to 99 became "
+        f"{counted(len(terrain), 'terrain area')} of multiplier 100 / (100 - value); "
+        f"{counted(len(closed), 'area')} of value 100 obstacles"
     ]
     if len(values) > MOST_CLASSES:
         notes.append(f"its {len(values)} values were rounded to {MOST_CLASSES}")

@@ -10,6 +10,7 @@ from shapely import affinity
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
+from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError, UsageError
 from mrmg.scene.importing.frames import Frame
 from mrmg.scene.importing.layers import Area, ImportOptions, Layer
@@ -41,7 +42,8 @@ def read_polygon_map(path: Path, options: ImportOptions) -> Layer:
     border, solid = _in_metres(raw, longest_m, str(path))
     shapes = list(_polygons(solid))
     x_min, y_min, x_max, y_max = (round(value, 3) for value in border.bounds)
-    notes = [f"{len(raw.obstacles)} shapes became {len(shapes)} polygons"]
+    became = counted(len(shapes), "polygon")
+    notes = [f"{counted(len(raw.obstacles), 'shape')} became {became}"]
     if longest_m is not None:
         notes.append(f"scaled to a longest side of {longest_m:g} m (--longest-side)")
     return Layer(
