@@ -27,7 +27,7 @@ class Router(Protocol):
 
 
 def search(params: RouterParams, problem: RoutingProblem, seed: int) -> Routing:
-    """Find tours by NRPA, and improve them by ruin and recreate."""
+    """Find tours by ruin and recreate."""
     return solve_routing(problem.arrays, params, seed)
 
 

@@ -1,7 +1,8 @@
 """What routes are made of: legs between places, and hops from station to station.
 
-Places: 0..T-1 are targets, goals first; T is the start where a leg begins, the finish
-where it ends.
+Robots for which all legs between targets are alike share one table. Places of a table:
+0..T-1 are targets, goals first; each robot has one more, its home: the start where a
+leg begins, the finish where it ends.
 """
 
 from __future__ import annotations
@@ -11,13 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 
 USABLE, MISSING, CHARGE_TIME, LIMIT = range(4)
 """Columns of robots: energy of a full battery above the reserve, how much of it is
 missing at the start [J], time that recharging takes [s/J], longest time [s]."""
 
-ROUNDING = 1e-12
-"""Share by which sums in another order may differ."""
+MOST_NEAR = 8
+"""Stations next to a place that are thought of on legs from and to it: the nearest.
+Any others may stand between those of two places."""
 
 
 class Legs(NamedTuple):
@@ -25,82 +28,122 @@ class Legs(NamedTuple):
 
     Attributes:
         goals: number of goals G.
-        cost, time: from place to place [J], [s], shape (R, T + 1, T + 1).
-        hop, hop_time: from station to station over any others, shape (R, S, S).
-        follower: next station on that way, shape (R, S, S).
+        table: of each robot, shape (R,).
+        home: each robot's place in its table, shape (R,).
+        cost, time: from place to place [J], [s], shape (tables, P, P).
+        hop, hop_time: from station to station over any others, (tables, S, S).
+        follower: next station on that way, shape (tables, S, S).
+        near: the nearest stations from each place, and to it, nearest first, shape
+            (tables, P, 2, min(S, MOST_NEAR)).
+        rank: of each station among these, -1 for others, (tables, P, 2, S).
+        round_trip: least cost from goal to goal and back over the robots, (G, G).
         robot: shape (R, 4).
-        metric: whether no way to or from a station is shorter over another one, as on
-            roadmaps, shape (R,).
         energy_weight, makespan_weight: of the objective.
     """
 
     goals: int
+    table: np.ndarray
+    home: np.ndarray
     cost: np.ndarray
     time: np.ndarray
     hop: np.ndarray
     hop_time: np.ndarray
     follower: np.ndarray
+    near: np.ndarray
+    rank: np.ndarray
+    round_trip: np.ndarray
     robot: np.ndarray
-    metric: np.ndarray
     energy_weight: float
     makespan_weight: float
 
 
-@kernel
-def new_legs(problem):
-    """Return the legs of a `RoutingArrays`."""
-    robots, places, targets = problem.cost.shape
-    stations = targets - problem.goals
-    legs = Legs(
-        problem.goals,
-        np.zeros((robots, places, places)),
-        np.zeros((robots, places, places)),
-        np.zeros((robots, stations, stations)),
-        np.zeros((robots, stations, stations)),
-        np.zeros((robots, stations, stations)),
-        np.zeros((robots, 4)),
-        np.ones(robots, np.bool_),
+def new_legs(problem: RoutingArrays) -> Legs:
+    """Return the legs of a routing problem."""
+    robots, _, targets = problem.cost.shape
+    goals, stations = problem.goals, targets - problem.goals
+    table, home = _shared_tables(problem)
+    tables, places = int(table.max()) + 1, int(home.max()) + 1
+    cost = np.full((tables, places, places), np.inf)
+    time = np.zeros_like(cost)
+    for r in np.flatnonzero(home == targets):
+        cost[table[r], :targets, :targets] = problem.cost[r, :targets]
+        time[table[r], :targets, :targets] = problem.time[r, :targets]
+    cost[table, home, :targets] = problem.cost[:, targets]
+    time[table, home, :targets] = problem.time[:, targets]
+    cost[table, :targets, home] = problem.finish[:, :targets]
+    time[table, :targets, home] = problem.finish_time[:, :targets]
+    cost[table, home, home] = problem.finish[:, targets]
+    time[table, home, home] = problem.finish_time[:, targets]
+    robot = np.zeros((robots, 4))
+    robot[:, USABLE] = problem.capacity - problem.reserve
+    robot[:, MISSING] = problem.capacity - problem.energy
+    robot[:, CHARGE_TIME] = 1.0 / problem.charge_power
+    robot[:, LIMIT] = problem.limit
+    one = np.flatnonzero(home == targets)
+    between = slice(goals, targets)
+    hop = cost[:, between, between].copy()
+    hop[:, range(stations), range(stations)] = 0.0
+    hop_time = time[:, between, between].copy()
+    hop_time[:, range(stations), range(stations)] = 0.0
+    within = hop <= robot[one, USABLE, None, None]
+    hop_time += robot[one, CHARGE_TIME, None, None] * np.where(within, hop, 0.0)
+    hop[~within] = np.inf
+    follower = np.broadcast_to(np.arange(stations), hop.shape).copy()
+    for over in range(stations):
+        detour = hop[:, :, over, None] + hop[:, None, over]
+        shorter = detour < hop
+        longer = hop_time[:, :, over, None] + hop_time[:, None, over]
+        hop[shorter] = detour[shorter]
+        hop_time[shorter] = longer[shorter]
+        first = np.broadcast_to(follower[:, :, over, None], hop.shape)
+        follower[shorter] = first[shorter]
+    apart = np.stack([cost[:, :, between], cost[:, between].transpose(0, 2, 1)], axis=2)
+    near = np.argsort(apart, axis=3, kind="stable")[..., :MOST_NEAR].copy()
+    rank = np.full((tables, places, 2, stations), -1)
+    np.put_along_axis(rank, near, np.arange(near.shape[3]), axis=3)
+    return Legs(
+        goals,
+        table,
+        home,
+        cost,
+        time,
+        hop,
+        hop_time,
+        follower,
+        near,
+        rank,
+        (cost + cost.transpose(0, 2, 1))[:, :goals, :goals].min(axis=0),
+        robot,
         problem.energy_weight,
         problem.makespan_weight,
     )
-    goals = problem.goals
+
+
+def _shared_tables(problem: RoutingArrays) -> tuple[np.ndarray, np.ndarray]:
+    """Return each robot's table and home.
+
+    Robots share a table if legs between targets, and batteries, are the same.
+    """
+    robots, _, targets = problem.cost.shape
+    battery = np.stack([problem.capacity - problem.reserve, problem.charge_power], 1)
+    first: list[int] = []
+    table, home = np.zeros(robots, np.int64), np.zeros(robots, np.int64)
     for r in range(robots):
-        for a in range(places):
-            for t in range(targets):
-                legs.cost[r, a, t] = problem.cost[r, a, t]
-                legs.time[r, a, t] = problem.time[r, a, t]
-            legs.cost[r, a, targets] = problem.finish[r, a]
-            legs.time[r, a, targets] = problem.finish_time[r, a]
-        usable = problem.capacity[r] - problem.reserve[r]
-        rate = 1.0 / problem.charge_power[r]
-        legs.robot[r, USABLE] = usable
-        legs.robot[r, MISSING] = problem.capacity[r] - problem.energy[r]
-        legs.robot[r, CHARGE_TIME] = rate
-        legs.robot[r, LIMIT] = problem.limit[r]
-        for s in range(stations):
-            for e in range(stations):
-                leg = problem.cost[r, goals + s, goals + e] if s != e else 0.0
-                time = problem.time[r, goals + s, goals + e] if s != e else 0.0
-                legs.hop[r, s, e] = leg if leg <= usable else np.inf
-                legs.hop_time[r, s, e] = time + rate * leg
-                legs.follower[r, s, e] = e
-        for over in range(stations):
-            for s in range(stations):
-                for e in range(stations):
-                    detour = legs.hop[r, s, over] + legs.hop[r, over, e]
-                    if detour < legs.hop[r, s, e]:
-                        legs.hop[r, s, e] = detour
-                        legs.hop_time[r, s, e] = (
-                            legs.hop_time[r, s, over] + legs.hop_time[r, over, e]
-                        )
-                        legs.follower[r, s, e] = legs.follower[r, s, over]
-        for s in range(goals, targets):
-            for e in range(goals, targets):
-                for a in range(places):
-                    there = legs.cost[r, a, s] + legs.cost[r, s, e]
-                    back = legs.cost[r, e, s] + legs.cost[r, s, a]
-                    shorter = there < legs.cost[r, a, e] * (1.0 - ROUNDING)
-                    shorter |= back < legs.cost[r, e, a] * (1.0 - ROUNDING)
-                    if a != e and shorter:
-                        legs.metric[r] = False
-    return legs
+        alike = (
+            k
+            for k, q in enumerate(first)
+            if np.array_equal(battery[q], battery[r])
+            and np.array_equal(problem.cost[q, :targets], problem.cost[r, :targets])
+            and np.array_equal(problem.time[q, :targets], problem.time[r, :targets])
+        )
+        table[r] = next(alike, len(first))
+        if table[r] == len(first):
+            first.append(r)
+        home[r] = targets + np.count_nonzero(table[:r] == table[r])
+    return table, home
+
+
+@kernel
+def towards(table, own, end, a, b):
+    """Return the entry for the leg from a to b, as seen from an end of the route."""
+    return table[own, a, b] if end == 0 else table[own, b, a]

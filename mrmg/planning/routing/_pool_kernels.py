@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.planning.routing._nrpa_kernels import goals_to_visit
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing._subset_kernels import join_robot
 
 MOST_POOLED = 10
@@ -35,24 +35,18 @@ class Pool(NamedTuple):
     length: np.ndarray
 
 
-@kernel
-def new_pool(problem):
+def new_pool(problem: RoutingArrays) -> Pool:
     """Return an empty pool; one without room if there are too many goals."""
-    robots = len(problem.energy)
+    robots, goals = len(problem.energy), np.flatnonzero(problem.open_goal)
+    if len(goals) > MOST_POOLED or problem.makespan_weight > 0.0:
+        goals = goals[:0]
     bit = np.zeros(problem.goals, np.int64)
-    goals = goals_to_visit(problem)
-    number = 0
-    for g in range(problem.goals if goals <= MOST_POOLED else 0):
-        if problem.open_goal[g]:
-            bit[g] = 1 << number
-            number += 1
-    if goals > MOST_POOLED or problem.makespan_weight > 0.0:
-        goals = 0
-    sets = 1 << goals
+    bit[goals] = 1 << np.arange(len(goals))
+    sets = 1 << len(goals)
     return Pool(
         bit,
         np.full((robots, sets), np.inf),
-        np.zeros((robots, sets, goals), np.int64),
+        np.zeros((robots, sets, len(goals)), np.int64),
         np.zeros((robots, sets), np.int64),
     )
 

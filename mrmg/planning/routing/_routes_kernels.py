@@ -7,10 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.planning.routing._insertion_kernels import value_with
+from mrmg.planning.routing._insertion_kernels import cost_without_stations, value_with
+from mrmg.planning.routing._legs_kernels import USABLE
 from mrmg.planning.routing._pool_kernels import pool_route
 from mrmg.planning.routing._random_kernels import random_unit
 from mrmg.planning.routing._refuel_kernels import (
+    ROUNDING,
     label_route,
     route_value,
     row_of,
@@ -19,9 +21,8 @@ from mrmg.planning.routing._refuel_kernels import (
 IMPOSSIBLE = 1e12
 """Cost of each goal that no robot can visit [J]."""
 
-COST, TIME, DIRECT, LABEL = range(4)
-"""Columns of what is known of a route: energy [J], time [s], energy without stations
-[J], and label of its best way."""
+COST, TIME, LABEL = range(3)
+"""Columns of what is known of a route: energy [J], time [s], label of its best way."""
 
 
 class Routes(NamedTuple):
@@ -30,7 +31,7 @@ class Routes(NamedTuple):
     Attributes:
         goal: row R holds the absent goals, shape (R + 1, G).
         length: their number, shape (R + 1,).
-        known: shape (R + 1, 4).
+        known: shape (R + 1, 3).
         front, back: steps from start and finish whose labels hold, shape (R + 1,).
             After n goals front is n + 2 if all is up to date.
         changed: 1 where a route differs from what it is a copy of, shape (R + 1,).
@@ -44,27 +45,16 @@ class Routes(NamedTuple):
     changed: np.ndarray
 
 
-@kernel
-def new_routes(robots, goals):
+def new_routes(robots: int, goals: int) -> Routes:
     """Return room for routes, all empty."""
     return Routes(
         np.zeros((robots + 1, goals), np.int64),
         np.zeros(robots + 1, np.int64),
-        np.zeros((robots + 1, 4)),
+        np.zeros((robots + 1, 3)),
         np.zeros(robots + 1, np.int64),
         np.zeros(robots + 1, np.int64),
         np.ones(robots + 1, np.int64),
     )
-
-
-@kernel
-def add_absent(open_goal, seen, routes):
-    """Write goals that are to be visited but were not seen on any route as absent."""
-    absent = len(routes.length) - 1
-    for g in range(len(open_goal)):
-        if open_goal[g] and not seen[g]:
-            routes.goal[absent, routes.length[absent]] = g
-            routes.length[absent] += 1
 
 
 @kernel
@@ -76,7 +66,7 @@ def copy_routes(source, copy, changed):
             copy.length[r] = source.length[r]
             for i in range(source.length[r]):
                 copy.goal[r, i] = source.goal[r, i]
-            for column in range(4):
+            for column in range(3):
                 copy.known[r, column] = source.known[r, column]
             copy.front[r] = 0
             copy.back[r] = 0
@@ -85,7 +75,6 @@ def copy_routes(source, copy, changed):
 @kernel
 def update(legs, routes, labels, pool):
     """Bring labels and costs of changed routes up to date, and pool those routes."""
-    end = legs.cost.shape[1] - 1
     for r in range(len(routes.length) - 1):
         n = routes.length[r]
         if routes.front[r] == n + 2:
@@ -98,12 +87,6 @@ def update(legs, routes, labels, pool):
         routes.known[r, TIME] = time
         routes.known[r, LABEL] = label
         pool_route(pool, r, goal, n, cost)
-        place = end
-        direct = 0.0
-        for i in range(n):
-            direct += legs.cost[r, place, goal[i]]
-            place = goal[i]
-        routes.known[r, DIRECT] = direct + legs.cost[r, place, end]
         routes.front[r] = routes.back[r] = n + 2
         routes.changed[r] = 1
 
@@ -122,17 +105,21 @@ def objective(legs, routes):
 
 
 @kernel
-def longest_other(routes, r):
-    """Return the longest time of the other robots' routes [s]."""
-    longest = 0.0
-    for b in range(len(routes.length) - 1):
-        if b != r:
-            longest = max(longest, routes.known[b, TIME])
-    return longest
+def two_longest(routes):
+    """Return the longest time of a route [s], whose it is, and the second longest."""
+    longest = second = 0.0
+    robot = -1
+    for r in range(len(routes.length) - 1):
+        time = routes.known[r, TIME]
+        if robot < 0 or time > longest:
+            longest, second, robot = time, longest, r
+        else:
+            second = max(second, time)
+    return longest, robot, second
 
 
 @kernel
-def put_goal(legs, routes, labels, goal, random, blink):
+def put_goal(legs, routes, labels, goal, random, blink, balance):
     """Put a goal where it costs least; return whether it fits anywhere.
 
     Args:
@@ -140,32 +127,47 @@ def put_goal(legs, routes, labels, goal, random, blink):
         goal: on no route.
         random: state of the generator.
         blink: how often a place is overlooked.
+        balance: how much more a surcharge counts on a route of mean energy than on an
+            empty one, as a share.
     """
-    end = legs.cost.shape[1] - 1
-    best = np.inf
+    best, timed = np.inf, labels.full.shape[1] > 1
     robot = place = -1
+    most, last_robot, second = two_longest(routes)
+    total = 1e-9
     for r in range(len(routes.length) - 1):
-        n = routes.length[r]
-        longest = longest_other(routes, r) if legs.makespan_weight > 0.0 else 0.0
-        before = route_value(
-            legs, routes.known[r, COST], routes.known[r, TIME], longest
-        )
-        spared = routes.known[r, COST] - routes.known[r, DIRECT]
+        total += routes.known[r, COST] if balance > 0.0 else 0.0
+    for r in range(len(routes.length) - 1):
+        n, own = routes.length[r], legs.table[r]
+        usable = legs.robot[r, USABLE] * (1.0 + ROUNDING)
+        longest = second if r == last_robot else most
+        present = routes.known[r, COST]
+        before = route_value(legs, present, routes.known[r, TIME], longest)
+        count = 1.0 + balance * present * len(legs.robot) / total
+        front = row_of(legs, r, routes.goal[r], n, 0, 0), legs.home[r]
         for i in range(n + 1):
-            a = routes.goal[r, i - 1] if i > 0 else end
-            b = routes.goal[r, i] if i < n else end
-            way = legs.cost[r, a, goal] + legs.cost[r, goal, b] - legs.cost[r, a, b]
-            # Stations only add to the length, so that bounds the surcharge.
-            if legs.energy_weight * (way - spared) >= best:
+            last = front
+            at = routes.goal[r, i] if i < n else legs.home[r]
+            behind = row_of(legs, r, routes.goal[r], n, 1, n - i), at
+            front = row_of(legs, r, routes.goal[r], n, 0, i + 1), at
+            # No way is shorter over stations, so that this bounds the cost.
+            least = labels.least[last[0]] + legs.cost[own, last[1], goal]
+            least += legs.cost[own, goal, at] + labels.least[behind[0]]
+            if not count * legs.energy_weight * (least - present) < best:
                 continue
             if random_unit(random) < blink:
                 continue
-            ends = (row_of(legs, r, 0, i), a), (row_of(legs, r, 1, n - i), b)
-            value = value_with(
-                legs, labels, r, ends[0], goal, ends[1], longest, best + before
-            )
-            if value - before < best:
-                best = value - before
+            value = np.inf
+            if not timed:  # nothing beats the cheapest ways to either side
+                way = legs.cost[own, last[1], goal] + legs.cost[own, goal, at]
+                value = legs.energy_weight * cost_without_stations(
+                    labels, last[0], behind[0], way, usable
+                )
+            if value == np.inf:
+                value = value_with(
+                    legs, labels, r, last, goal, behind, longest, best / count + before
+                )
+            if count * (value - before) < best:
+                best = count * (value - before)
                 robot, place = r, i
     if robot < 0:
         return False

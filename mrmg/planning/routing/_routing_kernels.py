@@ -1,4 +1,4 @@
-"""The router: nested rollout policy adaptation, then ruin and recreate.
+"""The router: insertion of all goals, then ruin and recreate.
 
 The search takes goals that lie together out of the routes and puts each back where it
 costs least, stations placed exactly (slack induction by string removals, Christiaens
@@ -12,18 +12,13 @@ from math import log
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.planning.routing._legs_kernels import new_legs
-from mrmg.planning.routing._nrpa_kernels import goals_to_visit, nrpa
-from mrmg.planning.routing._pool_kernels import combine, new_pool
+from mrmg.planning.routing._pool_kernels import combine
 from mrmg.planning.routing._random_kernels import random_unit
-from mrmg.planning.routing._refuel_kernels import new_labels, write_tour
 from mrmg.planning.routing._routes_kernels import (
     COST,
     IMPOSSIBLE,
     LABEL,
-    add_absent,
     copy_routes,
-    new_routes,
     objective,
     put_goal,
     remove_goals,
@@ -32,12 +27,18 @@ from mrmg.planning.routing._routes_kernels import (
 from mrmg.planning.routing._ruin_kernels import (
     choose_ruin,
     order_absent,
-    round_trips,
     swap_tails,
 )
+from mrmg.planning.routing._tour_kernels import write_tour
 
 BLINK = 0.01
 """How often a place for a goal is overlooked, so that it goes elsewhere."""
+
+BALANCE = 1.0
+"""How much more a surcharge counts on a route of mean energy than on an empty one, as
+a share, where goals are put on routes for the first time. Without it a few robots serve
+all goals: for large fleets that is hardly less energy, and takes far longer to drive,
+and routes of many goals to improve."""
 
 SWAPS = 0.15
 """How often two robots exchange the ends of their routes instead."""
@@ -48,21 +49,21 @@ HOT, COLD = 0.3, 0.003
 POOLED_HOT, POOLED_COLD = 5.0, 0.5
 """The same where routes are pooled: to meet many of them is what counts there."""
 
-ROUNDS_PER_GOAL = 50
-"""Rounds are at most so many for each goal there is to visit."""
-
 
 @kernel
-def search(legs, routes, labels, near, pool, rounds, random):
+def search(legs, routes, present, best, labels, pool, rounds, random):
     """Improve routes by ruin and recreate with simulated annealing; keep the best.
 
     Before the first round, routes that cannot be driven are emptied, and absent goals
     put where they fit. At the end routes the search has met are combined anew.
+
+    Args:
+        legs, rounds, random: the problem, rounds at most, state of the generator.
+        routes, pool: to begin with; receive the best, and all others.
+        present, best, labels: room for routes twice, and for their labels.
     """
     robots, goals = len(routes.length) - 1, routes.goal.shape[1]
-    pooled = pool.cost.shape[1] > 1
-    first, last = (POOLED_HOT, POOLED_COLD) if pooled else (HOT, COLD)
-    present, best = new_routes(robots, goals), new_routes(robots, goals)
+    first, last = (HOT, COLD) if pool.cost.shape[1] == 1 else (POOLED_HOT, POOLED_COLD)
     gone, home = np.zeros(goals, np.int64), np.zeros(goals, np.int64)
     key = np.zeros(goals)
     value = best_value = np.inf
@@ -73,7 +74,7 @@ def search(legs, routes, labels, near, pool, rounds, random):
             gone[:] = 0
             swap_tails(routes, random)
         elif k > 0:
-            choose_ruin(routes, near, random, home, gone)
+            choose_ruin(routes, legs.round_trip, random, home, gone)
         else:
             for r in range(robots):
                 for i in range(routes.length[r]):
@@ -81,11 +82,12 @@ def search(legs, routes, labels, near, pool, rounds, random):
         remove_goals(routes, gone)
         update(legs, routes, labels, pool)
         order_absent(legs, routes, random, key)
+        blink, balance = (BLINK, 0.0) if k > 0 else (0.0, BALANCE)
         n = routes.length[robots]
         routes.length[robots] = 0
         for i in range(n):
             goal = routes.goal[robots, i]
-            if put_goal(legs, routes, labels, goal, random, BLINK if k > 0 else 0.0):
+            if put_goal(legs, routes, labels, goal, random, blink, balance):
                 update(legs, routes, labels, pool)
             else:
                 routes.goal[robots, routes.length[robots]] = goal
@@ -109,63 +111,6 @@ def search(legs, routes, labels, near, pool, rounds, random):
     copy_routes(best, routes, routes.changed)
     combine(pool, routes)
     update(legs, routes, labels, pool)
-
-
-@kernel
-def read_playout(problem, sequence, moves, routes, seen):
-    """Turn the moves of a playout into routes; what it has not `seen` is absent."""
-    targets = problem.cost.shape[2]
-    for k in range(moves):
-        r = sequence[k] // targets
-        t = sequence[k] % targets
-        if t < problem.goals:
-            routes.goal[r, routes.length[r]] = t
-            routes.length[r] += 1
-            seen[t] = True
-    add_absent(problem.open_goal, seen, routes)
-
-
-@kernel
-def solve_routing(
-    problem, levels, iterations, alpha, rounds, random, tour, tour_length
-):
-    """Solve a routing problem: NRPA, then ruin and recreate from its answer on.
-
-    Args:
-        problem: `RoutingArrays`.
-        levels, iterations, alpha: of NRPA.
-        rounds: of ruin and recreate.
-        random: state of the generator.
-        tour: receives goals and stations of each robot in order, shape (R, >= 3 G).
-        tour_length: receives their number, shape (R,).
-
-    Returns:
-        Energy [J] of the tours; at least IMPOSSIBLE if none was found.
-    """
-    robots = len(problem.energy)
-    goals = problem.goals
-    routes = new_routes(robots, goals)
-    sequence = np.zeros(3 * goals + 4 * robots, np.int64)
-    _, moves = nrpa(problem, levels, iterations, alpha, random, sequence)
-    read_playout(problem, sequence, moves, routes, np.zeros(goals, np.int64))
-    return improve_routes(problem, routes, rounds, random, tour, tour_length)
-
-
-@kernel
-def improve_routes(problem, routes, rounds, random, tour, tour_length):
-    """Search from given routes on and write the best tours found; return their energy.
-
-    Args:
-        problem, rounds, random, tour, tour_length: as of `solve_routing`.
-        routes: to begin with; those that cannot be driven are mended.
-    """
-    legs = new_legs(problem)
-    labels = new_labels(legs)
-    near = np.zeros((problem.goals, problem.goals))
-    round_trips(problem, near)
-    rounds = min(rounds, ROUNDS_PER_GOAL * goals_to_visit(problem))
-    search(legs, routes, labels, near, new_pool(problem), rounds, random)
-    return write_tours(legs, routes, labels, tour, tour_length)
 
 
 @kernel

@@ -18,17 +18,6 @@ STRINGS = 0.6
 
 
 @kernel
-def round_trips(problem, near):
-    """Write the least cost from goal to goal and back over the robots, (G, G)."""
-    near[:] = np.inf
-    for r in range(len(problem.energy)):
-        for a in range(problem.goals):
-            for b in range(problem.goals):
-                both = problem.cost[r, a, b] + problem.cost[r, b, a]
-                near[a, b] = min(near[a, b], both)
-
-
-@kernel
 def choose_ruin(routes, near, random, home, gone):
     """Flag goals to be taken out: strings of routes near a seed, or its neighbours.
 
@@ -121,15 +110,14 @@ def swap_tails(routes, random):
 def order_absent(legs, routes, random, key):
     """Put the absent goals into a drawn order, or the farthest or nearest first."""
     robots = len(routes.length) - 1
-    start = legs.cost.shape[1] - 1
     draw = random_unit(random)
     for k in range(routes.length[robots]):
         goal = routes.goal[robots, k]
         rank = random_unit(random)
         if draw > 0.6:
-            rank = legs.cost[0, start, goal]
+            rank = np.inf
             for r in range(robots):
-                rank = min(rank, legs.cost[r, start, goal])
+                rank = min(rank, legs.cost[legs.table[r], legs.home[r], goal])
             rank = -rank if draw < 0.85 else rank
         i = k
         while i > 0 and key[i - 1] > rank:

@@ -1,7 +1,7 @@
 """The discrete problem: who visits which goals in what order, recharging where.
 
-An energy-constrained multi-start open route problem with recharging, solved by nested
-rollout policy adaptation and local search with exact placing of the stations.
+An energy-constrained multi-start open route problem with recharging, solved by ruin and
+recreate with exact placing of the stations, or by nested rollout policy adaptation.
 """
 
 from __future__ import annotations
@@ -10,9 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrmg.planning.routing import _routing_kernels
-from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing._routes_kernels import IMPOSSIBLE
+from mrmg.planning.routing._legs_kernels import new_legs
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays, nrpa
+from mrmg.planning.routing._pool_kernels import new_pool
+from mrmg.planning.routing._refuel_kernels import new_labels
+from mrmg.planning.routing._routes_kernels import IMPOSSIBLE, Routes, new_routes
+from mrmg.planning.routing._routing_kernels import search, write_tours
+
+ROUNDS_PER_GOAL = 50
+"""Rounds are at most so many for each goal there is to visit."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -20,15 +26,15 @@ class RouterParams:
     """Parameters of the router.
 
     Attributes:
-        method: name of the router (`routers.find_router`): "nrpa" alone, "search"
-            (NRPA, then ruin and recreate), "exact", or one of another package. The
-            other parameters are of the first two; tours that are drawn anew while a
-            tree grows are always theirs.
+        method: name of the router (`routers.find_router`): "nrpa", "search" (ruin and
+            recreate), "exact", or one of another package. The other parameters are of
+            the first two; tours that are drawn anew while a tree grows are always of
+            NRPA.
         levels: nesting levels of NRPA.
         iterations: iterations of each level.
         alpha: step of the policy adaptation.
-        rounds: most rounds of ruin and recreate, fewer if there are few goals; 0 leaves
-            the order NRPA found.
+        rounds: most rounds of ruin and recreate, fewer if there are few goals; with 0
+            the order is NRPA's.
     """
 
     method: str = "search"
@@ -143,21 +149,40 @@ def tour_room(goals: int, targets: int) -> int:
 
 def solve_routing(problem: RoutingArrays, params: RouterParams, seed: int) -> Routing:
     """Solve a routing problem; the same seed gives the same tours."""
-    robots = len(problem.energy)
-    room = tour_room(problem.goals, problem.cost.shape[2])
-    tour = np.zeros((robots, room), np.int64)
+    robots, goals = len(problem.energy), problem.goals
+    random = np.array([seed], np.uint64)
+    routes, present, best = (new_routes(robots, goals) for _ in range(3))
+    if params.rounds == 0:
+        _play_out(problem, params, random, routes)
+    absent = problem.open_goal.copy()
+    for goal, length in zip(routes.goal[:-1], routes.length[:-1], strict=True):
+        absent[goal[:length]] = False
+    routes.length[robots] = absent.sum()
+    routes.goal[robots, : absent.sum()] = np.flatnonzero(absent)
+    legs = new_legs(problem)
+    labels = new_labels(legs)
+    rounds = min(params.rounds, ROUNDS_PER_GOAL * int(problem.open_goal.sum()))
+    pool = new_pool(problem)
+    search(legs, routes, present, best, labels, pool, rounds, random)
+    tour = np.zeros((robots, tour_room(goals, problem.cost.shape[2])), np.int64)
     length = np.zeros(robots, np.int64)
-    cost = _routing_kernels.solve_routing(
-        problem,
-        params.levels,
-        params.iterations,
-        params.alpha,
-        params.rounds,
-        np.array([seed], np.uint64),
-        tour,
-        length,
-    )
+    cost = write_tours(legs, routes, labels, tour, length)
     tours = tuple(
         tuple(int(t) for t in row[:n]) for row, n in zip(tour, length, strict=True)
     )
     return Routing(tours, float(cost) if cost < IMPOSSIBLE else float("inf"))
+
+
+def _play_out(
+    problem: RoutingArrays, params: RouterParams, random: np.ndarray, routes: Routes
+) -> None:
+    """Write the goals of NRPA's best playout as routes."""
+    robots, _, targets = problem.cost.shape
+    sequence = np.zeros(3 * problem.goals + 4 * robots, np.int64)
+    _, moves = nrpa(
+        problem, params.levels, params.iterations, params.alpha, random, sequence
+    )
+    for r, t in zip(*np.divmod(sequence[:moves], targets), strict=True):
+        if t < problem.goals:
+            routes.goal[r, routes.length[r]] = t
+            routes.length[r] += 1

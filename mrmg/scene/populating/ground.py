@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,13 +10,22 @@ from functools import cached_property
 import numpy as np
 import shapely
 from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import connected_components, dijkstra, shortest_path
 from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 # Half of the 16 directions to neighbours; the graph is symmetric. With knight's moves a
 # path over the grid is at most 2.8 % longer than the straight line.
 _OFFSETS = ((1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (1, 2), (2, -1), (1, -2))
+
+_FEW_PLACES = 300
+"""Places between which all costs are found on the grid itself."""
+
+_REACH = 6.0
+"""How far places are joined to others, as a multiple of their mean spacing."""
+
+_AT_ONCE = 16
+"""Places from which costs are found in one call, which is soon interrupted."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,6 +138,28 @@ class Ground:
         """Return costs from `sources` to all points [m], shape (n, rows * columns)."""
         # One source at a time: SciPy holds the interpreter's lock, and Ctrl-C waits.
         return np.array([dijkstra(self.roads, indices=source) for source in sources])
+
+    def between(self, places: Sequence[int]) -> np.ndarray:
+        """Return costs from place to place [m], shape (n, n).
+
+        Many places are joined to those about them only, and costs between others lead
+        over places: they are a percent or two more than on the grid.
+        """
+        if len(places) <= _FEW_PLACES:
+            return np.array([self.distances([one])[0, places] for one in places])
+        spacing_m = math.sqrt(self.free.sum() / len(places)) * self.cell_m
+        reach_m = _REACH * spacing_m * float(np.median(self.multiplier[self.free]))
+        while True:
+            near = np.concatenate(
+                [
+                    dijkstra(self.roads, indices=some, limit=reach_m)[:, places]
+                    for some in np.array_split(places, len(places) // _AT_ONCE)
+                ]
+            )
+            costs = shortest_path(np.where(np.isfinite(near), near, 0.0), method="D")
+            if np.isfinite(costs).all():
+                return np.asarray(costs)
+            reach_m *= 2.0
 
     def road_to_nearest(self, targets: np.ndarray) -> np.ndarray:
         """Return the cost from every point to the nearest of `targets` [m]."""

@@ -82,9 +82,11 @@ def place_mission(
         starts = _depot(places, robots, rng)
         if len(starts) < robots:
             continue
-        free = [i for i in range(len(road_m)) if i not in starts]
-        posts = [free[i] for i in _medoids(road_m[np.ix_(free, free)], stations, rng)]
-        rest = [i for i in free if i not in posts]
+        free = np.setdiff1d(np.arange(len(road_m)), starts)
+        posts = [
+            int(free[i]) for i in _medoids(road_m[np.ix_(free, free)], stations, rng)
+        ]
+        rest = np.setdiff1d(free, posts)
         sites = _spread(road_m, rest, [*starts, *posts], goals)
         least = _least_capacity_m(uphill_m, starts, sites, posts)
         most = shortcut * _most_capacity_m(road_m, starts, sites)
@@ -131,16 +133,17 @@ def _medoids(road_m: np.ndarray, count: int, rng: np.random.Generator) -> list[i
 
 
 def _spread(
-    road_m: np.ndarray, allowed: Sequence[int], taken: Sequence[int], count: int
+    road_m: np.ndarray, allowed: np.ndarray, taken: Sequence[int], count: int
 ) -> list[int]:
     """Return `count` of the allowed places, far from the taken ones and each other."""
     sites: list[int] = []
-    pool = np.array(allowed)
+    near = np.full(len(road_m), -np.inf)
+    near[allowed] = road_m[list(taken)][:, allowed].min(axis=0)
     for _ in range(count):
-        near = road_m[[*taken, *sites]][:, pool].min(axis=0)
         best = int(near.argmax())
-        sites.append(int(pool[best]))
-        pool = np.delete(pool, best)
+        sites.append(best)
+        near = np.minimum(near, road_m[best])
+        near[best] = -np.inf
     return sites
 
 
@@ -158,13 +161,24 @@ def _least_capacity_m(
 def _widest_gap(road_m: np.ndarray, posts: list[int]) -> float:
     """Return the longest leg one must drive to get from any station to any other."""
     between = road_m[np.ix_(posts, posts)]
-    joined, widest = [0], 0.0
-    while len(joined) < len(posts):
-        apart = [k for k in range(len(posts)) if k not in joined]
-        legs = between[np.ix_(joined, apart)]
-        widest = max(widest, float(legs.min()))
-        joined.append(apart[int(legs.min(axis=0).argmin())])
-    return widest
+    return float(_tree_legs_m(between[1:, 1:], between[0, 1:]).max(initial=0.0))
+
+
+def _tree_legs_m(between_m: np.ndarray, reach_m: np.ndarray) -> np.ndarray:
+    """Return the legs of the shortest tree from a root to all places (Prim).
+
+    Args:
+        between_m: length from place to place [m], shape (n, n).
+        reach_m: from the root to each of them [m], shape (n,).
+    """
+    near_m, legs_m = reach_m.copy(), np.zeros(len(reach_m))
+    away = np.ones(len(reach_m), bool)
+    for n in range(len(legs_m)):
+        closest = int(np.where(away, near_m, np.inf).argmin())
+        legs_m[n] = near_m[closest]
+        away[closest] = False
+        near_m = np.minimum(near_m, between_m[closest])
+    return legs_m
 
 
 def _most_capacity_m(road_m: np.ndarray, starts: list[int], sites: list[int]) -> float:
@@ -174,12 +188,6 @@ def _most_capacity_m(road_m: np.ndarray, starts: list[int], sites: list[int]) ->
     short of the spanning forest of the goals, rooted at the robots.
     """
     reach = road_m[np.ix_(starts, sites)].min(axis=0)
-    away, forest_m = list(range(len(sites))), 0.0
-    near = reach.copy()
-    while away:
-        closest = min(away, key=lambda k: near[k])
-        forest_m += near[closest]
-        away.remove(closest)
-        near = np.minimum(near, road_m[sites[closest], sites])
+    forest_m = float(_tree_legs_m(road_m[np.ix_(sites, sites)], reach).sum())
     need_m = max(float(reach.max()), forest_m / len(starts))
     return need_m / (1.0 - RESERVE)

@@ -99,7 +99,7 @@ def populate(
             "ask for fewer, or scale the map up"
         )
         raise UsageError(message)
-    road_m = ground.distances(places)[:, places]
+    road_m = ground.between(places)
     points_m = ground.points_m[places]
     sites = Sites(
         road_m=road_m,

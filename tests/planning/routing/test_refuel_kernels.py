@@ -15,8 +15,8 @@ from mrmg.planning.routing._refuel_kernels import (
     label_route,
     new_labels,
     row_of,
-    write_tour,
 )
+from mrmg.planning.routing._tour_kernels import write_tour
 from mrmg.planning.routing.routing import routing_arrays
 
 SLACK_J = 1e-6
@@ -116,14 +116,15 @@ def test_one_more_goal_is_worth_what_the_longer_route_costs(
     problem = mission(seed, goals=5, stations=3, range_m=(50.0, 120.0))
     legs = new_legs(problem)
     labels = new_labels(legs)
-    end = legs.cost.shape[1] - 1
+    end = int(legs.home[0])
     route = (0, 1, 2, 3)
-    label_route(legs, labels, 0, np.array(route), len(route), 0, 0)
+    goals = np.array(route)
+    label_route(legs, labels, 0, goals, len(route), 0, 0)
     for place in range(len(route) + 1):
         a = route[place - 1] if place > 0 else end
         b = route[place] if place < len(route) else end
-        front = row_of(legs, 0, 0, place)
-        back = row_of(legs, 0, 1, len(route) - place)
+        front = row_of(legs, 0, goals, len(route), 0, place)
+        back = row_of(legs, 0, goals, len(route), 1, len(route) - place)
         cost, _ = refuelled(problem, (*route[:place], 4, *route[place:]))
 
         def with_goal(
@@ -174,11 +175,11 @@ def test_recharging_takes_its_time_and_routes_keep_their_limit(
     )
     legs = new_legs(problem)
     labels = new_labels(legs)
-    goal, end = np.array([0]), legs.cost.shape[1] - 1
+    goal, end = np.array([0]), int(legs.home[0])
     cost, time_s, _ = label_route(legs, labels, 0, goal, 1, 0, 0)
     kept = slack_s > 0.0
     assert (cost, time_s) == ((finish_m, expected_s) if kept else (np.inf, np.inf))
     label_route(legs, labels, 0, goal, 0, 0, 0)
-    before, behind = ((row_of(legs, 0, side, 0), end) for side in range(2))
+    before, behind = ((row_of(legs, 0, goal, 0, side, 0), end) for side in range(2))
     value = value_with(legs, labels, 0, before, 0, behind, 0.0, np.inf)
     assert value == pytest.approx(finish_m + 1.001 * expected_s if kept else np.inf)

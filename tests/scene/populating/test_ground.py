@@ -105,3 +105,18 @@ def test_road_to_nearest() -> None:
     nearest = grid.road_to_nearest(targets)
     assert nearest == pytest.approx(grid.distances(targets).min(axis=0))
     assert np.isinf(grid.road_to_nearest(np.array([], dtype=int))).all()
+
+
+def test_costs_between_many_places_lead_over_places() -> None:
+    """A wall with a gap at one end stands between two halves."""
+    wall = shapely.box(20, 0, 21, 34)
+    ground = Ground.over((0, 0, 40, 40), [wall], [], margin_m=1.0)
+    free = np.flatnonzero(ground.free)
+    places = np.random.default_rng(0).choice(free, 400, replace=False).tolist()
+    some = places[:8]
+    exact = ground.distances(some)[:, places]
+    over = ground.between(places)[:8]
+    assert (over >= exact - 1e-9).all()
+    far = exact > 20.0
+    assert np.median(over[far] / exact[far]) < 1.02
+    assert (over[far] / exact[far]).max() < 1.06
