@@ -8,7 +8,6 @@ it. A second thread, which the system wakes at once, therefore gives the main th
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
 import sys
@@ -114,6 +113,8 @@ def sheltered_children() -> Iterator[None]:
     if sys.platform == "win32":  # has no such masks
         yield
         return
+    import multiprocessing
+
     # The first lock starts Python's resource tracker, which lifts such masks.
     multiprocessing.get_context("spawn").Lock()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])

@@ -34,7 +34,12 @@ def heading_hints(source: str | Path) -> list[Fault]:
         document = read_yaml(path, source=str(source))
     except SceneError:
         return []
-    root = composed(path)
+    suspicious = [
+        found
+        for found in _angles(document)
+        if LARGEST_TURN_RAD < abs(found[-1]) < math.inf
+    ]
+    root = composed(path) if suspicious else None  # lines take long to find
     return [
         Fault(
             entry,
@@ -43,8 +48,7 @@ def heading_hints(source: str | Path) -> list[Fault]:
             id=id_at(document, entry),
             line=line_at(root, f"{entry}.{key}"),
         )
-        for entry, key, name, angle in _angles(document)
-        if LARGEST_TURN_RAD < abs(angle) < math.inf
+        for entry, key, name, angle in suspicious
     ]
 
 
