@@ -105,7 +105,7 @@ def _scaled(frames: Sequence[Image.Image], share: float) -> list[Image.Image]:
 
 
 def _encode(frames: Sequence[Image.Image], path: Path) -> None:
-    # One palette for all, and no dithering: what stays still costs nothing.
+    # One palette for all, and no dithering, so that what stays still does not change.
     palette = _palette(frames)
     flat = [
         frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames
@@ -117,7 +117,7 @@ def _encode(frames: Sequence[Image.Image], path: Path) -> None:
         append_images=flat[1:],
         duration=1000 // _FPS,
         loop=0,
-        optimize=False,
+        optimize=True,  # what stays still is transparent
     )
 
 

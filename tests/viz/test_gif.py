@@ -43,6 +43,22 @@ def test_gif_of_a_mission_has_a_picture_per_tenth_of_a_second(
     assert 0.0 < moved < 0.2
 
 
+def test_what_stays_still_between_things_that_move_costs_nothing(
+    tmp_path: Path,
+) -> None:
+    [still] = noise(1, (160, 90))
+    frames = []
+    for step in range(10):
+        frame = still.copy()
+        for corner in ((step, 0), (150 - step, 80)):
+            frame.paste((255, 0, 0), (*corner, corner[0] + 6, corner[1] + 6))
+        frames.append(frame)
+    write_gif(frames[:1], tmp_path / "one.gif")
+    write_gif(frames, tmp_path / "all.gif")
+    one = (tmp_path / "one.gif").stat().st_size
+    assert one < (tmp_path / "all.gif").stat().st_size < 1.5 * one
+
+
 def test_a_gif_that_is_too_large_gets_smaller_pictures(tmp_path: Path) -> None:
     frames = noise(6, (160, 90))
     write_gif(frames, tmp_path / "large.gif")
