@@ -65,7 +65,7 @@ def drive() -> Callable[..., Trajectory]:
         step = rk4_step(derivative(math.sin, math.cos, math.tan))
         states = [(*robot.pose, 0.0, 0.0)]
         for u1, u2 in controls:
-            states.append(step(*states[-1], u1, u2, robot.model.wheelbase_m, DT_S))
+            states.append(step(states[-1], (u1, u2), robot.model.wheelbase_m, DT_S))
         return Trajectory(
             robot=robot.id,
             dt_s=DT_S,

@@ -81,7 +81,7 @@ class Car:
     def act(self, u1: float, u2: float) -> None:
         """Hold controls for a step."""
         wheelbase_m = self.robot.model.wheelbase_m
-        self.states.append(_STEP(*self.states[-1], u1, u2, wheelbase_m, DT_S))
+        self.states.append(_STEP(self.states[-1], (u1, u2), wheelbase_m, DT_S))
         self.controls.append((u1, u2))
 
     def drive_to(self, target: Goal | Station) -> None:

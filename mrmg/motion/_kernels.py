@@ -35,22 +35,14 @@ def step(robot, state, u1, u2, dt, out):
 
     `robot` is a record with `model`, `wheelbase` and, for a user's model, `step_at`.
     """
+    now, control = (state[0], state[1], state[2], state[3], state[4]), (u1, u2)
     if robot.model == USER:
-        x, y, theta, v, w = call_step(
-            robot.step_at, (state[0], state[1], state[2], state[3], state[4]), (u1, u2),
-            robot.wheelbase, dt,
-        )  # fmt: skip
+        then = call_step(robot.step_at, now, control, robot.wheelbase, dt)
     elif robot.model == CAR:
-        x, y, theta, v, w = _car_step(
-            state[0], state[1], state[2], state[3], state[4], u1, u2,
-            robot.wheelbase, dt,
-        )  # fmt: skip
+        then = _car_step(now, control, robot.wheelbase, dt)
     else:
-        x, y, theta, v, w = _unicycle_step(
-            state[0], state[1], state[2], state[3], state[4], u1, u2,
-            robot.wheelbase, dt,
-        )  # fmt: skip
-    out[0], out[1], out[2], out[3], out[4] = x, y, theta, v, w
+        then = _unicycle_step(now, control, robot.wheelbase, dt)
+    out[0], out[1], out[2], out[3], out[4] = then
 
 
 @kernel

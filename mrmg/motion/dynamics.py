@@ -59,12 +59,15 @@ def unicycle_derivative(sin: Any, cos: Any, tan: Any) -> Derivative:
 
 
 def rk4_step(derivative: Derivative) -> Derivative:
-    """Return step(x, y, theta, v, w, u1, u2, L, dt): one classic Runge-Kutta step.
+    """Return step(state, control, L, dt) -> state: one classic Runge-Kutta step.
 
+    State is (x, y, theta, v, w), control (u1, u2), as a user's motion has them;
     v and w (psi or omega) are integrals of the held control, so their stages are exact.
     """
 
-    def step(x, y, theta, v, w, u1, u2, wheelbase, dt):
+    def step(state, control, wheelbase, dt):
+        x, y, theta, v, w = state
+        u1, u2 = control
         half = 0.5 * dt
         ax, ay, at, _, _ = derivative(theta, v, w, u1, u2, wheelbase)
         vm = v + half * u1

@@ -192,7 +192,10 @@ def _linearised_gaps(motion_model: str, wheelbase_m: float) -> ca.Function:
     """Return z -> (Jacobian, value) of the gaps x_{k+1} - f(x_k, u_k)."""
     step = rk4_step(DERIVATIVES[motion_model](ca.sin, ca.cos, ca.tan))
     now = ca.SX.sym("now", _STAGE)
-    reached = ca.vertcat(*step(*ca.vertsplit(now), wheelbase_m, HORIZON_STEP_S))
+    state, control = ca.vertsplit(now, [0, NX, _STAGE])
+    reached = ca.vertcat(
+        *step(ca.vertsplit(state), ca.vertsplit(control), wheelbase_m, HORIZON_STEP_S)
+    )
     stage = ca.Function("stage", [now], [reached, ca.jacobian(reached, now)])
     z = ca.MX.sym("z", _SIZE)
     stages = ca.reshape(z[:-NX], _STAGE, HORIZON)

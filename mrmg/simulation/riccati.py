@@ -67,7 +67,10 @@ def _stage_deviation(motion_model: str, wheelbase_m: float) -> ca.Function:
     step = rk4_step(DERIVATIVES[motion_model](ca.sin, ca.cos, ca.tan))
     guess, target = ca.SX.sym("guess", _STAGE), ca.SX.sym("target", _STAGE)
     following = ca.SX.sym("following", NX)
-    reached = ca.vertcat(*step(*ca.vertsplit(guess), wheelbase_m, HORIZON_STEP_S))
+    state, control = ca.vertsplit(guess, [0, NX, _STAGE])
+    reached = ca.vertcat(
+        *step(ca.vertsplit(state), ca.vertsplit(control), wheelbase_m, HORIZON_STEP_S)
+    )
     slope = ca.jacobian(reached, guess)
     gap = reached + slope @ (target - guess) - following
     return ca.Function("linearise", [guess, target, following], [slope, gap])

@@ -160,11 +160,8 @@ class FilteredSensing:
         middle = 0.5 * (self._speed + speed), 0.5 * (self._steer + steer)
         for index, step in enumerate(self._steps):
             self._pose[index] = step(
-                *self._pose[index],
-                middle[0][index],
-                middle[1][index],
-                0.0,
-                0.0,
+                (*self._pose[index], middle[0][index], middle[1][index]),
+                (0.0, 0.0),
                 self._wheelbase_m[index],
                 self._period_s,
             )[:3]

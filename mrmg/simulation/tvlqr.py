@@ -73,7 +73,7 @@ def _slopes(motion_model: str, wheelbase_m: float) -> ca.Function:
     step = rk4_step(DERIVATIVES[motion_model](ca.sin, ca.cos, ca.tan))
     x, u = ca.SX.sym("x", NX), ca.SX.sym("u", NU)
     reached = ca.vertcat(
-        *step(*ca.vertsplit(x), *ca.vertsplit(u), wheelbase_m, HORIZON_STEP_S)
+        *step(ca.vertsplit(x), ca.vertsplit(u), wheelbase_m, HORIZON_STEP_S)
     )
     return ca.Function(
         "slopes", [x, u], [ca.jacobian(reached, x), ca.jacobian(reached, u)]

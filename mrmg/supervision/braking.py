@@ -35,7 +35,7 @@ def brake_to_rest(
         # A car holds its steering until it stands.
         free = turns_on_the_spot or not _moving(v)
         u2 = _toward_zero(w, limits.u2_max, dt_s) if free else 0.0
-        states.append(step(*states[-1], u1, u2, model.wheelbase_m, dt_s))
+        states.append(step(states[-1], (u1, u2), model.wheelbase_m, dt_s))
         controls.append((u1, u2))
     return (
         np.array(states[1:], float).reshape(-1, 5),

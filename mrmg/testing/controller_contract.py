@@ -160,7 +160,7 @@ def share_of_limit(model: RobotModel, share: float) -> float:
 def moved(model: RobotModel, state: np.ndarray, control: np.ndarray) -> np.ndarray:
     """Return the state one tick later."""
     step = rk4_step(DERIVATIVES[model.motion_model](math.sin, math.cos, math.tan))
-    return np.array(step(*state, *control, model.wheelbase_m, TICK_S))
+    return np.array(step(state, control, model.wheelbase_m, TICK_S))
 
 
 def reference_of(model: RobotModel) -> tuple[np.ndarray, np.ndarray]:

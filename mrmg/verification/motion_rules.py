@@ -143,22 +143,17 @@ def replay(model: RobotModel, trajectory: Trajectory) -> np.ndarray:
     states, controls = trajectory.state[:-1].tolist(), trajectory.control.tolist()
     return np.array(
         [
-            step(*state, *control, length_m, dt_s)
+            step(tuple(state), tuple(control), length_m, dt_s)
             for state, control in zip(states, controls, strict=True)
         ]
     ).reshape(len(states), 5)
 
 
 def plain_step(model: RobotModel) -> Derivative:
-    """Return step(x, y, theta, v, w, u1, u2, L, dt) of a model in plain Python."""
+    """Return step(state, control, L, dt) -> state of a model in plain Python."""
     if model.motion_model in DERIVATIVES:
         return rk4_step(DERIVATIVES[model.motion_model](math.sin, math.cos, math.tan))
-    motion = motion_of(model)
-
-    def step(*arguments: float) -> tuple[float, ...]:
-        return motion.step(arguments[:5], arguments[5:7], *arguments[7:])
-
-    return step
+    return motion_of(model).step
 
 
 def _check_dynamics(model: RobotModel, trajectory: Trajectory) -> list[Violation]:

@@ -77,7 +77,7 @@ def _states_after(
     if model.motion_model in DERIVATIVES:
         advance = rk4_step(DERIVATIVES[model.motion_model](np.sin, np.cos, np.tan))
         length_m = model.wheelbase_m
-        return np.stack(advance(*state.T, *control.T, length_m, time_s), axis=-1)
+        return np.stack(advance(state.T, control.T, length_m, time_s), axis=-1)
     motion = motion_of(model)
     return np.array(
         [

@@ -39,7 +39,7 @@ def integrate(
     """Return the state after one second in equal steps."""
     step = python_step(model)
     for _ in range(steps):
-        state = step(*state, *control, WHEELBASE_M, 1.0 / steps)
+        state = step(state, control, WHEELBASE_M, 1.0 / steps)
     return np.array(state)
 
 
@@ -63,7 +63,7 @@ def test_numba_and_python_agree_to_the_last_bit(model: str) -> None:
     out = np.empty(NX)
     for state, control, dt_s in random_cases(1, 5000):
         _kernels.step(record(model), state, *control, dt_s, out)
-        plain = step(*state.tolist(), *control.tolist(), WHEELBASE_M, dt_s)
+        plain = step(state.tolist(), control.tolist(), WHEELBASE_M, dt_s)
         assert out.tolist() == list(plain)
 
 
@@ -71,11 +71,11 @@ def test_numba_and_python_agree_to_the_last_bit(model: str) -> None:
 def test_casadi_agrees_with_python(model: str) -> None:
     x, u, dt = casadi.SX.sym("x", NX), casadi.SX.sym("u", NU), casadi.SX.sym("dt")
     traced = rk4_step(DERIVATIVES[model](casadi.sin, casadi.cos, casadi.tan))
-    expression = traced(*casadi.vertsplit(x), *casadi.vertsplit(u), WHEELBASE_M, dt)
+    expression = traced(casadi.vertsplit(x), casadi.vertsplit(u), WHEELBASE_M, dt)
     function = casadi.Function("step", [x, u, dt], [casadi.vertcat(*expression)])
     step = python_step(model)
     for state, control, dt_s in random_cases(2, 2000):
-        plain = step(*state.tolist(), *control.tolist(), WHEELBASE_M, dt_s)
+        plain = step(state.tolist(), control.tolist(), WHEELBASE_M, dt_s)
         symbolic = np.asarray(function(state, control, dt_s)).ravel()
         assert symbolic == pytest.approx(np.array(plain), rel=1e-12, abs=1e-12)
 
@@ -151,7 +151,7 @@ def test_motion_is_the_same_wherever_and_whichever_way_it_starts(model: str) -> 
         step = python_step(model)
         theta = state[2]
         c, s = math.cos(theta), math.sin(theta)
-        at_origin = step(0.0, 0.0, 0.0, *state[3:], *control, WHEELBASE_M, dt_s)
+        at_origin = step((0.0, 0.0, 0.0, *state[3:]), control, WHEELBASE_M, dt_s)
         dx, dy, turned, v, w = at_origin
         expected = (
             state[0] + c * dx - s * dy,
@@ -160,7 +160,7 @@ def test_motion_is_the_same_wherever_and_whichever_way_it_starts(model: str) -> 
             v,
             w,
         )
-        end = step(*state, *control, WHEELBASE_M, dt_s)
+        end = step(state, control, WHEELBASE_M, dt_s)
         assert end == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 
@@ -168,8 +168,8 @@ def test_motion_is_the_same_wherever_and_whichever_way_it_starts(model: str) -> 
 def test_driving_back_with_mirrored_time_returns_to_the_start(model: str) -> None:
     for state, control, _ in random_cases(5, 200):
         step = python_step(model)
-        there = step(*state, *control, WHEELBASE_M, 0.01)
-        back = step(*there, *control, WHEELBASE_M, -0.01)
+        there = step(state, control, WHEELBASE_M, 0.01)
+        back = step(there, control, WHEELBASE_M, -0.01)
         assert back == pytest.approx(state.tolist(), abs=1e-5)
 
 

@@ -50,7 +50,7 @@ def rolled_out(robot: Robot, control: np.ndarray) -> Trajectory:
     step = rk4_step(derivative)
     state = [(*robot.pose, 0.0, 0.0)]
     for u1, u2 in control:
-        state.append(step(*state[-1], u1, u2, robot.model.wheelbase_m, DT_S))
+        state.append(step(state[-1], (u1, u2), robot.model.wheelbase_m, DT_S))
     return Trajectory(
         robot=robot.id, dt_s=DT_S, state=np.array(state), control=np.array(control)
     )

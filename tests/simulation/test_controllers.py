@@ -76,8 +76,8 @@ def converged(
     for k in range(HORIZON):
         cost += ca.dot(ca.DM(params.control), (u[:, k] - planned[k]) ** 2)
         reached = step(
-            *ca.vertsplit(x[:, k]),
-            *ca.vertsplit(u[:, k]),
+            ca.vertsplit(x[:, k]),
+            ca.vertsplit(u[:, k]),
             model.wheelbase_m,
             HORIZON_STEP_S,
         )

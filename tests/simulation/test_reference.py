@@ -48,7 +48,7 @@ def test_between_states_it_is_the_exact_motion(
     for start, control, state in zip(item.state, item.control, states, strict=False):
         exact = tuple(start)
         for _ in range(8):
-            exact = step(*exact, *control, model.wheelbase_m, share * plan.dt_s / 8)
+            exact = step(exact, control, model.wheelbase_m, share * plan.dt_s / 8)
         np.testing.assert_allclose(state, exact, atol=1e-4)
 
 

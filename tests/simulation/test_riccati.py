@@ -43,7 +43,9 @@ def linear_system_solution(
     rows = [z[:NX]]
     for k in range(HORIZON):
         now = ca.vertsplit(z[k * STAGE : (k + 1) * STAGE])
-        reached = ca.vertcat(*step(*now, model.wheelbase_m, HORIZON_STEP_S))
+        reached = ca.vertcat(
+            *step(now[:NX], now[NX:], model.wheelbase_m, HORIZON_STEP_S)
+        )
         rows.append(z[(k + 1) * STAGE : (k + 1) * STAGE + NX] - reached)
     row = ca.vertcat(*rows)
     slope, value = (

@@ -72,7 +72,7 @@ class Manoeuvre:
         step = rk4_step(DERIVATIVES[model.motion_model](math.sin, math.cos, math.tan))
         state = [(0.0,) * NX]
         for u1, u2 in self.control:
-            state.append(step(*state[-1], u1, u2, model.wheelbase_m, STEP_S))
+            state.append(step(state[-1], (u1, u2), model.wheelbase_m, STEP_S))
         return np.array(state)
 
 

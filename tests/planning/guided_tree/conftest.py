@@ -178,8 +178,8 @@ class Replay:
         for r in range(self.robots):
             robot = self.fleet[r]
             after[r] = STEP(
-                *self.vertices.state[v, r],
-                *control[r],
+                self.vertices.state[v, r],
+                control[r],
                 float(robot["wheelbase"]),
                 self.params.dt_s,
             )
