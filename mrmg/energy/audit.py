@@ -253,7 +253,6 @@ def _goals_visited(scene: Scene, log: ExecutionLog) -> tuple[str, ...]:
         goal.id
         for goal in scene.goals
         if any(
-            first_stay(goal, log.time_s, state[:, :2], 0) is not None
-            for state in log.state
+            first_stay(goal, log.time_s, state, 0) is not None for state in log.state
         )
     )

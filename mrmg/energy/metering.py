@@ -179,7 +179,7 @@ def find_visits(scene: Scene, motion: Motion, tour: Sequence[str]) -> tuple[Visi
     step = 0
     for name in tour:
         target = targets[name]
-        stay = first_stay(target, motion.time_s, motion.state[:, :2], step)
+        stay = first_stay(target, motion.time_s, motion.state, step)
         if stay is None:
             continue
         step = stay.over

@@ -101,7 +101,7 @@ def over_s(scene: Scene, log: ExecutionLog) -> float:
     moving = np.flatnonzero((np.abs(rates) > AT_REST).any(axis=0))
     last = min(int(moving.max(initial=-1)) + 1, len(log.time_s) - 1)
     stays = [
-        [first_stay(goal, log.time_s, state[:, :2], 0) for state in log.state]
+        [first_stay(goal, log.time_s, state, 0) for state in log.state]
         for goal in scene.goals
     ]
     ends = [[stay.over for stay in found if stay] for found in stays]

@@ -1,6 +1,7 @@
 """What counts as a visit, and what it does to the battery: one rule for everybody.
 
-A robot is at a goal or station while its reference point lies in the region. A visit is
+A robot is at a goal or station while its reference point lies in the region and its yaw
+is within the tolerance of the goal's heading, if it has one. A visit is
 the first stay, after the visit before it is over, that lasts the target's dwell time
 without a break; it begins with the stay and is over when that time is. A station fills
 the battery at once as the visit begins, or with its charging power for as long as the
@@ -41,19 +42,36 @@ class Stay:
     over: int
 
 
+def is_at(
+    target: Goal | Station, poses: np.ndarray, depth_m: float = 0.0
+) -> np.ndarray:
+    """Return whether a robot is at a target, shape (n,).
+
+    Args:
+        target: a goal or station.
+        poses: of its reference point, x, y [m], yaw [rad] and what else there is,
+            shape (n, 3 or more).
+        depth_m: how deep in the region it must be.
+    """
+    at = np.asarray(target.region.depth(poses[:, :2]) >= depth_m)
+    if isinstance(target, Station) or target.heading_rad is None:
+        return at
+    off_rad = (poses[:, 2] - target.heading_rad + np.pi) % (2.0 * np.pi) - np.pi
+    return at & (np.abs(off_rad) <= target.heading_tolerance_rad)
+
+
 def first_stay(
-    target: Goal | Station, time_s: np.ndarray, points: np.ndarray, start: int
+    target: Goal | Station, time_s: np.ndarray, poses: np.ndarray, start: int
 ) -> Stay | None:
     """Return the first stay from state `start` on that is a visit, None without one.
 
     Args:
         target: where to stay.
         time_s: of the states, shape (n,).
-        points: positions of the reference point [m], shape (n, 2).
+        poses: as `is_at` takes them.
         start: index of the first state that counts.
     """
-    inside = target.region.depth(points[start:]) >= 0.0
-    for first, end in runs(inside):
+    for first, end in runs(is_at(target, poses[start:])):
         spent_s = time_s[start + first : start + end] - time_s[start + first]
         long_enough = spent_s >= target.dwell_s - ROUNDING_S
         if long_enough.any():
@@ -62,12 +80,14 @@ def first_stay(
 
 
 def longest_stay_s(
-    target: Goal | Station, time_s: np.ndarray, points: np.ndarray
+    target: Goal | Station, time_s: np.ndarray, poses: np.ndarray
 ) -> float:
     """Return how long the longest stay lasts, which may be 0; -inf without any."""
-    inside = target.region.depth(points) >= 0.0
     return max(
-        (float(time_s[end - 1] - time_s[first]) for first, end in runs(inside)),
+        (
+            float(time_s[end - 1] - time_s[first])
+            for first, end in runs(is_at(target, poses))
+        ),
         default=-np.inf,
     )
 

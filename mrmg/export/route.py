@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from mrmg.energy.visits import is_at
 from mrmg.plans import Plan, Trajectory, Visit
 from mrmg.scene.types import Goal, Scene, Station
 
@@ -88,8 +89,8 @@ def route_of(scene: Scene, plan: Plan, robot: str) -> Route:
 def _visited(trajectory: Trajectory, visit: Visit, target: Goal | Station) -> Node:
     """Return the node of a visit: where it stands or is deepest in the region."""
     depth_m = target.region.depth(trajectory.state[visit.step :, :2])
-    outside = depth_m < 0.0
-    depth_m = depth_m[: int(outside.argmax()) if outside.any() else len(outside)]
+    away = ~is_at(target, trajectory.state[visit.step :])
+    depth_m = depth_m[: int(away.argmax()) if away.any() else len(away)]
     end = visit.step + len(depth_m)
     moving = np.abs(trajectory.state[visit.step : end, 3]) >= STANDING_M_S
     at = int(depth_m.argmax() if moving.all() else moving.argmin())

@@ -27,7 +27,8 @@ from mrmg.planning.free_ground import FreeGround, bottleneck
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.path_bounds import Walls, outer_polygon, shortest_way_m
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
-from mrmg.scene.types import Region, Robot, Scene
+from mrmg.scene.region import Region
+from mrmg.scene.types import Robot, Scene
 
 
 def require_robots(scene: Scene) -> None:

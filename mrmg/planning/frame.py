@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from itertools import compress
 from math import pi, remainder, tau
+from typing import TypeVar
 
 import numpy as np
 import shapely
@@ -25,7 +26,10 @@ from mrmg.planning.path_following import _tracking_kernels
 from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Plan
 from mrmg.scene.elevation import Elevation
-from mrmg.scene.types import Finish, Region, Robot, Scene
+from mrmg.scene.region import Region
+from mrmg.scene.types import Finish, Goal, Robot, Scene
+
+_Target = TypeVar("_Target", Goal, Finish)
 
 DECIMALS = 9
 """Of coordinates in the frame: fewer than what rounding takes away from them."""
@@ -121,9 +125,7 @@ class Frame:
             terrain=tuple(
                 replace(item, shape=self._shape(item.shape)) for item in scene.terrain
             ),
-            goals=tuple(
-                replace(item, region=self._region(item.region)) for item in scene.goals
-            ),
+            goals=tuple(self._target(item) for item in scene.goals),
             stations=tuple(
                 replace(item, region=self._region(item.region))
                 for item in scene.stations
@@ -145,15 +147,15 @@ class Frame:
 
     def _robot(self, robot: Robot) -> Robot:
         (x, y), yaw = self.points(np.array(robot.pose[:2]))[0], robot.pose[2]
-        finish = robot.finish and self._finish(robot.finish)
+        finish = robot.finish and self._target(robot.finish)
         pose = (float(x), float(y), self.heading(yaw))
         return replace(robot, pose=pose, finish=finish)
 
-    def _finish(self, finish: Finish) -> Finish:
-        yaw = finish.heading_rad
+    def _target(self, target: _Target) -> _Target:
+        yaw = target.heading_rad
         return replace(
-            finish,
-            region=self._region(finish.region),
+            target,
+            region=self._region(target.region),
             heading_rad=None if yaw is None else self.heading(yaw),
         )
 

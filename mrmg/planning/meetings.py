@@ -82,8 +82,8 @@ def _width_between(walls: BaseGeometry, point: Point) -> float:
 
 
 def _points(path: np.ndarray) -> np.ndarray:
-    if len(path) < 2:
-        return path
+    if not np.ptp(path, axis=0).any():  # it ends where it begins
+        return path[:1]
     line = shapely.segmentize(shapely.LineString(path), SPACING_M)
     return np.asarray(shapely.get_coordinates(line))
 

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from mrmg.scene.types import Region
+from mrmg.scene.region import Region
 
 
 @dataclass(frozen=True)

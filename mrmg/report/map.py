@@ -17,7 +17,7 @@ from mrmg.viz import style
 from mrmg.viz.activities import breakdowns, lengths_along, visit_ranks
 from mrmg.viz.contours import contour_lines
 from mrmg.viz.map_labels import KINDS, MapLabel, map_labels
-from mrmg.viz.map_shapes import enclosing_circle, end_poses
+from mrmg.viz.map_shapes import enclosing_circle, end_poses, wanted_headings
 from mrmg.viz.scene_drawing import polygons_of
 
 _SVG = macros("map.svg.jinja")
@@ -122,6 +122,14 @@ class _Canvas:
         ranks = visit_ranks(plan) if plan else {}
         for target in self._scene.targets():
             yield self._target(target, ranks.get(target.id, []))
+        for robot in self._scene.robots:
+            if robot.finish:
+                color = f"--c:var(--r{self._index[robot.id]})"
+                tip = f"finish of {robot.id}"
+                yield self._shape(robot.finish.region.shape, "finish", tip, color)
+        for name, arrow, heading_rad in wanted_headings(self._scene):
+            tip = f"{name}: heading {heading_rad:.2f} rad"
+            yield self._shape(arrow, "heading", tip)
 
     def _target(self, target: Goal | Station, visits: list[tuple[str, int]]) -> Markup:
         station = isinstance(target, Station)

@@ -20,15 +20,16 @@ from mrmg.errors import Fault, SceneError
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.margins import STATES_NONE
 from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
+from mrmg.scene.region import HEADING_TOLERANCE_RAD
 from mrmg.scene.robot_model import RobotModel
 
 if TYPE_CHECKING:
+    from mrmg.scene.region import Region
     from mrmg.scene.types import (
         Battery,
         Finish,
         Goal,
         Obstacle,
-        Region,
         Robot,
         Scene,
         Station,
@@ -140,7 +141,10 @@ def terrain_entry(area: TerrainArea) -> _Entry:
 def goal_entry(goal: Goal) -> _Entry:
     """Return the entry of a goal."""
     entry = {"id": goal.id, **_region(goal.region)}
-    return {**entry, "dwell": float(goal.dwell_s)} if goal.dwell_s else entry
+    if goal.dwell_s:
+        entry["dwell"] = float(goal.dwell_s)
+    stated = (goal.heading_rad, goal.heading_tolerance_rad)
+    return entry | (_heading(goal) if stated != (None, HEADING_TOLERANCE_RAD) else {})
 
 
 def station_entry(station: Station) -> _Entry:
@@ -240,10 +244,13 @@ def _region(region: Region) -> _Entry:
 
 
 def _finish(finish: Finish) -> _Entry:
-    entry = _region(finish.region)
-    if finish.heading_rad is not None:
-        entry["heading"] = float(finish.heading_rad)
-    entry["heading_tolerance"] = float(finish.heading_tolerance_rad)
+    return {**_region(finish.region), **_heading(finish)}
+
+
+def _heading(target: Goal | Finish) -> _Entry:
+    entry = {"heading_tolerance": float(target.heading_tolerance_rad)}
+    if target.heading_rad is not None:
+        entry["heading"] = float(target.heading_rad)
     return entry
 
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
-import numpy as np
 from shapely.geometry import Polygon
 
-from mrmg.scene.content import ByContent, content, content_digest, contents
+from mrmg.scene.content import content_digest, contents
 from mrmg.scene.document import is_as_loaded, scene_document
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.margins import STATES_NONE, Margins
 from mrmg.scene.objective import ENERGY, Objective
+from mrmg.scene.region import HEADING_TOLERANCE_RAD, Region
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.slopes import STEEP, steep_ground
 from mrmg.scene.written import WrittenScene
@@ -68,58 +68,6 @@ class TerrainArea:
     energy_spread: float = 0.0
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Region(ByContent):
-    """A convex set of positions: a circle or a convex polygon.
-
-    Attributes:
-        center: [m], shape (2,): the circle's centre or the polygon's centroid.
-        radius_m: of the circle; 0 for a polygon.
-        corners: counter-clockwise [m], shape (n, 2); shape (0, 2) for a circle.
-    """
-
-    center: np.ndarray
-    radius_m: float
-    corners: np.ndarray
-
-    def content(self) -> dict[str, Any]:
-        """Return what counts for a digest; the last bits of a centroid do not."""
-        if not len(self.corners):
-            return contents(self)
-        center = [round(float(value), 9) for value in self.center]
-        return {
-            **contents(self),
-            "center": content(center),
-            "corners": content(Polygon(self.corners)),
-        }
-
-    @cached_property
-    def shape(self) -> Polygon:
-        """The region as a polygon (a circle with 64 sides, from within)."""
-        if len(self.corners):
-            return Polygon(self.corners)
-        angle = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
-        ring = np.stack([np.cos(angle), np.sin(angle)], axis=1) * self.radius_m
-        return Polygon(ring + self.center)
-
-    def depth(self, points: np.ndarray) -> np.ndarray:
-        """Return how far points lie inside [m]; negative outside. Shape (n, 2) -> (n,).
-
-        The depth is the distance to the nearest side's line (or to the circle), so a
-        point is in the region exactly when its depth is not negative.
-        """
-        points = np.atleast_2d(points)
-        if not len(self.corners):
-            offset = points - self.center
-            return np.asarray(self.radius_m - np.hypot(offset[:, 0], offset[:, 1]))
-        start = self.corners
-        edge = np.roll(start, -1, axis=0) - start
-        edge = edge / np.hypot(edge[:, 0], edge[:, 1])[:, None]
-        offset = points[:, None, :] - start[None]
-        inside = edge[None, :, 0] * offset[..., 1] - edge[None, :, 1] * offset[..., 0]
-        return np.asarray(inside.min(axis=1))
-
-
 @dataclass(frozen=True, kw_only=True)
 class Goal:
     """A region that some robot's reference point must enter once.
@@ -128,11 +76,15 @@ class Goal:
         id: unique name.
         region: where it is.
         dwell_s: how long the robot must stay there without a break.
+        heading_rad: its yaw there; None for any.
+        heading_tolerance_rad: allowed deviation from the heading.
     """
 
     id: str
     region: Region
     dwell_s: float = 0.0
+    heading_rad: float | None = None
+    heading_tolerance_rad: float = HEADING_TOLERANCE_RAD
 
 
 @dataclass(frozen=True, kw_only=True)

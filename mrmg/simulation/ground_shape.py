@@ -9,7 +9,8 @@ import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
-from mrmg.scene.types import Region, Scene
+from mrmg.scene.region import Region
+from mrmg.scene.types import Scene
 from mrmg.world.elevation import height_at
 
 FACET_M = 1.0

@@ -13,7 +13,8 @@ import shapely
 from shapely.geometry import Polygon
 
 from mrmg.scene.driven_parts import FLOOR_BIT, OBSTACLE_BIT
-from mrmg.scene.types import Obstacle, Region, Scene
+from mrmg.scene.region import Region
+from mrmg.scene.types import Obstacle, Scene
 from mrmg.simulation import palette
 from mrmg.simulation.convex import convex_pieces, triangles
 from mrmg.simulation.ground_shape import (

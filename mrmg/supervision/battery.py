@@ -6,7 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mrmg.energy.visits import Stay, battery_contents, first_stay, recharging
+from mrmg.energy.visits import (
+    Stay,
+    battery_contents,
+    first_stay,
+    is_at,
+    recharging,
+)
 from mrmg.plans import Visit
 from mrmg.scene.types import Robot, Scene, Station
 
@@ -26,27 +32,27 @@ class BatteryTracker:
         self._tour: list[str] = []
         self._begun_J = self.charge_J
         self._time_s = np.zeros(0)
-        self._points, self._draw_J = np.zeros((0, 2)), np.zeros(0)
+        self._poses, self._draw_J = np.zeros((0, 3)), np.zeros(0)
 
     def follow(self, tour: Sequence[str]) -> None:
         """Expect the visits of a tour from now on."""
         self._tour = list(tour)
         self._begun_J = self.charge_J
         self._time_s = np.zeros(0)
-        self._points, self._draw_J = np.zeros((0, 2)), np.zeros(0)
+        self._poses, self._draw_J = np.zeros((0, 3)), np.zeros(0)
 
-    def add(self, time_s: np.ndarray, points: np.ndarray, draw_J: np.ndarray) -> None:
+    def add(self, time_s: np.ndarray, poses: np.ndarray, draw_J: np.ndarray) -> None:
         """Take in some ticks.
 
         Args:
             time_s: of the state before the first tick and after each, shape (n + 1,).
-            points: of the reference point at these times [m], shape (n + 1, 2).
+            poses: x, y [m] and yaw [rad] at these times, shape (n + 1, 3).
             draw_J: energy drawn over each tick, shape (n,).
         """
         if not len(self._time_s):
-            self._time_s, self._points = time_s[:1], points[:1]
+            self._time_s, self._poses = time_s[:1], poses[:1]
         self._time_s = np.concatenate([self._time_s, time_s[1:]])
-        self._points = np.concatenate([self._points, points[1:]])
+        self._poses = np.concatenate([self._poses, poses[1:]])
         self._draw_J = np.concatenate([self._draw_J, draw_J])
         stays = self._stays()
         visits = [
@@ -54,7 +60,7 @@ class BatteryTracker:
             for name, stay in zip(self._tour, stays, strict=False)
         ]
         given = recharging(
-            self._scene, self._robot.id, self._time_s, self._points, visits
+            self._scene, self._robot.id, self._time_s, self._poses[:, :2], visits
         )
         before_J, after_J = battery_contents(
             self._robot.battery, self._draw_J, given, {0: self._begun_J}
@@ -72,7 +78,7 @@ class BatteryTracker:
     def _keep(self, first: int, content_J: np.ndarray) -> None:
         """Forget what was before a state."""
         self._begun_J = float(content_J[first])
-        self._time_s, self._points = self._time_s[first:], self._points[first:]
+        self._time_s, self._poses = self._time_s[first:], self._poses[first:]
         self._draw_J = self._draw_J[first:]
 
     def _stays(self) -> list[Stay]:
@@ -80,7 +86,7 @@ class BatteryTracker:
         stays: list[Stay] = []
         for name in self._tour:
             start = stays[-1].over if stays else 0
-            stay = first_stay(self._targets[name], self._time_s, self._points, start)
+            stay = first_stay(self._targets[name], self._time_s, self._poses, start)
             if stay is None:
                 break
             stays.append(stay)
@@ -102,5 +108,5 @@ class BatteryTracker:
         last = len(self._time_s) - 1
         if not self._tour:
             return last
-        outside = self._targets[self._tour[0]].region.depth(self._points) < 0.0
-        return min(last, int(np.flatnonzero(np.append(True, outside))[-1]))
+        away = ~is_at(self._targets[self._tour[0]], self._poses)
+        return min(last, int(np.flatnonzero(np.append(True, away))[-1]))

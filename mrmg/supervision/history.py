@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence, Set
 import numpy as np
 
 from mrmg.energy.metering import LoggedMotion, find_visits
-from mrmg.energy.visits import first_stay
+from mrmg.energy.visits import first_stay, is_at
 from mrmg.scene.types import Goal, Scene
 from mrmg.simulation.supervision import Observation
 from mrmg.supervision.metering import RobotMeter
@@ -55,7 +55,7 @@ class History:
     def _is_visited(self, goal: Goal) -> bool:
         time_s = np.array(self._time_s)
         return any(
-            (goal.region.depth(path) >= VISITED_DEPTH_M).any()
+            is_at(goal, path, VISITED_DEPTH_M).any()
             and first_stay(goal, time_s, path, 0) is not None
             for path in self._paths().values()
         )
@@ -85,6 +85,6 @@ class History:
         return entered
 
     def _paths(self) -> dict[str, np.ndarray]:
-        """Return where each robot was seen [m], shape (n, 2) each."""
-        paths = np.stack(self._state, axis=1)[..., :2]
+        """Return the poses in which each robot was seen, shape (n, 3) each."""
+        paths = np.stack(self._state, axis=1)[..., :3]
         return dict(zip(self._robots, paths, strict=True))

@@ -86,7 +86,7 @@ class RobotMeter:
         parts_J = measured_energy_parts(self.robot, work_J, time_s)
         draw_J = parts_J.sum(axis=1)
         self.used_J += float(draw_J.sum())
-        self._battery.add(time_s, state[:, :2], draw_J)
+        self._battery.add(time_s, state[:, :3], draw_J)
         self._estimate(time_s, state, parts_J[:, _DRIVE])
 
     def _estimate(

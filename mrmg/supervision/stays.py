@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrmg.energy.visits import runs
+from mrmg.energy.visits import is_at, runs
 from mrmg.plans import Visit
 from mrmg.scene.types import Goal
 
@@ -40,12 +40,13 @@ def stays_under_way(
     Args:
         goals: that still miss their visit.
         time_s: of what was seen, shape (n,).
-        paths: positions of robots in service at these times [m], shape (n, 2) each.
+        paths: poses of robots in service at these times, x, y [m] and yaw [rad], shape
+            (n, 3) each.
     """
     found: dict[str, OngoingStay] = {}
     for goal in goals:
         for robot, path in paths.items():
-            stays = runs(goal.region.depth(path) >= VISITED_DEPTH_M)
+            stays = runs(is_at(goal, path, VISITED_DEPTH_M))
             if not stays or stays[-1][1] < len(path):
                 continue
             stayed_s = float(time_s[-1] - time_s[stays[-1][0]])

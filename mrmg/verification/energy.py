@@ -106,8 +106,18 @@ def account_of(
 
 
 def stays_of(target: Goal | Station, trajectory: Trajectory) -> list[Run]:
-    """Return the runs of states at which the reference point is at a target."""
+    """Return the runs of states at which a robot is at a target, as it is wanted."""
     return _runs(_is_at(target, trajectory))
+
+
+def off_heading_rad(goal: Goal, trajectory: Trajectory) -> np.ndarray:
+    """Return how far each yaw is off a goal's heading; 0 where it has none."""
+    if goal.heading_rad is None:
+        return np.zeros(len(trajectory.state))
+    # As the angle between two directions, rather than as the planner reckons it.
+    along = np.cos(trajectory.state[:, 2] - goal.heading_rad)
+    across = np.sin(trajectory.state[:, 2] - goal.heading_rad)
+    return np.abs(np.arctan2(across, along))
 
 
 def longest_stay_s(target: Goal | Station, trajectory: Trajectory) -> float:
@@ -126,7 +136,10 @@ def shared_stays(
 
 
 def _is_at(target: Goal | Station, trajectory: Trajectory) -> np.ndarray:
-    return np.asarray(target.region.depth(trajectory.state[:, :2]) >= 0.0)
+    at = np.asarray(target.region.depth(trajectory.state[:, :2]) >= 0.0)
+    if isinstance(target, Goal):
+        at &= off_heading_rad(target, trajectory) <= target.heading_tolerance_rad
+    return at
 
 
 def _runs(flags: np.ndarray) -> list[Run]:

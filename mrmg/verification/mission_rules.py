@@ -16,6 +16,7 @@ from mrmg.verification.energy import (
     MotionAccount,
     account_of,
     longest_stay_s,
+    off_heading_rad,
     shared_stays,
 )
 from mrmg.verification.motion_rules import violation_at, worst_of_runs
@@ -72,9 +73,33 @@ def _check_goals(scene: Scene, plan: Plan) -> list[Violation]:
                     other=goal.id,
                 )
             )
-        elif goal.dwell_s > 0.0:
+            continue
+        askew = _check_heading(plan, goal)
+        violations += askew
+        if goal.dwell_s > 0.0 and not askew:
             violations += _check_dwell(plan, goal)
     return violations
+
+
+def _check_heading(plan: Plan, goal: Goal) -> list[Violation]:
+    """Check that some robot is at a goal with its heading."""
+    best: tuple[float, Trajectory, int] = (np.inf, plan.trajectories[0], 0)
+    for item in plan.trajectories:
+        inside = goal.region.depth(item.state[:, :2]) >= 0.0
+        off_rad = np.where(inside, off_heading_rad(goal, item), np.inf)
+        step = int(off_rad.argmin())
+        best = min(best, (float(off_rad[step]), item, step), key=lambda one: one[0])
+    off, trajectory, step = best
+    excess = off - goal.heading_tolerance_rad
+    if goal.heading_rad is None or excess <= 0.0:
+        return []
+    found, most = compared(off, goal.heading_tolerance_rad, 2)
+    message = (
+        f"goal {goal.id} is visited with its heading by no robot; this one comes "
+        f"nearest, {found} rad off, {most} are allowed"
+    )
+    kind = ViolationKind.HEADING
+    return [violation_at(trajectory, step, kind, message, amount=excess, other=goal.id)]
 
 
 def _check_dwell(plan: Plan, goal: Goal) -> list[Violation]:

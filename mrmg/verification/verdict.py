@@ -31,6 +31,7 @@ class ViolationKind(Enum):
     MARGIN = "margin"
     OCCUPIED = "occupied"
     GOAL_MISSED = "goal_missed"
+    HEADING = "heading"
     DWELL = "dwell"
     TOUR = "tour"
     VISIT = "visit"
@@ -57,6 +58,7 @@ class ViolationKind(Enum):
             ViolationKind.MARGIN: "m",
             ViolationKind.OCCUPIED: "s",
             ViolationKind.GOAL_MISSED: "m",
+            ViolationKind.HEADING: "rad",
             ViolationKind.DWELL: "s",
             ViolationKind.TOUR: "m",
             ViolationKind.VISIT: "s",

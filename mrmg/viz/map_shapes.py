@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from shapely import box
 from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.plans import Plan
+from mrmg.scene.region import Region
 from mrmg.scene.robot_model import placed
-from mrmg.scene.types import Region, Robot, Scene
+from mrmg.scene.types import Robot, Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.viz.label_placement import Occupied
 
@@ -30,6 +33,32 @@ def end_poses(
     return {
         robot: (float(at[0]), float(at[1]), float(at[2])) for robot, at in ends.items()
     }
+
+
+def heading_arrow(region: Region, heading_rad: float) -> Polygon:
+    """Return a triangle beside a region that points where a robot's nose shall."""
+    reach_m = float(
+        np.hypot(*(np.array(region.shape.exterior.coords) - region.center).T).max()
+    )
+    ahead = np.array([np.cos(heading_rad), np.sin(heading_rad)])
+    aside = np.array([-ahead[1], ahead[0]])
+    corners = [1.1 * ahead + 0.5 * aside, 2.0 * ahead, 1.1 * ahead - 0.5 * aside]
+    return Polygon(region.center + reach_m * np.array(corners))
+
+
+def wanted_headings(scene: Scene) -> Iterator[tuple[str, Polygon, float]]:
+    """Yield whose heading it is (of a goal, or a robot's finish), its arrow and it."""
+    for goal in scene.goals:
+        if goal.heading_rad is not None:
+            yield (
+                goal.id,
+                heading_arrow(goal.region, goal.heading_rad),
+                goal.heading_rad,
+            )
+    for robot in scene.robots:
+        if robot.finish and robot.finish.heading_rad is not None:
+            yaw = robot.finish.heading_rad
+            yield f"finish of {robot.id}", heading_arrow(robot.finish.region, yaw), yaw
 
 
 def enclosing_circle(

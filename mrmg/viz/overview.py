@@ -165,6 +165,7 @@ def _draw_targets(axes: Axes, scene: Scene, plan: Plan | None) -> None:
             _draw_rank(axes, goal.region.center, str(visits[0][1]))
     for station in scene.stations:
         scene_drawing.draw_station(axes, station)
+    scene_drawing.draw_wanted_poses(axes, scene)
 
 
 def _draw_rank(axes: Axes, center: np.ndarray, text: str) -> None:

@@ -14,14 +14,16 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.patheffects import withStroke
-from shapely import MultiPolygon, Polygon, box
+from shapely import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
 from mrmg import storage
-from mrmg.scene.types import Goal, Region, Robot, Scene, Station
+from mrmg.scene.region import Region
+from mrmg.scene.types import Goal, Robot, Scene, Station
 from mrmg.viz import style
 from mrmg.viz.contours import draw_contours
 from mrmg.viz.map_labels import BOLD, MapLabel, map_labels
+from mrmg.viz.map_shapes import wanted_headings
 
 DPI = 110
 _MAP_INCHES = 8.6
@@ -98,6 +100,7 @@ def draw_scene(scene: Scene, path: Path) -> None:
         draw_goal(axes, goal)
     for station in scene.stations:
         draw_station(axes, station)
+    draw_wanted_poses(axes, scene)
     draw_robots(axes, scene)
     axes.set_title(_title(scene), loc="left", fontsize=12, color=style.INK)
     add_legend(axes, map_legend(scene))
@@ -221,6 +224,17 @@ def draw_station(
     )
 
 
+def draw_wanted_poses(axes: Axes, scene: Scene) -> None:
+    """Draw where robots must end, and the headings of finishes and goals."""
+    colors = style.scene_robot_colors(scene)
+    for robot in scene.robots:
+        if robot.finish:
+            look = {"edgecolor": colors[robot.id], "linestyle": (0, (2, 1.5))}
+            _add_shape(axes, robot.finish.region.shape, fill=False, zorder=5, **look)
+    for _, arrow, _ in wanted_headings(scene):
+        _add_shape(axes, arrow, facecolor=style.GOAL_EDGE, linewidth=0.0, zorder=5)
+
+
 def draw_region(
     axes: Axes, region: Region, color: str, edge: str, linewidth: float
 ) -> None:
@@ -332,6 +346,4 @@ def polygons_of(shape: BaseGeometry) -> list[Polygon]:
     """Return the polygons a geometry is made of; lines and points are left out."""
     if isinstance(shape, Polygon):
         return [shape] if not shape.is_empty else []
-    if isinstance(shape, MultiPolygon) or hasattr(shape, "geoms"):
-        return [part for item in shape.geoms for part in polygons_of(item)]
-    return []
+    return [part for item in getattr(shape, "geoms", ()) for part in polygons_of(item)]

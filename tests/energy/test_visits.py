@@ -18,7 +18,8 @@ from mrmg.energy.visits import (
 )
 from mrmg.plans import Visit
 from mrmg.scene.loading import scene_from_document
-from mrmg.scene.types import Battery, Goal, Region, Scene
+from mrmg.scene.region import Region
+from mrmg.scene.types import Battery, Goal, Scene
 
 DT_S = 0.5
 AT, AWAY = (0.0, 0.0), (9.0, 0.0)
@@ -47,6 +48,26 @@ def test_a_visit_is_the_first_stay_that_is_long_enough(
 ) -> None:
     goal = Goal(id="g", region=ROUND, dwell_s=dwell_s)
     assert first_stay(goal, *way(presence), start) == stay
+
+
+@pytest.mark.parametrize(
+    ("heading", "yaw", "visited"),
+    [
+        (None, 2.0, True),
+        (2.0, 2.2, True),
+        (2.0, 1.69, False),
+        (np.pi, -np.pi + 0.29, True),  # across the seam of angles
+        (-3.0, 3.0 + 2.0 * np.pi, True),  # yaws of drives count full turns
+        (0.0, np.pi, False),
+    ],
+)
+def test_a_goal_with_a_heading_is_visited_with_it(
+    heading: float | None, yaw: float, visited: bool
+) -> None:
+    goal = Goal(id="g", region=ROUND, heading_rad=heading, heading_tolerance_rad=0.3)
+    time_s, points = way("..xx..")
+    poses = np.column_stack([points, np.full(len(points), yaw)])
+    assert (first_stay(goal, time_s, poses, 0) == Stay(2, 2)) == visited
 
 
 @given(st.text(alphabet="x.", min_size=1, max_size=60), st.integers(0, 12))

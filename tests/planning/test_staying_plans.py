@@ -47,7 +47,7 @@ def test_robots_stand_at_goals_for_their_dwell_times(seed: int) -> None:
     for goal in scene.goals:
         (visit,) = [item for item in plan.visits if item.target == goal.id]
         motion = plan.trajectory(visit.robot)
-        stay = first_stay(goal, motion.time_s, motion.state[:, :2], visit.step)
+        stay = first_stay(goal, motion.time_s, motion.state, visit.step)
         assert stay is not None and stay.first == visit.step
         if goal.dwell_s > 0.0:
             inside = goal.region.depth(motion.state[:, :2]) >= 0.0

@@ -23,8 +23,9 @@ from mrmg.scene.loading import (
 )
 from mrmg.scene.loading.yaml_text import parse_yaml
 from mrmg.scene.motor import Motor
+from mrmg.scene.region import Region
 from mrmg.scene.robot_model import RobotModel
-from mrmg.scene.types import Battery, Goal, Region, Robot, Scene
+from mrmg.scene.types import Battery, Goal, Robot, Scene
 
 EDGE_SCENES = Path(__file__).parents[1] / "scenes"
 ALL_SCENES = [

@@ -43,7 +43,7 @@ def test_verdict_survives_saving(
 def test_rows_name_kind_and_unit(kind: ViolationKind) -> None:
     row = verdict_with(kind).violations[0].to_row()
     assert row["kind"] == kind.value
-    assert row["unit"] in {"1", "SI", "m", "m^2", "s", "J"}
+    assert row["unit"] in {"1", "SI", "m", "m^2", "rad", "s", "J"}
 
 
 @pytest.mark.parametrize(

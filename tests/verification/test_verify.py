@@ -19,7 +19,8 @@ from hypothesis import strategies as st
 
 from mrmg.energy.ledger import EnergyLedger
 from mrmg.plans import Plan, Trajectory
-from mrmg.scene.types import Battery, Finish, Region, Scene
+from mrmg.scene.region import Region
+from mrmg.scene.types import Battery, Finish, Scene
 from mrmg.verification.verdict import Verdict, Violation, ViolationKind
 from mrmg.verification.verify import verify
 
@@ -136,6 +137,13 @@ def broken_dwell(case: Any, drive: Any) -> Case:
     return asked(scene, plan, goals=(replace(scene.goals[0], dwell_s=900.0),))
 
 
+def broken_heading(case: Any, drive: Any) -> Case:
+    """The car drives along the x axis, and never the other way round."""
+    scene, plan = case()
+    across = replace(scene.goals[0], heading_rad=1.5, heading_tolerance_rad=0.2)
+    return asked(scene, plan, goals=(across,))
+
+
 def broken_occupied(case: Any, drive: Any) -> Case:
     station = {"id": "s", "circle": {"center": [5, 12], "radius": 3}}
     scene, plan = case(robots=TWO_ROBOTS, stations=[station])
@@ -195,6 +203,7 @@ FOLLOWING = {
     Kind.CONTROL_LIMIT: {Kind.VISIT, Kind.LEDGER},
     Kind.TOUR: {Kind.VISIT, Kind.LEDGER},
     Kind.GOAL_MISSED: {Kind.TOUR},
+    Kind.HEADING: {Kind.TOUR, Kind.VISIT, Kind.LEDGER},
     Kind.DWELL: {Kind.TOUR, Kind.VISIT, Kind.LEDGER},
     Kind.RECHARGE: {Kind.VISIT},
     Kind.ENERGY: {Kind.VISIT},

@@ -10,7 +10,8 @@ from typing import Any, TypeVar
 import numpy as np
 
 from mrmg.plans import Plan, Trajectory
-from mrmg.scene.types import Region, Scene
+from mrmg.scene.region import Region
+from mrmg.scene.types import Scene
 
 Case = tuple[Scene, Plan]
 Make = Callable[[Scene, Plan, Random], Case]

@@ -28,7 +28,7 @@ from mrmg.planning.bound.borders import (
     sagitta_m,
 )
 from mrmg.planning.bound.geodesic import Field, Ground, Look, Ways
-from mrmg.scene.types import Region
+from mrmg.scene.region import Region
 
 SECTORS = 64
 """Directions that waves leave regions in."""

@@ -9,7 +9,7 @@ import shapely
 from shapely.geometry import Point
 from shapely.ops import substring
 
-from mrmg.scene.types import Region
+from mrmg.scene.region import Region
 
 SPACING_M = 0.04
 """Distance of the points that stand for a region's border."""

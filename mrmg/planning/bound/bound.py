@@ -48,7 +48,8 @@ from mrmg.planning.halting import NEVER, check
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import routing_arrays
-from mrmg.scene.types import Region, Robot, Scene
+from mrmg.scene.region import Region
+from mrmg.scene.types import Robot, Scene
 
 CELLS = 30_000
 """Cells of the grid on which ways are bounded."""

@@ -21,7 +21,8 @@ from mrmg.planning.bound._eikonal_kernels import UNREACHED
 from mrmg.planning.bound.borders import ARCS, SPACING_M, border, distances_m
 from mrmg.planning.bound.prices import least_prices
 from mrmg.planning.halting import NEVER, check
-from mrmg.scene.types import Region, Robot, Scene
+from mrmg.scene.region import Region
+from mrmg.scene.types import Robot, Scene
 
 ROUNDS = 3
 """Solutions of the eikonal equation at most per field."""

@@ -28,6 +28,9 @@ def unknown_features(scene: Scene) -> list[str]:
     """Return the features of a scene that the paper lacks, each with its place."""
     places = {
         "dwell times": [item.id for item in scene.targets() if item.dwell_s > 0.0],
+        "goals with headings": [
+            goal.id for goal in scene.goals if goal.heading_rad is not None
+        ],
         "stations for one robot at a time": [
             station.id for station in scene.stations if station.one_at_a_time
         ],

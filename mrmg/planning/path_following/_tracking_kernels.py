@@ -9,7 +9,7 @@ from mrmg.motion._kernels import step
 from mrmg.planning.path_following._following_kernels import track_control, turned
 from mrmg.planning.problem._clearance_kernels import clear_of_obstacles
 from mrmg.planning.problem._control_kernels import stands
-from mrmg.planning.problem._target_kernels import in_target
+from mrmg.planning.problem._target_kernels import askew, in_target
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.world._kernels import multiplier_in
 
@@ -58,7 +58,7 @@ def drive(own, spaces, terrain, course, dt, spent_s, state, control):
 
 @kernel
 def first_inside(targets, t, state, first):
-    """Return the first of the states from `first` on in a target; their number if none.
+    """Return the first of the states from `first` on at a target; their number if none.
 
     Args:
         targets: the targets.
@@ -67,7 +67,10 @@ def first_inside(targets, t, state, first):
         first: number of a state.
     """
     for k in range(first, len(state)):
-        if in_target(targets, t, state[k, 0], state[k, 1]):
+        # A robot ends with its finish's heading; it may enter it with any.
+        if in_target(targets, t, state[k, 0], state[k, 1]) and (
+            t >= targets.places or askew(targets, t, state[k]) == 0.0
+        ):
             return k
     return len(state)
 

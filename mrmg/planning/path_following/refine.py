@@ -28,8 +28,7 @@ from mrmg.planning.path_following.cost_map import cost_map_of, inflated, smooth_
 from mrmg.planning.path_following.pauses import with_pauses
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.path_following.tracking import Drive, Motion, drive_alone
-from mrmg.planning.problem._control_kernels import wrap
-from mrmg.planning.problem._target_kernels import Targets, in_target
+from mrmg.planning.problem._target_kernels import Targets, at_target
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.problem.targets import TARGET_MARGIN_M
 from mrmg.planning.problem.time_weighting import energy_share
@@ -142,7 +141,7 @@ def drive_paths(
         if halt[0]:
             return FleetDrive(())
         drive, failure = _driven(problem, r, task)
-        if drive is None and not problem.steered_home[r]:
+        if drive is None and failure:
             return FleetDrive((), failure)
         drives.append(drive)
     trajectories = coordinated(
@@ -182,8 +181,12 @@ def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, st
             task.inflations.append(place)
             task.cost_map = inflated(task.cost_map, place)
             task.smooth(problem, SPACINGS_M[-1:])
-        elif _entered_deeper(problem, task, drive.motion.state):
+        elif len(visit_steps(targets, task.tour, drive.motion.state)) < len(task.tour):
             reason = f"{robot} misses targets of its tour"
+            goals = [t for t in task.tour if t < targets.goals]
+            if (targets.tolerance[goals] < np.pi).any():
+                return task.before, ""  # its motions are searched for
+            _enter_deeper(problem, task, drive.motion.state)
         elif not ends_well(targets, r, end):
             reason = f"{robot} does not end where its finish requires"
             break
@@ -230,12 +233,9 @@ def tour_numbers(problem: Problem, plan: Plan) -> list[list[int]]:
     ]
 
 
-def _entered_deeper(problem: Problem, task: RobotTask, state: np.ndarray) -> bool:
-    """Lead a path deeper into the targets that were missed; tell if there were any."""
-    targets = problem.mission.targets
-    tour, path = task.tour, task.path
-    if len(visit_steps(targets, tour, state)) == len(tour):
-        return False
+def _enter_deeper(problem: Problem, task: RobotTask, state: np.ndarray) -> None:
+    """Lead a path deeper into the targets that were missed."""
+    path = task.path
     regions = planned_regions(problem.scene)
     deeper = path.deeper.copy()
     passed = 0
@@ -247,13 +247,9 @@ def _entered_deeper(problem: Problem, task: RobotTask, state: np.ndarray) -> boo
             deeper[i] += TARGET_MARGIN_M - reached + DEEPER_M
     task.path = replace(path, deeper=deeper)
     task.smooth(problem, SPACINGS_M[-1:])
-    return True
 
 
 def ends_well(targets: Targets, r: int, state: np.ndarray) -> bool:
     """Return whether robot r stands where, and as, it must end."""
     finish = targets.finish[r]
-    off = abs(wrap(targets.heading[r] - state[2]))
-    return finish < 0 or bool(
-        in_target(targets, finish, state[0], state[1]) and off <= targets.tolerance[r]
-    )
+    return bool(finish < 0 or at_target(targets, finish, state))

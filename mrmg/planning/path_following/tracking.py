@@ -114,7 +114,8 @@ def course_of(problem: Problem, r: int, path: Path) -> Course:
         fastest[:n] = _speed_limits(path, tight, ease)
         rest_s[:n] = (path.way[-1] - path.way) / robot["limit"][1]
     targets = problem.mission.targets
-    turned = targets.finish[r] >= 0 and targets.tolerance[r] < np.pi
+    finish = targets.finish[r]
+    turned = finish >= 0 and targets.tolerance[finish] < np.pi
     return Course(
         node=np.ascontiguousarray(np.resize(path.node, (most, 2))),
         gear=gear,
@@ -127,8 +128,8 @@ def course_of(problem: Problem, r: int, path: Path) -> Course:
         size=np.array([n]),
         ease=ease,
         stiffness=STIFFNESS / nimble_share(path_curvature(robot)),
-        heading=targets.heading[r : r + 1].copy(),
-        tolerance=np.array([targets.tolerance[r] if turned else np.inf]),
+        heading=targets.heading[finish : finish + 1].copy() if turned else np.zeros(1),
+        tolerance=np.array([targets.tolerance[finish] if turned else np.inf]),
     )
 
 

@@ -17,7 +17,8 @@ from mrmg.planning.free_ground import FreeGround, bottleneck
 from mrmg.planning.problem.targets import TARGET_MARGIN_M
 from mrmg.planning.roadmap.fleet import PASSAGE_SLACK_M, margins_of
 from mrmg.scene.margins import Margins, certified_minimum_m
-from mrmg.scene.types import Region, Robot, Scene
+from mrmg.scene.region import Region
+from mrmg.scene.types import Robot, Scene
 from mrmg.world.world import CELL_M, Opening
 
 LEVELS = 8

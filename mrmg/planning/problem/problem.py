@@ -34,7 +34,8 @@ from mrmg.planning.roadmap.vertices import planned_regions
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import routing_arrays
 from mrmg.plans import Trajectory
-from mrmg.scene.types import Region, Scene
+from mrmg.scene.region import Region
+from mrmg.scene.types import Scene
 from mrmg.world._kernels import TerrainGrid
 from mrmg.world.world import Opening, World
 
@@ -98,7 +99,8 @@ class Problem:
         Their paths lead to their last goals; motions from there are searched for.
         """
         targets = self.mission.targets
-        aims = (targets.finish >= 0) & (targets.tolerance < np.pi)
+        aims = targets.finish >= 0
+        aims[aims] = targets.tolerance[targets.finish[aims]] < np.pi
         return np.asarray(aims & (self.mission.fleet["model"] == CAR))
 
     def trajectory(self, robot: int, control: np.ndarray) -> Trajectory:

@@ -7,7 +7,7 @@ import numpy as np
 from mrmg.planning.problem._clearance_kernels import Zones
 from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.roadmap.vertices import planned_regions
-from mrmg.scene.types import Scene, Station
+from mrmg.scene.types import Finish, Goal, Scene, Station
 
 TARGET_MARGIN_M = 0.12
 """How deep inside a region the planner drives, so that a tracked path enters it too:
@@ -16,8 +16,8 @@ robots stray by 0.02 m at most, and by 0.04 m under the default disturbances."""
 GATE_MARGIN_M = 0.3
 """How far from a station for one robot others stay, so that tracked paths do, too."""
 
-FINISH_SHARE = 0.8
-"""Share of a finish's heading tolerance that planning uses."""
+HEADING_SHARE = 0.8
+"""Share of a heading's tolerance that planning uses."""
 
 LONGER_S = 0.5
 """How much longer than asked for robots stay, so that one that lags stays enough."""
@@ -49,27 +49,34 @@ def target_arrays(scene: Scene) -> Targets:
             reach[i] = np.hypot(*(corners - region.center).T).max()
         else:
             reach[i] = max(region.radius_m - TARGET_MARGIN_M, 0.5 * region.radius_m)
-    finishes = [robot.finish for robot in scene.robots]
+    heading, tolerance = _headings(scene)
     return Targets(
         goals=len(scene.goals),
         places=len(scene.targets()),
         finish=finish_of(scene),
-        heading=np.array([(f and f.heading_rad) or 0.0 for f in finishes]),
-        tolerance=np.array(
-            [
-                2.0 * np.pi
-                if f is None or f.heading_rad is None
-                else FINISH_SHARE * f.heading_tolerance_rad
-                for f in finishes
-            ]
-        ),
         center=np.array([region.center for region in regions], float).reshape(-1, 2),
         reach=reach,
         corner=corner,
         corners=np.array([len(corners) for corners in shrunk], np.int64),
+        heading=heading,
+        tolerance=tolerance,
         dwell=_dwell_s(scene),
         zone=_gates_of(scene),
     )
+
+
+def _headings(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Return each target's heading, and the deviation from it that planning allows."""
+    count = len(planned_regions(scene))
+    heading, tolerance = np.zeros(count), np.full(count, 2.0 * np.pi)
+    finishes = [robot.finish for robot in scene.robots if robot.finish]
+    places: dict[int, Goal | Finish] = dict(enumerate(scene.goals))
+    places |= enumerate(finishes, len(scene.targets()))
+    for t, place in places.items():
+        if place.heading_rad is not None:
+            heading[t] = place.heading_rad
+            tolerance[t] = HEADING_SHARE * place.heading_tolerance_rad
+    return heading, tolerance
 
 
 def _dwell_s(scene: Scene) -> np.ndarray:

@@ -8,7 +8,8 @@ import numpy as np
 import shapely
 
 from mrmg.planning.roadmap.fleet import TravelClass
-from mrmg.scene.types import Region, Scene
+from mrmg.scene.region import Region
+from mrmg.scene.types import Scene
 from mrmg.world._kernels import FreeSpace
 from mrmg.world.world import World
 

@@ -35,18 +35,10 @@ from mrmg.scene.loading.schema import (
 from mrmg.scene.loading.shape_schema import CircleEntry
 from mrmg.scene.loading.starts import crowded_robots, misplaced_robots
 from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
+from mrmg.scene.region import Region
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.slopes import slope_faults, steep_ground
-from mrmg.scene.types import (
-    Finish,
-    Goal,
-    Obstacle,
-    Region,
-    Robot,
-    Scene,
-    Station,
-    TerrainArea,
-)
+from mrmg.scene.types import Finish, Goal, Obstacle, Robot, Scene, Station, TerrainArea
 from mrmg.scene.written import WrittenScene
 
 HOME_RADIUS_M = 1.0
@@ -79,7 +71,13 @@ class Assembly:
         self.terrain = list(self._terrain())
         self.elevation = self._elevation()
         self.goals = [
-            Goal(id=entry.id, region=region, dwell_s=entry.dwell or 0.0)
+            Goal(
+                id=entry.id,
+                region=region,
+                dwell_s=entry.dwell or 0.0,
+                heading_rad=entry.heading,
+                heading_tolerance_rad=entry.heading_tolerance,
+            )
             for entry, region in self._regions("goals")
         ]
         self.stations = [

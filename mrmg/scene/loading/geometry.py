@@ -11,7 +11,7 @@ from shapely.geometry import Polygon
 from mrmg.errors import Fault
 from mrmg.scene.loading.schema import FinishEntry, RegionEntry
 from mrmg.scene.loading.shape_schema import ShapedEntry
-from mrmg.scene.types import Region
+from mrmg.scene.region import Region
 
 CIRCLE_SIDES = 32
 

@@ -17,6 +17,7 @@ LARGEST_TURN_RAD = 2.0 * math.pi
 
 _ANGLES = {
     "robots": ((("pose", 2), "heading"), (("finish", "heading"), "finish heading")),
+    "goals": ((("heading",), "heading"),),
     "obstacles": ((("box", "yaw"), "yaw"),),
     "terrain": ((("box", "yaw"), "yaw"),),
 }

@@ -16,6 +16,7 @@ A scene is one YAML file (scalars as in YAML 1.2; metres, radians, joules):
     goals:                            # convex: circle or polygon; each visited once
       - {id: g1, circle: {center: [20, 30], radius: 1.5}}
       - {id: g2, circle: {center: [60, 30], radius: 1.5}, dwell: 20}
+      - {id: g3, circle: {center: [60, 50], radius: 1.5}, heading: 1.57}
     stations:                         # convex; entering one fills the battery
       - {id: s1, polygon: [[40, 40], [43, 40], [43, 43], [40, 43]]}
     battery: {capacity_m: 240, reserve: 0.05}
@@ -52,6 +53,8 @@ Details:
   what it names; without any capacity the model's standard battery counts.
 - A goal or station with `dwell` (s) counts as visited when the reference point of one
   robot has been in its region for that long without a break, one target at a time.
+- A goal with `heading` (rad; within `heading_tolerance`, default 0.2) counts as visited
+  while the robot's yaw is that, too, for all of its `dwell`.
 - A station with `capacity: 1` is for one robot at a time: at no time are the reference
   points of two robots in its region, not even of one that only passes through. Without
   it any number of robots may be there.
@@ -108,6 +111,7 @@ from mrmg.scene.loading.shape_schema import (
     Strict,
     exactly_one,
 )
+from mrmg.scene.region import HEADING_TOLERANCE_RAD
 
 SCENE_FORMAT = 1
 
@@ -146,6 +150,15 @@ class RegionEntry(Strict):
     polygon: Ring | None = Field(default=None, description=RING)
     dwell: NotNegative | None = Field(
         default=None, description="time in s that a visit takes"
+    )
+
+
+class GoalEntry(RegionEntry):
+    """A goal, perhaps with a heading."""
+
+    heading: Number | None = Field(default=None, description="yaw in rad")
+    heading_tolerance: Positive = Field(
+        default=HEADING_TOLERANCE_RAD, description="in rad"
     )
 
 
@@ -215,7 +228,9 @@ class FinishEntry(Strict):
     circle: CircleEntry | None = Field(default=None, description=DISC)
     polygon: Ring | None = Field(default=None, description=RING)
     heading: Number | None = Field(default=None, description="yaw in rad")
-    heading_tolerance: Positive = Field(default=0.2, description="in rad")
+    heading_tolerance: Positive = Field(
+        default=HEADING_TOLERANCE_RAD, description="in rad"
+    )
 
 
 _MODEL = (
@@ -299,7 +314,7 @@ class SceneDocument(Strict):
     elevation: ElevationEntry | None = Field(
         default=None, description="heights of the ground in m; default: flat"
     )
-    goals: list[RegionEntry] = Field(
+    goals: list[GoalEntry] = Field(
         default=[], description="convex regions, each to be visited by some robot"
     )
     stations: list[StationEntry] = Field(
@@ -325,7 +340,7 @@ class SceneDocument(Strict):
 SECTIONS: dict[str, type[Strict]] = {
     "obstacles": ObstacleEntry,
     "terrain": TerrainEntry,
-    "goals": RegionEntry,
+    "goals": GoalEntry,
     "stations": StationEntry,
     "robots": RobotEntry,
 }

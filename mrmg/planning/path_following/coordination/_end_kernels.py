@@ -1,4 +1,4 @@
-"""How a robot's task ends: whom it meets on its way home, and where it may stay."""
+"""How a robot drives to a pose, whom it meets on its way, and where it may stay."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from mrmg.planning.path_following.coordination._motion_kernels import (
     write_curve,
 )
 from mrmg.planning.problem._control_kernels import braking_control, stands, wrap
-from mrmg.planning.problem._target_kernels import in_target
+from mrmg.planning.problem._target_kernels import at_target
 from mrmg.planning.roadmap._heap_kernels import push
 
 MOST_BRAKING_STEPS = 300
@@ -37,10 +37,7 @@ LEAST_NEARNESS = 0.2
 @kernel
 def may_end(targets, task, state):
     """Return whether a robot at rest in a state is where and as it must end."""
-    if task.finish < 0:
-        return True
-    off = abs(wrap(task.heading - state[2]))
-    return off <= task.tolerance and in_target(targets, task.finish, state[0], state[1])
+    return task.finish < 0 or at_target(targets, task.finish, state)
 
 
 @kernel
@@ -56,26 +53,26 @@ def brake(own, dt, state, control):
 
 
 @kernel
-def steer_home(search, state, control):
-    """Write a drive of a custom motion model to the finish; return the steps, or -1.
+def steer_to(search, target, state, control):
+    """Write a drive of a custom motion model to a target; return the steps, or -1.
 
-    It is steered to the finish's middle, then slowly at a point that lies in the
-    direction of the final heading.
+    It is steered to the target's middle, then slowly at a point that lies in the
+    direction of its heading.
     """
-    own, targets, task, dt = search.own, search.targets, search.task, search.dt
-    center = targets.center[task.finish]
-    near = 0.5 * targets.reach[task.finish]
+    own, targets, dt = search.own, search.targets, search.dt
+    center, heading = targets.center[target], targets.heading[target]
+    near = 0.5 * targets.reach[target]
     arrived = False
     for k in range(min(HOME_STEPS, len(control) - MOST_BRAKING_STEPS)):
         here = state[k]
         gap = hypot(center[0] - here[0], center[1] - here[1])
         arrived = gap < (2.0 * near if arrived else near)
-        if arrived and may_end(targets, task, here):
+        if arrived and at_target(targets, target, here):
             return k + brake(own, dt, state[k:], control[k:])
         share, wx, wy = 1.0, center[0], center[1]
         if arrived:
             share = CREEPING_SHARE
-            wx, wy = here[0] + cos(task.heading), here[1] + sin(task.heading)
+            wx, wy = here[0] + cos(heading), here[1] + sin(heading)
         u1, u2 = steer_user(own[0], here, wx, wy, share, dt)
         control[k, 0], control[k, 1] = u1, u2
         step(own[0], here, u1, u2, dt, state[k + 1])
@@ -83,25 +80,25 @@ def steer_home(search, state, control):
 
 
 @kernel
-def drive_home(search, course, state, control):
-    """Write a drive to the finish without regard to others; return the steps, or -1.
+def drive_to(search, target, course, state, control):
+    """Write a drive to a target without regard to others; return the steps, or -1.
 
     A car drives along the shortest curve, a robot that turns on the spot straight.
     """
-    own, task = search.own, search.task
+    own, targets = search.own, search.targets
     if own[0].model == USER:
-        return steer_home(search, state, control)
-    x = search.targets.center[task.finish, 0]
-    y = search.targets.center[task.finish, 1]
-    heading, free = task.heading, task.tolerance >= pi
+        return steer_to(search, target, state, control)
+    x, y = targets.center[target, 0], targets.center[target, 1]
+    heading, free = targets.heading[target], targets.tolerance[target] >= pi
     if free and own[0].model == CAR:
         heading = np.arctan2(y - state[0, 1], x - state[0, 0])
         if abs(wrap(heading - state[0, 2])) > 0.5 * pi:
             heading = wrap(heading + pi)
     if not write_curve(own, state[0], x, y, heading, course) < np.inf:
         return -1
-    course.heading[0] = task.heading
-    course.tolerance[0] = np.inf if free or own[0].model == CAR else task.tolerance
+    course.heading[0] = targets.heading[target]
+    turns = not (free or own[0].model == CAR)
+    course.tolerance[0] = targets.tolerance[target] if turns else np.inf
     return drive_curve(own, course, search.dt, state, control)
 
 
@@ -206,12 +203,9 @@ def add_end(search, nodes, room, a, motion, count):
 
 
 @kernel
-def home_is_tried(search, state, tries):
-    """Return whether to drive home from a state: the farther away, the more rarely."""
-    finish = search.task.finish
-    if finish < 0:
-        return False
-    center = search.targets.center[finish]
+def is_tried(search, target, state, tries):
+    """Return whether to drive to a target from a state: from afar more rarely."""
+    center = search.targets.center[target]
     far = hypot(state[0] - center[0], state[1] - center[1])
     return tries % (1 + int(0.2 * far / max(search.own[0].radius, 0.1))) == 0
 
@@ -221,8 +215,9 @@ def end_from(search, nodes, room, a, tries):
     """Open the ends of the task that node a leads to: to brake, or to drive home."""
     copy_numbers(nodes.state[a], room.state[0])
     count = brake(search.own, search.dt, room.state, room.control)
-    if not add_end(search, nodes, room, a, BRAKE, count) and home_is_tried(
-        search, room.state[0], tries
-    ):
-        count = drive_home(search, room.curve, room.state, room.control)
+    if add_end(search, nodes, room, a, BRAKE, count):
+        return
+    finish = search.task.finish
+    if finish >= 0 and is_tried(search, finish, room.state[0], tries):
+        count = drive_to(search, finish, room.curve, room.state, room.control)
         add_end(search, nodes, room, a, HOME, count)

@@ -26,10 +26,10 @@ from mrmg.planning.problem._control_kernels import (
 )
 from mrmg.world._kernels import convex_convex_distance, place_footprint
 
-BRAKE, HOME, STAY, WAIT, TRACK, HOLD, MOVE = range(-4, 3)
-"""Brake, or drive home, and be through; stand in a target, or until others set out;
-follow the path; brake, and stand; hold a speed and a steering, numbered from MOVE on.
-"""
+BRAKE, HOME, VISIT, STAY, WAIT, TRACK, HOLD, MOVE = range(-5, 3)
+"""Brake, or drive home, and be through; drive to a target's pose; stand in a target, or
+until others set out; follow the path; brake, and stand; hold a speed and a steering,
+numbered from MOVE on."""
 
 SETTLING_SHARE = 0.45
 """Share of a turn's radius that a car may drive while it steers into the turn."""

@@ -28,6 +28,9 @@ from mrmg.world._kernels import TerrainGrid
 OFF_PATH = -1
 """Segment of a robot that is not on its path."""
 
+CURVE_SHARE = 1.05
+"""Radius of the curves that costs-to-go are reckoned with, over the least one."""
+
 SIDEWAYS = 2.0
 """Metres of way that a metre off the path counts as."""
 
@@ -40,10 +43,10 @@ class Task(NamedTuple):
         stay: steps to stand in each of them, shape (L,).
         along: way along the path to each of them [m]; inf where it leads to none, (L,).
         rest_s: time from the end of the path on.
-        stays_s: cost of the stays from each leg on, shape (L + 1,).
+        later_s: cost from each leg on of stays, and of turns from heading to heading
+            beyond the costs-to-go, shape (L + 1,).
         finish: target to end in, or -1.
         home_along: whether the path leads to the finish.
-        heading, tolerance: to end with [rad]; a tolerance of at least pi for any.
         guide: costs-to-go on each leg.
         motion: (v, w) of each MOVE, shape (P, 2).
         steps: that a motion lasts.
@@ -58,11 +61,9 @@ class Task(NamedTuple):
     stay: np.ndarray
     along: np.ndarray
     rest_s: float
-    stays_s: np.ndarray
+    later_s: np.ndarray
     finish: int
     home_along: bool
-    heading: float
-    tolerance: float
     guide: Guide
     motion: np.ndarray
     steps: int
@@ -176,31 +177,48 @@ def cost_to_go_s(search, place, state):
     """
     own, task = search.own, search.task
     step_number, leg, segment, left = place
-    top = own[0].limit[1]
     legs = len(task.leg)
     on_path = task.home_along if leg == legs else task.along[leg] < np.inf
     x, y = state[0], state[1]
     spaces, time_s = search.spaces, 0.0
-    if leg < legs or task.finish >= 0:
+    target = task.leg[leg] if leg < legs else task.finish
+    if target >= 0:
         time_s = guide_at(
             task.guide, leg, step_number, spaces.x_min, spaces.y_min, x, y
         )
     if on_path and segment < search.course.size[0]:
         time_s = along_path_s(search, leg, left, state)
-    elif leg == legs and task.finish >= 0 and task.tolerance < pi:
-        if own[0].model == CAR:
-            turn, length = np.empty(MOST_PIECES), np.empty(MOST_PIECES)
-            dx = search.targets.center[task.finish, 0] - x
-            dy = search.targets.center[task.finish, 1] - y
-            radius = 1.05 * own[0].turning_radius
-            curve = reeds_shepp(dx, dy, state[2], task.heading, radius, turn, length)
-            if curve < np.inf:
-                reach = search.targets.reach[task.finish]
-                time_s = max(time_s, max(0.0, curve - reach) / top)
+    elif target >= 0 and search.targets.tolerance[target] < pi:
+        posed_s = posing_time_s(own, search.targets, target, x, y, state[2])
+        if own[0].model != CAR:
+            time_s += posed_s
         else:
-            off = abs(wrap(task.heading - state[2])) - task.tolerance
-            time_s += max(0.0, off) / own[0].limit[2]
-    return time_s + task.stays_s[leg]
+            if leg + 1 < legs or (leg < legs and task.finish >= 0):
+                cx = search.targets.center[target, 0]
+                cy = search.targets.center[target, 1]
+                posed_s += guide_at(
+                    task.guide, leg + 1, step_number, spaces.x_min, spaces.y_min, cx, cy
+                )
+            time_s = max(time_s, posed_s)
+    return time_s + task.later_s[leg]
+
+
+@kernel
+def posing_time_s(own, targets, target, x, y, theta):
+    """Return the time from a pose to a target's heading there, without obstacles [s].
+
+    Of a car that is the time along the shortest curve; of robots that can turn on the
+    spot, that of the turn alone.
+    """
+    heading, reach = targets.heading[target], targets.reach[target]
+    if own[0].model == CAR:
+        turn, length = np.empty(MOST_PIECES), np.empty(MOST_PIECES)
+        dx, dy = targets.center[target, 0] - x, targets.center[target, 1] - y
+        radius = CURVE_SHARE * own[0].turning_radius
+        curve = reeds_shepp(dx, dy, theta, heading, radius, turn, length)
+        return max(0.0, curve - reach) / own[0].limit[1] if curve < np.inf else 0.0
+    off = abs(wrap(heading - theta)) - targets.tolerance[target]
+    return max(0.0, off) / own[0].limit[2]
 
 
 @kernel

@@ -20,8 +20,9 @@ from mrmg.planning.path_following.coordination._end_kernels import (
     MOST_BRAKING_STEPS,
     brake,
     conflict_cost,
-    drive_home,
+    drive_to,
     end_from,
+    is_tried,
     list_near,
     passing_cost,
 )
@@ -32,6 +33,7 @@ from mrmg.planning.path_following.coordination._motion_kernels import (
     MOVE,
     STAY,
     TRACK,
+    VISIT,
     WAIT,
     clear,
     move,
@@ -43,7 +45,7 @@ from mrmg.planning.path_following.coordination._node_kernels import (
     is_new,
 )
 from mrmg.planning.problem._control_kernels import wrap
-from mrmg.planning.problem._target_kernels import in_target
+from mrmg.planning.problem._target_kernels import at_target
 from mrmg.planning.roadmap._heap_kernels import pop, push
 from mrmg.world._kernels import multiplier_in
 
@@ -62,7 +64,7 @@ def legs_done(targets, task, leg, state, first, last):
         while (
             leg < len(task.leg)
             and task.stay[leg] == 0
-            and in_target(targets, task.leg[leg], state[k, 0], state[k, 1])
+            and at_target(targets, task.leg[leg], state[k])
         ):
             leg += 1
     return leg
@@ -151,8 +153,30 @@ def stay(search, nodes, room, a):
     """Open a stay in the leg's target, if braking from node a ends in it."""
     task, targets, leg = search.task, search.targets, nodes.leg[a]
     tail = brake(search.own, search.dt, room.state, room.control)
-    if in_target(targets, task.leg[leg], room.state[tail, 0], room.state[tail, 1]):
+    if at_target(targets, task.leg[leg], room.state[tail]):
         stand(search, nodes, room, a, STAY, tail, tail + task.stay[leg])
+
+
+@kernel
+def visit(search, nodes, room, a):
+    """Open a drive from node a to the pose that the leg's target wants."""
+    task, first, leg = search.task, nodes.step[a], nodes.leg[a]
+    copy_numbers(nodes.state[a], room.state[0])
+    count = drive_to(search, task.leg[leg], room.curve, room.state, room.control)
+    last = first + count
+    if count < 0 or last + MOST_BRAKING_STEPS >= len(room.control):
+        return
+    after = room.state[count]
+    if not at_target(search.targets, task.leg[leg], after):
+        return
+    conflict_s = passing_cost(search, room, count, first)
+    leg += 1 if task.stay[leg] == 0 else 0
+    if conflict_s < np.inf and is_new(nodes.table, cell_of(task, after, leg, last)):
+        segment, left = OFF_PATH, nodes.left[a]
+        if search.course.size[0] > 1:
+            segment, left = rejoined(search.course, left, after)
+        cost = nodes.cost[a] + count * search.dt + conflict_s
+        add(search, nodes, a, VISIT, after, (last, leg, segment, left), cost)
 
 
 @kernel
@@ -179,6 +203,10 @@ def write_controls(search, nodes, room, a, control):
         p, motion = nodes.parent[b], nodes.motion[b]
         first, steps = nodes.step[p], nodes.step[b] - nodes.step[p]
         copy_numbers(nodes.state[p], room.state[0])
+        if motion == VISIT:
+            target = search.task.leg[nodes.leg[p]]
+            drive_to(search, target, room.curve, room.state, control[first:])
+            continue
         held = HOLD if motion in (STAY, WAIT) else motion
         segment = nodes.segment[p]
         move(search, held, segment, steps, room.state, control[first:])
@@ -187,7 +215,8 @@ def write_controls(search, nodes, room, a, control):
     if nodes.motion[a] == BRAKE:
         brake(search.own, search.dt, room.state, control[nodes.step[p] :])
     else:
-        drive_home(search, room.curve, room.state, control[nodes.step[p] :])
+        finish = search.task.finish
+        drive_to(search, finish, room.curve, room.state, control[nodes.step[p] :])
     return nodes.step[a]
 
 
@@ -219,9 +248,15 @@ def find_motion(search, nodes, room, start, control):
         if widened == 0 and nodes.leg[a] == legs:
             end_from(search, nodes, room, a, tries)
             tries += 1
-        elif widened == 0 and task.stay[nodes.leg[a]] > 0:
-            copy_numbers(nodes.state[a], room.state[0])
-            stay(search, nodes, room, a)
+        elif widened == 0:
+            target = task.leg[nodes.leg[a]]
+            if task.stay[nodes.leg[a]] > 0:
+                copy_numbers(nodes.state[a], room.state[0])
+                stay(search, nodes, room, a)
+            if search.targets.tolerance[target] < pi:
+                if is_tried(search, target, nodes.state[a], tries):
+                    visit(search, nodes, room, a)
+                tries += 1
         copy_numbers(nodes.state[a], room.state[0])
         nears = list_near(search, room, nodes.step[a])
         if widened == 0 and 0 <= nodes.segment[a] < search.course.size[0]:

@@ -181,10 +181,11 @@ class _Planning:
         led = len(path.target) == len(tour) or (
             problem.steered_home[r] and not tour[1:]
         )
+        led &= bool((problem.mission.targets.tolerance[task.leg] >= np.pi).all())
         guide = NO_GUIDE
         if not (led and self.round is ROUNDS[0]):
             guide = self._fields.static(r, tour)
-        along = guided(problem, task, path, guide)
+        along = guided(problem, r, task, path, guide)
         yield along._replace(most=min(FIRST_MOST, now.most)), course
         costs = task.hold_share, task.soft_s / (task.steps * problem.dt_s)
         timed = self._fields.timed(r, tour, task.stay, traffic, costs)
@@ -193,9 +194,12 @@ class _Planning:
         else:
             nowhere = no_path(problem, r)
             free = task_of(problem, r, tour, nowhere, now)._replace(
-                stay=task.stay, stays_s=task.stays_s
+                stay=task.stay, later_s=task.later_s
             )
-            yield guided(problem, free, nowhere, timed), course_of(problem, r, nowhere)
+            yield (
+                guided(problem, r, free, nowhere, timed),
+                course_of(problem, r, nowhere),
+            )
 
     def _search(
         self, r: int, task: Task, traffic: Traffic, course: Course

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import ceil, pi
 
 import numpy as np
 
 from mrmg.energy.model import CONSUMERS_W
-from mrmg.motion._kernels import USER
+from mrmg.motion._kernels import CAR, USER
 from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.coordination._field_kernels import Guide, guide_at
-from mrmg.planning.path_following.coordination._node_kernels import Task
+from mrmg.planning.path_following.coordination._node_kernels import Task, posing_time_s
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE
 from mrmg.planning.problem.problem import Problem
 
@@ -131,6 +132,8 @@ def task_of(
     along, stay_s = np.full(len(legs), np.inf), stays_s(problem, r, legs)
     led = min(len(legs), len(path.stop))
     along[:led] = path.way[path.stop[:led]]
+    # A path may well pass through a target with another heading than it wants.
+    along[targets.tolerance[legs] < pi] = np.inf
     stay_s[:led] = path.pause_s[:led]
     standing = (
         LONG_HOLD_SHARE if problem.mission.targets.zone.max() >= 0 else HOLD_SHARE
@@ -146,11 +149,9 @@ def task_of(
         stay=np.ceil(stay_s / dt_s).astype(np.int64),
         along=along,
         rest_s=0.0,
-        stays_s=standing / effort.weight * ahead_s,
+        later_s=standing / effort.weight * ahead_s,
         finish=finish,
         home_along=finish >= 0 and finish in path.target[-1:],
-        heading=float(targets.heading[r]),
-        tolerance=float(targets.tolerance[r]),
         guide=NO_GUIDE,
         motion=motions(robot, steps, dt_s),
         steps=steps,
@@ -162,11 +163,43 @@ def task_of(
     )
 
 
-def guided(problem: Problem, task: Task, path: Path, guide: Guide) -> Task:
-    """Return a task with costs-to-go through its targets."""
+def guided(problem: Problem, r: int, task: Task, path: Path, guide: Guide) -> Task:
+    """Return robot r's task with costs-to-go through its targets."""
     rest_s, legs = 0.0, len(task.leg)
     if task.finish >= 0 and not task.home_along:
         x, y = path.node[-1]
         spaces = problem.mission.spaces
         rest_s = guide_at(guide, legs, 0, spaces.x_min, spaces.y_min, x, y)
-    return task._replace(guide=guide, rest_s=float(rest_s))
+    later_s = task.later_s + poses_s(problem, r, task, guide)
+    return task._replace(guide=guide, rest_s=float(rest_s), later_s=later_s)
+
+
+def poses_s(problem: Problem, r: int, task: Task, guide: Guide) -> np.ndarray:
+    """Return what headings cost beyond the costs-to-go, from each leg on [s], (L + 1,).
+
+    That is the time from pose to pose of targets that follow each other, and that to
+    brake and set off at each.
+    """
+    targets, spaces = problem.mission.targets, problem.mission.spaces
+    own = problem.mission.fleet[r : r + 1]
+    tour = [*task.leg.tolist(), *([task.finish] if task.finish >= 0 else [])]
+    excess_s = np.zeros(len(task.leg) + 1)
+
+    def rest_s(leg: int, target: int) -> float:
+        x, y = targets.center[target]
+        return float(guide_at(guide, leg, 0, spaces.x_min, spaces.y_min, x, y))
+
+    stop_s = float(own[0]["limit"][1] / own[0]["limit"][3])
+    for leg, target in enumerate(task.leg):
+        excess_s[: leg + 1] += stop_s * (targets.tolerance[target] < pi)
+    for leg, (one, other) in enumerate(pairwise(tour)):
+        if (targets.tolerance[[one, other]] >= pi).any():
+            continue
+        x, y = targets.center[one]
+        time_s = posing_time_s(own, targets, other, x, y, targets.heading[one])
+        if own[0]["model"] == CAR:
+            time_s -= rest_s(leg + 1, one)
+            time_s += rest_s(leg + 2, other) if leg + 2 < len(tour) else 0.0
+        if np.isfinite(time_s):
+            excess_s[: leg + 1] += max(0.0, time_s)
+    return excess_s

@@ -1,0 +1,116 @@
+"""Goals that are visited with a heading: planned, judged and driven."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from math import remainder, tau
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import mrmg
+from mrmg.energy.visits import is_at
+from mrmg.errors import UsageError
+from mrmg.planning import PlannerParams, plan_mission, profile_params
+from mrmg.plans import Plan, PlanStatus
+from mrmg.scene.loading import dump_scene, load_scene
+from mrmg.scene.types import Scene
+
+MakeScene = Callable[..., Scene]
+QUICK = PlannerParams(improvements=0)
+PLACES = ((8, 4), (22, 4), (24, 16), (7, 16))
+
+
+def hall(yard: MakeScene, seed: int, model: str, **changes: Any) -> Scene:
+    """Four goals with random headings, for two robots."""
+    rng = np.random.default_rng(seed)
+    goals = [
+        {
+            "id": f"g{i}",
+            "circle": {"center": list(place), "radius": 1.2},
+            "heading": float(rng.uniform(-3.1, 3.1)),
+            "heading_tolerance": 0.2,
+        }
+        for i, place in enumerate(PLACES)
+    ]
+    robots = [
+        {"id": "r1", "model": model, "pose": [4, 10, 0]},
+        {"id": "r2", "model": model, "pose": [26, 10, 3.14]},
+    ]
+    return yard(**{"goals": goals, "robots": robots, **changes})
+
+
+def planned(scene: Scene, seed: int = 0) -> Plan:
+    result = plan_mission(scene, seed=seed, params=QUICK)
+    assert result.status is PlanStatus.SOLVED, result.reason
+    assert result.plan is not None
+    verdict = mrmg.verify(scene, result.plan)
+    assert verdict.ok, verdict.violations
+    return result.plan
+
+
+def deviations_rad(scene: Scene, plan: Plan) -> Iterator[float]:
+    """Yield how far each goal's visit is off its heading."""
+    for goal in scene.goals:
+        (visit,) = [item for item in plan.visits if item.target == goal.id]
+        state = plan.trajectory(visit.robot).state[visit.step]
+        assert goal.region.depth(state[:2])[0] >= 0.0
+        assert goal.heading_rad is not None
+        yield abs(remainder(state[2] - goal.heading_rad, tau))
+
+
+@pytest.mark.parametrize("model", ["car", "diffdrive"])
+@pytest.mark.parametrize("seed", range(3))
+def test_goals_are_visited_with_their_headings(
+    yard: MakeScene, model: str, seed: int
+) -> None:
+    scene = hall(yard, seed, model)
+    assert max(deviations_rad(scene, planned(scene, seed))) <= 0.2
+
+
+def test_a_robot_stays_with_the_heading(yard: MakeScene) -> None:
+    dock = {
+        "id": "dock",
+        "circle": {"center": [20, 14], "radius": 1.0},
+        "heading": -1.0,
+        "dwell": 4.0,
+    }
+    scene = hall(yard, 0, "car", goals=[dock])
+    plan = planned(scene)
+    (visit,) = plan.visits
+    steps = round(4.0 / plan.dt_s)
+    stay = plan.trajectory(visit.robot).state[visit.step : visit.step + steps + 1]
+    assert is_at(scene.goals[0], stay).all()
+
+
+def test_a_heading_is_kept_where_the_mission_lies_elsewhere(yard: MakeScene) -> None:
+    """Planning moves and turns the map; a fleet in the north-east shows it."""
+    corner = [{"id": "r1", "model": "car", "pose": [26, 16, 3.14]}]
+    scene = hall(yard, 1, "car", robots=corner)
+    assert max(deviations_rad(scene, planned(scene))) <= 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["car", "diffdrive"])
+def test_headings_are_kept_in_the_simulation(yard: MakeScene, model: str) -> None:
+    scene = hall(yard, 2, model)
+    plan = planned(scene)
+    account = mrmg.audit(scene, plan, mrmg.execute(scene, plan))
+    assert account.mission_ok, account.reasons
+
+
+def test_scenes_with_headings_are_written_as_they_are_read(
+    yard: MakeScene, tmp_path: Path
+) -> None:
+    scene = hall(yard, 0, "car")
+    (tmp_path / "again.yaml").write_text(dump_scene(scene))
+    again = load_scene(tmp_path / "again.yaml")
+    assert again.goals == scene.goals
+    assert again.digest == scene.digest
+
+
+def test_the_paper_s_method_refuses_headings(yard: MakeScene) -> None:
+    with pytest.raises(UsageError, match=r"goals with headings \(g0, g1, g2, g3\)"):
+        plan_mission(hall(yard, 0, "car"), params=profile_params("paper"))
