@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Mapping
 import numpy as np
 from markupsafe import Markup
 from shapely import box
-from shapely.geometry import Polygon
+from shapely.geometry import Point, Polygon
 
 from mrmg.plans import Plan
 from mrmg.report.page import macros
@@ -36,7 +36,7 @@ def mission_map(scene: Scene, plan: Plan | None, log: ExecutionLog | None) -> Ma
     x_min, y_min, x_max, y_max = scene.bounds
     width, height = x_max - x_min, y_max - y_min
     letter = max(width, height) / 48.0
-    canvas = _Canvas(scene)
+    canvas = _Canvas(scene, letter)
     kinds = [kind for kind in KINDS if kind != "stop"]
     labels = map_labels(scene, plan, log, em_m=letter, kinds=kinds)
     names = {label.of: label for label in labels if label.kind == "robot"}
@@ -60,8 +60,8 @@ def mission_map(scene: Scene, plan: Plan | None, log: ExecutionLog | None) -> Ma
 class _Canvas:
     """Turns a scene's things into SVG elements."""
 
-    def __init__(self, scene: Scene) -> None:
-        self._scene = scene
+    def __init__(self, scene: Scene, letter_m: float) -> None:
+        self._scene, self._letter_m = scene, letter_m
         self._x_min, self._y_max = scene.bounds[0], scene.bounds[3]
         self._index = {robot.id: at for at, robot in enumerate(scene.robots)}
 
@@ -97,6 +97,10 @@ class _Canvas:
     def planned(self, plan: Plan | None) -> Iterable[Markup]:
         for item in plan.trajectories if plan else ():
             yield self._path(item.robot, item.state, "planned")
+        for passage in plan.narrow if plan else ():
+            tip = f"{passage.robot} keeps {passage.margin_m:.2f} m from obstacles here"
+            ring = Point(passage.x_m, passage.y_m).buffer(self._letter_m)
+            yield self._shape(ring, "narrow", tip)
 
     def driven(self, log: ExecutionLog | None) -> Iterable[Markup]:
         if log is None:

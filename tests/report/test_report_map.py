@@ -10,6 +10,7 @@ import pytest
 
 from mrmg.report.map import mission_map
 from mrmg.report.timeline import timeline
+from mrmg.scene.margins import NarrowPassage
 from mrmg.simulation.log import Contact
 from mrmg.simulation.supervision import Event
 from mrmg.viz.activities import activities, shown_visits
@@ -144,6 +145,28 @@ def test_contacts_are_marked(mission) -> None:
     assert "r1 touched wall at 3.00 s" in tips(parts["driven"])
     mark = parts["driven"][-1]
     assert (float(mark.get("x")), float(mark.get("y"))) == (8.0, 16.0)
+
+
+def test_narrow_stretches_are_marked(mission) -> None:
+    scene, plan, log = mission
+    passage = NarrowPassage(
+        robot="r1", start_s=1.0, end_s=2.0, x_m=8.0, y_m=4.0, margin_m=0.12
+    )
+    parts = layers(mission_map(scene, replace(plan, narrow=(passage,)), log))
+    assert tips(parts["planned"])[-1] == "r1 keeps 0.12 m from obstacles here"
+
+
+def test_finishes_and_headings_are_shown(make_scene) -> None:
+    disc = {"circle": {"center": [20, 10], "radius": 1}, "heading": 1.5}
+    robot = {"id": "r1", "model": "car", "pose": [5, 10, 0], "finish": disc}
+    scene = make_scene(goals=[{"id": "g", **disc, "heading": -3.0}], robots=[robot])
+    parts = layers(mission_map(scene, None, None))
+    assert tips(parts["targets"]) == [
+        "g: goal",
+        "finish of r1",
+        "g: heading -3.00 rad",
+        "finish of r1: heading 1.50 rad",
+    ]
 
 
 def test_a_scene_alone_has_a_map_without_paths(make_scene) -> None:
