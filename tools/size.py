@@ -17,6 +17,7 @@ import io
 import json
 import tokenize
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,7 @@ _FUNCTION = ast.FunctionDef | ast.AsyncFunctionDef
 def code_lines(source: str) -> int:
     """Return how many lines of a module are neither blank, comment nor docstring."""
     documentation: set[int] = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in _statements(ast.parse(source)):
         value = node.value if isinstance(node, ast.Expr) else None
         if isinstance(value, ast.Constant) and isinstance(value.value, str):
             documentation.update(range(value.lineno, (value.end_lineno or 0) + 1))
@@ -58,6 +59,14 @@ def code_lines(source: str) -> int:
         if token.type not in _LAYOUT:
             code.update(range(token.start[0], token.end[0] + 1))
     return len(code - documentation)
+
+
+def _statements(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield the statements within a node, and leave their expressions unread."""
+    for child in ast.iter_child_nodes(node):
+        if not isinstance(child, ast.expr):
+            yield child
+            yield from _statements(child)
 
 
 def functions(source: str) -> list[tuple[str, int, int]]:
@@ -72,7 +81,7 @@ def functions(source: str) -> list[tuple[str, int, int]]:
                     lines = (child.end_lineno or 0) - child.lineno + 1
                     found.append((name, lines, _parameters(child)))
                 visit(child, name)
-            else:
+            elif not isinstance(child, ast.expr):
                 visit(child, prefix)
 
     visit(ast.parse(source), "")
@@ -89,13 +98,24 @@ def _parameters(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
 def measure(package: Path, tools: Path) -> dict[str, Any]:
     """Return the document of --json for the package and the tools in two folders."""
     lines: Counter[str] = Counter()
+    for path in sorted(package.rglob("*.py")):
+        place = path.relative_to(package.parent)
+        owner = place.parts[1] if len(place.parts) > 2 else package.name
+        lines[owner] += code_lines(path.read_text())
+    return {
+        "packages": dict(sorted(lines.items())),
+        "total": sum(lines.values()),
+        "core": sum(lines[name] for name in CORE),
+        **too_long(package, tools),
+    }
+
+
+def too_long(package: Path, tools: Path) -> dict[str, list[dict[str, Any]]]:
+    """Return the three lists of --json."""
     modules, lengthy, wide = [], [], []
     for path in (*sorted(package.rglob("*.py")), *sorted(tools.rglob("*.py"))):
         source, place = path.read_text(), path.relative_to(package.parent)
         module = ".".join(place.with_suffix("").parts)
-        if path.is_relative_to(package):
-            owner = place.parts[1] if len(place.parts) > 2 else package.name
-            lines[owner] += code_lines(source)
         length = len(source.splitlines())
         if length > LONGEST_MODULE:
             modules.append({"module": module, "lines": length})
@@ -106,9 +126,6 @@ def measure(package: Path, tools: Path) -> dict[str, Any]:
             if parameters > MOST_PARAMETERS:
                 wide.append(row | {"parameters": parameters})
     return {
-        "packages": dict(sorted(lines.items())),
-        "total": sum(lines.values()),
-        "core": sum(lines[name] for name in CORE),
         "long_modules": modules,
         "long_functions": lengthy,
         "wide_functions": wide,
