@@ -12,7 +12,7 @@ from contextlib import suppress
 import numpy as np
 
 from mrmg.background import in_background
-from mrmg.planning.bound.bound import CELLS, FINER, lower_bound_J
+from mrmg.planning.bound.bound import CELLS, FINER, ROUNDS, lower_bound_J
 from mrmg.planning.bound.joint_bound import Divisions
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.halting import NEVER, Halted
@@ -32,6 +32,7 @@ def bounds_of(
     step_s: float,
     *,
     cells: int = CELLS,
+    rounds: int = ROUNDS,
     finer: int = FINER,
     halt: np.ndarray = NEVER,
 ) -> Bounds:
@@ -41,6 +42,7 @@ def bounds_of(
         scene: the mission.
         step_s: time step of the plans.
         cells: of the grid; more take longer and bring the bound nearer to the truth.
+        rounds: how often the ways of the cheapest tours are tightened; as `cells`.
         finer: parts into which cells are cut in the end; as `cells`.
         halt: shape (1,); bounds are given up once it has turned true.
 
@@ -53,7 +55,7 @@ def bounds_of(
         makespan_s = makespan_bound_s(scene, step_s=step_s, cells=cells, halt=halt)
     if objective.energy_weight:
         energy_J = lower_bound_J(
-            scene, step_s=step_s, cells=cells, finer=finer, halt=halt
+            scene, step_s=step_s, cells=cells, rounds=rounds, finer=finer, halt=halt
         )
         timed = objective.makespan_weight > 0.0 or math.isfinite(limit_s)
         divisions = None
@@ -87,8 +89,9 @@ def bounds_beside(
     def prove() -> None:
         give_way()
         with suppress(Halted):
-            for cells in (COARSE_CELLS, CELLS) if anytime else (CELLS,):
-                found = bounds_of(scene, step_s, cells=cells, halt=halt)
+            coarse = [(COARSE_CELLS, 0), (COARSE_CELLS, ROUNDS)] if anytime else []
+            for cells, rounds in [*coarse, (CELLS, ROUNDS)]:
+                found = bounds_of(scene, step_s, cells=cells, rounds=rounds, halt=halt)
                 statistics.bounds = statistics.bounds.raised_by(found)
 
     return in_background(prove)

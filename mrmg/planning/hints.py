@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from mrmg.planning.bound.exact_tours import MOST_GOALS
+from mrmg.planning.bound.exact_tours import are_few
 from mrmg.planning.endings import listed
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
@@ -36,9 +36,9 @@ def hints_on(scene: Scene, plan: Plan, gap: float | None) -> Iterator[str]:
     yield from _on_narrow_passages(plan)
     if gap is None or gap <= LARGE_GAP:
         return
-    if len(goals) > MOST_GOALS:
+    if not are_few(len(goals), len(scene.robots)):
         yield (
-            f"the proven bound is loose for more than {MOST_GOALS} goals: much of the "
+            f"the proven bound is loose for as many as {len(goals)} goals: much of the "
             f"gap of {gap:.0%} need not be room for better plans"
         )
     elif objective.makespan_weight or math.isfinite(scene.time_limit_s):

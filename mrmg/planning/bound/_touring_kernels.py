@@ -17,26 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
+from mrmg.planning.bound._completion_kernels import Completions
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 
 NOTHING = -1
 """Parent of the first label."""
-
-
-class Completions(NamedTuple):
-    """What the rest of a mission costs at least, were batteries to last for ever.
-
-    Attributes:
-        from_station: least cost from station to goal over any stations, (R, S, G).
-        to_finish: least cost from node to finish over any stations, (R, T + 1).
-        after: with a robot at a goal and goals visited, shape (R, 2^G, G).
-        before: with a robot that has not set out, shape (R + 1, 2^G).
-    """
-
-    from_station: np.ndarray
-    to_finish: np.ndarray
-    after: np.ndarray
-    before: np.ndarray
 
 
 class TourSearch(NamedTuple):
@@ -47,6 +32,8 @@ class TourSearch(NamedTuple):
         goal_list: the open goals, shape (G,).
         leg: what legs cost from arc to arc, shape (R, T + 1, K, T, K); row T is the
             start, in whose arc 0 robots are.
+        drain: what they drain batteries by, likewise.
+        nearest: the least that they cost to any arc, shape (R, T + 1, K, T).
         finish: what the last leg costs from each node, shape (R, T + 1).
         rest: bounds of what is still to come, by which labels are dropped.
         most: cost of tours of interest; others may be missed.
@@ -55,6 +42,8 @@ class TourSearch(NamedTuple):
     routing: RoutingArrays
     goal_list: np.ndarray
     leg: np.ndarray
+    drain: np.ndarray
+    nearest: np.ndarray
     finish: np.ndarray
     rest: Completions
     most: float
@@ -70,49 +59,16 @@ class Labels(NamedTuple):
         trace: robot, node, arc and parent, shape (N, 4).
         first: number of the first label of the present robot with each set of goals
             visited, and of the end, shape (2^G + 1,).
+        near: labels that the present goal may follow, shape (N,).
         offer, origin: candidates' values and parents, shape (N, 2) and (N,).
     """
 
     value: np.ndarray
     trace: np.ndarray
     first: np.ndarray
+    near: np.ndarray
     offer: np.ndarray
     origin: np.ndarray
-
-
-@kernel
-def completions(between, from_start, from_station, to_finish, goal_list):
-    """Return the bounds of what visiting the rest of the goals costs.
-
-    Args:
-        between: least cost from goal to goal over any stations, shape (R, G, G).
-        from_start: from start to goal, shape (R, G).
-        from_station, to_finish: as in `Completions`.
-        goal_list: the open goals, shape (G,).
-    """
-    robots, n = from_start.shape
-    full = (1 << n) - 1
-    after = np.full((robots, full + 1, n), np.inf)
-    before = np.full((robots + 1, full + 1), np.inf)
-    before[robots, full] = 0.0
-    for r in range(robots - 1, -1, -1):
-        for mask in range(full, -1, -1):
-            done = before[r + 1, mask]
-            for g in range(n):
-                if not mask >> g & 1:
-                    continue
-                least = to_finish[r, goal_list[g]] + done
-                for u in range(n):
-                    if not mask >> u & 1:
-                        on = between[r, g, u] + after[r, mask | 1 << u, u]
-                        least = min(least, on)
-                after[r, mask, g] = least
-            least = to_finish[r, -1] + done
-            for u in range(n):
-                if not mask >> u & 1:
-                    least = min(least, from_start[r, u] + after[r, mask | 1 << u, u])
-            before[r, mask] = least
-    return Completions(from_station, to_finish, after, before)
 
 
 @kernel
@@ -135,6 +91,7 @@ def cheapest_tours(search, room):
         np.empty((room, 2)),
         np.empty((room, 4), np.int32),
         np.zeros(sets + 1, np.int64),
+        np.empty(room, np.int32),
         np.empty((room, 2)),
         np.empty(room, np.int32),
     )
@@ -146,16 +103,19 @@ def cheapest_tours(search, room):
         labels.first[0] = count
         for mask in range(sets):
             if cost[mask] < np.inf and (
-                cost[mask] + search.rest.before[r, mask] <= search.most
+                cost[mask] + search.rest.before[mask] <= search.most
             ):
                 if count < room:
                     _set(labels, count, cost[mask], problem.energy[r])
                     _trace(labels, count, r, start, 0, last[mask])
                 count += 1
             for g in range(n):
-                if mask >> g & 1 and count <= room:
+                rest = mask ^ (1 << g)
+                # Nothing is called in vain: a call's many arrays take their time.
+                some = rest < mask and labels.first[rest] < labels.first[rest + 1]
+                if some and count <= room:
                     count = _visit_goal(search, labels, r, mask, g, count)
-            if count <= room:
+            if labels.first[mask] < count <= room:
                 count = _visit_stations(search, labels, r, mask, count)
             if count > room:
                 return cost, last, labels.trace[:0]
@@ -184,9 +144,12 @@ def _visit_goal(search, labels, r, mask, g, count):
     Returns:
         The number of labels; more than there is room for if they do not fit.
     """
-    goal, rest = search.goal_list[g], mask ^ (1 << g)
-    for arc in range(search.leg.shape[4]):
-        offers = _offers(search, labels, r, rest, g, arc)
+    goal, ahead = search.goal_list[g], search.rest.after[mask, g]
+    near = _near(search, labels, r, mask ^ (1 << g), goal, ahead)
+    for arc in range(search.leg.shape[4] if near else 0):
+        offers = _offers(search, labels, r, near, goal, arc, ahead)
+        if offers == 0:
+            continue
         if count + offers > len(labels.value):
             return len(labels.value) + 1
         first = count
@@ -205,28 +168,49 @@ def _visit_goal(search, labels, r, mask, g, count):
 
 
 @kernel
-def _offers(search, labels, r, rest, g, arc):
-    """Write what comes of all labels that the g-th goal may follow; return the number.
+def _near(search, labels, r, rest, goal, ahead):
+    """Write the labels that a goal may follow at one of its arcs; return their number.
 
     Args:
         search, labels: `TourSearch`, `Labels`.
         r: robot.
         rest: goals visited before this one, as bits.
-        g: number of the goal in the list.
-        arc: of its border.
+        goal: number of the goal.
+        ahead: bound of what is still to come after it.
     """
     problem = search.routing
-    goal = search.goal_list[g]
-    ahead = search.rest.after[r, rest | 1 << g, g]
-    offers = 0
+    near = 0
     for k in range(labels.first[rest], labels.first[rest + 1]):
-        node = labels.trace[k, 1]
+        node, from_arc = labels.trace[k, 1], labels.trace[k, 2]
         left = labels.value[k, 1] - problem.cost[r, node, goal]
-        if left < problem.reserve[r]:
-            continue
-        leg = search.leg[r, node, labels.trace[k, 2], goal, arc]
-        cost = labels.value[k, 0] + leg
-        if leg < np.inf and cost + ahead <= search.most:
+        cost = labels.value[k, 0] + search.nearest[r, node, from_arc, goal]
+        if left >= problem.reserve[r] and cost < np.inf and cost + ahead <= search.most:
+            labels.near[near] = k
+            near += 1
+    return near
+
+
+@kernel
+def _offers(search, labels, r, near, goal, arc, ahead):
+    """Write what comes of labels that a goal follows at an arc; return the number.
+
+    Args:
+        search, labels: `TourSearch`, `Labels`.
+        r: robot.
+        near: number of the labels that the goal may follow.
+        goal: number of the goal.
+        arc: of its border.
+        ahead: bound of what is still to come after it.
+    """
+    problem = search.routing
+    offers = 0
+    for k in labels.near[:near]:
+        node, from_arc = labels.trace[k, 1], labels.trace[k, 2]
+        cost = labels.value[k, 0] + search.leg[r, node, from_arc, goal, arc]
+        if cost < np.inf and cost + ahead <= search.most:
+            left = labels.value[k, 1] - search.drain[r, node, from_arc, goal, arc]
+            if left < problem.reserve[r]:
+                continue
             labels.offer[offers, 0] = cost
             labels.offer[offers, 1] = min(left, problem.capacity[r])
             labels.origin[offers] = k
@@ -290,7 +274,12 @@ def _lead_on(search, labels, r, k, usable, ahead, cost, origin):
     for s in range(len(cost)):
         if search.routing.cost[r, node, goals + s] > usable or node == goals + s:
             continue
+        nearest = search.nearest[r, node, from_arc, goals + s]
+        if labels.value[k, 0] + nearest + ahead[s] > search.most:
+            continue
         for arc in range(cost.shape[1]):
+            if search.drain[r, node, from_arc, goals + s, arc] > usable:
+                continue
             value = labels.value[k, 0] + search.leg[r, node, from_arc, goals + s, arc]
             if value < cost[s, arc] and value + ahead[s] <= search.most:
                 cost[s, arc] = value
@@ -301,10 +290,10 @@ def _lead_on(search, labels, r, k, usable, ahead, cost, origin):
 def _after_station(search, r, mask, s):
     """Return a bound of what is still to come with robot r at a station."""
     rest = search.rest
-    least = rest.to_finish[r, search.routing.goals + s] + rest.before[r + 1, mask]
+    least = rest.to_finish[r, search.routing.goals + s] + rest.before[mask]
     for u in range(len(search.goal_list)):
         if not mask >> u & 1:
-            on = rest.from_station[r, s, u] + rest.after[r, mask | 1 << u, u]
+            on = rest.from_station[r, s, u] + rest.after[mask | 1 << u, u]
             least = min(least, on)
     return least
 

@@ -5,7 +5,7 @@ energy of that is at least the rolling resistance on the shortest ways (`geodesi
 a robot that starts and ends at rest gets no inertia for nothing, and turning, idling
 and other robots only cost more. The least over all orders is the bound.
 
-Up to MOST_GOALS goals, orders are distinguished by where each region is touched first
+Where goals are few, orders are distinguished by where each region is touched first
 (`touring`), as the way through a region is no more for nothing than any other.
 
 On slopes the battery also pays for climbing and is paid for rolling down, at most what
@@ -37,8 +37,7 @@ from shapely.geometry import Point
 from mrmg.planning.bound import _bound_kernels
 from mrmg.planning.bound.arcs import ArcWays
 from mrmg.planning.bound.exact_tours import (
-    MOST_GOALS,
-    completions,
+    are_few,
     exact_routing,
     over_stations,
 )
@@ -47,7 +46,11 @@ from mrmg.planning.bound.touring import touring_bound_J
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing.routing import routing_arrays
+from mrmg.planning.routing.routing import (
+    RouterParams,
+    routing_arrays,
+    solve_routing,
+)
 from mrmg.scene.region import Region
 from mrmg.scene.types import Robot, Scene
 
@@ -104,27 +107,18 @@ def lower_bound_J(
         return 0.0
     relaxed = Relaxation.of(scene, step_s=step_s, cells=cells, halt=halt)
     problem = relaxed.problem
-    if len(scene.goals) > MOST_GOALS:
+    if not are_few(len(scene.goals), len(scene.robots)):
         bound = relaxed_routing_J(problem)
     else:
-        rest = completions(problem)
-        routing = exact_routing(problem, rest)
-        if routing is None:
-            bound = relaxed_routing_J(problem)
-        elif routing.feasible and rounds and not halt[0]:
+        routing = exact_routing(problem)
+        bound = routing.cost_J if routing else relaxed_routing_J(problem)
+        routing = routing or solve_routing(problem, RouterParams(), 0)
+        if routing.feasible and rounds and not halt[0]:
             ways = relaxed.arc_ways(finer)
-            bound = touring_bound_J(
-                problem,
-                rest,
-                routing.tours,
-                ways,
-                relaxed.price,
-                rounds=rounds,
-                halt=halt,
+            touring_J = touring_bound_J(
+                problem, routing.tours, ways, relaxed.price, rounds=rounds, halt=halt
             )
-            bound = max(bound, routing.cost_J)
-        else:
-            bound = routing.cost_J
+            bound = max(bound, touring_J)
     bound -= sum(most_descent_J(scene, robot) for robot in scene.robots)
     return max(0.0, bound) * (1.0 - ROUNDING_SHARE)
 

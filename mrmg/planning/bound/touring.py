@@ -8,25 +8,30 @@ are looked at, so the result is the least cost of all tours or the limit.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from mrmg.planning.bound._touring_kernels import Completions
 from mrmg.planning.bound.arcs import ArcWays, Wave
 from mrmg.planning.bound.borders import ARCS
-from mrmg.planning.bound.exact_tours import cheapest_tours
+from mrmg.planning.bound.exact_tours import cheapest_tours, completions
 from mrmg.planning.halting import NEVER
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 
 SLACK = 1e-6
 """Share by which tours may cost more than the best known; rounding loses none."""
 
+WIDER = 0.02
+"""Share by which dearer tours are looked at where batteries allow none as cheap."""
+
+LEAST_RISE = 0.005
+"""Share of the bound within which too many labels end it."""
+
 
 def touring_bound_J(
     problem: RoutingArrays,
-    rest: Completions,
     tours: Sequence[Sequence[int]],
     ways: Sequence[ArcWays],
     price: np.ndarray,
@@ -40,27 +45,39 @@ def touring_bound_J(
 
     Args:
         problem: the relaxed routing problem, whose batteries limit tours.
-        rest: completions of that problem.
-        tours: cheapest tours of that problem, whose ways are tightened first.
+        tours: good tours of that problem, whose ways are tightened first.
         ways: of each robot.
         price: cost of a metre of plain ground of each robot, shape (R,).
         rounds: how often at most.
         halt: shape (1,); no round begins once it has turned true.
+
+    Returns:
+        The bound; 0 if none was found.
     """
-    best = float(rest.before[0, 0])
+    best, most, too_much, settled = 0.0, 0.0, math.inf, False
     leg = _leg_table(ways, price)
+    rest = None
     for _ in range(rounds):
-        if halt[0] or not _tighten(ways, leg, tours):
+        tightened = _tighten(ways, leg, tours)
+        if halt[0] or (settled and not tightened):
             break
         leg = _leg_table(ways, price)
-        most = (1.0 + SLACK) * _cost_along(leg, tours)
+        rest = rest or completions(problem, leg)
+        most = max(most, (1.0 + SLACK) * _cost_along(leg, tours))
+        if most >= too_much:
+            most = 0.5 * (best + too_much)
         found = cheapest_tours(problem, leg, rest, most)
+        settled = found is not None and found.feasible
         if found is None:
+            too_much = most
+            best = max(best, float(rest.before[0]))
+        elif settled:
+            best, tours = max(best, found.cost_J), found.tours
+        else:
+            best = max(best, most)
+            most *= 1.0 + WIDER
+        if too_much < (1.0 + LEAST_RISE) * best:
             break
-        best = max(best, min(found.cost_J, most))
-        if not found.feasible:
-            break
-        tours = found.tours
     return best
 
 

@@ -14,7 +14,7 @@ import pytest
 from mrmg.planning import plan_mission
 from mrmg.planning.bound._eikonal_kernels import UNREACHED, certified_field
 from mrmg.planning.bound.bound import Relaxation, lower_bound_J, relaxed_routing_J
-from mrmg.planning.bound.exact_tours import MOST_GOALS, exact_routing
+from mrmg.planning.bound.exact_tours import PRUNED_GOALS, exact_routing
 from mrmg.planning.bound.geodesic import Field, Look
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import (
@@ -125,7 +125,7 @@ def test_nothing_to_visit_costs_nothing_and_too_much_is_declined(
     idle = mission(0, goals=3, stations=1, robots=2, open_goal=(False,) * 3)
     assert exact_routing(idle) == Routing(((), ()), 0.0)
     assert relaxed_routing_J(idle) == 0.0
-    assert exact_routing(mission(0, goals=MOST_GOALS + 1, stations=2)) is None
+    assert exact_routing(mission(0, goals=PRUNED_GOALS + 1, stations=2)) is None
 
 
 def test_twelve_goals_and_four_robots_are_never_dearer_than_the_heuristic(

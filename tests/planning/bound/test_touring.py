@@ -9,10 +9,14 @@ from itertools import combinations, permutations, product
 import numpy as np
 import pytest
 
-from mrmg.planning.bound._touring_kernels import Completions
+from mrmg.planning.bound._completion_kernels import Completions
 from mrmg.planning.bound.arcs import ArcWays
 from mrmg.planning.bound.bound import lower_bound_J
-from mrmg.planning.bound.exact_tours import cheapest_tours, exact_routing
+from mrmg.planning.bound.exact_tours import (
+    cheapest_tours,
+    completions,
+    exact_routing,
+)
 from mrmg.planning.bound.geodesic import Ground, Ways
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import routing_arrays
@@ -35,11 +39,12 @@ def legs(seed: int, robots: int, goals: int, stations: int, arcs: int) -> np.nda
 def least_cost(leg: np.ndarray, goals: int, range_m: float) -> float:
     """Return the cheapest tours' cost by trying all, with at most one recharge a leg.
 
-    Batteries are drained by the least leg, whatever the arcs.
+    Legs drain batteries by what they cost, those from stations by the least that they
+    cost from any arc.
     """
     robots, start = leg.shape[0], leg.shape[1] - 1
-    least = leg.min(axis=(2, 4))
-    least[:, start] = leg[:, start, 0].min(axis=-1)
+    drain = leg.copy()
+    drain[:, goals:start] = leg[:, goals:start].min(axis=2, keepdims=True)
     best = math.inf
     for order in permutations(range(goals)):
         for cuts in combinations(range(goals + robots - 1), robots - 1):
@@ -49,7 +54,7 @@ def least_cost(leg: np.ndarray, goals: int, range_m: float) -> float:
                 for r, (low, high) in enumerate(zip(ends, ends[1:], strict=False))
             ]
             cost = sum(
-                route_cost(leg[r], least[r], route, start, goals, range_m)
+                route_cost(leg[r], drain[r], route, goals, range_m)
                 for r, route in enumerate(own)
             )
             best = min(best, cost)
@@ -58,32 +63,26 @@ def least_cost(leg: np.ndarray, goals: int, range_m: float) -> float:
 
 def route_cost(
     leg: np.ndarray,
-    least: np.ndarray,
+    drain: np.ndarray,
     route: tuple[int, ...],
-    start: int,
     goals: int,
     range_m: float,
 ) -> float:
-    stations = range(goals, start)
+    """Return the least cost of a route over all stations and arcs between its goals."""
+    start = len(leg) - 1
     best = math.inf
-    for stops in product((None, *stations), repeat=len(route)):
-        places = [
-            place
-            for stop, goal in zip(stops, route, strict=True)
-            for place in ((goal,) if stop is None else (stop, goal))
-        ]
-        left, here = range_m, start
-        cost = np.where(np.arange(leg.shape[1]) == 0, 0.0, np.inf)
-        for place in places:
-            left -= least[here, place]
-            if left < 0.0:
-                break
-            if place >= goals:
-                left = range_m
-            cost = (cost[:, None] + leg[here, :, place]).min(axis=0)
-            here = place
-        else:
-            best = min(best, float(cost.min()))
+    for stops in product((None, *range(goals, start)), repeat=len(route)):
+        cost, left, arc = np.zeros(1), np.full(1, range_m), np.zeros(1, int)
+        here = start
+        for stop, goal in zip(stops, route, strict=True):
+            for place in (goal,) if stop is None else (stop, goal):
+                cost = (cost[:, None] + leg[here, arc, place]).ravel()
+                left = (left[:, None] - drain[here, arc, place]).ravel()
+                arc = np.tile(np.arange(leg.shape[1]), len(arc))
+                cost, left, arc = (one[left >= 0.0] for one in (cost, left, arc))
+                left = np.full_like(left, range_m) if place >= goals else left
+                here = place
+        best = min(best, float(cost.min(initial=math.inf)))
     return best
 
 
@@ -112,8 +111,8 @@ def test_tours_by_arcs_are_the_cheapest(
         nothing = Completions(
             np.zeros((robots, stations, goals)),
             np.zeros((robots, goals + stations + 1)),
-            np.zeros((robots, 1 << goals, goals)),
-            np.zeros((robots + 1, 1 << goals)),
+            np.zeros((1 << goals, goals)),
+            np.zeros(1 << goals),
         )
         exact = least_cost(leg, goals, range_m)
         most = 1e4
@@ -121,6 +120,11 @@ def test_tours_by_arcs_are_the_cheapest(
         assert found is not None
         if exact <= most:
             assert found.cost_J == pytest.approx(exact)
+            rest = completions(problem, leg)
+            assert rest.before[0] <= exact
+            pruned = cheapest_tours(problem, leg, rest, (1.0 + 1e-9) * exact)
+            assert pruned is not None
+            assert pruned.cost_J == pytest.approx(exact)
         else:
             assert found.cost_J == math.inf
         below = cheapest_tours(problem, leg, nothing, 0.99 * exact)
