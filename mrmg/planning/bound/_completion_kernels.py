@@ -46,27 +46,33 @@ def completions(between, pair, from_start, to_end, from_station, to_finish):
     n, by_pairs = len(between), len(pair) > 0
     after = np.full((1 << n, n), np.inf)
     before = np.zeros(1 << n)
+    rest = np.empty(n, np.int64)
+    single, ahead = np.empty(n), np.full((n, n), np.inf)
     for mask in range((1 << n) - 1, -1, -1):
-        if mask < len(before) - 1:
-            before[mask] = np.inf
+        left = 0
         for u in range(n):
             if not mask >> u & 1:
-                on = from_start[u] + after[mask | 1 << u, u]
-                before[mask] = min(before[mask], on)
+                rest[left] = u
+                left += 1
+        before[mask] = np.inf if left else 0.0
+        for i in range(left):
+            u = rest[i]
+            on = mask | 1 << u
+            single[i] = after[on, u]
+            before[mask] = min(before[mask], from_start[u] + after[on, u])
+            if by_pairs:
+                single[i] = to_end[u] + before[on]
+                for j in range(left):
+                    w = rest[j]
+                    ahead[i, j] = after[on | 1 << w, w] if i != j else np.inf
         for g in range(n):
             if not mask >> g & 1:
                 continue
             least = to_end[g] + before[mask]
-            for u in range(n):
-                if mask >> u & 1:
-                    continue
-                on = mask | 1 << u
-                if not by_pairs:
-                    least = min(least, between[g, u] + after[on, u])
-                    continue
-                least = min(least, between[g, u] + to_end[u] + before[on])
-                for w in range(n):
-                    if not on >> w & 1:
-                        least = min(least, pair[g, u, w] + after[on | 1 << w, w])
+            for i in range(left):
+                u = rest[i]
+                least = min(least, between[g, u] + single[i])
+                for j in range(left if by_pairs else 0):
+                    least = min(least, pair[g, u, rest[j]] + ahead[i, j])
             after[mask, g] = least
     return Completions(from_station, to_finish, after, before)
