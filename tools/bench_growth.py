@@ -7,14 +7,18 @@ plan, with one seed for map, places and planner. One number grows at a time, the
 stay: 4 robots, 20 goals, 6 stations and 50 boxes on 100 x 100 m. The boxes of a map
 cover 12 % of it, however many there are, and stations grow with the goals, one for each
 4. Large fleets (16 robots with 64 goals and 20 stations, 32 with 128 and 40) are placed
-on the map of scene6, 100 x 100 m as well. Times are wall-clock, of planning in process;
-a plan counts if the verifier finds nothing wrong with it. Memory is the process's peak
-so far. The last table has one line for the missions of one size.
+on the map of scene6, 100 x 100 m as well. In the series `fleets` all grows together: 4
+goals and a station for each robot, ground and boxes with them (50 boxes on 100 x 100 m
+for 16 robots); 64, 128 and 256 robots take long and are measured by `--sizes` alone.
+Times are wall-clock, of planning in process; a plan counts if the verifier finds
+nothing wrong with it. Memory is the process's peak so far. The last table has one line
+for the missions of one size. The exponent of growth is the slope of a line through the
+logarithms of the sizes and of the median times to the first plan.
 
 Finished missions are kept in --output FILE: the same command goes on from there after
 an interruption. Rows of --json are those of the last table: `series`, `size`, `robots`,
 `goals`, `obstacles`, `ok` of `missions`, `first_plan_s_median`, `first_plan_s_worst`,
-`routing_s_median`, `memory_MB`.
+`routing_s_median`, `populate_s_median`, `memory_MB`. `exponents`: `series`, `exponent`.
 """
 
 from __future__ import annotations
@@ -32,7 +36,7 @@ from typing import Any
 import numpy as np
 import shapely
 from bench import conditions
-from growth_figure import GrowthPoint, draw_growth
+from growth_figure import GrowthPoint, draw_growth, exponent
 from protocol import Row, Trials, add_file_options, run, write_document
 from shapely import affinity
 
@@ -65,6 +69,7 @@ class Case:
         size: of it.
         robots, goals, stations: how many.
         boxes: of a drawn map; None for the map of scene6.
+        side_m: of a drawn map.
     """
 
     series: str
@@ -73,6 +78,15 @@ class Case:
     goals: int = 20
     stations: int = 6
     boxes: int | None = 50
+    side_m: float = SIDE_M
+
+    @staticmethod
+    def of_fleet(robots: int) -> Case:
+        """Return a mission on a map that grows with its fleet."""
+        boxes, side_m = round(50 * robots / 16), round(SIDE_M * sqrt(robots / 16), 1)
+        numbers = {"robots": robots, "goals": 4 * robots, "stations": robots}
+        fleet = Case(series="fleets", size=robots, boxes=boxes, **numbers)
+        return replace(fleet, side_m=side_m)
 
 
 SERIES = {
@@ -88,22 +102,31 @@ SERIES = {
         Case(series="large", size=r, robots=r, goals=g, stations=s, boxes=None)
         for r, g, s in ((16, 64, 20), (32, 128, 40))
     ],
+    "fleets": [Case.of_fleet(n) for n in (4, 8, 16, 32, 64, 128, 256)],
 }
+
+USUAL_MOST = {"fleets": 32}
+"""Largest sizes that are measured unless `--sizes` or `--most` names others."""
 
 
 def main() -> int:
     """Measure all chosen series; return 1 if a mission has no verified plan."""
     options = parse_options()
     chosen = [case for name in options.series for case in SERIES[name]]
+    chosen = [case for case in chosen if is_chosen(case, options.sizes, options.most)]
     options.seeds = range(options.seeds)
     trials = Trials(options.output)
-    rows = measure(chosen, options.seeds, trials, options.most)
+    rows = measure(chosen, options.seeds, trials)
     table = sizes_of(rows)
+    powers = {name: exponent(points) for name, points in points_of(rows).items()}
     print(f"\n{summary(table)}\n")
+    for name, power in powers.items():
+        print(f"time to the first plan by {name}: size to the power of {power:.2f}")
     if options.figure:
         draw(rows, options.figure)
     ok = all(row["ok"] for row in rows)
-    write_document(options, "bench_growth", table, ok)
+    exponents = [{"series": name, "exponent": x} for name, x in powers.items()]
+    write_document(options, "bench_growth", table, ok, exponents=exponents)
     return 0 if ok else 1
 
 
@@ -113,20 +136,26 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument("--series", nargs="+", default=list(SERIES), choices=SERIES)
     parser.add_argument("--seeds", type=int, default=3, help="default 3: 0, 1 and 2")
     parser.add_argument("--most", type=int, help="leave out larger sizes")
+    parser.add_argument("--sizes", type=int, nargs="+", help="only these sizes")
     add_file_options(parser)
     parser.add_argument("--figure", type=Path, help="PDF, SVG or PNG")
     return parser.parse_args()
 
 
-def measure(
-    cases: Sequence[Case], seeds: range, trials: Trials, most: int | None = None
-) -> list[Row]:
+def is_chosen(case: Case, sizes: Sequence[int] | None, most: int | None) -> bool:
+    """Return whether a mission's size is among those that are asked for."""
+    if sizes is not None:
+        return case.size in sizes
+    return case.size <= (most or USUAL_MOST.get(case.series, case.size))
+
+
+def measure(cases: Sequence[Case], seeds: range, trials: Trials) -> list[Row]:
     """Plan what is not finished; print a table of all and return its rows."""
     print(f"{__doc__}\n{conditions()}\n")
     print("grows | size | seed | ok | init s | router s | first plan s | cost J | MB")
     rows = []
     for case in cases:
-        for seed in seeds if most is None or case.size <= most else ():
+        for seed in seeds:
             make = partial(planned, case, seed)
             rows.append(trials.row(make, **asdict(case), seed=seed))
             print(table_row(rows[-1]), flush=True)
@@ -143,6 +172,7 @@ def warm() -> None:
 def planned(case: Case, seed: int) -> Row:
     """Generate, plan and verify one mission; return its row."""
     warm()
+    populating = time.perf_counter()
     scene = scene_from_document(document_of(case, seed), source=f"{case}")
     params = replace(PlannerParams(), improvements=0)
     began = time.perf_counter()
@@ -155,6 +185,7 @@ def planned(case: Case, seed: int) -> Row:
         "goals": case.goals,
         "stations": case.stations,
         "obstacles": len(scene.obstacles),
+        "populate_s": began - populating,
         "status": result.status.value,
         "reason": result.reason,
         "plan_s": time.perf_counter() - began,
@@ -200,6 +231,7 @@ def sizes_of(rows: Sequence[Row]) -> list[Row]:
                 "first_plan_s_median": np.median(first_s),
                 "first_plan_s_worst": np.max(first_s),
                 "routing_s_median": np.median(routing_s),
+                "populate_s_median": np.median([row["populate_s"] for row in same]),
                 "memory_MB": max(row["memory_MB"] for row in same),
             }
         )
@@ -225,15 +257,20 @@ def summary(table: Sequence[Row]) -> str:
 
 def draw(rows: Sequence[Row], path: Path) -> None:
     """Draw the series that grow."""
+    if series := points_of(rows):
+        draw_growth(series, path)
+        print(path)
+
+
+def points_of(rows: Sequence[Row]) -> dict[str, list[GrowthPoint]]:
+    """Return the missions of the series that grow, by their names."""
     series: dict[str, list[GrowthPoint]] = {}
     for row in rows:
         if row["series"] != "large":
             first_s = row["time_s"]["first_solution"] if row["ok"] else None
             points = series.setdefault(row["series"], [])
             points.append(GrowthPoint(row["size"], first_s))
-    if series:
-        draw_growth(series, path)
-        print(path)
+    return series
 
 
 def document_of(case: Case, seed: int) -> dict[str, Any]:
@@ -244,7 +281,7 @@ def document_of(case: Case, seed: int) -> dict[str, Any]:
     if case.boxes is None:
         bare = mrmg.load_scene("scene6").document
     else:
-        bare = drawn_map(case.boxes, seed)
+        bare = drawn_map(case.boxes, seed, case.side_m)
     for again in range(20):
         try:
             return populate(
@@ -259,41 +296,41 @@ def document_of(case: Case, seed: int) -> dict[str, Any]:
     raise refused
 
 
-def drawn_map(boxes: int, seed: int) -> dict[str, Any]:
+def drawn_map(boxes: int, seed: int, side_m: float = SIDE_M) -> dict[str, Any]:
     """Return a square map with boxes at drawn places."""
     rng = seeding.stream(seed, "growth", boxes)
-    side_m = SIDE_M * sqrt(COVERED / boxes)
-    placed: list[Any] = []
-    found = list(_free_boxes(rng, boxes, side_m, placed))
+    found = list(_free_boxes(rng, boxes, side_m))
     return {
         "format": 1,
         "name": f"{boxes} boxes, seed {seed}",
-        "bounds": [0, 0, SIDE_M, SIDE_M],
+        "bounds": [0, 0, side_m, side_m],
         "obstacles": found,
     }
 
 
 def _free_boxes(
-    rng: np.random.Generator, boxes: int, side_m: float, placed: list[Any]
+    rng: np.random.Generator, boxes: int, side_m: float
 ) -> Iterator[dict[str, Any]]:
     """Yield boxes that leave roads between each other, narrower if there is no room."""
+    box_m = side_m * sqrt(COVERED / boxes)
+    placed: list[Any] = []
     apart_m, tries = APART_M, 0
     while len(placed) < boxes:
         ratio = float(rng.uniform(0.6, 1.6))
-        size = (side_m * sqrt(ratio), side_m / sqrt(ratio))
+        size = (box_m * sqrt(ratio), box_m / sqrt(ratio))
         yaw = float(rng.uniform(0.0, np.pi / 2.0))
-        centre = rng.uniform(0.0, SIDE_M, 2)
+        centre = rng.uniform(0.0, side_m, 2)
         box = affinity.rotate(
             shapely.box(-size[0] / 2.0, -size[1] / 2.0, size[0] / 2.0, size[1] / 2.0),
             yaw,
             use_radians=True,
         )
         box = affinity.translate(box, *centre)
-        inside = shapely.box(0.0, 0.0, SIDE_M, SIDE_M).buffer(-apart_m).contains(box)
+        inside = shapely.box(0.0, 0.0, side_m, side_m).buffer(-apart_m).contains(box)
         tries += 1
         if tries % 2000 == 0:
             apart_m *= 0.8
-        if inside and all(box.distance(other) >= apart_m for other in placed):
+        if inside and (shapely.distance(box, placed) >= apart_m).all():
             placed.append(box)
             yield {
                 "id": f"box{len(placed)}",

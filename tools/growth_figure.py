@@ -33,6 +33,27 @@ class GrowthPoint:
     first_s: float | None
 
 
+def exponent(points: Sequence[GrowthPoint]) -> float:
+    """Return the power of the size that median times grow with; NaN if unknown.
+
+    It is the slope of the least-squares line through their logarithms.
+    """
+    medians = _medians(points)
+    if len(medians) < 2:
+        return float("nan")
+    size, first_s = np.log(np.array(medians)).T
+    return float(np.polyfit(size, first_s, 1)[0])
+
+
+def _medians(points: Sequence[GrowthPoint]) -> list[tuple[int, float]]:
+    """Return the sizes that have plans, and the median times to these."""
+    found: dict[int, list[float]] = {}
+    for point in sorted(points, key=lambda point: point.size):
+        if point.first_s is not None:
+            found.setdefault(point.size, []).append(point.first_s)
+    return [(size, statistics.median(times_s)) for size, times_s in found.items()]
+
+
 def draw_growth(series: Mapping[str, Sequence[GrowthPoint]], path: Path) -> None:
     """Draw the time to the first verified plan against what grows, a panel for each.
 
@@ -47,7 +68,8 @@ def draw_growth(series: Mapping[str, Sequence[GrowthPoint]], path: Path) -> None
         all_axes = np.ravel(figure.subplots(1, len(series), sharey=True))
         for axes, (name, points) in zip(all_axes, series.items(), strict=True):
             _draw_panel(axes, points)
-            axes.set_xlabel(name)
+            power = exponent(points)
+            axes.set_xlabel(name if np.isnan(power) else f"{name}, power {power:.2f}")
         all_axes[0].set_ylabel("time to the first plan [s]")
 
 
@@ -55,12 +77,9 @@ def _draw_panel(axes: Axes, points: Sequence[GrowthPoint]) -> None:
     by_size: dict[int, list[GrowthPoint]] = {}
     for point in sorted(points, key=lambda point: point.size):
         by_size.setdefault(point.size, []).append(point)
-    medians = []
     for size, own in by_size.items():
         times_s = [point.first_s for point in own if point.first_s is not None]
         axes.plot([size] * len(times_s), times_s, "o", color=_FACE, ms=3, alpha=0.7)
-        if times_s:
-            medians.append((size, statistics.median(times_s)))
         failed = len(own) - len(times_s)
         if failed:
             axes.annotate(
@@ -72,7 +91,7 @@ def _draw_panel(axes: Axes, points: Sequence[GrowthPoint]) -> None:
                 fontsize=5.5,
                 color=style.RESERVE,
             )
-    if medians:
+    if medians := _medians(points):
         axes.plot(*zip(*medians, strict=True), color=_INK, linewidth=1.2)
     axes.set_xscale("log")
     axes.set_yscale("log")

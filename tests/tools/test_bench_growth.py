@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import bench_growth
+import numpy as np
 import pytest
 import shapely
 from bench_growth import Case
@@ -26,6 +27,25 @@ def test_maps_cover_the_same_share(boxes: int) -> None:
     assert share == pytest.approx(bench_growth.COVERED, rel=0.01)
     assert shapely.unary_union(shapes).area == pytest.approx(share * 1e4)
     assert bench_growth.drawn_map(boxes, 0) != bench_growth.drawn_map(boxes, 1)
+
+
+def test_ground_grows_with_a_fleet() -> None:
+    case = Case.of_fleet(4)
+    assert (case.robots, case.goals, case.stations, case.side_m) == (4, 16, 4, 50.0)
+    document = bench_growth.document_of(case, 0)
+    assert document["bounds"] == [0, 0, 50.0, 50.0]
+    assert len(document["goals"]) == 16
+
+
+def test_sizes_are_chosen() -> None:
+    usual, large = Case.of_fleet(32), Case.of_fleet(64)
+    for sizes, most, chosen in (
+        (None, None, (True, False)),
+        (None, 64, (True, True)),
+        ([64], None, (False, True)),
+    ):
+        found = tuple(bench_growth.is_chosen(x, sizes, most) for x in (usual, large))
+        assert found == chosen
 
 
 def test_every_case_has_its_numbers() -> None:
@@ -55,13 +75,16 @@ def test_rows_and_figure(
     written = json.loads(document.read_text())
     assert [(row["size"], row["ok"]) for row in written["rows"]] == [(1, 1), (2, 1)]
     assert written["ok"] is True
+    (power,) = written["exponents"]
+    assert power["series"] == "robots"
+    assert np.isfinite(power["exponent"])
 
 
 def test_the_summary_has_a_line_for_the_missions_of_one_size() -> None:
     def row(size: int, first_s: float, ok: bool = True) -> dict[str, Any]:
         return {
             "series": "robots", "size": size, "robots": size, "goals": 20,
-            "obstacles": 50, "ok": ok, "memory_MB": 250.4,
+            "obstacles": 50, "ok": ok, "memory_MB": 250.4, "populate_s": 0.5,
             "time_s": {"first_solution": first_s, "routing": 0.25},
         }  # fmt: skip
 
