@@ -45,13 +45,17 @@ def _narrow(
     """Yield the stretches on which a robot keeps less than its margin."""
     bounds = shapely.box(*scene.bounds).boundary
     near = [bounds, *(item.shape for item in scene.barriers if item.stops(robot.id))]
-    bodies = shapely.polygons(robot.model.footprint_at(trajectory.state))
     tree = shapely.STRtree(near)
+    # Where the reference point is farther away than that, no corner is near enough.
+    reach_m = margin_m + float(np.hypot(*robot.model.footprint_m.T).max())
+    points = shapely.points(trajectory.state[:, :2])
+    close = np.unique(tree.query(points, predicate="dwithin", distance=reach_m)[0])
+    bodies = shapely.polygons(robot.model.footprint_at(trajectory.state[close]))
     found, distance = tree.query_nearest(
         bodies, return_distance=True, all_matches=False
     )
-    distance_m = np.zeros(len(bodies))
-    distance_m[found[0]] = distance
+    distance_m = np.full(len(points), np.inf)
+    distance_m[close[found[0]]] = distance
     less = np.flatnonzero(distance_m < margin_m - ROUNDING_M)
     for run in np.split(less, np.flatnonzero(np.diff(less) > 1) + 1):
         if len(run):

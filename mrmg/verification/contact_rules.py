@@ -13,6 +13,7 @@ from mrmg.plans import Trajectory
 from mrmg.scene.types import Obstacle, Robot, Scene
 from mrmg.verification.clearance import (
     BoundsGap,
+    Gap,
     GapMinimum,
     ObstacleGap,
     PairGap,
@@ -42,18 +43,28 @@ def check_obstacles(
 ) -> list[Contacts]:
     """Return the robot's contacts with obstacles, then with the bounds."""
     footprint = SweptFootprint.of(robot.model, trajectory)
-    steps = np.arange(len(trajectory.control))
-    outside = bounded_minimum(
-        BoundsGap(footprint, scene.bounds), steps, trajectory.dt_s
-    )
+    outside = _least_gap(BoundsGap(footprint, scene.bounds), footprint)
     contacts = [_bounds_contacts(robot.id, footprint, outside, scene.bounds)]
     obstacles = [item for item in scene.barriers if item.stops(robot.id)]
     if obstacles:
-        touched = bounded_minimum(
-            ObstacleGap(footprint, obstacles), steps, trajectory.dt_s
-        )
+        touched = _least_gap(ObstacleGap(footprint, obstacles), footprint)
         contacts.append(_obstacle_contacts(robot.id, footprint, touched, obstacles))
     return contacts
+
+
+def _least_gap(gap: Gap, footprint: SweptFootprint) -> GapMinimum:
+    """Return the certified minimum of a gap to what stands still.
+
+    Steps that are like the one before them are looked at only where there is contact.
+    """
+    state, control = footprint.state, footprint.control
+    changed = (state[1:] != state[:-1]).any(axis=1)
+    changed |= (control[1:] != control[:-1]).any(axis=1)
+    distinct = np.flatnonzero(np.concatenate([[True], changed])[: len(control)])
+    found = bounded_minimum(gap, distinct, footprint.dt_s)
+    if len(found.contact_step) and len(distinct) < len(control):
+        return bounded_minimum(gap, np.arange(len(control)), footprint.dt_s)
+    return found
 
 
 def check_robots(scene: Scene, trajectories: Sequence[Trajectory]) -> list[Contacts]:

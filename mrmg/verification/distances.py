@@ -21,17 +21,19 @@ def obstacle_distance(scene: Scene, robot: Robot, poses: np.ndarray) -> np.ndarr
     Returns:
         Distance [m], 0 on contact, shape (n,).
     """
-    shapes = shapely.polygons(robot.model.footprint_at(poses))
+    new = np.concatenate([[True], (poses[1:, :3] != poses[:-1, :3]).any(axis=1)])
+    which = np.cumsum(new[: len(poses)]) - 1  # a robot that stays is looked at once
+    shapes = shapely.polygons(robot.model.footprint_at(poses[new[: len(poses)]]))
     blocking = [item.shape for item in scene.barriers if item.stops(robot.id)]
     distance = np.asarray(
         shapely.distance(shapes, shapely.boundary(shapely.box(*scene.bounds)))
     )
     if not blocking:
-        return distance
+        return np.asarray(distance[which])
     tree = shapely.STRtree(blocking)
     found, nearest = tree.query_nearest(shapes, return_distance=True, all_matches=False)
     distance[found[0]] = np.minimum(distance[found[0]], nearest)
-    return distance
+    return np.asarray(distance[which])
 
 
 def robot_distance(robots: Sequence[Robot], poses: Sequence[np.ndarray]) -> np.ndarray:

@@ -116,3 +116,19 @@ def test_every_obstacle_under_a_footprint_is_named(case: Any) -> None:
     second = {**WALL, "id": "second"}
     verdict = verify(*case(obstacles=[WALL, second]))
     assert [item.other for item in verdict.violations] == ["wall", "second"]
+
+
+def test_a_rest_in_contact_is_one_contact(make_scene: Any, make_plan: Any) -> None:
+    """The nose comes to x = 8, rests there for two seconds, and goes back."""
+    there, back = [(1.5, 0.0)] * 10, [(-1.5, 0.0)] * 10
+    controls = [*there, *back, *[(0.0, 0.0)] * 20, *back, *there]
+    for wall_x, found in ((8.4, []), (8.2, [ViolationKind.OBSTACLE])):
+        box = {"center": [wall_x, 10], "size": [0.6, 4]}
+        scene = make_scene(
+            goals=[], obstacles=[{"id": "wall", "box": box, "height": 1}]
+        )
+        verdict = verify(scene, make_plan(scene, {"r1": controls}, {"r1": ()}))
+        kinds = [item.kind for item in verdict.violations]
+        assert [kind for kind in kinds if kind is ViolationKind.OBSTACLE] == found
+        clearance_m = max(wall_x - 0.3 - 8.0, 0.0)
+        assert verdict.min_obstacle_clearance_m == pytest.approx(clearance_m, abs=2e-3)
