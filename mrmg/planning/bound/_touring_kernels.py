@@ -312,6 +312,8 @@ def _end_tours(search, labels, r, cost, last):
             drain = problem.finish[r, node]
             total = labels.value[k, 0] + search.finish[r, node]
             enough = drain == 0.0 or labels.value[k, 1] - drain >= problem.reserve[r]
-            if enough and total < cost[mask]:
+            # Of what costs more, tours that cost less may have been missed.
+            few = total + search.rest.before[mask] <= search.most
+            if enough and few and total < cost[mask]:
                 cost[mask] = total
                 last[mask] = k
