@@ -17,7 +17,7 @@ from mrmg.planning.routing._refuel_kernels import new_labels
 from mrmg.planning.routing._routes_kernels import IMPOSSIBLE, Routes, new_routes
 from mrmg.planning.routing._routing_kernels import search, write_tours
 
-ROUNDS_PER_GOAL = 50
+ROUNDS_PER_GOAL = 75
 """Rounds are at most so many for each goal there is to visit."""
 
 
