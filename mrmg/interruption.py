@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import FrameType
+from types import FrameType, TracebackType
 from typing import Any, NoReturn
 
 EXIT_CODE = 130
@@ -48,6 +48,7 @@ def install() -> None:
     signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
     signal.signal(signal.SIGINT, _raise)
     sys.unraisablehook = _end_where_dropped
+    sys.excepthook = _end_where_printed
     threading.Thread(target=_watch, args=(reader,), daemon=True).start()
 
 
@@ -142,6 +143,15 @@ def _end_where_dropped(dropped: Any) -> None:
     if isinstance(dropped.exc_value, KeyboardInterrupt):
         end()
     sys.__unraisablehook__(dropped)
+
+
+def _end_where_printed(
+    kind: type[BaseException], value: BaseException, trace: TracebackType | None
+) -> None:
+    """End the process where compiled code would print the exception and go on."""
+    if issubclass(kind, KeyboardInterrupt):
+        end()
+    sys.__excepthook__(kind, value, trace)
 
 
 def _children(process: int) -> list[int]:

@@ -297,6 +297,24 @@ def test_an_interrupt_that_is_dropped_ends_the_process() -> None:
     assert process.returncode == 130
 
 
+def test_an_interrupt_that_compiled_code_prints_ends_the_process() -> None:
+    code = (
+        "import sys\n"
+        "from mrmg import interruption\n"
+        "interruption.install()\n"
+        "try:\n"
+        "    raise KeyboardInterrupt\n"
+        "except KeyboardInterrupt:\n"
+        "    sys.excepthook(*sys.exc_info())  # as PyErr_Print does, which returns\n"
+        "print('went on')\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+    assert (ended.returncode, ended.stdout) == (130, "")
+    assert ended.stderr == "mrmg: stopped; the same command takes it up again\n"
+
+
 def test_ctrl_c_while_improving_keeps_the_best_plan(tmp_path: Path) -> None:
     out = tmp_path / "run"
     words = ["plan", "quickstart", "--budget", "600", "--out", str(out)]
