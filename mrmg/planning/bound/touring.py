@@ -24,7 +24,7 @@ SLACK = 1e-6
 """Share by which tours may cost more than the best known; rounding loses none."""
 
 WIDER = 0.02
-"""Share by which dearer tours are looked at where batteries allow none as cheap."""
+"""Share by which costlier tours are looked at where batteries allow none as cheap."""
 
 LEAST_RISE = 0.005
 """Share of the bound within which too many labels end it."""

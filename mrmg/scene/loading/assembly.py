@@ -35,7 +35,7 @@ from mrmg.scene.loading.schema import (
 from mrmg.scene.loading.shape_schema import CircleEntry
 from mrmg.scene.loading.starts import crowded_robots, misplaced_robots
 from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
-from mrmg.scene.region import Region
+from mrmg.scene.region import HEADING_TOLERANCE_RAD, Region
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.slopes import slope_faults, steep_ground
 from mrmg.scene.types import Finish, Goal, Obstacle, Robot, Scene, Station, TerrainArea
@@ -76,7 +76,7 @@ class Assembly:
                 region=region,
                 dwell_s=entry.dwell or 0.0,
                 heading_rad=entry.heading,
-                heading_tolerance_rad=entry.heading_tolerance,
+                heading_tolerance_rad=entry.heading_tolerance or HEADING_TOLERANCE_RAD,
             )
             for entry, region in self._regions("goals")
         ]

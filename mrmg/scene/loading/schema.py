@@ -157,8 +157,8 @@ class GoalEntry(RegionEntry):
     """A goal, perhaps with a heading."""
 
     heading: Number | None = Field(default=None, description="yaw in rad")
-    heading_tolerance: Positive = Field(
-        default=HEADING_TOLERANCE_RAD, description="in rad"
+    heading_tolerance: Positive | None = Field(
+        default=None, description=f"in rad; default {HEADING_TOLERANCE_RAD}"
     )
 
 
