@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from solved import verified_plan
 
 import mrmg
 from mrmg.planning import PlannerParams, plan_mission
-from mrmg.plans import PlanStatus
 from mrmg.scene.types import Scene
 
 MakeScene = Callable[..., Scene]
@@ -28,12 +28,7 @@ def disc(x: float, y: float, radius: float, **more: Any) -> dict[str, Any]:
 
 
 def planned(scene: Scene, seed: int = 0) -> Any:
-    result = plan_mission(scene, seed=seed, params=QUICK)
-    assert result.status is PlanStatus.SOLVED, result.reason
-    assert result.plan is not None
-    verdict = mrmg.verify(scene, result.plan)
-    assert verdict.ok, verdict.violations
-    return result.plan
+    return verified_plan(scene, seed, QUICK)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from solved import verified_plan
 
 import mrmg
 from mrmg.energy.visits import is_at
 from mrmg.errors import UsageError
 from mrmg.planning import PlannerParams, plan_mission, profile_params
-from mrmg.plans import Plan, PlanStatus
+from mrmg.plans import Plan
 from mrmg.scene.loading import dump_scene, load_scene
 from mrmg.scene.types import Scene
 
@@ -43,12 +44,7 @@ def hall(yard: MakeScene, seed: int, model: str, **changes: Any) -> Scene:
 
 
 def planned(scene: Scene, seed: int = 0) -> Plan:
-    result = plan_mission(scene, seed=seed, params=QUICK)
-    assert result.status is PlanStatus.SOLVED, result.reason
-    assert result.plan is not None
-    verdict = mrmg.verify(scene, result.plan)
-    assert verdict.ok, verdict.violations
-    return result.plan
+    return verified_plan(scene, seed, QUICK)
 
 
 def deviations_rad(scene: Scene, plan: Plan) -> Iterator[float]:
