@@ -14,7 +14,7 @@ from mrmg.scene.region import Region
 SPACING_M = 0.04
 """Distance of the points that stand for a region's border."""
 
-ARCS = 32
+ARCS = 64
 """Arcs into which borders are cut."""
 
 CHORDS = 4

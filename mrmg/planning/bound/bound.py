@@ -115,10 +115,15 @@ def lower_bound_J(
         routing = routing or solve_routing(problem, RouterParams(), 0)
         if routing.feasible and rounds and not halt[0]:
             ways = relaxed.arc_ways(finer)
-            touring_J = touring_bound_J(
-                problem, routing.tours, ways, relaxed.price, rounds=rounds, halt=halt
+            bound = touring_bound_J(
+                problem,
+                routing.tours,
+                ways,
+                relaxed.price,
+                proven_J=bound,
+                rounds=rounds,
+                halt=halt,
             )
-            bound = max(bound, touring_J)
     bound -= sum(most_descent_J(scene, robot) for robot in scene.robots)
     return max(0.0, bound) * (1.0 - ROUNDING_SHARE)
 

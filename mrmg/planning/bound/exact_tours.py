@@ -57,7 +57,7 @@ def exact_routing(
     leg = np.ascontiguousarray(problem.cost[:, :, None, :, None])
     for share in SHARES if math.isfinite(least_J) else ():
         most_J = math.inf if math.isinf(share) else (1.0 + share) * least_J
-        found = cheapest_tours(problem, leg, rest, most_J)
+        found, _ = cheapest_tours(problem, leg, rest, most_J)
         if found is None or found.feasible:
             return found
     return Routing(tuple(() for _ in problem.energy), math.inf)
@@ -70,8 +70,12 @@ def are_few(goals: int, robots: int) -> bool:
 
 
 def cheapest_tours(
-    problem: RoutingArrays, leg: np.ndarray, rest: Completions, most: float
-) -> Routing | None:
+    problem: RoutingArrays,
+    leg: np.ndarray,
+    rest: Completions,
+    most: float,
+    room: int = MOST_LABELS,
+) -> tuple[Routing | None, int]:
     """Return the cheapest tours if they cost `most` or less.
 
     Args:
@@ -80,10 +84,11 @@ def cheapest_tours(
             (R, T + 1, K, T, K).
         rest: completions of the mission.
         most: cost of tours of interest.
+        room: labels at most.
 
     Returns:
-        Tours, of infinite cost if all cost more; None if that takes too many labels to
-        tell.
+        Tours, of infinite cost if all cost more, None if that takes more labels to
+        tell than there is room for; and the labels that it took.
     """
     goal_list = np.flatnonzero(problem.open_goal)
     stations = slice(problem.goals, problem.cost.shape[2])
@@ -91,16 +96,17 @@ def cheapest_tours(
     drain[:, stations] = drain[:, stations].min(axis=2, keepdims=True)
     nearest, finish = leg.min(axis=4), problem.finish
     search = TourSearch(problem, goal_list, leg, drain, nearest, finish, rest, most)
-    cost, last, trace = _touring_kernels.cheapest_tours(search, MOST_LABELS)
+    cost, last, trace = _touring_kernels.cheapest_tours(search, room)
     if not len(trace):
-        return None
+        return None, room
     tours: list[list[int]] = [[] for _ in problem.energy]
     label = int(last[-1]) if np.isfinite(cost[-1]) else -1
     while label >= 0:
         robot, node, _, label = trace[label].tolist()
         if node < leg.shape[3]:
             tours[robot].insert(0, node)
-    return Routing(tuple(tuple(tour) for tour in tours), float(cost[-1]))
+    found = Routing(tuple(tuple(tour) for tour in tours), float(cost[-1]))
+    return found, len(trace)
 
 
 def least_costs(

@@ -23,11 +23,19 @@ from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 SLACK = 1e-6
 """Share by which tours may cost more than the best known; rounding loses none."""
 
-WIDER = 0.02
-"""Share by which costlier tours are looked at where batteries allow none as cheap."""
+STEP = 0.02
+"""Share of what is proven by which costlier tours are looked at in the next round."""
 
 LEAST_RISE = 0.005
-"""Share of the bound within which too many labels end it."""
+"""Share by which one round with the cheapest tours must raise the bound for another."""
+
+FINE_ARC_GOALS = 16
+"""Goals up to which tours are told apart by all arcs; beyond, by pairs of them, as
+otherwise labels would be too many."""
+
+WORK_LABELS = 6_000_000
+"""Labels that all rounds may set: some 5 s of one processor. The limit counts work, not
+time, so that the same mission has the same bound on every machine."""
 
 
 def touring_bound_J(
@@ -36,49 +44,65 @@ def touring_bound_J(
     ways: Sequence[ArcWays],
     price: np.ndarray,
     *,
+    proven_J: float = 0.0,
     rounds: int,
+    work: int = WORK_LABELS,
     halt: np.ndarray = NEVER,
 ) -> float:
     """Return a lower bound of the cost of all tours.
 
-    Each round finds the cheapest tours by arcs, and tightens the ways they take.
+    Each round looks for the cheapest tours by arcs among those that cost little more
+    than what is proven, which proves as much if there are none, and tightens the ways
+    that the cheapest ones take.
 
     Args:
         problem: the relaxed routing problem, whose batteries limit tours.
         tours: good tours of that problem, whose ways are tightened first.
         ways: of each robot.
         price: cost of a metre of plain ground of each robot, shape (R,).
+        proven_J: a bound that is known already.
         rounds: how often at most.
+        work: labels that all rounds may set.
         halt: shape (1,); no round begins once it has turned true.
 
     Returns:
-        The bound; 0 if none was found.
+        The bound; `proven_J` if no better one was found.
     """
-    best, most, too_much, settled = 0.0, 0.0, math.inf, False
+    best, settled_J = proven_J, -math.inf
     leg = _leg_table(ways, price)
     rest = None
     for _ in range(rounds):
         tightened = _tighten(ways, leg, tours)
+        settled = math.isfinite(settled_J)
         if halt[0] or (settled and not tightened):
             break
         leg = _leg_table(ways, price)
-        rest = rest or completions(problem, leg)
-        most = max(most, (1.0 + SLACK) * _cost_along(leg, tours))
-        if most >= too_much:
-            most = 0.5 * (best + too_much)
-        found = cheapest_tours(problem, leg, rest, most)
-        settled = found is not None and found.feasible
+        merged = leg if problem.goals <= FINE_ARC_GOALS else _by_pairs(leg)
+        rest = rest or completions(problem, merged)
+        best = max(best, float(rest.before[0]))
+        most, along_J = (1.0 + STEP) * best, (1.0 + SLACK) * _cost_along(leg, tours)
+        if best < along_J:
+            most = min(most, along_J)
+        found, labels = cheapest_tours(problem, merged, rest, most, work)
+        work -= labels
         if found is None:
-            too_much = most
-            best = max(best, float(rest.before[0]))
-        elif settled:
+            break
+        enough = False
+        if found.feasible:
             best, tours = max(best, found.cost_J), found.tours
+            enough = best < (1.0 + LEAST_RISE) * settled_J
+            settled_J = best
         else:
             best = max(best, most)
-            most *= 1.0 + WIDER
-        if too_much < (1.0 + LEAST_RISE) * best:
+        if enough or work < labels:  # the next round takes more
             break
     return best
+
+
+def _by_pairs(leg: np.ndarray) -> np.ndarray:
+    """Return what legs cost at least between pairs of neighbouring arcs."""
+    halves = [leg[:, :, i::2, :, j::2] for i in (0, 1) for j in (0, 1)]
+    return np.ascontiguousarray(np.minimum.reduce(halves))
 
 
 def _tighten(

@@ -11,13 +11,14 @@ import pytest
 
 from mrmg.planning.bound._completion_kernels import Completions
 from mrmg.planning.bound.arcs import ArcWays
-from mrmg.planning.bound.bound import lower_bound_J
+from mrmg.planning.bound.bound import Relaxation, lower_bound_J
 from mrmg.planning.bound.exact_tours import (
     cheapest_tours,
     completions,
     exact_routing,
 )
 from mrmg.planning.bound.geodesic import Ground, Ways
+from mrmg.planning.bound.touring import touring_bound_J
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import routing_arrays
 from mrmg.scene.loading import scene_from_document
@@ -116,18 +117,20 @@ def test_tours_by_arcs_are_the_cheapest(
         )
         exact = least_cost(leg, goals, range_m)
         most = 1e4
-        found = cheapest_tours(problem, leg, nothing, most)
+        found, _ = cheapest_tours(problem, leg, nothing, most)
         assert found is not None
         if exact <= most:
             assert found.cost_J == pytest.approx(exact)
             rest = completions(problem, leg)
             assert rest.before[0] <= exact
-            pruned = cheapest_tours(problem, leg, rest, (1.0 + 1e-9) * exact)
+            pruned, labels = cheapest_tours(problem, leg, rest, (1.0 + 1e-9) * exact)
             assert pruned is not None
             assert pruned.cost_J == pytest.approx(exact)
+            few = cheapest_tours(problem, leg, rest, (1.0 + 1e-9) * exact, labels - 1)
+            assert few == (None, labels - 1), "too little room is said, not guessed at"
         else:
             assert found.cost_J == math.inf
-        below = cheapest_tours(problem, leg, nothing, 0.99 * exact)
+        below, _ = cheapest_tours(problem, leg, nothing, 0.99 * exact)
         assert below is not None
         assert not below.feasible, "nothing is cheaper than the cheapest"
 
@@ -216,7 +219,8 @@ def test_no_way_through_dear_ground_costs_less_than_its_bound() -> None:
     strip = {"id": "mud", "polygon": [[14, 0], [18, 0], [18, 20], [14, 20]]}
     ways = arc_ways(field(terrain=[{**strip, "multiplier": 2.0}]))
     arcs = ways.between.shape[1]
-    pairs = [(a, b) for a in (0, 4, 9) for b in (14, 16, 20)]
+    shares = product((0.0, 0.12, 0.28), (0.44, 0.5, 0.62))
+    pairs = [(int(a * arcs), int(b * arcs)) for a, b in shares]
     for a, b in pairs:
         for wave in ways.waves(0, a, 1, b):
             ways.take(wave, ways.certificate(wave))
@@ -247,16 +251,41 @@ def test_no_way_from_a_start_is_shorter_than_its_bound() -> None:
             assert ways.from_start[0, 1, arc] >= 0.97 * exact
 
 
-def test_touching_a_goal_beside_the_way_is_paid_for() -> None:
-    """Three goals at the corners of a triangle; each is entered and left by one arc."""
-    centers = np.array([[4.0, 4.0], [28.0, 4.0], [16.0, 16.0]])
+TRIANGLE = np.array([[4.0, 4.0], [28.0, 4.0], [16.0, 16.0]])
+
+
+def triangle() -> Scene:
+    """Three goals at the corners of a triangle, which is begun on one of its sides."""
     goals = [
         {"id": f"g{k}", "circle": {"center": center.tolist(), "radius": 1.5}}
-        for k, center in enumerate(centers)
+        for k, center in enumerate(TRIANGLE)
     ]
-    scene = field(
-        goals=goals, robots=[{"id": "r1", "model": "car", "pose": [16, 4, 0]}]
-    )
+    return field(goals=goals, robots=[{"id": "r1", "model": "car", "pose": [16, 4, 0]}])
+
+
+def test_less_work_proves_less_and_never_less_than_was_known() -> None:
+    relaxed = Relaxation.of(triangle(), cells=2000)
+    routing = exact_routing(relaxed.problem)
+    assert routing is not None
+    found_J = [
+        touring_bound_J(
+            relaxed.problem,
+            routing.tours,
+            relaxed.arc_ways(),
+            relaxed.price,
+            proven_J=routing.cost_J,
+            rounds=20,
+            work=labels,
+        )
+        for labels in (0, 300, 1_000_000)
+    ]
+    assert routing.cost_J <= found_J[0] <= found_J[1] <= found_J[2]
+    assert found_J[0] < found_J[2]
+
+
+def test_touching_a_goal_beside_the_way_is_paid_for() -> None:
+    """Each goal is entered and left by one arc."""
+    scene = triangle()
     joules = scene.robots[0].model.energy_model.plain_ground_J_per_m()
     coarse_m, touring_m = (
         lower_bound_J(scene, rounds=rounds) / joules for rounds in (0, 20)
@@ -267,7 +296,7 @@ def test_touching_a_goal_beside_the_way_is_paid_for() -> None:
     for order in permutations(range(3)):
         cost, points = np.zeros(1), np.array([[16.0, 4.0]])
         for k in order:
-            to = centers[k] + ring
+            to = TRIANGLE[k] + ring
             leg = np.hypot(*(points[:, None] - to[None]).transpose(2, 0, 1))
             cost, points = (cost[:, None] + leg).min(axis=0), to
         exact_m = min(exact_m, float(cost.min()))
