@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from random import Random
 from typing import Any
 
 import numpy as np
 import pytest
+from faults import plans
 from faults.commands import MOST_BYTES, Outcome
+from faults.damage import DAMAGES
 from faults.mutations import mutated, zipped
+from faults.rows import Options
+from protocol import Trials
 
 from mrmg import storage
 
@@ -59,3 +64,20 @@ def test_equal_seeds_damage_equally_and_others_otherwise(name: str) -> None:
 def test_the_end_of_a_command_is_judged(outcome: dict[str, Any], fault: str) -> None:
     found = Outcome(**outcome).fault()
     assert found.startswith(fault) if fault else not found
+
+
+@pytest.mark.slow
+def test_every_damage_of_a_plan_is_done_and_caught(tmp_path: Path) -> None:
+    options = Options(
+        seed=1,
+        files=0,
+        plans=len(DAMAGES),
+        kills=0,
+        missions=0,
+        work=tmp_path,
+        keep=None,
+        trials=Trials(None),
+    )
+    found = list(plans.rows(options))
+    assert sum(row["cases"] for row in found) == len(DAMAGES)
+    assert [row["failures"] for row in found] == [[]] * len(found)

@@ -134,7 +134,7 @@ def states_under(
     states = [tuple((trajectory.state[0] if start is None else start).tolist())]
     for pair in control.tolist():
         states.append(
-            step(*states[-1], *pair, float(model.wheelbase_m), trajectory.dt_s)
+            step(states[-1], tuple(pair), float(model.wheelbase_m), trajectory.dt_s)
         )
     return np.array(states)
 

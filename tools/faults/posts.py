@@ -52,9 +52,8 @@ def thin_post(
 def _between(model: RobotModel, trajectory: Trajectory, number: int) -> np.ndarray:
     """Return states between two states of a trajectory, by the equations of motion."""
     step = plain_step(model)
-    state, control = trajectory.state[number].tolist(), trajectory.control[number]
+    state = tuple(trajectory.state[number].tolist())
+    control = tuple(trajectory.control[number].tolist())
     times_s = np.linspace(0.0, trajectory.dt_s, SUBSTEPS + 2)[1:-1]
     length_m = float(model.wheelbase_m)
-    return np.array(
-        [step(*state, *control.tolist(), length_m, float(time)) for time in times_s]
-    )
+    return np.array([step(state, control, length_m, float(time)) for time in times_s])
