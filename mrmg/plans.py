@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from enum import Enum
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 from mrmg import storage
 from mrmg.columns import control_columns, data_frame, named, state_columns
 from mrmg.energy.ledger import EnergyLedger
-from mrmg.errors import ExitCode, Fault, RunFolderError
+from mrmg.errors import ExitCode
 from mrmg.scene.margins import NarrowPassage
 
 PLAN_FORMAT = 1
@@ -43,14 +44,12 @@ class PlanStatus(Enum):
     @property
     def exit_code(self) -> ExitCode:
         """The exit code of a command that ends with this status."""
-        return {
+        decided = {
             PlanStatus.SOLVED: ExitCode.OK,
             PlanStatus.INFEASIBLE: ExitCode.INFEASIBLE,
-            PlanStatus.TIMEOUT: ExitCode.OUT_OF_BUDGET,
-            PlanStatus.NO_PLAN_FOUND: ExitCode.OUT_OF_BUDGET,
             PlanStatus.INVALID_SCENE: ExitCode.INVALID_FILE,
-            PlanStatus.CANCELLED: ExitCode.OUT_OF_BUDGET,
-        }[self]
+        }
+        return decided.get(self, ExitCode.OUT_OF_BUDGET)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +63,8 @@ class Trajectory:
         control: u1, u2 held over each step, shape (n, 2).
         motion: motion model, which decides the columns; "" where it is not recorded.
     """
+
+    __pydantic_config__ = storage.WITH_ARRAYS
 
     robot: str
     dt_s: float
@@ -154,6 +155,8 @@ class Plan:
             model's over each step, by robot, shape (n,), in such plans.
     """
 
+    __pydantic_config__ = storage.WITH_ARRAYS
+
     scene_name: str
     scene_digest: str
     seed: int
@@ -238,10 +241,7 @@ class Plan:
             "dt_s": self.dt_s,
             "robots": [trajectory.robot for trajectory in self.trajectories],
             "tours": {robot: list(tour) for robot, tour in self.tours.items()},
-            "visits": [
-                {name: getattr(visit, name) for name in Visit.__slots__}
-                for visit in self.visits
-            ],
+            "visits": [asdict(visit) for visit in self.visits],
             "ledger": self.ledger.to_rows(),
         }
 
@@ -252,19 +252,10 @@ class Plan:
         Raises:
             RunFolderError: if a file is missing or not a plan of this format.
         """
-        try:
-            header = storage.read_json(folder / f"{name}.json")
-            arrays = storage.read_arrays(folder / f"{name}.npz")
-            if header["format"] != PLAN_FORMAT:
-                raise ValueError(
-                    f"format is {header['format']}, this version reads {PLAN_FORMAT}"
-                )
-            return _plan_from(header, arrays)
-        except storage.UNREADABLE as error:
-            fault = Fault(
-                f"{name}.json", f"no readable plan ({error}); run 'mrmg plan'"
-            )
-            raise RunFolderError(str(folder), [fault]) from error
+        path = folder / f"{name}.json"
+        with storage.damage_reported(path, "no readable plan", "run 'mrmg plan'"):
+            packed = path.with_suffix(".npz")
+            return _plan_of(path.read_bytes(), packed.read_bytes(), packed.name)
 
 
 def plan_in_force(folder: Path) -> Plan:
@@ -277,39 +268,34 @@ def plan_in_force(folder: Path) -> Plan:
     return Plan.load(folder, DRIVEN_PLAN if joined else "plan")
 
 
-def _plan_from(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Plan:
-    return Plan(
-        scene_name=header["scene_name"],
-        scene_digest=header["scene_digest"],
-        seed=header["seed"],
-        profile=header["profile"],
-        parameters_digest=header["parameters_digest"],
-        versions=header["versions"],
-        dt_s=header["dt_s"],
-        trajectories=tuple(
-            Trajectory(
-                robot=robot,
-                dt_s=header["dt_s"],
-                state=arrays[f"{robot}.state"],
-                control=arrays[f"{robot}.control"],
-                motion=header.get("motions", {}).get(robot, ""),
-            )
-            for robot in header["robots"]
-        ),
-        tours={robot: tuple(tour) for robot, tour in header["tours"].items()},
-        visits=tuple(Visit(**visit) for visit in header["visits"]),
-        ledger=EnergyLedger.from_rows(header["ledger"]),
-        planner=header.get("planner", ""),
-        router=header.get("router", ""),
-        content_J=_by_robot(arrays, _CONTENT),
-        rolling_factor=_by_robot(arrays, _FACTOR),
-        margins={
-            robot: (kept["obstacle"], kept["robot"])
-            for robot, kept in header.get("margins", {}).items()
-        },
-        narrow=tuple(NarrowPassage(**each) for each in header.get("narrow", ())),
-        skipped=header.get("skipped", {}),
-    )
+@lru_cache(maxsize=2)
+def _plan_of(stated: bytes, packed: bytes, name: str) -> Plan:
+    """Return the plan of the content of its files; steps of a run read the same one."""
+    header = storage.of_format(stated, PLAN_FORMAT)
+    arrays = storage.arrays_of(packed, name)
+    motions = header.pop("motions", {})
+    trajectories = [
+        Trajectory(
+            robot=robot,
+            dt_s=header["dt_s"],
+            state=arrays[f"{robot}.state"],
+            control=arrays[f"{robot}.control"],
+            motion=motions.get(robot, ""),
+        )
+        for robot in header.pop("robots")
+    ]
+    margins = {
+        robot: (kept["obstacle"], kept["robot"])
+        for robot, kept in header.get("margins", {}).items()
+    }
+    found = {
+        "trajectories": trajectories,
+        "ledger": {"entries": header["ledger"]},
+        "content_J": _by_robot(arrays, _CONTENT),
+        "rolling_factor": _by_robot(arrays, _FACTOR),
+        "margins": margins,
+    }
+    return storage.typed(Plan, header | found)
 
 
 def _by_robot(arrays: Mapping[str, np.ndarray], suffix: str) -> dict[str, np.ndarray]:

@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from mrmg.errors import Fault, RunFolderError
 from mrmg.interruption import cleaned_up_by
 
 _Kind = TypeVar("_Kind")
@@ -141,6 +142,41 @@ def typed(kind: type[_Kind], data: Any) -> _Kind:
         raise ValueError(f"{place}: {first['msg']}") from error
 
 
+WITH_ARRAYS = {"arbitrary_types_allowed": True}
+"""`__pydantic_config__` of dataclasses with arrays, for `typed`."""
+
+
+@contextmanager
+def damage_reported(path: Path, found: str, remedy: str) -> Iterator[None]:
+    """Refuse a file of a run that cannot be read within the block.
+
+    Args:
+        path: of the file.
+        found: what it turned out to be, such as "no readable plan".
+        remedy: what the user can do, such as "run 'mrmg plan'".
+
+    Raises:
+        RunFolderError: if the file is missing, damaged or of another structure.
+    """
+    try:
+        yield
+    except UNREADABLE as error:
+        fault = Fault(path.name, f"{found} ({error}); {remedy}")
+        raise RunFolderError(str(path.parent), [fault]) from error
+
+
+def of_format(content: bytes, version: int) -> dict[str, Any]:
+    """Return the other keys of the content of a JSON file of a format.
+
+    Raises:
+        ValueError: if it is of another format; others of `UNREADABLE` as `json_of`.
+    """
+    keys: dict[str, Any] = json_of(content)
+    if keys.pop("format") != version:
+        raise ValueError(f"this version reads format {version} only")
+    return keys
+
+
 def write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
     """Write named arrays to an `.npz` without pickle, atomically and byte-stable."""
     write_bytes(path, array_bytes(arrays))
@@ -151,15 +187,6 @@ def array_bytes(arrays: Mapping[str, np.ndarray]) -> bytes:
     buffer = io.BytesIO()
     np.savez_compressed(buffer, allow_pickle=False, **dict(sorted(arrays.items())))
     return buffer.getvalue()
-
-
-def read_arrays(path: Path) -> dict[str, np.ndarray]:
-    """Read the arrays of an `.npz`; refuses pickled content.
-
-    Raises:
-        ValueError: if the file is damaged.
-    """
-    return arrays_of(path.read_bytes(), path.name)
 
 
 def arrays_of(content: bytes, name: str) -> dict[str, np.ndarray]:
@@ -211,7 +238,9 @@ def _array_of(data: bytes) -> np.ndarray:
     if not fits and not dtype.hasobject:
         raise ValueError(f"an array of {stated_bytes} bytes is stated")
     file.seek(0)
-    return np.lib.format.read_array(file, allow_pickle=False)
+    array = np.lib.format.read_array(file, allow_pickle=False)
+    array.setflags(write=False)
+    return np.asarray(array)
 
 
 def user_cache_folder() -> Path:

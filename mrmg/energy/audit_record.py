@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from mrmg import storage
 from mrmg.energy.ledger import EnergyLedger
-from mrmg.errors import Fault, RunFolderError
 
 AUDIT_FORMAT = 1
+AUDIT_FILE = "audit.json"
 
 MODEL_MISMATCH = "model mismatch"
 """Cause of a mission that failed in nothing but the energy its models predict."""
@@ -136,19 +134,8 @@ class EnergyAudit:
     def save(self, folder: Path) -> None:
         """Write `audit.json`."""
         ledgers = {name: getattr(self, name).to_rows() for name in _LEDGERS}
-        storage.write_json(
-            folder / "audit.json",
-            {
-                "format": AUDIT_FORMAT,
-                "mission_ok": self.mission_ok,
-                "causes": list(self.causes),
-                "reasons": list(self.reasons),
-                "robots": [asdict(item) for item in self.robots],
-                "visits": [asdict(item) for item in self.visits],
-                "goals_visited": list(self.goals_visited),
-                **ledgers,
-            },
-        )
+        content = {"format": AUDIT_FORMAT, **asdict(self), **ledgers}
+        storage.write_json(folder / AUDIT_FILE, content)
 
     @staticmethod
     def load(folder: Path) -> EnergyAudit:
@@ -157,34 +144,12 @@ class EnergyAudit:
         Raises:
             RunFolderError: if the file is missing or not an audit of this format.
         """
-        try:
-            return _audit_from(storage.read_json(folder / "audit.json"))
-        except storage.UNREADABLE as error:
-            fault = Fault(
-                "audit.json", f"no readable audit ({error}); run 'mrmg audit'"
-            )
-            raise RunFolderError(str(folder), [fault]) from error
+        path = folder / AUDIT_FILE
+        with storage.damage_reported(path, "no readable audit", "run 'mrmg audit'"):
+            content = storage.of_format(path.read_bytes(), AUDIT_FORMAT)
+            for name in _LEDGERS:
+                content[name] = {"entries": content[name]}
+            return storage.typed(EnergyAudit, content)
 
 
 _LEDGERS = ("planned", "metered", "measured")
-
-
-def _audit_from(content: Mapping[str, Any]) -> EnergyAudit:
-    if content["format"] != AUDIT_FORMAT:
-        raise ValueError(f"this version reads format {AUDIT_FORMAT} only")
-    ledgers = {name: EnergyLedger.from_rows(content[name]) for name in _LEDGERS}
-    return EnergyAudit(
-        mission_ok=content["mission_ok"],
-        causes=tuple(content.get("causes", ())),
-        reasons=tuple(content["reasons"]),
-        robots=tuple(_robot_from(row) for row in content["robots"]),
-        visits=tuple(SimulatedVisit(**row) for row in content["visits"]),
-        goals_visited=tuple(content["goals_visited"]),
-        **ledgers,
-    )
-
-
-def _robot_from(row: Mapping[str, Any]) -> RobotAudit:
-    balance = row.get("balance")
-    found = None if balance is None else EnergyBalance(**balance)
-    return RobotAudit(**{**row, "balance": found})

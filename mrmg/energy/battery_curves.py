@@ -1,4 +1,8 @@
-"""Battery content of each robot over time, as planned and as driven."""
+"""Motion and battery content of each robot over time, as planned and as driven.
+
+Audit, pictures, video and pages all read these curves; those of a drive are worked out
+once for the log.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrmg.energy.audit import measured_step_energy
 from mrmg.energy.metering import (
-    LoggedMotion,
     battery_content,
     battery_profile,
     find_visits,
+    measured_energy_parts,
 )
 from mrmg.plans import Plan, Visit
 from mrmg.scene.types import Scene
@@ -20,19 +23,47 @@ from mrmg.simulation.log import ExecutionLog
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BatteryCurve:
-    """Battery content of one robot over time.
+    """Motion and battery content of one robot over time.
 
     Attributes:
         robot: id of the robot.
         time_s: shape (n,).
+        state: at each time, shape (n, 5).
         energy_J: content at each time, after a recharge, shape (n,).
         visits: of this robot; their `energy_J` is the content on arrival.
     """
 
     robot: str
     time_s: np.ndarray
+    state: np.ndarray
     energy_J: np.ndarray
     visits: tuple[Visit, ...]
+
+    @property
+    def least_J(self) -> float:
+        """Least battery content, arrivals included."""
+        arrivals_J = [visit.energy_J for visit in self.visits]
+        return min([float(self.energy_J.min()), *arrivals_J])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeasuredCurve(BatteryCurve):
+    """A curve by the work of the simulated drives.
+
+    Attributes:
+        drawn_J: measured over each tick by part of `MEASURED_PARTS`, shape (n - 1, 3).
+    """
+
+    drawn_J: np.ndarray
+
+
+def shown_curves(
+    scene: Scene, plan: Plan, log: ExecutionLog | None
+) -> tuple[BatteryCurve, ...]:
+    """Return the curves of what was driven, else of what was planned."""
+    if log is None:
+        return planned_curves(scene, plan)
+    return measured_curves(scene, plan, log)
 
 
 def planned_curves(scene: Scene, plan: Plan) -> tuple[BatteryCurve, ...]:
@@ -41,6 +72,7 @@ def planned_curves(scene: Scene, plan: Plan) -> tuple[BatteryCurve, ...]:
         BatteryCurve(
             robot=trajectory.robot,
             time_s=trajectory.time_s,
+            state=trajectory.state,
             energy_J=plan.content_J[trajectory.robot]
             if plan.content_J
             else battery_profile(scene, trajectory, plan.visits),
@@ -50,30 +82,42 @@ def planned_curves(scene: Scene, plan: Plan) -> tuple[BatteryCurve, ...]:
     )
 
 
+_last: list[tuple[Scene, Plan, ExecutionLog, tuple[MeasuredCurve, ...]]] = []
+"""The drive whose curves were worked out last, and the curves."""
+
+
 def measured_curves(
     scene: Scene, plan: Plan, log: ExecutionLog
-) -> tuple[BatteryCurve, ...]:
-    """Return the battery content by the work of the simulated drives."""
-    if log.disturbance is not None:
-        scene = log.disturbance.actual_scene(scene)
-    curves = []
-    for index, (robot, state) in enumerate(zip(log.robots, log.state, strict=True)):
-        motion = LoggedMotion(robot=robot, time_s=log.time_s, state=state)
-        visits = find_visits(scene, motion, plan.tours.get(robot, ()))
-        draw_J = measured_step_energy(scene.robot(robot), log, index).sum(axis=1)
-        content_J, arrival_J = battery_content(scene, motion, draw_J, visits)
-        curves.append(
-            BatteryCurve(
-                robot=robot,
-                time_s=log.time_s,
+) -> tuple[MeasuredCurve, ...]:
+    """Return the battery content by the work of the simulated drives.
+
+    Where robots were disturbed, contents are those of the batteries they really had.
+    """
+    for known, of_plan, of_log, curves in _last:
+        if of_plan is plan and of_log is log and known == scene:
+            return curves
+    actual = log.disturbance.actual_scene(scene) if log.disturbance else scene
+    found = []
+    for motion, work_J in zip(log.driven_motions(), log.work_J, strict=True):
+        visits = find_visits(actual, motion, plan.tours.get(motion.robot, ()))
+        drawn_J = measured_energy_parts(actual.robot(motion.robot), work_J, log.time_s)
+        draw_J = drawn_J.sum(axis=1)
+        content_J, arrival_J = battery_content(actual, motion, draw_J, visits)
+        found.append(
+            MeasuredCurve(
+                robot=motion.robot,
+                time_s=motion.time_s,
+                state=motion.state,
                 energy_J=content_J,
                 visits=tuple(
                     replace(visit, energy_J=energy_J)
                     for visit, energy_J in zip(visits, arrival_J, strict=True)
                 ),
+                drawn_J=drawn_J,
             )
         )
-    return tuple(curves)
+    _last[:] = [(scene, plan, log, tuple(found))]
+    return tuple(found)
 
 
 def with_recharge_jumps(curve: BatteryCurve) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtri
 
-from mrmg.energy.audit import believed_rolling, measured_step_energy
+from mrmg.energy.audit import believed_rolling
+from mrmg.energy.battery_curves import measured_curves
 from mrmg.energy.metering import Motion, step_energy_parts
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
@@ -56,13 +57,10 @@ def energy_by_terrain(
             TerrainEnergy(multiplier=key, planned_m=way_m, planned_J=energy_J)
             for key, (way_m, energy_J) in sorted(planned.items())
         )
-    driven, rolling = log.driven_motions(), believed_rolling(plan, log)
+    driven, rolling = measured_curves(scene, plan, log), believed_rolling(plan, log)
     metered = _by_class(scene, driven, _model_energy(scene, driven, rolling))
-    work_J = [
-        measured_step_energy(scene.robot(robot), log, index).sum(axis=1)
-        for index, robot in enumerate(log.robots)
-    ]
-    measured = _by_class(scene, driven, work_J)
+    drawn_J = [curve.drawn_J.sum(axis=1) for curve in driven]
+    measured = _by_class(scene, driven, drawn_J)
     nothing = (0.0, 0.0)
     return tuple(
         TerrainEnergy(

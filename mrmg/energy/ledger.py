@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 
@@ -51,18 +50,4 @@ class EnergyLedger:
 
     def to_rows(self) -> list[dict[str, Any]]:
         """Return the entries as JSON rows."""
-        return [
-            {
-                "robot": entry.robot,
-                "leg": entry.leg,
-                "target": entry.target,
-                "part": entry.part,
-                "energy_J": entry.energy_J,
-            }
-            for entry in self.entries
-        ]
-
-    @staticmethod
-    def from_rows(rows: Iterable[dict[str, Any]]) -> EnergyLedger:
-        """Rebuild a ledger from `to_rows`."""
-        return EnergyLedger(tuple(LedgerEntry(**row) for row in rows))
+        return [asdict(entry) for entry in self.entries]

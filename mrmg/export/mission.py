@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import shapely
 
-from mrmg.energy.battery_curves import measured_curves, planned_curves
+from mrmg.energy.battery_curves import shown_curves
 from mrmg.errors import Fault, RunFolderError
 from mrmg.plans import Plan, Visit
 from mrmg.runs.record import read_record
 from mrmg.scene.types import Robot, Scene
 from mrmg.simulation.log import ExecutionLog
-from mrmg.viz.activities import (
-    CHARGING,
-    Activity,
-    activities,
-    breakdowns,
-    shown_motions,
-)
+from mrmg.viz.activities import CHARGING, Activity, activities, breakdowns
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -150,23 +144,20 @@ def read_mission(run_folder: Path, *, trust_code: bool = False) -> Mission:
     if plan is None:
         reason = f"there is no plan to export ({record.planning['reason']})"
         raise RunFolderError(str(run_folder), [Fault("planning.json", reason)])
-    curves = planned_curves if log is None else partial(measured_curves, log=log)
     broken_s = breakdowns(log)
     courses = [
         Course(
-            robot=scene.robot(motion.robot),
-            tour=plan.tours.get(motion.robot, ()),
-            time_s=motion.time_s,
-            state=motion.state,
+            robot=scene.robot(curve.robot),
+            tour=plan.tours.get(curve.robot, ()),
+            time_s=curve.time_s,
+            state=curve.state,
             content_J=curve.energy_J,
             visits=curve.visits,
             activities=activities(
-                scene, motion, curve.visits, broken_s.get(motion.robot)
+                scene, curve, curve.visits, broken_s.get(curve.robot)
             ),
-            broken_s=broken_s.get(motion.robot),
+            broken_s=broken_s.get(curve.robot),
         )
-        for motion, curve in zip(
-            shown_motions(plan, log), curves(scene, plan), strict=True
-        )
+        for curve in shown_curves(scene, plan, log)
     ]
     return Mission(scene=scene, plan=plan, log=log, courses=tuple(courses))

@@ -12,8 +12,8 @@ import numpy as np
 
 from mrmg.energy.battery_curves import (
     BatteryCurve,
-    measured_curves,
     planned_curves,
+    shown_curves,
     with_recharge_jumps,
 )
 from mrmg.energy.metering import Motion
@@ -22,7 +22,6 @@ from mrmg.report.chart_spec import chart, line, rounded
 from mrmg.scene.types import Battery, Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.verification.distances import obstacle_distance, robot_distance
-from mrmg.viz.activities import shown_motions, shown_visits
 
 _MOST_SAMPLES = 1200
 _FINEST_S = 0.1
@@ -36,19 +35,19 @@ def chart_data(scene: Scene, plan: Plan, log: ExecutionLog | None) -> dict[str, 
         `chart_spec`.
     """
     time_s = _grid(plan, log)
-    motions = shown_motions(plan, log)
-    poses = [_poses(motion, time_s) for motion in motions]
+    curves = shown_curves(scene, plan, log)
+    poses = [_poses(curve, time_s) for curve in curves]
     return {
         "time_s": rounded(time_s, 3),
         "robots": [
             {
-                "id": motion.robot,
+                "id": curve.robot,
                 "x": rounded(pose[:, 0] - scene.bounds[0], 2),
                 "y": rounded(scene.bounds[3] - pose[:, 1], 2),
                 "turn": rounded(-np.degrees(pose[:, 2]), 1),
                 "speed": rounded(pose[:, 3], 2),
             }
-            for motion, pose in zip(motions, poses, strict=True)
+            for curve, pose in zip(curves, poses, strict=True)
         ],
         "visits": [
             {
@@ -57,11 +56,11 @@ def chart_data(scene: Scene, plan: Plan, log: ExecutionLog | None) -> dict[str, 
                 "kind": visit.kind,
                 "time_s": round(visit.time_s, 2),
             }
-            for motion in motions
-            for visit in shown_visits(scene, plan, motion)
+            for curve in curves
+            for visit in curve.visits
         ],
         "charts": [
-            *_charge_charts(scene, plan, log, time_s),
+            *_charge_charts(scene, plan, curves if log else (), time_s),
             *_tracking_chart(log, time_s),
             *_distance_charts(scene, poses),
         ],
@@ -85,9 +84,8 @@ def _poses(motion: Motion, time_s: np.ndarray) -> np.ndarray:
 
 
 def _charge_charts(
-    scene: Scene, plan: Plan, log: ExecutionLog | None, time_s: np.ndarray
+    scene: Scene, plan: Plan, driven: Sequence[BatteryCurve], time_s: np.ndarray
 ) -> list[dict[str, Any]]:
-    driven = measured_curves(scene, plan, log) if log is not None else ()
     charts = []
     for at, planned in enumerate(planned_curves(scene, plan)):
         owner, battery = (at, planned.robot), scene.robot(planned.robot).battery

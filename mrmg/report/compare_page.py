@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mrmg import storage
-from mrmg.energy.battery_curves import BatteryCurve, measured_curves, planned_curves
+from mrmg.energy.battery_curves import BatteryCurve, shown_curves
 from mrmg.report import chart_spec
 from mrmg.report.compare import Comparison
 from mrmg.report.map import mission_map
@@ -17,7 +17,6 @@ from mrmg.report.page import elements as html
 from mrmg.report.page import page
 from mrmg.runs.record import RunRecord
 from mrmg.viz import style
-from mrmg.viz.activities import shown_motions, shown_visits
 
 _SAMPLES = 800
 _SHORTEST_S = 0.1
@@ -97,7 +96,11 @@ def _maps(comparison: Comparison) -> str:
 
 
 def _charts(comparison: Comparison, solved: Sequence[int]) -> dict[str, Any]:
-    curves = {number: _curves(comparison.records[number]) for number in solved}
+    curves = {
+        number: shown_curves(record.scene, record.plan, record.log)
+        for number, record in enumerate(comparison.records)
+        if record.plan is not None
+    }
     ends_s = [float(curve.time_s[-1]) for run in curves.values() for curve in run]
     end_s = max(_SHORTEST_S, *ends_s)
     time_s = np.linspace(0.0, end_s, _SAMPLES)
@@ -124,7 +127,7 @@ def _charts(comparison: Comparison, solved: Sequence[int]) -> dict[str, Any]:
                 "goals",
                 "Goals visited",
                 "",
-                lambda at: _goals_visited(comparison.records[at], time_s),
+                lambda at: _goals_visited(curves[at], time_s),
                 digits=0,
             ),
             drawn(
@@ -135,13 +138,6 @@ def _charts(comparison: Comparison, solved: Sequence[int]) -> dict[str, Any]:
             ),
         ],
     }
-
-
-def _curves(record: RunRecord) -> tuple[BatteryCurve, ...]:
-    assert record.plan is not None
-    if record.log is None:
-        return planned_curves(record.scene, record.plan)
-    return measured_curves(record.scene, record.plan, record.log)
 
 
 def _used_kJ(curves: Sequence[BatteryCurve], time_s: np.ndarray) -> np.ndarray:
@@ -157,18 +153,11 @@ def _used_kJ(curves: Sequence[BatteryCurve], time_s: np.ndarray) -> np.ndarray:
     return _until_end(used / 1000.0, curves, time_s)
 
 
-def _goals_visited(record: RunRecord, time_s: np.ndarray) -> np.ndarray:
-    assert record.plan is not None
-    motions = shown_motions(record.plan, record.log)
-    at_s = [
-        visit.time_s
-        for motion in motions
-        for visit in shown_visits(record.scene, record.plan, motion)
-        if visit.kind == "goal"
-    ]
-    count = np.searchsorted(np.sort(at_s), time_s, side="right").astype(float)
-    count[time_s > float(motions[0].time_s[-1])] = np.nan
-    return np.asarray(count)
+def _goals_visited(curves: Sequence[BatteryCurve], time_s: np.ndarray) -> np.ndarray:
+    visits = [visit for curve in curves for visit in curve.visits]
+    at_s = np.sort([visit.time_s for visit in visits if visit.kind == "goal"])
+    count = np.searchsorted(at_s, time_s, side="right")
+    return _until_end(count.astype(float), curves, time_s)
 
 
 def _lowest_percent(

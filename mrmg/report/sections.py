@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mrmg.energy.audit_record import EnergyAudit
+from mrmg.energy.battery_curves import shown_curves
 from mrmg.energy.by_terrain import energy_by_terrain, planned_interval_J
 from mrmg.energy.ledger import EnergyLedger
 from mrmg.energy.model import PARTS
@@ -11,7 +12,7 @@ from mrmg.report.page import elements as html
 from mrmg.runs.record import RunRecord
 from mrmg.scene.margins import sentences_on_margins
 from mrmg.scene.types import Scene
-from mrmg.viz.activities import lengths_along, shown_motions, standing_of
+from mrmg.viz.activities import lengths_along, standing_of
 from mrmg.viz.style import terrain_classes
 
 _PART_COLORS = {
@@ -160,8 +161,9 @@ def tours(record: RunRecord) -> list[str]:
 
 
 def _without_tour(record: RunRecord, plan: Plan, robot: str) -> str:
-    motions = {item.robot: item.state for item in shown_motions(plan, record.log)}
-    stays = lengths_along(motions[robot])[-1] < _STILL_M
+    curves = shown_curves(record.scene, plan, record.log)
+    state = next(curve.state for curve in curves if curve.robot == robot)
+    stays = lengths_along(state)[-1] < _STILL_M
     standing = standing_of(robot, plan, record.log)
     return f"{standing}: stays where it is" if stays else standing
 

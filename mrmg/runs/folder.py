@@ -222,23 +222,17 @@ class RunFolder:
         Raises:
             RunFolderError: if it is missing or unreadable; names `remedy`.
         """
-        try:
-            return storage.read_json(self.file(name))
-        except storage.UNREADABLE as error:
-            fault = Fault(name, f"not readable ({error}); run '{remedy}'")
-            raise RunFolderError(str(self.path), [fault]) from error
+        path = self.file(name)
+        with storage.damage_reported(path, "not readable", f"run '{remedy}'"):
+            return storage.read_json(path)
 
     def _record(self) -> _Record:
         if not self.file("run.json").exists():
             return _Record()
-        record = self.read_json("run.json", remedy="mrmg run")
-        try:
-            if record["format"] != RUN_FORMAT:
-                raise ValueError(f"this version reads format {RUN_FORMAT} only")
-            return storage.typed(_Record, record)
-        except storage.UNREADABLE as error:
-            fault = Fault("run.json", f"{error}; 'mrmg run' makes it in a new folder")
-            raise RunFolderError(str(self.path), [fault]) from error
+        path, remedy = self.file("run.json"), "'mrmg run' makes it in a new folder"
+        with storage.damage_reported(path, "not readable", remedy):
+            content = storage.of_format(path.read_bytes(), RUN_FORMAT)
+            return storage.typed(_Record, content)
 
     def _write(
         self,

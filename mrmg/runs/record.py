@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mrmg import storage
 from mrmg.energy.audit_record import EnergyAudit
 from mrmg.errors import Fault, RunFolderError
 from mrmg.plans import Plan, PlanStatus, plan_in_force
 from mrmg.runs.paths import why_no_run
-from mrmg.runs.summary import summarize
+from mrmg.runs.summary import outcomes_in, read_file, summarize
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
-from mrmg.simulation.log import ExecutionLog, log_in_force, require_same_mission
+from mrmg.simulation.log import ExecutionLog, require_same_mission
 from mrmg.studies.outcomes import ROBUSTNESS_FILE, Study, load_studies
 from mrmg.verification.verdict import Verdict
 
@@ -59,34 +58,28 @@ def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
     """
     if not (run_folder / "planning.json").exists():
         raise RunFolderError(str(run_folder), [_why_no_record(run_folder)])
-    planning = _read(run_folder, "planning.json", "mrmg plan")
-    solved = planning["status"] == PlanStatus.SOLVED.value
-
-    def left(name: str) -> bool:
-        return solved and (run_folder / name).exists()
-
+    planning = read_file(run_folder, "planning.json", "mrmg plan")
     has_run = (run_folder / "run.json").exists()
-    run = _read(run_folder, "run.json", "mrmg run") if has_run else {}
+    run = read_file(run_folder, "run.json", "mrmg run") if has_run else {}
     scene = load_scene(run_folder / "scene.yaml", trust_code=trust_code)
-    plan = plan_in_force(run_folder) if left("plan.json") else None
-    require_same_mission(scene, plan)
-    log = log_in_force(run_folder, scene) if solved else None
-    summed_up = (run_folder / "summary.json").exists()
+    found: dict[str, Any] = dict.fromkeys(("plan", "verdict", "log", "audit"))
+    if planning["status"] == PlanStatus.SOLVED.value:
+        found["plan"] = plan_in_force(run_folder)
+        require_same_mission(scene, found["plan"])
+        found |= outcomes_in(run_folder, scene)
+        if (run_folder / ROBUSTNESS_FILE).exists():
+            found["studies"] = load_studies(run_folder, Plan.load(run_folder))
+    if (run_folder / "summary.json").exists():
+        summary = read_file(run_folder, "summary.json", "mrmg report")
+    else:
+        summary = summarize(scene, run_folder)
     return RunRecord(
         folder=run_folder,
         scene=scene,
-        summary=_read(run_folder, "summary.json", "mrmg report")
-        if summed_up
-        else summarize(scene, run_folder),
+        summary=summary,
         planning=planning,
         arguments=run.get("arguments", {}),
-        plan=plan,
-        verdict=Verdict.load(run_folder) if left("verdict.json") else None,
-        log=log,
-        audit=EnergyAudit.load(run_folder) if log and left("audit.json") else None,
-        studies=load_studies(run_folder, Plan.load(run_folder))
-        if left(ROBUSTNESS_FILE)
-        else (),
+        **found,
     )
 
 
@@ -97,11 +90,3 @@ def _why_no_record(folder: Path) -> Fault:
         return Fault("planning.json", "missing: this is not a run folder")
     remedy = f"'mrmg run SCENE --out {folder}' goes on with it"
     return Fault("planning.json", f"missing: the run was stopped early; {remedy}")
-
-
-def _read(folder: Path, name: str, remedy: str) -> dict[str, Any]:
-    try:
-        return dict(storage.read_json(folder / name))
-    except storage.UNREADABLE as error:
-        fault = Fault(name, f"cannot be read ({error}); run '{remedy}'")
-        raise RunFolderError(str(folder), [fault]) from error

@@ -11,7 +11,6 @@ from typing import Any
 import mrmg
 from mrmg import storage
 from mrmg.energy.audit_record import ENERGY_IMBALANCE, MODEL_MISMATCH, EnergyAudit
-from mrmg.errors import Fault, RunFolderError
 from mrmg.plans import Plan, PlanStatus
 from mrmg.runs.summary_model import Summary
 from mrmg.scene.margins import sentences_on_margins
@@ -31,24 +30,31 @@ def summarize(scene: Scene, folder: Path) -> dict[str, Any]:
         RunFolderError: if nothing was planned, a file cannot be read, or plan or log
             are of another scene.
     """
-    planning = _read(folder, "planning.json")
+    planning = read_file(folder, "planning.json", "mrmg plan")
     solved = planning["status"] == PlanStatus.SOLVED.value
     plan = Plan.load(folder) if solved else None
-
-    def left(name: str) -> bool:
-        return solved and (folder / name).exists()
-
     require_same_mission(scene, plan)
-    log = log_in_force(folder, scene) if solved else None
-    return summary_of(
-        scene,
-        planning,
-        seed=plan.seed if plan else _read(folder, "run.json")["arguments"]["seed"],
-        plan=plan,
-        verdict=Verdict.load(folder) if left("verdict.json") else None,
-        log=log,
-        audit=EnergyAudit.load(folder) if log and left("audit.json") else None,
-    )
+    if plan is not None:
+        seed = plan.seed
+    else:
+        seed = read_file(folder, "run.json", "mrmg plan")["arguments"]["seed"]
+    outcomes = outcomes_in(folder, scene) if solved else {}
+    return summary_of(scene, planning, seed=seed, plan=plan, **outcomes)
+
+
+def outcomes_in(folder: Path, scene: Scene) -> dict[str, Any]:
+    """Return what became of a folder's plan: verdict, log and audit.
+
+    Those that were not reached are None.
+    """
+    log = log_in_force(folder, scene)
+    judged = (folder / "verdict.json").exists()
+    audited = log is not None and (folder / "audit.json").exists()
+    return {
+        "verdict": Verdict.load(folder) if judged else None,
+        "log": log,
+        "audit": EnergyAudit.load(folder) if audited else None,
+    }
 
 
 def summary_of(
@@ -161,7 +167,7 @@ def _execution_figures(log: ExecutionLog, audit: EnergyAudit) -> dict[str, Any]:
         "goals_visited": len(audit.goals_visited),
         "contacts": len(log.contacts),
         "gave_up": log.gave_up,
-        "disturbance": log.disturbance.to_json() if log.disturbance else None,
+        "disturbance": asdict(log.disturbance) if log.disturbance else None,
         "realtime_factor": log.timing["realtime_factor"],
         "controller_ms": {
             **{name: controller_ms[name] for name in ("median", "p99")},
@@ -172,7 +178,7 @@ def _execution_figures(log: ExecutionLog, audit: EnergyAudit) -> dict[str, Any]:
             "rms_m": (sum(squares) / len(squares)) ** 0.5,
             "max_m": max(robot.tracking_max_m for robot in audit.robots),
         },
-        "events": [event.to_json() for event in log.events],
+        "events": [asdict(event) for event in log.events],
         "replans": sum(event.action == "replan" for event in log.events),
     }
 
@@ -193,9 +199,11 @@ def _energy_figures(audit: EnergyAudit) -> dict[str, Any]:
     }
 
 
-def _read(folder: Path, name: str) -> dict[str, Any]:
-    try:
+def read_file(folder: Path, name: str, remedy: str) -> dict[str, Any]:
+    """Read a JSON file of a run folder.
+
+    Raises:
+        RunFolderError: if it is missing or damaged; names the command `remedy`.
+    """
+    with storage.damage_reported(folder / name, "cannot be read", f"run '{remedy}'"):
         return dict(storage.read_json(folder / name))
-    except storage.UNREADABLE as error:
-        fault = Fault(name, f"cannot be read ({error}); run 'mrmg plan'")
-        raise RunFolderError(str(folder), [fault]) from error

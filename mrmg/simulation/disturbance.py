@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -95,18 +95,6 @@ class Disturbance:
             for index, robot in enumerate(scene.robots)
         )
         return replace(scene, robots=tuple(robots))
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the disturbance as JSON data."""
-        return {"seed": self.seed, "robots": [asdict(item) for item in self.robots]}
-
-    @staticmethod
-    def from_json(data: Mapping[str, Any]) -> Disturbance:
-        """Rebuild a disturbance from `to_json`."""
-        return Disturbance(
-            seed=data["seed"],
-            robots=tuple(RobotDisturbance(**row) for row in data["robots"]),
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
+from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -14,13 +15,14 @@ import numpy as np
 from mrmg import storage
 from mrmg.columns import data_frame, named, state_columns
 from mrmg.energy.metering import LoggedMotion
-from mrmg.errors import Fault, IdentityError, RunFolderError, UsageError
+from mrmg.errors import Fault, IdentityError, UsageError
 from mrmg.plans import Plan, plan_in_force
 from mrmg.scene.types import Scene
 from mrmg.simulation.disturbance import Disturbance
 from mrmg.simulation.supervision import Event
 
 LOG_FORMAT = 1
+LOG_FILE = "log.json"
 
 _NOT_PLAIN = ("contacts", "disturbance", "events", "timing")
 
@@ -93,6 +95,8 @@ class ExecutionLog:
             each branch of the MPC (`controller_calls.BRANCHES`). Kept apart: all else
             is equal between equal runs.
     """
+
+    __pydantic_config__ = storage.WITH_ARRAYS
 
     scene_digest: str
     plan_digest: str
@@ -191,16 +195,12 @@ class ExecutionLog:
             for field in fields(self)
             if field.name not in {*self._arrays(), *_NOT_PLAIN}
         }
-        header["robots"] = list(self.robots)
         header["versions"] = dict(self.versions)
-        header["contacts"] = [
-            {name: getattr(contact, name) for name in Contact.__slots__}
-            for contact in self.contacts
-        ]
-        header["events"] = [event.to_json() for event in self.events]
+        header["contacts"] = [asdict(contact) for contact in self.contacts]
+        header["events"] = [asdict(event) for event in self.events]
         if self.disturbance is not None:
-            header["disturbance"] = self.disturbance.to_json()
-        storage.write_json(folder / "log.json", {"format": LOG_FORMAT, **header})
+            header["disturbance"] = asdict(self.disturbance)
+        storage.write_json(folder / LOG_FILE, {"format": LOG_FORMAT, **header})
 
     def _arrays(self) -> dict[str, np.ndarray]:
         values = {field.name: getattr(self, field.name) for field in fields(self)}
@@ -217,23 +217,19 @@ class ExecutionLog:
         Raises:
             RunFolderError: if a file is missing or not a log of this format.
         """
-        try:
-            header = storage.read_json(folder / "log.json")
-            if header.pop("format") != LOG_FORMAT:
-                raise ValueError(f"this version reads format {LOG_FORMAT} only")
-            header["robots"] = tuple(header["robots"])
-            header["bounded_solves"] = tuple(header.get("bounded_solves", ()))
-            header["motions"] = tuple(header.get("motions", ()))
-            header["contacts"] = tuple(Contact(**row) for row in header["contacts"])
-            header["events"] = tuple(Event(**row) for row in header.get("events", ()))
-            if "disturbance" in header:
-                header["disturbance"] = Disturbance.from_json(header["disturbance"])
-            arrays: dict[str, Any] = storage.read_arrays(folder / "log.npz")
-            timing = storage.read_json(folder / "timing.json")
-            return ExecutionLog(**header, **arrays, timing=timing)
-        except storage.UNREADABLE as error:
-            fault = Fault("log.json", f"no readable log ({error}); run 'mrmg execute'")
-            raise RunFolderError(str(folder), [fault]) from error
+        path = folder / LOG_FILE
+        with storage.damage_reported(path, "no readable log", "run 'mrmg execute'"):
+            names = (LOG_FILE, "log.npz", "timing.json")
+            return _log_of(*((folder / name).read_bytes() for name in names))
+
+
+@lru_cache(maxsize=1)
+def _log_of(header: bytes, arrays: bytes, timing: bytes) -> ExecutionLog:
+    """Return the log of the content of its files; steps of a run read the same one."""
+    content = storage.of_format(header, LOG_FORMAT)
+    content |= storage.arrays_of(arrays, "log.npz")
+    content["timing"] = storage.json_of(timing)
+    return storage.typed(ExecutionLog, content)
 
 
 def log_in_force(folder: Path, scene: Scene) -> ExecutionLog | None:
@@ -244,7 +240,7 @@ def log_in_force(folder: Path, scene: Scene) -> ExecutionLog | None:
     Raises:
         RunFolderError: if a file cannot be read, or is of another scene.
     """
-    if not (folder / "log.json").exists():
+    if not (folder / LOG_FILE).exists():
         return None
     log = ExecutionLog.load(folder)
     require_same_mission(scene, None, log)

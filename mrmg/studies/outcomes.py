@@ -12,7 +12,7 @@ which is good for small n and for p near 1.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,6 @@ import numpy as np
 from mrmg import storage
 from mrmg.energy.audit import audit
 from mrmg.energy.audit_record import EnergyAudit
-from mrmg.errors import Fault, RunFolderError
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
@@ -256,19 +255,8 @@ def load_studies(folder: Path, plan: Plan) -> tuple[Study, ...]:
     path = folder / ROBUSTNESS_FILE
     if not path.exists():
         return ()
-    try:
-        content = storage.read_json(path)
-        if content["format"] != ROBUSTNESS_FORMAT:
-            raise ValueError(f"this version reads format {ROBUSTNESS_FORMAT} only")
-        if content["plan_digest"] != plan.digest:
-            return ()
-        return _studies(content["studies"])
-    except storage.UNREADABLE as error:
-        fault = Fault(
-            ROBUSTNESS_FILE, f"not readable ({error}); delete it and run it again"
-        )
-        raise RunFolderError(str(folder), [fault]) from error
-
-
-def _studies(rows: Sequence[Mapping[str, Any]]) -> tuple[Study, ...]:
-    return tuple(Study.from_json(row) for row in rows)
+    remedy = "delete it and run it again"
+    with storage.damage_reported(path, "not readable", remedy):
+        content = storage.of_format(path.read_bytes(), ROBUSTNESS_FORMAT)
+        rows = content["studies"] if content["plan_digest"] == plan.digest else ()
+        return tuple(Study.from_json(row) for row in rows)

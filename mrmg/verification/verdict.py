@@ -2,71 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from enum import Enum
 from pathlib import Path
 from typing import Any
 
 from mrmg import storage
-from mrmg.errors import Fault, RunFolderError
 
 VERDICT_FORMAT = 1
+VERDICT_FILE = "verdict.json"
 
 
 class ViolationKind(Enum):
-    """Every rule of a plan; `unit` is that of a violation's amount."""
+    """Every rule of a plan, with the unit of `Violation.amount`.
 
-    SCENE_MISMATCH = "scene_mismatch"
-    MALFORMED = "malformed"
-    START = "start"
-    FINAL_REST = "final_rest"
-    FINISH = "finish"
-    DYNAMICS = "dynamics"
-    STATE_LIMIT = "state_limit"
-    CONTROL_LIMIT = "control_limit"
-    OBSTACLE = "obstacle"
-    BOUNDS = "bounds"
-    ROBOT = "robot"
-    MARGIN = "margin"
-    OCCUPIED = "occupied"
-    GOAL_MISSED = "goal_missed"
-    HEADING = "heading"
-    DWELL = "dwell"
-    TOUR = "tour"
-    VISIT = "visit"
-    RECHARGE = "recharge"
-    ENERGY = "energy"
-    LATE = "late"
-    LEDGER = "ledger"
+    The unit is "SI" where it depends on the component.
+    """
 
-    @property
-    def unit(self) -> str:
-        """Unit of `Violation.amount`; "SI" where it depends on the component."""
-        return {
-            ViolationKind.SCENE_MISMATCH: "1",
-            ViolationKind.MALFORMED: "1",
-            ViolationKind.START: "SI",
-            ViolationKind.FINAL_REST: "SI",
-            ViolationKind.FINISH: "SI",
-            ViolationKind.DYNAMICS: "SI",
-            ViolationKind.STATE_LIMIT: "SI",
-            ViolationKind.CONTROL_LIMIT: "SI",
-            ViolationKind.OBSTACLE: "m^2",
-            ViolationKind.BOUNDS: "m",
-            ViolationKind.ROBOT: "m^2",
-            ViolationKind.MARGIN: "m",
-            ViolationKind.OCCUPIED: "s",
-            ViolationKind.GOAL_MISSED: "m",
-            ViolationKind.HEADING: "rad",
-            ViolationKind.DWELL: "s",
-            ViolationKind.TOUR: "m",
-            ViolationKind.VISIT: "s",
-            ViolationKind.RECHARGE: "m",
-            ViolationKind.ENERGY: "J",
-            ViolationKind.LATE: "s",
-            ViolationKind.LEDGER: "J",
-        }[self]
+    unit: str
+
+    def __new__(cls, name: str, unit: str) -> ViolationKind:
+        """Return a kind whose value is its name."""
+        kind = object.__new__(cls)
+        kind._value_, kind.unit = name, unit
+        return kind
+
+    SCENE_MISMATCH = "scene_mismatch", "1"
+    MALFORMED = "malformed", "1"
+    START = "start", "SI"
+    FINAL_REST = "final_rest", "SI"
+    FINISH = "finish", "SI"
+    DYNAMICS = "dynamics", "SI"
+    STATE_LIMIT = "state_limit", "SI"
+    CONTROL_LIMIT = "control_limit", "SI"
+    OBSTACLE = "obstacle", "m^2"
+    BOUNDS = "bounds", "m"
+    ROBOT = "robot", "m^2"
+    MARGIN = "margin", "m"
+    OCCUPIED = "occupied", "s"
+    GOAL_MISSED = "goal_missed", "m"
+    HEADING = "heading", "rad"
+    DWELL = "dwell", "s"
+    TOUR = "tour", "m"
+    VISIT = "visit", "s"
+    RECHARGE = "recharge", "m"
+    ENERGY = "energy", "J"
+    LATE = "late", "s"
+    LEDGER = "ledger", "J"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,12 +78,6 @@ class Violation:
         """Return the violation as a JSON row."""
         return {**asdict(self), "kind": self.kind.value, "unit": self.kind.unit}
 
-    @staticmethod
-    def from_row(row: Mapping[str, Any]) -> Violation:
-        """Rebuild a violation from `to_row`."""
-        values = {name: value for name, value in row.items() if name != "unit"}
-        return Violation(**{**values, "kind": ViolationKind(row["kind"])})
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
@@ -126,17 +102,9 @@ class Verdict:
 
     def save(self, folder: Path) -> None:
         """Write `verdict.json`."""
-        storage.write_json(
-            folder / "verdict.json",
-            {
-                "format": VERDICT_FORMAT,
-                "ok": self.ok,
-                "violations": [violation.to_row() for violation in self.violations],
-                "min_obstacle_clearance_m": self.min_obstacle_clearance_m,
-                "min_robot_distance_m": self.min_robot_distance_m,
-                "skipped": list(self.skipped),
-            },
-        )
+        rows = [violation.to_row() for violation in self.violations]
+        content = {"format": VERDICT_FORMAT, **asdict(self), "violations": rows}
+        storage.write_json(folder / VERDICT_FILE, content)
 
     @staticmethod
     def load(folder: Path) -> Verdict:
@@ -145,16 +113,7 @@ class Verdict:
         Raises:
             RunFolderError: if the file is missing or not a verdict of this format.
         """
-        try:
-            content = storage.read_json(folder / "verdict.json")
-            if content.pop("format") != VERDICT_FORMAT:
-                raise ValueError(f"this version reads format {VERDICT_FORMAT} only")
-            rows = content.pop("violations")
-            violations = tuple(Violation.from_row(row) for row in rows)
-            skipped = tuple(content.pop("skipped", ()))
-            return Verdict(violations=violations, skipped=skipped, **content)
-        except storage.UNREADABLE as error:
-            fault = Fault(
-                "verdict.json", f"no readable verdict ({error}); run 'mrmg verify'"
-            )
-            raise RunFolderError(str(folder), [fault]) from error
+        path = folder / VERDICT_FILE
+        with storage.damage_reported(path, "no readable verdict", "run 'mrmg verify'"):
+            content = storage.of_format(path.read_bytes(), VERDICT_FORMAT)
+            return storage.typed(Verdict, content)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrmg.energy.metering import Motion, find_visits
+from mrmg.energy.metering import Motion
 from mrmg.energy.visits import runs
 from mrmg.plans import Plan, Visit
 from mrmg.scene.types import Scene
@@ -37,16 +37,6 @@ class Activity:
     start_s: float
     end_s: float
     target: str = ""
-
-
-def shown_motions(plan: Plan, log: ExecutionLog | None) -> tuple[Motion, ...]:
-    """Return what was driven, or what was planned where nothing was driven yet."""
-    return plan.trajectories if log is None else log.driven_motions()
-
-
-def shown_visits(scene: Scene, plan: Plan, motion: Motion) -> tuple[Visit, ...]:
-    """Return the visits of a planned or driven motion."""
-    return find_visits(scene, motion, plan.tours.get(motion.robot, ()))
 
 
 def activities(

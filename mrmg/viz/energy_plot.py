@@ -47,10 +47,8 @@ def draw_energy(
     """
     require_same_mission(scene, plan, log)
     planned = {curve.robot: curve for curve in planned_curves(scene, plan)}
-    simulated = {
-        curve.robot: curve
-        for curve in (measured_curves(scene, plan, log) if log is not None else ())
-    }
+    driven = measured_curves(scene, plan, log) if log else ()
+    simulated = {curve.robot: curve for curve in driven}
     width_in, panel_in = _PANEL_INCHES
     figure = Figure(
         figsize=(width_in, panel_in * len(planned) + 0.7),

@@ -7,8 +7,11 @@ from collections.abc import Collection, Iterable
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from mrmg.energy.audit import measured_step_energy
-from mrmg.energy.battery_curves import BatteryCurve, measured_curves
+from mrmg.energy.battery_curves import (
+    BatteryCurve,
+    MeasuredCurve,
+    measured_curves,
+)
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
@@ -51,7 +54,7 @@ class Film:
         self.colors = style.scene_robot_colors(scene)
         self.curves = measured_curves(scene, plan, log)
         self.capacity_J = [robot.battery.capacity_J for robot in scene.robots]
-        self.used_J = _used_J(scene, log)
+        self.used_J = _used_J(self.curves)
         self.followed = self._followed()
         self.yaw = self._smooth_yaw()
         self._place_panes()
@@ -125,13 +128,10 @@ class Film:
         return "…" if curve.robot in breakdowns(self.log) else ""
 
 
-def _used_J(scene: Scene, log: ExecutionLog) -> np.ndarray:
+def _used_J(curves: Iterable[MeasuredCurve]) -> np.ndarray:
     """Return the energy the fleet has drawn at each tick, shape (n,)."""
-    used_J = np.zeros(len(log.time_s))
-    for index, robot in enumerate(log.robots):
-        draw_J = measured_step_energy(scene.robot(robot), log, index)
-        used_J[1:] += np.cumsum(draw_J.sum(axis=1))
-    return used_J
+    used_J = sum(np.cumsum(curve.drawn_J.sum(axis=1)) for curve in curves)
+    return np.append(0.0, used_J)
 
 
 class Stage:

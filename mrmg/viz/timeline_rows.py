@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from mrmg.energy.battery_curves import shown_curves
 from mrmg.plans import Plan, Visit
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
@@ -13,8 +14,6 @@ from mrmg.viz.activities import (
     Activity,
     activities,
     breakdowns,
-    shown_motions,
-    shown_visits,
     standing_of,
 )
 from mrmg.viz.tags import text_width_em
@@ -76,18 +75,17 @@ def timeline_rows(
         log: what was driven.
         widths_em: of the time axis in each layout, in sizes of the names' letters.
     """
-    motions = shown_motions(plan, log)
-    end_s = max(_SHORTEST_S, *(float(motion.time_s[-1]) for motion in motions))
+    curves = shown_curves(scene, plan, log)
+    end_s = max(_SHORTEST_S, *(float(curve.time_s[-1]) for curve in curves))
     broken_s = breakdowns(log)
     rows = []
-    for motion in motions:
-        visits = shown_visits(scene, plan, motion)
-        spans = activities(scene, motion, visits, broken_s.get(motion.robot))
+    for curve in curves:
+        robot, visits = curve.robot, curve.visits
         rows.append(
             TimelineRow(
-                robot=motion.robot,
-                standing=standing_of(motion.robot, plan, log),
-                spans=spans,
+                robot=robot,
+                standing=standing_of(robot, plan, log),
+                spans=activities(scene, curve, visits, broken_s.get(robot)),
                 visits=named_visits(scene, visits, end_s, widths_em),
             )
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -263,5 +263,5 @@ def test_disturbed_execution_says_how(parts: Any) -> None:
         audit=account,
     )
     check(summary)
-    assert summary["execution"]["disturbance"] == disturbance.to_json()
+    assert summary["execution"]["disturbance"] == asdict(disturbance)
     assert summary["execution"]["gave_up"] == "lost"

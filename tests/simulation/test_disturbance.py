@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from mrmg import storage
 from mrmg.scene.types import Battery
 from mrmg.simulation.disturbance import (
     DEFAULT_RANGES,
@@ -67,7 +68,8 @@ def test_ranges_name_every_quantity_of_a_robot() -> None:
 
 def test_json_gives_an_equal_disturbance() -> None:
     drawn = DEFAULT_RANGES.draw(2, ["r1", "r2"])
-    assert Disturbance.from_json(json.loads(json.dumps(drawn.to_json()))) == drawn
+    data = json.loads(json.dumps(asdict(drawn)))
+    assert storage.typed(Disturbance, data) == drawn
 
 
 def test_the_actual_battery_keeps_its_reserve_in_joules() -> None:

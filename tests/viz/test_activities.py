@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from mrmg.energy.battery_curves import shown_curves
 from mrmg.energy.metering import LoggedMotion, find_visits
-from mrmg.viz.activities import activities, shown_motions
+from mrmg.viz.activities import activities
 
 
 def motion_of(speed: list[tuple[float, float]], tick_s: float = 0.1) -> LoggedMotion:
@@ -60,7 +61,7 @@ def test_charging_lasts_while_the_robot_is_in_the_station_of_its_tour(
 
 def test_activities_leave_no_gap(case, make_log) -> None:
     scene, plan = case()
-    for motion in shown_motions(plan, make_log(scene, plan)):
+    for motion in shown_curves(scene, plan, make_log(scene, plan)):
         spans = activities(scene, motion, ())
         assert spans[0].start_s == 0.0
         assert spans[-1].end_s == motion.time_s[-1]
