@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mrmg.cli import log_options, terminal
-from mrmg.cli.run_options import add_options, add_overwrite, add_trust, given
+from mrmg.cli.run_options import add_options, given
 from mrmg.counted import counted
 from mrmg.errors import ExitCode, UsageError
 
@@ -22,7 +22,7 @@ figures and a plot of the fit. With --log, fit logs of the real robot instead:
 stationary power, rolling, turning and inertia by terrain, with intervals."""
 
 
-def add_calibrate(verbs: argparse._SubParsersAction) -> None:  # type: ignore[type-arg]
+def add_calibrate(verbs: Any) -> None:
     """Add the verb."""
     verb = verbs.add_parser(
         "calibrate",
@@ -30,32 +30,20 @@ def add_calibrate(verbs: argparse._SubParsersAction) -> None:  # type: ignore[ty
         description=_DESCRIPTION,
         epilog=log_options.EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
+        command=calibrate,
     )
     log_options.add_logs(verb)
     verb.add_argument(
         "model", metavar="MODEL", help="name of a shipped model, or a model's folder"
     )
-    verb.add_argument(
-        "-o", "--out", type=Path, metavar="DIR", help="default calibrated-MODEL"
-    )
-    add_overwrite(verb, "the folder's content")
-    verb.add_argument(
-        "--plot",
-        type=Path,
-        metavar="PICTURE.png",
-        help="PNG, SVG or PDF by its suffix; default calibration.png in DIR",
-    )
-    verb.add_argument(
-        "--in-place",
-        action="store_true",
-        help="change the model's own robot.yaml, too",
-    )
+    verb.add_out("DIR", "default calibrated-MODEL")
+    verb.add_overwrite("the folder's content")
+    plot = "PNG, SVG or PDF by its suffix; default calibration.png in DIR"
+    verb.add_argument("--plot", type=Path, metavar="PICTURE.png", help=plot)
+    verb.add_flag("--in-place", "change the model's own robot.yaml, too")
     add_options(verb, "calibrate")
-    add_trust(verb)
-    verb.add_argument(
-        "--json", action="store_true", help="print calibration.json alone"
-    )
-    verb.set_defaults(command=calibrate)
+    verb.add_trust()
+    verb.add_json("calibration.json alone")
 
 
 def calibrate(options: argparse.Namespace) -> int:

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from mrmg.cli import terminal
-from mrmg.cli.run_options import add_trust, reader
 from mrmg.counted import counted
 from mrmg.errors import ExitCode
 from mrmg.runs import argument_values as values
@@ -31,6 +30,7 @@ def add_campaign(verbs: Any) -> None:
         description="Plan and drive every combination of the factors of a file, and "
         "put the results together in tables and a page. Trials that are done are "
         "kept: the same command goes on where it was stopped.",
+        command=campaign,
     )
     verb.add_argument("file", type=Path, metavar="FILE.yaml", help="campaign file")
     verb.add_argument(
@@ -40,31 +40,24 @@ def add_campaign(verbs: Any) -> None:
         help="who makes trials: processes of this machine, or a Dask cluster; default "
         "local",
     )
-    verb.add_argument(
+    verb.add_value(
         "--scheduler",
-        metavar="ADDRESS",
-        help="of the cluster, such as tcp://host:8786; default a cluster of this "
+        "ADDRESS",
+        "of the cluster, such as tcp://host:8786; default a cluster of this "
         "machine's processes",
     )
-    verb.add_argument(
+    verb.add_value(
         "--workers",
-        type=reader(values.count),
-        metavar="N",
-        help="trials under way at once; default 1, or what the cluster has room for; "
+        "N",
+        "trials under way at once; default 1, or what the cluster has room for; "
         "no influence on the result",
+        values.count,
     )
-    verb.add_argument(
-        "--out", type=Path, metavar="DIR", help="folder; default campaigns/FILE"
-    )
-    verb.add_argument(
-        "--runs", action="store_true", help="leave a run folder of each trial, too"
-    )
-    verb.add_argument(
-        "--parquet", action="store_true", help="write trials.parquet, too"
-    )
-    add_trust(verb)
-    verb.add_argument("--json", action="store_true", help="print summary.json alone")
-    verb.set_defaults(command=campaign)
+    verb.add_out("DIR", "folder; default campaigns/FILE", short=False)
+    verb.add_flag("--runs", "leave a run folder of each trial, too")
+    verb.add_flag("--parquet", "write trials.parquet, too")
+    verb.add_trust()
+    verb.add_json("summary.json alone")
 
 
 def campaign(options: argparse.Namespace) -> int:

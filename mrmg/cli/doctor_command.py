@@ -11,14 +11,12 @@ from mrmg.errors import ExitCode
 
 def add_doctor(verbs: Any) -> None:
     """Add the verb `doctor`."""
-    verb = verbs.add_parser("doctor", help="check this machine, with remedies")
-    verb.add_argument(
-        "--licences",
-        action="store_true",
-        help="list the packages mrmg depends on, with their licences",
+    verb = verbs.add_parser(
+        "doctor", help="check this machine, with remedies", command=doctor
     )
-    verb.add_argument("--json", action="store_true", help="print the findings alone")
-    verb.set_defaults(command=doctor)
+    packages = "list the packages mrmg depends on, with their licences"
+    verb.add_flag("--licences", packages)
+    verb.add_json("the findings alone")
 
 
 def doctor(options: argparse.Namespace) -> int:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 from mrmg.cli import terminal
-from mrmg.cli.run_options import add_overwrite, add_trust
 from mrmg.errors import ExitCode
 from mrmg.export.table import format_names
 
@@ -19,29 +17,18 @@ def add_export(verbs: Any) -> None:
         help="write the drive or the plan for other tools",
         description="Write the drive of a run, or its plan where nothing was driven: "
         "as ROS 2 messages (mcap), orders and states of VDA 5050, GeoJSON or a table.",
+        command=export,
     )
-    verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
+    verb.add_run()
     verb.add_argument(
         "--format", required=True, choices=format_names(), help="what to write"
     )
-    verb.add_argument(
-        "-o",
-        "--out",
-        type=Path,
-        metavar="PATH",
-        help="folder, or the file by its suffix; default RUN/export",
-    )
-    verb.add_argument(
-        "--version",
-        metavar="X.Y.Z",
-        help="of the format's standard: 2.1.0 or 3.0.0 of vda5050; default all",
-    )
-    add_overwrite(verb, "files")
-    add_trust(verb)
-    verb.add_argument(
-        "--json", action="store_true", help="print the names of the files as JSON"
-    )
-    verb.set_defaults(command=export)
+    verb.add_out("PATH", "folder, or the file by its suffix; default RUN/export")
+    standard = "of the format's standard: 2.1.0 or 3.0.0 of vda5050; default all"
+    verb.add_value("--version", "X.Y.Z", standard)
+    verb.add_overwrite("files")
+    verb.add_trust()
+    verb.add_json("the names of the files as JSON")
 
 
 def export(options: argparse.Namespace) -> int:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrmg.cli import show_commands, terminal
-from mrmg.cli.run_options import add_overwrite, add_trust
 from mrmg.errors import ExitCode
 
 if TYPE_CHECKING:
@@ -23,22 +22,16 @@ def add_replay(verbs: Any) -> None:
         description="Repeat the execution of a capsule, which every failed execution "
         "leaves as capsule.zip in its run folder, and report whether it fails again in "
         "the same way. Exit code 0 if it does, 6 if not.",
+        command=replay,
     )
     verb.add_argument("capsule", type=Path, metavar="CAPSULE", help="capsule.zip")
-    verb.add_argument(
-        "--out",
-        type=Path,
-        metavar="DIR",
-        help="run folder for what is repeated; default 'replay' beside the capsule",
-    )
-    add_overwrite(verb, "another run")
-    verb.add_argument("--render", action="store_true", help="make the video, too")
-    verb.add_argument(
-        "--view", action="store_true", help="watch it in three dimensions"
-    )
-    add_trust(verb)
-    verb.add_argument("--json", action="store_true", help="print the outcome as JSON")
-    verb.set_defaults(command=replay)
+    place = "run folder for what is repeated; default 'replay' beside the capsule"
+    verb.add_out("DIR", place, short=False)
+    verb.add_overwrite("another run")
+    verb.add_flag("--render", "make the video, too")
+    verb.add_flag("--view", "watch it in three dimensions")
+    verb.add_trust()
+    verb.add_json("the outcome as JSON")
 
 
 def replay(options: argparse.Namespace) -> int:

@@ -10,49 +10,37 @@ from pathlib import Path
 from typing import Any
 
 from mrmg.cli import terminal
-from mrmg.cli.run_options import add_trust
 from mrmg.errors import ExitCode, MachineError, SceneError, UsageError
 
 
 def add_robot(verbs: Any) -> None:
     """Add the verb `robot`."""
-    robot = verbs.add_parser("robot", help="check, make, import or list robot models")
-    acts = robot.add_subparsers(title="commands", metavar="COMMAND", required=True)
-
+    acts = verbs.add_group("robot", "check, make, import or list robot models")
     check = acts.add_parser(
         "check",
         help="compare a model's robot.yaml with its MJCF, and show the robot",
         description="Report every fault of a robot model, differences between its "
         "robot.yaml and its MJCF included, or else print its figures and draw it. "
         "Exit code 0 if it is valid, 3 if not.",
+        command=check_robot,
     )
-    check.add_argument(
-        "model",
-        metavar="FOLDER",
-        help="a model's folder, or the name of a shipped model",
-    )
-    check.add_argument(
-        "-o", "--out", type=Path, metavar="PICTURE.png", help="default NAME.png"
-    )
-    add_trust(check)
-    check.add_argument(
-        "--json", action="store_true", help="print faults and figures alone"
-    )
-    check.set_defaults(command=check_robot)
+    place = "a model's folder, or the name of a shipped model"
+    check.add_argument("model", metavar="FOLDER", help=place)
+    check.add_out("PICTURE.png", "default NAME.png")
+    check.add_trust()
+    check.add_json("faults and figures alone")
 
-    new = acts.add_parser("new", help="begin a robot model of your own")
-    new.add_argument("name", metavar="NAME", help="of the model, and of its folder")
-    new.add_argument(
-        "--like", default="car", metavar="MODEL", help="shipped model; default car"
+    new = acts.add_parser(
+        "new", help="begin a robot model of your own", command=new_robot
     )
-    new.set_defaults(command=new_robot)
+    new.add_argument("name", metavar="NAME", help="of the model, and of its folder")
+    new.add_value("--like", "MODEL", "shipped model; default car", str, "car")
 
     _add_import(acts)
-    listed = acts.add_parser("list", help="list the shipped robot models")
-    listed.add_argument(
-        "--json", action="store_true", help="print their figures as JSON"
+    listed = acts.add_parser(
+        "list", help="list the shipped robot models", command=list_robots
     )
-    listed.set_defaults(command=list_robots)
+    listed.add_json("their figures as JSON")
 
 
 def _add_import(acts: Any) -> None:
@@ -61,11 +49,10 @@ def _add_import(acts: Any) -> None:
         help="make a model of a robot description: URDF, xacro or MJCF",
         description="Write a model's folder with every parameter that the description "
         "states, and report those that it does not.",
+        command=import_robot,
     )
     imported.add_argument("file", type=Path, metavar="FILE.urdf|FILE.xacro|FILE.xml")
-    imported.add_argument(
-        "-o", "--out", type=Path, metavar="FOLDER", help="default models/NAME"
-    )
+    imported.add_out("FOLDER", "default models/NAME")
     for flag, what in (("--drive", "turn the driven wheels"), ("--steer", "steer")):
         imported.add_argument(
             flag,
@@ -81,7 +68,6 @@ def _add_import(acts: Any) -> None:
         metavar="NAME=VALUE",
         help="argument of a xacro file; may be repeated",
     )
-    imported.set_defaults(command=import_robot)
 
 
 def check_robot(options: argparse.Namespace) -> int:

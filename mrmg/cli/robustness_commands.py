@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrmg.cli import terminal
-from mrmg.cli.run_options import add_options, add_trust, given, reader
+from mrmg.cli.run_options import add_options, given
 from mrmg.counted import counted
 from mrmg.errors import ExitCode
 from mrmg.runs import argument_values as values
@@ -31,41 +31,19 @@ def add_robustness(verbs: Any) -> None:
         description="Drive the plan of a run folder many times, each time under other "
         "disturbances. Trials that are done are kept: the same command goes on where "
         "it was stopped.",
+        command=robustness,
     )
-    verb.add_argument("run", type=Path, metavar="RUN", help="run folder")
-    verb.add_argument(
-        "--trials",
-        type=reader(values.count),
-        default=100,
-        metavar="N",
-        help="default 100",
-    )
-    verb.add_argument(
-        "--workers",
-        type=reader(values.count),
-        default=1,
-        metavar="N",
-        help="processes that drive; default 1, and no influence on the result",
-    )
-    verb.add_argument(
-        "--disturb",
-        default="",
-        metavar="SPEC",
-        help=DISTURBANCE_HELP.replace("%", "%%"),
-    )
-    verb.add_argument(
-        "--seed",
-        type=reader(values.seed),
-        default=0,
-        metavar="N",
-        help="--disturb-seed of the first trial, the next have N+1, ...; default 0",
-    )
+    verb.add_run()
+    verb.add_value("--trials", "N", "default 100", values.count, 100)
+    processes = "processes that drive; default 1, and no influence on the result"
+    verb.add_value("--workers", "N", processes, values.count, 1)
+    disturbances = DISTURBANCE_HELP.replace("%", "%%")
+    verb.add_value("--disturb", "SPEC", disturbances, str, "")
+    seed = "--disturb-seed of the first trial, the next have N+1, ...; default 0"
+    verb.add_value("--seed", "N", seed, values.seed, 0)
     add_options(verb, "robustness")
-    add_trust(verb)
-    verb.add_argument(
-        "--json", action="store_true", help="print the study of robustness.json alone"
-    )
-    verb.set_defaults(command=robustness)
+    verb.add_trust()
+    verb.add_json("the study of robustness.json alone")
 
 
 def robustness(options: argparse.Namespace) -> int:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from mrmg import extensions
+from mrmg.cli.usage import reader
 from mrmg.errors import UsageError
 from mrmg.runs.arguments import RunArguments, VideoArguments
 from mrmg.runs.options import Option, options_of
@@ -45,40 +46,12 @@ def add_options(
             )
 
 
-def add_trust(verb: argparse.ArgumentParser) -> None:
-    """Add the option of every verb that loads a scene, a run or a robot model."""
-    verb.add_argument(
-        "--trust-code",
-        action="store_true",
-        help="let robot models run Python code that they bring (motion_model: FILE.py)",
-    )
-
-
 def given(
     options: argparse.Namespace, arguments: _Arguments = RunArguments
 ) -> dict[str, Any]:
     """Return what the command line gives of a class of arguments, by field."""
     known = [option.name for option in options_of(arguments)]
     return {name: value for name, value in vars(options).items() if name in known}
-
-
-def add_overwrite(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the option that lets a verb replace finished results, named by `what`."""
-    parser.add_argument(
-        "--overwrite", action="store_true", help=f"replace {what} that is there"
-    )
-
-
-def reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
-    """Return a reader whose message argparse shows."""
-
-    def read_text(text: str) -> Any:
-        try:
-            return read(text)
-        except ValueError as error:
-            raise argparse.ArgumentTypeError(str(error)) from error
-
-    return read_text
 
 
 def _name(group: str) -> Callable[[str], str]:

@@ -6,13 +6,56 @@ import argparse
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 from mrmg import interruption
 from mrmg.cli import terminal
 from mrmg.errors import ExitCode
+from mrmg.runs import argument_values as values
 
 LOCAL_HOST = "127.0.0.1"
 PORT = 8080
+
+
+def add_show(verbs: Any) -> None:
+    """Add the verbs."""
+    pages = verbs.add_parser("compare", help="set runs side by side", command=compare)
+    pages.add_argument(
+        "runs", type=Path, nargs="+", metavar="RUN", help="run folders, two or more"
+    )
+    pages.add_out("PAGE.html", "page with table and plots; default compare.html")
+    pages.add_trust()
+    pages.add_json("the table alone")
+
+    paper = verbs.add_parser("figure", help="draw a figure for a paper", command=figure)
+    paper.add_run()
+    paper.add_argument(
+        "--kind",
+        choices=("map", "energy", "timeline"),
+        default="map",
+        help="default map",
+    )
+    paper.add_out("FIGURE.pdf", "PDF, SVG or PNG by its suffix; default KIND.pdf")
+    paper.add_trust()
+
+    viewer = verbs.add_parser(
+        "view", help="watch a run or a scene in three dimensions", command=view
+    )
+    viewer.add_argument(
+        "source", metavar="RUN|SCENE", help="run folder, scene file or shipped scene"
+    )
+    viewer.add_argument(
+        "--in",
+        dest="place",
+        choices=("window", "browser"),
+        help="default: window where there is a screen, else browser",
+    )
+    viewer.add_argument(
+        "--host", default=LOCAL_HOST, help="address the page is served on"
+    )
+    about = "port of the page; default 8080"
+    viewer.add_value("--port", None, about, values.port, PORT)
+    viewer.add_trust()
 
 
 def compare(options: argparse.Namespace) -> int:
@@ -21,11 +64,12 @@ def compare(options: argparse.Namespace) -> int:
     from mrmg.report.compare_page import write_comparison
 
     comparison = compare_runs(options.runs, trust_code=options.trust_code)
-    write_comparison(comparison, options.out)
+    page = options.out or Path("compare.html")
+    write_comparison(comparison, page)
     if options.json:
         terminal.print_json(comparison.to_json())
     else:
-        print(f"{comparison.to_text()}\n\n{options.out}")
+        print(f"{comparison.to_text()}\n\n{page}")
     return ExitCode.OK
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, NoReturn
 
 from mrmg import shipped
@@ -17,11 +18,16 @@ class _Verbs(argparse._SubParsersAction):  # type: ignore[type-arg]
     """The verbs of a parser, each of which shows its help text on its own page, too."""
 
     def add_parser(self, name: str, **details: Any) -> Any:
-        """Add a verb; see argparse."""
-        summary = details.get("help", "")
+        """Add a verb; see argparse. `command` is what it calls with its options."""
+        summary, command = details.get("help", ""), details.pop("command", None)
         verb = super().add_parser(name, **{"description": summary, **details})
         verb.summary = summary
+        verb.set_defaults(command=command)
         return verb
+
+    def add_group(self, name: str, help: str) -> Any:
+        """Add a verb that has verbs of its own; return what they are added to."""
+        return self.add_parser(name, help=help).add_verbs()
 
 
 class Parser(argparse.ArgumentParser):
@@ -33,6 +39,51 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, *args: Any, **details: Any) -> None:
         super().__init__(*args, **details)
         self.register("action", "parsers", _Verbs)
+
+    def add_verbs(self) -> Any:
+        """Return what the parser's verbs are added to."""
+        return self.add_subparsers(title="commands", metavar="COMMAND", required=True)
+
+    def add_value(
+        self,
+        flag: str,
+        metavar: str | None,
+        help: str,
+        read: Callable[[str], Any] = str,
+        default: Any = None,
+    ) -> None:
+        """Add an option with a value that `read` reads."""
+        self.add_argument(
+            flag, type=reader(read), metavar=metavar, help=help, default=default
+        )
+
+    def add_flag(self, flag: str, help: str) -> None:
+        """Add an option without a value."""
+        self.add_argument(flag, action="store_true", help=help)
+
+    def add_run(self) -> None:
+        """Add the run folder that a verb is about."""
+        self.add_argument("run", type=Path, metavar="RUN", help="run folder")
+
+    def add_out(self, metavar: str, help: str, *, short: bool = True) -> None:
+        """Add the option that names what a verb writes."""
+        flags = ("-o", "--out") if short else ("--out",)
+        self.add_argument(*flags, type=Path, metavar=metavar, help=help)
+
+    def add_overwrite(self, what: str) -> None:
+        """Add the option that lets a verb replace finished results, named by `what`."""
+        self.add_flag("--overwrite", f"replace {what} that is there")
+
+    def add_trust(self) -> None:
+        """Add the option of every verb that loads a scene, a run or a robot model."""
+        self.add_flag(
+            "--trust-code",
+            "let robot models run Python code that they bring (motion_model: FILE.py)",
+        )
+
+    def add_json(self, what: str) -> None:
+        """Add the option that prints `what` in place of words for people."""
+        self.add_flag("--json", f"print {what}")
 
     def read(self, words: Sequence[str]) -> argparse.Namespace:
         """Return the options that `words` give; a mistake ends the program."""
@@ -103,6 +154,18 @@ class Parser(argparse.ArgumentParser):
             verb = "run" if "run" in verbs else "check"
             return f" (did you mean '{verb} {word}'?)"
         return nearest(word, verbs)
+
+
+def reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
+    """Return a reader whose message argparse shows."""
+
+    def read_text(text: str) -> Any:
+        try:
+            return read(text)
+        except ValueError as error:
+            raise argparse.ArgumentTypeError(str(error)) from error
+
+    return read_text
 
 
 def _is_number(word: str) -> bool:
