@@ -23,6 +23,9 @@ balance, what was measured is worth nothing, and that has failed, too
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import fields
+
 import numpy as np
 
 from mrmg.energy.audit_record import (
@@ -76,15 +79,6 @@ def audit(
         [visit for curve in measured for visit in curve.visits],
         believed_rolling(plan, log),
     )
-    measured_ledger = EnergyLedger(
-        tuple(
-            entry
-            for curve in measured
-            for entry in leg_entries(
-                curve.robot, curve.drawn_J, MEASURED_PARTS, curve.visits
-            )
-        )
-    )
     goals_visited = _goals_visited(scene, log)
     robots = tuple(
         _robot_audit(
@@ -102,28 +96,39 @@ def audit(
         **_energy_failures(scene, plan, log, robots, energy_tolerance_pct),
     }
     reasons = tuple(reason for found in failures.values() for reason in found)
-    visits = [
-        SimulatedVisit(
-            robot=visit.robot,
-            target=visit.target,
-            kind=visit.kind,
-            time_s=visit.time_s,
-            energy_J=visit.energy_J,
-        )
-        for curve in measured
-        for visit in curve.visits
-    ]
     return EnergyAudit(
         mission_ok=not reasons,
         causes=tuple(cause for cause, found in failures.items() if found),
         reasons=reasons,
         robots=robots,
-        visits=tuple(sorted(visits, key=lambda visit: visit.time_s)),
+        visits=_simulated_visits(measured),
         goals_visited=goals_visited,
         planned=plan.ledger,
         metered=metered_ledger,
-        measured=measured_ledger,
+        measured=_measured_ledger(measured),
     )
+
+
+def _measured_ledger(curves: Iterable[MeasuredCurve]) -> EnergyLedger:
+    return EnergyLedger(
+        tuple(
+            entry
+            for curve in curves
+            for entry in leg_entries(
+                curve.robot, curve.drawn_J, MEASURED_PARTS, curve.visits
+            )
+        )
+    )
+
+
+def _simulated_visits(curves: Iterable[MeasuredCurve]) -> tuple[SimulatedVisit, ...]:
+    names = [item.name for item in fields(SimulatedVisit)]
+    visits = [
+        SimulatedVisit(**{name: getattr(visit, name) for name in names})
+        for curve in curves
+        for visit in curve.visits
+    ]
+    return tuple(sorted(visits, key=lambda visit: visit.time_s))
 
 
 def _energy_failures(

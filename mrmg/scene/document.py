@@ -21,7 +21,6 @@ from mrmg.scene.elevation import Elevation
 from mrmg.scene.margins import STATES_NONE
 from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
 from mrmg.scene.region import HEADING_TOLERANCE_RAD
-from mrmg.scene.robot_model import RobotModel
 
 if TYPE_CHECKING:
     from mrmg.scene.region import Region
@@ -267,6 +266,8 @@ def _battery(battery: Battery) -> _Entry:
 
 def _model(robot: Robot) -> _Entry:
     """Return what identifies a robot's model: its origin, and what differs from it."""
+    from mrmg.scene.loading.models import model_parameters
+
     model, origin = robot.model, robot.model.origin
     if origin is None or (model.mjcf, model.motion_model) != (
         origin.model.mjcf,
@@ -288,45 +289,6 @@ def _model(robot: Robot) -> _Entry:
     if changes:
         entry["model"] = {"like": origin.reference, **changes}
     return entry
-
-
-def model_parameters(model: RobotModel) -> _Entry:
-    """Return a model's values under the keys of `robot.yaml`, without its files."""
-    limits = model.limits
-    return {
-        "footprint": _points(model.footprint_m),
-        "height": float(model.height_m),
-        "wheelbase": float(model.wheelbase_m),
-        "track": float(model.track_m),
-        "mass": float(model.mass_kg),
-        "center_of_mass": float(model.center_of_mass_m),
-        "wheel": {
-            "radius": float(model.wheel_radius_m),
-            "inertia": float(model.wheel_inertia_kg_m2),
-            "count": int(model.wheel_count),
-        },
-        "limits": {
-            "v_min": float(limits.v_min_m_s),
-            "v_max": float(limits.v_max_m_s),
-            "w_max": float(limits.w_max),
-            "u1_max": float(limits.u1_max_m_s2),
-            "u2_max": float(limits.u2_max),
-        },
-        "planning_share": float(model.planning_share),
-        "rolling_coefficient": float(model.rolling_coefficient),
-        "turning_coefficient": float(model.turning_coefficient),
-        "friction_coefficient": float(model.friction_coefficient),
-        "drive_efficiency": float(model.drive_efficiency),
-        "regeneration_efficiency": float(model.regeneration_efficiency),
-        "idle_power": float(model.idle_power_W),
-        "device_power": float(model.device_power_W),
-        "energy": model.energy_preset,
-        "battery_capacity": float(model.battery_capacity_J),
-        "skid_track": model.skid_track_m,
-        "motor": model.motor and model.motor.entry,
-        "tracking_error": model.tracking_error and model.tracking_error.entry,
-        "margins": model.margins.entry,
-    }
 
 
 def _differences(before: Mapping[str, Any], after: Mapping[str, Any]) -> _Entry:

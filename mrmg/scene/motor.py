@@ -27,18 +27,6 @@ class Motor:
     gear_efficiency: float
     no_load_current_A: float
 
-    @property
-    def entry(self) -> dict[str, float]:
-        """The motor by its keys in `robot.yaml`."""
-        return {
-            "torque_constant": float(self.torque_constant_Nm_A),
-            "back_emf_constant": float(self.back_emf_constant_V_s),
-            "resistance": float(self.resistance_Ohm),
-            "gear_ratio": float(self.gear_ratio),
-            "gear_efficiency": float(self.gear_efficiency),
-            "no_load_current": float(self.no_load_current_A),
-        }
-
     def volts_per_m_s(self, wheel_radius_m: float) -> float:
         """Return the back-EMF per speed of the wheels' rims [V s/m]."""
         return self.back_emf_constant_V_s * self.gear_ratio / wheel_radius_m

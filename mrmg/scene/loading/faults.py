@@ -113,9 +113,14 @@ def shown(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
+def keys_of(model: type[BaseModel]) -> dict[str, FieldInfo]:
+    """Return the fields of a model by their keys in files."""
+    return {field.alias or name: field for name, field in model.model_fields.items()}
+
+
 def _known_keys(model: type[BaseModel], loc: tuple[str | int, ...]) -> list[str]:
     inner, _ = _walk(model, loc)
-    return [] if inner is None else list(inner.model_fields)
+    return [] if inner is None else list(keys_of(inner))
 
 
 def _description(model: type[BaseModel], loc: tuple[str | int, ...]) -> str | None:
@@ -133,9 +138,9 @@ def _walk(
         if isinstance(part, int):
             field = None
             continue
-        if inner is None or part not in inner.model_fields:
+        if inner is None or part not in keys_of(inner):
             return None, None
-        field = inner.model_fields[part]
+        field = keys_of(inner)[part]
         inner = _model_in(field.annotation)
     return inner, field
 

@@ -10,7 +10,7 @@ Units: m, kg, s, rad, J.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -25,7 +25,13 @@ from mrmg.scene.loading.consistency import mjcf_faults
 from mrmg.scene.loading.faults import faults_of
 from mrmg.scene.loading.margins_schema import MarginsEntry, TrackingErrorEntry
 from mrmg.scene.loading.places import lines_of
-from mrmg.scene.loading.shape_schema import NotNegative, Positive, Ring, Strict
+from mrmg.scene.loading.shape_schema import (
+    NamedWithUnits,
+    NotNegative,
+    Positive,
+    Ring,
+    Strict,
+)
 from mrmg.scene.loading.trust import file_within, refusal_of_code
 from mrmg.scene.loading.yaml_text import parse_yaml, read_text
 from mrmg.scene.motor import Motor
@@ -37,47 +43,47 @@ SHIPPED_MOTIONS = ("car", "unicycle")
 Share = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
 
 
-class WheelEntry(Strict):
+class WheelEntry(NamedWithUnits):
     """One wheel."""
 
-    radius: Positive = Field(description="rolling radius in m")
-    inertia: NotNegative = Field(
+    wheel_radius_m: Positive = Field(description="rolling radius in m")
+    wheel_inertia_kg_m2: NotNegative = Field(
         description="spin inertia of one wheel and its share of the drive in kg m^2"
     )
-    count: Annotated[int, Field(ge=1)] = Field(description="number of wheels")
+    wheel_count: Annotated[int, Field(ge=1)] = Field(description="number of wheels")
     mass: Positive = Field(description="mass of one wheel in kg")
 
 
-class LimitsEntry(Strict):
+class LimitsEntry(NamedWithUnits):
     """Bounds of state and control."""
 
-    v_min: Annotated[float, Field(le=0, allow_inf_nan=False)] = Field(
+    v_min_m_s: Annotated[float, Field(le=0, allow_inf_nan=False)] = Field(
         description="fastest reverse speed in m/s, negative or 0"
     )
-    v_max: Positive = Field(description="fastest forward speed in m/s")
+    v_max_m_s: Positive = Field(description="fastest forward speed in m/s")
     w_max: Positive = Field(
         description="steering angle in rad (car), or yaw rate in rad/s (unicycle)"
     )
-    u1_max: Positive = Field(description="acceleration in m/s^2")
+    u1_max_m_s2: Positive = Field(description="acceleration in m/s^2")
     u2_max: Positive = Field(
         description="steering rate in rad/s (car), or yaw acceleration in rad/s^2"
     )
 
 
-class MotorEntry(Strict):
+class MotorEntry(NamedWithUnits):
     """The motors of a side as one, and their gear."""
 
-    torque_constant: Positive = Field(description="torque per current in N m/A")
-    back_emf_constant: Positive = Field(description="voltage per speed in V s/rad")
-    resistance: Positive = Field(description="of the winding in Ohm")
+    torque_constant_Nm_A: Positive = Field(description="torque per current in N m/A")
+    back_emf_constant_V_s: Positive = Field(description="voltage per speed in V s/rad")
+    resistance_Ohm: Positive = Field(description="of the winding in Ohm")
     gear_ratio: Positive = Field(description="turns of the motor per turn of the wheel")
     gear_efficiency: Share = Field(description="from motor to wheel, in (0, 1]")
-    no_load_current: NotNegative = Field(
+    no_load_current_A: NotNegative = Field(
         default=0.0, description="current in A that turns motor and gear alone"
     )
 
 
-class ModelDocument(Strict):
+class ModelDocument(NamedWithUnits):
     """The content of `robot.yaml`."""
 
     format: Literal[1] = Field(description="format: 1")
@@ -88,15 +94,15 @@ class ModelDocument(Strict):
         description="convex outline, at least 3 corners [x, y] in m; x forward, y "
         "left, from the middle of the rear axle"
     )
-    height: Positive = Field(description="height of the body in m")
-    wheelbase: Positive = Field(description="distance of the axles in m")
-    track: Positive = Field(description="distance of the wheels of an axle in m")
-    skid_track: Positive | None = Field(
+    height_m: Positive = Field(description="height of the body in m")
+    wheelbase_m: Positive = Field(description="distance of the axles in m")
+    track_m: Positive = Field(description="distance of the wheels of an axle in m")
+    skid_track_m: Positive | None = Field(
         default=None,
         description="effective track in m where wheels skid in turns; for logs",
     )
-    mass: Positive = Field(description="mass of the whole robot in kg")
-    center_of_mass: Annotated[float, Field(allow_inf_nan=False)] = Field(
+    mass_kg: Positive = Field(description="mass of the whole robot in kg")
+    center_of_mass_m: Annotated[float, Field(allow_inf_nan=False)] = Field(
         default=0.0, description="centre of mass ahead of the rear axle in m"
     )
     wheel: WheelEntry = Field(description="its wheels")
@@ -116,14 +122,16 @@ class ModelDocument(Strict):
     regeneration_efficiency: Annotated[
         float, Field(ge=0, le=1, allow_inf_nan=False)
     ] = Field(description="from wheel to battery when braking, in [0, 1]")
-    idle_power: NotNegative = Field(description="power of the electronics in W")
-    device_power: NotNegative = Field(
+    idle_power_W: NotNegative = Field(description="power of the electronics in W")
+    device_power_W: NotNegative = Field(
         default=0.0, description="power of what it carries in W"
     )
-    energy: EnergyPreset = Field(
-        default="full", description="which parts of the energy model count"
+    energy_preset: EnergyPreset = Field(
+        alias="energy",
+        default="full",
+        description="which parts of the energy model count",
     )
-    battery_capacity: Positive = Field(
+    battery_capacity_J: Positive = Field(
         description="capacity of the standard battery in J"
     )
     margins: MarginsEntry | None = Field(
@@ -235,7 +243,7 @@ def _parameters(entry: ModelDocument) -> dict[str, Any]:
     # Keys left at their defaults stay out: files without them keep their digests. How
     # well a model was tracked is no part of what it is.
     return entry.model_dump(
-        mode="json", exclude_defaults=True, exclude={"tracking_error"}
+        mode="json", by_alias=True, exclude_defaults=True, exclude={"tracking_error"}
     )
 
 
@@ -246,7 +254,7 @@ def _differences(model: RobotModel, mjcf: Path, entry: ModelDocument) -> list[Fa
     """
     if shipped.is_unchanged_model(_parameters(entry), mjcf):
         return []
-    stated = "center_of_mass" in entry.model_fields_set
+    stated = "center_of_mass_m" in entry.model_fields_set
     return mjcf_faults(model, mjcf, center_stated=stated)
 
 
@@ -292,53 +300,48 @@ def _model(folder: Path, entry: ModelDocument) -> RobotModel:
     outline = shapely.orient_polygons(shapely.Polygon(entry.footprint))
     footprint = np.array(outline.exterior.coords[:-1])
     footprint.setflags(write=False)
-    return RobotModel(
-        name=folder.name,
-        motion_model=(
-            entry.motion_model
-            if entry.motion_model in SHIPPED_MOTIONS
-            else str((folder / entry.motion_model).resolve())
-        ),
-        footprint_m=footprint,
-        height_m=entry.height,
-        wheelbase_m=entry.wheelbase,
-        track_m=entry.track,
-        limits=Limits(
-            v_min_m_s=entry.limits.v_min,
-            v_max_m_s=entry.limits.v_max,
-            w_max=entry.limits.w_max,
-            u1_max_m_s2=entry.limits.u1_max,
-            u2_max=entry.limits.u2_max,
-        ),
-        planning_share=entry.planning_share,
-        mass_kg=entry.mass,
-        center_of_mass_m=entry.center_of_mass,
-        wheel_radius_m=entry.wheel.radius,
-        wheel_inertia_kg_m2=entry.wheel.inertia,
-        wheel_count=entry.wheel.count,
-        rolling_coefficient=entry.rolling_coefficient,
-        turning_coefficient=entry.turning_coefficient,
-        friction_coefficient=entry.friction_coefficient,
-        drive_efficiency=entry.drive_efficiency,
-        regeneration_efficiency=entry.regeneration_efficiency,
-        idle_power_W=entry.idle_power,
-        device_power_W=entry.device_power,
-        energy_preset=entry.energy,
-        battery_capacity_J=entry.battery_capacity,
-        mjcf=None if entry.mjcf is None else folder / entry.mjcf,
-        skid_track_m=entry.skid_track,
-        motor=None if entry.motor is None else _motor(entry.motor),
-        margins=(entry.margins or MarginsEntry()).margins,
-        tracking_error=entry.tracking_error.value if entry.tracking_error else None,
-    )
+    motion = entry.motion_model
+    if motion not in SHIPPED_MOTIONS:
+        motion = str((folder / motion).resolve())
+    stated = {
+        **_values_of(RobotModel, entry),
+        **_values_of(RobotModel, entry.wheel),
+        "limits": Limits(**_values_of(Limits, entry.limits)),
+        "motor": entry.motor and Motor(**_values_of(Motor, entry.motor)),
+        "margins": (entry.margins or MarginsEntry()).margins,
+        "tracking_error": entry.tracking_error and entry.tracking_error.value,
+        "motion_model": motion,
+        "mjcf": entry.mjcf and folder / entry.mjcf,
+    }
+    return RobotModel(name=folder.name, footprint_m=footprint, **stated)
 
 
-def _motor(entry: MotorEntry) -> Motor:
-    return Motor(
-        torque_constant_Nm_A=entry.torque_constant,
-        back_emf_constant_V_s=entry.back_emf_constant,
-        resistance_Ohm=entry.resistance,
-        gear_ratio=entry.gear_ratio,
-        gear_efficiency=entry.gear_efficiency,
-        no_load_current_A=entry.no_load_current,
-    )
+def _values_of(kind: type[Any], entry: Strict) -> dict[str, Any]:
+    """Return the values of an entry that a dataclass has, too, by their names there."""
+    known = type(entry).model_fields
+    names = [item.name for item in fields(kind) if item.name in known]
+    return {name: getattr(entry, name) for name in names}
+
+
+def model_parameters(model: RobotModel) -> dict[str, Any]:
+    """Return a model's values under the keys of `robot.yaml`, without its files."""
+    own = _keys_of(ModelDocument, model)
+    return {
+        **{key: own[key] for key in own if key not in ("motion_model", "mjcf")},
+        "footprint": model.footprint_m.tolist(),
+        "wheel": _keys_of(WheelEntry, model),
+        "limits": _keys_of(LimitsEntry, model.limits),
+        "motor": model.motor and _keys_of(MotorEntry, model.motor),
+        "tracking_error": model.tracking_error and model.tracking_error.entry,
+        "margins": model.margins.entry,
+    }
+
+
+def _keys_of(kind: type[Strict], value: object) -> dict[str, Any]:
+    """Return what a file would state of a value, by the keys of an entry."""
+    return {
+        field.alias or name: item.item() if isinstance(item, np.generic) else item
+        for name, field in kind.model_fields.items()
+        for item in [getattr(value, name, None)]
+        if hasattr(value, name)
+    }

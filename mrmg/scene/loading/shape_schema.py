@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -24,6 +25,20 @@ class Strict(BaseModel):
     """No key that is not named, no text for numbers."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+
+_UNIT = re.compile(r"_(m_s2|m_s|m|kg_m2|kg|W|J|Ohm|Nm_A|V_s|A)$")
+
+
+class NamedWithUnits(Strict):
+    """Entries whose fields have their units in their names, which their keys have not.
+
+    So entries and the values made of them share the names.
+    """
+
+    model_config = ConfigDict(
+        alias_generator=lambda name: _UNIT.sub("", name).removeprefix("wheel_")
+    )
 
 
 def exactly_one(*keys: str) -> ConfigDict:

@@ -19,6 +19,7 @@ from mrmg.cli import main
 from mrmg.errors import SceneError
 from mrmg.runs import summary_model
 from mrmg.scene.loading import robot_schema, scene_from_document, scene_schema
+from mrmg.scene.loading.faults import keys_of
 from mrmg.scene.loading.models import ModelDocument
 from mrmg.scene.loading.schema import SceneDocument
 from mrmg.scene.loading.yaml_text import read_yaml
@@ -89,7 +90,7 @@ def test_an_editor_can_explain_every_key(schema: dict[str, Any]) -> None:
 def test_an_editor_can_complete_keys_and_words() -> None:
     schema = scene_schema()
     assert set(schema["properties"]) == set(SceneDocument.model_fields)
-    assert set(robot_schema()["properties"]) == set(ModelDocument.model_fields)
+    assert set(robot_schema()["properties"]) == set(keys_of(ModelDocument))
     robot = schema["$defs"]["RobotEntry"]["properties"]
     assert robot["model"]["anyOf"][0]["examples"] == shipped.model_names()
     assert robot["energy"]["enum"] == ["full", "paper"]
