@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from mrmg.plans import Plan, Trajectory
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Robot, Scene
 from mrmg.simulation.log import ExecutionLog
-from mrmg.viz import print_style
 
 DT_S = 0.1
 
@@ -206,11 +204,11 @@ def _driven(
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     """The figures that were written."""
     figures: list[Figure] = []
-    write = print_style.scene_drawing.write_figure
+    save = Figure.savefig
 
-    def kept(figure: Figure, path: Path) -> None:
-        write(figure, path)
+    def kept(figure: Figure, *given: Any, **details: Any) -> None:
+        save(figure, *given, **details)
         figures.append(figure)
 
-    monkeypatch.setattr(print_style.scene_drawing, "write_figure", kept)
+    monkeypatch.setattr(Figure, "savefig", kept)
     return figures

@@ -63,7 +63,8 @@ def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
     run = read_file(run_folder, "run.json", "mrmg run") if has_run else {}
     scene = load_scene(run_folder / "scene.yaml", trust_code=trust_code)
     found: dict[str, Any] = dict.fromkeys(("plan", "verdict", "log", "audit"))
-    if planning["status"] == PlanStatus.SOLVED.value:
+    solved = planning["status"] == PlanStatus.SOLVED.value
+    if solved and (run_folder / "plan.json").exists():
         found["plan"] = plan_in_force(run_folder)
         require_same_mission(scene, found["plan"])
         found |= outcomes_in(run_folder, scene)

@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from mrmg.studies.calibration import Calibration, Estimate
-from mrmg.viz import scene_drawing, style
+from mrmg.viz import style
+from mrmg.viz.figures import new_figure, tidy, write_figure
 from mrmg.viz.print_style import FOR_PRINT
 
 _LOOKS = {
@@ -32,13 +31,7 @@ def draw_calibration(calibration: Calibration, path: Path) -> None:
         calibration: what to draw.
         path: picture to write (PNG, SVG or PDF by its suffix).
     """
-    figure = Figure(
-        figsize=_SIZE_INCHES,
-        dpi=scene_drawing.DPI,
-        layout="constrained",
-        facecolor="white",
-    )
-    FigureCanvasAgg(figure)
+    figure = new_figure(*_SIZE_INCHES)
     left, right = figure.subplots(1, 2, width_ratios=(1.0, 1.25))
     _draw_agreement(left, calibration)
     _draw_residuals(right, calibration)
@@ -50,7 +43,7 @@ def draw_calibration(calibration: Calibration, path: Path) -> None:
         frameon=False,
     )
     with rc_context(FOR_PRINT):
-        scene_drawing.write_figure(figure, path)
+        write_figure(figure, path)
 
 
 def _draw_agreement(axes: Axes, calibration: Calibration) -> None:
@@ -71,7 +64,7 @@ def _draw_agreement(axes: Axes, calibration: Calibration) -> None:
         )
     axes.set_xlabel("fitted mean power of a leg [W]")
     axes.set_ylabel("measured mean power of a leg [W]")
-    _tidy(axes)
+    tidy(axes)
 
 
 def _draw_residuals(axes: Axes, calibration: Calibration) -> None:
@@ -87,7 +80,7 @@ def _draw_residuals(axes: Axes, calibration: Calibration) -> None:
     axes.set_title(f"band: root mean square, {rms:.3g} W", loc="left", fontsize=9)
     axes.set_xlabel("leg, in order of driving")
     axes.set_ylabel("measured less fitted [W]")
-    _tidy(axes)
+    tidy(axes)
 
 
 def _rows_by_kind(calibration: Calibration) -> dict[str, np.ndarray]:
@@ -106,10 +99,3 @@ def _line(name: str, item: Estimate) -> str:
     was = "not in the model" if item.was is None else f"model: {item.was:.6g}"
     quantity = name.removesuffix("_kg_m2").removesuffix("_kg").replace("_", " ")
     return f"{quantity} {item.rounded()} ± {item.half_width:.1g}{unit} ({was})"
-
-
-def _tidy(axes: Axes) -> None:
-    axes.grid(color="#E4E6EA", linewidth=0.7)
-    axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)

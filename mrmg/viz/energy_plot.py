@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from mrmg.energy.battery_curves import (
     BatteryCurve,
@@ -19,6 +17,7 @@ from mrmg.plans import Plan, Visit
 from mrmg.scene.types import Robot, Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
 from mrmg.viz import scene_drawing, style
+from mrmg.viz.figures import add_legend_above, new_figure, tidy, write_figure
 from mrmg.viz.timeline_rows import HIDDEN, named_visits
 
 _PANEL_INCHES = (9.5, 2.5)
@@ -50,28 +49,14 @@ def draw_energy(
     driven = measured_curves(scene, plan, log) if log else ()
     simulated = {curve.robot: curve for curve in driven}
     width_in, panel_in = _PANEL_INCHES
-    figure = Figure(
-        figsize=(width_in, panel_in * len(planned) + 0.7),
-        dpi=scene_drawing.DPI,
-        layout="constrained",
-        facecolor="white",
-    )
-    FigureCanvasAgg(figure)
+    figure = new_figure(width_in, panel_in * len(planned) + 0.7)
     panels = figure.subplots(len(planned), 1, sharex=True, squeeze=False)[:, 0]
     for axes, robot_id in zip(panels, planned, strict=True):
         robot = scene.robot(robot_id)
         draw_battery(axes, scene, robot, planned[robot_id], simulated.get(robot_id))
     panels[-1].set_xlabel("time [s]")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(
-        handles,
-        labels,
-        loc="outside upper right",
-        ncols=len(handles),
-        frameon=False,
-        fontsize=9.5,
-    )
-    scene_drawing.write_figure(figure, path)
+    add_legend_above(figure, panels[0].get_legend_handles_labels()[0])
+    write_figure(figure, path)
 
 
 def draw_battery(
@@ -107,10 +92,7 @@ def draw_battery(
     axes.set_ylim(low * capacity_kJ, high * capacity_kJ)
     axes.set_ylabel("battery [kJ]")
     axes.set_title(robot.id, loc="left", fontsize=11, fontweight="bold", color=color)
-    axes.grid(color="#E4E6EA", linewidth=0.7)
-    axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    tidy(axes)
     percent = axes.twinx()
     percent.set_ylim(100.0 * low, 100.0 * high)
     percent.set_yticks([0, 25, 50, 75, 100])

@@ -6,14 +6,13 @@ import io
 
 import numpy as np
 from matplotlib import rc_context
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from mrmg.studies.calibration.log_calibration import LogCalibration
 from mrmg.studies.calibration.log_fit import Pieces
 from mrmg.studies.calibration.robot_logs import LoggedRun
 from mrmg.viz import style
+from mrmg.viz.figures import new_figure, tidy
 from mrmg.viz.print_style import FOR_PRINT
 
 _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -23,7 +22,7 @@ _ROWS_PER_INCH = 5.5
 def runs_svg(calibration: LogCalibration) -> str:
     """Return all runs side by side as SVG: measured energies within their intervals."""
     runs = calibration.runs
-    figure = _figure(9.5, 1.2 + len(runs) / _ROWS_PER_INCH)
+    figure = new_figure(9.5, 1.2 + len(runs) / _ROWS_PER_INCH, dpi=None)
     axes = figure.subplots()
     colors = _colors(calibration)
     for row, item in enumerate(runs):
@@ -44,13 +43,13 @@ def runs_svg(calibration: LogCalibration) -> str:
     axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     axes.minorticks_off()
     axes.set_xlabel("predicted over measured energy of a run, and its 90 % interval")
-    _tidy(axes)
+    tidy(axes)
     return _svg(figure)
 
 
 def fit_svg(calibration: LogCalibration) -> str:
     """Return power measured against fitted, and residuals by speed and yaw rate."""
-    figure = _figure(9.5, 3.6)
+    figure = new_figure(9.5, 3.6, dpi=None)
     panels = figure.subplots(1, 3)
     fit, colors = calibration.fits[0], _colors(calibration)
     labelled: set[str] = set()
@@ -74,7 +73,7 @@ def fit_svg(calibration: LogCalibration) -> str:
     panels[1].set(xlabel="speed [m/s]", ylabel="measured less fitted [W]")
     panels[2].set(xlabel="yaw rate [rad/s]", ylabel="measured less fitted [W]")
     for axes in panels:
-        _tidy(axes)
+        tidy(axes)
     for axes in panels[1:]:
         axes.axhline(0.0, color=style.MUTED, linewidth=0.8)
     legend = figure.legend(loc="outside lower center", ncols=6, frameon=False)
@@ -99,23 +98,8 @@ def _colors(calibration: LogCalibration) -> dict[str, str]:
     }
 
 
-def _figure(width_in: float, height_in: float) -> Figure:
-    figure = Figure(
-        figsize=(width_in, height_in), layout="constrained", facecolor="white"
-    )
-    FigureCanvasAgg(figure)
-    return figure
-
-
 def _svg(figure: Figure) -> str:
     text = io.StringIO()
     with rc_context({**FOR_PRINT, "svg.hashsalt": "mrmg"}):
         figure.savefig(text, format="svg", metadata={"Date": None})
     return text.getvalue()
-
-
-def _tidy(axes: Axes) -> None:
-    axes.grid(color="#E4E6EA", linewidth=0.7)
-    axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)

@@ -17,6 +17,7 @@ from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
 from mrmg.viz import scene_drawing, style
 from mrmg.viz.activities import breakdowns, lengths_along, standing_of, visit_ranks
+from mrmg.viz.figures import write_figure
 from mrmg.viz.map_labels import map_labels
 from mrmg.viz.map_shapes import end_poses, end_ring
 
@@ -61,7 +62,7 @@ def draw_overview(
     figure, axes = scene_drawing.new_map_figure(scene)
     axes.set_title(_title(scene, plan), loc="left", fontsize=12, color=style.INK)
     draw_mission(axes, scene, plan, log)
-    scene_drawing.write_figure(figure, path)
+    write_figure(figure, path)
 
 
 def draw_mission(

@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib import rc_context
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from mrmg.errors import UsageError
-from mrmg.viz import scene_drawing
+from mrmg.viz.figures import new_figure, write_figure
 
 COLUMN_IN, PAGE_IN = 3.45, 7.16
 """Widths of one and of two columns of an IEEE paper [inch]."""
@@ -64,7 +63,6 @@ def print_figure(size_in: tuple[float, float], path: Path) -> Iterator[Figure]:
     """
     require_format(path)
     with rc_context({**FOR_PRINT, **_SMALL}):
-        figure = Figure(figsize=size_in, layout="constrained", facecolor="white")
-        FigureCanvasAgg(figure)
+        figure = new_figure(*size_in, dpi=None)
         yield figure
-        scene_drawing.write_figure(figure, path)
+        write_figure(figure, path)

@@ -8,7 +8,6 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from mrmg.scene.driven_parts import why_not_driven
@@ -17,8 +16,9 @@ from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Battery, Robot, Scene
 from mrmg.simulation.world_model import build_world
 from mrmg.viz import style
+from mrmg.viz.figures import new_figure, write_figure
 from mrmg.viz.print_style import require_format
-from mrmg.viz.scene_drawing import DPI, HALO, write_figure
+from mrmg.viz.scene_drawing import HALO
 from mrmg.viz.world_view import open_view, top_camera
 
 _PIXELS = (1100, 800)
@@ -41,8 +41,7 @@ def draw_robot(model: RobotModel, path: Path) -> None:
         MachineError: if the robot has an MJCF and this machine cannot draw it.
     """
     require_format(path)
-    figure = Figure(figsize=(11.0, 6.6), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(11.0, 6.6)
     figure.suptitle(model.name, fontsize=15, fontweight="bold")
     shown, table = figure.subplots(2, 1, height_ratios=(4.2, 2.0))
     seen, above = _halves(figure, shown)

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, PathPatch
@@ -17,25 +16,18 @@ from matplotlib.patheffects import withStroke
 from shapely import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
-from mrmg import storage
 from mrmg.scene.region import Region
 from mrmg.scene.types import Goal, Robot, Scene, Station
 from mrmg.viz import style
 from mrmg.viz.contours import draw_contours
+from mrmg.viz.figures import new_figure, write_figure
 from mrmg.viz.map_labels import BOLD, MapLabel, map_labels
 from mrmg.viz.map_shapes import wanted_headings
 
-DPI = 110
 _MAP_INCHES = 8.6
 _LEGEND_INCHES = 2.6
 LETTER_POINTS = 10.0
 """Size of the names on maps: one em."""
-_TIMELESS: dict[str, dict[str, Any]] = {
-    "png": {"Software": None},
-    "pdf": {"CreationDate": None},
-    "svg": {"Date": None},
-}
-"""Metadata by format, such that equal figures give equal files."""
 HALO = [withStroke(linewidth=2.5, foreground="white")]
 """What keeps text readable on anything."""
 _MARKERS = {"goal": "o", "station": "s"}
@@ -60,13 +52,7 @@ def new_map_figure(scene: Scene) -> tuple[Figure, Axes]:
     ratio = (y_max - y_min) / (x_max - x_min)
     width_in = _MAP_INCHES / max(1.0, ratio)
     height_in = min(max(width_in * ratio, 2.4), _MAP_INCHES)
-    figure = Figure(
-        figsize=(width_in + _LEGEND_INCHES + 0.9, height_in + 0.9),
-        dpi=DPI,
-        layout="constrained",
-        facecolor="white",
-    )
-    FigureCanvasAgg(figure)
+    figure = new_figure(width_in + _LEGEND_INCHES + 0.9, height_in + 0.9)
     axes = figure.add_subplot()
     axes.set_aspect("equal")
     margin = 0.01 * max(x_max - x_min, y_max - y_min)
@@ -78,13 +64,6 @@ def new_map_figure(scene: Scene) -> tuple[Figure, Axes]:
     for spine in axes.spines.values():
         spine.set_visible(False)
     return figure, axes
-
-
-def write_figure(figure: Figure, path: Path) -> None:
-    """Write a figure to `path` atomically, in the format of its suffix."""
-    form = path.suffix.removeprefix(".").lower() or "png"
-    with storage.atomic_path(path) as temporary:
-        figure.savefig(temporary, format=form, metadata=_TIMELESS.get(form))
 
 
 def draw_scene(scene: Scene, path: Path) -> None:

@@ -7,16 +7,15 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
-from mrmg.viz import scene_drawing, style
+from mrmg.viz import style
 from mrmg.viz.activities import BROKEN, CHARGING, DRIVING, WAITING
+from mrmg.viz.figures import add_legend_above, new_figure, write_figure
 from mrmg.viz.timeline_rows import HIDDEN, TimelineRow, timeline_rows
 
 _WIDTH_INCHES, _BAR_INCHES, _LINE_INCHES = 9.5, 0.24, 0.16
@@ -61,13 +60,7 @@ def draw_timeline(
     require_same_mission(scene, plan, log)
     rows, end_s = timeline_rows(scene, plan, log, (_NAMES_EM,))
     tops_in = np.cumsum([_row_inches(row) for row in rows])
-    figure = Figure(
-        figsize=(_WIDTH_INCHES, 1.0 + tops_in[-1]),
-        dpi=scene_drawing.DPI,
-        layout="constrained",
-        facecolor="white",
-    )
-    FigureCanvasAgg(figure)
+    figure = new_figure(_WIDTH_INCHES, 1.0 + tops_in[-1])
     axes = figure.add_subplot()
     axes.set_xlim(0.0, end_s)
     for bottom_in, row in zip(tops_in, rows, strict=True):
@@ -89,14 +82,8 @@ def draw_timeline(
         handles.append(Patch(**_BROKEN, label="broken down"))
     if log and log.events:
         handles.append(Line2D([], [], **_EVENT, label="stop or new plan"))
-    figure.legend(
-        handles=handles,
-        loc="outside upper right",
-        ncols=len(handles),
-        frameon=False,
-        fontsize=9.5,
-    )
-    scene_drawing.write_figure(figure, path)
+    add_legend_above(figure, handles)
+    write_figure(figure, path)
 
 
 def _row_inches(row: TimelineRow) -> float:

@@ -8,12 +8,13 @@ from xml.etree import ElementTree
 
 import pytest
 
+from mrmg.energy.battery_curves import shown_curves
 from mrmg.report.map import mission_map
 from mrmg.report.timeline import timeline
 from mrmg.scene.margins import NarrowPassage
 from mrmg.simulation.log import Contact
 from mrmg.simulation.supervision import Event
-from mrmg.viz.activities import activities, shown_visits
+from mrmg.viz.activities import activities
 from mrmg.viz.map_labels import KINDS, map_labels
 
 
@@ -186,7 +187,7 @@ def test_the_timeline_s_spans_are_the_activities(mission) -> None:
     assert output[1].startswith("r1 charges at s from 4.")
     assert output[-2:] == [
         f"r1 enters {visit.kind} {visit.target} at {visit.time_s:.1f} s"
-        for visit in shown_visits(scene, plan, log.driven_motions()[0])
+        for visit in shown_curves(scene, plan, log)[0].visits
     ]
     assert "stays where it is" not in page
     spans = activities(scene, plan.trajectories[1], ())

@@ -1,0 +1,57 @@
+"""What all figures drawn with matplotlib have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from mrmg import storage
+
+DPI = 110
+_TIMELESS: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "pdf": {"CreationDate": None},
+    "svg": {"Date": None},
+}
+"""Metadata by format, such that equal figures give equal files."""
+
+
+def new_figure(width_in: float, height_in: float, **details: Any) -> Figure:
+    """Return an empty white figure; `details` as of matplotlib's `Figure`."""
+    look = {"dpi": DPI, "layout": "constrained", "facecolor": "white", **details}
+    figure = Figure(figsize=(width_in, height_in), **look)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def tidy(axes: Axes) -> None:
+    """Give axes a pale grid behind their lines, and no frame above and on the right."""
+    axes.grid(color="#E4E6EA", linewidth=0.7)
+    axes.set_axisbelow(True)
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+
+
+def add_legend_above(figure: Figure, handles: Iterable[Artist]) -> None:
+    """Put a legend of one line above a figure, on the right."""
+    shown = list(handles)
+    figure.legend(
+        handles=shown,
+        loc="outside upper right",
+        ncols=len(shown),
+        frameon=False,
+        fontsize=9.5,
+    )
+
+
+def write_figure(figure: Figure, path: Path) -> None:
+    """Write a figure to `path` atomically, in the format of its suffix."""
+    form = path.suffix.removeprefix(".").lower() or "png"
+    with storage.atomic_path(path) as temporary:
+        figure.savefig(temporary, format=form, metadata=_TIMELESS.get(form))
