@@ -189,6 +189,15 @@ def array_bytes(arrays: Mapping[str, np.ndarray]) -> bytes:
     return buffer.getvalue()
 
 
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """Read the arrays of an `.npz`; refuses pickled content.
+
+    Raises:
+        ValueError: if the file is damaged.
+    """
+    return arrays_of(path.read_bytes(), path.name)
+
+
 def arrays_of(content: bytes, name: str) -> dict[str, np.ndarray]:
     """Return the arrays of an `.npz`; refuses pickled content.
 

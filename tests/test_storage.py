@@ -25,10 +25,6 @@ ARRAYS = {
 }
 
 
-def read_arrays(path: Path) -> dict[str, np.ndarray]:
-    return storage.arrays_of(path.read_bytes(), path.name)
-
-
 def test_a_writer_that_raises_leaves_nothing(tmp_path: Path) -> None:
     with (
         pytest.raises(RuntimeError, match="disk"),
@@ -71,7 +67,7 @@ def test_a_killed_writer_leaves_no_file_of_the_final_name(tmp_path: Path) -> Non
     assert process.returncode == -signal.SIGKILL
     assert not path.exists()
     storage.write_arrays(path, ARRAYS)
-    assert read_arrays(path).keys() == ARRAYS.keys()
+    assert storage.read_arrays(path).keys() == ARRAYS.keys()
 
 
 def test_missing_folders_are_made(tmp_path: Path) -> None:
@@ -90,7 +86,7 @@ def test_others_may_read_what_was_written(tmp_path: Path) -> None:
 def test_arrays_return_as_they_were(tmp_path: Path) -> None:
     path = tmp_path / "arrays.npz"
     storage.write_arrays(path, ARRAYS)
-    back = read_arrays(path)
+    back = storage.read_arrays(path)
     assert back.keys() == ARRAYS.keys()
     for name, array in ARRAYS.items():
         assert back[name].dtype == array.dtype
@@ -116,17 +112,17 @@ def test_pickled_content_is_refused_both_ways(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
     np.savez(tmp_path / "b.npz", a=np.array([{}], dtype=object))
     with pytest.raises(ValueError, match="allow_pickle"):
-        read_arrays(tmp_path / "b.npz")
+        storage.read_arrays(tmp_path / "b.npz")
 
 
 def test_a_file_that_unpacks_to_far_more_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     storage.write_arrays(tmp_path / "bomb.npz", {"a": np.zeros(2**18)})
-    assert read_arrays(tmp_path / "bomb.npz")["a"].size == 2**18
+    assert storage.read_arrays(tmp_path / "bomb.npz")["a"].size == 2**18
     monkeypatch.setattr(storage, "MAX_UNPACKED_BYTES", 2**20)
     with pytest.raises(ValueError, match="unpack to 2097280; allowed are 1048576"):
-        read_arrays(tmp_path / "bomb.npz")
+        storage.read_arrays(tmp_path / "bomb.npz")
 
 
 @pytest.mark.parametrize("shape", ["(10**9,)", "(1000000000000,)", "(-1,)", "(3, 2)"])
@@ -141,7 +137,7 @@ def test_an_array_has_the_size_that_it_states(tmp_path: Path, shape: str) -> Non
         head = data[:8] + len(header).to_bytes(2, "little")
         archive.writestr("a.npy", head + header + np.arange(5.0).tobytes())
     with pytest.raises(ValueError, match=r"b\.npz is damaged"):
-        read_arrays(tmp_path / "b.npz")
+        storage.read_arrays(tmp_path / "b.npz")
 
 
 @pytest.mark.parametrize(
@@ -161,7 +157,7 @@ def test_a_truncated_file_is_called_damaged(tmp_path: Path, share: float) -> Non
     whole = path.read_bytes()
     path.write_bytes(whole[: int(share * len(whole))])
     with pytest.raises(ValueError, match="damaged"):
-        read_arrays(path)
+        storage.read_arrays(path)
 
 
 def test_no_flipped_bit_is_read_as_other_numbers(tmp_path: Path) -> None:
@@ -173,7 +169,7 @@ def test_no_flipped_bit_is_read_as_other_numbers(tmp_path: Path) -> None:
         broken[position] ^= 0x10
         path.write_bytes(bytes(broken))
         try:
-            back = read_arrays(path)
+            back = storage.read_arrays(path)
         except (ValueError, OSError, RuntimeError):
             continue
         assert all(np.array_equal(array, np.arange(50.0)) for array in back.values())
@@ -183,7 +179,7 @@ def test_text_that_is_no_archive_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "plan.npz"
     path.write_text("hello")
     with pytest.raises(ValueError):  # noqa: PT011  (numpy chooses the words)
-        read_arrays(path)
+        storage.read_arrays(path)
 
 
 @given(

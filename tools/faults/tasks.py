@@ -283,7 +283,7 @@ _READERS: Mapping[str, Callable[[Path], object]] = {
         if path.name in ("scene.yaml", "robot.yaml")
         else yaml.safe_load(path.read_text())
     ),
-    ".npz": lambda path: storage.arrays_of(path.read_bytes(), path.name),
+    ".npz": storage.read_arrays,
     ".png": _read_png,
     ".html": _read_html,
     ".csv": _read_csv,
