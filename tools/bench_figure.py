@@ -11,10 +11,10 @@ import numpy as np
 from bench_record import BenchRow
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
+from print_style import PAGE_IN, print_figure
 from problem_figure import add_legend
 
 from mrmg.viz import style
-from mrmg.viz.print_style import PAGE_IN, print_figure
 
 MOST_LETTERS = 45
 """Letters of all names under one panel up to which they stand level."""

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter
+from print_style import PAGE_IN, print_figure
 
 from mrmg.viz import style
-from mrmg.viz.print_style import PAGE_IN, print_figure
 
 _HEIGHT_IN = 2.3
 _MARKED = (1.0, 2.0, 5.0)

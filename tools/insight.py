@@ -9,7 +9,7 @@ import numpy as np
 
 from mrmg import seeding
 from mrmg.errors import UsageError
-from mrmg.planning.guided_tree.planner import grow_guided_tree
+from mrmg.planning.guided_tree.planner import Growth, grow_guided_tree
 from mrmg.planning.parameters import GUIDED_TREE, PlannerParams, profile_params
 from mrmg.planning.problem.problem import state_problem
 from mrmg.planning.roadmap.roadmap import build_roadmap
@@ -75,10 +75,16 @@ def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
                 roadmap=edges[long],
                 multiplier=weight[long].mean(axis=1) / length_m[long],  # there and back
                 tours={
-                    name: problem.path(at, growth.first_tours[at])
+                    name: problem.path(at, _first_tour(growth, at))
                     for at, name in enumerate(ids)
                 },
                 tree={name: pieces[:, :, at] for at, name in enumerate(ids)},
                 trajectories=growth.trajectories,
             )
     raise UsageError(f"{scene.name}: no plan was found in {params.trees} attempts")
+
+
+def _first_tour(growth: Growth, robot: int) -> tuple[int, ...]:
+    """Return the tour of a robot at the root of a tree that solved its mission."""
+    tours = growth.tree.tours
+    return tuple(tours.target[0, robot, : tours.length[0, robot]].tolist())

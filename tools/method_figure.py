@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
+from print_style import PAGE_IN, TEXT_PT, print_figure
 from problem_figure import add_legend, aspect, draw_starts, draw_targets, prepare_map
 
 from mrmg.scene.types import Scene
 from mrmg.viz import scene_drawing, style
-from mrmg.viz.print_style import PAGE_IN, TEXT_PT, print_figure
 
 _PANELS = 3
 _TITLES = ("(a) roadmap", "(b) tours", "(c) motion tree and plan")

@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.markers import MarkerStyle
 from matplotlib.patches import Patch
+from print_style import COLUMN_IN, PAGE_IN, SMALL_PT, TEXT_PT, print_figure
 
 from mrmg.scene.types import Goal, Scene, Station
 from mrmg.viz import scene_drawing, style
 from mrmg.viz.map_labels import KINDS, map_labels
-from mrmg.viz.print_style import COLUMN_IN, PAGE_IN, SMALL_PT, TEXT_PT, print_figure
 
 _ABREAST = 3
 _ROBOT_PT = 6.0

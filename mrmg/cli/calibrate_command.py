@@ -58,7 +58,7 @@ def calibrate(options: argparse.Namespace) -> int:
         write_calibration,
     )
     from mrmg.viz.calibration_plot import draw_calibration
-    from mrmg.viz.print_style import require_format
+    from mrmg.viz.figures import require_format
 
     folder = folder_of_model(options.model)
     out = options.out or Path(f"calibrated-{folder.name}")

@@ -107,7 +107,7 @@ def _print_findings(
 def draw(options: argparse.Namespace) -> int:
     """Draw a scene into a picture."""
     from mrmg.scene.loading import load_scene
-    from mrmg.viz.print_style import require_format
+    from mrmg.viz.figures import require_format
     from mrmg.viz.scene_drawing import draw_scene
 
     scene = load_scene(options.scene, trust_code=options.trust_code)

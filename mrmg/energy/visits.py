@@ -79,19 +79,6 @@ def first_stay(
     return None
 
 
-def longest_stay_s(
-    target: Goal | Station, time_s: np.ndarray, poses: np.ndarray
-) -> float:
-    """Return how long the longest stay lasts, which may be 0; -inf without any."""
-    return max(
-        (
-            float(time_s[end - 1] - time_s[first])
-            for first, end in runs(is_at(target, poses))
-        ),
-        default=-np.inf,
-    )
-
-
 def runs(flags: np.ndarray) -> list[tuple[int, int]]:
     """Return (start, end) of each run of true flags, the end excluded."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))

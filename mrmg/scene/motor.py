@@ -31,11 +31,6 @@ class Motor:
         """Return the back-EMF per speed of the wheels' rims [V s/m]."""
         return self.back_emf_constant_V_s * self.gear_ratio / wheel_radius_m
 
-    def newtons_per_A(self, wheel_radius_m: float) -> float:
-        """Return the traction force of a side per current [N/A]."""
-        torque_Nm = self.torque_constant_Nm_A * self.gear_ratio * self.gear_efficiency
-        return torque_Nm / wheel_radius_m
-
     def power_W(
         self, current_A: np.ndarray, speed_m_s: np.ndarray, wheel_radius_m: float
     ) -> np.ndarray:

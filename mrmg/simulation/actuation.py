@@ -7,8 +7,6 @@ that impulse and angle are exact at every tick.
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
 from mrmg.simulation.disturbance import Disturbance
@@ -16,39 +14,24 @@ from mrmg.simulation.disturbance import Disturbance
 _SHORTEST_S = 1e-9
 
 
-class Actuation(Protocol):
-    """Turns what is commanded into what the robots' actuators do."""
+class Actuation:
+    """Turns what is commanded into what the robots' actuators do; by default just that.
+
+    All arrays have shape (R,).
+    """
 
     def force_N(self, commanded_N: np.ndarray, period_s: float) -> np.ndarray:
-        """Return the mean force over a tick in which one force is commanded, (R,)."""
-
-    def steer(
-        self, start: np.ndarray, end: np.ndarray, period_s: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the steering at both ends of a tick in which a ramp is commanded.
-
-        Args:
-            start: commanded at the start of the tick, shape (R,).
-            end: commanded at its end.
-            period_s: length of the tick.
-        """
-
-
-class PerfectActuation:
-    """Follows its command at once."""
-
-    def force_N(self, commanded_N: np.ndarray, period_s: float) -> np.ndarray:
-        """Return the force commanded."""
+        """Return the mean force over a tick in which one force is commanded."""
         return commanded_N
 
     def steer(
         self, start: np.ndarray, end: np.ndarray, period_s: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the ramp commanded."""
+        """Return the steering at both ends of a tick in which a ramp is commanded."""
         return start, end
 
 
-class LaggingActuation:
+class LaggingActuation(Actuation):
     """Lag and gain of all robots' actuators."""
 
     def __init__(self, disturbance: Disturbance, steer: np.ndarray) -> None:
@@ -99,4 +82,4 @@ def actuation_of(disturbance: Disturbance, steer: np.ndarray) -> Actuation:
         item.lag_s or item.drive_gain or item.steering_gain
         for item in disturbance.robots
     )
-    return LaggingActuation(disturbance, steer) if differs else PerfectActuation()
+    return LaggingActuation(disturbance, steer) if differs else Actuation()

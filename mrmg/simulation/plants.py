@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import mujoco
 import numpy as np
 
@@ -22,21 +20,6 @@ Resistance = tuple[np.ndarray, np.ndarray]
 each (R,): the first arguments of `Fleet.set_resistance`."""
 
 
-class Plant(Protocol):
-    """The ground contact of a running simulation."""
-
-    def resistance(self, ground: Ground, level: np.ndarray) -> Resistance:
-        """Return what the driven axles are to lose over the coming tick.
-
-        Args:
-            ground: what lies under the robots.
-            level: cosine of the slope along each heading, shape (R,).
-        """
-
-    def resist(self) -> None:
-        """Set all other frictions for the coming tick."""
-
-
 class ModelledGround:
     """Losses by the energy model's law, with the coefficients of the MJCF."""
 
@@ -45,12 +28,18 @@ class ModelledGround:
         self._true = true_resistance(world, disturbance)
 
     def resistance(self, ground: Ground, level: np.ndarray) -> Resistance:
-        """Return the law's forces; the slope carries a part of the weight."""
+        """Return what the driven axles are to lose over the coming tick.
+
+        Args:
+            ground: what lies under the robots.
+            level: cosine of the slope along each heading, shape (R,): the slope carries
+                a part of the weight.
+        """
         along_N = level * self._true.force_N(*ground)
         return along_N, ground.turning_multiplier * self._true.swing_N
 
     def resist(self) -> None:
-        """Do nothing: the driven axles lose all."""
+        """Set all other frictions for the coming tick: the driven axles lose all."""
 
 
 class ScrubbedGround:
@@ -70,6 +59,10 @@ class ScrubbedGround:
     def resist(self) -> None:
         """Set the frictions of all wheels."""
         self._tyres.resist()
+
+
+Plant = ModelledGround | ScrubbedGround
+"""The ground contact of a running simulation."""
 
 
 def plant_of(

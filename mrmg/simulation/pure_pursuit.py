@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -55,7 +54,7 @@ class PurePursuit:
     ) -> None:
         """Follow with a robot of `model`."""
         self._w_limit = model.limits.w_max
-        self._steering: _Steering
+        self._steering: _Wheels | _Turning
         if model.motion_model == "car":
             self._params = params or PurePursuitParams()
             self._steering = _Wheels(model.wheelbase_m)
@@ -94,24 +93,6 @@ class PurePursuit:
         return min(max(w, -self._w_limit), self._w_limit)
 
 
-class _Steering(Protocol):
-    """How robots of one motion model follow an arc."""
-
-    def ends_arc(self, reference: np.ndarray, along_m_s: np.ndarray) -> np.ndarray:
-        """Return from where on the reference is on another arc, shape (HORIZON + 1,).
-
-        Args:
-            reference: the states ahead, shape (HORIZON + 1, 5).
-            along_m_s: their speeds in the direction of driving.
-        """
-
-    def on_arc(self, curvature_per_m: float, speed_m_s: float) -> float:
-        """Return psi or omega of an arc."""
-
-    def without_arc(self, state: np.ndarray, reference: np.ndarray) -> float:
-        """Return psi or omega where there is no point to drive at."""
-
-
 @dataclass(frozen=True, slots=True)
 class _Wheels:
     """A car's: psi = atan(L kappa)."""
@@ -119,7 +100,14 @@ class _Wheels:
     wheelbase_m: float
 
     def ends_arc(self, reference: np.ndarray, along_m_s: np.ndarray) -> np.ndarray:
-        """It ends where the robot turns back."""
+        """Return from where on the reference is on another arc, shape (HORIZON + 1,).
+
+        It ends where the robot turns back.
+
+        Args:
+            reference: the states ahead, shape (HORIZON + 1, 5).
+            along_m_s: their speeds in the direction of driving.
+        """
         return np.asarray(along_m_s < 0.0)
 
     def on_arc(self, curvature_per_m: float, speed_m_s: float) -> float:

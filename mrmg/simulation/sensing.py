@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -41,8 +40,8 @@ class FilterParams:
     speed_drift_m_s: float = 0.1
 
 
-class Sensing(Protocol):
-    """Turns true states into what the control sees.
+class Sensing:
+    """Turns true states into what the control sees; by default that is the truth.
 
     Attributes:
         state: seen (x, y, theta, v, w), shape (R, 5).
@@ -62,26 +61,11 @@ class Sensing(Protocol):
             axle_speed_m_s: the true speed of the driven axles, shape (R,).
             commanded_m_s: speed commanded for this instant, shape (R,).
         """
-
-
-class PerfectSensing:
-    """Sees the truth."""
-
-    state: np.ndarray
-    axle_speed_m_s: np.ndarray
-
-    def look(
-        self, state: np.ndarray, axle_speed_m_s: np.ndarray, commanded_m_s: np.ndarray
-    ) -> None:
-        """Take the truth over."""
         self.state, self.axle_speed_m_s = state, axle_speed_m_s
 
 
-class FilteredSensing:
+class FilteredSensing(Sensing):
     """Sees noisy, late measurements through a filter."""
-
-    state: np.ndarray
-    axle_speed_m_s: np.ndarray
 
     def __init__(
         self,
@@ -192,7 +176,7 @@ def sensing_of(scene: Scene, disturbance: Disturbance, period_s: float) -> Sensi
     )
     if blurred:
         return FilteredSensing(scene, disturbance, period_s)
-    return PerfectSensing()
+    return Sensing()
 
 
 _LEAST_NOISE = 1e-3

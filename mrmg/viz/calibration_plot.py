@@ -10,8 +10,7 @@ from matplotlib.axes import Axes
 
 from mrmg.studies.calibration import Calibration, Estimate
 from mrmg.viz import style
-from mrmg.viz.figures import new_figure, tidy, write_figure
-from mrmg.viz.print_style import FOR_PRINT
+from mrmg.viz.figures import FOR_PRINT, new_figure, tidy, write_figure
 
 _LOOKS = {
     "straight": ("o", "#0072B2"),

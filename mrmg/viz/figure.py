@@ -13,8 +13,8 @@ from mrmg.runs.record import read_record
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.viz.energy_plot import draw_energy
+from mrmg.viz.figures import FOR_PRINT, require_format
 from mrmg.viz.overview import draw_overview
-from mrmg.viz.print_style import FOR_PRINT, require_format
 from mrmg.viz.timeline_plot import draw_timeline
 
 Draw = Callable[[Scene, Plan, ExecutionLog | None, Path], None]
@@ -38,7 +38,7 @@ def draw_figure(
     Args:
         run_folder: the run; at least planned.
         kind: one of `KINDS`.
-        path: file to write; its suffix, one of `print_style.FORMATS`, gives the format.
+        path: file to write; its suffix, one of `figures.FORMATS`, gives the format.
         trust_code: whether robot models may bring Python code (`loading.trust`).
 
     Raises:

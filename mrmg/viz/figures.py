@@ -12,14 +12,35 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from mrmg import storage
+from mrmg.errors import UsageError
 
 DPI = 110
+FORMATS = (".pdf", ".svg", ".png")
+"""What figures can be written as."""
+
+FOR_PRINT: Any = {
+    # Journals want text as text, in embedded TrueType fonts.
+    "pdf.fonttype": 42,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "mrmg",
+    "savefig.dpi": 300,
+}
 _TIMELESS: dict[str, dict[str, Any]] = {
     "png": {"Software": None},
     "pdf": {"CreationDate": None},
     "svg": {"Date": None},
 }
 """Metadata by format, such that equal figures give equal files."""
+
+
+def require_format(path: Path) -> None:
+    """Refuse files of another format than `FORMATS`.
+
+    Raises:
+        UsageError: if the suffix is none of them.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise UsageError(f"{path} must end in one of {', '.join(FORMATS)}")
 
 
 def new_figure(width_in: float, height_in: float, **details: Any) -> Figure:

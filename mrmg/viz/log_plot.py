@@ -12,8 +12,7 @@ from mrmg.studies.calibration.log_calibration import LogCalibration
 from mrmg.studies.calibration.log_fit import Pieces
 from mrmg.studies.calibration.robot_logs import LoggedRun
 from mrmg.viz import style
-from mrmg.viz.figures import new_figure, tidy
-from mrmg.viz.print_style import FOR_PRINT
+from mrmg.viz.figures import FOR_PRINT, new_figure, tidy
 
 _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 _ROWS_PER_INCH = 5.5

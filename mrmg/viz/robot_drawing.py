@@ -16,8 +16,7 @@ from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Battery, Robot, Scene
 from mrmg.simulation.world_model import build_world
 from mrmg.viz import style
-from mrmg.viz.figures import new_figure, write_figure
-from mrmg.viz.print_style import require_format
+from mrmg.viz.figures import new_figure, require_format, write_figure
 from mrmg.viz.scene_drawing import HALO
 from mrmg.viz.world_view import open_view, top_camera
 
@@ -34,7 +33,7 @@ def draw_robot(model: RobotModel, path: Path) -> None:
 
     Args:
         model: of the robot.
-        path: file to write; its suffix, one of `print_style.FORMATS`, gives the format.
+        path: file to write; its suffix, one of `figures.FORMATS`, gives the format.
 
     Raises:
         UsageError: if the suffix is unknown.

@@ -13,8 +13,9 @@ from mrmg.energy.visits import (
     battery_contents,
     crowded_stations,
     first_stay,
-    longest_stay_s,
+    is_at,
     recharging,
+    runs,
 )
 from mrmg.plans import Visit
 from mrmg.scene.loading import scene_from_document
@@ -24,6 +25,14 @@ from mrmg.scene.types import Battery, Goal, Scene
 DT_S = 0.5
 AT, AWAY = (0.0, 0.0), (9.0, 0.0)
 ROUND = Region(center=np.zeros(2), radius_m=1.0, corners=np.zeros((0, 2)))
+
+
+def longest_stay_s(target, time_s: np.ndarray, poses: np.ndarray) -> float:
+    stays = runs(is_at(target, poses))
+    return max(
+        (float(time_s[end - 1] - time_s[first]) for first, end in stays),
+        default=-np.inf,
+    )
 
 
 def way(presence: str) -> tuple[np.ndarray, np.ndarray]:

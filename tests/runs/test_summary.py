@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from mrmg.planning.statistics import Bounds, Improvement
 from mrmg.plans import PlanStatus
 from mrmg.runs.summary import summarize, summary_of
 from mrmg.runs.summary_model import summary_schema
-from mrmg.simulation.disturbance import DEFAULT_RANGES
+from mrmg.simulation.disturbance import DEFAULT_RANGES, Disturbance
 from mrmg.verification.verify import verify
 
 SECTIONS = {
@@ -263,5 +263,6 @@ def test_disturbed_execution_says_how(parts: Any) -> None:
         audit=account,
     )
     check(summary)
-    assert summary["execution"]["disturbance"] == asdict(disturbance)
+    stated = summary["execution"]["disturbance"]
+    assert storage.typed(Disturbance, stated) == disturbance
     assert summary["execution"]["gave_up"] == "lost"

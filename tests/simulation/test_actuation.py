@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrmg.simulation.actuation import LaggingActuation, PerfectActuation, actuation_of
+from mrmg.simulation.actuation import Actuation, LaggingActuation, actuation_of
 from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
 
 T_S = 0.02
@@ -82,7 +82,7 @@ def test_without_lag_and_gain_everything_is_done_at_once() -> None:
     """The perfect actuators do what lagging ones without lag do."""
     undisturbed = Disturbance(seed=0, robots=(RobotDisturbance(robot="r1"),))
     prompt = actuation_of(undisturbed, np.array([0.1]))
-    assert isinstance(prompt, PerfectActuation)
+    assert isinstance(prompt, Actuation)
     general = LaggingActuation(undisturbed, np.array([0.1]))
     angles = 0.1 + 0.05 * np.sin(np.arange(6))
     angles[0] = 0.1

@@ -9,7 +9,7 @@ import pytest
 
 from mrmg.scene.types import Scene
 from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
-from mrmg.simulation.sensing import FilteredSensing, PerfectSensing, Sensing, sensing_of
+from mrmg.simulation.sensing import FilteredSensing, Sensing, sensing_of
 
 PERIOD_S = 0.02
 WHEELBASE_M = 1.2
@@ -59,7 +59,7 @@ def filtered(scene: Scene, disturbance: Disturbance) -> FilteredSensing:
 
 def test_without_noise_and_delay_the_truth_is_seen(scene: Scene) -> None:
     sensing = sensing_of(scene, disturbed(mass=0.1, lag_s=0.05), PERIOD_S)
-    assert isinstance(sensing, PerfectSensing)
+    assert isinstance(sensing, Sensing)
     truth = circle(1.0)
     assert seen(sensing, truth).tobytes() == truth.tobytes()
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from method_figure import draw_method
+from print_style import COLUMN_IN, PAGE_IN
 from problem_figure import draw_problem, draw_problems, problem_legend
 
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
-from mrmg.viz.print_style import COLUMN_IN, PAGE_IN
 
 
 @pytest.fixture(scope="module")

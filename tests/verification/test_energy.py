@@ -13,8 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from mrmg.energy import metering
-from mrmg.energy.visits import crowded_stations
-from mrmg.energy.visits import longest_stay_s as longest_by_planner
+from mrmg.energy.visits import crowded_stations, is_at, runs
 from mrmg.plans import Trajectory
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.types import Robot, Scene, TerrainArea
@@ -38,6 +37,14 @@ TARGETS = {
         {"id": "t", "circle": {"center": [30, 10], "radius": 6}},
     ],
 }
+
+
+def longest_by_planner(target, time_s: np.ndarray, poses: np.ndarray) -> float:
+    stays = runs(is_at(target, poses))
+    return max(
+        (float(time_s[end - 1] - time_s[first]) for first, end in stays),
+        default=-np.inf,
+    )
 
 
 def random_scene(make_scene: Any, rng: np.random.Generator) -> Scene:

@@ -70,17 +70,6 @@ class Growth:
         """Parent of each vertex, -1 for the root, shape (V,)."""
         return self.tree.vertices.parent[: self.counts["vertices"]]
 
-    @property
-    def first_tours(self) -> tuple[tuple[int, ...], ...]:
-        """The tours of the root; empty if CreateNewTour found none."""
-        table = self.tree.tours
-        if not self.counts["vertices"]:
-            return ()
-        return tuple(
-            tuple(int(t) for t in targets[:n])
-            for targets, n in zip(table.target[0], table.length[0], strict=True)
-        )
-
 
 def grow_guided_tree(
     problem: Problem, params: PlannerParams, seed: int, halt: np.ndarray

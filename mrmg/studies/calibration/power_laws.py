@@ -21,7 +21,6 @@ are a function of few parameters of a terrain:
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -37,31 +36,6 @@ wheels as far ahead of the middle as a quarter of the effective track."""
 
 CREEP_M_S = 0.01
 """Rim speed below which a side counts as standing."""
-
-
-class PowerLaw(Protocol):
-    """A law of power."""
-
-    @property
-    def name(self) -> str:
-        """What it is called."""
-
-    @property
-    def formula(self) -> str:
-        """How it reads."""
-
-    @property
-    def parameters(self) -> tuple[str, ...]:
-        """Names of its parameters, with units."""
-
-    def features(self, run: LoggedRun) -> np.ndarray:
-        """Return the features of each row, shape (n, k)."""
-
-    def coefficients(self, parameters: np.ndarray) -> np.ndarray:
-        """Return what multiplies the features, shape (k,)."""
-
-    def start(self, power_W: float, speed_m_s: float) -> np.ndarray:
-        """Return parameters to begin a fit with, all above 0."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,6 +147,10 @@ class MotorLaw:
         amperes = 0.3 * power_W / (self.volts_per_m_s * max(speed_m_s, 0.1))
         start = np.array([amperes, 2.0 * amperes, 0.1 * power_W])
         return start[: len(self.parameters)]
+
+
+PowerLaw = PolynomialLaw | MotorLaw
+"""A law of power."""
 
 
 def laws_of(

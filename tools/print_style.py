@@ -1,4 +1,4 @@
-"""Sizes and settings of figures made for print."""
+"""Sizes and settings of the tools' figures, which are made for print."""
 
 from __future__ import annotations
 
@@ -10,23 +10,13 @@ from typing import Any
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from mrmg.errors import UsageError
-from mrmg.viz.figures import new_figure, write_figure
+from mrmg.viz.figures import FOR_PRINT, new_figure, require_format, write_figure
 
 COLUMN_IN, PAGE_IN = 3.45, 7.16
 """Widths of one and of two columns of an IEEE paper [inch]."""
 TEXT_PT, SMALL_PT = 7.5, 6.0
 """Sizes of text, and of the labels within maps."""
-FORMATS = (".pdf", ".svg", ".png")
-"""What figures can be written as."""
 
-FOR_PRINT: Any = {
-    # Journals want text as text, in embedded TrueType fonts.
-    "pdf.fonttype": 42,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "mrmg",
-    "savefig.dpi": 300,
-}
 _SMALL: Any = {
     "font.size": TEXT_PT,
     "axes.titlesize": TEXT_PT,
@@ -38,16 +28,6 @@ _SMALL: Any = {
     "hatch.linewidth": 0.4,
     "patch.linewidth": 0.5,
 }
-
-
-def require_format(path: Path) -> None:
-    """Refuse files of another format than `FORMATS`.
-
-    Raises:
-        UsageError: if the suffix is none of them.
-    """
-    if path.suffix.lower() not in FORMATS:
-        raise UsageError(f"{path} must end in one of {', '.join(FORMATS)}")
 
 
 @contextmanager
