@@ -26,7 +26,7 @@ def add_export(verbs: Any) -> None:
     verb.add_out("PATH", "folder, or the file by its suffix; default RUN/export")
     standard = "of the format's standard: 2.1.0 or 3.0.0 of vda5050; default all"
     verb.add_value("--version", "X.Y.Z", standard)
-    verb.add_overwrite("files")
+    verb.add_overwrite("an export")
     verb.add_trust()
     verb.add_json("the names of the files as JSON")
 
