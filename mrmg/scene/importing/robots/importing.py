@@ -20,6 +20,7 @@ from mrmg.scene.importing.robots.mjcf_text import mjcf_text
 from mrmg.scene.importing.robots.parameters import Parameter, parameters_of
 from mrmg.scene.importing.robots.survey import Survey, survey
 from mrmg.scene.loading.models import load_model
+from mrmg.templates import rendered
 
 _BESIDE_AXLE_M = 1e-3
 """Distance from the driven axle up to which a support is below it."""
@@ -118,28 +119,16 @@ def _doubts(found: Survey) -> list[str]:
 def _robot_yaml(
     name: str, path: Path, found: Survey, values: Mapping[str, Parameter]
 ) -> str:
-    motion = "car" if found.steered else "unicycle"
-    lines = [
-        f"# {name}: imported from {path.name}. What is marked ASSUMED is not in that",
-        "# file: measure it or look it up. 'mrmg calibrate' measures the energy of the",
-        "# simulated robot. Frame: origin in the middle of the driven axle on the",
-        "# ground, x forward, y left. SI units.",
-        "format: 1",
-        f"motion_model: {motion}",
-    ]
-    group = ""
-    for key, value in values.items():
-        outer, _, inner = key.rpartition(".")
-        if outer != group and outer:
-            lines.append(f"{outer}:")
-        group = outer
-        shown: Any = value.value
-        origin = f"from {value.source}" if value.source else f"ASSUMED: {value.reason}"
-        indent = "  " if outer else ""
-        unit = f"{value.unit}; " if value.unit else ""
-        lines.append(f"{indent}{inner}: {shown}  # {unit}{origin}")
-    lines.append(f"mjcf: {name}.xml")
-    return shipped.with_modeline("\n".join(lines) + "\n", shipped.robot_schema_file())
+    text = rendered(
+        __package__,
+        "robot.yaml.jinja",
+        {},
+        name=name,
+        source=path.name,
+        motion="car" if found.steered else "unicycle",
+        values={tuple(key.rpartition(".")[::2]): item for key, item in values.items()},
+    )
+    return shipped.with_modeline(text, shipped.robot_schema_file())
 
 
 def _drawn(
