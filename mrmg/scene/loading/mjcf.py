@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -115,7 +116,10 @@ class CompiledRobot:
         """Return how far the tyres of a wheel reach below its joint."""
         down = np.array([0.0, 0.0, -1.0])
         middle = down @ self._data.xanchor[self._id("joint", joint)]
-        lowest = max(self._support_m(geom, down) for geom in self._tyres(joint))
+        lowest = max(
+            support_m(self._model, self._data, geom, down)
+            for geom in self._tyres(joint)
+        )
         return float(lowest - middle)
 
     def spin_inertia_kg_m2(self, joint: str) -> float:
@@ -151,9 +155,8 @@ class CompiledRobot:
         Infinity for planes and height fields.
         """
         vector = np.array([*direction, 0.0, 0.0, 0.0])[:3]
-        return self._support_m(self._id("geom", geom), vector) - float(
-            vector @ self.origin_m
-        )
+        far_m = support_m(self._model, self._data, self._id("geom", geom), vector)
+        return far_m - float(vector @ self.origin_m)
 
     def traction_N(self, motor: str, joints: Sequence[str], force_N: float) -> float:
         """Return the force of wheels on the ground as one motor is commanded `force_N`.
@@ -242,28 +245,34 @@ class CompiledRobot:
             if model.body_weldid[model.geom_bodyid[geom]] == body
         ]
 
-    def _support_m(self, geom: int, direction: np.ndarray) -> float:
-        """Return the largest coordinate of a geom along a unit vector [m]."""
-        model, kinds = self._model, self._mujoco.mjtGeom
-        kind, size = model.geom_type[geom], model.geom_size[geom]
-        own = self._data.geom_xmat[geom].reshape(3, 3).T @ direction
-        if kind == kinds.mjGEOM_SPHERE:
-            reach = size[0]
-        elif kind == kinds.mjGEOM_CAPSULE:
-            reach = size[0] + size[1] * abs(own[2])
-        elif kind == kinds.mjGEOM_CYLINDER:
-            reach = size[0] * np.hypot(own[0], own[1]) + size[1] * abs(own[2])
-        elif kind == kinds.mjGEOM_ELLIPSOID:
-            reach = np.linalg.norm(size * own)
-        elif kind == kinds.mjGEOM_BOX:
-            reach = size @ np.abs(own)
-        elif kind == kinds.mjGEOM_MESH:
-            mesh = model.geom_dataid[geom]
-            first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-            reach = (model.mesh_vert[first : first + count] @ own).max()
-        else:
-            return float("inf")
-        return float(reach + self._data.geom_xpos[geom] @ direction)
+
+def support_m(model: Any, data: Any, geom: int, direction: np.ndarray) -> float:
+    """Return the largest coordinate of a geom along a unit vector [m].
+
+    Infinity for planes and height fields.
+    """
+    import mujoco
+
+    kinds = mujoco.mjtGeom
+    kind, size = model.geom_type[geom], model.geom_size[geom]
+    own = data.geom_xmat[geom].reshape(3, 3).T @ direction
+    if kind == kinds.mjGEOM_SPHERE:
+        reach = size[0]
+    elif kind == kinds.mjGEOM_CAPSULE:
+        reach = size[0] + size[1] * abs(own[2])
+    elif kind == kinds.mjGEOM_CYLINDER:
+        reach = size[0] * np.hypot(own[0], own[1]) + size[1] * abs(own[2])
+    elif kind == kinds.mjGEOM_ELLIPSOID:
+        reach = np.linalg.norm(size * own)
+    elif kind == kinds.mjGEOM_BOX:
+        reach = size @ np.abs(own)
+    elif kind == kinds.mjGEOM_MESH:
+        mesh = model.geom_dataid[geom]
+        first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+        reach = (model.mesh_vert[first : first + count] @ own).max()
+    else:
+        return float("inf")
+    return float(reach + data.geom_xpos[geom] @ direction)
 
 
 def _range(limited: bool, ends: np.ndarray) -> tuple[float, float]:

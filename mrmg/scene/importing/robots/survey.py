@@ -16,6 +16,7 @@ import numpy as np
 
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.importing.robots.description import Description
+from mrmg.scene.loading.mjcf import support_m
 
 _UPRIGHT, _ACROSS = 0.9, 0.9
 """Least share of a joint's axis along z (steering), or y (wheels)."""
@@ -123,31 +124,15 @@ class _Scan:
         return tuple(sorted(moved))
 
     def corners(self, geoms: Iterable[int]) -> np.ndarray:
-        """Return points whose box is that of some geoms, shape (n, 3)."""
-        points = [self._corners(geom) for geom in geoms]
-        return np.concatenate(points) if points else np.zeros((0, 3))
-
-    def _corners(self, geom: int) -> np.ndarray:
-        model, kinds = self.model, self.mujoco.mjtGeom
-        size, kind = model.geom_size[geom], kinds(model.geom_type[geom])
-        turn = self.data.geom_xmat[geom].reshape(3, 3)
-        if kind == kinds.mjGEOM_MESH:
-            mesh = model.geom_dataid[geom]
-            first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-            vertices = model.mesh_vert[first : first + count]
-            return np.asarray(vertices @ turn.T + self.data.geom_xpos[geom])
-        axis = np.abs(turn[:, 2])
-        if kind in (kinds.mjGEOM_CYLINDER, kinds.mjGEOM_CAPSULE):
-            disc = np.sqrt(np.maximum(0.0, 1.0 - axis**2))
-            round_ends = kind == kinds.mjGEOM_CAPSULE
-            reach = axis * size[1] + size[0] * (1.0 if round_ends else disc)
-        elif kind == kinds.mjGEOM_SPHERE:
-            reach = np.full(3, size[0])
-        elif kind in (kinds.mjGEOM_BOX, kinds.mjGEOM_ELLIPSOID):
-            reach = np.abs(turn) @ size
-        else:
-            return np.zeros((0, 3))
-        return np.asarray(self.data.geom_xpos[geom] + np.stack([-reach, reach]))
+        """Return least and greatest corners of the boxes about geoms, shape (n, 3)."""
+        axes = np.eye(3)
+        points = [
+            [end * support_m(self.model, self.data, geom, end * axis) for axis in axes]
+            for geom in geoms
+            for end in (-1.0, 1.0)
+        ]
+        corners = np.array(points).reshape(-1, 3)
+        return np.asarray(corners[np.isfinite(corners).all(axis=1)])
 
     def geoms(self, bodies: Iterable[int]) -> list[int]:
         """Return the shapes of bodies that collide; drawn ones if none does."""
