@@ -11,6 +11,10 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
+from mrmg.energy import battery_curves
+from mrmg.energy.audit import audit
+from mrmg.energy.by_terrain import energy_by_terrain
+from mrmg.energy.metering import battery_content
 from mrmg.report import page as report_page
 from mrmg.report.charts import chart_data
 from mrmg.report.sections import percent
@@ -86,6 +90,27 @@ def test_paths_and_curves_have_one_look_everywhere(mission) -> None:
         assert f"--{name}-width:{look.width_em:g};" in page
         assert f"--{name}-opacity:{look.opacity:g};" in page
         assert f"stroke-width:calc(var(--{name}-width)*1em)" in page
+
+
+def test_all_that_show_a_drive_read_its_curves_worked_out_once(
+    mission, monkeypatch, tmp_path
+) -> None:
+    contents = []
+
+    def counted(*arguments):
+        contents.append(battery_content(*arguments))
+        return contents[-1]
+
+    monkeypatch.setattr(battery_curves, "battery_content", counted)
+    scene, plan, log = mission
+    audit(scene, plan, log)
+    energy_by_terrain(scene, plan, log)
+    chart_data(scene, plan, log)
+    timeline(scene, plan, log)
+    draw_energy(scene, plan, log, path=tmp_path / "picture.svg")
+    draw_timeline(scene, plan, log, path=tmp_path / "timeline.svg")
+    Film(scene, plan, log, OPTIONS)
+    assert len(contents) == len(scene.robots)
 
 
 def test_robots_without_a_tour_are_called_not_used(mission, drawn, tmp_path) -> None:
