@@ -6,10 +6,9 @@ import os
 import platform
 import sys
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
-from typing import Any
 
 from packaging.requirements import Requirement
 
@@ -33,10 +32,6 @@ class Finding:
     found: str
     ok: bool = True
     remedy: str = ""
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the finding as JSON data."""
-        return asdict(self)
 
 
 def examine() -> list[Finding]:

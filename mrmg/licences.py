@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from importlib.metadata import PackageMetadata, PackageNotFoundError, metadata, requires
 
 from packaging.requirements import Requirement
@@ -31,10 +31,6 @@ class Dependency:
     licence: str
     extra: str
     required_by: tuple[str, ...]
-
-    def to_json(self) -> dict[str, object]:
-        """Return the dependency as JSON data."""
-        return asdict(self)
 
 
 def dependencies() -> list[Dependency]:

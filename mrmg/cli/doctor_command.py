@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import asdict
 from typing import Any
 
 from mrmg.cli import terminal
@@ -27,7 +28,7 @@ def doctor(options: argparse.Namespace) -> int:
 
     findings = examine()
     if options.json:
-        terminal.print_json([finding.to_json() for finding in findings])
+        terminal.print_json([asdict(finding) for finding in findings])
     else:
         for finding in findings:
             mark = "ok     " if finding.ok else "MISSING"
@@ -43,7 +44,7 @@ def _licences(options: argparse.Namespace) -> int:
 
     found = dependencies()
     if options.json:
-        terminal.print_json([each.to_json() for each in found])
+        terminal.print_json([asdict(each) for each in found])
         return ExitCode.OK
     rows = [("package", "version", "licence", "extra")]
     rows += [

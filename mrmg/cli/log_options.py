@@ -41,8 +41,8 @@ class LogGroup:
     terrain: str | None = None
 
 
-class _AddFiles(argparse.Action):
-    """Begins a group of files."""
+class _Grouped(argparse.Action):
+    """Begins a group of files, or names the terrain of the last one."""
 
     def __call__(
         self,
@@ -51,51 +51,32 @@ class _AddFiles(argparse.Action):
         values: Any,
         option_string: str | None = None,
     ) -> None:
-        group = LogGroup(option_string == "--test", list(values))
-        namespace.groups = [*namespace.groups, group]
-
-
-class _NameTerrain(argparse.Action):
-    """Names the terrain of the last group of files."""
-
-    def __call__(
-        self,
-        parser: argparse.ArgumentParser,
-        namespace: argparse.Namespace,
-        values: Any,
-        option_string: str | None = None,
-    ) -> None:
-        if not namespace.groups or namespace.groups[-1].terrain is not None:
+        groups = namespace.groups
+        if option_string != "--terrain":
+            group = LogGroup(option_string == "--test", list(values))
+            namespace.groups = [*groups, group]
+        elif groups and groups[-1].terrain is None:
+            groups[-1].terrain = values
+        else:
             parser.error("--terrain: name the files with --log or --test before it")
-        namespace.groups[-1].terrain = values
 
 
 def add_logs(verb: argparse.ArgumentParser) -> None:
     """Add --log, --terrain and --test; `files_by_use` reads what they leave."""
     verb.set_defaults(groups=[])
-    verb.add_argument(
-        "--log",
-        nargs="+",
-        action=_AddFiles,
-        dest="groups",
-        metavar="FILE",
-        help="logs to fit, all of one terrain; may be repeated",
-    )
-    verb.add_argument(
-        "--terrain",
-        action=_NameTerrain,
-        dest="groups",
-        metavar="NAME",
-        help="what the files before it were driven on",
-    )
-    verb.add_argument(
-        "--test",
-        nargs="+",
-        action=_AddFiles,
-        dest="groups",
-        metavar="FILE",
-        help="logs to predict, not fitted",
-    )
+    for flag, metavar, count, about in (
+        ("--log", "FILE", "+", "logs to fit, all of one terrain; may be repeated"),
+        ("--terrain", "NAME", None, "what the files before it were driven on"),
+        ("--test", "FILE", "+", "logs to predict, not fitted"),
+    ):
+        verb.add_argument(
+            flag,
+            nargs=count,
+            action=_Grouped,
+            dest="groups",
+            metavar=metavar,
+            help=about,
+        )
 
 
 def files_by_use(

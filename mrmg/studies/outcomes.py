@@ -70,15 +70,6 @@ class Trial:
     duration_s: float
     log_digest: str
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the trial as JSON data."""
-        return asdict(self)
-
-    @staticmethod
-    def from_json(data: Mapping[str, Any]) -> Trial:
-        """Rebuild a trial from `to_json`."""
-        return storage.typed(Trial, data)
-
 
 def assess_trial(
     scene: Scene, plan: Plan, log: ExecutionLog, account: EnergyAudit | None = None
@@ -174,14 +165,8 @@ class Study:
                 "seed": self.worst.seed,
                 "execute": self.replay_options(self.worst),
             },
-            "outcomes": [trial.to_json() for trial in self.trials],
+            "outcomes": [asdict(trial) for trial in self.trials],
         }
-
-    @staticmethod
-    def from_json(data: Mapping[str, Any]) -> Study:
-        """Rebuild a study from `to_json`."""
-        known = {"options": data["options"], "trials": data["outcomes"]}
-        return storage.typed(Study, known)
 
     def _failures(self) -> dict[str, int]:
         """Return how many trials failed by each cause; one may fail by several."""
@@ -259,4 +244,7 @@ def load_studies(folder: Path, plan: Plan) -> tuple[Study, ...]:
     with storage.damage_reported(path, "not readable", remedy):
         content = storage.of_format(path.read_bytes(), ROBUSTNESS_FORMAT)
         rows = content["studies"] if content["plan_digest"] == plan.digest else ()
-        return tuple(Study.from_json(row) for row in rows)
+        return tuple(
+            storage.typed(Study, {"options": row["options"], "trials": row["outcomes"]})
+            for row in rows
+        )

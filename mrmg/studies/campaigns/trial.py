@@ -8,7 +8,7 @@ import threading
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -165,7 +165,7 @@ def _of_drive(
         driven: with the plan in force at each time.
         account: the audit of it.
     """
-    trial = assess_trial(scene, driven.plan, driven.log, account).to_json()
+    trial = asdict(assess_trial(scene, driven.plan, driven.log, account))
     unused = ("seed", "reasons", "charge_J", "charge_robot", "goals_visited", "causes")
     errors = [robot.measured_error_pct for robot in account.robots]
     broken = [violation.message for violation in verdict.violations[:1]]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from mrmg import storage
 from mrmg.errors import UsageError
 from mrmg.plans import Plan, PlanStatus
 from mrmg.runs.arguments import RunArguments
@@ -71,7 +72,7 @@ def study_robustness(
     for number, content, _ in completed_trials(
         jobs, make_trial, Engine(workers=workers), check=_read
     ):
-        done[number] = Trial.from_json(content)
+        done[number] = storage.typed(Trial, content)
         if on_trial is not None:
             feasible = sum(trial.feasible for trial in done.values())
             on_trial(len(done), trials, feasible)
@@ -111,7 +112,7 @@ def make_trial(folder: Path, arguments: RunArguments) -> dict[str, Any]:
     """Drive the plan of a run folder as the arguments want it, and judge the drive."""
     scene, plan = _mission(folder)
     driven = drive(scene, plan, arguments)
-    return assess_trial(scene, driven.plan, driven.log).to_json()
+    return asdict(assess_trial(scene, driven.plan, driven.log))
 
 
 @lru_cache(maxsize=1)
@@ -120,4 +121,4 @@ def _mission(folder: Path) -> tuple[Scene, Plan]:
 
 
 def _read(job: Job, content: Any) -> Trial:
-    return Trial.from_json(content)
+    return storage.typed(Trial, content)
