@@ -31,7 +31,10 @@ from mrmg.planning.path_following.coordination._node_kernels import (
     Task,
 )
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE, Fields
-from mrmg.planning.path_following.coordination.priorities import search_priorities
+from mrmg.planning.path_following.coordination.priorities import (
+    search_priorities,
+    shortened,
+)
 from mrmg.planning.path_following.coordination.tasks import (
     Round,
     guided,
@@ -53,6 +56,10 @@ ROUNDS = (
 )
 """Rounds one after the other."""
 
+ROUNDS_ALONE = 2
+"""Rounds in which a robot's motion without regard to the others is searched for: one
+more than with regard to them, as all else depends on it."""
+
 FIRST_MOST = 300
 """Nodes of a robot's first search, at most."""
 
@@ -61,6 +68,9 @@ YIELDING_WEIGHT = 1.1
 
 YIELDING_S = 20.0
 """Cost of conflicts with robots for one that makes room for others [s]."""
+
+WAYS_ON = 20
+"""Ways on from a node at most: its motions, to track, hold, wait, stay and visit."""
 
 MOST_CURVE_NODES = 1500
 """Nodes of the curve that a robot drives home along, at most."""
@@ -100,7 +110,11 @@ def empty_course(most: int) -> Course:
 
 
 def empty_nodes(most: int) -> Nodes:
-    """Return room for a search of at most so many nodes."""
+    """Return room for a search of at most so many nodes.
+
+    The table has more places than there are ways on from all nodes, wherever they lead:
+    it must never be full.
+    """
     return Nodes(
         state=np.empty((most, 5)),
         parent=np.empty(most, np.int64),
@@ -112,7 +126,7 @@ def empty_nodes(most: int) -> Nodes:
         motion=np.empty(most, np.int64),
         key=np.empty(2 * most + 2),
         entry=np.empty(2 * most + 2, np.int64),
-        table=np.full(1 << (4 * most).bit_length(), -1, np.int64),
+        table=np.full(1 << (WAYS_ON * most).bit_length(), -1, np.int64),
         size=np.array([0, 0, -1]),
     )
 
@@ -239,8 +253,9 @@ class _Planning:
     def find_alone(
         self, r: int, motions: Sequence[Motion | None], first: Round, halt: np.ndarray
     ) -> Motion | None:
-        """Return a motion of a robot that may meet the others, as hard as it takes."""
-        for self.round in ROUNDS[ROUNDS.index(first) :]:
+        """Return a motion of a robot that may meet the others."""
+        number = ROUNDS.index(first)
+        for self.round in ROUNDS[number : number + ROUNDS_ALONE]:
             found = self.find(r, motions, np.zeros(len(motions), bool))
             if found is not None or halt[0]:
                 return found
@@ -290,6 +305,7 @@ def coordinated(
         planning.round = now
         found = search_priorities(alone, planning, now.orders, halt)
         if found is not None:
+            found = shortened(found, alone, planning, halt)
             return trajectories_of(problem, found)
     return ()
 

@@ -10,7 +10,7 @@ matter.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -23,7 +23,13 @@ YIELDS = 2
 
 
 class MotionPlanning(Protocol):
-    """What the search needs to know of motions."""
+    """What the search needs to know of motions.
+
+    Attributes:
+        nodes: that have been looked at for all motions so far.
+    """
+
+    nodes: int
 
     def find(
         self,
@@ -79,22 +85,38 @@ def search_priorities(
     """
     robots = len(motions)
     conflict = np.stack([planning.conflicts(r, motions) for r in range(robots)])
-    stack = [_Node(np.zeros((robots, robots), bool), tuple(motions), conflict)]
-    for _ in range(most_nodes):
-        if not stack or halt[0]:
-            return None
-        node = stack.pop()
-        if not np.isfinite(node.conflict).any():
+    root = _Node(np.zeros((robots, robots), bool), tuple(motions), conflict)
+    stack: list[Iterator[_Node]] = [iter([root])]
+    while stack and most_nodes > 0 and not halt[0]:
+        node = next(stack[-1], None)
+        if node is None:
+            stack.pop()
+        elif not np.isfinite(node.conflict).any():
             return node.motions
-        first, second = divmod(int(node.conflict.argmin()), robots)
-        children = [
-            _with_priority(node, low, high, planning)
-            for low, high in ((first, second), (second, first))
-            if not node.above[high, low]
-        ]
-        found = [child for child in children if child is not None]
-        stack += sorted(found, key=lambda child: child.cost, reverse=True)
+        else:
+            stack.append(_children(node, planning))
+            most_nodes -= 1
     return None
+
+
+def _children(node: _Node, planning: MotionPlanning) -> Iterator[_Node]:
+    """Yield the nodes in which one of two robots in conflict has priority.
+
+    The one that takes longer has it first. The other order is looked at only where that
+    one leaves as many robots in conflict, or leads nowhere.
+    """
+    pair = divmod(int(node.conflict.argmin()), len(node.motions))
+    low, high = sorted(pair, key=lambda r: len(node.motions[r].control))
+    found = []
+    for one, other in ((low, high), (high, low)):
+        if node.above[other, one]:
+            continue
+        child = _with_priority(node, one, other, planning)
+        if child is not None and child.cost < node.cost:
+            yield child
+        elif child is not None:
+            found.append(child)
+    yield from sorted(found, key=lambda child: child.cost)
 
 
 def _with_priority(
@@ -151,3 +173,33 @@ def _giving_way(
             motions[high] = trial[high]
             return trial[low]
     return None
+
+
+def shortened(
+    motions: Sequence[Motion],
+    alone: Sequence[Motion],
+    planning: MotionPlanning,
+    halt: np.ndarray,
+) -> tuple[Motion, ...]:
+    """Return motions in which robots lose less time to each other.
+
+    Those that lose time move anew among all others, each once, the one that loses most
+    first, while less is searched than it took to find the motions.
+
+    Args:
+        motions: that have no conflicts.
+        alone: what robots would do without the others.
+        planning: finds motions.
+        halt: shape (1,); the search ends soon after it has turned true.
+    """
+    best, most = list(motions), 2 * planning.nodes
+    lost = {
+        r: len(motions[r].control) - len(one.control) for r, one in enumerate(alone)
+    }
+    for r in sorted(lost, key=lambda r: -lost[r]):
+        if lost[r] <= 0 or planning.nodes >= most or halt[0]:
+            break
+        found = planning.find(r, best, np.arange(len(best)) != r, yielding=True)
+        if found is not None and len(found.control) < len(best[r].control):
+            best[r] = found
+    return tuple(best)

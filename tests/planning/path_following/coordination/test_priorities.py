@@ -7,11 +7,15 @@ another one leaves later.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 
-from mrmg.planning.path_following.coordination.priorities import search_priorities
+from mrmg.planning.path_following.coordination.priorities import (
+    search_priorities,
+    shortened,
+)
 from mrmg.planning.path_following.tracking import Motion
 
 LONG = 40
@@ -22,6 +26,7 @@ class Crossing:
 
     def __init__(self, approach: Sequence[int], latest: Sequence[int]) -> None:
         self.approach, self.latest = approach, latest
+        self.nodes = 1
 
     def motion(self, r: int, delay: int) -> Motion:
         """Return robot r's motion that crosses `delay` steps later than it could."""
@@ -88,3 +93,26 @@ def test_halted_it_finds_nothing() -> None:
     planning = Crossing([3, 3], [5, 5])
     alone = [planning.motion(r, 0) for r in range(2)]
     assert search_priorities(alone, planning, 100, np.ones(1, bool)) is None
+
+
+def test_who_has_lost_time_for_nothing_moves_sooner() -> None:
+    planning = Crossing([3, 3, 3], [9, 9, 9])
+    alone = [planning.motion(r, 0) for r in range(3)]
+    late = [planning.motion(r, delay) for r, delay in enumerate([2, 0, 7])]
+    sooner = shortened(late, alone, planning, np.zeros(1, bool))
+    assert [len(motion.control) for motion in sooner] == [5, 3, 4]
+
+
+def test_the_second_order_is_looked_at_only_where_the_first_one_fails() -> None:
+    planning = Crossing([3, 3, 6, 6], [5, 5, 5, 5])
+    asked: list[int] = []
+    find = planning.find
+
+    def noted(r: int, *args: Any, **options: Any) -> Motion | None:
+        asked.append(r)
+        return find(r, *args, **options)
+
+    planning.find = noted  # type: ignore[method-assign]
+    alone = [planning.motion(r, 0) for r in range(4)]
+    assert search_priorities(alone, planning, 100, np.zeros(1, bool)) is not None
+    assert len(asked) == len(set(asked)) == 2
