@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from typing import TypedDict, Unpack
 
 import numpy as np
@@ -193,9 +194,6 @@ class _Planning:
         search.on_progress(0.1, "roadmap built")
         best = search.run()
         proof = None if best else search.proof(search.tours_missing)
-        if best is None and not proof:
-            problem, search = self._tightened(own, problem, search, proofs)
-            best = search.best
         if best is None:
             why = self._in_time(
                 partial(
@@ -221,22 +219,6 @@ class _Planning:
             ),
         )
 
-    def _tightened(
-        self, own: Scene, problem: Problem, search: Search, proofs: Proofs
-    ) -> tuple[Problem, Search]:
-        """Search with the least margins in narrow ground; return what counts then.
-
-        The paper's method has one search, of so many iterations.
-        """
-        if self.params.planner == GUIDED_TREE:
-            return problem, search
-        tight = self._in_time(partial(tightened, own, self.request.seed, self.params))
-        if tight is None:
-            return problem, search
-        again = self._search(tight, proofs)
-        again.run()
-        return (tight, again) if again.best else (problem, search)
-
     def _bounding(self, own: Scene) -> Future[None]:
         """Begin to prove bounds of the mission in its frame."""
         load_bounds(own.objective)  # what holds the interpreter's lock first
@@ -254,7 +236,16 @@ class _Planning:
         def attempt(number: int, halt: np.ndarray) -> Attempt:
             request = replace(self.request, number=number, halt=halt)
             found = self.planner(problem, request)
+            if not (found.plans or halt[0] or proof(not found.tours_found)):
+                found = self._tried_tightly(found, tight(), request)
             return on_the_map(found, problem, self.scene, self.params)
+
+        @cache
+        def tight() -> Problem | None:
+            if self.params.planner == GUIDED_TREE:  # it has one search, of so much work
+                return None
+            own = Frame.of(self.scene).scene(self.scene)
+            return tightened(own, self.request.seed, self.params)
 
         def proof(tours_missing: bool) -> str | None:
             unbounded = math.isinf(self.statistics.bounds.energy_J or 0.0)
@@ -270,6 +261,24 @@ class _Planning:
             on_improvement=self.options.get("on_improvement") or (lambda _: None),
             proof=proof,
             preference=Preference.of(self.scene),
+        )
+
+    def _tried_tightly(
+        self, failed: Attempt, problem: Problem | None, request: Request
+    ) -> Attempt:
+        """Return an attempt that keeps the least margins in narrow ground, if any is.
+
+        It follows one that has found no plan with the margins that are wanted.
+        """
+        if problem is None:
+            return failed
+        found = self.planner(problem, request)
+        return replace(
+            found,
+            routing_s=failed.routing_s + found.routing_s,
+            counts=Counter(failed.counts) + Counter(found.counts),
+            tours_found=failed.tours_found or found.tours_found,
+            blocked=failed.blocked or found.blocked,
         )
 
     def _in_time(self, call: Callable[[], Result]) -> Result | None:
