@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +17,7 @@ from mrmg import seeding
 from mrmg.compared import compared
 from mrmg.counted import counted
 from mrmg.planning import endings
+from mrmg.planning.attempt import Request
 from mrmg.planning.bound.joint_bound import Divisions
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.bound.tour_existence import NoTours, proof_of_no_tours
@@ -25,15 +27,22 @@ from mrmg.planning.feasibility import (
     proof_of_infeasibility,
     widest_gap,
 )
+from mrmg.planning.frame import Frame
 from mrmg.planning.halting import NEVER, Halted
 from mrmg.planning.meetings import narrowest_meeting
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.path_following.strategy import easiest
+from mrmg.planning.path_following.strategy import easiest, path_following
 from mrmg.planning.preference import TIME_MARGIN_S
 from mrmg.planning.problem.openings import passages_missing
-from mrmg.planning.problem.problem import Problem, unjoined_goals, unjoined_places
+from mrmg.planning.problem.problem import (
+    Problem,
+    state_mission,
+    unjoined_goals,
+    unjoined_places,
+)
 from mrmg.planning.problem.targets import finish_of
 from mrmg.planning.roadmap.roadmap import Roadmap
+from mrmg.planning.routers import find_router
 from mrmg.planning.routing.routing import solve_routing
 from mrmg.planning.routing.shortfall import MAX_SHARE, shortfall
 from mrmg.planning.search import Search
@@ -208,6 +217,12 @@ def _obstacle(
             limit_s=scene.time_limit_s,
             margin_s=TIME_MARGIN_S,
         )
+    rounds = search.statistics.counts.get("coordinated", 0)
+    searched = f", and {counted(rounds, 'search', 'searches')} for motions found none"
+    searched = searched if rounds else ""
+    headings = _headings_in_the_way(scene, params, seed)
+    if headings:
+        return endings.HEADINGS.reason(places=listed(headings), searched=searched)
     routing = solve_routing(
         easiest(problem, params).mission.routing,
         params.router,
@@ -216,12 +231,37 @@ def _obstacle(
     blocked = [search.blocked] if search.blocked else []
     if any(routing.tours) or not blocked:
         blocked.append(narrowest_meeting(problem, routing.tours))
-    rounds = search.statistics.counts.get("coordinated", 0)
-    searched = f", and {counted(rounds, 'search', 'searches')} for motions found none"
-    return endings.NO_PROGRESS.reason(
-        blocked="; ".join(blocked),
-        searched=searched if rounds else "",
+    return endings.NO_PROGRESS.reason(blocked="; ".join(blocked), searched=searched)
+
+
+def _headings_in_the_way(scene: Scene, params: PlannerParams, seed: int) -> list[str]:
+    """Return the places with headings, if one attempt without these finds a plan."""
+    goals = [goal.id for goal in scene.goals if goal.heading_rad is not None]
+    headed = [
+        robot.id
+        for robot in scene.robots
+        if robot.finish and robot.finish.heading_rad is not None
+    ]
+    if not goals + headed:
+        return []
+    free = replace(
+        scene,
+        goals=tuple(replace(goal, heading_rad=None) for goal in scene.goals),
+        robots=tuple(
+            replace(robot, finish=replace(robot.finish, heading_rad=None))
+            if robot.finish
+            else robot
+            for robot in scene.robots
+        ),
     )
+    problem = state_mission(Frame.of(free).scene(free), seed, params)
+    request = Request(
+        params=params,
+        router=find_router(replace(params.router, method="search")),
+        seed=seed,
+    )
+    found = path_following(problem, request)
+    return goals + [f"the finish of {name}" for name in headed] if found.plans else []
 
 
 def _missing_tours(problem: Problem, params: PlannerParams, seed: int) -> str:

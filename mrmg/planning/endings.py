@@ -117,6 +117,13 @@ NO_PROGRESS = Ending(
     PlanStatus.NO_PLAN_FOUND,
     "tours were found, but no plan along them: {blocked}{searched}",
 )
+HEADINGS = Ending(
+    "no motions to the headings",
+    PlanStatus.NO_PLAN_FOUND,
+    "tours were found, but no motions along them that get to {places} with the heading "
+    "wanted there{searched}; without headings there are some: other headings, a larger "
+    "heading_tolerance or more room to turn would help",
+)
 BUDGET_FOR_ROADMAP = Ending(
     "the budget ends with the roadmap",
     PlanStatus.TIMEOUT,
@@ -144,6 +151,7 @@ ENDINGS = (
     NO_TOURS_IN_TIME,
     LATE,
     NO_PROGRESS,
+    HEADINGS,
     BUDGET_FOR_ROADMAP,
     BUDGET_OVER,
 )

@@ -66,6 +66,13 @@ SWAP = {
 }
 """Two robots that must get past each other where there is no room for it."""
 
+LANE = {
+    "bounds": [0, 0, 30, 1.8],
+    "goals": [circle("east", 20, 0.9, 0.5)],
+    "robots": [car("r1", 8, 0.9, finish={**ends_at(27, 0.9), "heading": 3.1416})],
+}
+"""A car that must turn round where it is too narrow to."""
+
 NARROW = PlannerParams(trees=1)
 
 
@@ -165,6 +172,12 @@ ROWS = (
         endings.NO_PROGRESS,
         SWAP,
         ("no motions", "keep the robots apart", "r1 and r2 meet near", "2.40 m wide"),
+        NARROW,
+    ),
+    Row(
+        endings.HEADINGS,
+        LANE,
+        ("the finish of r1 with the heading wanted", "heading_tolerance"),
         NARROW,
     ),
     Row(endings.BUDGET_FOR_ROADMAP, {}, ("1e-06 s",), options=("--budget", "1e-6")),
