@@ -22,7 +22,7 @@ from mrmg import seeding
 from mrmg.planning.path_following import _tracking_kernels
 from mrmg.planning.path_following._following_kernels import Course
 from mrmg.planning.path_following.band import Path
-from mrmg.planning.path_following.coordination import _search_kernels
+from mrmg.planning.path_following.coordination import _search_kernels, priorities
 from mrmg.planning.path_following.coordination._motion_kernels import Traffic
 from mrmg.planning.path_following.coordination._node_kernels import (
     Nodes,
@@ -31,15 +31,11 @@ from mrmg.planning.path_following.coordination._node_kernels import (
     Task,
 )
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE, Fields
-from mrmg.planning.path_following.coordination.priorities import (
-    search_priorities,
-    shortened,
-)
 from mrmg.planning.path_following.coordination.tasks import (
     Round,
     guided,
+    horizon_steps,
     no_path,
-    stays_s,
     task_of,
 )
 from mrmg.planning.path_following.coordination.traffic import FleetTraffic
@@ -77,12 +73,6 @@ MOST_CURVE_NODES = 1500
 
 BRAKING_SHARE = 0.8
 """Share of the largest deceleration that it brakes with at the end."""
-
-SLOWEST = 4.0
-"""Motions may take so many times as long as way and stays do at full speed ..."""
-
-LEAST_STEPS = 1500
-"""... and so many steps more."""
 
 
 def rounds_of(number: int) -> Sequence[Round]:
@@ -290,7 +280,7 @@ def coordinated(
     robots = len(tours)
     drives = [None] * robots if drives is None else drives
     lasting = [0 if drive is None else len(drive.motion.control) for drive in drives]
-    horizon = max(_horizon(problem, tours, paths), 2 * max(lasting))
+    horizon = max(horizon_steps(problem, tours, paths), 2 * max(lasting))
     planning = _Planning(problem, tours, paths, drives, horizon)
     rng = seeding.stream(seed, "coordination")
     for now in rounds:
@@ -303,9 +293,9 @@ def coordinated(
                 return ()
         alone = [motion for motion in motions if motion is not None]
         planning.round = now
-        found = search_priorities(alone, planning, now.orders, halt)
+        found = priorities.search_priorities(alone, planning, now.orders, halt)
         if found is not None:
-            found = shortened(found, alone, planning, halt)
+            found = priorities.shortened(found, alone, planning, halt)
             return trajectories_of(problem, found)
     return ()
 
@@ -335,20 +325,3 @@ def trajectories_of(
             Trajectory(robot=robot.id, dt_s=problem.dt_s, state=state, control=control)
         )
     return tuple(trajectories)
-
-
-def _horizon(
-    problem: Problem, tours: Sequence[Sequence[int]], paths: Sequence[Path]
-) -> int:
-    """Return the steps that motions may take."""
-    mission = problem.mission
-    top = mission.fleet["limit"][:, 1]
-    spans_s, standing_s = [], 0.0
-    for r, (tour, path) in enumerate(zip(tours, paths, strict=True)):
-        way = np.vstack([problem.start[r, :2], mission.targets.center[list(tour)]])
-        straight_m = float(np.hypot(*np.diff(way, axis=0).T).sum())
-        longest_m = max(straight_m, float(path.way[-1]))
-        spans_s.append(longest_m / float(top[r]))
-        # One robot may have to wait for the stays of all others.
-        standing_s += max(float(stays_s(problem, r, tour).sum()), path.pause_s.sum())
-    return int((SLOWEST * max(spans_s) + standing_s) / problem.dt_s) + LEAST_STEPS

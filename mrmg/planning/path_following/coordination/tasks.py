@@ -45,6 +45,13 @@ LONG_HOLD_SHARE = 0.02
 """The same where robots wait for each other at stations, which takes minutes."""
 
 
+SLOWEST = 4.0
+"""Motions may take so many times as long as way and stays do at full speed ..."""
+
+LEAST_STEPS = 1500
+"""... and so many steps more."""
+
+
 def motion_steps(robot: np.ndarray, dt_s: float, fineness: float) -> int:
     """Return the number of steps that a robot's motions last."""
     way_m = MOTION_SHARE * 2.0 * float(robot["radius"]) / fineness
@@ -203,3 +210,20 @@ def poses_s(problem: Problem, r: int, task: Task, guide: Guide) -> np.ndarray:
         if np.isfinite(time_s):
             excess_s[: leg + 1] += max(0.0, time_s)
     return excess_s
+
+
+def horizon_steps(
+    problem: Problem, tours: Sequence[Sequence[int]], paths: Sequence[Path]
+) -> int:
+    """Return the steps that motions may take."""
+    mission = problem.mission
+    top = mission.fleet["limit"][:, 1]
+    spans_s, standing_s = [], 0.0
+    for r, (tour, path) in enumerate(zip(tours, paths, strict=True)):
+        way = np.vstack([problem.start[r, :2], mission.targets.center[list(tour)]])
+        straight_m = float(np.hypot(*np.diff(way, axis=0).T).sum())
+        longest_m = max(straight_m, float(path.way[-1]))
+        spans_s.append(longest_m / float(top[r]))
+        # One robot may have to wait for the stays of all others.
+        standing_s += max(float(stays_s(problem, r, tour).sum()), path.pause_s.sum())
+    return int((SLOWEST * max(spans_s) + standing_s) / problem.dt_s) + LEAST_STEPS
