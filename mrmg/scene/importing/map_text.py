@@ -22,6 +22,7 @@ from shapely.geometry import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.errors import Fault, SceneError
+from mrmg.scene.loading.yaml_text import read_text
 
 M_PER_CM = 0.01
 _POINTS_TAG = "MAP_POINTS"
@@ -57,13 +58,7 @@ def read_map(path: Path) -> RawMap:
     Raises:
         SceneError: naming every line that cannot be used.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise SceneError(str(path), [Fault("", "not a text file in UTF-8")]) from error
-    except OSError as error:
-        message = f"cannot be read ({error.strerror})"
-        raise SceneError(str(path), [Fault("", message)]) from error
+    text = read_text(path, source=str(path))
     lines = [(n + 1, line.strip()) for n, line in enumerate(text.splitlines())]
     lines = [(number, line) for number, line in lines if line]
     if not lines:
