@@ -258,14 +258,16 @@ def find_motion(search, nodes, room, start, control):
                     visit(search, nodes, room, a)
                 tries += 1
         copy_numbers(nodes.state[a], room.state[0])
+        follows = widened == 0 and 0 <= nodes.segment[a] < search.course.size[0]
+        if not follows:
+            wait(search, nodes, room, a)  # lists robots of its own
         nears = list_near(search, room, nodes.step[a])
-        if widened == 0 and 0 <= nodes.segment[a] < search.course.size[0]:
+        if follows:
             expand(search, nodes, room, a, TRACK, nears)
             later = value + WIDENING_SHARE * task.steps * search.dt
             entry = 2 * a + 1
             nodes.size[1] = push(nodes.key, nodes.entry, nodes.size[1], later, entry)
             continue
-        wait(search, nodes, room, a)
         for motion in range(HOLD, MOVE + motions):
             expand(search, nodes, room, a, motion, nears)
     if nodes.size[2] >= 0:  # the best there is, if not good enough to end sooner

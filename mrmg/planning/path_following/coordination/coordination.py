@@ -59,6 +59,10 @@ more than with regard to them, as all else depends on it."""
 FIRST_MOST = 300
 """Nodes of a robot's first search, at most."""
 
+UNTIMED_SHARE = 10
+"""Times as many nodes as else where costs-to-go do not know when the others are where,
+as in missions of many goals or on large maps."""
+
 YIELDING_WEIGHT = 1.1
 """Weight of its cost-to-go."""
 
@@ -194,7 +198,8 @@ class _Planning:
         costs = task.hold_share, task.soft_s / (task.steps * problem.dt_s)
         timed = self._fields.timed(r, tour, task.stay, traffic, costs)
         if timed is None:
-            yield along, course
+            most = min(UNTIMED_SHARE * along.most, ROUNDS[-1].most)
+            yield along._replace(most=most), course
         else:
             nowhere = no_path(problem, r)
             free = task_of(problem, r, tour, nowhere, now)._replace(

@@ -1,0 +1,67 @@
+"""The search for one robot's motion among others that move as given."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from mrmg.planning.path_following.coordination._node_kernels import Scratch, Setting
+from mrmg.planning.path_following.coordination._search_kernels import find_motion
+from mrmg.planning.path_following.coordination.coordination import (
+    ROUNDS,
+    empty_course,
+    empty_nodes,
+)
+from mrmg.planning.path_following.coordination.fields import Fields
+from mrmg.planning.path_following.coordination.tasks import guided, no_path, task_of
+from mrmg.planning.path_following.coordination.traffic import FleetTraffic
+from mrmg.planning.path_following.tracking import Motion, course_of
+from mrmg.planning.problem.problem import Problem
+from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
+from mrmg.scene.types import Scene
+
+HORIZON = 2000
+
+
+def test_near_robots_are_minded_where_a_wait_is_open(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    """One that stands in the way sets out later; another one is far away."""
+    poses = {"far": [4, 4, 0], "near": [15, 10, 0], "own": [6, 10, 0]}
+    robots = [{"id": name, "model": "car", "pose": at} for name, at in poses.items()]
+    goals = [{"id": "g", "circle": {"center": [24, 10], "radius": 1}}]
+    problem = state(yard(robots=robots, goals=goals), samples=50)
+    motions = [
+        Motion(np.tile(at, (200, 1)), np.zeros((199, 2))) for at in problem.start
+    ]
+    motions[1].state[190:, 1] += 0.05 * np.arange(10)  # it sets out
+    traffic = FleetTraffic(problem, HORIZON)
+    nowhere, above = no_path(problem, 2), np.array([False, True, False])
+    guide = Fields(problem).static(2, [0])
+    task = task_of(problem, 2, [0], nowhere, ROUNDS[0])
+    search = Setting(
+        own=problem.mission.fleet[2:],
+        spaces=problem.mission.spaces,
+        terrain=problem.mission.terrain,
+        targets=problem.mission.targets,
+        zones=problem.mission.zones,
+        course=course_of(problem, 2, nowhere),
+        traffic=traffic.around(2, [*motions[:2], None], above),
+        task=guided(problem, 2, task, nowhere, guide),
+        dt=problem.dt_s,
+    )
+    room = Scratch(
+        state=np.zeros((HORIZON + 1, 5)),
+        control=np.zeros((HORIZON, 2)),
+        corner=np.empty((2, MOST_CORNERS, 2)),
+        near=np.empty(3, np.int64),
+        curve=empty_course(100),
+    )
+    control = np.zeros((HORIZON, 2))
+    start = problem.start[2]
+    count, _ = find_motion(search, empty_nodes(task.most), room, start, control)
+    assert count > 0
+    own = problem.trajectory(2, control[:count])
+    found = [*motions[:2], Motion(own.state, own.control)]
+    assert traffic.conflicts(2, found)[1] == np.inf
