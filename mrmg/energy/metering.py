@@ -174,6 +174,19 @@ def find_visits(scene: Scene, motion: Motion, tour: Sequence[str]) -> tuple[Visi
     Raises:
         KeyError: if the tour names a target that the scene does not have.
     """
+    return visits_and_energy(scene, motion, tour)[0]
+
+
+def visits_and_energy(
+    scene: Scene, motion: Motion, tour: Sequence[str]
+) -> tuple[tuple[Visit, ...], np.ndarray, list[LedgerEntry]]:
+    """Return visits as `find_visits`, and what `battery_profile` and the ledger say.
+
+    Args:
+        scene: names the targets.
+        motion: planned or logged states of one robot.
+        tour: ids of goals and stations.
+    """
     visits: list[Visit] = []
     targets = {target.id: target for target in scene.targets()}
     step = 0
@@ -193,11 +206,13 @@ def find_visits(scene: Scene, motion: Motion, tour: Sequence[str]) -> tuple[Visi
                 energy_J=0.0,
             )
         )
-    arrival_J = _battery(scene, motion, visits)[1]
-    return tuple(
-        replace(visit, energy_J=energy_J)
-        for visit, energy_J in zip(visits, arrival_J, strict=True)
+    energy_J = step_energy_parts(scene, motion)
+    content_J, arrival_J = battery_content(scene, motion, energy_J.sum(axis=1), visits)
+    found = tuple(
+        replace(visit, energy_J=arrived_J)
+        for visit, arrived_J in zip(visits, arrival_J, strict=True)
     )
+    return found, content_J, leg_entries(motion.robot, energy_J, PARTS, visits)
 
 
 def battery_profile(
@@ -214,14 +229,8 @@ def battery_profile(
         motion: planned or logged states of one robot.
         visits: those of this robot count, others are passed over.
     """
-    return _battery(scene, motion, own_visits(motion, visits))[0]
-
-
-def _battery(
-    scene: Scene, motion: Motion, visits: Sequence[Visit]
-) -> tuple[np.ndarray, list[float]]:
     draw_J = step_energy_parts(scene, motion).sum(axis=1)
-    return battery_content(scene, motion, draw_J, visits)
+    return battery_content(scene, motion, draw_J, own_visits(motion, visits))[0]
 
 
 def battery_content(

@@ -8,7 +8,8 @@ from functools import cache
 from importlib.metadata import version
 
 from mrmg import extensions
-from mrmg.energy.metering import battery_profile, find_visits, plan_ledger
+from mrmg.energy.ledger import EnergyLedger, LedgerEntry
+from mrmg.energy.metering import battery_profile, find_visits, visits_and_energy
 from mrmg.energy.visits import crowded_stations
 from mrmg.planning.endings import listed
 from mrmg.planning.feasibility import energy_and_metres
@@ -37,15 +38,15 @@ def make_plan(
     """
     scene = problem.scene
     visits: list[Visit] = []
+    entries: list[LedgerEntry] = []
     for trajectory in trajectories:
-        own = find_visits(scene, trajectory, tours[trajectory.robot])
-        if len(own) < len(tours[trajectory.robot]):
-            return None
-        battery = scene.robot(trajectory.robot).battery
+        tour, battery = tours[trajectory.robot], scene.robot(trajectory.robot).battery
+        own, content_J, drawn = visits_and_energy(scene, trajectory, tour)
         least_J = battery.reserve_J + problem.soc_margin * battery.capacity_J
-        if battery_profile(scene, trajectory, own).min() < least_J:
+        if len(own) < len(tour) or content_J.min() < least_J:
             return None
         visits += own
+        entries += drawn
     ways = {item.robot: item.state[:, :2] for item in trajectories}
     if any(crowded_stations(scene, ways)):
         return None
@@ -68,7 +69,7 @@ def make_plan(
         ),
         tours=tours,
         visits=tuple(visits),
-        ledger=plan_ledger(scene, trajectories, visits),
+        ledger=EnergyLedger(tuple(entries)),
     )
 
 

@@ -72,11 +72,17 @@ def path_curvature(robot: np.ndarray) -> float:
 
 def inflated(cost_map: CostMap, place: np.ndarray) -> CostMap:
     """Return the surface with obstacles counted as nearer around a place."""
-    rows, columns = cost_map.distance.shape
-    x = cost_map.x_min + (np.arange(columns) + 0.5) * cost_map.cell - place[0]
-    y = cost_map.y_min + (np.arange(rows) + 0.5) * cost_map.cell - place[1]
-    near = np.maximum(0.0, 1.0 - np.hypot(x[None, :], y[:, None]) / INFLATION_REACH_M)
-    return cost_map._replace(distance=cost_map.distance - INFLATION_M * near)
+    distance = cost_map.distance.copy()
+    x, y = (
+        least + (np.arange(count) + 0.5) * cost_map.cell - at
+        for least, count, at in zip(
+            (cost_map.x_min, cost_map.y_min), distance.shape[::-1], place, strict=True
+        )
+    )
+    columns, rows = (np.flatnonzero(np.abs(off) < INFLATION_REACH_M) for off in (x, y))
+    far = np.hypot(x[None, columns], y[rows, None]) / INFLATION_REACH_M
+    distance[np.ix_(rows, columns)] -= INFLATION_M * np.maximum(0.0, 1.0 - far)
+    return cost_map._replace(distance=distance)
 
 
 def smooth_terrain(multiplier: np.ndarray) -> np.ndarray:

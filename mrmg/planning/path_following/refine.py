@@ -140,7 +140,9 @@ def drive_paths(
     for r, task in enumerate(tasks):
         if halt[0]:
             return FleetDrive(())
+        cost_map = task.cost_map
         drive, failure = _driven(problem, r, task)
+        task.cost_map = cost_map  # of the places that it was led round, maps are large
         if drive is None and failure:
             return FleetDrive((), failure)
         drives.append(drive)

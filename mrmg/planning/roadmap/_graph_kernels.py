@@ -53,27 +53,30 @@ def cheapest_paths(low, high, cost, start, edge, entry, entry_start):
     successor = np.full((targets, vertices), -1, np.int32)
     key = np.empty(2 * len(low) + len(entry) + 1)
     waiting = np.empty(len(key), np.int32)
-    done = np.empty(vertices, np.bool_)
+    # Neighbours, and the costs from there, side by side: memory is read in order.
+    neighbour, price = np.empty(len(edge), np.int32), np.empty(len(edge))
+    for v in range(vertices):
+        for k in range(start[v], start[v + 1]):
+            e = edge[k]
+            back = low[e] == v
+            neighbour[k] = high[e] if back else low[e]
+            price[k] = cost[e, 1 if back else 0]
     for t in range(targets):
-        done[:] = False
+        own, after = total[t], successor[t]
         size = 0
         for v in entry[entry_start[t] : entry_start[t + 1]]:
-            total[t, v] = 0.0
+            own[v] = 0.0
             size = push(key, waiting, size, 0.0, v)
         while size > 0:
-            v = waiting[0]
+            value, v = key[0], waiting[0]
             size = pop(key, waiting, size)
-            if done[v]:
+            if value > own[v]:
                 continue
-            done[v] = True
             for k in range(start[v], start[v + 1]):
-                e = edge[k]
-                back = low[e] == v
-                u = high[e] if back else low[e]
-                over = total[t, v] + cost[e, 1 if back else 0]
-                if over < total[t, u]:
-                    total[t, u] = over
-                    successor[t, u] = v
+                over, u = value + price[k], neighbour[k]
+                if over < own[u]:
+                    own[u] = over
+                    after[u] = v
                     size = push(key, waiting, size, over, u)
     return total, successor
 

@@ -129,8 +129,8 @@ def build_roadmap(
     return Roadmap(
         arrays=RoadmapArrays(
             vertex=vertex,
-            cost_to_go=np.stack([one.cost for one in paths]),
-            successor=np.stack([one.successor for one in paths]),
+            cost_to_go=_stacked([one.cost for one in paths]),
+            successor=_stacked([one.successor for one in paths]),
             slope_refund=np.array([slope.refund for slope in slopes]),
             buckets=_buckets(vertex, (x_min, y_min), (x_max, y_max), BUCKET_M),
         ),
@@ -206,6 +206,11 @@ def _cheapest_paths(
         energy=energy,
         distance=[energy[:, sources].min(axis=1) for sources in entries],
     )
+
+
+def _stacked(arrays: list[np.ndarray]) -> np.ndarray:
+    """Return arrays as one; a single one is not copied, as it may be large."""
+    return arrays[0][None] if len(arrays) == 1 else np.stack(arrays)
 
 
 def _with_potential(
