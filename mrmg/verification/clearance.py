@@ -216,14 +216,8 @@ class PairGap:
         separation = self._other.state[:, :2] - self._one.state[:, :2]
         models = (self._one.model, self._other.model)
         reach = sum(model.circumscribed_radius_m for model in models)
-        travel = self._travel(self._one) + self._travel(self._other)
+        travel = self._one.travel_m + self._other.travel_m
         return np.asarray(np.hypot(separation[:, 0], separation[:, 1]) - reach - travel)
-
-    @staticmethod
-    def _travel(footprint: SweptFootprint) -> np.ndarray:
-        after = np.abs(footprint.state[:, 3] + footprint.dt_s * footprint.control[:, 0])
-        fastest = np.maximum(np.abs(footprint.state[:, 3]), after)
-        return np.asarray(fastest * footprint.dt_s)
 
 
 def _hulls(start: np.ndarray, end: np.ndarray) -> np.ndarray:

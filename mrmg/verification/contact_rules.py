@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import combinations
 
 import numpy as np
 import shapely
@@ -19,7 +18,8 @@ from mrmg.verification.clearance import (
     PairGap,
     bounded_minimum,
 )
-from mrmg.verification.motion_rules import worst_of_runs
+from mrmg.verification.distances import boxes_apart_m
+from mrmg.verification.motion_rules import changing_steps, worst_of_runs
 from mrmg.verification.swept_footprint import SweptFootprint
 from mrmg.verification.verdict import Violation, ViolationKind
 
@@ -57,10 +57,8 @@ def _least_gap(gap: Gap, footprint: SweptFootprint) -> GapMinimum:
 
     Steps that are like the one before them are looked at only where there is contact.
     """
-    state, control = footprint.state, footprint.control
-    changed = (state[1:] != state[:-1]).any(axis=1)
-    changed |= (control[1:] != control[:-1]).any(axis=1)
-    distinct = np.flatnonzero(np.concatenate([[True], changed])[: len(control)])
+    control = footprint.control
+    distinct = np.flatnonzero(changing_steps(footprint.state, control))
     found = bounded_minimum(gap, distinct, footprint.dt_s)
     if len(found.contact_step) and len(distinct) < len(control):
         return bounded_minimum(gap, np.arange(len(control)), footprint.dt_s)
@@ -71,28 +69,33 @@ def check_robots(scene: Scene, trajectories: Sequence[Trajectory]) -> list[Conta
     """Return the contacts of every pair of robots.
 
     Of pairs that are farther apart than another pair comes to each other, the clearance
-    is what circles around their footprints are apart.
+    is what circles around their footprints, or boxes around their motions, are apart.
 
     Args:
         scene: gives the footprints.
         trajectories: of equal length, one per robot.
     """
     footprints = [
-        (item.robot, SweptFootprint.of(scene.robot(item.robot).model, item))
-        for item in trajectories
+        SweptFootprint.of(scene.robot(item.robot).model, item) for item in trajectories
     ]
-    pairs = list(combinations(footprints, 2))
-    gaps = [PairGap(one, another) for (_, one), (_, another) in pairs]
-    apart_m = [gap.least_apart_m() for gap in gaps]
-    contacts = [Contacts(clearance_m=least_m) for least_m in apart_m]
+    first, second = np.triu_indices(len(footprints), 1)
+    reach_m = np.array([one.reach_m for one in footprints])
+    apart_m = boxes_apart_m(trajectories) - reach_m[:, None] - reach_m
+    bounds_m = apart_m[first, second].tolist()
+    contacts = [Contacts(clearance_m=least_m) for least_m in bounds_m]
     nearest_m = np.inf
-    for i in np.argsort(apart_m, kind="stable").tolist():
-        if apart_m[i] > nearest_m:
+    for i in np.argsort(bounds_m, kind="stable").tolist():
+        if bounds_m[i] > nearest_m:
             break  # all others are farther apart
-        ((robot, one), (other, another)), gap = pairs[i], gaps[i]
-        touched = bounded_minimum(gap, gap.close_steps(), one.dt_s)
-        contacts[i] = _pair_contacts((robot, other), (one, another), touched)
-        nearest_m = min(nearest_m, contacts[i].clearance_m)
+        pair = footprints[first[i]], footprints[second[i]]
+        gap = PairGap(*pair)
+        least_m = gap.least_apart_m()
+        contacts[i] = Contacts(clearance_m=least_m)
+        if least_m <= nearest_m:
+            touched = bounded_minimum(gap, gap.close_steps(), pair[0].dt_s)
+            robot, other = (trajectories[k[i]].robot for k in (first, second))
+            contacts[i] = _pair_contacts((robot, other), pair, touched)
+            nearest_m = min(nearest_m, contacts[i].clearance_m)
     return contacts
 
 

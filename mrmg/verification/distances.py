@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
+from mrmg.plans import Trajectory
 from mrmg.scene.types import Robot, Scene
 
 
@@ -57,3 +58,11 @@ def robot_distance(robots: Sequence[Robot], poses: Sequence[np.ndarray]) -> np.n
             nearest[one] = np.minimum(nearest[one], apart)
             nearest[other] = np.minimum(nearest[other], apart)
     return nearest
+
+
+def boxes_apart_m(trajectories: Sequence[Trajectory]) -> np.ndarray:
+    """Return what boxes around reference points' motions are apart [m], (R, R)."""
+    points = [item.state[:, :2] for item in trajectories]
+    low, high = (np.array([f(own, axis=0) for own in points]) for f in (np.min, np.max))
+    gap = np.maximum(low[:, None] - high, low - high[:, None]).clip(min=0.0)
+    return np.asarray(np.hypot(gap[..., 0], gap[..., 1]))

@@ -15,7 +15,7 @@ import shapely
 from mrmg.plans import Plan, Trajectory
 from mrmg.scene.margins import certified_minimum_m
 from mrmg.scene.types import Scene
-from mrmg.verification.distances import obstacle_distance
+from mrmg.verification.distances import boxes_apart_m, obstacle_distance
 from mrmg.verification.motion_rules import violation_at, worst_of_runs
 from mrmg.verification.verdict import Violation, ViolationKind
 
@@ -27,6 +27,7 @@ def check_margins(scene: Scene, plan: Plan) -> list[Violation]:
     """Return where a plan keeps less than the margins it states."""
     violations = _stated_too_small(scene, plan)
     own = [item for item in plan.trajectories if item.robot in plan.margins]
+    reach_m = [scene.robot(item.robot).model.circumscribed_radius_m for item in own]
     for trajectory in own:
         robot = scene.robot(trajectory.robot)
         distance_m = obstacle_distance(scene, robot, trajectory.state)
@@ -39,8 +40,11 @@ def check_margins(scene: Scene, plan: Plan) -> list[Violation]:
                 )
                 needed_m[first : last + 1] = narrow.margin_m
         violations += _violations(trajectory, distance_m, needed_m, "an obstacle")
-    for one, other in combinations(own, 2):
+    boxes_m = boxes_apart_m(own) if own else np.zeros((0, 0))
+    for (i, one), (j, other) in combinations(enumerate(own), 2):
         spacing_m = max(plan.margins[item.robot][1] for item in (one, other))
+        if boxes_m[i, j] >= spacing_m + reach_m[i] + reach_m[j]:
+            continue
         distance_m = _distance_m(scene, one, other, spacing_m)
         needed_m = np.full(len(distance_m), spacing_m)
         violations += _violations(one, distance_m, needed_m, other.robot)

@@ -55,10 +55,7 @@ def _check_goals(scene: Scene, plan: Plan) -> list[Violation]:
     for goal in scene.goals:
         if goal.id in plan.skipped:
             continue  # the verdict names it
-        depths = [
-            (goal.region.depth(item.state[:, :2]), item) for item in plan.trajectories
-        ]
-        depth, trajectory = max(depths, key=lambda pair: float(pair[0].max()))
+        depth, trajectory = _deepest(plan, goal)
         step = int(depth.argmax())
         missed_m = -float(depth[step])
         if missed_m > 0.0:
@@ -74,11 +71,27 @@ def _check_goals(scene: Scene, plan: Plan) -> list[Violation]:
                 )
             )
             continue
-        askew = _check_heading(plan, goal)
+        askew = [] if goal.heading_rad is None else _check_heading(plan, goal)
         violations += askew
         if goal.dwell_s > 0.0 and not askew:
             violations += _check_dwell(plan, goal)
     return violations
+
+
+def _deepest(plan: Plan, goal: Goal) -> tuple[np.ndarray, Trajectory]:
+    """Return how deep in a goal the first robot that visits it is at each state.
+
+    Those that have it on their tours are looked at first. If nobody visits it, it is
+    the one that comes nearest.
+    """
+    found = []
+    for item in sorted(
+        plan.trajectories, key=lambda one: goal.id not in plan.tours[one.robot]
+    ):
+        found.append((goal.region.depth(item.state[:, :2]), item))
+        if found[-1][0].max() >= 0.0:
+            return found[-1]
+    return max(found, key=lambda pair: float(pair[0].max()))
 
 
 def _check_heading(plan: Plan, goal: Goal) -> list[Violation]:
@@ -91,7 +104,7 @@ def _check_heading(plan: Plan, goal: Goal) -> list[Violation]:
         best = min(best, (float(off_rad[step]), item, step), key=lambda one: one[0])
     off, trajectory, step = best
     excess = off - goal.heading_tolerance_rad
-    if goal.heading_rad is None or excess <= 0.0:
+    if excess <= 0.0:
         return []
     found, most = compared(off, goal.heading_tolerance_rad, 2)
     message = (

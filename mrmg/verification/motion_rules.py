@@ -136,17 +136,27 @@ def replay(model: RobotModel, trajectory: Trajectory) -> np.ndarray:
     """Return the state after each step, from the state before it, shape (n, 5).
 
     Runs the plain Python form of the motion model, one step at a time, so that a valid
-    plan is met bit for bit and a defect stays in its own step.
+    plan is met bit for bit and a defect stays in its own step. A step that is like the
+    one before it, as of a robot that stands, is not run again.
     """
     step = plain_step(model)
     length_m, dt_s = float(model.wheelbase_m), float(trajectory.dt_s)
-    states, controls = trajectory.state[:-1].tolist(), trajectory.control.tolist()
-    return np.array(
-        [
-            step(tuple(state), tuple(control), length_m, dt_s)
-            for state, control in zip(states, controls, strict=True)
-        ]
-    ).reshape(len(states), 5)
+    changes = changing_steps(trajectory.state[:-1], trajectory.control)
+    states, controls = (
+        rows[changes].tolist() for rows in (trajectory.state[:-1], trajectory.control)
+    )
+    found = [
+        step(tuple(state), tuple(control), length_m, dt_s)
+        for state, control in zip(states, controls, strict=True)
+    ]
+    return np.asarray(np.array(found).reshape(-1, 5)[np.cumsum(changes) - 1])
+
+
+def changing_steps(state: np.ndarray, control: np.ndarray) -> np.ndarray:
+    """Return which steps are not like the one before them, shape (n, k) -> (n,)."""
+    rows = np.concatenate([state, control], axis=1)
+    differs = (rows[1:] != rows[:-1]).any(axis=1)
+    return np.asarray(np.concatenate([[True], differs])[: len(rows)])
 
 
 def plain_step(model: RobotModel) -> Derivative:

@@ -56,6 +56,17 @@ class SweptFootprint:
             acceleration_m_s2=_acceleration_bound(model, trajectory),
         )
 
+    @property
+    def reach_m(self) -> float:
+        """Distance from the steps' positions within which the footprint stays [m]."""
+        return self.model.circumscribed_radius_m + float(self.travel_m.max(initial=0.0))
+
+    @property
+    def travel_m(self) -> np.ndarray:
+        """Way of the reference point in each step at most [m], shape (n,)."""
+        after = np.abs(self.state[:, 3] + self.dt_s * self.control[:, 0])
+        return np.asarray(np.maximum(np.abs(self.state[:, 3]), after) * self.dt_s)
+
     def states_at(self, step: np.ndarray, time_s: np.ndarray) -> np.ndarray:
         """Return the states `time_s` after the start of each step, shape (k, 5)."""
         return _states_after(self.model, self.state[step], self.control[step], time_s)
