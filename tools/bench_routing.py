@@ -193,7 +193,7 @@ def uneven_mission(
         way = np.minimum(way, way[:, k : k + 1] + way[k : k + 1])
     plain = rng.uniform(80.0, 120.0, robots)
     capacity = plain * rng.uniform(*range_m, robots)
-    return routing_arrays(
+    problem = routing_arrays(
         goals=goals,
         distance=np.repeat(way[None, :targets, :targets], robots, axis=0),
         start_distance=way[targets:, :targets],
@@ -201,8 +201,10 @@ def uneven_mission(
         energy=capacity * rng.uniform(0.5, 1.0, robots),
         capacity=capacity,
         reserve=0.05 * capacity,
-        open_goal=None if open_goal is None else np.array(open_goal),
     )
+    if open_goal is None:
+        return problem
+    return problem._replace(open_goal=np.array(open_goal))
 
 
 def compared(

@@ -11,9 +11,8 @@ from mrmg import seeding
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.problem.problem import Problem
-from mrmg.planning.routers import Router
+from mrmg.planning.routers import Router, solve
 from mrmg.planning.routing.routing import Routing
-from mrmg.planning.routing.routing_problem import RoutingProblem
 from mrmg.plans import Plan, Trajectory
 
 
@@ -56,7 +55,7 @@ class Request:
         """
         if seed is None:
             seed = self.stream_seed("tours")
-        return self.router(RoutingProblem.of(problem.mission.routing), seed)
+        return solve(self.router, problem.mission.routing, seed)
 
     def plan(
         self,

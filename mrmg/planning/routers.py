@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Protocol
 
 from mrmg import extensions
 from mrmg.planning.bound.exact_tours import exact_routing
-from mrmg.planning.routing.routing import RouterParams, Routing, solve_routing
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays, with_own_tables
+from mrmg.planning.routing.routing import (
+    RouterParams,
+    Routing,
+    solve_routing,
+)
 from mrmg.planning.routing.routing_problem import RoutingProblem, faults_of_tours
 
 
@@ -26,26 +30,51 @@ class Router(Protocol):
         """Return tours, of infinite cost if none were found."""
 
 
-def search(params: RouterParams, problem: RoutingProblem, seed: int) -> Routing:
+@dataclass(frozen=True, slots=True)
+class BuiltInRouter:
+    """A router of this package, which also takes the arrays of its kernels.
+
+    Robots alike may share their legs in these; a `RoutingProblem` has them for each.
+    """
+
+    params: RouterParams
+
+    def __call__(self, problem: RoutingProblem, seed: int) -> Routing:
+        """Return tours, of infinite cost if none were found."""
+        return self.solve(problem.arrays, seed)
+
+    def solve(self, problem: RoutingArrays, seed: int) -> Routing:
+        """Return the same for the arrays of kernels."""
+        return ROUTERS[self.params.method](self.params, problem, seed)
+
+
+def solve(router: Router, problem: RoutingArrays, seed: int) -> Routing:
+    """Return any router's tours for the arrays of kernels."""
+    if isinstance(router, BuiltInRouter):
+        return router.solve(problem, seed)
+    return router(RoutingProblem.of(problem), seed)
+
+
+def search(params: RouterParams, problem: RoutingArrays, seed: int) -> Routing:
     """Find tours by ruin and recreate."""
-    return solve_routing(problem.arrays, params, seed)
+    return solve_routing(problem, params, seed)
 
 
-def nrpa(params: RouterParams, problem: RoutingProblem, seed: int) -> Routing:
+def nrpa(params: RouterParams, problem: RoutingArrays, seed: int) -> Routing:
     """Find tours by nested rollout policy adaptation alone."""
-    return solve_routing(problem.arrays, replace(params, rounds=0), seed)
+    return solve_routing(problem, replace(params, rounds=0), seed)
 
 
-def exact(params: RouterParams, problem: RoutingProblem, seed: int) -> Routing:
+def exact(params: RouterParams, problem: RoutingArrays, seed: int) -> Routing:
     """Return the cheapest tours, or those of `search` where `exact_routing` has none.
 
     It has none where the mission is too large, or has an option that it does not know.
     """
-    best = exact_routing(problem.arrays)
+    best = exact_routing(with_own_tables(problem))
     return search(params, problem, seed) if best is None else best
 
 
-ROUTERS: Mapping[str, Callable[[RouterParams, RoutingProblem, int], Routing]] = (
+ROUTERS: Mapping[str, Callable[[RouterParams, RoutingArrays, int], Routing]] = (
     MappingProxyType({"search": search, "nrpa": nrpa, "exact": exact})
 )
 """The routers of this package by name."""
@@ -59,7 +88,7 @@ def find_router(params: RouterParams) -> Router:
         MachineError: if the package that adds it is broken.
     """
     if params.method in ROUTERS:
-        return partial(ROUTERS[params.method], params)
+        return BuiltInRouter(params)
     return checked(extensions.load(extensions.ROUTERS, params.method), params.method)
 
 

@@ -105,9 +105,12 @@ def lower_bound_J(
     """
     if not scene.goals:
         return 0.0
-    relaxed = Relaxation.of(scene, step_s=step_s, cells=cells, halt=halt)
+    few = are_few(len(scene.goals), len(scene.robots))
+    relaxed = Relaxation.of(
+        scene, step_s=step_s, cells=cells, shared=not few, halt=halt
+    )
     problem = relaxed.problem
-    if not are_few(len(scene.goals), len(scene.robots)):
+    if not few:
         bound = relaxed_routing_J(problem)
     else:
         routing = exact_routing(problem)
@@ -154,6 +157,7 @@ class Relaxation:
         step_s: float = 0.1,
         cells: int = CELLS,
         with_finishes: bool = False,
+        shared: bool = False,
         halt: np.ndarray = NEVER,
     ) -> Relaxation:
         """Relax a mission.
@@ -166,6 +170,7 @@ class Relaxation:
             step_s: time step of its plans.
             cells: cells of the grid on which ways are bounded.
             with_finishes: whether tours lead on to where robots must end.
+            shared: whether robots alike share their legs.
             halt: shape (1,); it is given up once it has turned true.
 
         Raises:
@@ -179,20 +184,27 @@ class Relaxation:
         ways = _ways_by_key(scene, step_s, cells, regions, halt)
         batteries = [robot.battery for robot in scene.robots]
         price = [r.model.energy_model.plain_ground_J_per_m() for r in scene.robots]
-        leg = np.stack([ways[key].between for key in keys])
+        full_J = [_relaxed_full_J(scene, one) for one in scene.robots]
+        reserve_J = [battery.reserve_J - 1e-3 for battery in batteries]
+        alike = [0 if shared else r for r in range(len(keys))]
+        kinds = list(zip(keys, price, full_J, reserve_J, alike, strict=True))
+        distinct = list(dict.fromkeys(kinds))
         first = np.stack([ways[key].from_start[r] for r, key in enumerate(keys)])
         last = np.zeros((len(keys), targets + 1))
         for place, r in enumerate(ends if with_finishes else (), start=targets):
-            last[r] = [*leg[r, :targets, place], first[r, place]]
+            last[r] = [*ways[keys[r]].between[:targets, place], first[r, place]]
         problem = routing_arrays(
             goals=len(scene.goals),
-            distance=leg[:, :targets, :targets],
+            distance=np.stack(
+                [ways[k].between[:targets, :targets] for k, *_ in distinct]
+            ),
             start_distance=first[:, :targets],
             finish_distance=last,
             plain=np.array(price),
+            table=np.array([distinct.index(kind) for kind in kinds]),
             energy=np.array([_relaxed_start_J(scene, one) for one in scene.robots]),
-            capacity=np.array([_relaxed_full_J(scene, one) for one in scene.robots]),
-            reserve=np.array([battery.reserve_J - 1e-3 for battery in batteries]),
+            capacity=np.array(full_J),
+            reserve=np.array(reserve_J),
         )
         return Relaxation(scene, step_s, problem, keys, ways, np.array(price))
 
@@ -288,11 +300,12 @@ def relaxed_routing_J(problem: RoutingArrays) -> float:
     if not len(goal_list):
         return 0.0
     usable = np.array([problem.capacity, problem.energy]) - problem.reserve
-    most = np.broadcast_to(usable[0, :, None, None], problem.cost.shape).copy()
-    most[:, start] = usable[1, :, None]
+    owner = np.unique(problem.table, return_index=True)[1]
+    most = np.broadcast_to(usable[0, owner, None, None], problem.cost.shape).copy()
+    most[problem.table, problem.home] = usable[1, :, None]
     legs = np.where(problem.cost <= most, problem.cost, np.inf)
     legs = over_stations(legs, range(goals, start))[..., goal_list]
     between = np.min(legs[:, goal_list], axis=0)
     symmetric = np.ascontiguousarray(np.minimum(between, between.T))
-    first = np.ascontiguousarray(legs[:, start])
+    first = np.ascontiguousarray(legs[problem.table, problem.home])
     return float(_bound_kernels.spanning_bound(symmetric, first, SPANNING_ROUNDS))

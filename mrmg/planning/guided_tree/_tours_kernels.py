@@ -96,6 +96,8 @@ def _routing_from(setting, rules, tree, state, energy, region, visited):
         problem.charge_power,
         problem.energy_weight,
         problem.makespan_weight,
+        problem.table,
+        problem.home,
     )
 
 

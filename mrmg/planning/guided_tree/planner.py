@@ -26,6 +26,7 @@ from mrmg.planning.guided_tree._tree_kernels import (
 from mrmg.planning.parameters import BETA_SHARE, GuidedTreeParams, PlannerParams
 from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.problem.problem import Problem
+from mrmg.planning.routing._nrpa_kernels import with_own_tables
 from mrmg.plans import Trajectory
 from mrmg.scene.types import Scene
 
@@ -129,7 +130,7 @@ def setting_of(problem: Problem) -> Setting:
         targets=mission.targets,
         roadmap=roadmap,
         joined=paths.any(axis=1) | (paths.shape[1] == 0),  # without targets, all
-        routing=mission.routing,
+        routing=with_own_tables(mission.routing),
     )
 
 

@@ -313,10 +313,12 @@ def _drawn_tours(
     for draw in draws:
         varied = problem.with_margin(draw.surcharge)
         arrays = varied.mission.routing
+        places = arrays.cost.shape[2]
         noise = seeding.stream(request.seed, "costs", draw.number).standard_normal(
-            arrays.cost.shape[1:]
+            (places + 1, places)
         )
-        factor = np.exp(draw.spread * noise)
+        rows = np.minimum(np.arange(arrays.cost.shape[1]), places)
+        factor = np.exp(draw.spread * noise[rows])
         arrays = arrays._replace(cost=arrays.cost * factor, time=arrays.time * factor)
         varied = replace(varied, mission=varied.mission._replace(routing=arrays))
         seed = seeding.stream_seed(request.seed, "tours", draw.number)

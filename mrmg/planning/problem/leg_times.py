@@ -11,6 +11,7 @@ from mrmg.planning.preference import Preference
 from mrmg.planning.problem.targets import finish_of
 from mrmg.planning.problem.time_weighting import way_lengths_m
 from mrmg.planning.roadmap.roadmap import Roadmap
+from mrmg.planning.routing.routing import homes
 from mrmg.scene.types import Scene
 
 TIE_SHARE = 0.01
@@ -22,7 +23,7 @@ class Times(NamedTuple):
     """The part of a routing problem that is about time; see `RoutingArrays`.
 
     Attributes:
-        time: from place to target, with the dwell there [s], shape (R, T + 1, T).
+        time: from place to target, with the dwell there [s], shape (C, T + H, T).
         finish_time: from place to finish [s], shape (R, T + 1).
         limit: longest time of a route [s], shape (R,).
         charge_power: at which batteries are filled [W], shape (R,).
@@ -39,7 +40,12 @@ class Times(NamedTuple):
 
 
 def routing_times(
-    scene: Scene, roadmap: Roadmap, fleet: np.ndarray, dwell: np.ndarray, margin: float
+    scene: Scene,
+    roadmap: Roadmap,
+    fleet: np.ndarray,
+    table: np.ndarray,
+    dwell: np.ndarray,
+    margin: float,
 ) -> Times | None:
     """Return the times of a mission's legs, or None if time does not matter.
 
@@ -49,6 +55,7 @@ def routing_times(
         scene: the mission.
         roadmap: its roadmap.
         fleet: records of FLEET, shape (R,).
+        table: of each robot, as of `routing_arrays`.
         dwell: how long robots stay at each target [s].
         margin: surcharge on times, for what the roadmap does not see.
     """
@@ -58,7 +65,8 @@ def routing_times(
     places, robots = len(scene.targets()), len(fleet)
     length = way_lengths_m(roadmap)
     pace = (1.0 + margin) / fleet["limit"][:, 1]
-    time = np.zeros((robots, places + 1, places))
+    home = homes(table, places)
+    time = np.zeros((int(table.max()) + 1, int(home.max()) + 1, places))
     finish_time = np.zeros((robots, places + 1))
     for r, finish in enumerate(finish_of(scene)):
         field = fleet[r]["field"]
@@ -68,7 +76,8 @@ def routing_times(
             np.isfinite(to[:, :-1]), to[:, :-1], roadmap.distance[field].T
         )
         here = [*range(places), -1]
-        time[r] = pace[r] * to[:places, here].T + dwell[:places]
+        legs = pace[r] * to[:places, here].T + dwell[:places]
+        time[table[r], :places], time[table[r], home[r]] = legs[:-1], legs[-1]
         if finish >= 0:
             finish_time[r] = pace[r] * to[finish, here]
     objective = preference.objective

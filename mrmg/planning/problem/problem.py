@@ -198,7 +198,11 @@ def state_problem(
     stay_m = idle_m[:, None] * targets.dwell[:places]
     last_leg = _last_legs(scene, roadmap, fleet)
     energy = np.array([robot.battery.start_J for robot in scene.robots])
-    times = routing_times(scene, roadmap, fleet, targets.dwell, params.route_margin)
+    table = tables_of(fleet)
+    owner = np.unique(table, return_index=True)[1]
+    times = routing_times(
+        scene, roadmap, fleet, table, targets.dwell, params.route_margin
+    )
     start = np.zeros((len(scene.robots), 5))
     start[:, :3] = [robot.pose for robot in scene.robots]
     mission = Mission(
@@ -210,10 +214,11 @@ def state_problem(
         zones=gate_arrays(scene),
         routing=routing_arrays(
             goals=len(scene.goals),
-            distance=roadmap.distance[fleet["field"], :places, :places]
-            + stay_m[:, None],
+            distance=roadmap.distance[fleet["field"][owner], :places, :places]
+            + stay_m[owner, None],
             start_distance=roadmap.start_distance[:, :places] + stay_m,
             plain=fleet["plain"] * (1.0 + params.route_margin),
+            table=table,
             energy=energy,
             capacity=fleet["capacity"],
             reserve=fleet["reserve"],
@@ -230,6 +235,14 @@ def state_problem(
         dt_s=params.dt_s,
         route_margin=params.route_margin,
     )
+
+
+def tables_of(fleet: np.ndarray) -> np.ndarray:
+    """Return a number for each robot; equal ones have the same legs and batteries."""
+    deciding = ("field", "plain", "energy", "limit", "capacity", "reserve", "charge")
+    columns = [np.asarray(fleet[name]).reshape(len(fleet), -1) for name in deciding]
+    kinds = np.unique(np.concatenate(columns, axis=1), axis=0, return_inverse=True)[1]
+    return np.asarray(kinds).reshape(-1)
 
 
 def _last_legs(scene: Scene, roadmap: Roadmap, fleet: np.ndarray) -> np.ndarray:

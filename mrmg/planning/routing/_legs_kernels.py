@@ -59,17 +59,13 @@ class Legs(NamedTuple):
 
 def new_legs(problem: RoutingArrays) -> Legs:
     """Return the legs of a routing problem."""
-    robots, _, targets = problem.cost.shape
+    robots, targets = len(problem.energy), problem.cost.shape[2]
     goals, stations = problem.goals, targets - problem.goals
-    table, home = _shared_tables(problem)
-    tables, places = int(table.max()) + 1, int(home.max()) + 1
+    table, home = problem.table, problem.home
+    tables, places = problem.cost.shape[:2]
     cost = np.full((tables, places, places), np.inf)
     time = np.zeros_like(cost)
-    for r in np.flatnonzero(home == targets):
-        cost[table[r], :targets, :targets] = problem.cost[r, :targets]
-        time[table[r], :targets, :targets] = problem.time[r, :targets]
-    cost[table, home, :targets] = problem.cost[:, targets]
-    time[table, home, :targets] = problem.time[:, targets]
+    cost[:, :, :targets], time[:, :, :targets] = problem.cost, problem.time
     cost[table, :targets, home] = problem.finish[:, :targets]
     time[table, :targets, home] = problem.finish_time[:, :targets]
     cost[table, home, home] = problem.finish[:, targets]
@@ -117,30 +113,6 @@ def new_legs(problem: RoutingArrays) -> Legs:
         problem.energy_weight,
         problem.makespan_weight,
     )
-
-
-def _shared_tables(problem: RoutingArrays) -> tuple[np.ndarray, np.ndarray]:
-    """Return each robot's table and home.
-
-    Robots share a table if legs between targets, and batteries, are the same.
-    """
-    robots, _, targets = problem.cost.shape
-    battery = np.stack([problem.capacity - problem.reserve, problem.charge_power], 1)
-    first: list[int] = []
-    table, home = np.zeros(robots, np.int64), np.zeros(robots, np.int64)
-    for r in range(robots):
-        alike = (
-            k
-            for k, q in enumerate(first)
-            if np.array_equal(battery[q], battery[r])
-            and np.array_equal(problem.cost[q, :targets], problem.cost[r, :targets])
-            and np.array_equal(problem.time[q, :targets], problem.time[r, :targets])
-        )
-        table[r] = next(alike, len(first))
-        if table[r] == len(first):
-            first.append(r)
-        home[r] = targets + np.count_nonzero(table[:r] == table[r])
-    return table, home
 
 
 @kernel

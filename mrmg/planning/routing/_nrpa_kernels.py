@@ -23,7 +23,8 @@ class RoutingArrays(NamedTuple):
 
     Attributes:
         goals: number of goals G.
-        cost: energy from place to target, shape (R, T + 1, T); row T is the start.
+        cost: energy from place to target, shape (C, T + H, T); the last H rows are
+            homes.
         energy: energy at the start, shape (R,).
         capacity, reserve: shape (R,).
         escape: energy from a target to where a robot is safe: the nearest station, or
@@ -31,12 +32,15 @@ class RoutingArrays(NamedTuple):
         open_goal: which goals are to be visited, shape (G,).
         finish: energy from place to a robot's finish, 0 where routes are open, inf
             where there is no way, shape (R, T + 1).
-        time: from place to target, with the dwell there [s], shape (R, T + 1, T).
+        time: from place to target, with the dwell there [s], shape (C, T + H, T).
         finish_time: from place to finish [s], shape (R, T + 1).
         limit: longest time of a route [s], shape (R,).
         charge_power: at which batteries are filled [W], inf for at once, shape (R,).
         energy_weight: of the summed energy in the objective.
         makespan_weight: of the longest time of a route in the objective [J/s].
+        table: of each robot, among C tables of legs; NRPA wants one for each, shape
+            (R,).
+        home: each robot's start among the places of its table, shape (R,).
     """
 
     goals: int
@@ -53,6 +57,8 @@ class RoutingArrays(NamedTuple):
     charge_power: np.ndarray
     energy_weight: float
     makespan_weight: float
+    table: np.ndarray
+    home: np.ndarray
 
 
 class Fleet(NamedTuple):
@@ -71,6 +77,21 @@ class Fleet(NamedTuple):
     clock: np.ndarray
     refuelled: np.ndarray
     unvisited: np.ndarray
+
+
+def with_own_tables(problem: RoutingArrays) -> RoutingArrays:
+    """Return the same problem with a table of legs for each robot."""
+    robots, targets = len(problem.energy), problem.cost.shape[2]
+    if np.array_equal(problem.table, np.arange(robots)):
+        return problem
+    rows = [np.r_[:targets, home] for home in problem.home]
+    pairs = list(zip(problem.table, rows, strict=True))
+    return problem._replace(
+        table=np.arange(robots),
+        home=np.full(robots, targets),
+        cost=np.stack([problem.cost[k, own] for k, own in pairs]),
+        time=np.stack([problem.time[k, own] for k, own in pairs]),
+    )
 
 
 @kernel

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrmg.planning.routing._legs_kernels import new_legs
-from mrmg.planning.routing._nrpa_kernels import RoutingArrays, nrpa
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays, nrpa, with_own_tables
 from mrmg.planning.routing._pool_kernels import new_pool
 from mrmg.planning.routing._refuel_kernels import new_labels
 from mrmg.planning.routing._routes_kernels import IMPOSSIBLE, Routes, new_routes
@@ -68,10 +68,10 @@ def routing_arrays(
     distance: np.ndarray,
     start_distance: np.ndarray,
     plain: np.ndarray,
+    table: np.ndarray | None = None,
     energy: np.ndarray,
     capacity: np.ndarray,
     reserve: np.ndarray,
-    open_goal: np.ndarray | None = None,
     finish_distance: np.ndarray | None = None,
     time: np.ndarray | None = None,
     finish_time: np.ndarray | None = None,
@@ -84,17 +84,16 @@ def routing_arrays(
 
     Args:
         goals: number of goals G among the targets.
-        distance: weighted length from target to target [m], shape (R, T, T).
+        distance: weighted length from target to target [m], shape (C, T, T).
         start_distance: from each robot to each target [m], shape (R, T).
         plain: energy per metre of plain ground [J/m], shape (R,).
+        table: of each robot among the C, for robots alike; each has its own if None.
         energy: energy now [J], shape (R,).
         capacity: [J], shape (R,).
         reserve: [J], shape (R,).
-        open_goal: which goals are still to be visited; all if None.
         finish_distance: from each target, and last from its start, to each robot's
             finish [m], shape (R, T + 1); inf for no way, 0 (or None) to end anywhere.
-        time: from each target, and last from the start, to each target with the dwell
-            there [s], shape (R, T + 1, T); nothing takes time if None.
+        time: from place to target with the dwell there [s], as `cost`; 0 if None.
         finish_time: from there to the finish [s], shape (R, T + 1); 0 if None.
         limit: longest time of each robot's route [s], shape (R,); none if None.
         charge_power: of stations for each battery [W], shape (R,); at once if None.
@@ -102,18 +101,17 @@ def routing_arrays(
         makespan_weight: of the longest time of a route in the objective [J/s].
     """
     robots, targets = start_distance.shape
-    metres = np.concatenate([distance, start_distance[:, None, :]], axis=1)
-    cost = np.ascontiguousarray(metres * plain[:, None, None])
+    table = np.arange(robots) if table is None else table
+    cost = _costs(distance, start_distance, plain, table)
     finish = _filled(finish_distance, 0.0, (robots, targets + 1)) * plain[:, None]
     return RoutingArrays(
         goals=goals,
         cost=cost,
-        # Contiguous, or kernels would be compiled anew for columns of a record array.
-        energy=np.ascontiguousarray(energy, dtype=float),
-        capacity=np.ascontiguousarray(capacity, dtype=float),
-        reserve=np.ascontiguousarray(reserve, dtype=float),
-        escape=_escape(cost, finish, goals),
-        open_goal=np.ones(goals, bool) if open_goal is None else open_goal,
+        energy=_filled(energy, 0.0, (robots,)),
+        capacity=_filled(capacity, 0.0, (robots,)),
+        reserve=_filled(reserve, 0.0, (robots,)),
+        escape=_escape(cost[:, :targets, goals:], table, finish),
+        open_goal=np.ones(goals, bool),
         finish=finish,
         time=_filled(time, 0.0, cost.shape),
         finish_time=_filled(finish_time, 0.0, finish.shape),
@@ -121,17 +119,41 @@ def routing_arrays(
         charge_power=_filled(charge_power, np.inf, (robots,)),
         energy_weight=float(energy_weight),
         makespan_weight=float(makespan_weight),
+        table=table,
+        home=homes(table, targets),
     )
 
 
-def _escape(cost: np.ndarray, finish: np.ndarray, goals: int) -> np.ndarray:
+def _costs(
+    distance: np.ndarray,
+    start_distance: np.ndarray,
+    plain: np.ndarray,
+    table: np.ndarray,
+) -> np.ndarray:
+    """Return the energies of all legs, homes behind targets, shape (C, T + H, T)."""
+    targets = start_distance.shape[1]
+    home, owner = homes(table, targets), np.unique(table, return_index=True)[1]
+    cost = np.full((len(distance), int(home.max()) + 1, targets), np.inf)
+    cost[:, :targets] = distance * plain[owner, None, None]
+    cost[table, home] = start_distance * plain[:, None]
+    return cost
+
+
+def homes(table: np.ndarray, targets: int) -> np.ndarray:
+    """Return the place of each robot's start in its table, behind all targets."""
+    before = np.tril(table[:, None] == table, -1)
+    return np.asarray(targets + before.sum(axis=1))
+
+
+def _escape(
+    to_station: np.ndarray, table: np.ndarray, finish: np.ndarray
+) -> np.ndarray:
     """Return the energy from each target to the nearest place of safety, (R, T)."""
-    to_station = cost[:, :-1, goals:]
     if not to_station.shape[2]:
         return np.ascontiguousarray(finish[:, :-1])
-    nearest = np.asarray(to_station.min(axis=2))
+    nearest = np.asarray(to_station.min(axis=2))[table]
     closed = finish.any(axis=1, keepdims=True)
-    return np.where(closed, np.minimum(nearest, finish[:, :-1]), nearest)
+    return np.asarray(np.where(closed, np.minimum(nearest, finish[:, :-1]), nearest))
 
 
 def _filled(
@@ -139,6 +161,7 @@ def _filled(
 ) -> np.ndarray:
     if values is None:
         return np.full(shape, otherwise)
+    # Contiguous, or kernels would be compiled anew for columns of a record array.
     return np.ascontiguousarray(values, dtype=float)
 
 
@@ -177,6 +200,7 @@ def _play_out(
     problem: RoutingArrays, params: RouterParams, random: np.ndarray, routes: Routes
 ) -> None:
     """Write the goals of NRPA's best playout as routes."""
+    problem = with_own_tables(problem)
     robots, _, targets = problem.cost.shape
     sequence = np.zeros(3 * problem.goals + 4 * robots, np.int64)
     _, moves = nrpa(

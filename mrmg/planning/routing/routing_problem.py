@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays, with_own_tables
 from mrmg.planning.routing.routing import Routing
+
+OF_TABLES = ("table", "home")
+"""Last fields of `RoutingArrays`, which routers outside this package do without."""
 
 ROUNDING = 1e-6
 """Share by which sums of energies and times may differ."""
@@ -62,7 +65,8 @@ class RoutingProblem:
     def of(arrays: RoutingArrays) -> RoutingProblem:
         """Return the problem that kernels have as `arrays`, in the same order."""
         names = (each.name for each in fields(RoutingProblem))
-        own: dict[str, Any] = dict(zip(names, arrays, strict=True))
+        values = with_own_tables(arrays)[: -len(OF_TABLES)]
+        own: dict[str, Any] = dict(zip(names, values, strict=True))
         for name, value in own.items():
             if isinstance(value, np.ndarray):
                 own[name] = value.view()
@@ -73,6 +77,7 @@ class RoutingProblem:
     def arrays(self) -> RoutingArrays:
         """The problem for kernels: copies that may be written."""
         own: list[Any] = [getattr(self, each.name) for each in fields(self)]
+        own += [np.arange(self.robots), np.full(self.robots, self.targets)]
         return RoutingArrays._make(
             each.copy() if isinstance(each, np.ndarray) else each for each in own
         )

@@ -17,6 +17,7 @@ from mrmg.motion.dynamics import car_derivative, rk4_step
 from mrmg.planning.guided_tree.planner import Growth, grow_guided_tree
 from mrmg.planning.parameters import GuidedTreeParams, PlannerParams, paper_params
 from mrmg.planning.problem.problem import Problem, state_mission
+from mrmg.planning.routing._nrpa_kernels import with_own_tables
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 
@@ -81,7 +82,7 @@ class Replay:
         self.groups = tree.groups
         self.roadmap = recording.problem.roadmap.arrays
         self.fleet = recording.problem.mission.fleet
-        self.routing = recording.problem.mission.routing
+        self.routing = with_own_tables(recording.problem.mission.routing)
         self.robots = len(self.scene.robots)
         self.goals = len(self.scene.goals)
         self.joined = np.isfinite(self.roadmap.cost_to_go[0]).any(axis=0)

@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays, with_own_tables
 from mrmg.planning.routing.routing import (
     RouterParams,
     Routing,
@@ -123,6 +123,35 @@ def test_the_seed_matters(mission: Mission) -> None:
     problem = mission(3, goals=12, stations=4, robots=3, range_m=(150.0, 250.0))
     params = RouterParams(iterations=10, rounds=0)
     assert len({solve_routing(problem, params, seed).tours for seed in range(6)}) > 1
+
+
+def test_robots_alike_may_share_their_legs() -> None:
+    """Two of three robots do: tours are those of robots with legs of their own."""
+    rng = np.random.default_rng(1)
+    point = rng.uniform(0.0, 100.0, (15, 2))
+    apart = np.hypot(*(point[:, None] - point[None]).transpose(2, 0, 1))
+    table, capacity = np.array([1, 0, 1]), np.array([150.0, 130.0, 150.0])
+    own = {
+        "start_distance": apart[12:, :12],
+        "finish_distance": np.stack([np.r_[apart[:12, 12 + r], 0.0] for r in range(3)]),
+        "plain": np.array([1.0, 1.5, 1.0]),
+        "energy": np.array([100.0, 120.0, 150.0]),
+        "capacity": capacity,
+        "reserve": 0.1 * capacity,
+    }
+    legs = apart[None, :12, :12]
+    shared = routing_arrays(goals=9, distance=np.repeat(legs, 2, 0), table=table, **own)
+    alone = routing_arrays(goals=9, distance=np.repeat(legs, 3, 0), **own)
+    assert shared.cost.shape == (2, 14, 12)
+    separated = with_own_tables(shared)
+    assert all(
+        np.array_equal(ours, theirs)
+        for ours, theirs in zip(separated, alone, strict=True)
+    )
+    for params in (RouterParams(), RouterParams(rounds=0)):
+        found = solve_routing(shared, params, 0)
+        assert found.feasible
+        assert found == solve_routing(alone, params, 0)
 
 
 def test_the_problem_is_left_as_it_was(mission: Mission) -> None:
