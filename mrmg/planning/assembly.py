@@ -40,10 +40,14 @@ def make_plan(
     visits: list[Visit] = []
     entries: list[LedgerEntry] = []
     for trajectory in trajectories:
-        tour, battery = tours[trajectory.robot], scene.robot(trajectory.robot).battery
-        own, content_J, drawn = visits_and_energy(scene, trajectory, tour)
+        battery = scene.robot(trajectory.robot).battery
+        own, content_J, drawn = visits_and_energy(
+            scene, trajectory, tours[trajectory.robot]
+        )
+        if len(own) < len(tours[trajectory.robot]):
+            return None
         least_J = battery.reserve_J + problem.soc_margin * battery.capacity_J
-        if len(own) < len(tour) or content_J.min() < least_J:
+        if content_J.min() < least_J:
             return None
         visits += own
         entries += drawn

@@ -193,7 +193,7 @@ class _Planning:
         search = self._search(problem, proofs)
         search.on_progress(0.1, "roadmap built")
         best = search.run()
-        proof = None if best else search.proof(search.tours_missing)
+        proof = None if best else search.proof(search.tours_missing, False)
         if best is None:
             why = self._in_time(
                 partial(
@@ -236,7 +236,7 @@ class _Planning:
         def attempt(number: int, halt: np.ndarray) -> Attempt:
             request = replace(self.request, number=number, halt=halt)
             found = self.planner(problem, request)
-            if not (found.plans or halt[0] or proof(not found.tours_found)):
+            if not (found.plans or halt[0] or proof(not found.tours_found, True)):
                 found = self._tried_tightly(found, tight(), request)
             return on_the_map(found, problem, self.scene, self.params)
 
@@ -247,10 +247,13 @@ class _Planning:
             own = Frame.of(self.scene).scene(self.scene)
             return tightened(own, self.request.seed, self.params)
 
-        def proof(tours_missing: bool) -> str | None:
-            unbounded = math.isinf(self.statistics.bounds.energy_J or 0.0)
-            sought = partial(proofs.reason, tours_missing=tours_missing or unbounded)
-            return self._in_time(sought)
+        def proof(tours_missing: bool, goes_on: bool) -> str | None:
+            missing = tours_missing or math.isinf(self.statistics.bounds.energy_J or 0)
+            # Where there are tours, next to nothing but finishes can be in the way, and
+            # the proofs of a large fleet take longer than its next attempts.
+            if goes_on and not missing and not any(r.finish for r in self.scene.robots):
+                return None
+            return self._in_time(partial(proofs.reason, tours_missing=missing))
 
         return Search(
             attempt=attempt,

@@ -52,7 +52,8 @@ class Search:
         workers: threads.
         on_progress, on_improvement: called with progress.
         proof: returns why the mission has no solution, None if that is not known; takes
-            whether no tours were found. Called once an attempt has failed.
+            whether no tours were found, and whether attempts would go on. Called once
+            an attempt has failed.
         preference: what plans are compared by.
         best: the best plan so far that is in time.
         earliest_s: when the earliest of all plans is over.
@@ -69,7 +70,7 @@ class Search:
     workers: int
     on_progress: Progress
     on_improvement: OnImprovement
-    proof: Callable[[bool], str | None]
+    proof: Callable[[bool, bool], str | None]
     preference: Preference = field(default_factory=Preference)
     best: Plan | None = None
     earliest_s: float = math.inf
@@ -110,7 +111,7 @@ class Search:
                     if (
                         self.attempts == 1
                         and not found
-                        and self.proof(self.tours_missing)
+                        and self.proof(self.tours_missing, True)
                     ):
                         break
             except KeyboardInterrupt:

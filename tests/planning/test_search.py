@@ -41,7 +41,7 @@ def search(
         workers=workers,
         on_progress=lambda fraction, text: None,
         on_improvement=more.get("on_improvement", lambda improvement: None),
-        proof=lambda tours_missing: None,
+        proof=lambda *_: None,
     )
 
 
