@@ -31,7 +31,10 @@ LEAST_RISE = 0.005
 
 FINE_ARC_GOALS = 16
 """Goals up to which tours are told apart by all arcs; beyond, by pairs of them, as
-otherwise labels would be too many."""
+otherwise labels would be too many ..."""
+
+FINE_ARC_LEGS = 20_000_000
+"""... and legs from arc to arc up to which they are, by their memory (160 MB)."""
 
 WORK_LABELS = 6_000_000
 """Labels that all rounds may set: some 5 s of one processor. The limit counts work, not
@@ -69,21 +72,20 @@ def touring_bound_J(
         The bound; `proven_J` if no better one was found.
     """
     best, settled_J = proven_J, -math.inf
-    leg = _leg_table(ways, price)
     rest = None
     for _ in range(rounds):
-        tightened = _tighten(ways, leg, tours)
+        tightened = _tighten(ways, price, tours)
         settled = math.isfinite(settled_J)
         if halt[0] or (settled and not tightened):
             break
-        leg = _leg_table(ways, price)
-        merged = leg if problem.goals <= FINE_ARC_GOALS else _by_pairs(leg)
-        rest = rest or completions(problem, merged)
+        leg = _leg_table(ways, price, problem.goals)
+        rest = rest or completions(problem, leg)
         best = max(best, float(rest.before[0]))
-        most, along_J = (1.0 + STEP) * best, (1.0 + SLACK) * _cost_along(leg, tours)
+        most = (1.0 + STEP) * best
+        along_J = (1.0 + SLACK) * _cost_along(ways, price, tours)
         if best < along_J:
             most = min(most, along_J)
-        found, labels = cheapest_tours(problem, merged, rest, most, work)
+        found, labels = cheapest_tours(problem, leg, rest, most, work)
         work -= labels
         if found is None:
             break
@@ -99,19 +101,13 @@ def touring_bound_J(
     return best
 
 
-def _by_pairs(leg: np.ndarray) -> np.ndarray:
-    """Return what legs cost at least between pairs of neighbouring arcs."""
-    halves = [leg[:, :, i::2, :, j::2] for i in (0, 1) for j in (0, 1)]
-    return np.ascontiguousarray(np.minimum.reduce(halves))
-
-
 def _tighten(
-    ways: Sequence[ArcWays], leg: np.ndarray, tours: Sequence[Sequence[int]]
+    ways: Sequence[ArcWays], price: np.ndarray, tours: Sequence[Sequence[int]]
 ) -> bool:
     """Tighten the ways that tours take; return whether any was new."""
     new: dict[tuple[int, Wave], ArcWays] = {}
     for r, tour in enumerate(tours):
-        arcs = _arcs_along(leg[r], tour)
+        arcs = _arcs_along(_legs_of(ways[r], r, price[r]), tour) if tour else []
         for one in zip((-1 - r, *tour), (0, *arcs), tour, arcs, strict=False):
             new |= {(id(ways[r]), wave): ways[r] for wave in ways[r].waves(*one)}
     with ThreadPoolExecutor() as threads:
@@ -140,23 +136,43 @@ def _arcs_along(leg: np.ndarray, tour: Sequence[int]) -> list[int]:
     return arcs[-2::-1]  # the last one found is that of the start
 
 
-def _leg_table(ways: Sequence[ArcWays], price: np.ndarray) -> np.ndarray:
-    """Return what legs cost from arc to arc, shape (R, T + 1, K, T, K)."""
+def _legs_of(ways: ArcWays, r: int, price: float) -> np.ndarray:
+    """Return what the legs of robot r cost from arc to arc, (T + 1, K, T, K)."""
+    start = np.full((1, *ways.between.shape[1:]), np.inf)
+    start[0, 0] = price * ways.from_start[r]
+    return np.concatenate([price * ways.between, start])
+
+
+def _leg_table(ways: Sequence[ArcWays], price: np.ndarray, goals: int) -> np.ndarray:
+    """Return what legs cost from arc to arc, shape (R, T + 1, K, T, K).
+
+    Two neighbouring arcs count as one where there are many goals or legs.
+    """
     count = len(ways[0].ways.regions)
-    leg = np.full((len(ways), count + 1, ARCS, count, ARCS), np.inf)
+    legs = len(ways) * (count + 1) * count * ARCS**2
+    fine = goals <= FINE_ARC_GOALS and legs <= FINE_ARC_LEGS
+    table = []
     for r, one in enumerate(ways):
-        leg[r, :count] = price[r] * one.between
-        leg[r, count, 0] = price[r] * one.from_start[r]
-    return leg
+        leg = _legs_of(one, r, price[r])
+        if not fine:
+            parts = [leg[:, i::2, :, j::2] for i in (0, 1) for j in (0, 1)]
+            leg = np.minimum.reduce(parts)
+        table.append(leg)
+    return np.stack(table)
 
 
-def _cost_along(leg: np.ndarray, tours: Sequence[Sequence[int]]) -> float:
+def _cost_along(
+    ways: Sequence[ArcWays], price: np.ndarray, tours: Sequence[Sequence[int]]
+) -> float:
     """Return the least cost of given tours, whatever arcs they touch."""
     total = 0.0
-    for table, tour in zip(leg, tours, strict=True):
-        cost, place = np.where(np.arange(ARCS) == 0, 0.0, np.inf), len(table) - 1
+    for r, tour in enumerate(tours):
+        if not tour:
+            continue
+        leg = _legs_of(ways[r], r, price[r])
+        cost, place = np.where(np.arange(ARCS) == 0, 0.0, np.inf), len(leg) - 1
         for target in tour:
-            cost = (cost[:, None] + table[place, :, target]).min(axis=0)
+            cost = (cost[:, None] + leg[place, :, target]).min(axis=0)
             place = target
         total += float(cost.min())
     return total

@@ -9,6 +9,7 @@ from itertools import combinations, permutations, product
 import numpy as np
 import pytest
 
+from mrmg.planning.bound import touring
 from mrmg.planning.bound._completion_kernels import Completions
 from mrmg.planning.bound.arcs import ArcWays
 from mrmg.planning.bound.bound import Relaxation, lower_bound_J
@@ -281,6 +282,15 @@ def test_less_work_proves_less_and_never_less_than_was_known() -> None:
     ]
     assert routing.cost_J <= found_J[0] <= found_J[1] <= found_J[2]
     assert found_J[0] < found_J[2]
+
+
+def test_pairs_of_arcs_prove_less_and_stay_below_the_optimum(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = triangle()
+    fine_J = lower_bound_J(scene)
+    monkeypatch.setattr(touring, "FINE_ARC_LEGS", 0)
+    assert lower_bound_J(scene, rounds=0) < lower_bound_J(scene) <= fine_J
 
 
 def test_touching_a_goal_beside_the_way_is_paid_for() -> None:
