@@ -7,7 +7,7 @@ import math
 import mujoco
 import numpy as np
 import shapely
-from shapely.geometry import Polygon
+from shapely.geometry import MultiPolygon, Polygon
 
 from mrmg.scene.region import Region
 from mrmg.scene.types import Scene
@@ -61,7 +61,7 @@ def _unbiased(height: np.ndarray) -> np.ndarray:
     return np.asarray(height - (around - 4.0 * height) / 12.0)
 
 
-def height_span(scene: Scene, shape: Polygon) -> tuple[float, float]:
+def height_span(scene: Scene, shape: Polygon | MultiPolygon) -> tuple[float, float]:
     """Return the lowest and highest ground under a shape [m]."""
     if scene.elevation is None:
         return 0.0, 0.0
@@ -76,21 +76,32 @@ def height_span(scene: Scene, shape: Polygon) -> tuple[float, float]:
     return float(height.min()), float(height.max())
 
 
+def on_map(scene: Scene, shape: Polygon) -> Polygon | MultiPolygon:
+    """Return the part of a shape that is on the map or close to it; it may be empty.
+
+    A shape may reach so far beyond the map that nothing is left of its precision.
+    """
+    around = shapely.box(*scene.bounds).buffer(_BASE_M, join_style="mitre")
+    return shape if around.covers(shape) else shapely.intersection(shape, around)
+
+
 def draped_mark(scene: Scene, region: Region) -> tuple[np.ndarray, np.ndarray]:
     """Return a thin mesh over a convex region that lies on the ground.
 
     Returns:
         Corners [m], shape (n, 3), and faces, shape (m, 3).
     """
-    outline = shapely.segmentize(region.shape.exterior, _MARK_SPACING_M)
+    part = on_map(scene, region.shape)
+    middle = shapely.get_coordinates(part.centroid)[0]
+    outline = shapely.segmentize(part.exterior, _MARK_SPACING_M)
     ring = shapely.get_coordinates(shapely.orient_polygons(Polygon(outline)))[:-1]
-    reach = float(np.hypot(*(ring - region.center).T).max())
+    reach = float(np.hypot(*(ring - middle).T).max())
     rings = max(1, math.ceil(reach / _MARK_SPACING_M))
     share = (np.arange(1, rings + 1) / rings)[:, None, None]
-    on_map = np.concatenate(
+    points = np.concatenate(
         [
-            region.center[None],
-            (region.center + share * (ring - region.center)).reshape(-1, 2),
+            middle[None],
+            (middle + share * (ring - middle)).reshape(-1, 2),
         ]
     )
     n = len(ring)
@@ -103,10 +114,10 @@ def draped_mark(scene: Scene, region: Region) -> tuple[np.ndarray, np.ndarray]:
         faces.append(np.stack([first, third, fourth], axis=1))
         faces.append(np.stack([first, fourth, second], axis=1))
     top = np.concatenate(faces)
-    height = height_at(scene, on_map) + _MARK_LIFT_M
-    upper = np.column_stack([on_map, height])
-    lower = np.column_stack([on_map, height - 2.0 * _MARK_LIFT_M])
-    count, rim = len(on_map), 1 + (rings - 1) * n
+    height = height_at(scene, points) + _MARK_LIFT_M
+    upper = np.column_stack([points, height])
+    lower = np.column_stack([points, height - 2.0 * _MARK_LIFT_M])
+    count, rim = len(points), 1 + (rings - 1) * n
     here, there = rim + np.arange(n), rim + after
     sides = np.concatenate(
         [

@@ -22,6 +22,7 @@ from mrmg.simulation.ground_shape import (
     add_height_field,
     draped_mark,
     height_span,
+    on_map,
 )
 from mrmg.world.terrain import multiplier_at
 
@@ -111,8 +112,10 @@ def _bytes(colours: np.ndarray) -> np.ndarray:
 
 def add_obstacle(
     spec: mujoco.MjSpec, scene: Scene, obstacle: Obstacle
-) -> mujoco.MjsBody:
+) -> mujoco.MjsBody | None:
     """Add one obstacle as a body: hidden convex solids and one drawn mesh.
+
+    One that lies beside the map is left out.
 
     On a slope it is founded in its lowest ground and rises its height above the
     highest.
@@ -120,13 +123,16 @@ def add_obstacle(
     Obstacles stay bodies of their own, even where they overlap, so that a contact can
     name what was touched and so that an exclusion can let single robots through.
     """
-    low, high = height_span(scene, obstacle.shape)
+    shape = on_map(scene, obstacle.shape)
+    if shape.area == 0.0:
+        return None
+    low, high = height_span(scene, shape)
     foot_m = 0.0 if scene.elevation is None else low - FOUNDATION_M
     height_m = high - foot_m + obstacle.height_m
     body = spec.worldbody.add_body(
         name=f"obstacle:{obstacle.id}", pos=[0.0, 0.0, foot_m]
     )
-    for number, ring in enumerate(convex_pieces(obstacle.shape)):
+    for number, ring in enumerate(convex_pieces(shape)):
         name = f"solid:{obstacle.id}:{number}"
         spec.add_mesh(name=name, uservert=_prism(ring, height_m).ravel())
         body.add_geom(
@@ -139,7 +145,7 @@ def add_obstacle(
         )
     colour = palette.OBSTACLE if obstacle.blocks is None else palette.PARTIAL_OBSTACLE
     name = f"obstacle:{obstacle.id}"
-    _add_drawn_mesh(spec, name, obstacle.shape, height_m)
+    _add_drawn_mesh(spec, name, shape, height_m)
     body.add_geom(
         name=name,
         type=mujoco.mjtGeom.mjGEOM_MESH,

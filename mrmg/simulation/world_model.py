@@ -81,7 +81,7 @@ def _built(scene: Scene, drawn: bool) -> MujocoWorld:
     for obstacle in scene.obstacles:
         body = scenery.add_obstacle(spec, scene, obstacle)
         for robot in scene.robots:
-            if not obstacle.stops(robot.id):
+            if body is not None and not obstacle.stops(robot.id):
                 spec.add_exclude(bodyname1=body.name, bodyname2=f"{robot.id}/{CHASSIS}")
     model = spec.compile()
     return MujocoWorld(

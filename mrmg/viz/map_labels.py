@@ -17,7 +17,7 @@ from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.plans import Plan
-from mrmg.scene.types import Obstacle, Scene
+from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.viz import style
 from mrmg.viz.activities import breakdowns, lengths_along, visit_ranks
@@ -130,9 +130,12 @@ def _wanted(
         yield _beside("breakdown", robot_id, text, ring, em_m, _UPPER_RIGHT)
     yield from _paths(scene, plan, em_m)
     yield from _terrain(scene, em_m)
+    bounds = shapely.box(*scene.bounds)
     for number, obstacle in enumerate(scene.barriers):
-        if obstacle.id != f"obstacle_{number}":  # else the file gives it no name
-            yield _obstacle(obstacle, em_m)
+        visible = shapely.intersection(obstacle.shape, bounds)
+        # An id of this form is one that the file does not give.
+        if visible.area > 0.0 and obstacle.id != f"obstacle_{number}":
+            yield _obstacle(obstacle.id, visible, em_m)
     yield from _heights(scene, em_m)
 
 
@@ -207,14 +210,14 @@ def _terrain(scene: Scene, em_m: float) -> Iterator[_Wanted]:
             yield _optional("terrain", area.id, text, em_m, spots, cost)
 
 
-def _obstacle(obstacle: Obstacle, em_m: float) -> _Wanted:
-    """Return an obstacle's name, for where it fits on the obstacle."""
-    half_m = half_size_m("obstacle", obstacle.id, em_m)
-    spots = _spots_within(obstacle.shape)
+def _obstacle(name: str, shape: BaseGeometry, em_m: float) -> _Wanted:
+    """Return an obstacle's name, for where it fits on its visible part."""
+    half_m = half_size_m("obstacle", name, em_m)
+    spots = _spots_within(shape)
     boxes = shapely.box(*(spots - half_m).T, *(spots + half_m).T)
-    spots = spots[shapely.covers(obstacle.shape, boxes)]
+    spots = spots[shapely.covers(shape, boxes)]
     cost = np.linspace(0.0, 1.0, len(spots))
-    return _optional("obstacle", obstacle.id, obstacle.id, em_m, spots, cost)
+    return _optional("obstacle", name, name, em_m, spots, cost)
 
 
 def _spots_within(shape: BaseGeometry) -> np.ndarray:

@@ -38,7 +38,8 @@ HUGE, DEEP, ENDLESS = "@huge@", "@deep@", "@nan@"
 """Stand for values that cannot be dumped; replaced in the text afterwards."""
 
 VALUES: tuple[Any, ...] = (
-    *(None, True, False, 0, -1, 1, 2, 10**18, 0.5, -0.0, 1e308, 1e-320, 1e7),
+    *(None, True, False, 0, -1, 1, 2, 10**18, 0.5, -0.0, 1e308, 1e300, 1e-320, 1e7),
+    *(1e5, -1e8, 1e-4),
     *("", "x", "x" * 5000, "<b>&", "\x1b[31m", "\ud800", "../x", "/etc/passwd", "1"),
     *([], {}, [None], [[]], {"": None}, {"a": 1}, [1, 2], [1, 2, 3], ["x", "y"]),
     *(HUGE, DEEP, ENDLESS, float("inf")),

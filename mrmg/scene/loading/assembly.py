@@ -32,7 +32,7 @@ from mrmg.scene.loading.schema import (
     FinishEntry,
     SceneDocument,
 )
-from mrmg.scene.loading.shape_schema import CircleEntry
+from mrmg.scene.loading.shape_schema import LARGEST_M, CircleEntry
 from mrmg.scene.loading.starts import crowded_robots, misplaced_robots
 from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
 from mrmg.scene.region import HEADING_TOLERANCE_RAD, Region
@@ -174,6 +174,10 @@ class Assembly:
         x_min, y_min, x_max, y_max = header.bounds
         if x_min >= x_max or y_min >= y_max:
             message = f"got {raw}; expected x_min < x_max and y_min < y_max"
+            self._fault("bounds", message)
+            return None
+        if max(x_max - x_min, y_max - y_min) > LARGEST_M:
+            message = f"got {raw}; expected sides of at most {LARGEST_M:.0f} m"
             self._fault("bounds", message)
             return None
         return x_min, y_min, x_max, y_max

@@ -187,13 +187,20 @@ def _unpacked(rows: int, columns: int, text: str) -> np.ndarray | Fault:
     return np.frombuffer(data, "<i4").reshape(rows, columns) * PACKED_M
 
 
-def _sampled(hills: list[HillEntry], cell_m: float, bounds: Bounds) -> np.ndarray:
+def _sampled(
+    hills: list[HillEntry], cell_m: float, bounds: Bounds
+) -> np.ndarray | Fault:
     """Return the sum of round hills, each h cos^2(pi d / 2 R) at distance d < R."""
     x_min, y_min, x_max, y_max = bounds
-    columns = max(2, math.ceil((x_max - x_min) / cell_m) + 1)
-    rows = max(2, math.ceil((y_max - y_min) / cell_m) + 1)
-    if rows * columns > MOST_NODES:
-        return np.broadcast_to(0.0, (rows, columns))  # refused by its size
+    # Counted as floats, which may be as large as they like.
+    across, down = (x_max - x_min) / cell_m + 1.0, (y_max - y_min) / cell_m + 1.0
+    if across * down > MOST_NODES:
+        return Fault(
+            "elevation.hills",
+            f"would have {down:.7g} x {across:.7g} heights within these bounds; "
+            f"at most {MOST_NODES} in all: a larger cell makes them fewer",
+        )
+    columns, rows = max(2, math.ceil(across)), max(2, math.ceil(down))
     x, y = np.meshgrid(
         np.linspace(x_min, x_max, columns), np.linspace(y_max, y_min, rows)
     )

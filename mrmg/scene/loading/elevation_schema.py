@@ -7,9 +7,9 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from mrmg.scene.loading.shape_schema import (
-    Number,
+    Height,
+    Length,
     Point,
-    Positive,
     Strict,
     exactly_one,
 )
@@ -19,8 +19,8 @@ class HillEntry(Strict):
     """A round hill; hollow if its height is negative."""
 
     center: Point
-    height: Number = Field(description="height of the top in m")
-    radius: Positive = Field(description="radius of the foot in m")
+    height: Height = Field(description="height of the top in m")
+    radius: Length = Field(description="radius of the foot in m")
 
 
 class PackedEntry(Strict):
@@ -39,16 +39,16 @@ class ElevationEntry(Strict):
     file: Annotated[str, Field(min_length=1)] | None = Field(
         default=None, description="path of an .npy or .png file"
     )
-    range: Annotated[list[Number], Field(min_length=2, max_length=2)] | None = Field(
+    range: Annotated[list[Height], Field(min_length=2, max_length=2)] | None = Field(
         default=None, description="[height of black in m, height of white in m]"
     )
-    grid: Annotated[list[list[Number]], Field(min_length=2)] | None = Field(
+    grid: Annotated[list[list[Height]], Field(min_length=2)] | None = Field(
         default=None, description="rows of heights in m, from north to south"
     )
     hills: Annotated[list[HillEntry], Field(min_length=1)] | None = Field(
         default=None, description="round hills, which add up; heights and radii in m"
     )
-    cell: Positive | None = Field(
+    cell: Length | None = Field(
         default=None, description="distance of the samples of hills in m"
     )
     packed: PackedEntry | None = Field(

@@ -102,7 +102,9 @@ from mrmg.scene.loading.shape_schema import (
     ID,
     RING,
     CircleEntry,
+    Coordinate,
     Identifier,
+    Length,
     NotNegative,
     Number,
     Positive,
@@ -120,7 +122,7 @@ class ObstacleEntry(ShapedEntry):
     """Ground that robots must keep off."""
 
     id: Identifier | None = Field(default=None, description=ID)
-    height: Positive = Field(default=1.0, description="height in m")
+    height: Length = Field(default=1.0, description="height in m")
     blocks: Annotated[list[Identifier], Field(min_length=1)] | None = Field(
         default=None, description="at least one id of a robot"
     )
@@ -302,7 +304,7 @@ class SceneDocument(Strict):
     name: Annotated[str, Field(min_length=1, max_length=200)] = Field(
         description="what the scene is called; default: the file's name"
     )
-    bounds: Annotated[list[Number], Field(min_length=4, max_length=4)] = Field(
+    bounds: Annotated[list[Coordinate], Field(min_length=4, max_length=4)] = Field(
         description="[x_min, y_min, x_max, y_max] in m"
     )
     obstacles: list[ObstacleEntry] = Field(

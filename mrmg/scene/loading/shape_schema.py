@@ -7,14 +7,21 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+# Limits within which sums, squares and quotients of doubles stay finite, and places
+# exact to well below a millimetre.
+MOST = 1e12
+LARGEST_M, SMALLEST_M, FARTHEST_M, HIGHEST_M = 1e6, 1e-4, 1e8, 1e5
+Number = Annotated[float, Field(ge=-MOST, le=MOST, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, le=MOST, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=MOST, allow_inf_nan=False)]
+Length = Annotated[float, Field(ge=SMALLEST_M, le=LARGEST_M, allow_inf_nan=False)]
+Height = Annotated[float, Field(ge=-HIGHEST_M, le=HIGHEST_M, allow_inf_nan=False)]
+Coordinate = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M, allow_inf_nan=False)]
 ID_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$"
 ID = "name, unique in the whole file"
 Identifier = Annotated[str, Field(pattern=ID_PATTERN, max_length=64, description=ID)]
 Point = Annotated[
-    list[Number], Field(min_length=2, max_length=2, description="[x, y] in m")
+    list[Coordinate], Field(min_length=2, max_length=2, description="[x, y] in m")
 ]
 RING = "at least 3 corners [x, y] in m"
 DISC = "a disc: its center [x, y] and its radius in m"
@@ -50,7 +57,7 @@ class BoxEntry(Strict):
     """A rectangle about its centre."""
 
     center: Point
-    size: Annotated[list[Positive], Field(min_length=2, max_length=2)] = Field(
+    size: Annotated[list[Length], Field(min_length=2, max_length=2)] = Field(
         description="[length, width] in m"
     )
     yaw: Number = Field(default=0.0, description="turn in rad")
@@ -60,7 +67,7 @@ class CircleEntry(Strict):
     """A disc."""
 
     center: Point
-    radius: Positive = Field(description="radius in m")
+    radius: Length = Field(description="radius in m")
 
 
 class ShapedEntry(Strict):

@@ -146,7 +146,7 @@ def save(path: Path, name: str) -> None:
         ({"grid": [[0, 0], [0, 0]], "cell": 1}, r"belongs to hills"),
         (
             {"hills": [{"center": [5, 5], "height": 1, "radius": 9}], "cell": 0.001},
-            r"has 10001 x 20001 heights; at most 1000000",
+            r"would have 10001 x 20001 heights within these bounds; at most 1000000",
         ),
         (
             {"packed": {"rows": 2, "columns": 2, "heights": "???"}},
