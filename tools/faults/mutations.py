@@ -268,11 +268,13 @@ def _npy(values: np.ndarray) -> bytes:
 
 
 def zipped(members: Mapping[str, bytes]) -> bytes:
-    """Return a zip of members by name."""
+    """Return a zip of members by name, dated as of no clock."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in members.items():
-            archive.writestr(name, content)
+            info = zipfile.ZipInfo(name)
+            info.compress_type = zipfile.ZIP_DEFLATED
+            archive.writestr(info, content)
     return buffer.getvalue()
 
 
