@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrmg.energy.model import EFFECTIVE_MASS_KG, ROLLING_N
-from mrmg.motion._kernels import UNICYCLE
+from mrmg.motion._kernels import UNICYCLE, USER
 from mrmg.planning.path_following import _tracking_kernels
 from mrmg.planning.path_following._following_kernels import Course
 from mrmg.planning.path_following.band import Path, nimble_share
@@ -147,6 +147,8 @@ def steerable_speeds(
     """
     robot = problem.mission.fleet[r]
     limit = robot["limit"]
+    if robot["model"] == USER:  # only its own steering knows
+        return np.full(len(bend), np.inf)
     change = np.abs(np.diff(bend)) / np.maximum(np.diff(way), 1e-6)
     change[1:][np.diff(end) != 0] = 0.0  # the robot stands there
     change = np.maximum(change, 1e-9)

@@ -13,8 +13,10 @@ from mrmg.planning.path_following.coordination._motion_kernels import (
     HOME,
     blocked_for_good,
     clear,
+    drivable_radius,
     drive_curve,
     first_conflict,
+    smooth_radius,
     write_curve,
 )
 from mrmg.planning.problem._control_kernels import braking_control, stands, wrap
@@ -83,23 +85,39 @@ def steer_to(search, target, state, control):
 def drive_to(search, target, course, state, control):
     """Write a drive to a target without regard to others; return the steps, or -1.
 
-    A car drives along the shortest curve, a robot that turns on the spot straight.
+    A car drives along the shortest curve. A robot that turns on the spot drives
+    straight and turns, or along a curve where it is there sooner.
     """
     own, targets = search.own, search.targets
     if own[0].model == USER:
         return steer_to(search, target, state, control)
     x, y = targets.center[target, 0], targets.center[target, 1]
     heading, free = targets.heading[target], targets.tolerance[target] >= pi
-    if free and own[0].model == CAR:
-        heading = np.arctan2(y - state[0, 1], x - state[0, 0])
-        if abs(wrap(heading - state[0, 2])) > 0.5 * pi:
-            heading = wrap(heading + pi)
-    if not write_curve(own, state[0], x, y, heading, course) < np.inf:
+    course.heading[0], course.tolerance[0] = heading, np.inf
+    if own[0].model == CAR:
+        if free:
+            heading = np.arctan2(y - state[0, 1], x - state[0, 0])
+            if abs(wrap(heading - state[0, 2])) > 0.5 * pi:
+                heading = wrap(heading + pi)
+        radius = drivable_radius(own[0])
+        if not write_curve(own, state[0], x, y, heading, course, radius) < np.inf:
+            return -1
+        return drive_curve(own, course, search.dt, state, control)
+    curved = -1
+    if not free:
+        course.tolerance[0] = targets.tolerance[target]
+        radius = smooth_radius(own[0])
+        if write_curve(own, state[0], x, y, heading, course, radius) < np.inf:
+            curved = drive_curve(own, course, search.dt, state, control)
+        if curved >= 0 and not at_target(targets, target, state[curved]):
+            curved = -1
+    if not write_curve(own, state[0], x, y, heading, course, 0.0) < np.inf:
         return -1
-    course.heading[0] = targets.heading[target]
-    turns = not (free or own[0].model == CAR)
-    course.tolerance[0] = targets.tolerance[target] if turns else np.inf
-    return drive_curve(own, course, search.dt, state, control)
+    count = drive_curve(own, course, search.dt, state, control)
+    if curved >= 0 and (count < 0 or curved < count):
+        write_curve(own, state[0], x, y, heading, course, smooth_radius(own[0]))
+        count = drive_curve(own, course, search.dt, state, control)
+    return count
 
 
 @kernel

@@ -102,6 +102,50 @@ def timed_cost_to_go(price, seed, penalty, hold, field):
 
 
 @kernel
+def descend(price, region, stay, hold, field, way):
+    """Write the cells of the cheapest way down the costs-to-go; return their number.
+
+    Args:
+        price: cost of a cell's side, inf where it may not be passed, shape (ny, nx).
+        region: cells of each leg's target, shape (L, ny, nx).
+        stay: layers to stand in each of them, -1 for good, shape (L,).
+        hold: cost of holding for the time of a layer outside of where it ends.
+        field: costs-to-go, shape (L, T, ny, nx); the last layer lasts.
+        way: row and column of the first cell; receives the next ones, shape (n, 2).
+    """
+    rows, columns = price.shape
+    legs, last = len(field), field.shape[1] - 1
+    leg = t = 0
+    i, j = way[0]
+    for n in range(1, len(way)):
+        while leg < legs and region[leg, i, j] and (stay[leg] >= 0 or t == last):
+            after = 0.0
+            if stay[leg] >= 0 and leg + 1 < legs:
+                after = field[leg + 1, min(t + stay[leg], last), i, j]
+            if after > field[leg, t, i, j]:
+                break
+            t = min(t + max(stay[leg], 0), last)
+            leg += 1
+        if leg == legs:
+            return n
+        u, best, row, column = min(t + 1, last), np.inf, -1, -1
+        if t < last:
+            ends = region[leg, i, j] and stay[leg] < 0
+            best, row, column = field[leg, u, i, j] + (0.0 if ends else hold), i, j
+        for a in range(max(0, i - 1), min(rows, i + 2)):
+            for b in range(max(0, j - 1), min(columns, j + 2)):
+                side = DIAGONAL if a != i and b != j else 1.0
+                cost = field[leg, u, a, b] + 0.5 * side * (price[i, j] + price[a, b])
+                if cost < best and (a != i or b != j):
+                    best, row, column = cost, a, b
+        if not best < np.inf:
+            return n
+        t, i, j = u, row, column
+        way[n, 0], way[n, 1] = i, j
+    return len(way)
+
+
+@kernel
 def add_others(own, traffic, inner, grid, layer, soft_s, penalty):
     """Add to penalties where the other robots are in each layer of time.
 

@@ -6,14 +6,18 @@ model, so that what is found can be driven exactly.
 
 from __future__ import annotations
 
-from math import atan, cos, hypot, sin
+from math import atan, cos, hypot, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, step
-from mrmg.planning.path_following._following_kernels import track_control, turned
+from mrmg.motion._kernels import USER, copy_numbers, steer_user, step
+from mrmg.planning.path_following._following_kernels import (
+    advance,
+    track_control,
+    turned,
+)
 from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
     MOST_PIECES,
     reeds_shepp,
@@ -163,6 +167,28 @@ def clear(own, spaces, zones, traffic, state, count, first, corner):
 
 
 @kernel
+def steer_along(own, course, segment, preview, state, dt):
+    """Return (u1, u2, segment) of a custom motion model that follows a path.
+
+    It is steered to the point of the path that lies `preview` metres ahead.
+    """
+    last = course.size[0] - 1
+    if segment > last:
+        u1, u2 = braking_control(own, 0, state, dt)
+        return u1, u2, segment
+    i, s = advance(course, segment, state[0], state[1])
+    ahead = i
+    while ahead + 2 <= last and course.way[ahead + 1] < s + preview:
+        ahead += 1
+    size = max(course.way[ahead + 1] - course.way[ahead], 1e-9)
+    t = min(1.0, max(0.0, (s + preview - course.way[ahead]) / size))
+    x = (1.0 - t) * course.node[ahead, 0] + t * course.node[ahead + 1, 0]
+    y = (1.0 - t) * course.node[ahead, 1] + t * course.node[ahead + 1, 1]
+    u1, u2 = steer_user(own[0], state, x, y, 1.0, dt)
+    return u1, u2, last + 1 if s > course.way[last] - 0.5 * preview else i
+
+
+@kernel
 def move(search, motion, segment, steps, state, control):
     """Write the states and controls of a motion from state[0]; return the segment.
 
@@ -185,7 +211,11 @@ def move(search, motion, segment, steps, state, control):
         c, s = cos(state[0, 2]), sin(state[0, 2])
         x, y = state[0, 0] + c * v - s * w, state[0, 1] + s * v + c * w
     for k in range(steps):
-        if motion == TRACK:
+        if motion == TRACK and own[0].model == USER:
+            u1, u2, segment = steer_along(
+                own, search.course, segment, search.task.preview, state[k], dt
+            )
+        elif motion == TRACK:
             u1, u2, segment, _, _ = track_control(
                 own, search.course, segment, LONG, state[k], dt
             )
@@ -213,28 +243,38 @@ def drivable_radius(robot):
 
 
 @kernel
-def write_curve(own, state, x, y, theta, course):
-    """Write a path to a pose: a line for robots that turn on the spot, else a curve.
+def smooth_radius(robot):
+    """Return the radius of turns that a robot that turns by its wheels hardly leaves.
+
+    While its rate of turning grows it drives the same share of it as a car does.
+    """
+    top = robot.limit[1]
+    least = top / sqrt(SETTLING_SHARE * robot.limit[4])
+    return max(least, top / robot.limit[2])
+
+
+@kernel
+def write_curve(own, state, x, y, theta, course, radius):
+    """Write a path to a pose: the shortest curve of a radius, or a line.
 
     Args:
         own: the robot, shape (1,).
         state: where it begins.
         x, y, theta: where it ends.
         course: receives the path.
+        radius: of turns [m]; 0 for a line, which ends with any heading.
 
     Returns:
         Its length [m]; inf if there is none, or no room for it.
     """
     dx, dy = x - state[0], y - state[1]
     turn, length = np.zeros(MOST_PIECES), np.zeros(MOST_PIECES)
-    radius = 1.0
-    if own[0].model == CAR:
-        radius = drivable_radius(own[0])
+    if radius > 0.0:
         total = reeds_shepp(dx, dy, state[2], theta, radius, turn, length)
         heading = state[2]
     else:
         total = length[0] = hypot(dx, dy)
-        heading = np.arctan2(dy, dx)
+        heading, radius = np.arctan2(dy, dx), 1.0
     if not total < SPACING_M * (len(course.node) - 2 * MOST_PIECES):
         return np.inf
     px, py = state[0], state[1]

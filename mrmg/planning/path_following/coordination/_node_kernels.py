@@ -12,6 +12,7 @@ from mrmg.motion._kernels import CAR, copy_numbers
 from mrmg.planning.path_following._following_kernels import Course, advance
 from mrmg.planning.path_following.coordination._field_kernels import Guide, guide_at
 from mrmg.planning.path_following.coordination._motion_kernels import (
+    TRACK,
     Traffic,
 )
 from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
@@ -50,6 +51,7 @@ class Task(NamedTuple):
         guide: costs-to-go on each leg.
         motion: (v, w) of each MOVE, shape (P, 2).
         steps: that a motion lasts.
+        preview: how far ahead a custom motion model looks along its path [m].
         resolution: sides of cells: position [m], heading [rad], speed [m/s], steering.
         weight: of the cost-to-go: a plan takes at most so many times the least cost.
         hold_share: cost of a second of standing, of moving it is 1.
@@ -67,6 +69,7 @@ class Task(NamedTuple):
     guide: Guide
     motion: np.ndarray
     steps: int
+    preview: float
     resolution: np.ndarray
     weight: float
     hold_share: float
@@ -252,7 +255,10 @@ def queueing_s(search, leg, step_number):
 
 @kernel
 def add(search, nodes, a, motion, state, place, cost):
-    """Add a node and open it, if its cost-to-go is finite.
+    """Add a node and open it, if its cost-to-go is finite; return it or -1.
+
+    One that is reached along the path is opened for all other motions only: the way
+    along the path goes on at once.
 
     Args:
         search: the search.
@@ -267,11 +273,13 @@ def add(search, nodes, a, motion, state, place, cost):
     b = nodes.size[0]
     rest_s = cost_to_go_s(search, place, state)
     if not rest_s < np.inf:
-        return
+        return -1
     nodes.size[0] = b + 1
     copy_numbers(state, nodes.state[b])
     nodes.parent[b], nodes.motion[b], nodes.step[b] = a, motion, step_number
     nodes.leg[b], nodes.segment[b], nodes.left[b] = leg, segment, left
     nodes.cost[b] = cost
     value = cost + search.task.weight * rest_s + queueing_s(search, leg, step_number)
-    nodes.size[1] = push(nodes.key, nodes.entry, nodes.size[1], value, 2 * b)
+    entry = 2 * b + (1 if motion == TRACK else 0)
+    nodes.size[1] = push(nodes.key, nodes.entry, nodes.size[1], value, entry)
+    return b

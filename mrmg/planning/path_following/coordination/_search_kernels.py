@@ -52,6 +52,9 @@ from mrmg.world._kernels import multiplier_in
 REJOIN_M, REJOIN_ANGLE = 0.4, 0.4
 """Distance [m] and deviation [rad] within which a robot takes to its path again."""
 
+WAYS_ON = 6
+"""Ways on from a node beside its motions: to track, hold, wait, stay, visit, end."""
+
 WIDENING_SHARE = 0.25
 """How much later than the motion along the path the others are looked at, as a share
 of a motion's time."""
@@ -93,7 +96,7 @@ def rejoined(course, left, state):
 
 @kernel
 def expand(search, nodes, room, a, motion, nears):
-    """Add what a motion leads to from node a, if it is free and new."""
+    """Add what a motion leads to from node a if it is free and new; return it or -1."""
     task, course, state = search.task, search.course, room.state
     own, dt, steps = search.own, search.dt, task.steps
     segment, left, first = nodes.segment[a], nodes.left[a], nodes.step[a]
@@ -102,10 +105,10 @@ def expand(search, nodes, room, a, motion, nears):
         own, search.spaces, search.zones, search.traffic, state, steps, first,
         room.corner,
     ):  # fmt: skip
-        return
+        return -1
     conflict_s = conflict_cost(search, room, nears, first, steps)
     if not conflict_s < np.inf:
-        return
+        return -1
     leg = legs_done(search.targets, task, nodes.leg[a], state, 1, steps)
     after = state[steps]
     if motion == TRACK:
@@ -114,13 +117,13 @@ def expand(search, nodes, room, a, motion, nears):
         segment, left = rejoined(course, left, after)
     stamp = first + steps if first < search.traffic.end else 0
     if not is_new(nodes.table, cell_of(task, after, leg, stamp)) and motion != TRACK:
-        return
+        return -1
     share = task.hold_share
     if motion != HOLD:
         share = multiplier_in(search.terrain, after[0], after[1])
     cost = nodes.cost[a] + share * steps * dt + conflict_s
     place = (first + steps, leg, segment, left)
-    add(search, nodes, a, motion, after, place, cost)
+    return add(search, nodes, a, motion, after, place, cost)
 
 
 @kernel
@@ -221,6 +224,40 @@ def write_controls(search, nodes, room, a, control):
 
 
 @kernel
+def offer(search, nodes, room, a, tries):
+    """Open what ends node a's leg there, or the task; return the tries until now."""
+    task, leg = search.task, nodes.leg[a]
+    if leg == len(task.leg):
+        end_from(search, nodes, room, a, tries)
+        return tries + 1
+    if task.stay[leg] > 0:
+        copy_numbers(nodes.state[a], room.state[0])
+        stay(search, nodes, room, a)
+    if search.targets.tolerance[task.leg[leg]] < pi:
+        if is_tried(search, task.leg[leg], nodes.state[a], tries):
+            visit(search, nodes, room, a)
+        return tries + 1
+    return tries
+
+
+@kernel
+def follow_path(search, nodes, room, a, tries):
+    """Add the nodes along the path from node a on; return the tries until now.
+
+    All of them are opened for what else leads on from them.
+    """
+    while a >= 0 and nodes.size[0] + WAYS_ON < search.task.most:
+        tries = offer(search, nodes, room, a, tries)
+        on_path = 0 <= nodes.segment[a] < search.course.size[0]
+        if not on_path or nodes.step[a] + 2 * MOST_BRAKING_STEPS >= len(room.control):
+            return tries
+        copy_numbers(nodes.state[a], room.state[0])
+        nears = list_near(search, room, nodes.step[a])
+        a = expand(search, nodes, room, a, TRACK, nears)
+    return tries
+
+
+@kernel
 def find_motion(search, nodes, room, start, control):
     """Find controls for one robot's task; return (their number or -1, nodes).
 
@@ -231,13 +268,13 @@ def find_motion(search, nodes, room, start, control):
         start: its state, shape (5,).
         control: receives the controls, shape (n, 2).
     """
-    task, legs = search.task, len(search.task.leg)
+    task = search.task
     copy_numbers(start, room.state[0])
     leg = legs_done(search.targets, task, 0, room.state, 0, 0)
     begin = 0 if search.course.size[0] > 1 else OFF_PATH
     add(search, nodes, -1, HOLD, start, (0, leg, begin, 0), 0.0)
-    motions, tries, most = len(task.motion), 0, task.most
-    while nodes.size[1] > 0 and nodes.size[0] + motions + 4 < task.most:
+    motions, tries = len(task.motion), 0
+    while nodes.size[1] > 0 and nodes.size[0] + motions + WAYS_ON < task.most:
         value, number = nodes.key[0], nodes.entry[0]
         nodes.size[1] = pop(nodes.key, nodes.entry, nodes.size[1])
         a, widened = number >> 1, number & 1
@@ -245,31 +282,20 @@ def find_motion(search, nodes, room, start, control):
             return write_controls(search, nodes, room, a, control), nodes.size[0]
         if nodes.step[a] + 2 * MOST_BRAKING_STEPS >= len(control):
             continue
-        if widened == 0 and nodes.leg[a] == legs:
-            end_from(search, nodes, room, a, tries)
-            tries += 1
-        elif widened == 0:
-            target = task.leg[nodes.leg[a]]
-            if task.stay[nodes.leg[a]] > 0:
-                copy_numbers(nodes.state[a], room.state[0])
-                stay(search, nodes, room, a)
-            if search.targets.tolerance[target] < pi:
-                if is_tried(search, target, nodes.state[a], tries):
-                    visit(search, nodes, room, a)
-                tries += 1
+        if widened == 0:
+            tries = follow_path(search, nodes, room, a, tries)
+            if 0 <= nodes.segment[a] < search.course.size[0]:
+                later = value + WIDENING_SHARE * task.steps * search.dt
+                entry = 2 * a + 1
+                nodes.size[1] = push(
+                    nodes.key, nodes.entry, nodes.size[1], later, entry
+                )
+                continue
         copy_numbers(nodes.state[a], room.state[0])
-        follows = widened == 0 and 0 <= nodes.segment[a] < search.course.size[0]
-        if not follows:
-            wait(search, nodes, room, a)  # lists robots of its own
+        wait(search, nodes, room, a)  # lists robots of its own
         nears = list_near(search, room, nodes.step[a])
-        if follows:
-            expand(search, nodes, room, a, TRACK, nears)
-            later = value + WIDENING_SHARE * task.steps * search.dt
-            entry = 2 * a + 1
-            nodes.size[1] = push(nodes.key, nodes.entry, nodes.size[1], later, entry)
-            continue
         for motion in range(HOLD, MOVE + motions):
             expand(search, nodes, room, a, motion, nears)
     if nodes.size[2] >= 0:  # the best there is, if not good enough to end sooner
-        return write_controls(search, nodes, room, nodes.size[2], control), most
-    return -1, most
+        return write_controls(search, nodes, room, nodes.size[2], control), task.most
+    return -1, task.most

@@ -19,6 +19,7 @@ from itertools import islice
 import numpy as np
 
 from mrmg import seeding
+from mrmg.motion._kernels import CAR
 from mrmg.planning.path_following import _tracking_kernels
 from mrmg.planning.path_following._following_kernels import Course
 from mrmg.planning.path_following.band import Path
@@ -31,6 +32,7 @@ from mrmg.planning.path_following.coordination._node_kernels import (
     Task,
 )
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE, Fields
+from mrmg.planning.path_following.coordination.leads import rounded_path
 from mrmg.planning.path_following.coordination.tasks import (
     Round,
     guided,
@@ -154,6 +156,8 @@ class _Planning:
         )
         self.round = ROUNDS[0]
         self.nodes = 0
+        self._blocked: set[int] = set()
+        """Robots whose short search has failed: they are searched for at length."""
 
     def find(
         self,
@@ -165,12 +169,14 @@ class _Planning:
     ) -> Motion | None:
         """Return a motion of robot r without conflicts with the robots marked."""
         traffic = self._traffic.around(r, motions, above)
+        at_length = yielding or r in self._blocked
         for task, course in islice(
-            self._tasks(r, traffic, yielding), int(yielding), None
+            self._tasks(r, traffic, yielding), int(at_length), None
         ):
             found = self._search(r, task, traffic, course)
             if found is not None:
                 return found
+            self._blocked.add(r)
         return None
 
     def _tasks(
@@ -205,10 +211,10 @@ class _Planning:
             free = task_of(problem, r, tour, nowhere, now)._replace(
                 stay=task.stay, later_s=task.later_s
             )
-            yield (
-                guided(problem, r, free, nowhere, timed),
-                course_of(problem, r, nowhere),
-            )
+            guide, way = timed
+            steered = problem.mission.fleet[r]["model"] != CAR
+            lead = rounded_path(problem, r, way) if steered else nowhere
+            yield guided(problem, r, free, nowhere, guide), course_of(problem, r, lead)
 
     def _search(
         self, r: int, task: Task, traffic: Traffic, course: Course

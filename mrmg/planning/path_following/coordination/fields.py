@@ -54,8 +54,10 @@ class Fields:
         stay: np.ndarray,
         traffic: Traffic,
         costs: tuple[float, float],
-    ) -> Guide | None:
-        """Return robot r's costs-to-go among the others; None for too many cells.
+    ) -> tuple[Guide, np.ndarray] | None:
+        """Return robot r's costs-to-go among the others, and the way down them.
+
+        The way is a chain of points, shape (n, 2). None for too many cells.
 
         Args:
             r: robot.
@@ -105,7 +107,39 @@ class Fields:
             field[-1] = _field_kernels.cost_to_go(lasting, last)
             _field_kernels.timed_cost_to_go(price, seed, penalty, hold, field)
             legs.append(field)
-        return Guide(np.stack(legs[::-1]), cell_m, layer)
+        field, standing = np.stack(legs[::-1]), hold_share * layer * dt_s
+        stood = np.full(len(targets), -1)
+        stood[: len(stay)] = -(-stay // layer)
+        way = self._way_down(r, targets, stood, (price, standing, field))
+        return Guide(field, cell_m, layer), way
+
+    def _way_down(
+        self,
+        r: int,
+        targets: Sequence[int],
+        stood: np.ndarray,
+        costs: tuple[np.ndarray, float, np.ndarray],
+    ) -> np.ndarray:
+        """Return robot r's cheapest way down its costs-to-go, shape (n, 2).
+
+        Args:
+            r: robot.
+            targets: of its tour.
+            stood: layers to stand in each of them, -1 for good.
+            costs: of a cell's side, of holding for a layer, and to go.
+        """
+        spaces = self._problem.mission.spaces
+        corner = np.array([spaces.x_min, spaces.y_min])
+        here = self._problem.start[r, :2]
+        rows, columns = self._shape
+        way = np.zeros((len(costs[2][0]) + 2 * len(targets) * (rows + columns), 2), int)
+        cell = ((here - corner) // self._cell_m).astype(int)
+        way[0] = np.clip(cell[::-1], 0, (rows - 1, columns - 1))
+        regions = np.stack([self._region([target]) for target in targets])
+        size = _field_kernels.descend(costs[0], regions, stood, *costs[1:], way)
+        points = corner + (way[:size, ::-1] + 0.5) * self._cell_m
+        points[0] = here
+        return np.asarray(points)
 
     def _way(self, r: int, targets: tuple[int, ...]) -> np.ndarray:
         """Return the way from each cell through targets [m], inf if there is none."""

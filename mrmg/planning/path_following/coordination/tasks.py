@@ -162,6 +162,7 @@ def task_of(
         guide=NO_GUIDE,
         motion=motions(robot, steps, dt_s),
         steps=steps,
+        preview=top * steps * dt_s,
         resolution=np.array(sides),
         weight=effort.weight,
         hold_share=standing,
