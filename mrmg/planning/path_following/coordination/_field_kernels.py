@@ -183,12 +183,14 @@ def add_others(own, traffic, inner, grid, layer, soft_s, penalty):
             for i in range(first_row, last_row + 1):
                 for j in range(first, last + 1):
                     x, y = x_min + (j + 0.5) * cell, y_min + (i + 0.5) * cell
+                    apart = hypot(x - middle[0], y - middle[1])
+                    if apart >= far or penalty[t, i, j] == np.inf:
+                        continue
                     if not convex_segment_distance(placed, x, y, x, y) < near:
                         continue
                     if traffic.hard[other]:
                         penalty[t, i, j] = np.inf
                     else:
-                        apart = hypot(x - middle[0], y - middle[1])
                         penalty[t, i, j] += soft_s * max(0.0, 1.0 - apart / reach)
 
 

@@ -47,10 +47,10 @@ from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.plans import Trajectory
 
 ROUNDS = (
-    Round(most=1_000, orders=50, weight=1.5, fineness=1.0, soft_s=2.0),
-    Round(most=4_000, orders=100, weight=1.5, fineness=1.0, soft_s=4.0),
-    Round(most=16_000, orders=200, weight=2.0, fineness=2.0, soft_s=1.0),
-    Round(most=64_000, orders=400, weight=2.0, fineness=3.0, soft_s=4.0),
+    Round(most=1_000, dead_ends=2, weight=1.5, fineness=1.0, soft_s=2.0),
+    Round(most=4_000, dead_ends=10, weight=1.5, fineness=1.0, soft_s=4.0),
+    Round(most=16_000, dead_ends=50, weight=2.0, fineness=2.0, soft_s=1.0),
+    Round(most=64_000, dead_ends=200, weight=2.0, fineness=3.0, soft_s=4.0),
 )
 """Rounds one after the other."""
 
@@ -185,7 +185,8 @@ class _Planning:
         """Yield what to search for, and along which path.
 
         First comes a short search that does not know when the others are where. The
-        next one does, if there is room for it, and then does without a path.
+        next one does, if there is room for it, and then does without the path: robots
+        that turn on the spot have the way down the costs-to-go instead.
         """
         problem, path, tour = self._problem, self._paths[r], self._tours[r]
         now, course = self.round, self._courses[r]
@@ -304,7 +305,7 @@ def coordinated(
                 return ()
         alone = [motion for motion in motions if motion is not None]
         planning.round = now
-        found = priorities.search_priorities(alone, planning, now.orders, halt)
+        found = priorities.search_priorities(alone, planning, now.dead_ends, halt)
         if found is not None:
             found = priorities.shortened(found, alone, planning, halt)
             return trajectories_of(problem, found)

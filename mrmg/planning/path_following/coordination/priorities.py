@@ -72,7 +72,7 @@ class _Node:
 def search_priorities(
     motions: Sequence[Motion],
     planning: MotionPlanning,
-    most_nodes: int,
+    most_dead_ends: int,
     halt: np.ndarray,
 ) -> tuple[Motion, ...] | None:
     """Return motions that do not meet, or None.
@@ -80,22 +80,22 @@ def search_priorities(
     Args:
         motions: one for each robot, found without regard to the others.
         planning: finds motions.
-        most_nodes: nodes looked at, at most.
+        most_dead_ends: nodes all of whose children lead nowhere, at most.
         halt: shape (1,); the search ends soon after it has turned true.
     """
     robots = len(motions)
     conflict = np.stack([planning.conflicts(r, motions) for r in range(robots)])
     root = _Node(np.zeros((robots, robots), bool), tuple(motions), conflict)
     stack: list[Iterator[_Node]] = [iter([root])]
-    while stack and most_nodes > 0 and not halt[0]:
+    while stack and most_dead_ends > 0 and not halt[0]:
         node = next(stack[-1], None)
         if node is None:
             stack.pop()
+            most_dead_ends -= 1
         elif not np.isfinite(node.conflict).any():
             return node.motions
         else:
             stack.append(_children(node, planning))
-            most_nodes -= 1
     return None
 
 

@@ -108,14 +108,14 @@ class Round:
 
     Attributes:
         most: nodes of one robot's search at most.
-        orders: nodes of the search over priorities at most.
+        dead_ends: of the search over priorities at most.
         weight: of costs-to-go: motions take at most so many times the least cost.
         fineness: how much shorter motions, and finer cells, are than usual.
         soft_s: cost of conflicts with robots of lower priority [s].
     """
 
     most: int
-    orders: int
+    dead_ends: int
     weight: float
     fineness: float
     soft_s: float
