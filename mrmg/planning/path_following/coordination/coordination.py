@@ -62,8 +62,8 @@ FIRST_MOST = 300
 """Nodes of a robot's first search, at most."""
 
 UNTIMED_SHARE = 10
-"""Times as many nodes as else where costs-to-go do not know when the others are where,
-as in missions of many goals or on large maps."""
+"""Times as many nodes as else along tours of several targets where costs-to-go do not
+know when the others are where."""
 
 YIELDING_WEIGHT = 1.1
 """Weight of its cost-to-go."""
@@ -205,7 +205,8 @@ class _Planning:
         costs = task.hold_share, task.soft_s / (task.steps * problem.dt_s)
         timed = self._fields.timed(r, tour, task.stay, traffic, costs)
         if timed is None:
-            most = min(UNTIMED_SHARE * along.most, ROUNDS[-1].most)
+            share = UNTIMED_SHARE if len(tour) > 1 and not yielding else 1
+            most = min(share * along.most, ROUNDS[-1].most)
             yield along._replace(most=most), course
         else:
             nowhere = no_path(problem, r)
