@@ -80,25 +80,22 @@ class Fields:
         penalty = np.zeros((layers, *price.shape))
         grid = float(mission.spaces.x_min), float(mission.spaces.y_min), cell_m
         _field_kernels.add_others(
-            own,
-            traffic,
-            inner_m(own[0]),
-            grid,
-            layer,
-            soft_share * layer * dt_s,
+            own, traffic, inner_m(own[0]), grid, layer, soft_share * layer * dt_s,
             penalty,
-        )
+        )  # fmt: skip
+        standing, stood = hold_share * layer * dt_s, np.full(len(targets), -1)
+        stood[: len(stay)] = -(-stay // layer)
         lasting = np.where(penalty[-1] < np.inf, price, np.inf)
         legs: list[np.ndarray] = []
         for i in range(len(targets) - 1, -1, -1):
             region = self._region(targets[i : i + 1])
-            hold = np.full(price.shape, hold_share * layer * dt_s)
+            hold = np.full(price.shape, standing)
             seed = np.full(penalty.shape, np.inf)
             last = np.where(region, 0.0, np.inf)
-            if i < len(stay):
+            if stood[i] >= 0:
                 later = legs[-1] if legs else np.zeros(penalty.shape)
-                ahead = np.arange(layers) + -(-int(stay[i]) // layer)
-                seed[:, region] = later[np.minimum(ahead, layers - 1)][:, region]
+                ahead = np.minimum(np.arange(layers) + stood[i], layers - 1)
+                seed[:, region] = later[ahead][:, region]
                 last = seed[-1]
             else:
                 hold[region] = 0.0
@@ -107,9 +104,7 @@ class Fields:
             field[-1] = _field_kernels.cost_to_go(lasting, last)
             _field_kernels.timed_cost_to_go(price, seed, penalty, hold, field)
             legs.append(field)
-        field, standing = np.stack(legs[::-1]), hold_share * layer * dt_s
-        stood = np.full(len(targets), -1)
-        stood[: len(stay)] = -(-stay // layer)
+        field = np.stack(legs[::-1])
         way = self._way_down(r, targets, stood, (price, standing, field))
         return Guide(field, cell_m, layer), way
 
