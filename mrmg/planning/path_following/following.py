@@ -8,8 +8,9 @@ search for motions starts from the paths (`coordination`).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import cos, pi, radians, sin
 
 import numpy as np
@@ -92,8 +93,8 @@ def follow_tours(
     """Plan along tours.
 
     Where time counts, cars that are slower backwards turn round rather than change
-    gear, if there is room. Where a robot does not get through with one way of turning,
-    the others are tried.
+    gear, if there is room. A robot that does not get through with one way of turning
+    tries the others, and so do all where their batteries do not suffice.
 
     Args:
         problem: the mission.
@@ -115,8 +116,10 @@ def follow_tours(
     deeper_m = FIRST_PLAN_DEPTH_M if soon else TRACKING_M
     tried: list[list[Path]] = []
     failed = Followed(None, driven=False)
-    lenient_first = timed and slower.any()
-    for sharp in (*LENIENT_TURNS, SHARP) if lenient_first else (SHARP, *LENIENT_TURNS):
+    sharps = (SHARP, *LENIENT_TURNS)
+    if timed and slower.any():
+        sharps = (*LENIENT_TURNS, SHARP)
+    for sharp in sharps:
         paths = [
             tour_path(problem, r, tour[: len(tour) - steers], sharp, deeper_m)
             for r, (tour, steers) in enumerate(zip(stops, steered, strict=True))
@@ -129,7 +132,8 @@ def follow_tours(
                 _geared(problem, r, cost_maps[r], path) for r, path in enumerate(paths)
             ]
         tasks = [RobotTask(*one) for one in zip(stops, paths, cost_maps, strict=True)]
-        drive = drive_paths(problem, tasks, halt, rounds_of(number))
+        others = partial(_otherwise, problem, tasks, paths, sharps, deeper_m)
+        drive = drive_paths(problem, tasks, halt, rounds_of(number), others)
         if drive.trajectories:
             plan = make_plan(problem, seed, params, drive.trajectories, tours)
             if plan is not None:
@@ -137,9 +141,26 @@ def follow_tours(
             failed = Followed(None, why_refused(problem, drive.trajectories, tours))
         else:
             failed = Followed(None, drive.failure, failed.driven, drive.meeting)
-        if drive.meeting or halt[0]:
+        if not drive.trajectories or halt[0]:
             break
     return failed
+
+
+def _otherwise(
+    problem: Problem,
+    tasks: Sequence[RobotTask],
+    paths: Sequence[Path],
+    sharps: Sequence[float],
+    deeper_m: float,
+    r: int,
+) -> Iterator[RobotTask]:
+    """Yield what robot r may drive instead: its tour with changes of gear elsewhere."""
+    tour, tried = [*paths[r].target], [paths[r]]
+    for sharp in sharps:
+        path = tour_path(problem, r, tour, sharp, deeper_m)
+        if not any(np.array_equal(path.gear, before.gear) for before in tried):
+            tried.append(path)
+            yield RobotTask(tasks[r].tour, path, tasks[r].cost_map)
 
 
 def _same_gears(paths: Sequence[Path], others: Sequence[Path]) -> bool:

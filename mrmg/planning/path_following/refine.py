@@ -12,8 +12,9 @@ keeps every battery above its reserve, and is better by the scene's objective.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -124,6 +125,7 @@ def drive_paths(
     tasks: Sequence[RobotTask],
     halt: np.ndarray,
     rounds: Sequence[Round] = ROUNDS[:1],
+    others: Callable[[int], Iterable[RobotTask]] = lambda r: (),
 ) -> FleetDrive:
     """Smooth paths and drive the fleet along them.
 
@@ -135,16 +137,23 @@ def drive_paths(
         tasks: what each robot drives; changed as its path is.
         halt: shape (1,); driving ends soon after it has turned true.
         rounds: of the search where robots meet.
+        others: what a robot that does not get through may drive instead.
     """
-    drives = []
-    for r, task in enumerate(tasks):
-        if halt[0]:
-            return FleetDrive(())
-        cost_map = task.cost_map
-        drive, failure = _driven(problem, r, task)
-        task.cost_map = cost_map  # of the places that it was led round, maps are large
-        if drive is None and failure:
-            return FleetDrive((), failure)
+    tasks, drives = list(tasks), []
+    for r in range(len(tasks)):
+        drive, failures = None, list[str]()
+        for task in chain([tasks[r]], others(r)):
+            if halt[0]:
+                return FleetDrive(())
+            cost_map = task.cost_map
+            drive, failure = _driven(problem, r, task)
+            task.cost_map = cost_map  # maps that led round places are large
+            failures.append(failure)
+            if drive is not None or not failure:
+                tasks[r] = task
+                break
+        else:
+            return FleetDrive((), failures[0])
         drives.append(drive)
     trajectories = coordinated(
         problem,
