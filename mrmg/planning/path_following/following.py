@@ -107,7 +107,6 @@ def follow_tours(
     """
     cost_maps = cost_maps_of(problem)
     stops = [whole_tour(problem, routing, r) for r in range(len(cost_maps))]
-    steered = problem.steered_home
     tours = problem.visits(routing.tours)
     limit = problem.mission.fleet["limit"]
     slower = -limit[:, 0] < REVERSE_SPEED_SHARE * limit[:, 1]  # backwards than forwards
@@ -116,13 +115,14 @@ def follow_tours(
     deeper_m = FIRST_PLAN_DEPTH_M if soon else TRACKING_M
     tried: list[list[Path]] = []
     failed = Followed(None, driven=False)
-    sharps = (SHARP, *LENIENT_TURNS)
-    if timed and slower.any():
-        sharps = (*LENIENT_TURNS, SHARP)
+    later = LENIENT_TURNS
+    sharps = (*later, SHARP) if timed and slower.any() else (SHARP, *later)
     for sharp in sharps:
         paths = [
             tour_path(problem, r, tour[: len(tour) - steers], sharp, deeper_m)
-            for r, (tour, steers) in enumerate(zip(stops, steered, strict=True))
+            for r, (tour, steers) in enumerate(
+                zip(stops, problem.steered_home, strict=True)
+            )
         ]
         if any(_same_gears(paths, before) for before in tried):
             continue
