@@ -108,15 +108,12 @@ def follow_tours(
     cost_maps = cost_maps_of(problem)
     stops = [whole_tour(problem, routing, r) for r in range(len(cost_maps))]
     tours = problem.visits(routing.tours)
-    limit = problem.mission.fleet["limit"]
-    slower = -limit[:, 0] < REVERSE_SPEED_SHARE * limit[:, 1]  # backwards than forwards
     soon = number == 0
     timed = problem.minimum_time or problem.preference.objective.makespan_weight > 0.0
     deeper_m = FIRST_PLAN_DEPTH_M if soon else TRACKING_M
     tried: list[list[Path]] = []
     failed = Followed(None, driven=False)
-    later = LENIENT_TURNS
-    sharps = (*later, SHARP) if timed and slower.any() else (SHARP, *later)
+    sharps = _turns_to_change_gear_at(problem, timed)
     for sharp in sharps:
         paths = [
             tour_path(problem, r, tour[: len(tour) - steers], sharp, deeper_m)
@@ -144,6 +141,15 @@ def follow_tours(
         if not drive.trajectories or halt[0]:
             break
     return failed
+
+
+def _turns_to_change_gear_at(problem: Problem, timed: bool) -> tuple[float, ...]:
+    """Return from which turns on cars change gear, in the order in which it is tried."""
+    limit = problem.mission.fleet["limit"]
+    slower = -limit[:, 0] < REVERSE_SPEED_SHARE * limit[:, 1]  # backwards than forwards
+    if timed and slower.any():
+        return (*LENIENT_TURNS, SHARP)
+    return (SHARP, *LENIENT_TURNS)
 
 
 def _otherwise(
