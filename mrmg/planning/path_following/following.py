@@ -144,7 +144,7 @@ def follow_tours(
 
 
 def _turns_to_change_gear_at(problem: Problem, timed: bool) -> tuple[float, ...]:
-    """Return from which turns on cars change gear, in the order in which it is tried."""
+    """Return the turns from which on cars change gear, in the order of trying."""
     limit = problem.mission.fleet["limit"]
     slower = -limit[:, 0] < REVERSE_SPEED_SHARE * limit[:, 1]  # backwards than forwards
     if timed and slower.any():
