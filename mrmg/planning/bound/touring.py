@@ -27,7 +27,8 @@ STEP = 0.02
 """Share of what is proven by which costlier tours are looked at in the next round."""
 
 LEAST_RISE = 0.005
-"""Share by which one round with the cheapest tours must raise the bound for another."""
+"""Share by which one round with the cheapest tours must raise the bound for another,
+and by which costlier tours are looked at from the first such round on."""
 
 FINE_ARC_GOALS = 16
 """Goals up to which tours are told apart by all arcs; beyond, by pairs of them, as
@@ -36,8 +37,8 @@ otherwise labels would be too many ..."""
 FINE_ARC_LEGS = 20_000_000
 """... and legs from arc to arc up to which they are, by their memory (160 MB)."""
 
-WORK_LABELS = 6_000_000
-"""Labels that all rounds may set: some 5 s of one processor. The limit counts work, not
+WORK_LABELS = 8_000_000
+"""Labels that all rounds may set: some 6 s of one processor. The limit counts work, not
 time, so that the same mission has the same bound on every machine."""
 
 
@@ -81,7 +82,7 @@ def touring_bound_J(
         leg = _leg_table(ways, price, problem.goals)
         rest = rest or completions(problem, leg)
         best = max(best, float(rest.before[0]))
-        most = (1.0 + STEP) * best
+        most = (1.0 + (LEAST_RISE if settled else STEP)) * best
         along_J = (1.0 + SLACK) * _cost_along(ways, price, tours)
         if best < along_J:
             most = min(most, along_J)
