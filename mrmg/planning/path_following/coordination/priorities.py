@@ -18,6 +18,9 @@ import numpy as np
 
 from mrmg.planning.path_following.tracking import Motion
 
+SHORTENING_SHARE = 0.25
+"""Nodes that shortening motions may take, as a share of what finding them took."""
+
 YIELDS = 2
 """Times that each of two robots makes room for the other one."""
 
@@ -184,7 +187,7 @@ def shortened(
     """Return motions in which robots lose less time to each other.
 
     Those that lose time move anew among all others, each once, the one that loses most
-    first, while less is searched than it took to find the motions.
+    first, while a share of what it took to find the motions is left.
 
     Args:
         motions: that have no conflicts.
@@ -192,7 +195,7 @@ def shortened(
         planning: finds motions.
         halt: shape (1,); the search ends soon after it has turned true.
     """
-    best, most = list(motions), 2 * planning.nodes
+    best, most = list(motions), (1.0 + SHORTENING_SHARE) * planning.nodes
     lost = {
         r: len(motions[r].control) - len(one.control) for r, one in enumerate(alone)
     }
