@@ -52,8 +52,8 @@ def no_robots(folder: Path) -> str:
 
 
 def tiny_obstacle(folder: Path) -> str:
-    box = {"center": [10, 3], "size": [1e-6, 1e-6]}
-    return written(folder, obstacles=[{"box": box}])
+    corners = [[10, 3], [10 + 1e-6, 3], [10, 3 + 1e-6]]
+    return written(folder, obstacles=[{"polygon": corners}])
 
 
 def missing_actuator(folder: Path) -> str:
