@@ -157,8 +157,9 @@ def _end_where_printed(
 def _children(process: int) -> list[int]:
     """Return the processes below one, the lowest first; none where /proc is missing."""
     found: list[int] = []
-    for task in Path(f"/proc/{process}/task").glob("*/children"):
-        with suppress(OSError, ValueError):
-            for child in map(int, task.read_text().split()):
-                found += [*_children(child), child]
+    with suppress(OSError):  # it has ended meanwhile
+        for task in Path(f"/proc/{process}/task").glob("*/children"):
+            with suppress(OSError, ValueError):
+                for child in map(int, task.read_text().split()):
+                    found += [*_children(child), child]
     return found

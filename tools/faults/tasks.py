@@ -132,7 +132,7 @@ class Ended:
     def fault(self, *codes: int) -> str:
         """Return what is wrong with it, if it may only end with some codes; or ""."""
         if "Traceback" in self.text:
-            return f"traceback: {self.text.strip().splitlines()[-1]}"
+            return f"traceback: {self.text.strip()[-1500:]}"
         if self.code not in codes:
             return f"exit code {self.code}: {self.text.strip()[-200:]}"
         if self.code > 0 and self.code != 130 and "mrmg: " not in self.text:
@@ -198,12 +198,18 @@ class Started:
         return None if code is None else int(code)
 
     def send(self, number: int) -> None:
-        """Send a signal: Ctrl-C to the whole group, as a terminal does."""
-        with suppress(ProcessLookupError):
-            if number == signal.SIGINT:
-                os.killpg(self.group, number)
-            else:
-                os.kill(self.group, number)
+        """Send a signal: Ctrl-C to the whole group, as a terminal does.
+
+        A forked command has its group, and minds Ctrl-C, only after a moment.
+        """
+        while self.wait(0.0) is None:
+            with suppress(ProcessLookupError):
+                if number == signal.SIGINT:
+                    os.killpg(self.group, number)
+                else:
+                    os.kill(self.group, number)
+                return
+            time.sleep(0.01)
 
     def finish(self, within_s: float = FIRST_RUN_S) -> Ended:
         """Wait for the end; a hanging one is killed."""
