@@ -42,7 +42,6 @@ from mrmg.planning.problem.problem import (
 )
 from mrmg.planning.problem.targets import finish_of
 from mrmg.planning.roadmap.roadmap import Roadmap
-from mrmg.planning.routers import find_router
 from mrmg.planning.routing.routing import solve_routing
 from mrmg.planning.routing.shortfall import MAX_SHARE, shortfall
 from mrmg.planning.search import Search
@@ -159,17 +158,17 @@ def _unjoined_finishes(scene: Scene, roadmap: Roadmap) -> list[str]:
 
 
 def why_no_plan(
-    problem: Problem, params: PlannerParams, seed: int, search: Search
+    problem: Problem, request: Request, search: Search
 ) -> tuple[PlanStatus, str]:
     """Return how a search ended that found neither a plan nor a proof, and why."""
-    budget_s, statistics = params.budget_s, search.statistics
-    if budget_s is None or statistics.elapsed() <= budget_s:
-        return PlanStatus.NO_PLAN_FOUND, _obstacle(problem, params, seed, search)
+    params, statistics = request.params, search.statistics
+    if statistics.left_s(params.budget_s) > 0.0:
+        return PlanStatus.NO_PLAN_FOUND, _obstacle(problem, request, search)
     if not search.begun:
         return why_no_roadmap(params, statistics)
     if not search.attempts:
         return why_in_short(params, search)
-    return _budget_over(params, search, _obstacle(problem, params, seed, search))
+    return _budget_over(params, search, _obstacle(problem, request, search))
 
 
 def why_no_roadmap(
@@ -197,11 +196,10 @@ def _budget_over(
     )
 
 
-def _obstacle(
-    problem: Problem, params: PlannerParams, seed: int, search: Search
-) -> str:
+def _obstacle(problem: Problem, request: Request, search: Search) -> str:
     """Return what stood in the way of a plan."""
     scene, roadmap = problem.scene, problem.roadmap
+    params, seed = request.params, request.seed
     unjoined = unjoined_goals(scene, roadmap) + _unjoined_finishes(scene, roadmap)
     if unjoined:
         passages = passages_missing(scene, params.margins, unjoined_places(problem))
@@ -220,7 +218,8 @@ def _obstacle(
     rounds = search.statistics.counts.get("coordinated", 0)
     searched = f", and {counted(rounds, 'search', 'searches')} for motions found none"
     searched = searched if rounds else ""
-    headings = _headings_in_the_way(scene, params, seed)
+    in_time = search.statistics.left_s(params.budget_s) > 0.0
+    headings = _headings_in_the_way(scene, request) if in_time else []
     if headings:
         return endings.HEADINGS.reason(places=listed(headings), searched=searched)
     routing = solve_routing(
@@ -234,7 +233,7 @@ def _obstacle(
     return endings.NO_PROGRESS.reason(blocked="; ".join(blocked), searched=searched)
 
 
-def _headings_in_the_way(scene: Scene, params: PlannerParams, seed: int) -> list[str]:
+def _headings_in_the_way(scene: Scene, request: Request) -> list[str]:
     """Return the places with headings, if one attempt without these finds a plan."""
     goals = [goal.id for goal in scene.goals if goal.heading_rad is not None]
     headed = [
@@ -254,12 +253,8 @@ def _headings_in_the_way(scene: Scene, params: PlannerParams, seed: int) -> list
             for robot in scene.robots
         ),
     )
-    problem = state_mission(Frame.of(free).scene(free), seed, params)
-    request = Request(
-        params=params,
-        router=find_router(replace(params.router, method="search")),
-        seed=seed,
-    )
+    own = Frame.of(free).scene(free)
+    problem = state_mission(own, request.seed, request.params)
     found = path_following(problem, request)
     return goals + [f"the finish of {name}" for name in headed] if found.plans else []
 

@@ -199,8 +199,7 @@ class _Planning:
                 partial(
                     why_no_plan,
                     replace(problem, scene=self.scene),
-                    self.params,
-                    self.request.seed,
+                    self.request,
                     search,
                 )
             )
