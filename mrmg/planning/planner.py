@@ -243,8 +243,7 @@ class _Planning:
         def tight() -> Problem | None:
             if self.params.planner == GUIDED_TREE:  # it has one search, of so much work
                 return None
-            own = Frame.of(self.scene).scene(self.scene)
-            return tightened(own, self.request.seed, self.params)
+            return tightened(proofs.scene, self.request.seed, self.params)
 
         def proof(tours_missing: bool, goes_on: bool) -> str | None:
             missing = tours_missing or math.isinf(self.statistics.bounds.energy_J or 0)

@@ -62,17 +62,14 @@ FIRST_MOST = 300
 """Nodes of a robot's first search, at most."""
 
 UNTIMED_SHARE = 10
-"""Times as many nodes as else along tours of several targets where costs-to-go do not
-know when the others are where."""
+"""How many times as many nodes a search along several targets may have, where its
+costs-to-go do not know when the other robots are where."""
 
 YIELDING_WEIGHT = 1.1
-"""Weight of its cost-to-go."""
+"""Weight of the cost-to-go for a robot that makes room for others."""
 
 YIELDING_S = 20.0
-"""Cost of conflicts with robots for one that makes room for others [s]."""
-
-WAYS_ON = 20
-"""Ways on from a node at most: its motions, to track, hold, wait, stay and visit."""
+"""Cost of conflicts with the others for such a robot [s]."""
 
 MOST_CURVE_NODES = 1500
 """Nodes of the curve that a robot drives home along, at most."""
@@ -105,12 +102,13 @@ def empty_course(most: int) -> Course:
     )
 
 
-def empty_nodes(most: int) -> Nodes:
-    """Return room for a search of at most so many nodes.
+def empty_nodes(task: Task) -> Nodes:
+    """Return room for a search.
 
     The table has more places than there are ways on from all nodes, wherever they lead:
     it must never be full.
     """
+    most, ways_on = task.most, len(task.motion) + _search_kernels.WAYS_ON
     return Nodes(
         state=np.empty((most, 5)),
         parent=np.empty(most, np.int64),
@@ -122,7 +120,7 @@ def empty_nodes(most: int) -> Nodes:
         motion=np.empty(most, np.int64),
         key=np.empty(2 * most + 2),
         entry=np.empty(2 * most + 2, np.int64),
-        table=np.full(1 << (WAYS_ON * most).bit_length(), -1, np.int64),
+        table=np.full(1 << (ways_on * most).bit_length(), -1, np.int64),
         size=np.array([0, 0, -1]),
     )
 
@@ -239,7 +237,7 @@ class _Planning:
         )
         count, nodes = _search_kernels.find_motion(
             search,
-            empty_nodes(task.most),
+            empty_nodes(task),
             self._room._replace(curve=curve),
             self._problem.start[r],
             self._control,

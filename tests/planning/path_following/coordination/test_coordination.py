@@ -6,17 +6,13 @@ from collections.abc import Callable
 
 import pytest
 
-from mrmg.planning.path_following.coordination.coordination import (
-    ROUNDS,
-    WAYS_ON,
-    empty_nodes,
-)
-from mrmg.planning.path_following.coordination.tasks import motions
+from mrmg.planning.path_following.coordination.coordination import ROUNDS, empty_nodes
+from mrmg.planning.path_following.coordination.tasks import no_path, task_of
 from mrmg.planning.problem.problem import Problem
 from mrmg.scene.types import Scene
 
-OTHERS = 5
-"""To track, hold, wait, stay and visit."""
+OTHERS = 6
+"""To track, hold, wait, stay, visit and end."""
 
 
 @pytest.mark.parametrize("model", ["car", "diffdrive", "husky"])
@@ -27,7 +23,6 @@ def test_the_table_of_cells_is_never_full(
     robots = [{"id": "r", "model": model, "pose": [6, 10, 0]}]
     problem = state(yard(robots=robots), samples=50)
     for effort in ROUNDS:
-        pairs = motions(problem.mission.fleet[0], 5, problem.dt_s)
-        assert len(pairs) + OTHERS <= WAYS_ON
-        keys = effort.most * (len(pairs) + OTHERS)
-        assert len(empty_nodes(effort.most).table) > keys
+        task = task_of(problem, 0, [], no_path(problem, 0), effort)
+        keys = effort.most * (len(task.motion) + OTHERS)
+        assert len(empty_nodes(task).table) > keys
