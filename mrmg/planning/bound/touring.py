@@ -23,12 +23,12 @@ from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 SLACK = 1e-6
 """Share by which tours may cost more than the best known; rounding loses none."""
 
-STEP = 0.02
-"""Share of what is proven by which costlier tours are looked at in the next round."""
+STEP, FINE_STEP = 0.02, 0.005
+"""Shares of what is proven by which costlier tours are looked at in the next round,
+before and after the cheapest ones of some round are known."""
 
-LEAST_RISE = 0.005
-"""Share by which one round with the cheapest tours must raise the bound for another,
-and by which costlier tours are looked at from the first such round on."""
+LEAST_RISE = 0.001
+"""Share by which a round with the cheapest tours must raise the bound for another."""
 
 FINE_ARC_GOALS = 16
 """Goals up to which tours are told apart by all arcs; beyond, by pairs of them, as
@@ -73,16 +73,16 @@ def touring_bound_J(
         The bound; `proven_J` if no better one was found.
     """
     best, settled_J = proven_J, -math.inf
-    rest = None
+    rest, cheapest = None, False
     for _ in range(rounds):
         tightened = _tighten(ways, price, tours)
-        settled = math.isfinite(settled_J)
-        if halt[0] or (settled and not tightened):
+        if halt[0] or (cheapest and not tightened):
             break
+        settled = math.isfinite(settled_J)
         leg = _leg_table(ways, price, problem.goals)
         rest = rest or completions(problem, leg)
         best = max(best, float(rest.before[0]))
-        most = (1.0 + (LEAST_RISE if settled else STEP)) * best
+        most = (1.0 + (FINE_STEP if settled else STEP)) * best
         along_J = (1.0 + SLACK) * _cost_along(ways, price, tours)
         if best < along_J:
             most = min(most, along_J)
@@ -90,8 +90,8 @@ def touring_bound_J(
         work -= labels
         if found is None:
             break
-        enough = False
-        if found.feasible:
+        enough, cheapest = False, found.feasible
+        if cheapest:
             best, tours = max(best, found.cost_J), found.tours
             enough = best < (1.0 + LEAST_RISE) * settled_J
             settled_J = best

@@ -9,6 +9,7 @@ from itertools import combinations, permutations, product
 import numpy as np
 import pytest
 
+import mrmg
 from mrmg.planning.bound import touring
 from mrmg.planning.bound._completion_kernels import Completions
 from mrmg.planning.bound.arcs import ArcWays
@@ -282,6 +283,18 @@ def test_less_work_proves_less_and_never_less_than_was_known() -> None:
     ]
     assert routing.cost_J <= found_J[0] <= found_J[1] <= found_J[2]
     assert found_J[0] < found_J[2]
+
+
+@pytest.mark.parametrize("step", [0.002, 0.005])
+def test_the_bound_is_as_good_however_small_the_steps_towards_it(
+    step: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Costs up to which no tours are found are proven, and more is looked at then."""
+    scene = mrmg.load_scene("scene4")
+    monkeypatch.setattr(touring, "FINE_STEP", 0.05)
+    at_once_J = lower_bound_J(scene)
+    monkeypatch.setattr(touring, "FINE_STEP", step)
+    assert lower_bound_J(scene) >= (1.0 - 2.0 * touring.LEAST_RISE) * at_once_J
 
 
 def test_pairs_of_arcs_prove_less_and_stay_below_the_optimum(
