@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,12 +71,11 @@ def calibrate(options: argparse.Namespace) -> int:
     model, _ = load_model(folder, trust_code=options.trust_code)
     with terminal.progress_of("measuring") as on_progress:
         calibration = calibrate(model, on_progress=on_progress, **given(options))
-    write_calibration(calibration, folder, out, in_place=options.in_place)
-    draw_calibration(calibration, plot)
-    if options.json:
-        terminal.print_json(calibration.to_json())
-    else:
-        print("\n".join([*_lines(calibration), f"  {out / 'robot.yaml'}", f"  {plot}"]))
+    with writing_to(out, overwrite=options.overwrite):
+        write_calibration(calibration, folder, out, in_place=options.in_place)
+        draw_calibration(calibration, plot)
+    lines = [*_lines(calibration), f"  {out / 'robot.yaml'}", f"  {plot}"]
+    terminal.print_result(options, calibration.to_json(), lines)
     return ExitCode.OK
 
 
@@ -109,15 +110,33 @@ def _calibrate_from_logs(options: argparse.Namespace) -> int:
     )
     calibration = calibrate_from_logs(model, runs, tested)
     page = calibration_html(calibration)
-    write_calibration(calibration, folder, out, in_place=options.in_place)
-    write_terrain(calibration, out)
-    write_text(out / PAGE_FILE, page)
-    if options.json:
-        terminal.print_json(calibration.to_json())
-    else:
-        names = ("robot.yaml", TERRAIN_FILE, PAGE_FILE)
-        print("\n".join([*_log_lines(calibration), *(f"  {out / n}" for n in names)]))
+    with writing_to(out, overwrite=options.overwrite):
+        write_calibration(calibration, folder, out, in_place=options.in_place)
+        write_terrain(calibration, out)
+        write_text(out / PAGE_FILE, page)
+    files = [f"  {out / name}" for name in ("robot.yaml", TERRAIN_FILE, PAGE_FILE)]
+    lines = [*_log_lines(calibration), *files]
+    terminal.print_result(options, calibration.to_json(), lines)
     return ExitCode.OK
+
+
+@contextmanager
+def writing_to(folder: Path, *, overwrite: bool) -> Iterator[None]:
+    """Create a folder for a calibration, and keep other commands out of it.
+
+    Raises:
+        UsageError: if there is something in it and it is not to be replaced.
+        RunFolderError: if another process is writing to it.
+    """
+    from mrmg.runs.folder import exclusive
+    from mrmg.runs.replacing import require_absent
+    from mrmg.storage import remove_unfinished
+
+    folder.mkdir(parents=True, exist_ok=True)
+    with exclusive(folder):
+        require_absent(folder, overwrite=overwrite)  # others may have written meanwhile
+        remove_unfinished(folder)
+        yield
 
 
 def folder_of_model(reference: str) -> Path:

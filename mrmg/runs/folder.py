@@ -286,7 +286,7 @@ def opened_folder(
         raise UsageError(f"{error.filename} is a file; choose a folder") from error
     remove = partial(_remove_unfinished, path, places)
     try:
-        with _exclusive(path):
+        with exclusive(path):
             _refuse_foreign_files(path, marker, kind)
             remove()
             try:
@@ -317,7 +317,12 @@ def _refuse_foreign_files(path: Path, marker: str, kind: str) -> None:
 
 
 @contextmanager
-def _exclusive(path: Path) -> Iterator[None]:
+def exclusive(path: Path) -> Iterator[None]:
+    """Keep other commands out of a folder that is there.
+
+    Raises:
+        RunFolderError: if another process is working in it.
+    """
     with locked(path) as is_free:
         if not is_free:
             fault = Fault("", "another mrmg process is working in this folder")

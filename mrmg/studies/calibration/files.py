@@ -49,7 +49,6 @@ def write_calibration(
     text = with_values(
         source.read_text(encoding="utf-8"), calibration.changes(), source=str(source)
     )
-    storage.remove_unfinished(folder)
     for path in sorted(model_folder.rglob("*")):
         if path.is_file() and path != source:
             copy = folder / path.relative_to(model_folder)

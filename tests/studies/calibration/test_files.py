@@ -10,10 +10,15 @@ from pathlib import Path
 import pytest
 
 from mrmg import shipped
-from mrmg.errors import SceneError, UsageError
+from mrmg.cli.calibrate_command import writing_to
+from mrmg.errors import RunFolderError, SceneError, UsageError
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.loading.models import load_model
-from mrmg.studies.calibration import Calibration, fit_legs, write_calibration
+from mrmg.studies.calibration import (
+    Calibration,
+    fit_legs,
+    write_calibration,
+)
 
 
 @pytest.fixture
@@ -36,10 +41,7 @@ def test_the_copy_is_a_model_with_the_new_values(
 ) -> None:
     before = (model_folder / "robot.yaml").read_text()
     out = tmp_path / "out"
-    out.mkdir()
-    (out / ".part-killed-calibration.png").write_bytes(b"half")
     write_calibration(calibration, model_folder, out, in_place=False)
-    assert not list(out.glob(".part-*"))
     found, _ = load_model(out)
     assert found.rolling_coefficient == pytest.approx(0.05, rel=1e-3)
     assert found.turning_coefficient == pytest.approx(0.02, rel=1e-3)
@@ -93,3 +95,19 @@ def test_a_model_file_that_lacks_a_value_is_refused_and_nothing_written(
     with pytest.raises(SceneError, match="turning_coefficient: missing"):
         write_calibration(calibration, model_folder, tmp_path / "out", in_place=False)
     assert not (tmp_path / "out").exists()
+
+
+def test_two_calibrations_do_not_write_to_one_folder_at_once(tmp_path: Path) -> None:
+    folder = tmp_path / "out"
+    with writing_to(folder, overwrite=False):
+        (folder / ".part-growing").write_bytes(b"half")
+        second = writing_to(folder, overwrite=True)
+        with pytest.raises(RunFolderError, match="another mrmg process"), second:
+            pass
+        assert (folder / ".part-growing").exists()
+        (folder / "robot.yaml").write_text("of the first one\n")
+    third = writing_to(folder, overwrite=False)
+    with pytest.raises(UsageError, match="--overwrite"), third:
+        pass
+    with writing_to(folder, overwrite=True):
+        assert not list(folder.glob(".part-*"))
