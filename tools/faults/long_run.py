@@ -12,6 +12,7 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from protocol import Row
@@ -26,10 +27,13 @@ WARM_SHARE = 0.2
 """Share of the missions after which caches are filled."""
 
 MOST_GROWTH_BYTES = 10_000
-"""Memory that a mission may leave, by a straight line through the readings.
+"""Memory that a mission may leave, by a straight line through the readings."""
 
-Read when the allocator has given back what is free: what it keeps for later rises and
-falls by ten megabytes with the sizes of the missions, and would hide what is left."""
+ALLOCATOR = {"MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "131072"}
+"""Environment in which the C library gives large blocks back as soon as they are free.
+
+Else it keeps some for each thread, in steps of twenty megabytes that come and go with
+the threads' order, and would hide what missions leave."""
 
 REQUIRED = (
     f"memory grows by at most {MOST_GROWTH_BYTES // 1000} kB a mission, no handle"
@@ -44,7 +48,7 @@ def rows(options: Options) -> Iterator[Row]:
 
     def make() -> Row:
         context = multiprocessing.get_context("spawn")
-        with context.Pool(1) as pool:
+        with patch.dict(os.environ, ALLOCATOR), context.Pool(1) as pool:
             return pool.apply(_missions, (str(folder), options.missions))
 
     found = options.trials.row(make, part="long", missions=options.missions)
