@@ -6,146 +6,97 @@ visited, node, arc of the node's border); nodes are targets and, last, the start
 label of a state is a cost and the energy left, and is dropped where another one costs
 no more and leaves no less (resource-constrained shortest paths, Desrochers 1988).
 
+Where visits are counted (`_completion_kernels`), no label leads straight back to the
+goal before. So labels that come from different goals differ in where they may lead, and
+two are needed to drop a third (elimination of 2-cycles, Houck et al. 1980).
+
 What a leg drains a battery by and what it costs are two things: the cost may be energy,
 time or nothing, and it may depend on the arcs where regions are touched.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.planning.bound._completion_kernels import Completions
-from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-
-NOTHING = -1
-"""Parent of the first label."""
-
-
-class TourSearch(NamedTuple):
-    """What cheapest tours are sought among.
-
-    Attributes:
-        routing: the problem, whose costs drain batteries.
-        goal_list: the open goals, shape (G,).
-        leg: what legs cost from arc to arc, shape (R, T + 1, K, T, K); row T is the
-            start, in whose arc 0 robots are.
-        drain: what they drain batteries by, likewise.
-        nearest: the least that they cost to any arc, shape (R, T + 1, K, T).
-        finish: what the last leg costs from each node, shape (R, T + 1).
-        rest: bounds of what is still to come, by which labels are dropped.
-        most: cost of tours of interest; others may be missed.
-    """
-
-    routing: RoutingArrays
-    goal_list: np.ndarray
-    leg: np.ndarray
-    drain: np.ndarray
-    nearest: np.ndarray
-    finish: np.ndarray
-    rest: Completions
-    most: float
-
-
-class Labels(NamedTuple):
-    """Labels in the order in which they were set, and room for candidates.
-
-    Memory that is not written is not used.
-
-    Attributes:
-        value: cost and energy left, shape (N, 2).
-        trace: robot, node, arc and parent, shape (N, 4).
-        first: number of the first label of the present robot with each set of goals
-            visited, and of the end, shape (2^G + 1,).
-        near: labels that the present goal may follow, shape (N,).
-        offer, origin: candidates' values and parents, shape (N, 2) and (N,).
-    """
-
-    value: np.ndarray
-    trace: np.ndarray
-    first: np.ndarray
-    near: np.ndarray
-    offer: np.ndarray
-    origin: np.ndarray
+from mrmg.planning.bound._completion_kernels import (
+    after_visit,
+    before_visit,
+    states_of,
+)
+from mrmg.planning.bound._label_kernels import (
+    NOTHING,
+    Labels,
+    ahead_of,
+    bounded,
+    set_trace,
+    set_value,
+)
 
 
 @kernel
 def cheapest_tours(search, room):
-    """Return the least cost of visiting each set of goals, and its tours' labels.
+    """Return the least cost of each state of visits, and its tours' labels.
 
     Args:
         search: `TourSearch`.
         room: labels at most.
 
     Returns:
-        (cost, last, trace): of each set of goals, inf where no tours visit it that cost
-        at most `search.most`, shape (2^G,); the last label of its tours; and `trace` as
-        in `Labels`, which is empty if there are more labels than there is room for.
+        (cost, last, trace): of each state, inf where no tours lead to it that cost at
+        most `search.most`, shape (X,); the last label of its tours; and `trace` as in
+        `Labels`, which is empty if there are more labels than there is room for.
     """
     problem = search.routing
     n, start = len(search.goal_list), search.leg.shape[3]
-    sets = 1 << n
+    states = states_of(n, search.remembered)
     labels = Labels(
         np.empty((room, 2)),
         np.empty((room, 4), np.int32),
-        np.zeros(sets + 1, np.int64),
+        np.zeros(states + 1, np.int64),
         np.empty(room, np.int32),
         np.empty((room, 2)),
         np.empty(room, np.int32),
     )
-    cost = np.full(sets, np.inf)
-    last = np.full(sets, NOTHING, np.int32)
+    cost = np.full(states, np.inf)
+    last = np.full(states, NOTHING, np.int32)
     cost[0] = 0.0
     count = 0
     for r in range(len(problem.energy)):
         labels.first[0] = count
-        for mask in range(sets):
-            if cost[mask] < np.inf and (
-                cost[mask] + search.rest.before[mask] <= search.most
+        for state in range(states):
+            if cost[state] < np.inf and (
+                cost[state] + search.rest.before[state] <= search.most
             ):
                 if count < room:
-                    _set(labels, count, cost[mask], problem.energy[r])
-                    _trace(labels, count, r, start, 0, last[mask])
+                    set_value(labels, count, cost[state], problem.energy[r])
+                    set_trace(labels, count, r, start, 0, last[state])
                 count += 1
             for g in range(n):
-                rest = mask ^ (1 << g)
+                rest = before_visit(state, g, search.remembered)
                 # Nothing is called in vain: a call's many arrays take their time.
-                some = rest < mask and labels.first[rest] < labels.first[rest + 1]
+                some = rest >= 0 and labels.first[rest] < labels.first[rest + 1]
                 if some and count <= room:
-                    count = _visit_goal(search, labels, r, mask, g, count)
-            if labels.first[mask] < count <= room:
-                count = _visit_stations(search, labels, r, mask, count)
+                    count = _visit_goal(search, labels, r, state, g, count)
+            if labels.first[state] < count <= room:
+                count = _visit_stations(search, labels, r, state, count)
             if count > room:
                 return cost, last, labels.trace[:0]
-            labels.first[mask + 1] = count
+            labels.first[state + 1] = count
         _end_tours(search, labels, r, cost, last)
     return cost, last, labels.trace[:count]
 
 
 @kernel
-def _set(labels, k, cost, left):
-    """Write the value of label k."""
-    labels.value[k, 0], labels.value[k, 1] = cost, left
-
-
-@kernel
-def _trace(labels, k, r, node, arc, parent):
-    """Write where label k is, and the label that it continues."""
-    labels.trace[k, 0], labels.trace[k, 1] = r, node
-    labels.trace[k, 2], labels.trace[k, 3] = arc, parent
-
-
-@kernel
-def _visit_goal(search, labels, r, mask, g, count):
-    """Set the labels of robot r at the g-th goal, with a mask's goals visited.
+def _visit_goal(search, labels, r, state, g, count):
+    """Set the labels of robot r at the g-th goal, in a state of visits.
 
     Returns:
         The number of labels; more than there is room for if they do not fit.
     """
-    goal, ahead = search.goal_list[g], search.rest.after[mask, g]
-    near = _near(search, labels, r, mask ^ (1 << g), goal, ahead)
+    goal, ahead = search.goal_list[g], ahead_of(search, r, state, g)
+    rest = before_visit(state, g, search.remembered)
+    near = _near(search, labels, r, rest, g, ahead)
     for arc in range(search.leg.shape[4] if near else 0):
         offers = _offers(search, labels, r, near, goal, arc, ahead)
         if offers == 0:
@@ -153,38 +104,61 @@ def _visit_goal(search, labels, r, mask, g, count):
         if count + offers > len(labels.value):
             return len(labels.value) + 1
         first = count
-        most_left = -np.inf
+        # Most energy left, the goal it comes from, and most by way of another one.
+        most_left, source, other_left = -np.inf, NOTHING, -np.inf
         for k in np.argsort(labels.offer[:offers, 0], kind="mergesort"):
             cost, left = labels.offer[k, 0], labels.offer[k, 1]
-            if left <= most_left:
+            origin = _repeatable(search, labels, labels.origin[k])
+            if left <= other_left:
                 continue
-            if count > first and labels.value[count - 1, 0] == cost:
+            if left <= most_left and source in (NOTHING, origin):
+                continue
+            if count > first and labels.value[count - 1, 0] == cost and origin < 0:
                 count -= 1  # as costly, and less energy left
-            most_left = left
-            _set(labels, count, cost, left)
-            _trace(labels, count, r, goal, arc, labels.origin[k])
+            if left <= most_left:
+                other_left = left
+            else:
+                if source != origin:
+                    other_left = most_left
+                most_left, source = left, origin
+            set_value(labels, count, cost, left)
+            set_trace(labels, count, r, goal, arc, labels.origin[k])
             count += 1
     return count
 
 
 @kernel
-def _near(search, labels, r, rest, goal, ahead):
+def _repeatable(search, labels, k):
+    """Return the goal that label k is at if its visits are counted, else NOTHING."""
+    node = labels.trace[k, 1]
+    return node if search.is_counted[node] else NOTHING
+
+
+@kernel
+def _near(search, labels, r, rest, g, ahead):
     """Write the labels that a goal may follow at one of its arcs; return their number.
 
     Args:
         search, labels: `TourSearch`, `Labels`.
         r: robot.
-        rest: goals visited before this one, as bits.
-        goal: number of the goal.
-        ahead: bound of what is still to come after it.
+        rest: state before this visit.
+        g: which goal of the list.
+        ahead: what bounds the rest of the mission after it.
     """
-    problem = search.routing
+    problem, goal = search.routing, search.goal_list[g]
+    counted = g >= search.remembered
     near = 0
     for k in range(labels.first[rest], labels.first[rest + 1]):
         node, from_arc = labels.trace[k, 1], labels.trace[k, 2]
+        if counted and node < problem.goals:
+            before = labels.trace[labels.trace[k, 3], 1]
+            if goal in (node, before):
+                continue
         left = labels.value[k, 1] - problem.cost[r, node, goal]
         cost = labels.value[k, 0] + search.nearest[r, node, from_arc, goal]
-        if left >= problem.reserve[r] and cost < np.inf and cost + ahead <= search.most:
+        if left < problem.reserve[r] or cost == np.inf:
+            continue
+        if cost + bounded(ahead, left) <= search.most:
             labels.near[near] = k
             near += 1
     return near
@@ -200,17 +174,17 @@ def _offers(search, labels, r, near, goal, arc, ahead):
         near: number of the labels that the goal may follow.
         goal: number of the goal.
         arc: of its border.
-        ahead: bound of what is still to come after it.
+        ahead: what bounds the rest of the mission after it.
     """
     problem = search.routing
     offers = 0
     for k in labels.near[:near]:
         node, from_arc = labels.trace[k, 1], labels.trace[k, 2]
         cost = labels.value[k, 0] + search.leg[r, node, from_arc, goal, arc]
-        if cost < np.inf and cost + ahead <= search.most:
-            left = labels.value[k, 1] - search.drain[r, node, from_arc, goal, arc]
-            if left < problem.reserve[r]:
-                continue
+        left = labels.value[k, 1] - search.drain[r, node, from_arc, goal, arc]
+        if left < problem.reserve[r] or cost == np.inf:
+            continue
+        if cost + bounded(ahead, left) <= search.most:
             labels.offer[offers, 0] = cost
             labels.offer[offers, 1] = min(left, problem.capacity[r])
             labels.origin[offers] = k
@@ -219,11 +193,11 @@ def _offers(search, labels, r, near, goal, arc, ahead):
 
 
 @kernel
-def _visit_stations(search, labels, r, mask, count):
-    """Set the labels of robot r at the stations with a mask's goals visited.
+def _visit_stations(search, labels, r, state, count):
+    """Set the labels of robot r at the stations in a state of visits.
 
     A full battery is the same whatever came before, so that costs decide: Dijkstra over
-    the stations' arcs, from the labels of this mask.
+    the stations' arcs, from the labels of this state.
 
     Returns:
         The number of labels; more than there is room for if they do not fit.
@@ -236,8 +210,8 @@ def _visit_stations(search, labels, r, mask, count):
     origin = np.full((stations, arcs), NOTHING, np.int32)
     ahead = np.empty(stations)
     for s in range(stations):
-        ahead[s] = _after_station(search, r, mask, s)
-    for k in range(labels.first[mask], count):
+        ahead[s] = _after_station(search, r, state, s)
+    for k in range(labels.first[state], count):
         usable = labels.value[k, 1] - problem.reserve[r]
         _lead_on(search, labels, r, k, usable, ahead, cost, origin)
     done = np.zeros((stations, arcs), np.bool_)
@@ -250,8 +224,8 @@ def _visit_stations(search, labels, r, mask, count):
         if s < 0:
             return count
         done[s, arc] = True
-        _set(labels, count, least, problem.capacity[r])
-        _trace(labels, count, r, goals + s, arc, origin[s, arc])
+        set_value(labels, count, least, problem.capacity[r])
+        set_trace(labels, count, r, goals + s, arc, origin[s, arc])
         usable = problem.capacity[r] - problem.reserve[r]
         _lead_on(search, labels, r, count, usable, ahead, cost, origin)
         count += 1
@@ -287,33 +261,34 @@ def _lead_on(search, labels, r, k, usable, ahead, cost, origin):
 
 
 @kernel
-def _after_station(search, r, mask, s):
+def _after_station(search, r, state, s):
     """Return a bound of what is still to come with robot r at a station."""
-    rest = search.rest
-    least = rest.to_finish[r, search.routing.goals + s] + rest.before[mask]
+    rest, states = search.rest, len(search.rest.before)
+    least = rest.to_finish[r, search.routing.goals + s] + rest.before[state]
     for u in range(len(search.goal_list)):
-        if not mask >> u & 1:
-            on = rest.from_station[r, s, u] + rest.after[mask | 1 << u, u]
+        following = after_visit(state, u, search.remembered, states)
+        for mode in range(len(rest.after) if following >= 0 else 0):
+            on = rest.from_station[r, mode, s, u] + rest.after[mode, following, u]
             least = min(least, on)
     return least
 
 
 @kernel
 def _end_tours(search, labels, r, cost, last):
-    """Write the cost of each set of goals once robot r has ended, and its last label.
+    """Write the cost of each state once robot r has ended, and its last label.
 
     A robot that may end where it starts need not have any energy for that.
     """
     problem = search.routing
-    for mask in range(len(cost)):
-        cost[mask] = np.inf
-        for k in range(labels.first[mask], labels.first[mask + 1]):
+    for state in range(len(cost)):
+        cost[state] = np.inf
+        for k in range(labels.first[state], labels.first[state + 1]):
             node = labels.trace[k, 1]
             drain = problem.finish[r, node]
             total = labels.value[k, 0] + search.finish[r, node]
             enough = drain == 0.0 or labels.value[k, 1] - drain >= problem.reserve[r]
             # Of what costs more, tours that cost less may have been missed.
-            few = total + search.rest.before[mask] <= search.most
-            if enough and few and total < cost[mask]:
-                cost[mask] = total
-                last[mask] = k
+            few = total + search.rest.before[state] <= search.most
+            if enough and few and total < cost[state]:
+                cost[state] = total
+                last[state] = k

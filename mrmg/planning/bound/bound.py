@@ -5,8 +5,10 @@ energy of that is at least the rolling resistance on the shortest ways (`geodesi
 a robot that starts and ends at rest gets no inertia for nothing, and turning, idling
 and other robots only cost more. The least over all orders is the bound.
 
-Where goals are few, orders are distinguished by where each region is touched first
-(`touring`), as the way through a region is no more for nothing than any other.
+Orders are distinguished by where each region is touched first (`touring`), as the way
+through a region is no more for nothing than any other. Where goals are many, not all
+visits are remembered (`counted_visits`); where there are more still, trees with prices
+span them (`relaxed_routing_J`).
 
 On slopes the battery also pays for climbing and is paid for rolling down, at most what
 that is worth without losses (`slopes.climb_J`). Along a way this adds up to the
@@ -28,7 +30,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -36,11 +38,9 @@ from shapely.geometry import Point
 
 from mrmg.planning.bound import _bound_kernels
 from mrmg.planning.bound.arcs import ArcWays
-from mrmg.planning.bound.exact_tours import (
-    are_few,
-    exact_routing,
-    over_stations,
-)
+from mrmg.planning.bound.completions import over_stations
+from mrmg.planning.bound.counted_visits import counted_visits
+from mrmg.planning.bound.exact_tours import are_few, exact_routing
 from mrmg.planning.bound.geodesic import Ground, Ways
 from mrmg.planning.bound.touring import touring_bound_J
 from mrmg.planning.halting import NEVER, check
@@ -65,6 +65,13 @@ FINER = 3
 
 ROUNDS = 20
 """Times that the ways of the cheapest tours are tightened at most."""
+
+MOST_TARGETS = 64
+"""Goals and stations up to which tours are told apart by arcs, by the memory for legs
+from arc to arc (134 MB) ..."""
+
+MOST_LEGS = 20_000
+"""... and legs of all robots between them, by the time that their arcs take."""
 
 TravelKey = tuple[tuple[str, ...], float, float]
 """What the ways of a robot depend on: obstacles, inscribed radius, top speed."""
@@ -106,24 +113,24 @@ def lower_bound_J(
     if not scene.goals:
         return 0.0
     few = are_few(len(scene.goals), len(scene.robots))
+    targets = len(scene.targets())
+    legs = len(scene.robots) * targets**2
+    by_arcs = few or (targets <= MOST_TARGETS and legs <= MOST_LEGS)
     relaxed = Relaxation.of(
-        scene, step_s=step_s, cells=cells, shared=not few, halt=halt
+        scene, step_s=step_s, cells=cells, shared=not by_arcs, halt=halt
     )
     problem = relaxed.problem
-    if not few:
-        bound = relaxed_routing_J(problem)
-    else:
-        routing = exact_routing(problem)
-        bound = routing.cost_J if routing else relaxed_routing_J(problem)
+    routing = exact_routing(problem) if few else None
+    bound = routing.cost_J if routing else relaxed_routing_J(problem)
+    if by_arcs and rounds and not halt[0]:
         routing = routing or solve_routing(problem, RouterParams(), 0)
-        if routing.feasible and rounds and not halt[0]:
-            ways = relaxed.arc_ways(finer)
+        if routing.feasible:
             bound = touring_bound_J(
                 problem,
-                routing.tours,
-                ways,
+                replace(routing, cost_J=bound),
+                relaxed.arc_ways(finer),
                 relaxed.price,
-                proven_J=bound,
+                visits=None if few else counted_visits(problem),
                 rounds=rounds,
                 halt=halt,
             )

@@ -10,9 +10,10 @@ import math
 
 import numpy as np
 
-from mrmg.planning.bound import _completion_kernels, _touring_kernels
+from mrmg.planning.bound import _touring_kernels
 from mrmg.planning.bound._completion_kernels import Completions
-from mrmg.planning.bound._touring_kernels import TourSearch
+from mrmg.planning.bound._label_kernels import TourSearch
+from mrmg.planning.bound.completions import Visits, completions, no_completions
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import Routing
 
@@ -75,6 +76,7 @@ def cheapest_tours(
     rest: Completions,
     most: float,
     room: int = MOST_LABELS,
+    visits: Visits | None = None,
 ) -> tuple[Routing | None, int]:
     """Return the cheapest tours if they cost `most` or less.
 
@@ -85,17 +87,17 @@ def cheapest_tours(
         rest: completions of the mission.
         most: cost of tours of interest.
         room: labels at most.
+        visits: of goals, as in `rest`; all are remembered if None.
 
     Returns:
         Tours, of infinite cost if all cost more, None if that takes more labels to
         tell than there is room for; and the labels that it took.
     """
-    goal_list = np.flatnonzero(problem.open_goal)
+    visits = visits or Visits.all_remembered(problem)
     stations = slice(problem.goals, problem.cost.shape[2])
     drain = leg.copy()  # from wherever in a station the battery is full
     drain[:, stations] = drain[:, stations].min(axis=2, keepdims=True)
-    nearest, finish = leg.min(axis=4), problem.finish
-    search = TourSearch(problem, goal_list, leg, drain, nearest, finish, rest, most)
+    search = _search(problem, visits, visits.priced(leg), drain, rest, most)
     cost, last, trace = _touring_kernels.cheapest_tours(search, room)
     if not len(trace):
         return None, room
@@ -105,8 +107,33 @@ def cheapest_tours(
         robot, node, _, label = trace[label].tolist()
         if node < leg.shape[3]:
             tours[robot].insert(0, node)
-    found = Routing(tuple(tuple(tour) for tour in tours), float(cost[-1]))
-    return found, len(trace)
+    least = float(cost[-1]) - visits.surcharge
+    return Routing(tuple(tuple(tour) for tour in tours), least), len(trace)
+
+
+def _search(
+    problem: RoutingArrays,
+    visits: Visits,
+    leg: np.ndarray,
+    drain: np.ndarray,
+    rest: Completions,
+    most: float,
+) -> TourSearch:
+    """Return the search for tours that cost `most` but for prices."""
+    counted = np.zeros(leg.shape[1], np.bool_)
+    counted[visits.order[visits.remembered :]] = True
+    return TourSearch(
+        routing=problem,
+        goal_list=visits.order,
+        remembered=visits.remembered,
+        is_counted=counted,
+        leg=leg,
+        drain=drain,
+        nearest=leg.min(axis=4),
+        finish=problem.finish,
+        rest=rest,
+        most=most + visits.surcharge,
+    )
 
 
 def least_costs(
@@ -122,82 +149,18 @@ def least_costs(
     Returns:
         Shape (2^n,); None if that takes too many labels.
     """
-    robots, nodes, targets = problem.cost.shape
+    robots, _, targets = problem.cost.shape
     cost, finish = problem.cost, problem.finish
     if free:
         cost, finish = (np.where(np.isfinite(one), 0.0, one) for one in (cost, finish))
-    sets = 1 << len(goals)
-    nothing = Completions(
-        np.zeros((robots, targets - problem.goals, len(goals))),
-        np.zeros((robots, nodes)),
-        np.zeros((sets, len(goals))),
-        np.zeros(sets),
-    )
+    visits = Visits(goals, len(goals), np.zeros(targets), np.zeros(robots))
     leg = np.ascontiguousarray(cost[:, :, None, :, None])
     drain = np.ascontiguousarray(problem.cost[:, :, None, :, None])
-    nearest = leg.min(axis=4)
-    search = TourSearch(problem, goals, leg, drain, nearest, finish, nothing, math.inf)
+    nothing = no_completions(problem, visits)
+    search = _search(problem, visits, leg, drain, nothing, math.inf)
+    search = search._replace(finish=finish)
     least, _, trace = _touring_kernels.cheapest_tours(search, MOST_LABELS)
     return np.asarray(least) if len(trace) else None
-
-
-def completions(problem: RoutingArrays, leg: np.ndarray | None = None) -> Completions:
-    """Return what the rest of a mission costs at least, for all that may be done.
-
-    Args:
-        problem: the mission.
-        leg: what legs cost from arc to arc, shape (R, T + 1, K, T, K), by which every
-            second goal is left at the arc that it is touched at; None for those of
-            the mission.
-    """
-    goals, start = problem.goals, problem.cost.shape[2]
-    cost = np.concatenate([problem.cost, problem.finish[:, :, None]], axis=2)
-    cost = over_stations(cost, range(goals, start))
-    goal_list = np.flatnonzero(problem.open_goal)
-    pair = np.zeros((0, 0, 0))
-    if leg is not None:
-        pair = _pairs(leg.min(axis=0), cost.min(axis=0), range(goals, start), goal_list)
-    found: Completions = _completion_kernels.completions(
-        cost[:, goal_list][:, :, goal_list].min(axis=0),
-        pair,
-        cost[:, start, goal_list].min(axis=0),
-        cost[:, goal_list, start].min(axis=0),
-        np.ascontiguousarray(cost[:, goals:start, goal_list]),
-        np.ascontiguousarray(cost[:, :, start]),
-    )
-    return found
-
-
-def _pairs(
-    leg: np.ndarray, cost: np.ndarray, stations: range, goal_list: np.ndarray
-) -> np.ndarray:
-    """Return what two legs cost at least with the same arc in the middle, (G, G, G).
-
-    Args:
-        leg: least cost of any robot from arc to arc, shape (T + 1, K, T, K).
-        cost: over any stations from node to node, shape (T + 1, T + 1).
-        stations: numbers of the stations, which robots may visit on both legs.
-        goal_list: the open goals, shape (G,).
-    """
-    into = leg.min(axis=1)[goal_list][:, goal_list]
-    out = leg.min(axis=3)[goal_list][..., goal_list]
-    for s in stations:
-        from_s, to_s = leg[s].min(axis=0)[goal_list], leg[goal_list, :, s].min(axis=2)
-        into = np.minimum(into, cost[goal_list, s, None, None] + from_s)
-        out = np.minimum(out, to_s[..., None] + cost[s, goal_list])
-    return np.asarray((into[..., None] + out).min(axis=2))
-
-
-def over_stations(cost: np.ndarray, stations: range) -> np.ndarray:
-    """Return the least costs over any stations (Floyd 1962, Warshall 1962).
-
-    Args:
-        cost: from node to node, shape (R, N, M), where the first nodes are the same.
-        stations: numbers of the nodes that may lie on the way.
-    """
-    for k in stations:
-        cost = np.minimum(cost, cost[:, :, k, None] + cost[:, None, k])
-    return cost
 
 
 def of_robot(problem: RoutingArrays, r: int) -> RoutingArrays:

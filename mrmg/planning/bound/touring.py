@@ -11,14 +11,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 
 import numpy as np
 
 from mrmg.planning.bound.arcs import ArcWays, Wave
 from mrmg.planning.bound.borders import ARCS
-from mrmg.planning.bound.exact_tours import cheapest_tours, completions
+from mrmg.planning.bound.completions import Visits, completions
+from mrmg.planning.bound.exact_tours import cheapest_tours
 from mrmg.planning.halting import NEVER
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.planning.routing.routing import Routing
 
 SLACK = 1e-6
 """Share by which tours may cost more than the best known; rounding loses none."""
@@ -44,11 +47,11 @@ time, so that the same mission has the same bound on every machine."""
 
 def touring_bound_J(
     problem: RoutingArrays,
-    tours: Sequence[Sequence[int]],
+    relaxed: Routing,
     ways: Sequence[ArcWays],
     price: np.ndarray,
     *,
-    proven_J: float = 0.0,
+    visits: Visits | None = None,
     rounds: int,
     work: int = WORK_LABELS,
     halt: np.ndarray = NEVER,
@@ -61,32 +64,34 @@ def touring_bound_J(
 
     Args:
         problem: the relaxed routing problem, whose batteries limit tours.
-        tours: good tours of that problem, whose ways are tightened first.
+        relaxed: good tours of that problem, whose ways are tightened first; their cost
+            is a bound that is known already.
         ways: of each robot.
         price: cost of a metre of plain ground of each robot, shape (R,).
-        proven_J: a bound that is known already.
+        visits: of goals; all are remembered if None.
         rounds: how often at most.
         work: labels that all rounds may set.
         halt: shape (1,); no round begins once it has turned true.
 
     Returns:
-        The bound; `proven_J` if no better one was found.
+        The bound; that of `relaxed` if no better one was found.
     """
-    best, settled_J = proven_J, -math.inf
-    rest, cheapest = None, False
+    visits = visits or Visits.all_remembered(problem)
+    best, tours = relaxed.cost_J, relaxed.tours
+    settled_J, rest, cheapest = -math.inf, None, False
     for _ in range(rounds):
         tightened = _tighten(ways, price, tours)
         if halt[0] or (cheapest and not tightened):
             break
         settled = math.isfinite(settled_J)
         leg = _leg_table(ways, price, problem.goals)
-        rest = rest or completions(problem, leg)
-        best = max(best, float(rest.before[0]))
+        rest = rest or completions(problem, leg, visits)
+        best = max(best, float(rest.before[0]) - visits.surcharge)
         most = (1.0 + (FINE_STEP if settled else STEP)) * best
-        along_J = (1.0 + SLACK) * _cost_along(ways, price, tours)
+        along_J = (1.0 + SLACK) * _cost_along(ways, price, tours, visits)
         if best < along_J:
             most = min(most, along_J)
-        found, labels = cheapest_tours(problem, leg, rest, most, work)
+        found, labels = cheapest_tours(problem, leg, rest, most, work, visits)
         work -= labels
         if found is None:
             break
@@ -147,26 +152,29 @@ def _legs_of(ways: ArcWays, r: int, price: float) -> np.ndarray:
 def _leg_table(ways: Sequence[ArcWays], price: np.ndarray, goals: int) -> np.ndarray:
     """Return what legs cost from arc to arc, shape (R, T + 1, K, T, K).
 
-    Two neighbouring arcs count as one where there are many goals or legs.
+    Neighbouring arcs count as one where there are many goals or legs.
     """
     count = len(ways[0].ways.regions)
     legs = len(ways) * (count + 1) * count * ARCS**2
-    fine = goals <= FINE_ARC_GOALS and legs <= FINE_ARC_LEGS
-    table = []
+    joined = 1 if goals <= FINE_ARC_GOALS else 2
+    while joined < ARCS and legs > FINE_ARC_LEGS * joined**2:
+        joined *= 2
+    table, each = [], range(joined)
     for r, one in enumerate(ways):
         leg = _legs_of(one, r, price[r])
-        if not fine:
-            parts = [leg[:, i::2, :, j::2] for i in (0, 1) for j in (0, 1)]
-            leg = np.minimum.reduce(parts)
-        table.append(leg)
+        parts = [leg[:, i::joined, :, j::joined] for i, j in product(each, each)]
+        table.append(np.minimum.reduce(parts))
     return np.stack(table)
 
 
 def _cost_along(
-    ways: Sequence[ArcWays], price: np.ndarray, tours: Sequence[Sequence[int]]
+    ways: Sequence[ArcWays],
+    price: np.ndarray,
+    tours: Sequence[Sequence[int]],
+    visits: Visits,
 ) -> float:
-    """Return the least cost of given tours, whatever arcs they touch."""
-    total = 0.0
+    """Return the least cost of given tours with prices, whatever arcs they touch."""
+    total = -visits.surcharge
     for r, tour in enumerate(tours):
         if not tour:
             continue
@@ -175,5 +183,5 @@ def _cost_along(
         for target in tour:
             cost = (cost[:, None] + leg[place, :, target]).min(axis=0)
             place = target
-        total += float(cost.min())
+        total += float(cost.min() + visits.toll[r] + visits.price[list(tour)].sum())
     return total

@@ -11,14 +11,10 @@ import pytest
 
 import mrmg
 from mrmg.planning.bound import touring
-from mrmg.planning.bound._completion_kernels import Completions
 from mrmg.planning.bound.arcs import ArcWays
 from mrmg.planning.bound.bound import Relaxation, lower_bound_J
-from mrmg.planning.bound.exact_tours import (
-    cheapest_tours,
-    completions,
-    exact_routing,
-)
+from mrmg.planning.bound.completions import Visits, completions, no_completions
+from mrmg.planning.bound.exact_tours import cheapest_tours, exact_routing
 from mrmg.planning.bound.geodesic import Ground, Ways
 from mrmg.planning.bound.touring import touring_bound_J
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
@@ -89,6 +85,22 @@ def route_cost(
     return best
 
 
+def by_arcs(leg: np.ndarray, goals: int, range_m: float) -> RoutingArrays:
+    """Return the mission of legs from arc to arc."""
+    least = leg.min(axis=(2, 4))
+    least[:, -1] = leg[:, -1, 0].min(axis=-1)
+    robots = len(leg)
+    return routing_arrays(
+        goals=goals,
+        distance=least[:, :-1],
+        start_distance=least[:, -1],
+        plain=np.ones(robots),
+        energy=np.full(robots, range_m),
+        capacity=np.full(robots, range_m),
+        reserve=np.zeros(robots),
+    )
+
+
 @pytest.mark.parametrize(
     ("goals", "stations", "robots", "range_m"),
     [(4, 0, 1, 1e9), (3, 1, 1, 40.0), (4, 0, 2, 50.0), (3, 2, 2, 25.0)],
@@ -100,31 +112,21 @@ def test_tours_by_arcs_are_the_cheapest(
         leg = legs(seed, robots, goals, stations, arcs=3)
         # One station between two goals at most, as the oracle tries: make two dear.
         leg[:, goals:-1, :, goals:] = 1e6
-        least = leg.min(axis=(2, 4))
-        least[:, -1] = leg[:, -1, 0].min(axis=-1)
-        problem = routing_arrays(
-            goals=goals,
-            distance=least[:, :-1],
-            start_distance=least[:, -1],
-            plain=np.ones(robots),
-            energy=np.full(robots, range_m),
-            capacity=np.full(robots, range_m),
-            reserve=np.zeros(robots),
-        )
-        nothing = Completions(
-            np.zeros((robots, stations, goals)),
-            np.zeros((robots, goals + stations + 1)),
-            np.zeros((1 << goals, goals)),
-            np.zeros(1 << goals),
-        )
+        problem = by_arcs(leg, goals, range_m)
+        nothing = no_completions(problem, Visits.all_remembered(problem))
         exact = least_cost(leg, goals, range_m)
         most = 1e4
         found, _ = cheapest_tours(problem, leg, nothing, most)
         assert found is not None
         if exact <= most:
             assert found.cost_J == pytest.approx(exact)
+            for penalty in ((0.0,), (0.0, 0.1), (0.1, 0.5), (2.0, 2.0)):
+                rest = completions(problem, leg, None, penalty)
+                assert rest.before[0] <= exact * (1.0 + 1e-9)
+                pruned, _ = cheapest_tours(problem, leg, rest, (1.0 + 1e-9) * exact)
+                assert pruned is not None
+                assert pruned.cost_J == pytest.approx(exact)
             rest = completions(problem, leg)
-            assert rest.before[0] <= exact
             pruned, labels = cheapest_tours(problem, leg, rest, (1.0 + 1e-9) * exact)
             assert pruned is not None
             assert pruned.cost_J == pytest.approx(exact)
@@ -135,6 +137,50 @@ def test_tours_by_arcs_are_the_cheapest(
         below, _ = cheapest_tours(problem, leg, nothing, 0.99 * exact)
         assert below is not None
         assert not below.feasible, "nothing is cheaper than the cheapest"
+
+
+@pytest.mark.parametrize(
+    ("goals", "stations", "robots", "range_m"),
+    [(5, 0, 1, 1e9), (4, 1, 1, 40.0), (4, 1, 2, 50.0), (4, 2, 2, 25.0)],
+)
+def test_counted_visits_prove_no_more_than_the_cheapest_tours_cost(
+    goals: int, stations: int, robots: int, range_m: float
+) -> None:
+    """Whatever the prices; and as much with one goal that need not be remembered."""
+    rng = np.random.default_rng(7)
+    for seed in range(6):
+        leg = legs(seed, robots, goals, stations, arcs=2)
+        problem = by_arcs(leg, goals, range_m)
+        exact, _ = cheapest_tours(
+            problem, leg, no_completions(problem, Visits.all_remembered(problem)), 1e5
+        )
+        assert exact is not None
+        if not exact.feasible:
+            continue
+        for remembered in range(goals + 1):
+            visits = Visits(
+                order=rng.permutation(goals),
+                remembered=remembered,
+                price=np.append(rng.normal(0.0, 5.0, goals), np.zeros(stations)),
+                toll=rng.uniform(0.0, 3.0, robots),
+            )
+            every = cheapest_tours(
+                problem, leg, no_completions(problem, visits), 1e5, visits=visits
+            )[0]
+            assert every is not None
+            least = every.cost_J
+            assert least <= exact.cost_J * (1.0 + 1e-9)
+            if remembered >= goals - 1:
+                unused = sum(not tour for tour in every.tours)
+                assert least >= exact.cost_J * (1.0 - 1e-9) - 3.0 * unused
+            for penalty in ((0.0,), (0.1, 0.3)):
+                rest = completions(problem, leg, visits, penalty)
+                assert rest.before[0] - visits.surcharge <= exact.cost_J * (1.0 + 1e-9)
+                most = exact.cost_J * (1.0 + 1e-9)
+                found = cheapest_tours(problem, leg, rest, most, visits=visits)[0]
+                assert found is not None
+                assert found.cost_J <= most
+                assert found.cost_J >= least - 1e-9 * exact.cost_J
 
 
 def test_a_goal_that_no_robot_reaches_makes_the_tours_infinite() -> None:
@@ -272,10 +318,9 @@ def test_less_work_proves_less_and_never_less_than_was_known() -> None:
     found_J = [
         touring_bound_J(
             relaxed.problem,
-            routing.tours,
+            routing,
             relaxed.arc_ways(),
             relaxed.price,
-            proven_J=routing.cost_J,
             rounds=20,
             work=labels,
         )
@@ -302,7 +347,7 @@ def test_pairs_of_arcs_prove_less_and_stay_below_the_optimum(
 ) -> None:
     scene = triangle()
     fine_J = lower_bound_J(scene)
-    monkeypatch.setattr(touring, "FINE_ARC_LEGS", 0)
+    monkeypatch.setattr(touring, "FINE_ARC_LEGS", 20_000)
     assert lower_bound_J(scene, rounds=0) < lower_bound_J(scene) <= fine_J
 
 

@@ -1,0 +1,101 @@
+"""Labels of tours under way, and what bounds the rest of a mission after them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.compilation import kernel
+from mrmg.planning.bound._completion_kernels import Completions
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+
+ENDLESS_J = 1e300
+"""Stands for the energy of batteries that last for ever."""
+
+NOTHING = -1
+"""Parent of the first label."""
+
+
+class TourSearch(NamedTuple):
+    """What cheapest tours are sought among.
+
+    Attributes:
+        routing: the problem, whose costs drain batteries.
+        goal_list: the open goals, shape (G,); those that are remembered come first.
+        remembered: how many are; visits of the others are counted.
+        is_counted: whether they are, of each node, shape (T + 1,).
+        leg: what legs cost from arc to arc, shape (R, T + 1, K, T, K); row T is the
+            start, in whose arc 0 robots are.
+        drain: what they drain batteries by, likewise.
+        nearest: the least that they cost to any arc, shape (R, T + 1, K, T).
+        finish: what the last leg costs from each node, shape (R, T + 1).
+        rest: bounds of what is still to come, by which labels are dropped.
+        most: cost of tours of interest; others may be missed.
+    """
+
+    routing: RoutingArrays
+    goal_list: np.ndarray
+    remembered: int
+    is_counted: np.ndarray
+    leg: np.ndarray
+    drain: np.ndarray
+    nearest: np.ndarray
+    finish: np.ndarray
+    rest: Completions
+    most: float
+
+
+class Labels(NamedTuple):
+    """Labels in the order in which they were set, and room for candidates.
+
+    Memory that is not written is not used.
+
+    Attributes:
+        value: cost and energy left, shape (N, 2).
+        trace: robot, node, arc and parent, shape (N, 4).
+        first: number of the first label of the present robot in each state, and of the
+            end, shape (X + 1,).
+        near: labels that the present goal may follow, shape (N,).
+        offer, origin: candidates' values and parents, shape (N, 2) and (N,).
+    """
+
+    value: np.ndarray
+    trace: np.ndarray
+    first: np.ndarray
+    near: np.ndarray
+    offer: np.ndarray
+    origin: np.ndarray
+
+
+@kernel
+def set_value(labels, k, cost, left):
+    """Write the value of label k."""
+    labels.value[k, 0], labels.value[k, 1] = cost, left
+
+
+@kernel
+def set_trace(labels, k, r, node, arc, parent):
+    """Write where label k is, and the label that it continues."""
+    labels.trace[k, 0], labels.trace[k, 1] = r, node
+    labels.trace[k, 2], labels.trace[k, 3] = arc, parent
+
+
+@kernel
+def ahead_of(search, r, state, g):
+    """Return what bounds the rest of a mission with a robot at a goal (`bounded`)."""
+    rest, full_J = search.rest, search.rest.full_J + search.routing.reserve[r]
+    ending, penalty = rest.penalty[0], rest.penalty[-1]
+    ended = rest.after[0, state, g] + ending * full_J
+    charged = np.inf
+    if len(rest.after) > 1:
+        charged = rest.after[1, state, g] + penalty * full_J
+    return ended, ending, charged, penalty
+
+
+@kernel
+def bounded(ahead, left):
+    """Return the least cost of the rest of a mission with some energy left."""
+    ended, ending, charged, penalty = ahead
+    left = min(left, ENDLESS_J)
+    return min(ended - ending * left, charged - penalty * left)

@@ -1,0 +1,96 @@
+"""Prices at which too many goals to be remembered are each visited once, or nearly so.
+
+Where visits are counted, walks of as many visits as there are goals take the place of
+tours. Prices of goals that walks leave out fall and those of goals visited again rise
+(subgradients, Held and Karp 1971); all of them give a bound. The goals that walks
+differ most about are remembered.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from mrmg.planning.bound import _completion_kernels
+from mrmg.planning.bound._completion_kernels import NONE, Legs, Tables
+from mrmg.planning.bound.completions import Visits, least_legs
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+
+ROUNDS = 120
+"""Changes of the prices."""
+
+FIRST_STEP, DECAY = 0.3, 0.97
+"""First change of a price, as a share of a walk's cost per goal, and how it falls."""
+
+MOST_WORK = 500_000_000
+"""Triples of goals that may follow each other in all states, by which goals are
+remembered: a second or two of one processor."""
+
+
+def counted_visits(problem: RoutingArrays) -> Visits:
+    """Return good prices for a mission of many goals, and which ones are remembered."""
+    order = np.flatnonzero(problem.open_goal)
+    robots, nodes, targets = problem.cost.shape
+    visits = Visits(order, 0, np.zeros(targets), np.zeros(robots))
+    best, best_J, step = visits, -np.inf, 0.0
+    wrong = np.zeros(len(order))
+    first = problem.cost[:, nodes - 1, order]
+    for i in range(ROUNDS):
+        legs = least_legs(problem, visits)
+        found = _completion_kernels.completions(legs, 0)
+        walk_J = float(found.before[0])
+        if not np.isfinite(walk_J):
+            break
+        if walk_J - visits.surcharge > best_J:
+            best, best_J = visits, walk_J - visits.surcharge
+        times, begun = _walk(legs, found)
+        used = np.zeros(robots)
+        np.add.at(used, (first + visits.toll[:, None])[:, begun].argmin(axis=0), 1.0)
+        step = DECAY * step if i else FIRST_STEP * walk_J / len(order)
+        price, toll = visits.price.copy(), visits.toll + step * (used - 1.0)
+        price[order] += step * (times - 1.0)
+        visits = replace(visits, price=price, toll=np.maximum(0.0, toll))
+        wrong = 0.9 * wrong + np.abs(times - 1.0)
+    own = best.price.copy()
+    remembered = most_remembered(len(order))
+    order = order[np.argsort(-wrong, kind="stable")]
+    own[order[:remembered]] = 0.0
+    return replace(best, order=order, remembered=remembered, price=own)
+
+
+def most_remembered(goals: int) -> int:
+    """Return how many of so many goals are remembered by MOST_WORK."""
+    for remembered in range(goals, 0, -1):
+        states = (goals - remembered + 1) << remembered
+        if states * (goals - 0.5 * remembered) ** 3 <= MOST_WORK:
+            return remembered
+    return 0
+
+
+def _walk(legs: Legs, found: Tables) -> tuple[np.ndarray, list[int]]:
+    """Return how often the cheapest walk visits each goal, and where robots begin.
+
+    Args:
+        legs: of one mode.
+        found: what `_completion_kernels.completions` returned for them.
+    """
+    after, second, follower = found.after[0], found.second[0], found.follower[0]
+    times, begun = np.zeros(len(legs.between)), list[int]()
+    at = before = NONE
+    for state in range(len(times)):
+        on = after[state + 1] + legs.price
+        if at >= 0:
+            back = follower[state + 1] == at
+            go = np.where(back, second[state + 1] + legs.price, on) + legs.between[at]
+            go[before if before >= 0 else at] = np.inf
+        if at < 0 or legs.to_end[at] + found.before[state] <= go.min():
+            at, before = (
+                int(np.argmin(legs.from_start[0] + on)),
+                _completion_kernels.NONE,
+            )
+            begun.append(at)
+        else:
+            at, before = int(np.argmin(go)), at
+        times[at] += 1.0
+    return times, begun
