@@ -6,7 +6,7 @@ The command line prints the message alone; the Python API raises the exception.
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -33,6 +33,20 @@ class MrmgError(Exception):
 
 class UsageError(MrmgError):
     """A command or function was called in a way it does not allow."""
+
+
+def refuse_values(values: object, allowed: Mapping[str, bool], what: str) -> None:
+    """Raise a UsageError that names the attributes whose values are not allowed.
+
+    Args:
+        values: has the attributes.
+        allowed: whether the value of each attribute is.
+        what: they are, for the message.
+    """
+    wrong = [name for name, fine in allowed.items() if not fine]
+    if wrong:
+        found = ", ".join(f"{name} = {getattr(values, name)!r}" for name in wrong)
+        raise UsageError(f"{what} out of range: {found}")
 
 
 @dataclass(frozen=True)

@@ -6,23 +6,33 @@ recharge at least once, against exact tours. The second is of Green VRP instance
 (closed routes of any number of vehicles, dwell and route time limits, stations
 revisited freely) against proven optima; it needs their folder.
 
+With --large only generated missions of --goals 100-250 are routed: with the default
+router, which has the number of rounds that first plans have, and for --seconds of
+processor time. Both are compared with the best that was found for the mission, also by
+the router itself in --reference seconds from each of --references other seeds.
+Batteries are recharged several times, or suffice.
+
 Finished missions are kept in --output FILE: the same command goes on from there after
 an interruption. Rows of --json: `router`, `within_1_pct` and `optimal` of `missions`,
 `worst_gap_pct`, `median_s`, `slowest_s`. `instances` has the second table: `instance`,
-`proven`, `found` [miles], `routes`, `seconds`.
+`proven`, `found` [miles], `routes`, `seconds`. Rows of --large: `goals`, `batteries`,
+`missions`, `within_2_pct`, `median_gap_pct`, `worst_gap_pct`, `first_gap_pct`,
+`first_s` (medians); `missions` has each of them.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from large_routing import add_large_options, against_long_runs
 from protocol import Row, Trials, add_file_options, run, write_document
+from routing_missions import uneven_mission
 
 from mrmg import storage
 from mrmg.planning.bound.exact_tours import exact_routing
@@ -66,6 +76,8 @@ def main() -> int:
     options = parse_options()
     print(f"{__doc__}\n")
     trials = Trials(options.output)
+    if options.large:
+        return against_long_runs(options, trials)
     rows, table = against_exact(options.instances, trials)
     instances: list[Row] = []
     if options.folder.is_dir():
@@ -135,6 +147,7 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument(
         "--rounds", type=int, default=10_000, help="of the search on Green VRP"
     )
+    add_large_options(parser)
     add_file_options(parser)
     return parser.parse_args()
 
@@ -160,51 +173,6 @@ def generate(seed: int) -> RoutingArrays:
     return uneven_mission(
         rng, goals=goals, stations=stations, robots=robots, range_m=(90.0, 200.0)
     )
-
-
-def uneven_mission(
-    rng: np.random.Generator,
-    *,
-    goals: int,
-    stations: int,
-    robots: int,
-    range_m: tuple[float, float],
-    open_goal: Sequence[bool] | None = None,
-) -> RoutingArrays:
-    """Return a mission over 100 x 100 m of uneven ground.
-
-    Ways cost up to 1.6 times their length, and are shortened through each other, so
-    that they are a metric, as shortest paths are.
-
-    Args:
-        rng: draws everything.
-        goals: how many.
-        stations: how many.
-        robots: how many.
-        range_m: between these lies the way a full battery lasts for.
-        open_goal: which goals are still to be visited; all if None.
-    """
-    targets = goals + stations
-    point = rng.uniform(0.0, 100.0, (targets + robots, 2))
-    way = np.hypot(*(point[:, None] - point[None]).transpose(2, 0, 1))
-    rough = rng.uniform(1.0, 1.6, way.shape)
-    way *= np.maximum(rough, rough.T)
-    for k in range(len(way)):
-        way = np.minimum(way, way[:, k : k + 1] + way[k : k + 1])
-    plain = rng.uniform(80.0, 120.0, robots)
-    capacity = plain * rng.uniform(*range_m, robots)
-    problem = routing_arrays(
-        goals=goals,
-        distance=np.repeat(way[None, :targets, :targets], robots, axis=0),
-        start_distance=way[targets:, :targets],
-        plain=plain,
-        energy=capacity * rng.uniform(0.5, 1.0, robots),
-        capacity=capacity,
-        reserve=0.05 * capacity,
-    )
-    if open_goal is None:
-        return problem
-    return problem._replace(open_goal=np.array(open_goal))
 
 
 def compared(

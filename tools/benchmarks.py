@@ -40,6 +40,7 @@ COMMANDS = {
     "clmapf": "bench_clmapf --seeds 0-2",
     "kinodynamic": "bench_kinodynamic",
     "routing": "bench_routing",
+    "routing_large": "bench_routing --large",
     "growth": "bench_growth --figure tools/pictures/growth.svg",
     "physics": "bench_physics --disturb",
     "controllers": "bench_controllers --trials 2",

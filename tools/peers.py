@@ -50,7 +50,7 @@ import peer_ompl
 import peer_ortools
 import peer_pyvrp
 from bench import TABLE, charged
-from bench_routing import generate, uneven_mission
+from bench_routing import generate
 from examples.own_router import nearest_goal
 from peer_comparison import tabulate
 from peer_legs import LEGS, leg_of
@@ -64,6 +64,7 @@ from protocol import (
     versions,
     write_document,
 )
+from routing_missions import uneven_mission
 
 import mrmg
 from mrmg.planning import Routing, RoutingProblem, plan_mission, profile_params

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field, replace
 
 from mrmg import extensions, storage
-from mrmg.errors import UsageError
+from mrmg.errors import UsageError, refuse_values
 from mrmg.planning.routing.routing import RouterParams
 from mrmg.scene.margins import STATES_NONE, Margins
 
@@ -71,14 +71,7 @@ class GuidedTreeParams:
             "ahead_least_m": 0.0 <= self.ahead_least_m <= self.ahead_most_m,
             "target_spread_m": self.target_spread_m >= 0.0,
         }
-        _refuse(self, allowed, "parameters of the guided tree")
-
-
-def _refuse(params: object, allowed: dict[str, bool], what: str) -> None:
-    wrong = [name for name, fine in allowed.items() if not fine]
-    if wrong:
-        values = ", ".join(f"{name} = {getattr(params, name)!r}" for name in wrong)
-        raise UsageError(f"{what} out of range: {values}")
+        refuse_values(self, allowed, "parameters of the guided tree")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -146,7 +139,7 @@ class PlannerParams:
             "route_margin": 0.0 <= self.route_margin <= 1.0,
             "budget_s": self.budget_s is None or self.budget_s > 0.0,
         }
-        _refuse(self, allowed, "planner parameters")
+        refuse_values(self, allowed, "planner parameters")
         if self.planner == GUIDED_TREE and self.router.method != "nrpa":
             raise UsageError(
                 f"planner {GUIDED_TREE} finds its tours by router nrpa alone, not by "

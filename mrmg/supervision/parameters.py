@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mrmg.errors import UsageError
+from mrmg.errors import refuse_values
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +52,4 @@ class ControlParams:
             "reserves": bool(self.reserves)
             and all(0.0 <= share <= 2.0 for share in self.reserves),
         }
-        wrong = [name for name, fine in allowed.items() if not fine]
-        if wrong:
-            values = ", ".join(f"{name} = {getattr(self, name)!r}" for name in wrong)
-            raise UsageError(f"supervision parameters out of range: {values}")
+        refuse_values(self, allowed, "supervision parameters")

@@ -75,3 +75,21 @@ def test_the_bench_prints_tables_and_writes_rows(
     assert [row["missions"] for row in written["rows"]] == [5, 5, 5]
     assert written["rows"][2]["optimal"] == 5
     assert written["instances"] == []
+
+
+def test_large_missions_are_compared_with_long_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written = tmp_path / "large.json"
+    options = ["--large", "--goals", "100", "--seeds", "0", "--seconds", "0.1"]
+    options += ["--reference", "0.2", "--references", "1", "--json", str(written)]
+    monkeypatch.setattr(sys, "argv", ["bench", *options])
+    code = bench_routing.main()
+    document = json.loads(written.read_text())
+    assert [row["missions"] for row in document["rows"]] == [1, 1]
+    assert document["ok"] == (code == 0)
+    for row in document["missions"]:
+        assert row["best_J"] <= min(row["first_J"], row["found_J"])
+        assert row["gap_pct"] == pytest.approx(
+            100 * (row["found_J"] / row["best_J"] - 1)
+        )

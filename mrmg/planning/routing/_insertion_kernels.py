@@ -5,16 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.planning.routing._legs_kernels import CHARGE_TIME, LIMIT, USABLE
+from mrmg.planning.routing._legs_kernels import LIMIT
 from mrmg.planning.routing._refuel_kernels import (
     COST,
     DRAW,
+    LEAST,
+    ON,
     RATE,
     ROUNDING,
     TIME,
-    arrive,
+    TO,
+    WAYS,
+    battery_of,
     extend,
     route_value,
+    slot_of,
 )
 
 
@@ -30,89 +35,54 @@ def value_with(legs, labels, r, before, goal, behind, longest, ceiling):
         longest: as of `route_value`.
         ceiling: values that are not below it count as inf.
     """
-    at = len(labels.ways) - 1
-    extend(legs, labels, r, 0, before[1], before[0], goal, at)
+    at, own, battery = len(labels.head) - 1, legs.table[r], battery_of(legs, r)
     row, place = behind
-    own, most = legs.table[r], legs.robot[r, LIMIT] * (1.0 + ROUNDING)
-    usable = legs.robot[r, USABLE] * (1.0 + ROUNDING)
-    best, worth = np.inf, ceiling
-    for k in range(labels.ways[at]):
-        for j in range(labels.ways[row]):
-            leg, time = legs.cost[own, goal, place], legs.time[own, goal, place]
-            cost = labels.way[at, k, COST] + leg + labels.way[row, j, COST]
-            drawn = labels.way[at, k, DRAW] + leg + labels.way[row, j, DRAW]
-            if legs.energy_weight * cost >= worth or drawn > usable:
-                continue
-            late = labels.way[at, k, TIME] + time + labels.way[row, j, TIME]
-            late += labels.way[row, j, RATE] * drawn
-            value = route_value(legs, cost, late, longest)
-            if value < worth and late <= most:
-                best = worth = value
-    if not legs.energy_weight * (labels.least[at] + labels.least[row]) < worth:
-        return best
-    near, battery = legs.near.shape[3], (usable, legs.robot[r, CHARGE_TIME])
-    rule = legs.energy_weight, legs.makespan_weight, longest, most
-    for i in range(near):
-        f = legs.near[own, goal, 0, i]
-        s = legs.goals + f
-        leg, time = legs.cost[own, goal, s], legs.time[own, goal, s]
-        n = arrive(
-            labels.way, at, labels.ways[at], leg, time, battery, f, labels.arrival
-        )
-        rank = legs.rank[own, place, 1, f] if n > 0 else 0
-        low, high = (0, near) if rank < 0 else (rank, rank + 1)
-        for j in range(low, high if n > 0 else low):
-            hop, hop_time = 0.0, 0.0
-            if rank < 0:
-                e = legs.near[own, place, 1, j]
-                hop, hop_time = legs.hop[own, f, e], legs.hop_time[own, f, e]
-            fulls = labels.full, row * near + j, labels.fulls[row * near + j]
-            value = joined_value(labels.arrival, n, hop, hop_time, fulls, rule)
-            best = min(best, value)
+    leg = legs.cost[own, before[1], goal], legs.time[own, before[1], goal]
+    slot = slot_of(legs, labels, own, before[1], goal)
+    rows, stops = (before[0], at), (slot, labels.paths[slot], 0)
+    extend(labels.way, labels.head, rows, leg, labels.path, stops, battery)
+    leg = legs.cost[own, goal, place], legs.time[own, goal, place]
+    slot = slot_of(legs, labels, own, goal, place)
+    most = legs.robot[r, LIMIT] * (1.0 + ROUNDING)
+    best = ceiling
+    for j in range(-1, labels.paths[slot]):
+        hop = leg[0], leg[1], leg[0], -1.0
+        if j >= 0:
+            path = labels.path[slot, j]
+            hop = path[COST], path[TIME], path[TO], path[ON]
+        least = labels.head[at, LEAST] + hop[0] + labels.head[row, LEAST]
+        if not legs.energy_weight * least < best:
+            continue
+        for k in range(int(labels.head[at, WAYS])):
+            for m in range(int(labels.head[row, WAYS])):
+                ends = (at, k), (row, m)
+                cost, time = joined(labels.way, ends, hop, battery[0])
+                value = route_value(legs, cost, time, longest)
+                if value < best and time <= most:
+                    best = value
     return best if best < ceiling else np.inf
 
 
 @kernel
-def joined_value(arrival, n, hop, time, others, rule):
-    """Return the least value of n arrivals with recharged ways from the finish.
+def joined(way, ends, hop, usable):
+    """Return cost and time of two labels that meet; inf if the battery is too small.
 
     Args:
-        arrival, n: of the arrivals at a station.
-        hop, time: from there to the other ways' station.
-        others: these, their row, and how many of them.
-        rule: weights of energy and makespan, longest time of the other routes, and of
-            this one at most.
+        way, ends: the labels: those of all rows, and row and number of the two.
+        hop: cost, time, energy to a station and energy from one, which is negative for
+            a leg without any.
+        usable: what the battery holds.
     """
-    full, at, fulls = others
-    best = np.inf
-    for k in range(n):
-        for j in range(fulls):
-            cost = arrival[0, k, COST] + hop + full[at, j, COST]
-            late = arrival[0, k, TIME] + time + full[at, j, TIME]
-            value = rule[0] * cost + rule[1] * (max(late, rule[2]) + 1e-3 * late)
-            if value < best and late <= rule[3]:
-                best = value
-    return best
-
-
-@kernel
-def cost_without_stations(labels, front, back, way, usable):
-    """Return the cost of a route with one more goal and no more stations.
-
-    It is inf unless the cheapest labels of the goal's neighbours suffice.
-
-    Args:
-        labels: of all routes.
-        front, back: rows of the goal's neighbours.
-        way: cost from one over the goal to the other.
-        usable: what a battery holds.
-    """
-    cost = labels.least[front] + way + labels.least[back]
-    for k in range(labels.ways[front]):
-        if labels.way[front, k, COST] <= labels.least[front]:
-            drawn = labels.way[front, k, DRAW] + way
-            for j in range(labels.ways[back]):
-                fits = drawn + labels.way[back, j, DRAW] <= usable
-                if fits and labels.way[back, j, COST] <= labels.least[back]:
-                    return cost
-    return np.inf
+    (a, k), (b, m) = ends
+    drawn = way[a, k, DRAW] + hop[2]
+    time = way[a, k, TIME] + hop[1] + way[b, m, TIME]
+    if hop[3] >= 0.0:
+        if drawn > usable:
+            return np.inf, np.inf
+        time += way[a, k, RATE] * drawn
+        drawn = hop[3]
+    drawn += way[b, m, DRAW]
+    if drawn > usable:
+        return np.inf, np.inf
+    time += way[b, m, RATE] * drawn
+    return way[a, k, COST] + hop[0] + way[b, m, COST], time

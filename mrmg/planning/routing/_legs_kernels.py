@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 
 USABLE, MISSING, CHARGE_TIME, LIMIT = range(4)
@@ -21,6 +20,9 @@ missing at the start [J], time that recharging takes [s/J], longest time [s]."""
 MOST_NEAR = 8
 """Stations next to a place that are thought of on legs from and to it: the nearest.
 Any others may stand between those of two places."""
+
+NEIGHBOURS = 100
+"""Goals next to a goal that are taken out with it: the nearest."""
 
 
 class Legs(NamedTuple):
@@ -35,9 +37,13 @@ class Legs(NamedTuple):
         follower: next station on that way, shape (tables, S, S).
         near: the nearest stations from each place, and to it, nearest first, shape
             (tables, P, 2, min(S, MOST_NEAR)).
-        rank: of each station among these, -1 for others, (tables, P, 2, S).
-        round_trip: least cost from goal to goal and back over the robots, (G, G).
+        reach: energy to the nearest station from each place, and from the nearest one
+            to it, inf if there is none, shape (tables, P, 2).
+        neighbour: of each goal, itself and others, nearest first, (G, at most
+            NEIGHBOURS).
+        remote: least cost from a home to each goal, shape (G,).
         robot: shape (R, 4).
+        timed: whether times count; all are 0 if not.
         energy_weight, makespan_weight: of the objective.
     """
 
@@ -50,9 +56,11 @@ class Legs(NamedTuple):
     hop_time: np.ndarray
     follower: np.ndarray
     near: np.ndarray
-    rank: np.ndarray
-    round_trip: np.ndarray
+    reach: np.ndarray
+    neighbour: np.ndarray
+    remote: np.ndarray
     robot: np.ndarray
+    timed: bool
     energy_weight: float
     makespan_weight: float
 
@@ -60,7 +68,8 @@ class Legs(NamedTuple):
 def new_legs(problem: RoutingArrays) -> Legs:
     """Return the legs of a routing problem."""
     robots, targets = len(problem.energy), problem.cost.shape[2]
-    goals, stations = problem.goals, targets - problem.goals
+    goals = problem.goals
+    timed = problem.makespan_weight > 0.0 or bool(np.isfinite(problem.limit).any())
     table, home = problem.table, problem.home
     tables, places = problem.cost.shape[:2]
     cost = np.full((tables, places, places), np.inf)
@@ -70,33 +79,25 @@ def new_legs(problem: RoutingArrays) -> Legs:
     time[table, :targets, home] = problem.finish_time[:, :targets]
     cost[table, home, home] = problem.finish[:, targets]
     time[table, home, home] = problem.finish_time[:, targets]
+    if not timed:
+        time[:] = 0.0
     robot = np.zeros((robots, 4))
     robot[:, USABLE] = problem.capacity - problem.reserve
     robot[:, MISSING] = problem.capacity - problem.energy
-    robot[:, CHARGE_TIME] = 1.0 / problem.charge_power
+    robot[:, CHARGE_TIME] = 1.0 / problem.charge_power if timed else 0.0
     robot[:, LIMIT] = problem.limit
     one = np.flatnonzero(home == targets)
     between = slice(goals, targets)
-    hop = cost[:, between, between].copy()
-    hop[:, range(stations), range(stations)] = 0.0
-    hop_time = time[:, between, between].copy()
-    hop_time[:, range(stations), range(stations)] = 0.0
-    within = hop <= robot[one, USABLE, None, None]
-    hop_time += robot[one, CHARGE_TIME, None, None] * np.where(within, hop, 0.0)
-    hop[~within] = np.inf
-    follower = np.broadcast_to(np.arange(stations), hop.shape).copy()
-    for over in range(stations):
-        detour = hop[:, :, over, None] + hop[:, None, over]
-        shorter = detour < hop
-        longer = hop_time[:, :, over, None] + hop_time[:, None, over]
-        hop[shorter] = detour[shorter]
-        hop_time[shorter] = longer[shorter]
-        first = np.broadcast_to(follower[:, :, over, None], hop.shape)
-        follower[shorter] = first[shorter]
+    battery = robot[one][:, (USABLE, CHARGE_TIME)]
+    hop, hop_time, follower = _hops(
+        cost[:, between, between], time[:, between, between], battery
+    )
     apart = np.stack([cost[:, :, between], cost[:, between].transpose(0, 2, 1)], axis=2)
+    reach = apart.min(axis=3, initial=np.inf)
     near = np.argsort(apart, axis=3, kind="stable")[..., :MOST_NEAR].copy()
-    rank = np.full((tables, places, 2, stations), -1)
-    np.put_along_axis(rank, near, np.arange(near.shape[3]), axis=3)
+    apart = (cost + cost.transpose(0, 2, 1))[:, :goals, :goals].min(axis=0)
+    np.fill_diagonal(apart, -1.0)
+    neighbour = np.argsort(apart, axis=1, kind="stable")[:, :NEIGHBOURS].copy()
     return Legs(
         goals,
         table,
@@ -107,15 +108,38 @@ def new_legs(problem: RoutingArrays) -> Legs:
         hop_time,
         follower,
         near,
-        rank,
-        (cost + cost.transpose(0, 2, 1))[:, :goals, :goals].min(axis=0),
+        reach,
+        neighbour,
+        cost[table, home, :goals].min(axis=0),
         robot,
+        timed,
         problem.energy_weight,
         problem.makespan_weight,
     )
 
 
-@kernel
-def towards(table, own, end, a, b):
-    """Return the entry for the leg from a to b, as seen from an end of the route."""
-    return table[own, a, b] if end == 0 else table[own, b, a]
+def _hops(
+    leg: np.ndarray, leg_time: np.ndarray, battery: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return cost, time and next station on the ways from station to station.
+
+    Args:
+        leg, leg_time: straight from station to station, shape (tables, S, S).
+        battery: energy that it holds, and time that recharging takes, (tables, 2).
+    """
+    hop, hop_time, stations = leg.copy(), leg_time.copy(), leg.shape[1]
+    hop[:, range(stations), range(stations)] = 0.0
+    hop_time[:, range(stations), range(stations)] = 0.0
+    within = hop <= battery[:, 0, None, None]
+    hop_time += battery[:, 1, None, None] * np.where(within, hop, 0.0)
+    hop[~within] = np.inf
+    follower = np.broadcast_to(np.arange(stations), hop.shape).copy()
+    for over in range(stations):
+        detour = hop[:, :, over, None] + hop[:, None, over]
+        shorter = detour < hop
+        longer = hop_time[:, :, over, None] + hop_time[:, None, over]
+        hop[shorter] = detour[shorter]
+        hop_time[shorter] = longer[shorter]
+        first = np.broadcast_to(follower[:, :, over, None], hop.shape)
+        follower[shorter] = first[shorter]
+    return hop, hop_time, follower

@@ -3,9 +3,10 @@
 A label is a way to get from one end of a route to one of its places: what it costs, how
 long it takes, and the energy drawn between that place and the nearest recharge. Labels
 from the start meet labels from the finish wherever a goal may be put in, so that this
-costs no walk along the route. Between two places stand as many stations as are needed:
-the first is one of the nearest of the first place, the last one of those of the second.
-Where there are at most MOST_NEAR stations, no route has a cheaper choice of them.
+costs no walk along the route. From place to place lead the leg and the recharging paths
+that are no worse than others in all (refuel paths of Andelmin and Bartolini 2017): over
+one of the nearest stations of the first place, any others, and one of the nearest of
+the second. Where there are at most MOST_NEAR stations, no route has a cheaper choice.
 
 Step m of a route is m places away from one of its ends, which are numbered 0 (start)
 and 1 (finish). A goal has the same rows of labels on whichever route it is.
@@ -24,20 +25,29 @@ from mrmg.planning.routing._legs_kernels import (
     MISSING,
     USABLE,
     Legs,
-    towards,
 )
 
-COST, TIME, DRAW, RATE, ORIGIN, STATION = range(6)
+COST, TIME, DRAW, RATE, ORIGIN, PATH = range(6)
 """Columns of labels: energy [J], time [s], energy drawn since the last recharge [J],
-time that recharging that takes [s/J], number of the label it continues, and station
-that is next to that one (-1: none). Of two labels of a node, one is of no use if it is
-no better in any of the first four."""
+time that recharging that takes [s/J], number of the label it continues, and of the
+recharging path it takes from there (-1: the leg). Of two labels of a row, one is of no
+use if it is no better in any of the first four."""
 
-MORE_WAYS = 8
-"""Labels kept at a place beside one for each station near it."""
+TO, ON, FIRST, LAST = range(2, 6)
+"""Columns of recharging paths beside cost and time: energy to the first station and
+from the last one, and these. They are compared as labels are."""
 
-TIMED_WAYS = 6
-"""Recharged ways kept at a station if time counts; else the cheapest is enough."""
+WAYS, LEAST, LEAST_DRAW = range(3)
+"""Columns of the heads of rows of labels."""
+
+MOST_WAYS = 12
+"""Labels kept at a place."""
+
+MOST_PATHS = 12
+"""Recharging paths kept between two places."""
+
+MOST_PAIRS = 1 << 15
+"""Pairs of places whose recharging paths are remembered."""
 
 ROUNDING = 1e-12
 """Share by which sums in another order may differ."""
@@ -47,36 +57,37 @@ class Labels(NamedTuple):
     """The undominated ways along every route, from both ends; one row for each step.
 
     Attributes:
-        way: to each step, shape (rows, K, 6); the last row is that of a goal that may
-            be put in.
-        ways: their number, shape (rows,).
-        least: cost of the cheapest, inf if there is none, shape (rows,).
-        full: on to each of the N nearest stations, recharged, shape (rows * N, F, 6).
-        fulls: their number, shape (rows * N,).
-        arrival: room for ways to one station, shape (1, F, 6).
+        way: to each step, shape (rows, MOST_WAYS, 6); the last row is that of a goal
+            that may be put in.
+        head: their number, cost of the cheapest, inf if there is none, and its draw,
+            shape (rows, 3).
+        pair: of places whose recharging paths a slot holds, -1 if none, (slots,).
+        paths: their number, shape (slots,).
+        path: shape (slots, MOST_PATHS, 6).
+        bound: room for what a goal adds at least in each place there is for it,
+            shape (goals + robots,).
     """
 
     way: np.ndarray
-    ways: np.ndarray
-    least: np.ndarray
-    full: np.ndarray
-    fulls: np.ndarray
-    arrival: np.ndarray
+    head: np.ndarray
+    pair: np.ndarray
+    paths: np.ndarray
+    path: np.ndarray
+    bound: np.ndarray
 
 
 def new_labels(legs: Legs) -> Labels:
-    """Return room for the labels of all routes."""
-    near = legs.near.shape[3]
-    timed = legs.makespan_weight > 0.0 or np.isfinite(legs.robot[:, LIMIT]).any()
+    """Return room for the labels of all routes, and for recharging paths."""
     rows = 2 * (legs.goals + 2 * len(legs.robot)) + 1
-    most = TIMED_WAYS if timed else 1
+    stations = legs.near.shape[3]
+    slots = min(legs.cost.size, MOST_PAIRS) if stations else 1
     return Labels(
-        np.zeros((rows, near + MORE_WAYS, 6)),
-        np.zeros(rows, np.int64),
-        np.full(rows, np.inf),
-        np.zeros((rows * near, most, 6)),
-        np.zeros(rows * near, np.int64),
-        np.zeros((1, most, 6)),
+        np.zeros((rows, MOST_WAYS, 6)),
+        np.tile([0.0, np.inf, np.inf], (rows, 1)),
+        np.full(slots, -1),
+        np.zeros(slots, np.int64),
+        np.zeros((slots, min(stations**2, MOST_PATHS), 6)),
+        np.zeros(legs.goals + len(legs.robot)),
     )
 
 
@@ -108,13 +119,19 @@ def add_label(label, row, n, new):
     """
     m = costliest = 0
     for k in range(n):
-        better = worse = True
-        for column in range(ORIGIN):
-            better &= label[row, k, column] <= new[column]
-            worse &= label[row, k, column] >= new[column]
-        if better:
+        if (
+            label[row, k, 0] <= new[0]
+            and label[row, k, 2] <= new[2]
+            and label[row, k, 1] <= new[1]
+            and label[row, k, 3] <= new[3]
+        ):
             return n
-        if worse:
+        if (
+            label[row, k, 0] >= new[0]
+            and label[row, k, 2] >= new[2]
+            and label[row, k, 1] >= new[1]
+            and label[row, k, 3] >= new[3]
+        ):
             continue
         if m < k:
             for column in range(label.shape[2]):
@@ -134,116 +151,88 @@ def add_label(label, row, n, new):
 
 
 @kernel
-def recharge(legs, labels, r, end, place, row):
-    """Lead the ways of a row, to a place, on to the stations next to it."""
-    own, near = legs.table[r], legs.near.shape[3]
-    battery = legs.robot[r, USABLE] * (1.0 + ROUNDING), legs.robot[r, CHARGE_TIME]
-    for j in range(near):
-        labels.fulls[row * near + j] = 0
-    for i in range(near):
-        f = legs.near[own, place, end, i]
-        leg = towards(legs.cost, own, end, place, legs.goals + f)
-        time = towards(legs.time, own, end, place, legs.goals + f)
-        ways = labels.ways[row]
-        n = arrive(labels.way, row, ways, leg, time, battery, f, labels.arrival)
-        for j in range(near if n > 0 else 0):
-            e = legs.near[own, place, end, j]
-            hop = towards(legs.hop, own, end, f, e)
-            if hop < np.inf:
-                time = towards(legs.hop_time, own, end, f, e)
-                at = row * near + j
-                labels.fulls[at] = lead_on(
-                    labels.arrival, n, hop, time, labels.full, at, labels.fulls[at]
-                )
+def slot_of(legs, labels, own, a, b):
+    """Return the slot of a table's recharging paths from a to b; find them if new."""
+    key, slot = key_and_slot(labels.pair, legs.cost.shape[1], own, a, b)
+    if labels.pair[slot] != key and legs.near.shape[3] > 0:
+        labels.pair[slot] = key
+        labels.paths[slot] = find_paths(legs, labels.path, slot, own, a, b)
+    return slot
 
 
 @kernel
-def arrive(way, row, ways, leg, time, battery, station, arrival):
-    """Write the ways of a row on to a station; return their number.
+def key_and_slot(pair, places, own, a, b):
+    """Return the number of a pair of places, and where its recharging paths belong."""
+    key = (own * places + a) * places + b
+    return key, key % len(pair)
 
-    Recharged, ways differ in cost and time alone: few are worth leading on.
 
-    Args:
-        way, row, ways: the labels, and how many of them.
-        leg, time: to the station.
-        battery: energy that it holds, and time that recharging takes.
-        station: its number.
-        arrival: receives labels.
-    """
+@kernel
+def find_paths(legs, path, slot, own, a, b):
+    """Write the recharging paths of a table from a to b; return their number."""
     n = 0
-    for k in range(ways):
-        drawn = way[row, k, DRAW] + leg
-        if drawn <= battery[0]:
-            cost, late = way[row, k, COST] + leg, way[row, k, TIME] + time
-            late += way[row, k, RATE] * drawn
-            if n == arrival.shape[1] == 1 and arrival[0, 0, COST] <= cost:
-                continue
-            new = (cost, late, 0.0, battery[1], 1.0 * k, 1.0 * station)
-            n = add_label(arrival, 0, n, new)
+    for i in range(legs.near.shape[3]):
+        f = legs.near[own, a, 0, i]
+        to, to_time = (
+            legs.cost[own, a, legs.goals + f],
+            legs.time[own, a, legs.goals + f],
+        )
+        for j in range(legs.near.shape[3]):
+            e = legs.near[own, b, 1, j]
+            on = legs.cost[own, legs.goals + e, b]
+            cost = to + legs.hop[own, f, e] + on
+            if cost < np.inf:
+                time = to_time + legs.hop_time[own, f, e]
+                time += legs.time[own, legs.goals + e, b]
+                n = add_label(path, slot, n, (cost, time, to, on, 1.0 * f, 1.0 * e))
     return n
 
 
 @kernel
-def lead_on(arrival, n, hop, time, full, at, fulls):
-    """Add n arrivals to the recharged ways at another station; return their number."""
-    for k in range(n):
-        cost = arrival[0, k, COST] + hop
-        if fulls == full.shape[1] == 1 and full[at, 0, COST] <= cost:
-            continue
-        new = (cost, arrival[0, k, TIME] + time, 0.0, arrival[0, k, RATE],
-               arrival[0, k, ORIGIN], arrival[0, k, STATION])  # fmt: skip
-        fulls = add_label(full, at, fulls, new)
-    return fulls
+def extend(way, head, rows, leg, path, stops, battery):
+    """Lead the ways of a row on to that of a neighbour.
+
+    Args:
+        way, head: all labels.
+        rows: of the ways there are, and of those to be written.
+        leg: cost and time from place to place.
+        path: all recharging paths.
+        stops: slot of those in the direction of driving, their number, and the end
+            from which the ways begin.
+        battery: as `battery_of` returns it.
+    """
+    row, next_row = rows
+    slot, paths, end = stops
+    n, ways = 0, int(head[row, WAYS])
+    for k in range(ways):
+        drawn = way[row, k, DRAW] + leg[0]
+        if drawn <= battery[0]:
+            cost, late = way[row, k, COST] + leg[0], way[row, k, TIME] + leg[1]
+            new = (cost, late, drawn, way[row, k, RATE], 1.0 * k, -1.0)
+            n = add_label(way, next_row, n, new)
+    for j in range(paths):
+        to, on = path[slot, j, TO + end], path[slot, j, ON - end]
+        lowest = np.inf
+        for k in range(ways if on <= battery[0] else 0):
+            drawn = way[row, k, DRAW] + to
+            cost = way[row, k, COST] + path[slot, j, COST]
+            if drawn <= battery[0] and (cost < lowest or battery[2]):
+                lowest = cost
+                late = way[row, k, TIME] + path[slot, j, TIME]
+                late += way[row, k, RATE] * drawn
+                new = (cost, late, on, battery[1], 1.0 * k, 1.0 * j)
+                n = add_label(way, next_row, n, new)
+    cheapest = 0
+    for k in range(1, n):
+        if way[next_row, k, COST] < way[next_row, cheapest, COST]:
+            cheapest = k
+    head[next_row, WAYS] = n
+    head[next_row, LEAST] = way[next_row, cheapest, COST] if n > 0 else np.inf
+    head[next_row, LEAST_DRAW] = way[next_row, cheapest, DRAW]
 
 
 @kernel
-def extend(legs, labels, r, end, place, row, follower, next_row):
-    """Lead the ways of a row, to a place, on to a neighbour, in another row."""
-    own, near = legs.table[r], legs.near.shape[3]
-    usable = legs.robot[r, USABLE] * (1.0 + ROUNDING)
-    n = 0
-    leg = towards(legs.cost, own, end, place, follower)
-    time = towards(legs.time, own, end, place, follower)
-    for k in range(labels.ways[row]):
-        drawn = labels.way[row, k, DRAW] + leg
-        if drawn <= usable:
-            cost, late = labels.way[row, k, COST] + leg, labels.way[row, k, TIME] + time
-            new = (cost, late, drawn, labels.way[row, k, RATE], 1.0 * k, -1.0)
-            n = add_label(labels.way, next_row, n, new)
-    for j in range(near if labels.ways[row] > 0 else 0):
-        e = legs.near[own, follower, 1 - end, j]
-        leg = towards(legs.cost, own, end, legs.goals + e, follower)
-        if leg > usable:
-            break
-        time = towards(legs.time, own, end, legs.goals + e, follower)
-        rank = legs.rank[own, place, end, e]
-        low, high = (0, near) if rank < 0 else (rank, rank + 1)
-        for i in range(low, high):
-            hop, hop_time = 0.0, 0.0
-            if rank < 0:
-                f = legs.near[own, place, end, i]
-                hop = towards(legs.hop, own, end, f, e)
-                hop_time = towards(legs.hop_time, own, end, f, e)
-            at = row * near + i
-            for k in range(labels.fulls[at] if hop < np.inf else 0):
-                new = (
-                    labels.full[at, k, COST] + hop + leg,
-                    labels.full[at, k, TIME] + hop_time + time,
-                    leg,
-                    labels.full[at, k, RATE],
-                    1.0 * (i * labels.full.shape[1] + k),
-                    1.0 * e,
-                )
-                n = add_label(labels.way, next_row, n, new)
-    labels.ways[next_row] = n
-    least = np.inf
-    for k in range(n):
-        least = min(least, labels.way[next_row, k, COST])
-    labels.least[next_row] = least
-
-
-@kernel
-def label_route(legs, labels, r, goal, length, front, back):
+def label_route(legs, labels, r, goal, length, held, plain):
     """Write the labels of a route and return (cost, time, label) of its best way.
 
     The way is the best by the weights of the objective among those within the limit;
@@ -253,27 +242,40 @@ def label_route(legs, labels, r, goal, length, front, back):
     Args:
         legs, labels, r: the problem, and robot r's labels in it.
         goal, length: the route's goals.
-        front, back: steps from the start and the finish whose labels hold already.
+        held: steps from the start and the finish whose labels hold already.
+        plain: whether no station is needed.
     """
+    own, home, slot, paths = legs.table[r], legs.home[r], 0, 0
+    battery, stations = battery_of(legs, r), legs.near.shape[3]
     for end in range(2):
-        for step in range(back if end else front, length + 2 - end):
-            row = row_of(legs, r, goal, length, end, step)
-            place = place_at(legs, r, goal, length, end, step)
-            if step == 0:
-                begin(legs, labels, r, end, row)
-            else:
-                before = place_at(legs, r, goal, length, end, step - 1)
-                last = row_of(legs, r, goal, length, end, step - 1)
-                extend(legs, labels, r, end, before, last, place, row)
+        first = end * (legs.goals + 2 * len(legs.robot))
+        if held[end] == 0:
+            begin(legs, labels, r, end, first + legs.goals + r)
+        place, row = home, first + legs.goals + r
+        for step in range(1, length + 2 - end):
+            last, last_row = place, row
             if step <= length:
-                recharge(legs, labels, r, end, place, row)
-    own, home = legs.table[r], legs.home[r]
+                place = goal[step - 1] if end == 0 else goal[length - step]
+                row = first + place
+            else:
+                place, row = home, first + legs.goals + len(legs.robot) + r
+            if step < held[end]:
+                continue
+            a, b = (place, last) if end else (last, place)
+            if stations > 0 and not plain:
+                key, slot = key_and_slot(labels.pair, legs.cost.shape[1], own, a, b)
+                if labels.pair[slot] != key:
+                    slot_of(legs, labels, own, a, b)
+                paths = labels.paths[slot]
+            leg = legs.cost[own, a, b], legs.time[own, a, b]
+            rows, stops = (last_row, row), (slot, paths, end)
+            extend(labels.way, labels.head, rows, leg, labels.path, stops, battery)
     if length == 0 and legs.cost[own, home, home] == 0.0:
         return 0.0, legs.time[own, home, home], -1
     row = row_of(legs, r, goal, length, 0, length + 1)
     best = best_cost = best_time = np.inf
     label = -1
-    for k in range(labels.ways[row]):
+    for k in range(int(labels.head[row, WAYS])):
         cost, time = labels.way[row, k, COST], labels.way[row, k, TIME]
         value = route_value(legs, cost, time, 0.0)
         if value < best and time <= legs.robot[r, LIMIT] * (1.0 + ROUNDING):
@@ -282,15 +284,23 @@ def label_route(legs, labels, r, goal, length, front, back):
 
 
 @kernel
+def battery_of(legs, r):
+    """Return what a battery holds, the time of recharging, and whether times count."""
+    usable = legs.robot[r, USABLE] * (1.0 + ROUNDING)
+    return usable, legs.robot[r, CHARGE_TIME], legs.timed
+
+
+@kernel
 def begin(legs, labels, r, end, row):
     """Write the label of an end of robot r's route."""
     labels.way[row, 0, :] = 0.0
-    labels.way[row, 0, STATION] = -1.0
+    labels.way[row, 0, PATH] = -1.0
     if end == 0:
         labels.way[row, 0, DRAW] = legs.robot[r, MISSING]
         labels.way[row, 0, RATE] = legs.robot[r, CHARGE_TIME]
-    labels.ways[row] = 1
-    labels.least[row] = 0.0
+    labels.head[row, WAYS] = 1.0
+    labels.head[row, LEAST] = 0.0
+    labels.head[row, LEAST_DRAW] = labels.way[row, 0, DRAW]
 
 
 @kernel

@@ -7,13 +7,17 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.planning.routing._insertion_kernels import cost_without_stations, value_with
-from mrmg.planning.routing._legs_kernels import USABLE
+from mrmg.planning.routing._insertion_kernels import value_with
+from mrmg.planning.routing._legs_kernels import MISSING, USABLE
 from mrmg.planning.routing._pool_kernels import pool_route
 from mrmg.planning.routing._random_kernels import random_unit
 from mrmg.planning.routing._refuel_kernels import (
+    LEAST,
+    LEAST_DRAW,
     ROUNDING,
+    WAYS,
     label_route,
+    place_at,
     route_value,
     row_of,
 )
@@ -34,6 +38,8 @@ class Routes(NamedTuple):
         known: shape (R + 1, 3).
         front, back: steps from start and finish whose labels hold, shape (R + 1,).
             After n goals front is n + 2 if all is up to date.
+        plain: 1 where the battery lasts for the route without a station, and labels
+            are of that way alone, shape (R + 1,).
         changed: 1 where a route differs from what it is a copy of, shape (R + 1,).
     """
 
@@ -42,6 +48,7 @@ class Routes(NamedTuple):
     known: np.ndarray
     front: np.ndarray
     back: np.ndarray
+    plain: np.ndarray
     changed: np.ndarray
 
 
@@ -51,6 +58,7 @@ def new_routes(robots: int, goals: int) -> Routes:
         np.zeros((robots + 1, goals), np.int64),
         np.zeros(robots + 1, np.int64),
         np.zeros((robots + 1, 3)),
+        np.zeros(robots + 1, np.int64),
         np.zeros(robots + 1, np.int64),
         np.zeros(robots + 1, np.int64),
         np.ones(robots + 1, np.int64),
@@ -68,27 +76,70 @@ def copy_routes(source, copy, changed):
                 copy.goal[r, i] = source.goal[r, i]
             for column in range(3):
                 copy.known[r, column] = source.known[r, column]
-            copy.front[r] = 0
-            copy.back[r] = 0
+            copy.front[r] = source.front[r]
+            copy.back[r] = source.back[r]
+            copy.plain[r] = source.plain[r]
 
 
 @kernel
-def update(legs, routes, labels, pool):
-    """Bring labels and costs of changed routes up to date, and pool those routes."""
+def copy_labels(legs, routes, changed, source, copy):
+    """Copy the labels of those routes that have changed."""
+    ends = legs.goals + 2 * len(legs.robot)
+    for r in range(len(legs.robot)):
+        n = routes.length[r] if changed[r] else -1
+        for i in range(2 * n + 1):
+            row = ends - len(legs.robot) + r
+            if i < 2 * n:
+                row = routes.goal[r, i // 2] + i % 2 * ends
+            for k in range(int(source.head[row, WAYS])):
+                for column in range(source.way.shape[2]):
+                    copy.way[row, k, column] = source.way[row, k, column]
+            for column in range(source.head.shape[1]):
+                copy.head[row, column] = source.head[row, column]
+
+
+@kernel
+def update(legs, routes, labels, pool, shorter):
+    """Bring labels and costs of changed routes up to date, and pool those routes.
+
+    Args:
+        legs, routes, labels, pool: the problem, and what is to be brought up to date.
+        shorter: whether goals were taken out.
+    """
     for r in range(len(routes.length) - 1):
-        n = routes.length[r]
-        if routes.front[r] == n + 2:
-            continue
-        goal = routes.goal[r]
-        cost, time, label = label_route(
-            legs, labels, r, goal, n, routes.front[r], routes.back[r]
-        )
-        routes.known[r, COST] = cost
-        routes.known[r, TIME] = time
-        routes.known[r, LABEL] = label
-        pool_route(pool, r, goal, n, cost)
-        routes.front[r] = routes.back[r] = n + 2
-        routes.changed[r] = 1
+        if routes.front[r] < routes.length[r] + 2:
+            suffices = not legs.timed and lasts(legs, routes, r)
+            plain = routes.plain[r] == 1
+            if plain != suffices and (plain or shorter):
+                routes.plain[r] = suffices
+                routes.front[r] = routes.back[r] = 0
+            label(legs, routes, labels, r)
+            cost = routes.known[r, COST]
+            pool_route(pool, r, routes.goal[r], routes.length[r], cost)
+            routes.changed[r] = 1
+
+
+@kernel
+def lasts(legs, routes, r):
+    """Return whether the battery lasts for a route without a station."""
+    own, last, drawn = legs.table[r], legs.home[r], legs.robot[r, MISSING]
+    for i in range(routes.length[r]):
+        drawn += legs.cost[own, last, routes.goal[r, i]]
+        last = routes.goal[r, i]
+    drawn += legs.cost[own, last, legs.home[r]]
+    return drawn <= legs.robot[r, USABLE] * (1.0 + ROUNDING)
+
+
+@kernel
+def label(legs, routes, labels, r):
+    """Bring labels and cost of a route up to date."""
+    held, n = (routes.front[r], routes.back[r]), routes.length[r]
+    plain = routes.plain[r] == 1
+    cost, time, best = label_route(legs, labels, r, routes.goal[r], n, held, plain)
+    routes.known[r, COST] = cost
+    routes.known[r, TIME] = time
+    routes.known[r, LABEL] = best
+    routes.front[r] = routes.back[r] = n + 2
 
 
 @kernel
@@ -119,6 +170,54 @@ def two_longest(routes):
 
 
 @kernel
+def bound_places(legs, routes, labels, goal, random, blink, balance):
+    """Return what a goal adds at least where no more stations are needed, and where.
+
+    What it adds at least in each other place that may be better is noted.
+
+    Args:
+        legs, routes, labels: the problem and its present routes.
+        goal: on no route.
+        random: state of the generator.
+        blink: how often a place is overlooked.
+        balance: by how much more a surcharge counts on a route for each joule of it.
+    """
+    best, robot, place, number = np.inf, -1, -1, 0
+    behind = legs.goals + 2 * len(legs.robot)
+    for r in range(len(legs.robot)):
+        own, home, n = legs.table[r], legs.home[r], routes.length[r]
+        usable = legs.robot[r, USABLE] * (1.0 + ROUNDING)
+        present = routes.known[r, COST]
+        weight = (1.0 + balance * present) * legs.energy_weight
+        to_station, on = legs.reach[own, goal, 0], legs.reach[own, goal, 1]
+        last, front = home, legs.goals + r
+        for i in range(n + 1):
+            at = routes.goal[r, i] if i < n else home
+            back = behind + (at if i < n else legs.goals + r)
+            # No way is shorter over stations, so that this bounds the cost.
+            to, way = legs.cost[own, last, goal], legs.cost[own, goal, at]
+            way += to
+            ends = labels.head[front, LEAST] + labels.head[back, LEAST]
+            adds = weight * (ends + way - present)
+            labels.bound[number] = np.inf
+            if adds < best and not random_unit(random) < blink:
+                drawn = labels.head[front, LEAST_DRAW] + labels.head[back, LEAST_DRAW]
+                if drawn + way <= usable and not legs.timed:
+                    best, robot, place = adds, r, i
+                elif legs.timed:
+                    labels.bound[number] = adds
+                else:  # a station is before the goal, behind it, or elsewhere as it was
+                    over = max(0.0, legs.reach[own, last, 0] + on - to)
+                    after = to_station + legs.reach[own, at, 1] - (way - to)
+                    least = ends + way + min(over, max(0.0, after))
+                    least = min(least, present + way - legs.cost[own, last, at])
+                    labels.bound[number] = max(adds, weight * (least - present))
+            last = front = at
+            number += 1
+    return best, robot, place
+
+
+@kernel
 def put_goal(legs, routes, labels, goal, random, blink, balance):
     """Put a goal where it costs least; return whether it fits anywhere.
 
@@ -130,45 +229,30 @@ def put_goal(legs, routes, labels, goal, random, blink, balance):
         balance: how much more a surcharge counts on a route of mean energy than on an
             empty one, as a share.
     """
-    best, timed = np.inf, labels.full.shape[1] > 1
-    robot = place = -1
-    most, last_robot, second = two_longest(routes)
-    total = 1e-9
-    for r in range(len(routes.length) - 1):
+    total, places = 1e-9, len(legs.robot)
+    for r in range(len(legs.robot)):
         total += routes.known[r, COST] if balance > 0.0 else 0.0
-    for r in range(len(routes.length) - 1):
-        n, own = routes.length[r], legs.table[r]
-        usable = legs.robot[r, USABLE] * (1.0 + ROUNDING)
-        longest = second if r == last_robot else most
-        present = routes.known[r, COST]
-        before = route_value(legs, present, routes.known[r, TIME], longest)
-        count = 1.0 + balance * present * len(legs.robot) / total
-        front = row_of(legs, r, routes.goal[r], n, 0, 0), legs.home[r]
-        for i in range(n + 1):
-            last = front
-            at = routes.goal[r, i] if i < n else legs.home[r]
-            behind = row_of(legs, r, routes.goal[r], n, 1, n - i), at
-            front = row_of(legs, r, routes.goal[r], n, 0, i + 1), at
-            # No way is shorter over stations, so that this bounds the cost.
-            least = labels.least[last[0]] + legs.cost[own, last[1], goal]
-            least += legs.cost[own, goal, at] + labels.least[behind[0]]
-            if not count * legs.energy_weight * (least - present) < best:
-                continue
-            if random_unit(random) < blink:
-                continue
-            value = np.inf
-            if not timed:  # nothing beats the cheapest ways to either side
-                way = legs.cost[own, last[1], goal] + legs.cost[own, goal, at]
-                value = legs.energy_weight * cost_without_stations(
-                    labels, last[0], behind[0], way, usable
-                )
-            if value == np.inf:
-                value = value_with(
-                    legs, labels, r, last, goal, behind, longest, best / count + before
-                )
-            if count * (value - before) < best:
-                best = count * (value - before)
-                robot, place = r, i
+        places += routes.length[r]
+    balance *= len(legs.robot) / total
+    best, robot, place = bound_places(
+        legs, routes, labels, goal, random, blink, balance
+    )
+    while True:
+        number = labels.bound[:places].argmin()
+        if not labels.bound[number] < best:
+            break
+        labels.bound[number] = np.inf
+        r = 0
+        while number > routes.length[r]:
+            number -= routes.length[r] + 1
+            r += 1
+        if routes.plain[r]:
+            routes.plain[r] = routes.front[r] = routes.back[r] = 0
+            label(legs, routes, labels, r)
+        weight = 1.0 + balance * routes.known[r, COST]
+        value = surcharge(legs, routes, labels, (r, number), goal, best / weight)
+        if weight * value < best:
+            best, robot, place = weight * value, r, number
     if robot < 0:
         return False
     n = routes.length[robot]
@@ -200,3 +284,26 @@ def remove_goals(routes, gone):
                 routes.goal[r, kept] = goal
                 kept += 1
         routes.length[r] = kept
+
+
+@kernel
+def surcharge(legs, routes, labels, where, goal, ceiling):
+    """Return what a goal adds in a place; inf if it does not fit.
+
+    Args:
+        legs, routes, labels: the problem and its present routes.
+        where: robot, and number of the place in its route.
+        goal: on no route.
+        ceiling: what it adds counts as inf unless it is below.
+    """
+    r, i = where
+    own, n = routes.goal[r], routes.length[r]
+    longest, last_robot, second = two_longest(routes)
+    if r == last_robot:
+        longest = second
+    before = route_value(legs, routes.known[r, COST], routes.known[r, TIME], longest)
+    front = row_of(legs, r, own, n, 0, i), place_at(legs, r, own, n, 0, i)
+    k = n - i
+    back = row_of(legs, r, own, n, 1, k), place_at(legs, r, own, n, 1, k)
+    ceiling += before
+    return value_with(legs, labels, r, front, goal, back, longest, ceiling) - before

@@ -8,17 +8,24 @@ and Vanden Berghe 2020). Goals that fit nowhere are absent until they do.
 from __future__ import annotations
 
 from math import log
+from typing import NamedTuple
 
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.planning.routing._pool_kernels import combine
+from mrmg.planning.routing._legs_kernels import Legs
+from mrmg.planning.routing._nrpa_kernels import RoutingArrays
+from mrmg.planning.routing._pool_kernels import Pool, combine, new_pool
 from mrmg.planning.routing._random_kernels import random_unit
+from mrmg.planning.routing._refuel_kernels import Labels, new_labels
 from mrmg.planning.routing._routes_kernels import (
     COST,
     IMPOSSIBLE,
     LABEL,
+    Routes,
+    copy_labels,
     copy_routes,
+    new_routes,
     objective,
     put_goal,
     remove_goals,
@@ -43,79 +50,129 @@ and routes of many goals to improve."""
 SWAPS = 0.15
 """How often two robots exchange the ends of their routes instead."""
 
-HOT, COLD = 0.3, 0.003
-"""First and last temperature of the search, as shares of a goal's mean cost."""
 
-POOLED_HOT, POOLED_COLD = 5.0, 0.5
-"""The same where routes are pooled: to meet many of them is what counts there."""
+class State(NamedTuple):
+    """What a search works on.
+
+    Attributes:
+        routes, labels: those that are tried.
+        present, kept: those that are left for others, and their labels.
+        best: the best met.
+        pool: all met.
+        gone, home, key: room for values of each goal, shape (G,).
+    """
+
+    routes: Routes
+    labels: Labels
+    present: Routes
+    kept: Labels
+    best: Routes
+    pool: Pool
+    gone: np.ndarray
+    home: np.ndarray
+    key: np.ndarray
+
+
+def new_state(problem: RoutingArrays, legs: Legs) -> State:
+    """Return the state of a search before anything is tried: no goal is on a route."""
+    robots, goals, targets = len(problem.energy), problem.goals, problem.open_goal
+    routes, present, best = (new_routes(robots, goals) for _ in range(3))
+    for each in (routes, best):
+        each.length[robots] = targets.sum()
+        each.goal[robots, : targets.sum()] = np.flatnonzero(targets)
+    labels = new_labels(legs)
+    kept = labels._replace(way=labels.way.copy(), head=labels.head.copy())
+    room = np.zeros(goals, np.int64)
+    return State(
+        routes,
+        labels,
+        present,
+        kept,
+        best,
+        new_pool(problem),
+        room,
+        room.copy(),
+        np.zeros(goals),
+    )
 
 
 @kernel
-def search(legs, routes, present, best, labels, pool, rounds, random):
+def search(legs, state, rounds, span, random):
     """Improve routes by ruin and recreate with simulated annealing; keep the best.
 
     Before the first round, routes that cannot be driven are emptied, and absent goals
-    put where they fit. At the end routes the search has met are combined anew.
+    put where they fit.
 
     Args:
-        legs, rounds, random: the problem, rounds at most, state of the generator.
-        routes, pool: to begin with; receive the best, and all others.
-        present, best, labels: room for routes twice, and for their labels.
+        legs, state: the problem, and the routes so far; a search may go on with them.
+        rounds: how many.
+        span: first and last temperature, as shares of a goal's mean cost.
+        random: state of the generator.
     """
-    robots, goals = len(routes.length) - 1, routes.goal.shape[1]
-    first, last = (HOT, COLD) if pool.cost.shape[1] == 1 else (POOLED_HOT, POOLED_COLD)
-    gone, home = np.zeros(goals, np.int64), np.zeros(goals, np.int64)
-    key = np.zeros(goals)
-    value = best_value = np.inf
-    hot = 0.0
-    update(legs, routes, labels, pool)
+    routes, present, best = state.routes, state.present, state.best
+    robots, gone = len(legs.robot), state.gone
+    update(legs, routes, state.labels, state.pool, True)
+    gone[:] = 0
+    for r in range(robots):
+        for i in range(routes.length[r]):
+            gone[routes.goal[r, i]] = routes.known[r, COST] == np.inf
+    recreate(legs, state, random, 0.0, BALANCE)
+    value, best_value = objective(legs, routes), objective(legs, best)
+    hot = (value - IMPOSSIBLE * routes.length[robots]) / max(1, legs.goals)
     for k in range(rounds + 1):
-        if k > 0 and robots > 1 and random_unit(random) < SWAPS:
-            gone[:] = 0
-            swap_tails(routes, random)
-        elif k > 0:
-            choose_ruin(routes, legs.round_trip, random, home, gone)
-        else:
-            for r in range(robots):
-                for i in range(routes.length[r]):
-                    gone[routes.goal[r, i]] = routes.known[r, COST] == np.inf
-        remove_goals(routes, gone)
-        update(legs, routes, labels, pool)
-        order_absent(legs, routes, random, key)
-        blink, balance = (BLINK, 0.0) if k > 0 else (0.0, BALANCE)
-        n = routes.length[robots]
-        routes.length[robots] = 0
-        for i in range(n):
-            goal = routes.goal[robots, i]
-            if put_goal(legs, routes, labels, goal, random, blink, balance):
-                update(legs, routes, labels, pool)
+        if k > 0:
+            if random_unit(random) < SWAPS:
+                gone[:] = 0
+                swap_tails(routes, legs.neighbour, random)
             else:
-                routes.goal[robots, routes.length[robots]] = goal
-                routes.length[robots] += 1
+                choose_ruin(routes, legs.neighbour, random, state.home, gone)
+            recreate(legs, state, random, BLINK, 0.0)
         found = objective(legs, routes)
-        if k == 0:
-            hot = first * (found - IMPOSSIBLE * routes.length[robots]) / max(1, goals)
-        warmth = hot * (last / first) ** (k / (rounds + 1))
+        warmth = hot * span[0] * (span[1] / span[0]) ** (k / (rounds + 1))
         if k == 0 or found < value - warmth * log(1.0 - random_unit(random)):
             value = found
             copy_routes(routes, present, routes.changed)
+            copy_labels(legs, routes, routes.changed, state.labels, state.kept)
             if found < best_value:
                 best_value = found
                 routes.changed[:] = 1
                 copy_routes(routes, best, routes.changed)
         else:
             copy_routes(present, routes, routes.changed)
-            update(legs, routes, labels, pool)
+            copy_labels(legs, routes, routes.changed, state.kept, state.labels)
         routes.changed[:] = 0
-    routes.changed[:] = 1
-    copy_routes(best, routes, routes.changed)
-    combine(pool, routes)
-    update(legs, routes, labels, pool)
 
 
 @kernel
-def write_tours(legs, routes, labels, tour, tour_length):
-    """Write the tours of up-to-date routes; return their energy [J]."""
+def recreate(legs, state, random, blink, balance):
+    """Take the flagged goals out of all routes, and put absent ones where they fit."""
+    routes, labels, absent = state.routes, state.labels, len(legs.robot)
+    remove_goals(routes, state.gone)
+    update(legs, routes, labels, state.pool, True)
+    order_absent(legs, routes, random, state.key)
+    n = routes.length[absent]
+    routes.length[absent] = 0
+    for i in range(n):
+        goal = routes.goal[absent, i]
+        if put_goal(legs, routes, labels, goal, random, blink, balance):
+            update(legs, routes, labels, state.pool, False)
+        else:
+            routes.goal[absent, routes.length[absent]] = goal
+            routes.length[absent] += 1
+
+
+@kernel
+def write_tours(legs, state, tour, tour_length):
+    """Write the tours of the best routes, or of better ones of all that were met.
+
+    Returns their energy [J].
+    """
+    routes, labels = state.routes, state.labels
+    routes.changed[:] = 1
+    copy_routes(state.best, routes, routes.changed)
+    combine(state.pool, routes)
+    routes.front[:] = routes.back[:] = 0
+    update(legs, routes, labels, state.pool, True)
     robots = len(routes.length) - 1
     total = IMPOSSIBLE * routes.length[robots]
     for r in range(robots):

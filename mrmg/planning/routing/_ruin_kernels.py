@@ -2,28 +2,31 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from mrmg.compilation import kernel
 from mrmg.planning.routing._random_kernels import random_below, random_unit
 
-MOST_RUINED = 10
-"""Mean number of goals taken out at a time, and longest string of them."""
+RUINED, RUINED_OF_MANY = 10, 20
+"""Most goals taken out at a time, as neighbours or as a string, for few and many: not
+more than a fifth of them, unless they are few."""
 
-WHOLE = 0.5
-"""How often routes are exchanged as a whole when their ends could be."""
-
-STRINGS = 0.6
+STRINGS = 0.7
 """How often strings of routes are taken out instead of a seed's nearest goals."""
+
+ANYWHERE = 0.3
+"""How often ends of routes are exchanged that are drawn without regard to where they
+lie, half of them all goals of both: an idle robot has no goals to lie near."""
+
+MOST_TAILS = 10
+"""Goals next to a goal, itself among them, that may follow it as ends are exchanged."""
 
 
 @kernel
-def choose_ruin(routes, near, random, home, gone):
+def choose_ruin(routes, neighbour, random, home, gone):
     """Flag goals to be taken out: strings of routes near a seed, or its neighbours.
 
     Args:
         routes: the present routes.
-        near: cost from goal to goal and back, shape (G, G).
+        neighbour: goals next to each goal, itself first, nearest first.
         random: state of the generator.
         home: room for each goal's robot, shape (G,).
         gone: receives the flags, shape (G,).
@@ -45,20 +48,18 @@ def choose_ruin(routes, near, random, home, gone):
         choice -= routes.length[r]
         r += 1
     seed = routes.goal[r, choice]
-    longest = min(MOST_RUINED, max(1, placed // used))
+    ruined = max(RUINED, min(RUINED_OF_MANY, placed // 5))
+    longest = min(ruined, max(1, placed // used))
     by_string = random_unit(random) < STRINGS
-    most = min(MOST_RUINED, placed)
-    if by_string:
-        most = 4 * MOST_RUINED // (1 + longest)
-    for _ in range(1 + random_below(random, most)):
-        goal = -1
-        for g in range(len(home)):
-            if home[g] >= 0 and (goal < 0 or near[seed, g] < near[seed, goal]):
-                goal = g
-        if goal < 0:
-            break
+    most = 4 * ruined // (1 + longest) if by_string else min(ruined, placed)
+    left = 1 + random_below(random, most)
+    for goal in neighbour[seed]:
         r = home[goal]
-        home[goal] = -1
+        if r < 0:
+            continue
+        if left == 0:
+            break
+        left -= 1
         gone[goal] = 1
         if by_string:
             cut_string(routes, r, goal, longest, random, gone)
@@ -88,15 +89,52 @@ def cut_string(routes, r, goal, longest, random, gone):
 
 
 @kernel
-def swap_tails(routes, random):
-    """Exchange the ends of two routes from drawn places on, or all of both."""
+def swap_tails(routes, neighbour, random):
+    """Exchange the ends of two routes, so that goals next to each other follow.
+
+    Where both are of one route, the goals between them are turned round instead.
+    """
     robots = len(routes.length) - 1
-    a = random_below(random, robots)
-    b = (a + 1 + random_below(random, robots - 1)) % robots
-    cut_a = random_below(random, routes.length[a] + 1)
-    cut_b = random_below(random, routes.length[b] + 1)
-    if random_unit(random) < WHOLE:
-        cut_a = cut_b = 0
+    if robots > 1 and random_unit(random) < ANYWHERE:
+        a = random_below(random, robots)
+        b = (a + 1 + random_below(random, robots - 1)) % robots
+        part = random_unit(random) < 0.5
+        cut_a = random_below(random, routes.length[a] + 1) if part else 0
+        cut_b = random_below(random, routes.length[b] + 1) if part else 0
+        exchange(routes, a, cut_a, b, cut_b)
+        return
+    goal = random_below(random, len(neighbour))
+    near = min(MOST_TAILS, neighbour.shape[1])
+    other = neighbour[goal, random_below(random, near)]
+    a, i = where(routes, goal)
+    b, j = where(routes, other)
+    if max(a, b) == robots or goal == other:
+        return
+    if a != b:
+        exchange(routes, a, i + 1, b, j)
+        return
+    low, high = min(i + 1, j), max(i, j - 1)
+    routes.front[a] = low + 1
+    routes.back[a] = routes.length[a] - high
+    while low < high:
+        first, last = routes.goal[a, low], routes.goal[a, high]
+        routes.goal[a, low], routes.goal[a, high] = last, first
+        low, high = low + 1, high - 1
+
+
+@kernel
+def where(routes, goal):
+    """Return the robot that visits a goal, and its place in the route."""
+    for r in range(len(routes.length)):
+        for i in range(routes.length[r]):
+            if routes.goal[r, i] == goal:
+                return r, i
+    return len(routes.length) - 1, 0
+
+
+@kernel
+def exchange(routes, a, cut_a, b, cut_b):
+    """Exchange the ends of two routes from some places on."""
     tail_a, tail_b = routes.length[a] - cut_a, routes.length[b] - cut_b
     for k in range(max(tail_a, tail_b)):
         i, j = cut_a + k, cut_b + k
@@ -115,9 +153,7 @@ def order_absent(legs, routes, random, key):
         goal = routes.goal[robots, k]
         rank = random_unit(random)
         if draw > 0.6:
-            rank = np.inf
-            for r in range(robots):
-                rank = min(rank, legs.cost[legs.table[r], legs.home[r], goal])
+            rank = legs.remote[goal]
             rank = -rank if draw < 0.85 else rank
         i = k
         while i > 0 and key[i - 1] > rank:

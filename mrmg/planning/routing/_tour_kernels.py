@@ -3,7 +3,15 @@
 from __future__ import annotations
 
 from mrmg.compilation import kernel
-from mrmg.planning.routing._refuel_kernels import ORIGIN, STATION, place_at, row_of
+from mrmg.planning.routing._refuel_kernels import (
+    FIRST,
+    LAST,
+    ORIGIN,
+    PATH,
+    place_at,
+    row_of,
+    slot_of,
+)
 
 
 @kernel
@@ -15,27 +23,23 @@ def write_tour(legs, labels, r, goal, length, label, tour):
         label: as `label_route` returned it.
         tour: receives targets in order; those that do not fit are only counted.
     """
-    own, near, most = legs.table[r], legs.near.shape[3], labels.full.shape[1]
-    n = 0
+    own, n = legs.table[r], 0
     for step in range(length + 1 if label >= 0 else 0, 0, -1):
         row = row_of(legs, r, goal, length, 0, step)
-        station = int(labels.way[row, label, STATION])
+        path = int(labels.way[row, label, PATH])
         label = int(labels.way[row, label, ORIGIN])
+        place = place_at(legs, r, goal, length, 0, step)
         if step <= length:
             n = append(tour, n, goal[step - 1])
-        if station >= 0:
-            last = row_of(legs, r, goal, length, 0, step - 1)
-            at = last * near + label // most
-            place = place_at(legs, r, goal, length, 0, step - 1)
-            over = int(legs.near[own, place, 0, label // most])
-            hop = int(labels.full[at, label % most, STATION])
-            label = int(labels.full[at, label % most, ORIGIN])
+        if path >= 0:
+            last = place_at(legs, r, goal, length, 0, step - 1)
+            slot = slot_of(legs, labels, own, last, place)
+            hop = int(labels.path[slot, path, FIRST])
+            end = int(labels.path[slot, path, LAST])
             low = n
             n = append(tour, n, legs.goals + hop)
-            while hop != station:
-                if hop == over:
-                    over = station
-                hop = int(legs.follower[own, hop, over])
+            while hop != end:
+                hop = int(legs.follower[own, hop, end])
                 n = append(tour, n, legs.goals + hop)
             reverse(tour, low, n)
     low = 0

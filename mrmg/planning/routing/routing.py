@@ -7,18 +7,32 @@ recreate with exact placing of the stations, or by nested rollout policy adaptat
 from __future__ import annotations
 
 from dataclasses import dataclass
+from time import thread_time
 
 import numpy as np
 
-from mrmg.planning.routing._legs_kernels import new_legs
+from mrmg.planning.routing._legs_kernels import Legs, new_legs
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays, nrpa, with_own_tables
-from mrmg.planning.routing._pool_kernels import new_pool
-from mrmg.planning.routing._refuel_kernels import new_labels
-from mrmg.planning.routing._routes_kernels import IMPOSSIBLE, Routes, new_routes
-from mrmg.planning.routing._routing_kernels import search, write_tours
+from mrmg.planning.routing._routes_kernels import IMPOSSIBLE, Routes
+from mrmg.planning.routing._routing_kernels import (
+    State,
+    new_state,
+    search,
+    write_tours,
+)
 
-ROUNDS_PER_GOAL = 75
-"""Rounds are at most so many for each goal there is to visit."""
+ROUNDS_PER_PAIR = 12
+"""Rounds are at most so many for each pair of goals to visit, one with itself, too."""
+
+SPAN = 1.0, 0.01
+"""First and last temperature of the search, as shares of a goal's mean cost."""
+
+PARTS, MOST_GROWTH = 20, 10.0
+"""Parts of a search in limited time, and by how much their rounds may grow: the next
+part has as many rounds as the last one had in a part's time."""
+
+POOLED_SPAN = 5.0, 0.5
+"""The same where routes are pooled: to meet many of them is what counts there."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,13 +49,16 @@ class RouterParams:
         alpha: step of the policy adaptation.
         rounds: most rounds of ruin and recreate, fewer if there are few goals; with 0
             the order is NRPA's.
+        limit_s: processor time for ruin and recreate, in place of a number of rounds
+            [s]; None for none. With it the same seed may give other tours.
     """
 
     method: str = "search"
     levels: int = 1
     iterations: int = 20
     alpha: float = 1.0
-    rounds: int = 600
+    rounds: int = 1500
+    limit_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,26 +191,42 @@ def solve_routing(problem: RoutingArrays, params: RouterParams, seed: int) -> Ro
     """Solve a routing problem; the same seed gives the same tours."""
     robots, goals = len(problem.energy), problem.goals
     random = np.array([seed], np.uint64)
-    routes, present, best = (new_routes(robots, goals) for _ in range(3))
+    legs = new_legs(problem)
+    state = new_state(problem, legs)
+    routes = state.routes
     if params.rounds == 0:
         _play_out(problem, params, random, routes)
-    absent = problem.open_goal.copy()
-    for goal, length in zip(routes.goal[:-1], routes.length[:-1], strict=True):
-        absent[goal[:length]] = False
-    routes.length[robots] = absent.sum()
-    routes.goal[robots, : absent.sum()] = np.flatnonzero(absent)
-    legs = new_legs(problem)
-    labels = new_labels(legs)
-    rounds = min(params.rounds, ROUNDS_PER_GOAL * int(problem.open_goal.sum()))
-    pool = new_pool(problem)
-    search(legs, routes, present, best, labels, pool, rounds, random)
+    rounds = min(params.rounds, ROUNDS_PER_PAIR * int(problem.open_goal.sum()) ** 2)
+    span = POOLED_SPAN if state.pool.cost.shape[1] > 1 else SPAN
+    if params.limit_s is None:
+        search(legs, state, rounds, span, random)
+    else:
+        _search_in_time(legs, state, span, random, params.limit_s)
     tour = np.zeros((robots, tour_room(goals, problem.cost.shape[2])), np.int64)
     length = np.zeros(robots, np.int64)
-    cost = write_tours(legs, routes, labels, tour, length)
+    cost = write_tours(legs, state, tour, length)
     tours = tuple(
         tuple(int(t) for t in row[:n]) for row, n in zip(tour, length, strict=True)
     )
     return Routing(tours, float(cost) if cost < IMPOSSIBLE else float("inf"))
+
+
+def _search_in_time(
+    legs: Legs,
+    state: State,
+    span: tuple[float, float],
+    random: np.ndarray,
+    limit_s: float,
+) -> None:
+    """Search in parts, each with the routes of the last one, until time is over."""
+    began, done, rounds = thread_time(), 0.0, 1
+    while done < 1.0:
+        until = min(done + 1.0 / PARTS, 1.0)
+        hot, cold = (span[0] * (span[1] / span[0]) ** share for share in (done, until))
+        search(legs, state, rounds, (hot, cold), random)
+        last, done = done, (thread_time() - began) / limit_s
+        wanted = min(1.0 / PARTS, 1.0 - done) / max(done - last, 1e-9)
+        rounds = max(1, int(rounds * min(wanted, MOST_GROWTH)))
 
 
 def _play_out(
@@ -210,3 +243,6 @@ def _play_out(
         if t < problem.goals:
             routes.goal[r, routes.length[r]] = t
             routes.length[r] += 1
+    absent = routes.goal[robots, : routes.length[robots]]
+    left = np.setdiff1d(absent, sequence[:moves] % targets)
+    absent[: len(left)], routes.length[robots] = left, len(left)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
+from time import thread_time
 
 import numpy as np
 import pytest
@@ -173,6 +174,41 @@ def test_large_missions_are_valid_and_gain_from_local_search(
     if alone.feasible:
         assert_valid(problem, alone, replay)
     assert searched.cost_J <= alone.cost_J * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("range_m", [(100.0, 140.0), (150.0, 300.0)])
+def test_tours_of_many_goals_are_valid(
+    mission: Mission, replay: Replay, range_m: tuple[float, float]
+) -> None:
+    problem = mission(7, goals=70, stations=9, robots=5, range_m=range_m)
+    routing = solve_routing(problem, RouterParams(rounds=300), 0)
+    assert_valid(problem, routing, replay)
+    assert any(target >= 70 for tour in routing.tours for target in tour)
+
+
+def test_a_search_in_limited_time_takes_that_time(
+    mission: Mission, replay: Replay
+) -> None:
+    problem = mission(7, goals=40, stations=6, robots=3, range_m=(150.0, 300.0))
+    solve_routing(problem, RouterParams(rounds=1), 0)
+    began = thread_time()
+    routing = solve_routing(problem, RouterParams(rounds=1, limit_s=0.4), 0)
+    assert 0.4 <= thread_time() - began <= 2.0
+    assert_valid(problem, routing, replay)
+    assert routing.cost_J < solve_routing(problem, RouterParams(rounds=1), 0).cost_J
+
+
+def test_stations_that_nobody_needs_change_nothing(mission: Mission) -> None:
+    problem = mission(2, goals=30, stations=4, robots=3, range_m=(2000.0, 3000.0))
+    without = problem._replace(
+        cost=np.delete(problem.cost, range(30, 34), axis=1)[:, :, :30].copy(),
+        time=np.delete(problem.time, range(30, 34), axis=1)[:, :, :30].copy(),
+        finish=np.delete(problem.finish, range(30, 34), axis=1),
+        finish_time=np.delete(problem.finish_time, range(30, 34), axis=1),
+        home=problem.home - 4,
+    )
+    found = solve_routing(problem, RouterParams(), 1)
+    assert found == solve_routing(without, RouterParams(), 1)
 
 
 @pytest.mark.parametrize(
