@@ -101,9 +101,14 @@ def edge_distance_field(edge, x_min, y_min, cell, rows, columns):
     distance = np.empty((rows, columns))
     near = np.empty((levels + 1, len(edge)), np.int64)  # by level, of the last square
     count = np.zeros(levels + 1, np.int64)
-    away = np.empty(len(edge))
+    away2 = np.empty(len(edge))
+    way = np.empty((len(edge), 3))  # dx, dy and the inverse of the squared length
     for e in range(len(edge)):
         near[0, e] = e
+        dx, dy = edge[e, 2] - edge[e, 0], edge[e, 3] - edge[e, 1]
+        length2 = dx * dx + dy * dy
+        way[e, 0], way[e, 1] = dx, dy
+        way[e, 2] = 1.0 / length2 if length2 > 0.0 else 0.0
     count[0] = len(edge)
     square = np.zeros((3 * levels + 1, 3), np.int64)  # level, row, column
     waiting = 1
@@ -115,19 +120,21 @@ def edge_distance_field(edge, x_min, y_min, cell, rows, columns):
             continue
         x = x_min + (column + 0.5) * size * cell
         y = y_min + (row + 0.5) * size * cell
-        least = np.inf
+        least2 = np.inf
         for i in range(count[level]):
             e = near[level, i]
-            away[i] = point_segment_distance(
-                x, y, edge[e, 0], edge[e, 1], edge[e, 2], edge[e, 3]
-            )
-            least = min(least, away[i])
+            px, py = x - edge[e, 0], y - edge[e, 1]
+            t = min(1.0, max(0.0, (px * way[e, 0] + py * way[e, 1]) * way[e, 2]))
+            px, py = px - t * way[e, 0], py - t * way[e, 1]
+            away2[i] = px * px + py * py
+            least2 = min(least2, away2[i])
         if size == 1:
-            distance[row, column] = least
+            distance[row, column] = sqrt(least2)
             continue
         count[level + 1] = 0
+        farthest = sqrt(least2) + sqrt(2.0) * size * cell
         for i in range(count[level]):
-            if away[i] <= least + sqrt(2.0) * size * cell:
+            if away2[i] <= farthest * farthest:
                 near[level + 1, count[level + 1]] = near[level, i]
                 count[level + 1] += 1
         for quarter in range(4):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mrmg.scene.robot_model import RobotModel
@@ -26,6 +28,31 @@ def lifted(scene: Scene, points: np.ndarray, lift_m: float) -> np.ndarray:
     """Return points `lift_m` above the ground, shape (n, 2) -> (n, 3)."""
     points = np.atleast_2d(points)
     return np.column_stack([points, height_at(scene, points) + lift_m])
+
+
+def ground_mesh(
+    scene: Scene, low: Sequence[float], high: Sequence[float], cell_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ground of a rectangle as a mesh of triangles.
+
+    Args:
+        scene: gives the heights.
+        low: corner of the rectangle with the least coordinates [m].
+        high: corner with the largest ones [m].
+        cell_m: longest side of its cells, of two triangles each.
+
+    Returns:
+        Nodes, row by row, shape (n, 3), and the nodes of each triangle, shape (m, 3).
+    """
+    x, y = (
+        np.linspace(start, end, int(np.ceil((end - start) / cell_m)) + 1)
+        for start, end in zip(low, high, strict=True)
+    )
+    nodes = lifted(scene, np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2), 0.0)
+    grid = np.arange(len(nodes)).reshape(len(y), len(x))
+    a, b = grid[:-1, :-1].ravel(), grid[:-1, 1:].ravel()
+    c, d = grid[1:, :-1].ravel(), grid[1:, 1:].ravel()
+    return nodes, np.stack([a, b, d, a, d, c], axis=1).reshape(-1, 3)
 
 
 def load_points(model: RobotModel, state: np.ndarray) -> np.ndarray:

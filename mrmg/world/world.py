@@ -26,19 +26,19 @@ NO_ALLOWANCE = np.zeros((0, 0))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Opening:
-    """A place where one robot keeps less than its margin from obstacles.
+    """A place where robots keep less than their margin from obstacles.
 
     Attributes:
-        shape: where its body's middle is meanwhile.
-        margin_m: what it keeps there.
-        allowance_m: by how much that is less than its margin.
-        robot: number of the robot.
+        shape: where their bodies' middles are meanwhile.
+        margin_m: what they keep there.
+        allowance_m: by how much that is less than their margin.
+        robots: their numbers.
     """
 
     shape: BaseGeometry
     margin_m: float
     allowance_m: float
-    robot: int
+    robots: tuple[int, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +81,7 @@ class World:
         keys = [
             (
                 tuple(i for i, o in enumerate(scene.barriers) if o.stops(robot.id)),
-                tuple(i for i, o in enumerate(openings) if o.robot == number),
+                tuple(i for i, o in enumerate(openings) if number in o.robots),
             )
             for number, robot in enumerate(scene.robots)
         ]

@@ -191,7 +191,7 @@ def respaced(path: Path, spacing_m: float = SPACINGS_M[-1]) -> Path:
     at = np.concatenate([*ways, way[[kept]]])
     return replace(
         path,
-        node=np.stack([np.interp(at, way, path.node[:, j]) for j in range(2)], axis=1),
+        node=path.points(at),
         gear=np.array(gear, np.int64),
         stop=np.array([number[int(v)] for v in path.stop], np.int64),
         pivot=np.unique([number[int(v)] for v in path.pivot]).astype(np.int64),

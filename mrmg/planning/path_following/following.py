@@ -210,7 +210,7 @@ def tour_path(
         sharp: turn from which on a car changes gear [rad].
         deeper_m: how much deeper than needed it enters its targets.
     """
-    vertices, ends = tour_vertices(problem, r, tour)
+    vertices, ends = problem.tour_vertices(r, tour)
     node = problem.roadmap.arrays.vertex[vertices]
     moves = np.hypot(*np.diff(node, axis=0).T) > 0.0
     node = node[np.concatenate([[True], moves])]
@@ -242,36 +242,17 @@ def _geared(problem: Problem, r: int, cost_map: CostMap, path: Path) -> Path:
     return with_best_gears(problem, r, cost_map, path, _turns(path))
 
 
-def tour_vertices(
-    problem: Problem, r: int, tour: Sequence[int]
-) -> tuple[list[int], list[int]]:
-    """Return the roadmap's vertices along robot r's tour, and where each leg ends."""
-    roadmap = problem.roadmap
-    field = problem.mission.fleet[r]["field"]
-    vertices, ends = [len(roadmap.targets) + r], []
-    for target in tour:
-        successor = roadmap.arrays.successor[field, target]
-        while successor[vertices[-1]] >= 0:
-            vertices.append(int(successor[vertices[-1]]))
-        ends.append(len(vertices) - 1)
-    return vertices, ends
-
-
 def _turns(path: Path) -> list[tuple[int, float]]:
     """Return how much a path turns at its start and at its stops, in order [rad]."""
-    way = path.way
-
-    def at(along: float) -> np.ndarray:
-        return np.array([np.interp(along, way, path.node[:, j]) for j in range(2)])
-
-    turns = []
+    way, turns = path.way, []
     for node in dict.fromkeys([0, *path.stop.tolist()]):
         if node == len(way) - 1:
             break
-        ahead = at(way[node] + DIRECTION_M) - path.node[node]
+        near = path.points(way[node] + DIRECTION_M * np.array([-1.0, 1.0]))
+        ahead = near[1] - path.node[node]
         before = np.array([cos(path.heading), sin(path.heading)])
         if node > 0:
-            before = path.node[node] - at(way[node] - DIRECTION_M)
+            before = path.node[node] - near[0]
         turn = np.arctan2(before[0] * ahead[1] - before[1] * ahead[0], before @ ahead)
         turns.append((node, abs(float(turn))))
     return turns

@@ -10,12 +10,10 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import product
 
 import numpy as np
 
-from mrmg import seeding
 from mrmg.planning.attempt import Attempt, Request
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following.coordination.coordination import (
@@ -23,16 +21,15 @@ from mrmg.planning.path_following.coordination.coordination import (
     rounds_of,
 )
 from mrmg.planning.path_following.coordination.tasks import no_path
+from mrmg.planning.path_following.draws import Draw, Tours, drawn_tours, tours_of
 from mrmg.planning.path_following.following import (
     LEAST_SOC_MARGIN,
     can_follow,
     follow_tours,
-    path_cost_J,
     whole_tour,
 )
 from mrmg.planning.path_following.refine import along_trajectories, refine
 from mrmg.planning.problem.problem import Problem
-from mrmg.planning.routing.routing import Routing
 from mrmg.plans import Plan
 
 TIME_SHARES = (1.0, 0.95, 0.85, 0.7)
@@ -46,17 +43,6 @@ FURTHER_DRAWS = (1, 3)
 """Draws that the first attempt goes on with where its first one fails: the next is of
 other energies, the third of energies that differ most."""
 
-SPREADS = (0.0, 0.04, 0.08, 0.12, 0.06)
-"""Standard deviations of the logarithms of the factors on energies and times in
-successive draws: the roadmap's energies are not quite what driving takes."""
-
-SURCHARGES = (0.0, 0.0, -0.06)
-"""Shares added to the roadmap's energies in successive draws; below 0, as paths drawn
-tight take less than the roadmap's."""
-
-TIMED_SURCHARGES = (0.06, 0.0, 0.12)
-"""The same where the makespan counts: who brakes hard and turns round needs more."""
-
 SEARCH_MARGINS = (1.0, 0.0, 2.0)
 """Multiples of the route margin in the tours of successive searches: batteries may
 leave no room for it, or driving may take more than it allows for."""
@@ -65,36 +51,8 @@ SEARCH_SOC_SHARES = ((1.0, 0.0), (1.0, 0.0), (0.0,))
 """Multiples of the state-of-charge margin in the tours of successive searches: the next
 one counts where no tours leave so much."""
 
-Tours = tuple[tuple[int, ...], ...]
-"""Targets of each robot, in order."""
-
 LEAST_GAIN = 0.001
 """Share of the objective that a refinement must save to be followed by another."""
-
-
-@dataclass(frozen=True, slots=True)
-class Draw:
-    """One draw of tours, for energies and times that differ by chance.
-
-    Attributes:
-        number: of its random streams.
-        spread: standard deviation of the logarithms of their factors.
-        surcharge: share added to all energies.
-    """
-
-    number: int
-    spread: float
-    surcharge: float
-
-    @staticmethod
-    def of(number: int, timed: bool) -> Draw:
-        """Return draw `number` of a mission in which the makespan counts or not."""
-        surcharges = TIMED_SURCHARGES if timed else SURCHARGES
-        return Draw(
-            number,
-            SPREADS[number % len(SPREADS)],
-            surcharges[number % len(surcharges)],
-        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -195,13 +153,6 @@ def _tries(problem: Problem, request: Request, schedule: Schedule) -> Iterator[A
             return
 
 
-def _tours(problem: Problem, request: Request, seed: int | None = None) -> Routing:
-    """Return tours; without goals there is nothing to find, and nothing to miss."""
-    if problem.mission.targets.goals == 0:
-        return Routing(tours=((),) * len(problem.start), cost_J=0.0)
-    return request.tours(problem, seed)
-
-
 def search_motions(problem: Problem, request: Request, met: bool = False) -> Attempt:
     """Search for motions along tours, and refine their plan.
 
@@ -211,7 +162,7 @@ def search_motions(problem: Problem, request: Request, met: bool = False) -> Att
         met: whether such a search has failed to keep robots apart on their paths.
     """
     began = time.perf_counter()
-    routing = _tours(problem, request)
+    routing = tours_of(problem, request)
     routing_s = time.perf_counter() - began
     if not routing.feasible or request.halted:
         return Attempt(routing_s=routing_s, tours_found=routing.feasible)
@@ -269,7 +220,7 @@ def follow_paths(
             receives those of these.
     """
     began = time.perf_counter()
-    choice = _drawn_tours(problem, request, draws)
+    choice, calls = drawn_tours(problem, request, draws)
     routing_s = time.perf_counter() - began
     problem = problem.with_margin(0.0)
     preference = problem.preference
@@ -300,31 +251,6 @@ def follow_paths(
         ):
             plans.append(plan)
             found_at.append(time.perf_counter())
-    counts = {"path_following_plans": driven, "router_calls": len(draws)}
+    counts = {"path_following_plans": driven, "router_calls": calls}
     found = Attempt(plans, found_at, routing_s, counts, bool(choice), failure)
     return found, met
-
-
-def _drawn_tours(
-    problem: Problem, request: Request, draws: tuple[Draw, ...]
-) -> list[Routing]:
-    """Return the different tours of several draws, those that look best first."""
-    found: dict[tuple[tuple[int, ...], ...], Routing] = {}
-    for draw in draws:
-        varied = problem.with_margin(draw.surcharge)
-        arrays = varied.mission.routing
-        places = arrays.cost.shape[2]
-        noise = seeding.stream(request.seed, "costs", draw.number).standard_normal(
-            (places + 1, places)
-        )
-        rows = np.minimum(np.arange(arrays.cost.shape[1]), places)
-        factor = np.exp(draw.spread * noise[rows])
-        arrays = arrays._replace(cost=arrays.cost * factor, time=arrays.time * factor)
-        varied = replace(varied, mission=varied.mission._replace(routing=arrays))
-        seed = seeding.stream_seed(request.seed, "tours", draw.number)
-        tours = _tours(varied, request, seed)
-        if tours.feasible:
-            found.setdefault(tours.tours, tours)
-    if len(found) < 2:
-        return list(found.values())
-    return sorted(found.values(), key=partial(path_cost_J, problem))

@@ -44,16 +44,23 @@ def in_zone(zones, zone, x, y):
 
 @kernel
 def clear_of_obstacles(own, spaces, state, corner):
-    """Return whether a robot keeps its margin from obstacles.
+    """Return whether a robot keeps its margin from obstacles; see `keeps_clear`."""
+    return keeps_clear(own, spaces, state, own[0].margin, corner)
+
+
+@kernel
+def keeps_clear(own, spaces, state, margin, corner):
+    """Return whether a robot keeps a margin from obstacles.
 
     Args:
         own: the robot, shape (1,).
         spaces: free spaces of the fleet.
         state: its state.
+        margin: that it keeps [m].
         corner: room for a footprint, shape (M, 2).
     """
     space = space_of(spaces, own[0].space)
-    n, radius, margin = own[0].corners, own[0].radius, own[0].margin
+    n, radius = own[0].corners, own[0].radius
     x, y, theta = state[0], state[1], state[2]
     c, s = cos(theta), sin(theta)
     cx = x + c * own[0].middle[0] - s * own[0].middle[1]

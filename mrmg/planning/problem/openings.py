@@ -6,7 +6,7 @@ target that there is no wide way to.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Sequence
 
 import numpy as np
 import shapely
@@ -59,9 +59,10 @@ def openings_to(
     for number, region in wanted:
         robot = scene.robots[number]
         key = tuple(i for i, o in enumerate(scene.barriers) if o.stops(robot.id))
-        ground = grounds.setdefault(key, FreeGround.of(scene, robot))
+        if key not in grounds:
+            grounds[key] = FreeGround.of(scene, robot)
         margin_m = margins_of(robot, margins)[0]
-        found += _openings(ground, robot, number, margin_m, entered(region))
+        found += _openings(grounds[key], robot, number, margin_m, entered(region))
     return tuple(found)
 
 
@@ -73,9 +74,8 @@ def tightest_openings(scene: Scene, margins: Margins) -> tuple[Opening, ...]:
         margins: stated for all robots.
     """
     found: list[Opening] = []
-    for number, robot in enumerate(scene.robots):
-        margin_m = margins_of(robot, margins)[0]
-        least_m = least_margin_m(robot, margin_m)
+    for margin_m, least_m, numbers in _robots_alike(scene, margins):
+        robot = scene.robots[numbers[0]]
         wide_m = robot.model.circumscribed_radius_m + margin_m
         needed_m = min(clearance_needed_m(robot, least_m), wide_m)
         pieces = FreeGround.of(scene, robot).narrow_pieces(needed_m, wide_m)
@@ -87,10 +87,25 @@ def tightest_openings(scene: Scene, margins: Margins) -> tuple[Opening, ...]:
                     shape=shape,
                     margin_m=least_m,
                     allowance_m=margin_m - least_m,
-                    robot=number,
+                    robots=tuple(numbers),
                 )
             )
     return tuple(found)
+
+
+def _robots_alike(
+    scene: Scene, margins: Margins
+) -> Iterator[tuple[float, float, list[int]]]:
+    """Yield wanted and least margin, and the numbers, of robots of equal ground."""
+    alike: dict[tuple[float, float, Hashable], list[int]] = {}
+    for number, robot in enumerate(scene.robots):
+        margin_m = margins_of(robot, margins)[0]
+        sizes_m = robot.model.half_width_m, robot.model.circumscribed_radius_m
+        stopping = tuple(i for i, o in enumerate(scene.barriers) if o.stops(robot.id))
+        key = margin_m, least_margin_m(robot, margin_m), (sizes_m, stopping)
+        alike.setdefault(key, []).append(number)
+    for (margin_m, least_m, _), numbers in alike.items():
+        yield margin_m, least_m, numbers
 
 
 def cell_m(scene: Scene, margins: Margins, wanted_m: float = CELL_M) -> float:
@@ -152,7 +167,7 @@ def _openings(
                     shape=narrow.buffer(reach_m),
                     margin_m=float(level_m),
                     allowance_m=float(margin_m - level_m),
-                    robot=number,
+                    robots=(number,),
                 )
             return
 

@@ -129,13 +129,22 @@ class Problem:
             robot: its number.
             tour: numbers of its targets, goals before stations.
         """
+        vertices, _ = self.tour_vertices(robot, tour)
+        return np.asarray(self.roadmap.arrays.vertex[vertices])
+
+    def tour_vertices(
+        self, robot: int, tour: Sequence[int]
+    ) -> tuple[list[int], list[int]]:
+        """Return the roadmap's vertices along a tour, and where each leg ends."""
         roadmap = self.roadmap
-        successors = roadmap.arrays.successor[int(self.mission.fleet[robot]["field"])]
-        vertices = [len(roadmap.targets) + robot]
+        field = self.mission.fleet[robot]["field"]
+        vertices, ends = [len(roadmap.targets) + robot], []
         for target in tour:
-            while successors[target, vertices[-1]] >= 0:
-                vertices.append(int(successors[target, vertices[-1]]))
-        return np.asarray(roadmap.arrays.vertex[vertices])
+            successor = roadmap.arrays.successor[field, target]
+            while successor[vertices[-1]] >= 0:
+                vertices.append(int(successor[vertices[-1]]))
+            ends.append(len(vertices) - 1)
+        return vertices, ends
 
     def visits(self, tours: Sequence[Sequence[int]]) -> dict[str, tuple[str, ...]]:
         """Return ids of targets by ids of robots, as plans have them.

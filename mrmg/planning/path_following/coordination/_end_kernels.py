@@ -19,8 +19,9 @@ from mrmg.planning.path_following.coordination._motion_kernels import (
     smooth_radius,
     write_curve,
 )
+from mrmg.planning.problem._clearance_kernels import keeps_clear
 from mrmg.planning.problem._control_kernels import braking_control, stands, wrap
-from mrmg.planning.problem._target_kernels import at_target
+from mrmg.planning.problem._target_kernels import at_target, in_target
 from mrmg.planning.roadmap._heap_kernels import push
 
 MOST_BRAKING_STEPS = 300
@@ -31,6 +32,15 @@ HOME_STEPS = 4000
 
 CREEPING_SHARE = 1e-3
 """Share of its top speed with which a custom motion model turns at its finish."""
+
+RINGS, BEARINGS = 4, 8
+"""Circles about a target's middle, and places on each, where a robot may end."""
+
+REGION_SHARE = 0.8
+"""Share of a target's reach, and of its tolerance of headings, that these take up."""
+
+END_SLACK_M = 0.05
+"""Clearance beyond the margin that they have: driving ends about so far off."""
 
 LEAST_NEARNESS = 0.2
 """Share of the cost of a conflict that it costs in any case."""
@@ -82,17 +92,44 @@ def steer_to(search, target, state, control):
 
 
 @kernel
-def drive_to(search, target, course, state, control):
+def free_pose(search, target, corner):
+    """Return (x, y, heading) at a target where there is room, nearest to its own.
+
+    It is its own if there is none, or the heading is free.
+    """
+    own, targets = search.own, search.targets
+    x, y = targets.center[target, 0], targets.center[target, 1]
+    heading, tolerance = targets.heading[target], targets.tolerance[target]
+    if tolerance >= pi:
+        return x, y, heading
+    margin, pose = own[0].margin + END_SLACK_M, np.zeros(3)
+    for ring in range(RINGS + 1):
+        far = REGION_SHARE * targets.reach[target] * ring / RINGS
+        for bearing in range(BEARINGS if ring > 0 else 1):
+            angle = 2.0 * pi * bearing / BEARINGS
+            pose[0], pose[1] = x + far * cos(angle), y + far * sin(angle)
+            if not in_target(targets, target, pose[0], pose[1]):
+                continue
+            for side in (0.0, 1.0, -1.0):
+                pose[2] = heading + side * REGION_SHARE * tolerance
+                if keeps_clear(own, search.spaces, pose, margin, corner):
+                    return pose[0], pose[1], pose[2]
+    return x, y, heading
+
+
+@kernel
+def drive_to(search, target, room, control):
     """Write a drive to a target without regard to others; return the steps, or -1.
 
     A car drives along the shortest curve. A robot that turns on the spot drives
     straight and turns, or along a curve where it is there sooner.
     """
     own, targets = search.own, search.targets
+    course, corner, state = room.curve, room.corner[0], room.state
     if own[0].model == USER:
         return steer_to(search, target, state, control)
-    x, y = targets.center[target, 0], targets.center[target, 1]
-    heading, free = targets.heading[target], targets.tolerance[target] >= pi
+    x, y, heading = free_pose(search, target, corner)
+    free = targets.tolerance[target] >= pi
     course.heading[0], course.tolerance[0] = heading, np.inf
     if own[0].model == CAR:
         if free:
@@ -102,21 +139,21 @@ def drive_to(search, target, course, state, control):
         radius = drivable_radius(own[0])
         if not write_curve(own, state[0], x, y, heading, course, radius) < np.inf:
             return -1
-        return drive_curve(own, course, search.dt, state, control)
+        return drive_curve(search, course, corner, state, control)
     curved = -1
     if not free:
         course.tolerance[0] = targets.tolerance[target]
         radius = smooth_radius(own[0])
         if write_curve(own, state[0], x, y, heading, course, radius) < np.inf:
-            curved = drive_curve(own, course, search.dt, state, control)
+            curved = drive_curve(search, course, corner, state, control)
         if curved >= 0 and not at_target(targets, target, state[curved]):
             curved = -1
     if not write_curve(own, state[0], x, y, heading, course, 0.0) < np.inf:
         return -1
-    count = drive_curve(own, course, search.dt, state, control)
+    count = drive_curve(search, course, corner, state, control)
     if curved >= 0 and (count < 0 or curved < count):
         write_curve(own, state[0], x, y, heading, course, smooth_radius(own[0]))
-        count = drive_curve(own, course, search.dt, state, control)
+        count = drive_curve(search, course, corner, state, control)
     return count
 
 
@@ -237,5 +274,5 @@ def end_from(search, nodes, room, a, tries):
         return
     finish = search.task.finish
     if finish >= 0 and is_tried(search, finish, room.state[0], tries):
-        count = drive_to(search, finish, room.curve, room.state, room.control)
+        count = drive_to(search, finish, room, room.control)
         add_end(search, nodes, room, a, HOME, count)

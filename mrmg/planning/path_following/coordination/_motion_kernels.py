@@ -311,8 +311,19 @@ def write_curve(own, state, x, y, theta, course, radius):
 
 
 @kernel
-def drive_curve(own, course, dt, state, control):
-    """Drive along a path until the robot rests at its end; return the steps, or -1."""
+def drive_curve(search, course, corner, state, control):
+    """Drive along a path until the robot rests at its end; return the steps, or -1.
+
+    It is given up where an obstacle is in the way.
+
+    Args:
+        search: gives robot, surroundings and step.
+        course: the path.
+        corner: room for a footprint, shape (M, 2).
+        state: from state[0] on, shape (n, 5).
+        control: shape (n, 2).
+    """
+    own, dt = search.own, search.dt
     way = course.way[max(course.size[0] - 1, 0)]
     most = int(way / (own[0].limit[1] * dt)) + REACH_STEPS
     most = min(most, len(control) - 1)
@@ -324,4 +335,6 @@ def drive_curve(own, course, dt, state, control):
         u1, u2, segment, _, _ = track_control(own, course, segment, LONG, state[k], dt)
         control[k, 0], control[k, 1] = u1, u2
         step(own[0], state[k], u1, u2, dt, state[k + 1])
+        if not clear_of_obstacles(own, search.spaces, state[k + 1], corner):
+            return -1
     return -1

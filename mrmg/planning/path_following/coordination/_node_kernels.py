@@ -57,6 +57,8 @@ class Task(NamedTuple):
         hold_share: cost of a second of standing, of moving it is 1.
         soft_s: cost of a conflict with a robot of lower priority [s].
         most: nodes at most.
+        enough: nodes after which the best end that was found counts, or twice as many
+            as finding the first one took.
     """
 
     leg: np.ndarray
@@ -75,6 +77,7 @@ class Task(NamedTuple):
     hold_share: float
     soft_s: float
     most: int
+    enough: int
 
 
 class Setting(NamedTuple):
@@ -156,15 +159,22 @@ def cell_of(task, state, leg, step):
 
 
 @kernel
-def is_new(table, key):
-    """Enter a key into a table of 2^n places; return whether it was not in it."""
+def place_of(table, key):
+    """Return the place of a key in a table of 2^n places, or the one it would have."""
     mask = len(table) - 1
     at = (key ^ (key >> 29)) * 0x9E3779B1
     at = (at ^ (at >> 17)) & mask
-    while table[at] != -1:
-        if table[at] == key:
-            return False
+    while table[at] != -1 and table[at] != key:
         at = (at + 1) & mask
+    return at
+
+
+@kernel
+def is_new(table, key):
+    """Enter a key into a table of 2^n places; return whether it was not in it."""
+    at = place_of(table, key)
+    if table[at] == key:
+        return False
     table[at] = key
     return True
 

@@ -43,6 +43,7 @@ from mrmg.planning.path_following.coordination._node_kernels import (
     add,
     cell_of,
     is_new,
+    place_of,
 )
 from mrmg.planning.problem._control_kernels import wrap
 from mrmg.planning.problem._target_kernels import at_target
@@ -101,6 +102,13 @@ def expand(search, nodes, room, a, motion, nears):
     own, dt, steps = search.own, search.dt, task.steps
     segment, left, first = nodes.segment[a], nodes.left[a], nodes.step[a]
     segment = move(search, motion, segment, steps, state, room.control)
+    after = state[steps]
+    leg = legs_done(search.targets, task, nodes.leg[a], state, 1, steps)
+    stamp = first + steps if first < search.traffic.end else 0
+    key = cell_of(task, after, leg, stamp)
+    at = place_of(nodes.table, key)
+    if nodes.table[at] == key and motion != TRACK:
+        return -1
     if not clear(
         own, search.spaces, search.zones, search.traffic, state, steps, first,
         room.corner,
@@ -109,15 +117,11 @@ def expand(search, nodes, room, a, motion, nears):
     conflict_s = conflict_cost(search, room, nears, first, steps)
     if not conflict_s < np.inf:
         return -1
-    leg = legs_done(search.targets, task, nodes.leg[a], state, 1, steps)
-    after = state[steps]
+    nodes.table[at] = key
     if motion == TRACK:
         left = min(segment, course.size[0] - 2)
     elif motion >= MOVE and course.size[0] > 1:
         segment, left = rejoined(course, left, after)
-    stamp = first + steps if first < search.traffic.end else 0
-    if not is_new(nodes.table, cell_of(task, after, leg, stamp)) and motion != TRACK:
-        return -1
     share = task.hold_share
     if motion != HOLD:
         share = multiplier_in(search.terrain, after[0], after[1])
@@ -165,7 +169,7 @@ def visit(search, nodes, room, a):
     """Open a drive from node a to the pose that the leg's target wants."""
     task, first, leg = search.task, nodes.step[a], nodes.leg[a]
     copy_numbers(nodes.state[a], room.state[0])
-    count = drive_to(search, task.leg[leg], room.curve, room.state, room.control)
+    count = drive_to(search, task.leg[leg], room, room.control)
     last = first + count
     if count < 0 or last + MOST_BRAKING_STEPS >= len(room.control):
         return
@@ -208,7 +212,7 @@ def write_controls(search, nodes, room, a, control):
         copy_numbers(nodes.state[p], room.state[0])
         if motion == VISIT:
             target = search.task.leg[nodes.leg[p]]
-            drive_to(search, target, room.curve, room.state, control[first:])
+            drive_to(search, target, room, control[first:])
             continue
         held = HOLD if motion in (STAY, WAIT) else motion
         segment = nodes.segment[p]
@@ -219,7 +223,7 @@ def write_controls(search, nodes, room, a, control):
         brake(search.own, search.dt, room.state, control[nodes.step[p] :])
     else:
         finish = search.task.finish
-        drive_to(search, finish, room.curve, room.state, control[nodes.step[p] :])
+        drive_to(search, finish, room, control[nodes.step[p] :])
     return nodes.step[a]
 
 
@@ -261,6 +265,8 @@ def follow_path(search, nodes, room, a, tries):
 def find_motion(search, nodes, room, start, control):
     """Find controls for one robot's task; return (their number or -1, nodes).
 
+    With fewer nodes than it may have, a search that fails has tried all motions.
+
     Args:
         search: the robot, its surroundings, its task and the others.
         nodes: empty room for nodes.
@@ -273,8 +279,8 @@ def find_motion(search, nodes, room, start, control):
     leg = legs_done(search.targets, task, 0, room.state, 0, 0)
     begin = 0 if search.course.size[0] > 1 else OFF_PATH
     add(search, nodes, -1, HOLD, start, (0, leg, begin, 0), 0.0)
-    motions, tries = len(task.motion), 0
-    while nodes.size[1] > 0 and nodes.size[0] + motions + WAYS_ON < task.most:
+    motions, tries, most = len(task.motion), 0, task.most
+    while nodes.size[1] > 0 and nodes.size[0] + motions + WAYS_ON < most:
         value, number = nodes.key[0], nodes.entry[0]
         nodes.size[1] = pop(nodes.key, nodes.entry, nodes.size[1])
         a, widened = number >> 1, number & 1
@@ -296,6 +302,9 @@ def find_motion(search, nodes, room, start, control):
         nears = list_near(search, room, nodes.step[a])
         for motion in range(HOLD, MOVE + motions):
             expand(search, nodes, room, a, motion, nears)
+        if nodes.size[2] >= 0:
+            most = min(most, max(task.enough, 2 * nodes.size[0]))
+    looked_at = nodes.size[0] if nodes.size[1] == 0 else task.most
     if nodes.size[2] >= 0:  # the best there is, if not good enough to end sooner
-        return write_controls(search, nodes, room, nodes.size[2], control), task.most
-    return -1, task.most
+        return write_controls(search, nodes, room, nodes.size[2], control), looked_at
+    return -1, looked_at

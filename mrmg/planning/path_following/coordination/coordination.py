@@ -59,7 +59,11 @@ ROUNDS_ALONE = 2
 more than with regard to them, as all else depends on it."""
 
 FIRST_MOST = 300
-"""Nodes of a robot's first search, at most."""
+"""Nodes of a robot's first search at most, and of one that has found an end."""
+
+FINER = (1.0, 2.0, 4.0)
+"""How much finer than its round's a robot's motions are: the next ones where all of
+these have been tried."""
 
 UNTIMED_SHARE = 10
 """How many times as many nodes a search along several targets may have, where its
@@ -167,18 +171,23 @@ class _Planning:
     ) -> Motion | None:
         """Return a motion of robot r without conflicts with the robots marked."""
         traffic = self._traffic.around(r, motions, above)
-        at_length = yielding or r in self._blocked
-        for task, course in islice(
-            self._tasks(r, traffic, yielding), int(at_length), None
-        ):
-            found = self._search(r, task, traffic, course)
-            if found is not None:
-                return found
-            self._blocked.add(r)
+        for finer in FINER:
+            all_tried = False
+            at_length = yielding or r in self._blocked
+            for task, course in islice(
+                self._tasks(r, traffic, yielding, finer), int(at_length), None
+            ):
+                found, nodes = self._search(r, task, traffic, course)
+                if found is not None:
+                    return found
+                self._blocked.add(r)
+                all_tried = nodes < task.most
+            if not all_tried:
+                break
         return None
 
     def _tasks(
-        self, r: int, traffic: Traffic, yielding: bool
+        self, r: int, traffic: Traffic, yielding: bool, finer: float
     ) -> Iterator[tuple[Task, Course]]:
         """Yield what to search for, and along which path.
 
@@ -188,9 +197,12 @@ class _Planning:
         """
         problem, path, tour = self._problem, self._paths[r], self._tours[r]
         now, course = self.round, self._courses[r]
+        now = replace(now, fineness=finer * now.fineness)
         if yielding:
             now = replace(now, weight=YIELDING_WEIGHT, soft_s=YIELDING_S)
         task = task_of(problem, r, tour, path, now)
+        if not yielding:
+            task = task._replace(enough=FIRST_MOST)
         led = len(path.target) == len(tour) or (
             problem.steered_home[r] and not tour[1:]
         )
@@ -218,7 +230,7 @@ class _Planning:
 
     def _search(
         self, r: int, task: Task, traffic: Traffic, course: Course
-    ) -> Motion | None:
+    ) -> tuple[Motion | None, int]:
         mission, dt_s, own = self._problem.mission, self._problem.dt_s, slice(r, r + 1)
         search = Setting(
             own=mission.fleet[own],
@@ -244,12 +256,12 @@ class _Planning:
         )
         self.nodes += nodes
         if count < 0:
-            return None
+            return None, nodes
         control = self._control[:count].copy()
         state = np.zeros((count + 1, 5))
         state[0] = self._problem.start[r]
         _tracking_kernels.write_states(mission.fleet, r, dt_s, control, state)
-        return Motion(state, control)
+        return Motion(state, control), nodes
 
     def find_alone(
         self, r: int, motions: Sequence[Motion | None], first: Round, halt: np.ndarray

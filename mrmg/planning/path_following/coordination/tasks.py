@@ -168,6 +168,7 @@ def task_of(
         hold_share=standing,
         soft_s=effort.soft_s,
         most=effort.most,
+        enough=effort.most,
     )
 
 
