@@ -148,36 +148,30 @@ def _names(folders: Sequence[Path]) -> tuple[str, ...]:
     return tuple(names)
 
 
-_FIGURES: tuple[tuple[str, str, int, float, tuple[str, ...]], ...] = (
-    ("planned energy", "kJ", 2, 1e-3, ("plan", "cost_J")),
-    ("proven bound", "kJ", 2, 1e-3, ("plan", "bound_J")),
-    ("planned duration", "s", 1, 1.0, ("plan", "makespan_s")),
-    ("proven bound of the duration", "s", 1, 1.0, ("plan", "bound_s")),
-    ("time limit", "s", 1, 1.0, ("plan", "time_limit_s")),
-    ("above the bound", "%", 1, 100.0, ("plan", "gap")),
-    ("planning time", "s", 2, 1.0, ("plan", "time_s", "total")),
-    ("first plan after", "s", 2, 1.0, ("plan", "time_s", "first_solution")),
-    ("path-following plans", "", 0, 1.0, ("plan", "path_following_plans")),
-    ("tree vertices", "", 0, 1.0, ("plan", "vertices")),
-    (
-        "least distance to obstacles",
-        "m",
-        2,
-        1.0,
-        ("verdict", "min_obstacle_clearance_m"),
-    ),
-    ("least distance of robots", "m", 2, 1.0, ("verdict", "min_robot_distance_m")),
-    ("rules broken", "", 0, 1.0, ("verdict", "violations")),
-    ("simulated energy", "kJ", 2, 1e-3, ("energy", "measured_J")),
-    ("lowest charge", "%", 1, 100.0, ("energy", "min_charge_fraction")),
-    ("recharges", "", 0, 1.0, ("energy", "recharges")),
-    ("goals visited", "", 0, 1.0, ("execution", "goals_visited")),
-    ("contacts", "", 0, 1.0, ("execution", "contacts")),
-    ("new plans on the way", "", 0, 1.0, ("execution", "replans")),
-    ("tracking error, rms", "cm", 2, 100.0, ("execution", "tracking", "rms_m")),
-    ("tracking error, largest", "cm", 2, 100.0, ("execution", "tracking", "max_m")),
+_FIGURES: tuple[tuple[str, str, int, float, str], ...] = (
+    ("planned energy", "kJ", 2, 1e-3, "plan.cost_J"),
+    ("proven bound", "kJ", 2, 1e-3, "plan.bound_J"),
+    ("planned duration", "s", 1, 1.0, "plan.makespan_s"),
+    ("proven bound of the duration", "s", 1, 1.0, "plan.bound_s"),
+    ("time limit", "s", 1, 1.0, "plan.time_limit_s"),
+    ("above the bound", "%", 1, 100.0, "plan.gap"),
+    ("planning time", "s", 2, 1.0, "plan.time_s.total"),
+    ("first plan after", "s", 2, 1.0, "plan.time_s.first_solution"),
+    ("path-following plans", "", 0, 1.0, "plan.path_following_plans"),
+    ("tree vertices", "", 0, 1.0, "plan.vertices"),
+    ("least distance to obstacles", "m", 2, 1.0, "verdict.min_obstacle_clearance_m"),
+    ("least distance of robots", "m", 2, 1.0, "verdict.min_robot_distance_m"),
+    ("rules broken", "", 0, 1.0, "verdict.violations"),
+    ("simulated energy", "kJ", 2, 1e-3, "energy.measured_J"),
+    ("lowest charge", "%", 1, 100.0, "energy.min_charge_fraction"),
+    ("recharges", "", 0, 1.0, "energy.recharges"),
+    ("goals visited", "", 0, 1.0, "execution.goals_visited"),
+    ("contacts", "", 0, 1.0, "execution.contacts"),
+    ("new plans on the way", "", 0, 1.0, "execution.replans"),
+    ("tracking error, rms", "cm", 2, 100.0, "execution.tracking.rms_m"),
+    ("tracking error, largest", "cm", 2, 100.0, "execution.tracking.max_m"),
 )
-"""Name, unit, digits, factor and place in `summary.json`."""
+"""Name, unit, digits, factor and dotted place in `summary.json`."""
 
 
 def _rows(records: Sequence[RunRecord]) -> list[Row]:
@@ -193,14 +187,11 @@ def _rows(records: Sequence[RunRecord]) -> list[Row]:
     for name, unit, digits, factor, place in _FIGURES:
         values = [_figure(record, place) for record in records]
         if any(value is not None for value in values):
-            scaled = tuple(
-                None if value is None else factor * value for value in values
-            )
             rows.append(
                 Row(
                     name=name,
                     unit=unit,
-                    values=scaled,
+                    values=tuple(value and factor * value for value in values),
                     digits=digits,
                     comparable=alike,
                 )
@@ -218,23 +209,23 @@ def _outcome(record: RunRecord) -> str:
     return "accomplished" if record.summary["mission_ok"] else "failed"
 
 
-def _figure(record: RunRecord, place: tuple[str, ...]) -> float | None:
+def _figure(record: RunRecord, place: str) -> float | None:
     """Return a figure of a run; of its plan in force where it was replanned."""
     first, plan = _at(record.summary, place), record.plan
     replanned = plan is not None and plan.cost_J != record.summary["plan"]["cost_J"]
-    if plan is None or not replanned or place[0] != "plan":
+    if plan is None or not replanned:
         return first
     # The gap is that of the first plan; the plan in force has gone other ways.
     in_force: dict[str, float | None] = {
-        "cost_J": plan.cost_J,
-        "makespan_s": plan.makespan_s,
-        "gap": None,
+        "plan.cost_J": plan.cost_J,
+        "plan.makespan_s": plan.makespan_s,
+        "plan.gap": None,
     }
-    return in_force.get(place[-1], first)
+    return in_force.get(place, first)
 
 
-def _at(summary: Mapping[str, Any], place: Sequence[str]) -> float | None:
+def _at(summary: Mapping[str, Any], place: str) -> float | None:
     value: Any = summary
-    for name in place:
+    for name in place.split("."):
         value = value.get(name) if isinstance(value, Mapping) else None
     return None if value is None else float(value)

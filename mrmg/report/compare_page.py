@@ -13,8 +13,7 @@ from mrmg.energy.battery_curves import BatteryCurve, shown_curves
 from mrmg.report import chart_spec
 from mrmg.report.compare import Comparison
 from mrmg.report.map import mission_map
-from mrmg.report.page import elements as html
-from mrmg.report.page import page
+from mrmg.report.page import page, rendered
 from mrmg.runs.record import RunRecord
 from mrmg.viz import style
 
@@ -41,58 +40,25 @@ def comparison_html(comparison: Comparison) -> str:
     light, dark = style.robot_colors(numbers), style.robot_colors_on_dark(numbers)
     solved = [number for number, item in enumerate(records) if item.plan is not None]
     charts = _charts(comparison, solved) if solved else None
-    places = (
-        [(item["id"], item["title"]) for item in charts["charts"]] if charts else []
-    )
-    toggles = [
-        html.toggle("owner", _owner(number), html.robot_dot(number, names[number]))
-        for number in solved
-    ]
-    return page(
-        "Comparison of runs",
-        [
-            html.heading(f"Comparison of {len(names)} runs"),
-            html.section("Differences", *_differences(comparison)),
-            html.section(
-                "Figures",
-                html.table(
-                    ["", *names],
-                    [[row.name, *row.cells()] for row in comparison.rows],
-                ),
-                html.note(
-                    "In brackets: the difference from the first run, where it is one "
-                    "of the same scene, whatever the objective."
-                ),
-            ),
-            html.section("Courses", html.controls(*toggles), html.charts(places))
-            if places
-            else "",
-            html.section("Maps", _maps(comparison)),
+    body = rendered(
+        "compare.html.jinja",
+        comparison=comparison,
+        owners={number: _owner(number) for number in solved},
+        charts=[(item["id"], item["title"]) for item in charts["charts"]]
+        if charts
+        else [],
+        maps=[
+            (name, mission_map(record.scene, record.plan, record.log))
+            for name, record in zip(names, records, strict=True)
         ],
-        colors=[(light[at], dark[at]) for at in numbers],
-        data=charts,
     )
-
-
-def _differences(comparison: Comparison) -> list[str]:
-    if not comparison.differences:
-        return [html.note("These runs were made with the same scene and parameters.")]
-    head, *rows = comparison.difference_table()
-    return [html.table(head, [[cell for cell in row] for row in rows])]
+    colors = [(light[at], dark[at]) for at in numbers]
+    return page("Comparison of runs", body, colors=colors, data=charts)
 
 
 def _owner(number: int) -> str:
     # A name of its own kind: runs may be called like robots, which maps have, too.
     return f"run {number}"
-
-
-def _maps(comparison: Comparison) -> str:
-    return html.maps(
-        [
-            (name, mission_map(record.scene, record.plan, record.log))
-            for name, record in zip(comparison.names, comparison.records, strict=True)
-        ]
-    )
 
 
 def _charts(comparison: Comparison, solved: Sequence[int]) -> dict[str, Any]:
@@ -114,28 +80,21 @@ def _charts(comparison: Comparison, solved: Sequence[int]) -> dict[str, Any]:
         ]
         return chart_spec.chart(name, title, unit, lines, digits=digits)
 
+    def lowest(at: int) -> np.ndarray:
+        return _lowest_percent(comparison.records[at], curves[at], time_s)
+
+    def used(at: int) -> np.ndarray:
+        return _used_kJ(curves[at], time_s)
+
+    def goals(at: int) -> np.ndarray:
+        return _goals_visited(curves[at], time_s)
+
     return {
         "time_s": chart_spec.rounded(time_s, 3),
         "charts": [
-            drawn(
-                "used",
-                "Energy drawn by the fleet",
-                "kJ",
-                lambda at: _used_kJ(curves[at], time_s),
-            ),
-            drawn(
-                "goals",
-                "Goals visited",
-                "",
-                lambda at: _goals_visited(curves[at], time_s),
-                digits=0,
-            ),
-            drawn(
-                "lowest",
-                "Lowest charge in the fleet",
-                "%",
-                lambda at: _lowest_percent(comparison.records[at], curves[at], time_s),
-            ),
+            drawn("used", "Energy drawn by the fleet", "kJ", used),
+            drawn("goals", "Goals visited", "", goals, digits=0),
+            drawn("lowest", "Lowest charge in the fleet", "%", lowest),
         ],
     }
 

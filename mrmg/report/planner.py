@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from mrmg.report import chart_spec
-from mrmg.report.page import elements as html
-from mrmg.report.sections import kJ
+from mrmg.report.page import rendered
 from mrmg.runs.record import RunRecord
 
 COST = "cost"
@@ -44,7 +44,7 @@ _ROOM = (0.9, 1.05)
 """Room below and above the courses, as factors."""
 
 
-def planner(record: RunRecord) -> list[str]:
+def planner(record: RunRecord) -> Markup:
     """Return what the planner did, and how good its plan is known to be."""
     statistics = record.planning["statistics"]
     times = statistics.get("time_s", {})
@@ -54,16 +54,16 @@ def planner(record: RunRecord) -> list[str]:
         if place not in _TOLD_IN_WORDS
         and (record.plan is not None or place != "time_s.first_solution")
     ]
-    chart = cost_chart(record)
-    return [
-        _quality(record.summary["plan"]),
-        html.bullets(record.planning.get("hints", [])),
-        html.charts([(COST, chart["title"])] if chart else []),
-        html.beside(
-            html.table(["Statistic", "Value"], rows),
-            _improvements(found_plans(record)),
-        ),
-    ]
+    chart, figures = cost_chart(record), record.summary["plan"]
+    return rendered(
+        "planner.html.jinja",
+        figures=figures,
+        objective=figures and judged(figures),
+        hints=record.planning.get("hints", []),
+        charts=[(COST, chart["title"])] if chart else [],
+        rows=rows,
+        found=[{**item, "objective": judged(item)} for item in found_plans(record)],
+    )
 
 
 def found_plans(record: RunRecord) -> Sequence[Mapping[str, Any]]:
@@ -123,55 +123,6 @@ def judged(figures: Mapping[str, Any]) -> Mapping[str, Any]:
 
 def _scaled(value: float | None, size: float) -> float:
     return np.nan if value is None else size * value
-
-
-def _said_value(value: float, unit: str) -> str:
-    """Return a value of the objective as text."""
-    if unit == "J":
-        return kJ(value)
-    return f"{value:.1f} s" if unit == "s" else f"{value:.4g}"
-
-
-def _quality(figures: Mapping[str, Any] | None) -> str:
-    """Return how far the plan can be from the optimum, if that is known."""
-    if figures is None or figures.get("gap") is None:
-        return ""
-    objective = judged(figures)
-    least = _said_value(objective["bound"], objective["unit"])
-    value = _said_value(objective["value"], objective["unit"])
-    share = f"{100.0 * figures['gap']:.1f} %"
-    return html.paragraph(
-        {
-            "energy": f"No plan for this mission needs less than {least}: this one "
-            f"({value}) is at most {share} above the minimum.",
-            "makespan": f"No plan for this mission is over before {least}: this one "
-            f"({value}) takes at most {share} longer than the shortest there is.",
-            "blend": "No plan for this mission has a weighted sum of energy and "
-            f"makespan below {least}: this one ({value}) is at most {share} above the "
-            "least there is.",
-        }[objective["name"]]
-    )
-
-
-def _improvements(found: Sequence[Mapping[str, Any]]) -> str:
-    rows = [
-        [
-            f"{item['time_s']:.2f} s",
-            kJ(item["cost_J"]),
-            f"{item['makespan_s']:.1f} s" if "makespan_s" in item else "",
-            _bound_of(judged(item)),
-            "" if item.get("gap") is None else f"{100.0 * item['gap']:.1f} %",
-        ]
-        for item in found
-    ]
-    columns = ["After", "Energy", "Makespan", "Proven bound", "Above the bound"]
-    return html.table(columns, rows)
-
-
-def _bound_of(objective: Mapping[str, Any]) -> str:
-    if objective["bound"] is None:
-        return ""
-    return _said_value(objective["bound"], objective["unit"])
 
 
 def _said(place: str, value: float | str, times: Mapping[str, float]) -> str:

@@ -76,9 +76,8 @@ def draw_battery(
     }
     for label, (curve, look) in curves.items():
         if curve is not None:
-            width = look.width_em * scene_drawing.LETTER_POINTS
-            alpha = look.opacity
-            _plot(axes, curve, color=color, linewidth=width, alpha=alpha, label=label)
+            stroke = look.stroke(scene_drawing.LETTER_POINTS)
+            _plot(axes, curve, color=color, label=label, **stroke)
     axes.axhline(
         reserve_kJ, color=style.RESERVE, linewidth=1.2, linestyle="--", label="reserve"
     )

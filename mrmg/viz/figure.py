@@ -8,23 +8,16 @@ from pathlib import Path
 from matplotlib import rc_context
 
 from mrmg.errors import Fault, RunFolderError, UsageError
-from mrmg.plans import Plan
 from mrmg.runs.record import read_record
-from mrmg.scene.types import Scene
-from mrmg.simulation.log import ExecutionLog
 from mrmg.viz.energy_plot import draw_energy
 from mrmg.viz.figures import FOR_PRINT, require_format
 from mrmg.viz.overview import draw_overview
 from mrmg.viz.timeline_plot import draw_timeline
 
-Draw = Callable[[Scene, Plan, ExecutionLog | None, Path], None]
-
-_DRAW: dict[str, Draw] = {
-    "map": lambda scene, plan, log, path: draw_overview(scene, plan, log, path=path),
-    "energy": lambda scene, plan, log, path: draw_energy(scene, plan, log, path=path),
-    "timeline": lambda scene, plan, log, path: draw_timeline(
-        scene, plan, log, path=path
-    ),
+_DRAW: dict[str, Callable[..., None]] = {
+    "map": draw_overview,
+    "energy": draw_energy,
+    "timeline": draw_timeline,
 }
 KINDS = tuple(_DRAW)
 """What a figure can show."""
@@ -54,4 +47,4 @@ def draw_figure(
         reason += "; 'mrmg scene draw' draws the scene"
         raise RunFolderError(str(run_folder), [Fault("planning.json", reason)])
     with rc_context(FOR_PRINT):
-        _DRAW[kind](record.scene, record.plan, record.log, path)
+        _DRAW[kind](record.scene, record.plan, record.log, path=path)

@@ -238,9 +238,8 @@ class Stage:
         near_m = np.array([x_m, y_m])
         for label, spot in self._target_labels:
             if np.hypot(*(spot - near_m)) < _NAMED_WITHIN_M:
-                label.blit_about(
-                    pane, self._view.project(lifted(film.scene, spot, 0.0))[0]
-                )
+                at = self._view.project(lifted(film.scene, spot, 0.0))[0]
+                label.blit(pane, at)
         tops = [
             lifted(film.scene, state[tick, :2], robot.model.height_m + _TAG_LIFT_M)
             for robot, state in zip(film.scene.robots, film.log.state, strict=True)
@@ -259,7 +258,7 @@ class Stage:
             self._tags, spots, beside, reading.robots, strict=True
         ):
             if robot.broken_down:
-                self._cross.blit_about(pane, spot)
+                self._cross.blit(pane, spot)
             tag.blit(pane, at, robot.charge, broken=robot.broken_down)
 
     def _extend_ground_trails(self, tick: int) -> None:
@@ -300,12 +299,7 @@ def _labels(
     colors["obstacle"] = style.ON_OBSTACLE
     return [
         (
-            Label(
-                label.text,
-                colors[label.kind],
-                height,
-                size_em=label.size_em,
-            ),
+            Label(label.text, colors[label.kind], height, size_em=label.size_em),
             np.array([label.x_m, label.y_m]),
         )
         for label in video_labels(film.scene, film.plan, film.em_m)

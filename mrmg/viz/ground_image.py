@@ -20,7 +20,7 @@ from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.viz import scene_drawing, style
 from mrmg.viz.map_labels import MapLabel, map_labels
-from mrmg.world.elevation import lifted
+from mrmg.world.elevation import ground_mesh
 
 PIXELS = 2048
 """Longer side of the image."""
@@ -109,21 +109,14 @@ def painted_elevation(
 ) -> trimesh.Trimesh:
     """Return the ground as a mesh whose corners have the colours of its image."""
     image = paint_ground(scene, plan, frame)
-    columns, rows = np.ceil(2.0 * frame.half_m / _RELIEF_CELL_M).astype(int) + 1
     low, high = frame.center_m - frame.half_m, frame.center_m + frame.half_m
-    x, y = np.meshgrid(
-        np.linspace(low[0], high[0], columns), np.linspace(low[1], high[1], rows)
-    )
-    points = np.stack([x.ravel(), y.ravel()], axis=1)
-    pixel = np.floor(frame.to_pixels(points)).astype(int)
+    nodes, faces = ground_mesh(scene, low, high, _RELIEF_CELL_M)
+    pixel = np.floor(frame.to_pixels(nodes[:, :2])).astype(int)
     limit = np.array([image.shape[1], image.shape[0]]) - 1
     column, row = np.clip(pixel, 0, limit).T
-    corner = np.arange(rows * columns).reshape(rows, columns)
-    a, b = corner[:-1, :-1].ravel(), corner[:-1, 1:].ravel()
-    c, d = corner[1:, :-1].ravel(), corner[1:, 1:].ravel()
     return trimesh.Trimesh(
-        vertices=lifted(scene, points, 0.0),
-        faces=np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)]),
+        vertices=nodes,
+        faces=faces,
         vertex_colors=image[row, column],
         process=False,
     )
@@ -204,15 +197,8 @@ def _spaced(points: np.ndarray, spacing_m: float) -> np.ndarray:
 def _paint_paths(axes: Axes, scene: Scene, plan: Plan, letter_points: float) -> None:
     colors = style.scene_robot_colors(scene)
     for trajectory in plan.trajectories:
-        axes.plot(
-            trajectory.state[:, 0],
-            trajectory.state[:, 1],
-            color=colors[trajectory.robot],
-            linewidth=style.PLANNED.width_em * letter_points,
-            alpha=style.PLANNED.opacity,
-            solid_capstyle="round",
-            zorder=4,
-        )
+        color, look = colors[trajectory.robot], style.PLANNED.stroke(letter_points)
+        scene_drawing.draw_path(axes, trajectory.state, color, zorder=4, **look)
 
 
 def _paint_rims(axes: Axes, scene: Scene) -> None:

@@ -99,6 +99,6 @@ def _colors(calibration: LogCalibration) -> dict[str, str]:
 
 def _svg(figure: Figure) -> str:
     text = io.StringIO()
-    with rc_context({**FOR_PRINT, "svg.hashsalt": "mrmg"}):
+    with rc_context(FOR_PRINT):
         figure.savefig(text, format="svg", metadata={"Date": None})
     return text.getvalue()

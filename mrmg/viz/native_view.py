@@ -189,42 +189,32 @@ def annotate(extra: mujoco.MjvScene, scene: Scene, replay: Replay) -> None:
 
 
 def _add_label(extra: mujoco.MjvScene, at: np.ndarray, text: str) -> None:
-    if extra.ngeom < extra.maxgeom:
-        geom = extra.geoms[extra.ngeom]
-        mujoco.mjv_initGeom(
-            geom,
-            mujoco.mjtGeom.mjGEOM_LABEL,
-            np.zeros(3),
-            at,
-            np.eye(3).ravel(),
-            np.array([1.0, 1.0, 1.0, 1.0], dtype=np.float32),
-        )
+    geom = _added(extra, mujoco.mjtGeom.mjGEOM_LABEL, at, np.ones(4))
+    if geom is not None:
         geom.label = text
-        extra.ngeom += 1
 
 
 def _add_line(
     extra: mujoco.MjvScene, start: np.ndarray, end: np.ndarray, rgba: np.ndarray
 ) -> None:
-    if extra.ngeom < extra.maxgeom:
-        geom = extra.geoms[extra.ngeom]
-        mujoco.mjv_initGeom(
-            geom,
-            mujoco.mjtGeom.mjGEOM_LINE,
-            np.zeros(3),
-            np.zeros(3),
-            np.eye(3).ravel(),
-            rgba.astype(np.float32),
-        )
-        mujoco.mjv_connector(
-            geom,
-            mujoco.mjtGeom.mjGEOM_LINE,
-            _LINE_PIXELS,
-            start,
-            end,
-        )
+    line = mujoco.mjtGeom.mjGEOM_LINE
+    geom = _added(extra, line, np.zeros(3), rgba)
+    if geom is not None:
+        mujoco.mjv_connector(geom, line, _LINE_PIXELS, start, end)
         geom.emission = 0.0  # the lights alone show its colour as it is
-        extra.ngeom += 1
+
+
+def _added(
+    extra: mujoco.MjvScene, kind: mujoco.mjtGeom, at: np.ndarray, rgba: np.ndarray
+) -> mujoco.MjvGeom | None:
+    """Return a new geom of the window; None once it has as many as it can."""
+    if extra.ngeom == extra.maxgeom:
+        return None
+    geom = extra.geoms[extra.ngeom]
+    extra.ngeom += 1
+    turn = np.eye(3).ravel()
+    mujoco.mjv_initGeom(geom, kind, np.zeros(3), at, turn, rgba.astype(np.float32))
+    return geom
 
 
 def _texts(scene: Scene, replay: Replay) -> list[tuple[int, int, str, str]]:

@@ -74,12 +74,15 @@ def draw_mission(
     if plan is not None:
         for trajectory in plan.trajectories:
             color = colors[trajectory.robot]
-            _draw_path(axes, trajectory.state, color, style.PLANNED, 4.2)
+            look = style.PLANNED.stroke(scene_drawing.LETTER_POINTS)
+            scene_drawing.draw_path(axes, trajectory.state, color, zorder=4.2, **look)
             _draw_arrows(axes, trajectory.state, color)
     if log is not None:
         for robot, state in zip(log.robots, log.state, strict=True):
-            _draw_path(axes, state, colors[robot], style.DRIVEN, 4.4)
-        _draw_contacts(axes, log)
+            look = style.DRIVEN.stroke(scene_drawing.LETTER_POINTS)
+            scene_drawing.draw_path(axes, state, colors[robot], zorder=4.4, **look)
+        for contact in log.contacts:
+            _draw_cross(axes, contact.x_m, contact.y_m)
     _draw_targets(axes, scene, plan)
     if plan is not None:
         _draw_narrow(axes, plan)
@@ -91,20 +94,6 @@ def draw_mission(
     labels = map_labels(scene, plan, log, em_m=em_m)
     scene_drawing.draw_labels(axes, scene, labels)
     return handles
-
-
-def _draw_path(
-    axes: Axes, state: np.ndarray, color: str, look: style.LineLook, zorder: float
-) -> None:
-    axes.plot(
-        state[:, 0],
-        state[:, 1],
-        color=color,
-        linewidth=look.width_em * scene_drawing.LETTER_POINTS,
-        alpha=look.opacity,
-        solid_capstyle="round",
-        zorder=zorder,
-    )
 
 
 def _draw_arrows(axes: Axes, state: np.ndarray, color: str) -> None:
@@ -129,11 +118,6 @@ def _draw_arrows(axes: Axes, state: np.ndarray, color: str) -> None:
             )
 
 
-def _draw_contacts(axes: Axes, log: ExecutionLog) -> None:
-    for contact in log.contacts:
-        _draw_cross(axes, contact.x_m, contact.y_m)
-
-
 def _draw_narrow(axes: Axes, plan: Plan) -> None:
     """Mark where robots keep less than their margins, with what they keep."""
     for one in plan.narrow:
@@ -147,7 +131,7 @@ def _draw_narrow(axes: Axes, plan: Plan) -> None:
             fontsize=7,
             color=style.INK,
             zorder=9,
-            path_effects=[withStroke(linewidth=2.5, foreground="white")],
+            path_effects=scene_drawing.HALO,
         )
 
 
@@ -197,9 +181,7 @@ def _draw_ends(
         robot = scene.robot(robot_id)
         if np.allclose(pose, robot.pose, atol=_STILL) and robot_id not in broken:
             continue
-        scene_drawing.draw_footprint(
-            axes, robot, pose, facecolor=colors[robot_id], alpha=1.0
-        )
+        scene_drawing.draw_footprint(axes, robot, pose, colors[robot_id])
         middle, radius_m = end_ring(robot, pose, em_m)
         ring = Circle(
             (float(middle[0]), float(middle[1])),
@@ -221,21 +203,16 @@ def _legend(
     colors = style.scene_robot_colors(scene)
     handles: list[Patch | Line2D] = []
     for robot in scene.robots:
-        text = (
-            robot.id
-            if plan is None
-            else f"{robot.id}: {_work(scene, plan, log, robot.id)}"
-        )
-        handles.append(Patch(facecolor=colors[robot.id], label=text))
+        work = "" if plan is None else f": {_work(scene, plan, log, robot.id)}"
+        handles.append(Patch(facecolor=colors[robot.id], label=robot.id + work))
     looks = {"planned path": (style.PLANNED, plan), "driven path": (style.DRIVEN, log)}
     handles += [
         Line2D(
             [],
             [],
             color=style.MUTED,
-            linewidth=look.width_em * scene_drawing.LETTER_POINTS,
-            alpha=look.opacity,
             label=label,
+            **look.stroke(scene_drawing.LETTER_POINTS),
         )
         for label, (look, shown) in looks.items()
         if shown is not None
@@ -259,7 +236,7 @@ def _work(scene: Scene, plan: Plan, log: ExecutionLog | None, robot: str) -> str
     """Return what a robot's tour amounts to, and what became of the robot."""
     tour = plan.tours.get(robot, ())
     goals = sum(target in {goal.id for goal in scene.goals} for target in tour)
-    words = [f"{goals} goal{'' if goals == 1 else 's'}"] if tour else []
+    words = [counted(goals, "goal")] if tour else []
     return ", ".join([*words, *filter(None, [standing_of(robot, plan, log)])])
 
 

@@ -16,6 +16,7 @@ from matplotlib.patheffects import withStroke
 from shapely import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
+from mrmg.counted import counted
 from mrmg.scene.region import Region
 from mrmg.scene.types import Goal, Robot, Scene, Station
 from mrmg.viz import style
@@ -232,27 +233,26 @@ def draw_robots(axes: Axes, scene: Scene) -> None:
     """Draw every robot's footprint at its start."""
     colors = style.scene_robot_colors(scene)
     for robot in scene.robots:
-        draw_footprint(axes, robot, robot.pose, facecolor=colors[robot.id], alpha=1.0)
+        draw_footprint(axes, robot, robot.pose, colors[robot.id])
 
 
 def draw_footprint(
-    axes: Axes,
-    robot: Robot,
-    pose: tuple[float, float, float],
-    *,
-    facecolor: str,
-    alpha: float,
+    axes: Axes, robot: Robot, pose: tuple[float, float, float], color: str
 ) -> None:
     """Draw a robot's outline at a pose (x [m], y [m], yaw [rad])."""
     _add_shape(
         axes,
         Polygon(robot.model.footprint_at(pose)),
-        facecolor=facecolor,
+        facecolor=color,
         edgecolor="white",
         linewidth=0.9,
-        alpha=alpha,
         zorder=7,
     )
+
+
+def draw_path(axes: Axes, state: np.ndarray, color: str, **look: Any) -> None:
+    """Draw a way through the places of states (x [m], y [m], ...) with round ends."""
+    axes.plot(state[:, 0], state[:, 1], color=color, solid_capstyle="round", **look)
 
 
 def map_legend(scene: Scene) -> list[Patch | Line2D]:
@@ -295,7 +295,7 @@ def _title(scene: Scene) -> str:
         (len(scene.stations), "station"),
         (len(scene.terrain), "terrain area"),
     ]
-    words = [f"{count} {noun}{'' if count == 1 else 's'}" for count, noun in counts]
+    words = [counted(count, noun) for count, noun in counts]
     return f"{scene.name}: " + ", ".join(words)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from mrmg.scene.types import Obstacle, Scene
 from mrmg.simulation import palette
@@ -44,6 +45,10 @@ class LineLook:
 
     width_em: float
     opacity: float
+
+    def stroke(self, points: float) -> dict[str, Any]:
+        """Return what draws it with matplotlib, its letters of `points`."""
+        return {"linewidth": self.width_em * points, "alpha": self.opacity}
 
 
 PLANNED, DRIVEN = LineLook(0.45, 0.33), LineLook(0.16, 1.0)

@@ -154,11 +154,7 @@ class Label:
         self._pixels = np.asarray(image)
         self.half = 0.5 * np.array(size, dtype=float)
 
-    def blit(self, picture: np.ndarray, spot: np.ndarray) -> None:
-        """Lay the name over `picture`, up and right of `spot` (column, row)."""
-        self.blit_about(picture, spot + self.half * (1.0, -1.0))
-
-    def blit_about(self, picture: np.ndarray, center: np.ndarray) -> None:
+    def blit(self, picture: np.ndarray, center: np.ndarray) -> None:
         """Lay the name over `picture`, about `center` (column, row)."""
         if np.isfinite(center).all():
             left, top = np.round(center - self.half).astype(int).tolist()

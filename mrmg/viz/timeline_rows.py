@@ -63,6 +63,12 @@ class TimelineRow:
         """Return how many lines of names a width of the timeline needs; at least 1."""
         return max([1, *(named.lines[layout] + 1 for named in self.visits)])
 
+    def spent_s(self, kind: str) -> float:
+        """Return how long the robot was at activities of a kind [s]."""
+        return sum(
+            span.end_s - span.start_s for span in self.spans if span.kind == kind
+        )
+
 
 def timeline_rows(
     scene: Scene, plan: Plan, log: ExecutionLog | None, widths_em: Sequence[float]

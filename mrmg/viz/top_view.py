@@ -81,7 +81,7 @@ class TopView:
         for color, points in trails.items():
             self.extend_trail(points, color)
         for label, spot in labels:
-            label.blit_about(self._background, self.to_pixels(spot[None])[0])
+            label.blit(self._background, self.to_pixels(spot[None])[0])
 
     def extend_trail(self, points: np.ndarray, color: str) -> None:
         """Paint a driven way through points [m], shape (n, 2), onto the background."""

@@ -128,7 +128,7 @@ def test_the_library_s_licence_goes_with_it(mission, tmp_path) -> None:
 
 def test_data_cannot_end_the_element_that_holds_it() -> None:
     data = {"name": "</script><b>'\"&"}
-    source = html.page("<t>", [Markup("<p>here</p>"), "<p>text"], data=data)
+    source = html.page("<t>", Markup("<p>here</p>"), data=data)
     assert Page(source).open == []
     held = re.search(r'id="data">(.*?)</script>', source, re.DOTALL)
     assert held is not None

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from markupsafe import Markup
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
@@ -17,7 +18,7 @@ from mrmg.energy.by_terrain import energy_by_terrain
 from mrmg.energy.metering import battery_content
 from mrmg.report import page as report_page
 from mrmg.report.charts import chart_data
-from mrmg.report.sections import percent
+from mrmg.report.formats import percent
 from mrmg.report.timeline import timeline
 from mrmg.scene.loading import load_scene
 from mrmg.simulation.supervision import Event
@@ -85,7 +86,7 @@ def test_paths_and_curves_have_one_look_everywhere(mission) -> None:
         ]
         assert looks == expected
         assert {line.get_linestyle() for line in lines[:2]} == {"-"}
-    page = report_page.page("t", [], colors=[("#111111", "#222222")])
+    page = report_page.page("t", Markup(), colors=[("#111111", "#222222")])
     for name, look in (("planned", style.PLANNED), ("driven", style.DRIVEN)):
         assert f"--{name}-width:{look.width_em:g};" in page
         assert f"--{name}-opacity:{look.opacity:g};" in page
