@@ -49,7 +49,7 @@ def test_the_terminals_summary_has_them(
             "balance_residual_pct": None,
         },
     }
-    terminal.print_summary(summary, "")
+    print("\n".join(terminal.summary_lines(summary, "")))
     printed = capsys.readouterr().out
     for noun in NOUNS:
         assert re.search(rf"\b{number} {noun}{'s' * (number > 1)}\b", printed), noun

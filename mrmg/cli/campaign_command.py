@@ -92,10 +92,8 @@ def campaign(options: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         print(report.kept(folder), file=sys.stderr)
         raise
-    if options.json:
-        terminal.print_json(figures)
-    else:
-        print("\n".join([*_lines(figures), *_places(folder, options.parquet)]))
+    lines = [*_lines(figures), *_places(folder, options.parquet)]
+    terminal.print_result(options, figures, lines)
     return ExitCode.OK
 
 

@@ -35,11 +35,9 @@ def run(options: argparse.Namespace) -> int:
             on_improvement=terminal.improvement_reporter(on_progress),
             **given(options),
         )
-    if options.json:
-        terminal.print_json(result.summary)
-    else:
-        terminal.print_summary(result.summary, result.reason)
-        print(f"  report     {result.folder / 'report.html'}")
+    lines = terminal.summary_lines(result.summary, result.reason)
+    page = f"  report     {result.folder / 'report.html'}"
+    terminal.print_result(options, result.summary, [*lines, page])
     return result.exit_code
 
 
@@ -92,7 +90,7 @@ def plan(options: argparse.Namespace) -> int:
     text += "".join(f"\n  hint: {hint}" for hint in outcome.get("hints", ()))
     text += f"\n  in {folder.path}"
     text += "; planned before, --overwrite plans again" if kept else ""
-    _print(options, outcome, text)
+    terminal.print_result(options, outcome, [text])
     return ExitCode.MISSION_FAILED if skipped else work.status().exit_code
 
 
@@ -105,7 +103,7 @@ def verify(options: argparse.Namespace) -> int:
     found = [violation["message"] for violation in verdict["violations"]]
     lines = terminal.because("valid" if verdict["ok"] else "not valid", found)
     lines += [f"  {goal} is left out" for goal in verdict["skipped"]]
-    _print(options, verdict, "\n".join(lines))
+    terminal.print_result(options, verdict, lines)
     return ExitCode.OK if verdict["ok"] else ExitCode.MISSION_FAILED
 
 
@@ -124,7 +122,7 @@ def execute(options: argparse.Namespace) -> int:
         *events,
         f"  {note}",
     ]
-    _print(options, log, "\n".join(lines))
+    terminal.print_result(options, log, lines)
     done = driven and account.mission_ok
     return ExitCode.OK if done else ExitCode.MISSION_FAILED
 
@@ -176,7 +174,7 @@ def audit(options: argparse.Namespace) -> int:
     account = work.folder.read_json("audit.json", remedy="mrmg audit")
     outcome = "mission done" if account["mission_ok"] else "mission failed"
     lines = terminal.because(outcome, account["reasons"])
-    _print(options, account, "\n".join(lines))
+    terminal.print_result(options, account, lines)
     return ExitCode.OK if account["mission_ok"] else ExitCode.MISSION_FAILED
 
 
@@ -200,7 +198,8 @@ def report(options: argparse.Namespace) -> int:
     from mrmg.runs.folder import Step
 
     work = _make(options, Step.REPORT)
-    _print(options, work.summary(), str(work.folder.file("report.html")))
+    page = str(work.folder.file("report.html"))
+    terminal.print_result(options, work.summary(), [page])
     return work.exit_code()
 
 
@@ -227,10 +226,3 @@ def _make(
             if not folder.holds(step):  # made from another outcome than there is now
                 work.make(step)
     return work
-
-
-def _print(options: argparse.Namespace, value: Any, text: str) -> None:
-    if options.json:
-        terminal.print_json(value)
-    else:
-        print(text)

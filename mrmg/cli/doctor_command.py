@@ -27,14 +27,13 @@ def doctor(options: argparse.Namespace) -> int:
     from mrmg.doctor import examine
 
     findings = examine()
-    if options.json:
-        terminal.print_json([asdict(finding) for finding in findings])
-    else:
-        for finding in findings:
-            mark = "ok     " if finding.ok else "MISSING"
-            print(f"{mark} {finding.name:<14} {finding.found}")
-            if finding.remedy:
-                print(f"{'':22} remedy: {finding.remedy}")
+    lines = []
+    for finding in findings:
+        mark = "ok     " if finding.ok else "MISSING"
+        lines.append(f"{mark} {finding.name:<14} {finding.found}")
+        if finding.remedy:
+            lines.append(f"{'':22} remedy: {finding.remedy}")
+    terminal.print_result(options, [asdict(each) for each in findings], lines)
     return ExitCode.OK if all(item.ok for item in findings) else ExitCode.MACHINE
 
 
@@ -43,9 +42,6 @@ def _licences(options: argparse.Namespace) -> int:
     from mrmg.licences import dependencies
 
     found = dependencies()
-    if options.json:
-        terminal.print_json([asdict(each) for each in found])
-        return ExitCode.OK
     rows = [("package", "version", "licence", "extra")]
     rows += [
         (
@@ -56,5 +52,6 @@ def _licences(options: argparse.Namespace) -> int:
         )
         for each in found
     ]
-    terminal.print_table(rows)
+    lines = terminal.table_lines(rows)
+    terminal.print_result(options, [asdict(each) for each in found], lines)
     return ExitCode.OK

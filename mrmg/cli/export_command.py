@@ -43,8 +43,6 @@ def export(options: argparse.Namespace) -> int:
         overwrite=options.overwrite,
         trust_code=options.trust_code,
     )
-    if options.json:
-        terminal.print_json([str(path) for path in files])
-    else:
-        print("\n".join(map(str, files)))
+    names = [str(path) for path in files]
+    terminal.print_result(options, names, names)
     return ExitCode.OK

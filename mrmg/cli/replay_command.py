@@ -47,10 +47,7 @@ def replay(options: argparse.Namespace) -> int:
             overwrite=options.overwrite,
             trust_code=options.trust_code,
         )
-    if options.json:
-        terminal.print_json(outcome.to_json())
-    else:
-        print("\n".join(_lines(outcome, out)))
+    terminal.print_result(options, outcome.to_json(), _lines(outcome, out))
     if options.render:
         _render(out, options.trust_code)
     if options.view:

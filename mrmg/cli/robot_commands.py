@@ -90,15 +90,10 @@ def check_robot(options: argparse.Namespace) -> int:
             terminal.print_json({"model": folder.name, "ok": False, "faults": faults})
         raise
     picture = _draw(model, options.out)
-    if options.json:
-        found = {"model": model.name, "ok": True, "faults": []}
-        found |= {"figures": robot_figures(model), "picture": picture}
-        terminal.print_json(found)
-    else:
-        print(f"{model.name}: valid")
-        print("\n".join(f"  {line}" for line in figure_lines(model)))
-        if picture is not None:
-            print(picture)
+    found = {"model": model.name, "ok": True, "faults": []}
+    found |= {"figures": robot_figures(model), "picture": picture}
+    lines = [f"{model.name}: valid", *(f"  {line}" for line in figure_lines(model))]
+    terminal.print_result(options, found, [*lines, *([picture] if picture else [])])
     return ExitCode.OK
 
 
@@ -172,9 +167,6 @@ def list_robots(options: argparse.Namespace) -> int:
     for name in shipped.model_names():
         model, _ = load_model(shipped.models_folder() / name)
         found[name] = robot_figures(model)
-    if options.json:
-        terminal.print_json(found)
-        return ExitCode.OK
     heads = ("model", "motion", "size [m]", "mass", "top speed", "plain", "range")
     rows = [
         (
@@ -188,7 +180,9 @@ def list_robots(options: argparse.Namespace) -> int:
         )
         for name, each in found.items()
     ]
-    for row in (heads, *rows):
-        first, second, *others = row
-        print(f"{first:<12}{second:<10}" + "".join(f"{cell:>13}" for cell in others))
+    lines = [
+        f"{first:<12}{second:<10}" + "".join(f"{cell:>13}" for cell in others)
+        for first, second, *others in (heads, *rows)
+    ]
+    terminal.print_result(options, found, lines)
     return ExitCode.OK

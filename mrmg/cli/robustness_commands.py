@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import argparse
 import shlex
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrmg.cli import terminal
-from mrmg.cli.run_options import add_options, given
+from mrmg.cli.run_options import add_options, given, help_of
 from mrmg.counted import counted
 from mrmg.errors import ExitCode
 from mrmg.runs import argument_values as values
-from mrmg.runs.arguments import DISTURBANCE_HELP
 
 if TYPE_CHECKING:
     from mrmg.studies.outcomes import Study
@@ -37,8 +35,7 @@ def add_robustness(verbs: Any) -> None:
     verb.add_value("--trials", "N", "default 100", values.count, 100)
     processes = "processes that drive; default 1, and no influence on the result"
     verb.add_value("--workers", "N", processes, values.count, 1)
-    disturbances = DISTURBANCE_HELP.replace("%", "%%")
-    verb.add_value("--disturb", "SPEC", disturbances, str, "")
+    verb.add_value("--disturb", "SPEC", help_of("disturb"), str, "")
     seed = "--disturb-seed of the first trial, the next have N+1, ...; default 0"
     verb.add_value("--seed", "N", seed, values.seed, 0)
     add_options(verb, "robustness")
@@ -74,10 +71,7 @@ def robustness(options: argparse.Namespace) -> int:
             )
         if folder.file("report.html").exists():
             run.make(Step.REPORT)
-    if options.json:
-        terminal.print_json(study.to_json())
-    else:
-        sys.stdout.write("".join(f"{line}\n" for line in _lines(study, options.run)))
+    terminal.print_result(options, study.to_json(), _lines(study, options.run))
     return ExitCode.OK
 
 

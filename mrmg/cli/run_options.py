@@ -32,7 +32,7 @@ def add_options(
             option.flag,
             dest=option.name,
             default=argparse.SUPPRESS,
-            help=option.help.replace("%", "%%"),
+            help=_escaped(option),
             **_details(option),
         )
         argument.suggested = option.choices  # to complete
@@ -44,6 +44,17 @@ def add_options(
                 help=argparse.SUPPRESS,
                 **_details(option),
             )
+
+
+def help_of(name: str) -> str:
+    """Return what an option of a run does, for a verb that takes it otherwise."""
+    return next(
+        _escaped(each) for each in options_of(RunArguments) if each.name == name
+    )
+
+
+def _escaped(option: Option) -> str:
+    return option.help.replace("%", "%%")
 
 
 def given(

@@ -69,15 +69,12 @@ def check(options: argparse.Namespace) -> int:
         notes = [Fault("", message) for message in rehearse(scene)]
     except FileError as error:
         if options.json:
-            _print_findings(error.faults, warnings, [])
+            terminal.print_json(_findings(error.faults, warnings, []))
         else:
             terminal.print_warnings(warnings)
         raise
     warnings += bend_warnings(scene)
     warnings += [Fault("", message) for message in mission_warnings(scene)]
-    if options.json:
-        _print_findings([], warnings, notes)
-        return ExitCode.OK
     counts = {
         "robot": len(scene.robots),
         "goal": len(scene.goals),
@@ -85,23 +82,21 @@ def check(options: argparse.Namespace) -> int:
         "obstacle": len(scene.obstacles),
         "terrain area": len(scene.terrain),
     }
-    held = ", ".join(f"{n} {name}{'' if n == 1 else 's'}" for name, n in counts.items())
-    print("\n  warning: ".join([f"{scene.name}: valid; {held}", *map(str, warnings)]))
+    held = ", ".join(counted(n, name) for name, n in counts.items())
     kept = {robot.id: margins_of(robot, STATES_NONE) for robot in scene.robots}
-    for sentence in sentences_on_margins(scene.robots, kept):
-        print(f"  margins: {sentence}")
-    for note in notes:
-        print(f"  note: {note}")
+    lines = [
+        f"{scene.name}: valid; {held}",
+        *(f"  warning: {warning}" for warning in warnings),
+        *(f"  margins: {text}" for text in sentences_on_margins(scene.robots, kept)),
+        *(f"  note: {note}" for note in notes),
+    ]
+    terminal.print_result(options, _findings([], warnings, notes), lines)
     return ExitCode.OK
 
 
-def _print_findings(
-    faults: Sequence[Fault], warnings: Sequence[Fault], notes: Sequence[Fault]
-) -> None:
-    findings = {"faults": faults, "warnings": warnings, "notes": notes}
-    terminal.print_json(
-        {name: [asdict(item) for item in items] for name, items in findings.items()}
-    )
+def _findings(*lists: Sequence[Fault]) -> dict[str, list[dict[str, Any]]]:
+    named = zip(("faults", "warnings", "notes"), lists, strict=True)
+    return {name: [asdict(item) for item in items] for name, items in named}
 
 
 def draw(options: argparse.Namespace) -> int:

@@ -66,10 +66,8 @@ def compare(options: argparse.Namespace) -> int:
     comparison = compare_runs(options.runs, trust_code=options.trust_code)
     page = options.out or Path("compare.html")
     write_comparison(comparison, page)
-    if options.json:
-        terminal.print_json(comparison.to_json())
-    else:
-        print(f"{comparison.to_text()}\n\n{page}")
+    lines = [comparison.to_text(), "", str(page)]
+    terminal.print_result(options, comparison.to_json(), lines)
     return ExitCode.OK
 
 

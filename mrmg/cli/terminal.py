@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -166,12 +167,20 @@ def print_json(value: Any) -> None:
     sys.stdout.write(storage.canonical_json(value))
 
 
-def print_table(rows: Sequence[Sequence[str]]) -> None:
-    """Print rows in columns, the first row being their names."""
+def print_result(options: argparse.Namespace, value: Any, lines: Iterable[str]) -> None:
+    """Print what a verb found: as JSON alone if that was asked for, else in lines."""
+    if options.json:
+        print_json(value)
+    else:
+        print("\n".join(lines))
+
+
+def table_lines(rows: Sequence[Sequence[str]]) -> Iterator[str]:
+    """Yield rows in columns, the first row being their names."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         cells = [text.ljust(width) for text, width in zip(row, widths, strict=True)]
-        print("  ".join(cells).rstrip())
+        yield "  ".join(cells).rstrip()
 
 
 def about(duration_s: float) -> str:
@@ -189,18 +198,17 @@ def because(outcome: str, reasons: Sequence[str]) -> list[str]:
     return [first, *(f"  {reason}" for reason in reasons[1:])]
 
 
-def print_summary(summary: dict[str, Any], reason: str) -> None:
-    """Print the outcome of a run in a few lines."""
+def summary_lines(summary: dict[str, Any], reason: str) -> Iterator[str]:
+    """Yield the outcome of a run in a few lines."""
     status = summary["status"]
     failed = "failed" if status == "solved" else f"not done ({status})"
     outcome = "done" if summary["mission_ok"] else failed
     why = f"; {reason}" if reason else ""
-    print(f"{summary['scene']}, seed {summary['seed']}: mission {outcome}{why}")
-    for line in _summary_lines(summary):
-        print(f"  {line}")
+    yield f"{summary['scene']}, seed {summary['seed']}: mission {outcome}{why}"
+    yield from (f"  {line}" for line in _figure_lines(summary))
 
 
-def _summary_lines(summary: dict[str, Any]) -> Iterator[str]:
+def _figure_lines(summary: dict[str, Any]) -> Iterator[str]:
     plan, verdict = summary["plan"], summary["verdict"]
     execution, energy = summary["execution"], summary["energy"]
     if plan:

@@ -14,7 +14,7 @@ from mrmg.export.ros_messages import MAP_FRAME, RosTypes
 from mrmg.scene.types import Goal, Obstacle, Scene, Station
 from mrmg.simulation import palette
 from mrmg.simulation.convex import triangles
-from mrmg.world.elevation import height_at, lifted
+from mrmg.world.elevation import ground_mesh, height_at, lifted
 from mrmg.world.terrain import multiplier_at
 
 MIN_CELL_M = 0.05
@@ -178,15 +178,8 @@ def _ground(ros: RosTypes, scene: Scene) -> Any:
     """Return the ground of a scene with elevation, coloured by its terrain."""
     x_min, y_min, x_max, y_max = scene.bounds
     cell_m = max(x_max - x_min, y_max - y_min) / MAX_GROUND_CELLS_PER_SIDE
-    x = np.linspace(x_min, x_max, int(np.ceil((x_max - x_min) / cell_m)) + 1)
-    y = np.linspace(y_min, y_max, int(np.ceil((y_max - y_min) / cell_m)) + 1)
-    nodes = lifted(scene, np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2), 0.0)
-    grid = np.arange(len(nodes)).reshape(len(y), len(x))
-    a, b, c, d = (
-        part.ravel()
-        for part in (grid[:-1, :-1], grid[:-1, 1:], grid[1:, :-1], grid[1:, 1:])
-    )
-    corners = nodes[np.stack([a, b, d, a, d, c], axis=1).ravel()]
+    nodes, faces = ground_mesh(scene, (x_min, y_min), (x_max, y_max), cell_m)
+    corners = nodes[faces.ravel()]
     middle = corners.reshape(-1, 3, 3).mean(axis=1)[:, :2]
     multipliers, which = np.unique(multiplier_at(scene, middle), return_inverse=True)
     colors = [_color(ros, palette.terrain_colour(value)) for value in multipliers]

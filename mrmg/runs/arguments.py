@@ -21,16 +21,6 @@ if TYPE_CHECKING:
     from mrmg.runs.folder import RunFolder
     from mrmg.scene.types import Scene
 
-DISTURBANCE_HELP = (
-    "drive robots that differ from their models: in mass, friction, rolling, "
-    "drive_gain, steering_gain, lag, position_noise, heading_noise, speed_noise, "
-    "delay, start_x, start_y, start_heading, capacity; SPEC is key=value,... such as "
-    "rolling=+30%,lag=0..80ms, or a YAML file of such keys, and changes the defaults "
-    "(mass=+-5%,friction=+-20%,rolling=+-10%,lag=50ms,position_noise=2cm); "
-    "a leading 'none' starts from no disturbance, a leading 'field:snow' (or asphalt, "
-    "flooring, ice, sandy_loam) from the spread found in logs of a robot on it"
-)
-
 
 _shown = partial(option, verbs=("render",))
 
@@ -39,27 +29,22 @@ _shown = partial(option, verbs=("render",))
 class VideoArguments(Checked):
     """How the video is made."""
 
-    view: str = _shown("top", "what is shown", choices=("top", "chase", "split"))
-    speed: float | None = _shown(
-        None,
-        "simulated seconds shown per second; default fits the mission to half a minute",
-        read=values.positive,
-        metavar="FACTOR",
-    )
-    size: tuple[int, int] = _shown(
-        (1280, 720), "in pixels, such as 1280x720", read=values.size, metavar="WxH"
-    )
-    fps: int = _shown(30, "frames per second", read=values.count, metavar="N")
-    robot: str | None = _shown(
-        None, "followed by the chase camera; default the first", metavar="ID"
-    )
-    from_s: float = _shown(
-        0.0, "mission time of the first frame", read=values.time, metavar="SECONDS"
-    )
-    to_s: float | None = _shown(
-        None, "mission time of the last frame", read=values.time, metavar="SECONDS"
-    )
-    gif: bool = _shown(False, "make a GIF of less than 5 MB, too", read=values.switch)
+    view: str = _shown("top", choices=("top", "chase", "split"))
+    """what is shown"""
+    speed: float | None = _shown(None, read=values.positive, metavar="FACTOR")
+    """simulated seconds shown per second; default fits the mission to half a minute"""
+    size: tuple[int, int] = _shown((1280, 720), read=values.size, metavar="WxH")
+    """in pixels, such as 1280x720"""
+    fps: int = _shown(30, read=values.count, metavar="N")
+    """frames per second"""
+    robot: str | None = _shown(None, metavar="ID")
+    """followed by the chase camera; default the first"""
+    from_s: float = _shown(0.0, read=values.time, metavar="SECONDS")
+    """mission time of the first frame"""
+    to_s: float | None = _shown(None, read=values.time, metavar="SECONDS")
+    """mission time of the last frame"""
+    gif: bool = _shown(False, read=values.switch)
+    """make a GIF of less than 5 MB, too"""
 
 
 DEFAULT_VIDEO = VideoArguments()
@@ -69,152 +54,106 @@ DEFAULT_VIDEO = VideoArguments()
 class RunArguments(Checked):
     """Everything but the scene that decides what a run leaves."""
 
-    seed: int = option(
-        0,
-        "of all random streams; default 0",
-        decides="plan",
-        read=values.seed,
-        metavar="N",
-    )
-    profile: str = option(
-        "default",
-        "'paper' is the published method: planner guided_tree with router nrpa",
-        decides="plan",
-        choices=("default", "paper"),
-    )
+    seed: int = option(0, decides="plan", read=values.seed, metavar="N")
+    """of all random streams; default 0"""
+    profile: str = option("default", decides="plan", choices=("default", "paper"))
+    """'paper' is the published method: planner guided_tree with router nrpa"""
     planner: str | None = option(
         None,
-        "path_following, which is the default, guided_tree, the published method, or "
-        "one that another package adds",
         decides="plan",
         choices=extensions.BUILT_IN[extensions.PLANNERS],
         extended=extensions.PLANNERS,
         read=values.name,
         metavar="NAME",
     )
+    """path_following, which is the default, guided_tree, the published method, or one
+    that another package adds"""
     router: str | None = option(
         None,
-        "what finds tours: search, which is the default, nrpa, exact, or one that "
-        "another package adds; guided_tree takes nrpa only",
         decides="plan",
         choices=extensions.BUILT_IN[extensions.ROUTERS],
         extended=extensions.ROUTERS,
         read=values.name,
         metavar="NAME",
     )
+    """what finds tours: search, which is the default, nrpa, exact, or one that another
+    package adds; guided_tree takes nrpa only"""
     objective: str | Mapping[str, float] | None = option(
-        None,
-        "what plans minimise, in place of the scene's objective; E and M are the "
-        "weights of each J and each s",
-        decides="plan",
-        read=values.objective,
-        metavar="energy|makespan|E:M",
+        None, decides="plan", read=values.objective, metavar="energy|makespan|E:M"
     )
+    """what plans minimise, in place of the scene's objective; E and M are the weights
+    of each J and each s"""
     time_limit_s: float | None = option(
-        None,
-        "by when all robots are at rest, in place of the scene's time limit",
-        decides="plan",
-        read=values.positive,
-        metavar="SECONDS",
+        None, decides="plan", read=values.positive, metavar="SECONDS"
     )
+    """by when all robots are at rest, in place of the scene's time limit"""
     budget_s: float | None = option(
-        None,
-        "go on improving the plan for so long; Ctrl-C ends it earlier",
-        decides="plan",
-        read=values.positive,
-        metavar="SECONDS",
-        group="limit",
+        None, decides="plan", read=values.positive, metavar="SECONDS", group="limit"
     )
+    """go on improving the plan for so long; Ctrl-C ends it earlier"""
     trees: int | None = option(
-        None,
-        "go on improving for so many motion trees: the same plan every time",
-        decides="plan",
-        read=values.count,
-        metavar="N",
-        group="limit",
+        None, decides="plan", read=values.count, metavar="N", group="limit"
     )
+    """go on improving for so many motion trees: the same plan every time"""
     soc_margin: float | None = option(
-        None,
-        "state-of-charge margin: share of every battery's capacity that plans leave "
-        "above the reserve where that can be; default 0.1",
-        decides="plan",
-        read=values.share,
-        metavar="SHARE",
-        formerly=("spare",),
+        None, decides="plan", read=values.share, metavar="SHARE", formerly=("spare",)
     )
+    """state-of-charge margin: share of every battery's capacity that plans leave above
+    the reserve where that can be; default 0.1"""
     margins: Mapping[str, float] | None = option(
-        None,
-        "distances in m that plans keep from obstacles and between robots, such as "
-        "obstacle=0.1,robot=0.3, in place of those of the scene and its robots; where "
-        "only a smaller one opens a passage, that one is used there",
-        decides="plan",
-        read=values.margins,
-        metavar="KEY=M,...",
+        None, decides="plan", read=values.margins, metavar="KEY=M,..."
     )
-    skip_unreachable: bool = option(
-        False,
-        "plan without the goals that are proven out of reach; the mission then ends "
-        "with exit code 6, and they are listed with their proofs",
-        decides="plan",
-        read=values.switch,
-    )
-    workers: int = option(
-        1,
-        "threads that plan; default 1",
-        verbs=("run", "plan"),
-        read=values.count,
-        metavar="N",
-    )
+    """distances in m that plans keep from obstacles and between robots, such as
+    obstacle=0.1,robot=0.3, in place of those of the scene and its robots; where only a
+    smaller one opens a passage, that one is used there"""
+    skip_unreachable: bool = option(False, decides="plan", read=values.switch)
+    """plan without the goals that are proven out of reach; the mission then ends with
+    exit code 6, and they are listed with their proofs"""
+    workers: int = option(1, verbs=("run", "plan"), read=values.count, metavar="N")
+    """threads that plan; default 1"""
     controller: str = option(
-        "mpc",
-        "tracking controller; default mpc, or that of the run",
-        decides="drive",
-        verbs=("run", "execute", "robustness"),
-        metavar="NAME",
+        "mpc", decides="drive", verbs=("run", "execute", "robustness"), metavar="NAME"
     )
+    """tracking controller; default mpc, or that of the run"""
     plant: str = option(
         "default",
-        "ground contact: default, as the energy model has it, or scrub, which it does "
-        "not know: by wheel, load and slip; default that of the run, or default",
         decides="drive",
         verbs=("run", "execute", "robustness", "calibrate"),
         choices=("default", "scrub"),
     )
-    disturb: str | None = option(
-        None, DISTURBANCE_HELP, decides="drive", bare="", metavar="SPEC"
-    )
-    disturb_seed: int = option(
-        0,
-        "of what is drawn from the disturbances; default 0",
-        decides="drive",
-        read=values.seed,
-        metavar="N",
-    )
+    """ground contact: default, as the energy model has it, or scrub, which it does not
+    know: by wheel, load and slip; default that of the run, or default"""
+    disturb: str | None = option(None, decides="drive", bare="", metavar="SPEC")
+    """drive robots that differ from their models: in mass, friction, rolling,
+    drive_gain, steering_gain, lag, position_noise, heading_noise, speed_noise, delay,
+    start_x, start_y, start_heading, capacity; SPEC is key=value,... such as
+    rolling=+30%,lag=0..80ms, or a YAML file of such keys, and changes the defaults
+    (mass=+-5%,friction=+-20%,rolling=+-10%,lag=50ms,position_noise=2cm); a leading
+    'none' starts from no disturbance, a leading 'field:snow' (or asphalt, flooring,
+    ice, sandy_loam) from the spread found in logs of a robot on it"""
+    disturb_seed: int = option(0, decides="drive", read=values.seed, metavar="N")
+    """of what is drawn from the disturbances; default 0"""
     faults: tuple[str, ...] = option(
-        (),
-        "let a robot break down on the way, such as r2@40s; may be repeated",
-        decides="drive",
-        flag="--fault",
-        read=values.words,
-        metavar="ROBOT@TIME",
+        (), decides="drive", flag="--fault", read=values.words, metavar="ROBOT@TIME"
     )
+    """let a robot break down on the way, such as r2@40s; may be repeated"""
     replan: bool = option(
         False,
-        "when a robot breaks down, or energy or tracking leave their corridor, stop "
-        "the fleet and plan the rest of the mission anew",
         decides="drive",
         verbs=("run", "execute", "robustness"),
         read=values.switch,
     )
+    """when a robot breaks down, or energy or tracking leave their corridor, stop the
+    fleet and plan the rest of the mission anew"""
     energy_tolerance_pct: float = option(
         5.0,
-        "by which a robot's measured energy may differ from planned in an undisturbed "
-        "drive; beyond it the model does not describe the robot; default 5",
         decides="audit",
         flag="--energy-tolerance",
         read=values.positive,
         metavar="PERCENT",
     )
+    """by which a robot's measured energy may differ from planned in an undisturbed
+    drive; beyond it the model does not describe the robot; default 5"""
     video: VideoArguments = DEFAULT_VIDEO
 
     def deciding(self, what: str) -> dict[str, Any]:

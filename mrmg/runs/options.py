@@ -1,15 +1,18 @@
 """Options: what one argument of a command is called, reads, decides and shows.
 
-A class of arguments states each of its options once, as a field made by `option`. The
-command line, the keywords of the Python API and the records of runs are made from them.
+A class of arguments states each of its options once, as a field made by `option` with a
+docstring, which is its help. The command line, the keywords of the Python API and the
+records of runs are made from them.
 """
 
 from __future__ import annotations
 
+import ast
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, field, fields
 from functools import cache
+from itertools import pairwise
 from typing import Any, TypeVar
 
 from mrmg.errors import UsageError
@@ -55,16 +58,16 @@ class Option:
     type: str
     flag: str
     help: str
-    read: Callable[[Any], Any]
-    decides: str
     verbs: tuple[str, ...]
-    metavar: str | None
-    choices: tuple[str, ...] | None
-    extended: str | None
-    bare: str | None
-    group: str | None
-    formerly: tuple[str, ...]
     default: Any
+    read: Callable[[Any], Any] = str
+    decides: str = ""
+    metavar: str | None = None
+    choices: tuple[str, ...] | None = None
+    extended: str | None = None
+    bare: str | None = None
+    group: str | None = None
+    formerly: tuple[str, ...] = ()
 
     def words(self, value: Any) -> list[str]:
         """Return the words of a command line that give `value`."""
@@ -92,9 +95,9 @@ def _text(value: Any) -> str:
     return str(value)
 
 
-def option(default: Any, help: str, **details: Any) -> Any:
+def option(default: Any, **details: Any) -> Any:
     """Return a dataclass field that is an option; `details` as in `Option`."""
-    metadata = {_OPTION: {"help": help, "default": default, **details}}
+    metadata = {_OPTION: {"default": default, **details}}
     return field(default=default, metadata=metadata)
 
 
@@ -106,28 +109,37 @@ def options_of(arguments: type[Checked]) -> tuple[Option, ...]:
 
 @cache
 def _options_of(arguments: Any) -> tuple[Option, ...]:
+    helps = _docstrings(arguments)
     return tuple(
-        _option_of(each) for each in fields(arguments) if each.metadata.get(_OPTION)
+        _option_of(each, helps[each.name])
+        for each in fields(arguments)
+        if each.metadata.get(_OPTION)
     )
 
 
-def _option_of(each: Field[Any]) -> Option:
-    details = dict(each.metadata[_OPTION])
-    decides = details.pop("decides", "")
-    complete = {
+def _docstrings(arguments: type) -> dict[str, str]:
+    """Return the docstrings of a class's fields, which only its source has."""
+    found: dict[str, str] = {}
+    for kind in reversed(arguments.__mro__[:-1]):
+        (definition,) = ast.parse(inspect.getsource(kind)).body
+        assert isinstance(definition, ast.ClassDef)
+        for statement, below in pairwise(definition.body):
+            match statement, below:
+                case (
+                    ast.AnnAssign(target=ast.Name(id=name)),
+                    ast.Expr(value=ast.Constant(value=str(text))),
+                ):
+                    found[name] = " ".join(text.split())
+    return found
+
+
+def _option_of(each: Field[Any], help: str) -> Option:
+    details = each.metadata[_OPTION]
+    usual = {
         "flag": "--" + each.name.removesuffix("_s").replace("_", "-"),
-        "read": str,
-        "decides": decides,
-        "verbs": _VERBS[decides],
-        "metavar": None,
-        "choices": None,
-        "extended": None,
-        "bare": None,
-        "group": None,
-        "formerly": (),
-        **details,
+        "verbs": _VERBS[details.get("decides", "")],
     }
-    return Option(name=each.name, type=str(each.type), **complete)
+    return Option(name=each.name, type=str(each.type), help=help, **(usual | details))
 
 
 class Checked:

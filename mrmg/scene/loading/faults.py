@@ -125,7 +125,8 @@ def _known_keys(model: type[BaseModel], loc: tuple[str | int, ...]) -> list[str]
 
 def _description(model: type[BaseModel], loc: tuple[str | int, ...]) -> str | None:
     _, field = _walk(model, loc)
-    return None if field is None else field.description
+    stated = None if field is None else field.description
+    return stated and stated.replace("\n", " ")
 
 
 def _walk(

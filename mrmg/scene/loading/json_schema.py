@@ -33,11 +33,11 @@ def schema_of(model: type[BaseModel]) -> dict[str, Any]:
 
 
 def _without_noise(node: Any) -> Any:
-    """Return a schema without titles, and without null for what may be left out."""
+    """Return a schema without titles, line ends, and null for what may be left out."""
     if isinstance(node, list):
         return [_without_noise(item) for item in node]
     if not isinstance(node, dict):
-        return node
+        return node.replace("\n", " ") if isinstance(node, str) else node
     kept = {
         key: _without_noise(value)
         for key, value in node.items()

@@ -18,12 +18,10 @@ FromRobots = Annotated[float, Field(ge=0, le=LARGEST_M["robot"], allow_inf_nan=F
 class MarginsEntry(Strict):
     """Distances that plans keep; what is left out follows from the robot's model."""
 
-    obstacle: FromObstacles | None = Field(
-        default=None, description="distance from obstacles and bounds in m, 0..1"
-    )
-    robot: FromRobots | None = Field(
-        default=None, description="distance from other robots in m, 0..2"
-    )
+    obstacle: FromObstacles | None = None
+    """distance from obstacles and bounds in m, 0..1"""
+    robot: FromRobots | None = None
+    """distance from other robots in m, 0..2"""
 
     @property
     def margins(self) -> Margins:
@@ -34,8 +32,10 @@ class MarginsEntry(Strict):
 class TrackingErrorEntry(Strict):
     """The largest tracking errors shown in MuJoCo."""
 
-    nominal: NotNegative = Field(description="in m, of a drive as modelled")
-    disturbed: NotNegative = Field(description="in m, under default disturbances")
+    nominal: NotNegative
+    """in m, of a drive as modelled"""
+    disturbed: NotNegative
+    """in m, under default disturbances"""
 
     @property
     def value(self) -> TrackingError:

@@ -28,8 +28,8 @@ from mrmg.scene.loading.places import lines_of
 from mrmg.scene.loading.shape_schema import (
     NamedWithUnits,
     NotNegative,
+    Point,
     Positive,
-    Ring,
     Strict,
 )
 from mrmg.scene.loading.trust import file_within, refusal_of_code
@@ -46,107 +46,102 @@ Share = Annotated[float, Field(gt=0, le=1, allow_inf_nan=False)]
 class WheelEntry(NamedWithUnits):
     """One wheel."""
 
-    wheel_radius_m: Positive = Field(description="rolling radius in m")
-    wheel_inertia_kg_m2: NotNegative = Field(
-        description="spin inertia of one wheel and its share of the drive in kg m^2"
-    )
-    wheel_count: Annotated[int, Field(ge=1)] = Field(description="number of wheels")
-    mass: Positive = Field(description="mass of one wheel in kg")
+    wheel_radius_m: Positive
+    """rolling radius in m"""
+    wheel_inertia_kg_m2: NotNegative
+    """spin inertia of one wheel and its share of the drive in kg m^2"""
+    wheel_count: Annotated[int, Field(ge=1)]
+    """number of wheels"""
+    mass: Positive
+    """mass of one wheel in kg"""
 
 
 class LimitsEntry(NamedWithUnits):
     """Bounds of state and control."""
 
-    v_min_m_s: Annotated[float, Field(le=0, allow_inf_nan=False)] = Field(
-        description="fastest reverse speed in m/s, negative or 0"
-    )
-    v_max_m_s: Positive = Field(description="fastest forward speed in m/s")
-    w_max: Positive = Field(
-        description="steering angle in rad (car), or yaw rate in rad/s (unicycle)"
-    )
-    u1_max_m_s2: Positive = Field(description="acceleration in m/s^2")
-    u2_max: Positive = Field(
-        description="steering rate in rad/s (car), or yaw acceleration in rad/s^2"
-    )
+    v_min_m_s: Annotated[float, Field(le=0, allow_inf_nan=False)]
+    """fastest reverse speed in m/s, negative or 0"""
+    v_max_m_s: Positive
+    """fastest forward speed in m/s"""
+    w_max: Positive
+    """steering angle in rad (car), or yaw rate in rad/s (unicycle)"""
+    u1_max_m_s2: Positive
+    """acceleration in m/s^2"""
+    u2_max: Positive
+    """steering rate in rad/s (car), or yaw acceleration in rad/s^2"""
 
 
 class MotorEntry(NamedWithUnits):
     """The motors of a side as one, and their gear."""
 
-    torque_constant_Nm_A: Positive = Field(description="torque per current in N m/A")
-    back_emf_constant_V_s: Positive = Field(description="voltage per speed in V s/rad")
-    resistance_Ohm: Positive = Field(description="of the winding in Ohm")
-    gear_ratio: Positive = Field(description="turns of the motor per turn of the wheel")
-    gear_efficiency: Share = Field(description="from motor to wheel, in (0, 1]")
-    no_load_current_A: NotNegative = Field(
-        default=0.0, description="current in A that turns motor and gear alone"
-    )
+    torque_constant_Nm_A: Positive
+    """torque per current in N m/A"""
+    back_emf_constant_V_s: Positive
+    """voltage per speed in V s/rad"""
+    resistance_Ohm: Positive
+    """of the winding in Ohm"""
+    gear_ratio: Positive
+    """turns of the motor per turn of the wheel"""
+    gear_efficiency: Share
+    """from motor to wheel, in (0, 1]"""
+    no_load_current_A: NotNegative = 0.0
+    """current in A that turns motor and gear alone"""
 
 
 class ModelDocument(NamedWithUnits):
     """The content of `robot.yaml`."""
 
-    format: Literal[1] = Field(description="format: 1")
-    motion_model: Annotated[str, Field(min_length=1)] = Field(
-        description="'car', 'unicycle', or a Python file of the model's folder"
-    )
-    footprint: Ring = Field(
-        description="convex outline, at least 3 corners [x, y] in m; x forward, y "
-        "left, from the middle of the rear axle"
-    )
-    height_m: Positive = Field(description="height of the body in m")
-    wheelbase_m: Positive = Field(description="distance of the axles in m")
-    track_m: Positive = Field(description="distance of the wheels of an axle in m")
-    skid_track_m: Positive | None = Field(
-        default=None,
-        description="effective track in m where wheels skid in turns; for logs",
-    )
-    mass_kg: Positive = Field(description="mass of the whole robot in kg")
-    center_of_mass_m: Annotated[float, Field(allow_inf_nan=False)] = Field(
-        default=0.0, description="centre of mass ahead of the rear axle in m"
-    )
-    wheel: WheelEntry = Field(description="its wheels")
-    limits: LimitsEntry = Field(description="bounds of speed, turning and control")
-    planning_share: Share = Field(
-        description="share of the limits that plans use, in (0, 1]; the rest is for "
-        "control"
-    )
-    rolling_coefficient: Positive = Field(
-        description="rolling resistance on plain ground as a share of the weight"
-    )
-    turning_coefficient: NotNegative = Field(
-        description="tyre scrub as a share of the weight, over wheelbase times turn"
-    )
-    friction_coefficient: Positive = Field(description="friction of tyre on ground")
-    drive_efficiency: Share = Field(description="from battery to wheel, in (0, 1]")
-    regeneration_efficiency: Annotated[
-        float, Field(ge=0, le=1, allow_inf_nan=False)
-    ] = Field(description="from wheel to battery when braking, in [0, 1]")
-    idle_power_W: NotNegative = Field(description="power of the electronics in W")
-    device_power_W: NotNegative = Field(
-        default=0.0, description="power of what it carries in W"
-    )
-    energy_preset: EnergyPreset = Field(
-        alias="energy",
-        default="full",
-        description="which parts of the energy model count",
-    )
-    battery_capacity_J: Positive = Field(
-        description="capacity of the standard battery in J"
-    )
-    margins: MarginsEntry | None = Field(
-        default=None,
-        description="distances that plans keep; default: by tracking_error",
-    )
-    tracking_error: TrackingErrorEntry | None = Field(
-        default=None, description="largest tracking errors shown in MuJoCo"
-    )
-    motor: MotorEntry | None = Field(
-        default=None, description="motors of each side, for logs of currents"
-    )
-    mjcf: Annotated[str, Field(min_length=1)] | None = Field(
-        default=None, description="MJCF file in the folder; without it, not driven"
-    )
+    format: Literal[1]
+    """format: 1"""
+    motion_model: Annotated[str, Field(min_length=1)]
+    """'car', 'unicycle', or a Python file of the model's folder"""
+    footprint: Annotated[list[Point], Field(min_length=3)]
+    """convex outline, at least 3 corners [x, y] in m; x forward, y left, from the
+    middle of the rear axle"""
+    height_m: Positive
+    """height of the body in m"""
+    wheelbase_m: Positive
+    """distance of the axles in m"""
+    track_m: Positive
+    """distance of the wheels of an axle in m"""
+    skid_track_m: Positive | None = None
+    """effective track in m where wheels skid in turns; for logs"""
+    mass_kg: Positive
+    """mass of the whole robot in kg"""
+    center_of_mass_m: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+    """centre of mass ahead of the rear axle in m"""
+    wheel: WheelEntry
+    """its wheels"""
+    limits: LimitsEntry
+    """bounds of speed, turning and control"""
+    planning_share: Share
+    """share of the limits that plans use, in (0, 1]; the rest is for control"""
+    rolling_coefficient: Positive
+    """rolling resistance on plain ground as a share of the weight"""
+    turning_coefficient: NotNegative
+    """tyre scrub as a share of the weight, over wheelbase times turn"""
+    friction_coefficient: Positive
+    """friction of tyre on ground"""
+    drive_efficiency: Share
+    """from battery to wheel, in (0, 1]"""
+    regeneration_efficiency: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
+    """from wheel to battery when braking, in [0, 1]"""
+    idle_power_W: NotNegative
+    """power of the electronics in W"""
+    device_power_W: NotNegative = 0.0
+    """power of what it carries in W"""
+    energy_preset: EnergyPreset = Field(alias="energy", default="full")
+    """which parts of the energy model count"""
+    battery_capacity_J: Positive
+    """capacity of the standard battery in J"""
+    margins: MarginsEntry | None = None
+    """distances that plans keep; default: by tracking_error"""
+    tracking_error: TrackingErrorEntry | None = None
+    """largest tracking errors shown in MuJoCo"""
+    motor: MotorEntry | None = None
+    """motors of each side, for logs of currents"""
+    mjcf: Annotated[str, Field(min_length=1)] | None = None
+    """MJCF file in the folder; without it, not driven"""
 
 
 def model_folder(reference: str, base: Path | None) -> Path | str:

@@ -98,9 +98,6 @@ from mrmg.energy.model import EnergyPreset
 from mrmg.scene.loading.elevation_schema import ElevationEntry
 from mrmg.scene.loading.margins_schema import MarginsEntry
 from mrmg.scene.loading.shape_schema import (
-    DISC,
-    ID,
-    RING,
     CircleEntry,
     Coordinate,
     Identifier,
@@ -121,25 +118,25 @@ SCENE_FORMAT = 1
 class ObstacleEntry(ShapedEntry):
     """Ground that robots must keep off."""
 
-    id: Identifier | None = Field(default=None, description=ID)
-    height: Length = Field(default=1.0, description="height in m")
-    blocks: Annotated[list[Identifier], Field(min_length=1)] | None = Field(
-        default=None, description="at least one id of a robot"
-    )
+    id: Identifier | None = None
+    """name, unique in the whole file"""
+    height: Length = 1.0
+    """height in m"""
+    blocks: Annotated[list[Identifier], Field(min_length=1)] | None = None
+    """at least one id of a robot"""
 
 
 class TerrainEntry(ShapedEntry):
     """Ground that costs more energy, or less."""
 
-    id: Identifier | None = Field(default=None, description=ID)
-    multiplier: Positive = Field(description="energy relative to plain ground")
-    turning_multiplier: Positive = Field(
-        default=1.0, description="resistance to turning relative to plain ground"
-    )
-    energy_spread: NotNegative = Field(
-        default=0.0,
-        description="standard deviation of a run's energy from run to run, as a share",
-    )
+    id: Identifier | None = None
+    """name, unique in the whole file"""
+    multiplier: Positive
+    """energy relative to plain ground"""
+    turning_multiplier: Positive = 1.0
+    """resistance to turning relative to plain ground"""
+    energy_spread: NotNegative = 0.0
+    """standard deviation of a run's energy from run to run, as a share"""
 
 
 class RegionEntry(Strict):
@@ -147,46 +144,45 @@ class RegionEntry(Strict):
 
     model_config = exactly_one("circle", "polygon")
 
-    id: Identifier = Field(description=ID)
-    circle: CircleEntry | None = Field(default=None, description=DISC)
-    polygon: Ring | None = Field(default=None, description=RING)
-    dwell: NotNegative | None = Field(
-        default=None, description="time in s that a visit takes"
-    )
+    id: Identifier
+    """name, unique in the whole file"""
+    circle: CircleEntry | None = None
+    """a disc: its center [x, y] and its radius in m"""
+    polygon: Ring | None = None
+    """at least 3 corners [x, y] in m"""
+    dwell: NotNegative | None = None
+    """time in s that a visit takes"""
 
 
 class GoalEntry(RegionEntry):
     """A goal, perhaps with a heading."""
 
-    heading: Number | None = Field(default=None, description="yaw in rad")
-    heading_tolerance: Positive | None = Field(
-        default=None, description=f"in rad; default {HEADING_TOLERANCE_RAD}"
-    )
+    heading: Number | None = None
+    """yaw in rad"""
+    heading_tolerance: Positive | None = None
+    """in rad; default 0.2"""
 
 
 class StationEntry(RegionEntry):
     """A station."""
 
-    capacity: Literal[1] | None = Field(
-        default=None, description="1: for one robot at a time"
-    )
+    capacity: Literal[1] | None = None
+    """1: for one robot at a time"""
 
 
 class BatteryEntry(Strict):
     """At most one capacity, and the reserve."""
 
-    capacity_J: Positive | None = Field(default=None, description="capacity in J")
-    capacity_Wh: Positive | None = Field(default=None, description="capacity in Wh")
-    capacity_m: Positive | None = Field(
-        default=None, description="capacity in metres of plain ground"
-    )
-    reserve: Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)] | None = Field(
-        default=None,
-        description="share of the capacity that must always remain, in [0, 1)",
-    )
-    charging_power: Positive | None = Field(
-        default=None, description="power in W with which stations fill it"
-    )
+    capacity_J: Positive | None = None
+    """capacity in J"""
+    capacity_Wh: Positive | None = None
+    """capacity in Wh"""
+    capacity_m: Positive | None = None
+    """capacity in metres of plain ground"""
+    reserve: Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)] | None = None
+    """share of the capacity that must always remain, in [0, 1)"""
+    charging_power: Positive | None = None
+    """power in W with which stations fill it"""
 
 
 class StartEnergyEntry(Strict):
@@ -194,19 +190,23 @@ class StartEnergyEntry(Strict):
 
     model_config = exactly_one("fraction", "J", "Wh", "m")
 
-    fraction: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = Field(
-        default=None, description="share of the capacity, in [0, 1]"
-    )
-    J: Positive | None = Field(default=None, description="energy in J")
-    Wh: Positive | None = Field(default=None, description="energy in Wh")
-    m: Positive | None = Field(default=None, description="metres of plain ground")
+    fraction: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = None
+    """share of the capacity, in [0, 1]"""
+    J: Positive | None = None
+    """energy in J"""
+    Wh: Positive | None = None
+    """energy in Wh"""
+    m: Positive | None = None
+    """metres of plain ground"""
 
 
 class BlendEntry(Strict):
     """Weights of energy and makespan; one of them at least is positive."""
 
-    energy: NotNegative = Field(description="weight of each J")
-    makespan: NotNegative = Field(description="weight of each s")
+    energy: NotNegative
+    """weight of each J"""
+    makespan: NotNegative
+    """weight of each s"""
 
 
 def _share_to_mapping(value: Any) -> Any:
@@ -227,12 +227,14 @@ class FinishEntry(Strict):
 
     model_config = exactly_one("circle", "polygon")
 
-    circle: CircleEntry | None = Field(default=None, description=DISC)
-    polygon: Ring | None = Field(default=None, description=RING)
-    heading: Number | None = Field(default=None, description="yaw in rad")
-    heading_tolerance: Positive = Field(
-        default=HEADING_TOLERANCE_RAD, description="in rad"
-    )
+    circle: CircleEntry | None = None
+    """a disc: its center [x, y] and its radius in m"""
+    polygon: Ring | None = None
+    """at least 3 corners [x, y] in m"""
+    heading: Number | None = None
+    """yaw in rad"""
+    heading_tolerance: Positive = HEADING_TOLERANCE_RAD
+    """in rad"""
 
 
 _MODEL = (
@@ -270,73 +272,54 @@ Model = Annotated[
 class RobotEntry(Strict):
     """One robot of the fleet."""
 
-    id: Identifier = Field(description=ID)
+    id: Identifier
+    """name, unique in the whole file"""
     model: Model = Field(description=_MODEL)
-    pose: Annotated[list[Number], Field(min_length=3, max_length=3)] = Field(
-        description="[x in m, y in m, yaw in rad]"
-    )
-    start_energy: StartEnergy = Field(
-        default=StartEnergyEntry(fraction=1.0),
-        description="a share of the capacity, 0..1",
-    )
-    battery: BatteryEntry | None = Field(
-        default=None, description="its own battery; replaces what it names"
-    )
-    energy: EnergyPreset | None = Field(
-        default=None, description="which parts of the energy model count"
-    )
-    rolling_factor: Positive | None = Field(
-        default=None,
-        description="rolling resistance to reckon with, relative to the model",
-    )
-    margins: MarginsEntry | None = Field(
-        default=None, description="its own margins; replace what they name"
-    )
-    finish: Literal["start"] | FinishEntry | None = Field(
-        default=None, description="start, or a circle or polygon to end in"
-    )
+    pose: Annotated[list[Number], Field(min_length=3, max_length=3)]
+    """[x in m, y in m, yaw in rad]"""
+    start_energy: StartEnergy = StartEnergyEntry(fraction=1.0)
+    """a share of the capacity, 0..1"""
+    battery: BatteryEntry | None = None
+    """its own battery; replaces what it names"""
+    energy: EnergyPreset | None = None
+    """which parts of the energy model count"""
+    rolling_factor: Positive | None = None
+    """rolling resistance to reckon with, relative to the model"""
+    margins: MarginsEntry | None = None
+    """its own margins; replace what they name"""
+    finish: Literal["start"] | FinishEntry | None = None
+    """start, or a circle or polygon to end in"""
 
 
 class SceneDocument(Strict):
     """A whole scene file."""
 
-    format: Literal[1] = Field(description="format: 1")
-    name: Annotated[str, Field(min_length=1, max_length=200)] = Field(
-        description="what the scene is called; default: the file's name"
-    )
-    bounds: Annotated[list[Coordinate], Field(min_length=4, max_length=4)] = Field(
-        description="[x_min, y_min, x_max, y_max] in m"
-    )
-    obstacles: list[ObstacleEntry] = Field(
-        default=[], description="ground that robots keep off; polygon, box or circle"
-    )
-    terrain: list[TerrainEntry] = Field(
-        default=[], description="ground that costs more; the later of two counts"
-    )
-    elevation: ElevationEntry | None = Field(
-        default=None, description="heights of the ground in m; default: flat"
-    )
-    goals: list[GoalEntry] = Field(
-        default=[], description="convex regions, each to be visited by some robot"
-    )
-    stations: list[StationEntry] = Field(
-        default=[], description="convex regions in which batteries are charged"
-    )
-    battery: BatteryEntry = Field(
-        default=BatteryEntry(), description="capacity and reserve of every robot"
-    )
-    margins: MarginsEntry | None = Field(
-        default=None, description="distances in m that plans keep; default: by model"
-    )
-    objective: Literal["energy", "makespan"] | BlendEntry | None = Field(
-        default=None, description="energy, makespan, or {energy: w, makespan: w}"
-    )
-    time_limit: Positive | None = Field(
-        default=None, description="largest makespan in s"
-    )
-    robots: list[RobotEntry] = Field(
-        default=[], description="the fleet; where each robot starts, and what it is"
-    )
+    format: Literal[1]
+    """format: 1"""
+    name: Annotated[str, Field(min_length=1, max_length=200)]
+    """what the scene is called; default: the file's name"""
+    bounds: Annotated[list[Coordinate], Field(min_length=4, max_length=4)]
+    """[x_min, y_min, x_max, y_max] in m"""
+    obstacles: list[ObstacleEntry] = []
+    """ground that robots keep off; polygon, box or circle"""
+    terrain: list[TerrainEntry] = []
+    """ground that costs more; the later of two counts"""
+    elevation: ElevationEntry | None = None
+    """heights of the ground in m; default: flat"""
+    goals: list[GoalEntry] = []
+    """convex regions, each to be visited by some robot"""
+    stations: list[StationEntry] = []
+    """convex regions in which batteries are charged"""
+    battery: BatteryEntry = BatteryEntry()
+    """capacity and reserve of every robot"""
+    margins: MarginsEntry | None = None
+    """distances in m that plans keep; default: by model"""
+    objective: Literal["energy", "makespan"] | BlendEntry | None = None
+    """energy, makespan, or {energy: w, makespan: w}"""
+    time_limit: Positive | None = None
+    """largest makespan in s"""
+    robots: list[RobotEntry] = []
+    """the fleet; where each robot starts, and what it is"""
 
 
 SECTIONS: dict[str, type[Strict]] = {

@@ -18,20 +18,31 @@ Length = Annotated[float, Field(ge=SMALLEST_M, le=LARGEST_M, allow_inf_nan=False
 Height = Annotated[float, Field(ge=-HIGHEST_M, le=HIGHEST_M, allow_inf_nan=False)]
 Coordinate = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M, allow_inf_nan=False)]
 ID_PATTERN = r"^[A-Za-z0-9_][A-Za-z0-9_.\-]*$"
-ID = "name, unique in the whole file"
-Identifier = Annotated[str, Field(pattern=ID_PATTERN, max_length=64, description=ID)]
+Identifier = Annotated[
+    str,
+    Field(
+        pattern=ID_PATTERN,
+        max_length=64,
+        description="name, unique in the whole file",
+    ),
+]
 Point = Annotated[
     list[Coordinate], Field(min_length=2, max_length=2, description="[x, y] in m")
 ]
-RING = "at least 3 corners [x, y] in m"
-DISC = "a disc: its center [x, y] and its radius in m"
-Ring = Annotated[list[Point], Field(min_length=3, description=RING)]
+Ring = Annotated[
+    list[Point], Field(min_length=3, description="at least 3 corners [x, y] in m")
+]
 
 
 class Strict(BaseModel):
-    """No key that is not named, no text for numbers."""
+    """No key that is not named, no text for numbers.
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+    The docstrings of fields say in messages and schemas what is expected there.
+    """
+
+    model_config = ConfigDict(
+        extra="forbid", strict=True, frozen=True, use_attribute_docstrings=True
+    )
 
 
 _UNIT = re.compile(r"_(m_s2|m_s|m|kg_m2|kg|W|J|Ohm|Nm_A|V_s|A)$")
@@ -57,17 +68,18 @@ class BoxEntry(Strict):
     """A rectangle about its centre."""
 
     center: Point
-    size: Annotated[list[Length], Field(min_length=2, max_length=2)] = Field(
-        description="[length, width] in m"
-    )
-    yaw: Number = Field(default=0.0, description="turn in rad")
+    size: Annotated[list[Length], Field(min_length=2, max_length=2)]
+    """[length, width] in m"""
+    yaw: Number = 0.0
+    """turn in rad"""
 
 
 class CircleEntry(Strict):
     """A disc."""
 
     center: Point
-    radius: Length = Field(description="radius in m")
+    radius: Length
+    """radius in m"""
 
 
 class ShapedEntry(Strict):
@@ -75,12 +87,11 @@ class ShapedEntry(Strict):
 
     model_config = exactly_one("polygon", "box", "circle")
 
-    polygon: Ring | None = Field(default=None, description=RING)
-    holes: list[Ring] | None = Field(
-        default=None, description="rings inside the polygon"
-    )
-    box: BoxEntry | None = Field(
-        default=None,
-        description="a rectangle: center and size [length, width] in m, yaw in rad",
-    )
-    circle: CircleEntry | None = Field(default=None, description=DISC)
+    polygon: Ring | None = None
+    """at least 3 corners [x, y] in m"""
+    holes: list[Ring] | None = None
+    """rings inside the polygon"""
+    box: BoxEntry | None = None
+    """a rectangle: center and size [length, width] in m, yaw in rad"""
+    circle: CircleEntry | None = None
+    """a disc: its center [x, y] and its radius in m"""

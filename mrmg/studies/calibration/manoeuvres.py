@@ -8,7 +8,7 @@ limits the planner uses, so that a model is measured where it will be driven.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -103,41 +103,44 @@ def manoeuvres_of(model: RobotModel) -> tuple[Manoeuvre, ...]:
 def circle(
     model: RobotModel, limits: Limits, speed_m_s: float, second: float
 ) -> Manoeuvre:
-    """Return a circle that `model` drives.
+    """Return a circle that `model` drives, its radius the same from start to end.
 
     Args:
-        model: whose motion model determines how it gets on a circle.
+        model: a unicycle turns in proportion to its speed; others steer at rest.
         limits: of its ramps.
         speed_m_s: while cruising.
         second: psi [rad] or omega [rad/s] while cruising.
     """
-    drive = _spinning_circle if model.motion_model == "unicycle" else _steered_circle
-    return drive(limits, speed_m_s, second)
+    name = f"circle at {speed_m_s:.2f} m/s"
+    if model.motion_model == "unicycle":
+        pieces = _there_and_back((speed_m_s, second), limits)
+        return Manoeuvre(f"{name}, turning {second:+.2f} rad/s", "circle", 1.0, pieces)
+    pieces = (
+        _ramp("steer", (0.0, second), limits),
+        *_there_and_back((speed_m_s, 0.0), limits),
+        _ramp("steer", (0.0, -second), limits),
+    )
+    return Manoeuvre(f"{name}, steering {second:+.2f} rad", "circle", 1.0, pieces)
 
 
 def _straight(limits: Limits, speed: float, multiplier: float) -> Manoeuvre:
-    """Speed up, cruise, brake."""
     return Manoeuvre(
         f"straight at {speed:.2f} m/s, terrain x{multiplier:g}",
         "straight",
         multiplier,
-        (
-            _ramp("speed up", (speed, 0.0), limits),
-            _hold("cruise", CRUISE_S),
-            _ramp("brake", (-speed, 0.0), limits),
-        ),
+        _there_and_back((speed, 0.0), limits),
     )
+
+
+def _spin(limits: Limits, turn_rate: float) -> Manoeuvre:
+    """Turn on the spot."""
+    pieces = _there_and_back((0.0, turn_rate), limits)
+    return Manoeuvre(f"spin at {turn_rate:.2f} rad/s", "spin", 1.0, pieces)
 
 
 def _cycle(limits: Limits, acceleration: float) -> Manoeuvre:
     """Speed up and brake between a third of the top speed and all of it."""
-    gentle = Limits(
-        v_min_m_s=limits.v_min_m_s,
-        v_max_m_s=limits.v_max_m_s,
-        w_max=limits.w_max,
-        u1_max_m_s2=acceleration,
-        u2_max=limits.u2_max,
-    )
+    gentle = replace(limits, u1_max_m_s2=acceleration)
     high = limits.v_max_m_s
     low = high / 3.0
     swing = (
@@ -157,52 +160,14 @@ def _cycle(limits: Limits, acceleration: float) -> Manoeuvre:
     )
 
 
-def _steered_circle(limits: Limits, speed: float, steer: float) -> Manoeuvre:
-    """Steer at rest, speed up, cruise, brake, straighten the wheels."""
-    return Manoeuvre(
-        f"circle at {speed:.2f} m/s, steering {steer:+.2f} rad",
-        "circle",
-        1.0,
-        (
-            _ramp("steer", (0.0, steer), limits),
-            _ramp("speed up", (speed, 0.0), limits),
-            _hold("cruise", CRUISE_S),
-            _ramp("brake", (-speed, 0.0), limits),
-            _ramp("steer", (0.0, -steer), limits),
-        ),
+def _there_and_back(speeds: tuple[float, float], limits: Limits) -> tuple[Piece, ...]:
+    """Speed up from rest to (v, w), cruise, brake."""
+    first, second = speeds
+    return (
+        _ramp("speed up", speeds, limits),
+        Piece("cruise", (0.0, 0.0), round(CRUISE_S / STEP_S)),
+        _ramp("brake", (0.0 - first, 0.0 - second), limits),
     )
-
-
-def _spinning_circle(limits: Limits, speed: float, turn_rate: float) -> Manoeuvre:
-    """Speed up and turn in proportion, cruise, brake: the radius stays the same."""
-    return Manoeuvre(
-        f"circle at {speed:.2f} m/s, turning {turn_rate:+.2f} rad/s",
-        "circle",
-        1.0,
-        (
-            _ramp("speed up", (speed, turn_rate), limits),
-            _hold("cruise", CRUISE_S),
-            _ramp("brake", (-speed, -turn_rate), limits),
-        ),
-    )
-
-
-def _spin(limits: Limits, turn_rate: float) -> Manoeuvre:
-    """Turn on the spot."""
-    return Manoeuvre(
-        f"spin at {turn_rate:.2f} rad/s",
-        "spin",
-        1.0,
-        (
-            _ramp("speed up", (0.0, turn_rate), limits),
-            _hold("cruise", CRUISE_S),
-            _ramp("brake", (0.0, -turn_rate), limits),
-        ),
-    )
-
-
-def _hold(name: str, duration_s: float) -> Piece:
-    return Piece(name, (0.0, 0.0), round(duration_s / STEP_S))
 
 
 def _ramp(name: str, change: tuple[float, float], limits: Limits) -> Piece:

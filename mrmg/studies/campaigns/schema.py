@@ -72,44 +72,53 @@ Names = Annotated[
     BeforeValidator(_listed, json_schema_input_type=str | list[str]),
     Field(min_length=1),
 ]
-SEED = "one seed for all trials, in place of each trial's"
 
 
 class PopulateEntry(Strict):
     """Robots, goals and stations that are placed on a map."""
 
-    robots: Count = Field(default=2, description="how many, at least 1")
-    goals: Count = Field(default=14, description="how many, at least 1")
-    stations: Count = Field(default=5, description="how many, at least 1")
-    model: str = Field(default="car", description="a shipped model, or a folder")
-    seed: Seed | None = Field(default=None, description=SEED)
+    robots: Count = 2
+    """how many, at least 1"""
+    goals: Count = 14
+    """how many, at least 1"""
+    stations: Count = 5
+    """how many, at least 1"""
+    model: str = "car"
+    """a shipped model, or a folder"""
+    seed: Seed | None = None
+    """one seed for all trials, in place of each trial's"""
 
 
 class PerturbEntry(Strict):
     """How far what a scene has is moved."""
 
-    goals: NotNegative = Field(default=0.0, description="largest distance in m")
-    stations: NotNegative = Field(default=0.0, description="largest distance in m")
-    starts: NotNegative = Field(default=0.0, description="largest distance in m")
-    headings: NotNegative = Field(default=0.0, description="largest turn in degrees")
-    obstacles: NotNegative = Field(default=0.0, description="largest distance in m")
-    seed: Seed | None = Field(default=None, description=SEED)
+    goals: NotNegative = 0.0
+    """largest distance in m"""
+    stations: NotNegative = 0.0
+    """largest distance in m"""
+    starts: NotNegative = 0.0
+    """largest distance in m"""
+    headings: NotNegative = 0.0
+    """largest turn in degrees"""
+    obstacles: NotNegative = 0.0
+    """largest distance in m"""
+    seed: Seed | None = None
+    """one seed for all trials, in place of each trial's"""
 
 
 class SourceEntry(Strict):
     """A scene, or how one is made from another."""
 
-    scene: str = Field(description="path of a scene file, or name of a shipped scene")
-    name: str | None = Field(default=None, description="what tables call it")
-    change: dict[str, Any] | None = Field(
-        default=None, description="keys of the scene file with other values"
-    )
-    populate: PopulateEntry | None = Field(
-        default=None, description="places a mission on the map, anew for each seed"
-    )
-    perturb: PerturbEntry | None = Field(
-        default=None, description="moves what the scene has, anew for each seed"
-    )
+    scene: str
+    """path of a scene file, or name of a shipped scene"""
+    name: str | None = None
+    """what tables call it"""
+    change: dict[str, Any] | None = None
+    """keys of the scene file with other values"""
+    populate: PopulateEntry | None = None
+    """places a mission on the map, anew for each seed"""
+    perturb: PerturbEntry | None = None
+    """moves what the scene has, anew for each seed"""
 
 
 Source = Annotated[
@@ -124,21 +133,24 @@ class CampaignDocument(Strict):
         list[Source],
         BeforeValidator(_listed, json_schema_input_type=Source | list[Source]),
         Field(min_length=1),
-    ] = Field(description="at least one scene")
+    ]
+    """at least one scene"""
     seeds: Annotated[
         list[Seed],
         BeforeValidator(_seeds, json_schema_input_type=int | str | list[Seed]),
         Field(min_length=1),
-    ] = Field(
-        default=[0], description="whole numbers of at least 0, or a range such as 0-49"
-    )
-    planners: Names = Field(default=["default"], description="names of planners")
-    routers: Names = Field(default=["default"], description="names of routers")
-    controllers: Names = Field(default=["default"], description="names of controllers")
-    plants: Names = Field(default=["default"], description="ground contacts")
-    disturbances: Names = Field(
-        default=["none"], description="none, default, or as --disturb takes them"
-    )
+    ] = [0]
+    """whole numbers of at least 0, or a range such as 0-49"""
+    planners: Names = ["default"]
+    """names of planners"""
+    routers: Names = ["default"]
+    """names of routers"""
+    controllers: Names = ["default"]
+    """names of controllers"""
+    plants: Names = ["default"]
+    """ground contacts"""
+    disturbances: Names = ["none"]
+    """none, default, or as --disturb takes them"""
     parameters: dict[
         str,
         Annotated[
@@ -146,7 +158,8 @@ class CampaignDocument(Strict):
             BeforeValidator(_listed, json_schema_input_type=Any),
             Field(min_length=1),
         ],
-    ] = Field(default={}, description="options of mrmg run, each with its values")
+    ] = {}
+    """options of mrmg run, each with its values"""
 
 
 def campaign_schema() -> dict[str, Any]:

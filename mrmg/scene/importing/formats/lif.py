@@ -34,8 +34,10 @@ class _Open(Strict):
 class PositionEntry(_Open):
     """Where a node is."""
 
-    x: Number = Field(description="metres")
-    y: Number = Field(description="metres")
+    x: Number
+    """metres"""
+    y: Number
+    """metres"""
 
 
 class NodeEntry(_Open):

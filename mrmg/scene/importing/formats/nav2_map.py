@@ -42,11 +42,12 @@ class MapDocument(Strict):
 
     model_config = {**Strict.model_config, "extra": "ignore"}
 
-    image: Annotated[str, Field(min_length=1)] = Field(description="PGM or PNG file")
-    resolution: Positive = Field(description="side of a cell in m")
-    origin: Annotated[list[Number], Field(min_length=2, max_length=3)] = Field(
-        description="[x, y, yaw] of the lower left corner in m and rad"
-    )
+    image: Annotated[str, Field(min_length=1)]
+    """PGM or PNG file"""
+    resolution: Positive
+    """side of a cell in m"""
+    origin: Annotated[list[Number], Field(min_length=2, max_length=3)]
+    """[x, y, yaw] of the lower left corner in m and rad"""
     mode: Literal["trinary", "scale", "raw"] = "trinary"
     negate: Literal[0, 1, False, True] = 0
     occupied_thresh: Annotated[float, Field(ge=0, le=1)] = 0.65
