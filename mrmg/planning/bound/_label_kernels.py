@@ -27,9 +27,14 @@ class TourSearch(NamedTuple):
         is_counted: whether they are, of each node, shape (T + 1,).
         leg: what legs cost from arc to arc, shape (R, T + 1, K, T, K); row T is the
             start, in whose arc 0 robots are.
-        drain: what they drain batteries by, likewise.
+        drain: what they drain batteries by, likewise; but from stations, where from
+            whatever arc batteries are full,
+        station_drain: (R, S, T, K).
         nearest: the least that they cost to any arc, shape (R, T + 1, K, T).
-        finish: what the last leg costs from each node, shape (R, T + 1).
+        price: added to the cost of each visit, shape (T,).
+        toll: added to the cost of each robot at its start, shape (R,).
+        finish: what the last leg costs from each node, shape (R, T + 1); from the
+            start, less the toll, as a robot that stays there pays none.
         rest: bounds of what is still to come, by which labels are dropped.
         most: cost of tours of interest; others may be missed.
     """
@@ -40,7 +45,10 @@ class TourSearch(NamedTuple):
     is_counted: np.ndarray
     leg: np.ndarray
     drain: np.ndarray
+    station_drain: np.ndarray
     nearest: np.ndarray
+    price: np.ndarray
+    toll: np.ndarray
     finish: np.ndarray
     rest: Completions
     most: float
@@ -52,8 +60,10 @@ class Labels(NamedTuple):
     Memory that is not written is not used.
 
     Attributes:
-        value: cost and energy left, shape (N, 2).
-        trace: robot, node, arc and parent, shape (N, 4).
+        value: cost and energy left of the present robot's labels, in their order, shape
+            (N, 2).
+        place: robot, node and arc, shape (N, 3).
+        parent: the label that each one continues, shape (N,).
         first: number of the first label of the present robot in each state, and of the
             end, shape (X + 1,).
         near: labels that the present goal may follow, shape (N,).
@@ -61,7 +71,8 @@ class Labels(NamedTuple):
     """
 
     value: np.ndarray
-    trace: np.ndarray
+    place: np.ndarray
+    parent: np.ndarray
     first: np.ndarray
     near: np.ndarray
     offer: np.ndarray
@@ -70,15 +81,23 @@ class Labels(NamedTuple):
 
 @kernel
 def set_value(labels, k, cost, left):
-    """Write the value of label k."""
-    labels.value[k, 0], labels.value[k, 1] = cost, left
+    """Write the value of label k, one of the present robot."""
+    own = k - labels.first[0]
+    labels.value[own, 0], labels.value[own, 1] = cost, left
+
+
+@kernel
+def value_of(labels, k):
+    """Return cost and energy left of label k, one of the present robot."""
+    own = k - labels.first[0]
+    return labels.value[own, 0], labels.value[own, 1]
 
 
 @kernel
 def set_trace(labels, k, r, node, arc, parent):
     """Write where label k is, and the label that it continues."""
-    labels.trace[k, 0], labels.trace[k, 1] = r, node
-    labels.trace[k, 2], labels.trace[k, 3] = arc, parent
+    labels.place[k, 0], labels.place[k, 1], labels.place[k, 2] = r, node, arc
+    labels.parent[k] = parent
 
 
 @kernel

@@ -31,6 +31,7 @@ from mrmg.planning.bound._label_kernels import (
     bounded,
     set_trace,
     set_value,
+    value_of,
 )
 
 
@@ -43,16 +44,17 @@ def cheapest_tours(search, room):
         room: labels at most.
 
     Returns:
-        (cost, last, trace): of each state, inf where no tours lead to it that cost at
-        most `search.most`, shape (X,); the last label of its tours; and `trace` as in
-        `Labels`, which is empty if there are more labels than there is room for.
+        (cost, last, place, parent): of each state, inf where no tours lead to it that
+        cost at most `search.most`, shape (X,); the last label of its tours; and of each
+        label as in `Labels`, empty if there are more than there is room for.
     """
     problem = search.routing
     n, start = len(search.goal_list), search.leg.shape[3]
     states = states_of(n, search.remembered)
     labels = Labels(
         np.empty((room, 2)),
-        np.empty((room, 4), np.int32),
+        np.empty((room, 3), np.int16),
+        np.empty(room, np.int32),
         np.zeros(states + 1, np.int64),
         np.empty(room, np.int32),
         np.empty((room, 2)),
@@ -69,7 +71,8 @@ def cheapest_tours(search, room):
                 cost[state] + search.rest.before[state] <= search.most
             ):
                 if count < room:
-                    set_value(labels, count, cost[state], problem.energy[r])
+                    begun = cost[state] + search.toll[r]
+                    set_value(labels, count, begun, problem.energy[r])
                     set_trace(labels, count, r, start, 0, last[state])
                 count += 1
             for g in range(n):
@@ -81,10 +84,10 @@ def cheapest_tours(search, room):
             if labels.first[state] < count <= room:
                 count = _visit_stations(search, labels, r, state, count)
             if count > room:
-                return cost, last, labels.trace[:0]
+                return cost, last, labels.place[:0], labels.parent[:0]
             labels.first[state + 1] = count
         _end_tours(search, labels, r, cost, last)
-    return cost, last, labels.trace[:count]
+    return cost, last, labels.place[:count], labels.parent[:count]
 
 
 @kernel
@@ -113,7 +116,7 @@ def _visit_goal(search, labels, r, state, g, count):
                 continue
             if left <= most_left and source in (NOTHING, origin):
                 continue
-            if count > first and labels.value[count - 1, 0] == cost and origin < 0:
+            if count > first and value_of(labels, count - 1)[0] == cost and origin < 0:
                 count -= 1  # as costly, and less energy left
             if left <= most_left:
                 other_left = left
@@ -130,7 +133,7 @@ def _visit_goal(search, labels, r, state, g, count):
 @kernel
 def _repeatable(search, labels, k):
     """Return the goal that label k is at if its visits are counted, else NOTHING."""
-    node = labels.trace[k, 1]
+    node = labels.place[k, 1]
     return node if search.is_counted[node] else NOTHING
 
 
@@ -146,16 +149,17 @@ def _near(search, labels, r, rest, g, ahead):
         ahead: what bounds the rest of the mission after it.
     """
     problem, goal = search.routing, search.goal_list[g]
-    counted = g >= search.remembered
+    counted, price = g >= search.remembered, search.price[goal]
     near = 0
     for k in range(labels.first[rest], labels.first[rest + 1]):
-        node, from_arc = labels.trace[k, 1], labels.trace[k, 2]
+        node, from_arc = labels.place[k, 1], labels.place[k, 2]
         if counted and node < problem.goals:
-            before = labels.trace[labels.trace[k, 3], 1]
+            before = labels.place[labels.parent[k], 1]
             if goal in (node, before):
                 continue
-        left = labels.value[k, 1] - problem.cost[r, node, goal]
-        cost = labels.value[k, 0] + search.nearest[r, node, from_arc, goal]
+        cost, left = value_of(labels, k)
+        left -= problem.cost[r, node, goal]
+        cost += price + search.nearest[r, node, from_arc, goal]
         if left < problem.reserve[r] or cost == np.inf:
             continue
         if cost + bounded(ahead, left) <= search.most:
@@ -176,12 +180,16 @@ def _offers(search, labels, r, near, goal, arc, ahead):
         arc: of its border.
         ahead: what bounds the rest of the mission after it.
     """
-    problem = search.routing
+    problem, start, price = search.routing, search.leg.shape[3], search.price[goal]
     offers = 0
     for k in labels.near[:near]:
-        node, from_arc = labels.trace[k, 1], labels.trace[k, 2]
-        cost = labels.value[k, 0] + search.leg[r, node, from_arc, goal, arc]
-        left = labels.value[k, 1] - search.drain[r, node, from_arc, goal, arc]
+        node, from_arc = labels.place[k, 1], labels.place[k, 2]
+        cost, left = value_of(labels, k)
+        cost += price + search.leg[r, node, from_arc, goal, arc]
+        if problem.goals <= node < start:
+            left -= search.station_drain[r, node - problem.goals, goal, arc]
+        else:
+            left -= search.drain[r, node, from_arc, goal, arc]
         if left < problem.reserve[r] or cost == np.inf:
             continue
         if cost + bounded(ahead, left) <= search.most:
@@ -212,7 +220,7 @@ def _visit_stations(search, labels, r, state, count):
     for s in range(stations):
         ahead[s] = _after_station(search, r, state, s)
     for k in range(labels.first[state], count):
-        usable = labels.value[k, 1] - problem.reserve[r]
+        usable = value_of(labels, k)[1] - problem.reserve[r]
         _lead_on(search, labels, r, k, usable, ahead, cost, origin)
     done = np.zeros((stations, arcs), np.bool_)
     while True:
@@ -243,18 +251,22 @@ def _lead_on(search, labels, r, k, usable, ahead, cost, origin):
         ahead: bounds of what is still to come after each station, shape (S,).
         cost, origin: of each station's arcs, and the label before, shape (S, K).
     """
-    node, from_arc = labels.trace[k, 1], labels.trace[k, 2]
-    goals = search.routing.goals
+    node, from_arc = labels.place[k, 1], labels.place[k, 2]
+    goals, start = search.routing.goals, search.leg.shape[3]
+    charged, before = goals <= node < start, value_of(labels, k)[0]
     for s in range(len(cost)):
         if search.routing.cost[r, node, goals + s] > usable or node == goals + s:
             continue
         nearest = search.nearest[r, node, from_arc, goals + s]
-        if labels.value[k, 0] + nearest + ahead[s] > search.most:
+        if before + nearest + ahead[s] > search.most:
             continue
         for arc in range(cost.shape[1]):
-            if search.drain[r, node, from_arc, goals + s, arc] > usable:
+            drain = search.drain[r, node, from_arc, goals + s, arc]
+            if charged:
+                drain = search.station_drain[r, node - goals, goals + s, arc]
+            if drain > usable:
                 continue
-            value = labels.value[k, 0] + search.leg[r, node, from_arc, goals + s, arc]
+            value = before + search.leg[r, node, from_arc, goals + s, arc]
             if value < cost[s, arc] and value + ahead[s] <= search.most:
                 cost[s, arc] = value
                 origin[s, arc] = k
@@ -283,10 +295,11 @@ def _end_tours(search, labels, r, cost, last):
     for state in range(len(cost)):
         cost[state] = np.inf
         for k in range(labels.first[state], labels.first[state + 1]):
-            node = labels.trace[k, 1]
+            node = labels.place[k, 1]
+            before, left = value_of(labels, k)
             drain = problem.finish[r, node]
-            total = labels.value[k, 0] + search.finish[r, node]
-            enough = drain == 0.0 or labels.value[k, 1] - drain >= problem.reserve[r]
+            total = before + search.finish[r, node]
+            enough = drain == 0.0 or left - drain >= problem.reserve[r]
             # Of what costs more, tours that cost less may have been missed.
             few = total + search.rest.before[state] <= search.most
             if enough and few and total < cost[state]:

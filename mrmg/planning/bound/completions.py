@@ -62,20 +62,6 @@ class Visits:
         """What tours that visit every goal once pay too much at most [J]."""
         return float(self.price[self.order].sum() + self.toll.sum())
 
-    def priced(self, leg: np.ndarray) -> np.ndarray:
-        """Return legs of robots with prices, none of a counted goal to itself.
-
-        Args:
-            leg: cost from arc to arc, shape (R, T + 1, K, T, K).
-        """
-        counted = self.order[self.remembered :]
-        if not (self.price.any() or self.toll.any() or len(counted)):
-            return leg
-        priced = leg + self.price[:, None]
-        priced[:, -1] += self.toll[:, None, None, None]
-        priced[:, counted, :, counted] = np.inf
-        return np.asarray(priced)
-
 
 def no_completions(problem: RoutingArrays, visits: Visits) -> Completions:
     """Return completions that know nothing, for searches among all tours."""

@@ -94,21 +94,19 @@ def cheapest_tours(
         tell than there is room for; and the labels that it took.
     """
     visits = visits or Visits.all_remembered(problem)
-    stations = slice(problem.goals, problem.cost.shape[2])
-    drain = leg.copy()  # from wherever in a station the battery is full
-    drain[:, stations] = drain[:, stations].min(axis=2, keepdims=True)
-    search = _search(problem, visits, visits.priced(leg), drain, rest, most)
-    cost, last, trace = _touring_kernels.cheapest_tours(search, room)
-    if not len(trace):
+    search = _search(problem, visits, leg, leg, rest, most)
+    cost, last, place, parent = _touring_kernels.cheapest_tours(search, room)
+    if not len(parent):
         return None, room
     tours: list[list[int]] = [[] for _ in problem.energy]
     label = int(last[-1]) if np.isfinite(cost[-1]) else -1
     while label >= 0:
-        robot, node, _, label = trace[label].tolist()
+        robot, node, _ = place[label].tolist()
         if node < leg.shape[3]:
             tours[robot].insert(0, node)
+        label = int(parent[label])
     least = float(cost[-1]) - visits.surcharge
-    return Routing(tuple(tuple(tour) for tour in tours), least), len(trace)
+    return Routing(tuple(tuple(tour) for tour in tours), least), len(parent)
 
 
 def _search(
@@ -122,6 +120,9 @@ def _search(
     """Return the search for tours that cost `most` but for prices."""
     counted = np.zeros(leg.shape[1], np.bool_)
     counted[visits.order[visits.remembered :]] = True
+    stations = slice(problem.goals, problem.cost.shape[2])
+    finish = problem.finish.copy()
+    finish[:, -1] -= visits.toll
     return TourSearch(
         routing=problem,
         goal_list=visits.order,
@@ -129,8 +130,11 @@ def _search(
         is_counted=counted,
         leg=leg,
         drain=drain,
+        station_drain=drain[:, stations].min(axis=2),
         nearest=leg.min(axis=4),
-        finish=problem.finish,
+        price=visits.price,
+        toll=visits.toll,
+        finish=finish,
         rest=rest,
         most=most + visits.surcharge,
     )
@@ -159,8 +163,8 @@ def least_costs(
     nothing = no_completions(problem, visits)
     search = _search(problem, visits, leg, drain, nothing, math.inf)
     search = search._replace(finish=finish)
-    least, _, trace = _touring_kernels.cheapest_tours(search, MOST_LABELS)
-    return np.asarray(least) if len(trace) else None
+    least, _, _, parent = _touring_kernels.cheapest_tours(search, MOST_LABELS)
+    return np.asarray(least) if len(parent) else None
 
 
 def of_robot(problem: RoutingArrays, r: int) -> RoutingArrays:

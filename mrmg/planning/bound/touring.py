@@ -79,12 +79,13 @@ def touring_bound_J(
     visits = visits or Visits.all_remembered(problem)
     best, tours = relaxed.cost_J, relaxed.tours
     settled_J, rest, cheapest = -math.inf, None, False
+    leg = _room_for_legs(ways, problem.goals)
     for _ in range(rounds):
         tightened = _tighten(ways, price, tours)
         if halt[0] or (cheapest and not tightened):
             break
         settled = math.isfinite(settled_J)
-        leg = _leg_table(ways, price, problem.goals)
+        _write_legs(leg, ways, price)
         rest = rest or completions(problem, leg, visits)
         best = max(best, float(rest.before[0]) - visits.surcharge)
         most = (1.0 + (FINE_STEP if settled else STEP)) * best
@@ -149,8 +150,8 @@ def _legs_of(ways: ArcWays, r: int, price: float) -> np.ndarray:
     return np.concatenate([price * ways.between, start])
 
 
-def _leg_table(ways: Sequence[ArcWays], price: np.ndarray, goals: int) -> np.ndarray:
-    """Return what legs cost from arc to arc, shape (R, T + 1, K, T, K).
+def _room_for_legs(ways: Sequence[ArcWays], goals: int) -> np.ndarray:
+    """Return a table for what legs cost from arc to arc, shape (R, T + 1, K, T, K).
 
     Neighbouring arcs count as one where there are many goals or legs.
     """
@@ -159,12 +160,19 @@ def _leg_table(ways: Sequence[ArcWays], price: np.ndarray, goals: int) -> np.nda
     joined = 1 if goals <= FINE_ARC_GOALS else 2
     while joined < ARCS and legs > FINE_ARC_LEGS * joined**2:
         joined *= 2
-    table, each = [], range(joined)
+    arcs = ARCS // joined
+    return np.empty((len(ways), count + 1, arcs, count, arcs))
+
+
+def _write_legs(leg: np.ndarray, ways: Sequence[ArcWays], price: np.ndarray) -> None:
+    """Write what legs cost from arc to arc at present."""
+    each = range(ARCS // leg.shape[4])
+    leg[:] = np.inf
     for r, one in enumerate(ways):
-        leg = _legs_of(one, r, price[r])
-        parts = [leg[:, i::joined, :, j::joined] for i, j in product(each, each)]
-        table.append(np.minimum.reduce(parts))
-    return np.stack(table)
+        own = _legs_of(one, r, price[r])
+        for i, j in product(each, each):
+            part = own[:, i :: len(each), :, j :: len(each)]
+            np.minimum(leg[r], part, out=leg[r])
 
 
 def _cost_along(
