@@ -90,8 +90,7 @@ def touring_bound_J(
         best = max(best, float(rest.before[0]) - visits.surcharge)
         most = (1.0 + (FINE_STEP if settled else STEP)) * best
         along_J = (1.0 + SLACK) * _cost_along(ways, price, tours, visits)
-        if best < along_J:
-            most = min(most, along_J)
+        most = min(most, along_J) if best < along_J else most
         found, labels = cheapest_tours(problem, leg, rest, most, work, visits)
         work -= labels
         if found is None:
