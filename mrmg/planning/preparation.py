@@ -105,11 +105,11 @@ def bound_smallest() -> None:
 
 
 _CALLS = {
-    PATH_FOLLOWING: (follow_smallest, bound_smallest, coordinate_smallest),
+    PATH_FOLLOWING: (coordinate_smallest, follow_smallest, bound_smallest),
     GUIDED_TREE: (guide_smallest, bound_smallest),
 }
-"""What compiles all kernels of a part; the same kernels in two that run side by side
-are compiled twice, so those that share some are not next to each other."""
+"""What compiles all kernels of a part, what takes longest first: it would be waited for
+at the end. What two share that run side by side is compiled twice."""
 
 SMALL_PARAMS = PlannerParams(samples=20, trees=1)
 """What suffices to plan the smallest mission."""
