@@ -85,10 +85,7 @@ def _walk(legs: Legs, found: Tables) -> tuple[np.ndarray, list[int]]:
             go = np.where(back, second[state + 1] + legs.price, on) + legs.between[at]
             go[before if before >= 0 else at] = np.inf
         if at < 0 or legs.to_end[at] + found.before[state] <= go.min():
-            at, before = (
-                int(np.argmin(legs.from_start[0] + on)),
-                _completion_kernels.NONE,
-            )
+            at, before = int(np.argmin(legs.from_start[0] + on)), NONE
             begun.append(at)
         else:
             at, before = int(np.argmin(go)), at
