@@ -114,10 +114,6 @@ def sheltered_children() -> Iterator[None]:
     if sys.platform == "win32":  # has no such masks
         yield
         return
-    import multiprocessing
-
-    # The first lock starts Python's resource tracker, which lifts such masks.
-    multiprocessing.get_context("spawn").Lock()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
     try:
         yield

@@ -97,6 +97,12 @@ def test_kernels_import_only_what_can_be_compiled(path: Path) -> None:
         assert feeds_cache if inside else name.split(".")[0] in allowed, name
 
 
+@pytest.mark.parametrize("path", MODULES, ids=relative)
+def test_mujoco_is_imported_at_one_place(path: Path) -> None:
+    is_door = path.name == "mujoco_import.py"
+    assert ("mujoco" in imported_names(path)) == is_door
+
+
 def imported_names(path: Path) -> list[str]:
     names = []
     for node in ast.walk(ast.parse(path.read_text())):

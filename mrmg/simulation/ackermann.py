@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import mujoco
 import numpy as np
 
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import PARTS
 from mrmg.scene.types import Robot
 from mrmg.simulation.chassis import part_ids

@@ -10,10 +10,10 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Protocol
 
-import mujoco
 import numpy as np
 
 from mrmg.errors import Fault, FileError, UsageError
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.types import Robot
 
 

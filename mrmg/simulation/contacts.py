@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import mujoco
-
+from mrmg.mujoco_import import mujoco
 from mrmg.simulation.log import Contact
 from mrmg.simulation.world_model import MujocoWorld
 

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import mujoco
 import numpy as np
 
 from mrmg.energy.model import GRAVITY_M_S2
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import CHASSIS, PARTS, ROOT
 from mrmg.scene.types import Robot
 from mrmg.simulation.chassis import part_ids

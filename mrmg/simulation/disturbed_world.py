@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import ROOT
 from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
 from mrmg.simulation.slopes import standing_pose

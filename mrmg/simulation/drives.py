@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import mujoco
 import numpy as np
 
 from mrmg.errors import Fault, FileError
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.loading.force_drive import drive_fault, transmission
 from mrmg.scene.types import Robot
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
-import mujoco
 import numpy as np
+
+from mrmg.mujoco_import import mujoco
 
 _LOST_M = 2.0
 _REST_S = 1.0

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import ROOT
 from mrmg.scene.types import Scene
 from mrmg.simulation.chassis import Chassis, chassis_maker, part_ids

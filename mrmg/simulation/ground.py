@@ -12,12 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import mujoco
 import numpy as np
 import shapely
 
 from mrmg.energy.model import GRAVITY_M_S2
 from mrmg.errors import Fault, FileError
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.types import Robot, Scene
 from mrmg.simulation.disturbance import Disturbance
 from mrmg.simulation.world_model import MujocoWorld

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-import mujoco
 import numpy as np
 import shapely
 from shapely.geometry import MultiPolygon, Polygon
 
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.region import Region
 from mrmg.scene.types import Scene
 from mrmg.world.elevation import height_at

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 
 from mrmg.errors import UsageError
+from mrmg.mujoco_import import mujoco
 from mrmg.simulation.disturbance import Disturbance
 from mrmg.simulation.ground import Ground, true_resistance
 from mrmg.simulation.scrub import ScrubbingTyres

@@ -7,11 +7,11 @@ each other. Groups: 1 drawn, 3 hidden solids.
 
 from __future__ import annotations
 
-import mujoco
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
 
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import FLOOR_BIT, OBSTACLE_BIT
 from mrmg.scene.region import Region
 from mrmg.scene.types import Obstacle, Scene

@@ -35,10 +35,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
 from mrmg.energy.model import GRAVITY_M_S2
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import FLOOR_BIT, ROOT
 from mrmg.simulation.ground import TerrainUnderfoot
 from mrmg.simulation.scenery import FLOOR

@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-import mujoco
 import numpy as np
 
+from mrmg.mujoco_import import mujoco
 from mrmg.plans import Plan
 from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.loading.mjcf import no_warning_file

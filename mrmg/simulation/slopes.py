@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
-import mujoco
 import numpy as np
 
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.types import Scene
 from mrmg.world.elevation import gradient_at, height_at
 

@@ -21,9 +21,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import mujoco
 import numpy as np
 
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import CHASSIS, PARTS
 from mrmg.scene.loading.force_drive import is_metered, transmission
 from mrmg.scene.types import Robot

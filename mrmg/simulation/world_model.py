@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 
 from mrmg.errors import Fault, FileError
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import CHASSIS, HULL, require_drivable
 from mrmg.scene.loading.mjcf import no_warning_file
 from mrmg.scene.types import Robot, Scene

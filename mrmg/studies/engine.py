@@ -17,6 +17,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
+from multiprocessing import get_context
 from typing import Any, TypeVar
 
 from mrmg.errors import MachineError, UsageError
@@ -107,6 +108,8 @@ class Engine:
                 for number, job in islice(waiting, count)
             }
 
+        # The first lock starts Python's resource tracker, which lifts signal masks.
+        get_context("spawn").Lock()
         try:
             with sheltered_children():
                 running = submitted(2 * (self.workers or 1))

@@ -9,10 +9,10 @@ import threading
 import time
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from mrmg.extras import import_extra
+from mrmg.mujoco_import import mujoco
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.world_model import build_world

@@ -30,7 +30,7 @@ _CURE = (
 _PROBE = """
 import sys
 from importlib import import_module
-import mujoco
+from mrmg.mujoco_import import mujoco
 context = import_module("mujoco." + sys.argv[1]).GLContext(32, 32)
 context.make_current()
 model = mujoco.MjModel.from_xml_string("<mujoco/>")

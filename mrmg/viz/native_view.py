@@ -6,10 +6,10 @@ import math
 import time
 import warnings
 
-import mujoco
 import numpy as np
 
 from mrmg.errors import MachineError
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.types import Scene
 from mrmg.simulation.world_model import MujocoWorld, build_world
 from mrmg.viz import style
@@ -45,7 +45,7 @@ def open_window(scene: Scene, replay: Replay | None) -> None:
     Raises:
         MachineError: if no window can be opened.
     """
-    import mujoco.viewer
+    from mujoco.viewer import launch_passive
 
     _refuse_without_screen()
     world = replay.film.world if replay else build_world(scene)
@@ -54,7 +54,7 @@ def open_window(scene: Scene, replay: Replay | None) -> None:
     mujoco.mj_forward(model, data)
     if replay is not None:
         replay.playing = True
-    window = mujoco.viewer.launch_passive(
+    window = launch_passive(
         model,
         data,
         key_callback=lambda key: steer(replay, key),

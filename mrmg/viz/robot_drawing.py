@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-import mujoco
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import why_not_driven
 from mrmg.scene.robot_figures import figure_lines
 from mrmg.scene.robot_model import RobotModel

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import mujoco
 import numpy as np
 import trimesh
+
+from mrmg.mujoco_import import mujoco
 
 _LAST_DRAWN_GROUP = 2
 _SIDES = 24

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from mrmg.errors import MachineError
+from mrmg.mujoco_import import mujoco
 from mrmg.simulation.scenery import FLOOR
 from mrmg.simulation.world_model import MujocoWorld
 from mrmg.viz.gl_backend import offscreen_context

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 from protocol import Row
 
 from mrmg import shipped
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.loading.models import load_model
 from mrmg.scene.robot_model import Limits, RobotModel
 from mrmg.simulation.log import ExecutionLog

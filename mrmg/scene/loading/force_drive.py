@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    import mujoco
+    from mrmg.mujoco_import import mujoco
 
 
 def transmission(model: mujoco.MjModel) -> np.ndarray:
     """Return what joint velocities make of actuators' velocities, shape (nout, nv)."""
-    import mujoco
+    from mrmg.mujoco_import import mujoco
 
     still = mujoco.MjData(model)
     mujoco.mj_forward(model, still)
@@ -37,7 +37,7 @@ def is_metered(model: mujoco.MjModel, index: int) -> bool:
 
 def drive_fault(model: mujoco.MjModel, index: int, moment: np.ndarray) -> str:
     """Return why an actuator cannot be commanded as a force; "" if it can."""
-    import mujoco
+    from mrmg.mujoco_import import mujoco
 
     elsewhere = _transmission_fault(model, index)
     dofs = np.flatnonzero(moment)
@@ -66,7 +66,7 @@ def drive_fault(model: mujoco.MjModel, index: int, moment: np.ndarray) -> str:
 
 
 def _transmission_fault(model: mujoco.MjModel, index: int) -> str:
-    import mujoco
+    from mrmg.mujoco_import import mujoco
 
     kind, target = model.actuator_trntype[index], model.actuator_trnid[index, 0]
     joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)

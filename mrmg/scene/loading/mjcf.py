@@ -24,7 +24,7 @@ _TURNED_RAD = 1.0
 @contextmanager
 def no_warning_file() -> Iterator[None]:
     """Keep MuJoCo from writing warnings to a file in the working directory."""
-    import mujoco
+    from mrmg.mujoco_import import mujoco
 
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
@@ -47,7 +47,7 @@ class CompiledRobot:
         Raises:
             ValueError: if MuJoCo cannot use it, with its message.
         """
-        import mujoco
+        from mrmg.mujoco_import import mujoco
 
         self.file = path.name
         self._mujoco = mujoco
@@ -251,7 +251,7 @@ def support_m(model: Any, data: Any, geom: int, direction: np.ndarray) -> float:
 
     Infinity for planes and height fields.
     """
-    import mujoco
+    from mrmg.mujoco_import import mujoco
 
     kinds = mujoco.mjtGeom
     kind, size = model.geom_type[geom], model.geom_size[geom]

@@ -195,7 +195,7 @@ def _mesh_file(name: str, folder: Path) -> Path | None:
 
 
 def _compiled_urdf(root: ET.Element) -> Any:
-    import mujoco
+    from mrmg.mujoco_import import mujoco
 
     for extension in root.findall("mujoco"):
         root.remove(extension)
@@ -204,7 +204,7 @@ def _compiled_urdf(root: ET.Element) -> Any:
 
 
 def _compiled_mjcf(path: Path, notes: list[str]) -> Any:
-    import mujoco
+    from mrmg.mujoco_import import mujoco
 
     spec = mujoco.MjSpec.from_file(str(path))
     folder = path.parent / spec.meshdir

@@ -135,7 +135,7 @@ def _drawn(
     description: Description, found: Survey, folder: Path
 ) -> tuple[dict[int, list[str]], list[str]]:
     """Return the geoms to draw, by wheel (-1: chassis), and write their meshes."""
-    import mujoco
+    from mrmg.mujoco_import import mujoco
 
     model, data = description.model, mujoco.MjData(description.model)
     mujoco.mj_forward(model, data)

@@ -85,7 +85,7 @@ class _Scan:
     """A compiled description at rest."""
 
     def __init__(self, model: Any) -> None:
-        import mujoco
+        from mrmg.mujoco_import import mujoco
 
         self.mujoco, self.model, self.data = mujoco, model, mujoco.MjData(model)
         mujoco.mj_forward(model, self.data)

@@ -1,0 +1,31 @@
+"""What MuJoCo's import starts is out of reach of Ctrl-C."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+REPORT = """
+import signal, sys
+
+def report(event, arguments):
+    if event == "subprocess.Popen":
+        print(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))
+
+sys.addaudithook(report)
+import mrmg.mujoco_import
+print("after:", signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, []))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems start no children")
+def test_children_of_the_import_do_not_see_ctrl_c() -> None:
+    """Where no child is started any more, the shelter has become needless."""
+    answer = subprocess.run(
+        [sys.executable, "-c", REPORT], capture_output=True, text=True, check=True
+    )
+    *children, after = answer.stdout.splitlines()
+    assert set(children) == {"True"}
+    assert after == "after: False"
