@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
-import sys
-import threading
 from concurrent.futures import Future
 from contextlib import suppress
 
@@ -21,10 +18,6 @@ from mrmg.scene.types import Scene
 
 COARSE_CELLS = 1000
 """Cells of the grid of a first bound where time is limited: a tenth of the work."""
-
-NICENESS = 15
-"""Of the bound, on the system's scale: the first plan comes as soon as without one
-(measured; with 5, two to three times as late where other processes ran, too)."""
 
 
 def bounds_of(
@@ -87,7 +80,6 @@ def bounds_beside(
     """
 
     def prove() -> None:
-        give_way()
         with suppress(Halted):
             coarse = [(COARSE_CELLS, 0), (COARSE_CELLS, ROUNDS)] if anytime else []
             for cells, rounds in [*coarse, (CELLS, ROUNDS)]:
@@ -95,12 +87,3 @@ def bounds_beside(
                 statistics.bounds = statistics.bounds.raised_by(found)
 
     return in_background(prove)
-
-
-def give_way() -> None:
-    """Leave the processors to other threads; so do all threads that this one starts.
-
-    Linux alone gives threads priorities of their own.
-    """
-    if sys.platform == "linux":
-        os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)
