@@ -2,12 +2,13 @@
 
 Cars of 3 x 2 m with a smallest turning radius of 3 m, each with a goal pose of its own
 (L. Wen, Y. Liu, H. Li: CL-MAPF, Robotics and Autonomous Systems 150, 2022). Protocol:
-one process, one thread; the first plan counts, with the makespan as the objective, and
-its time is that of `plan_mission`, with all kernels loaded. Cars are of second order:
-|v| <= 2.118 m/s, |u1| <= 2 m/s^2, |u2| <= 1 rad/s, wheelbase 2 m. Every car must be at
-rest within 0.5 m and 0.2 rad of its goal at the end, its rear axle must stay within the
-map, and nothing may overlap at any time, in between steps and with cars that have
-arrived included: `mrmg.verify` judges that, with true rectangles.
+one process, one thread; the first plan counts as it is found, unrefined, with the
+makespan as the objective, and its time is that of `plan_mission`, with all kernels
+loaded. Cars are of second order: |v| <= 2.118 m/s, |u1| <= 2 m/s^2, |u2| <= 1 rad/s,
+wheelbase 2 m. Every car must be at rest within 0.5 m and 0.2 rad of its goal at the
+end, its rear axle must stay within the map, and nothing may overlap at any time, in
+between steps and with cars that have arrived included: `mrmg.verify` judges that, with
+true rectangles.
 
 Files with a car that overlaps a disc where it starts are listed and do not count. Where
 a car starts nearer to a disc than the margin that is asked for, the margin of that file
@@ -68,7 +69,11 @@ MARGIN_M = 0.05
 0.01 m at two steps of 0.1 s touches one in between."""
 
 PARAMS = PlannerParams(
-    samples=100, obstacle_margin_m=MARGIN_M, robot_margin_m=0.22, improvements=0
+    samples=100,
+    obstacle_margin_m=MARGIN_M,
+    robot_margin_m=0.22,
+    improvements=0,
+    refinements=0,
 )
 
 CAR = {

@@ -20,7 +20,7 @@ from mrmg.planning.assembly import make_plan, why_refused
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import TRACKING_M, Path, smooth_path
-from mrmg.planning.path_following.coordination.coordination import rounds_of
+from mrmg.planning.path_following.coordination.rounds import rounds_of
 from mrmg.planning.path_following.gears import with_best_gears
 from mrmg.planning.path_following.refine import cost_maps_of, drive_paths
 from mrmg.planning.path_following.robot_task import RobotTask

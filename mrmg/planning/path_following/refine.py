@@ -23,8 +23,9 @@ from mrmg.planning.assembly import make_plan
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import SPACINGS_M, path_of, visit_steps
-from mrmg.planning.path_following.coordination.coordination import ROUNDS, coordinated
-from mrmg.planning.path_following.coordination.tasks import Round, no_path
+from mrmg.planning.path_following.coordination.coordination import coordinated
+from mrmg.planning.path_following.coordination.rounds import ROUNDS, Round
+from mrmg.planning.path_following.coordination.tasks import no_path
 from mrmg.planning.path_following.cost_map import cost_map_of, inflated, smooth_terrain
 from mrmg.planning.path_following.pauses import with_pauses
 from mrmg.planning.path_following.robot_task import RobotTask

@@ -33,8 +33,15 @@ from mrmg.planning.path_following.coordination._node_kernels import (
 )
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE, Fields
 from mrmg.planning.path_following.coordination.leads import rounded_path
-from mrmg.planning.path_following.coordination.tasks import (
+from mrmg.planning.path_following.coordination.rounds import (
+    FINER,
+    FIRST_MOST,
+    ROUNDS,
+    ROUNDS_ALONE,
+    UNTIMED_SHARE,
     Round,
+)
+from mrmg.planning.path_following.coordination.tasks import (
     guided,
     horizon_steps,
     no_path,
@@ -45,29 +52,6 @@ from mrmg.planning.path_following.tracking import Drive, Motion, course_of
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.plans import Trajectory
-
-ROUNDS = (
-    Round(most=1_000, dead_ends=2, weight=1.5, fineness=1.0, soft_s=2.0),
-    Round(most=4_000, dead_ends=10, weight=1.5, fineness=1.0, soft_s=4.0),
-    Round(most=16_000, dead_ends=50, weight=2.0, fineness=2.0, soft_s=1.0),
-    Round(most=64_000, dead_ends=200, weight=2.0, fineness=3.0, soft_s=4.0),
-)
-"""Rounds one after the other."""
-
-ROUNDS_ALONE = 2
-"""Rounds in which a robot's motion without regard to the others is searched for: one
-more than with regard to them, as all else depends on it."""
-
-FIRST_MOST = 300
-"""Nodes of a robot's first search at most, and of one that has found an end."""
-
-FINER = (1.0, 2.0, 4.0)
-"""How much finer than its round's a robot's motions are: the next ones where all of
-these have been tried."""
-
-UNTIMED_SHARE = 10
-"""How many times as many nodes a search along several targets may have, where its
-costs-to-go do not know when the other robots are where."""
 
 YIELDING_WEIGHT = 1.1
 """Weight of the cost-to-go for a robot that makes room for others."""
@@ -80,11 +64,6 @@ MOST_CURVE_NODES = 1500
 
 BRAKING_SHARE = 0.8
 """Share of the largest deceleration that it brakes with at the end."""
-
-
-def rounds_of(number: int) -> Sequence[Round]:
-    """Return the round of an attempt: later ones try harder."""
-    return ROUNDS[min(number, len(ROUNDS) - 1) :][:1]
 
 
 def empty_course(most: int) -> Course:
@@ -160,6 +139,10 @@ class _Planning:
         self.nodes = 0
         self._blocked: set[int] = set()
         """Robots whose short search has failed: they are searched for at length."""
+        self._answers: dict[tuple[object, ...], Motion | None] = {}
+        """What came of each search for a motion ..."""
+        self._known: dict[tuple[int, bytes], Motion] = {}
+        """... and the motions found, equal ones once: orders of robots repeat them."""
 
     def find(
         self,
@@ -170,6 +153,22 @@ class _Planning:
         yielding: bool = False,
     ) -> Motion | None:
         """Return a motion of robot r without conflicts with the robots marked."""
+        options = self.round, yielding, r in self._blocked
+        asked = (r, *options, above.tobytes(), *map(id, motions))
+        if asked not in self._answers:
+            found = self._found(r, motions, above, yielding)
+            if found is not None:
+                found = self._known.setdefault((r, found.control.tobytes()), found)
+            self._answers[asked] = found
+        return self._answers[asked]
+
+    def _found(
+        self,
+        r: int,
+        motions: Sequence[Motion | None],
+        above: np.ndarray,
+        yielding: bool,
+    ) -> Motion | None:
         traffic = self._traffic.around(r, motions, above)
         for finer in FINER:
             all_tried = False

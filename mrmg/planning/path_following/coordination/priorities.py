@@ -105,10 +105,16 @@ def search_priorities(
 def _children(node: _Node, planning: MotionPlanning) -> Iterator[_Node]:
     """Yield the nodes in which one of two robots in conflict has priority.
 
+    They are those in conflict first, among the robots that priorities have been given
+    to if any of these are: so a dead end is met soon after the choice that leads there.
     The one that takes longer has it first. The other order is looked at only where that
     one leaves as many robots in conflict, or leads nowhere.
     """
-    pair = divmod(int(node.conflict.argmin()), len(node.motions))
+    ordered = node.above.any(axis=0) | node.above.any(axis=1)
+    conflict = np.where(np.logical_or.outer(ordered, ordered), node.conflict, np.inf)
+    if not np.isfinite(conflict).any():
+        conflict = node.conflict
+    pair = divmod(int(conflict.argmin()), len(node.motions))
     low, high = sorted(pair, key=lambda r: len(node.motions[r].control))
     found = []
     for one, other in ((low, high), (high, low)):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, pi
 
@@ -15,6 +14,7 @@ from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.coordination._field_kernels import Guide, guide_at
 from mrmg.planning.path_following.coordination._node_kernels import Task, posing_time_s
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE
+from mrmg.planning.path_following.coordination.rounds import Round
 from mrmg.planning.problem.problem import Problem
 
 MOTION_SHARE = 0.6
@@ -100,25 +100,6 @@ def stays_s(problem: Problem, r: int, legs: Sequence[int]) -> np.ndarray:
         stations = np.array([t >= targets.goals for t in legs], bool)
         stay_s[stations] = np.maximum(stay_s[stations], filling_s)
     return stay_s
-
-
-@dataclass(frozen=True, slots=True)
-class Round:
-    """How hard one round of the search tries.
-
-    Attributes:
-        most: nodes of one robot's search at most.
-        dead_ends: of the search over priorities at most.
-        weight: of costs-to-go: motions take at most so many times the least cost.
-        fineness: how much shorter motions, and finer cells, are than usual.
-        soft_s: cost of conflicts with robots of lower priority [s].
-    """
-
-    most: int
-    dead_ends: int
-    weight: float
-    fineness: float
-    soft_s: float
 
 
 def task_of(

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from mrmg.planning.path_following.coordination.coordination import (
-    ROUNDS,
     coordinated,
     empty_nodes,
 )
+from mrmg.planning.path_following.coordination.rounds import ROUNDS
 from mrmg.planning.path_following.coordination.tasks import no_path, task_of
 from mrmg.planning.problem._target_kernels import at_target
 from mrmg.planning.problem.problem import Problem

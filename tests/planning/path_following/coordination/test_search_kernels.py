@@ -9,11 +9,11 @@ import numpy as np
 from mrmg.planning.path_following.coordination._node_kernels import Scratch, Setting
 from mrmg.planning.path_following.coordination._search_kernels import find_motion
 from mrmg.planning.path_following.coordination.coordination import (
-    ROUNDS,
     empty_course,
     empty_nodes,
 )
 from mrmg.planning.path_following.coordination.fields import Fields
+from mrmg.planning.path_following.coordination.rounds import ROUNDS
 from mrmg.planning.path_following.coordination.tasks import guided, no_path, task_of
 from mrmg.planning.path_following.coordination.traffic import FleetTraffic
 from mrmg.planning.path_following.tracking import Motion, course_of

@@ -1,0 +1,54 @@
+"""Rounds of the search for motions: how hard each tries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Round:
+    """How hard one round of the search tries.
+
+    Attributes:
+        most: nodes of one robot's search at most.
+        dead_ends: of the search over priorities at most.
+        weight: of costs-to-go: motions take at most so many times the least cost.
+        fineness: how much shorter motions, and finer cells, are than usual.
+        soft_s: cost of conflicts with robots of lower priority [s].
+    """
+
+    most: int
+    dead_ends: int
+    weight: float
+    fineness: float
+    soft_s: float
+
+
+ROUNDS = (
+    Round(most=1_000, dead_ends=1, weight=1.5, fineness=1.0, soft_s=2.0),
+    Round(most=4_000, dead_ends=10, weight=1.5, fineness=1.0, soft_s=4.0),
+    Round(most=16_000, dead_ends=50, weight=2.0, fineness=2.0, soft_s=1.0),
+    Round(most=64_000, dead_ends=200, weight=2.0, fineness=3.0, soft_s=4.0),
+)
+"""Rounds one after the other."""
+
+ROUNDS_ALONE = 2
+"""Rounds in which a robot's motion without regard to the others is searched for: one
+more than with regard to them, as all else depends on it."""
+
+FIRST_MOST = 300
+"""Nodes of a robot's first search at most, and of one that has found an end."""
+
+FINER = (1.0, 2.0, 4.0)
+"""How much finer than its round's a robot's motions are: the next ones where all of
+these have been tried."""
+
+UNTIMED_SHARE = 10
+"""How many times as many nodes a search along several targets may have, where its
+costs-to-go do not know when the other robots are where."""
+
+
+def rounds_of(number: int) -> Sequence[Round]:
+    """Return the round of an attempt: later ones try harder."""
+    return ROUNDS[min(number, len(ROUNDS) - 1) :][:1]
