@@ -66,6 +66,11 @@ class _Node:
     conflict: np.ndarray
 
     @property
+    def key(self) -> tuple[object, ...]:
+        """What equal nodes share, as long as their motions are kept."""
+        return self.above.tobytes(), *map(id, self.motions)
+
+    @property
     def cost(self) -> tuple[int, int]:
         """Pairs in conflict, and steps that all motions take."""
         steps = sum(len(motion.control) for motion in self.motions)
@@ -90,11 +95,14 @@ def search_priorities(
     conflict = np.stack([planning.conflicts(r, motions) for r in range(robots)])
     root = _Node(np.zeros((robots, robots), bool), tuple(motions), conflict)
     stack: list[Iterator[_Node]] = [iter([root])]
+    seen: dict[tuple[object, ...], _Node] = {}  # two may make room for a third in turn
     while stack and most_dead_ends > 0 and not halt[0]:
         node = next(stack[-1], None)
         if node is None:
             stack.pop()
             most_dead_ends -= 1
+        elif seen.setdefault(node.key, node) is not node:
+            continue
         elif not np.isfinite(node.conflict).any():
             return node.motions
         else:

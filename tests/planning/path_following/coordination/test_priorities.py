@@ -109,3 +109,58 @@ def test_the_second_order_is_looked_at_only_where_the_first_one_fails() -> None:
     alone = [planning.motion(r, 0) for r in range(4)]
     assert search_priorities(alone, planning, 100, np.zeros(1, bool)) is not None
     assert len(planning.asked) == len(set(planning.asked)) == 2
+
+
+class TwoCrossings(Crossing):
+    """Robots 0-2 cross one place, robots 3 and 4 another one."""
+
+    def conflicts(self, r: int, motions: Sequence[Motion]) -> np.ndarray:
+        """Return the step at which robot r crosses with those of its place."""
+        elsewhere = (np.arange(len(motions)) < 3) != (r < 3)
+        return np.where(elsewhere, np.inf, super().conflicts(r, motions))
+
+
+def test_conflicts_of_robots_with_priorities_come_before_sooner_ones() -> None:
+    # 0 and 1 would cross at step 3; who waits meets 2 at step 4. 3 and 4 do so at 3.
+    planning = TwoCrossings([3, 3, 4, 3, 3], [9] * 5)
+    alone = [planning.motion(r, 0) for r in range(5)]
+    assert search_priorities(alone, planning, 100, np.zeros(1, bool)) is not None
+    assert [r < 3 for r in planning.asked] == [True, True, True, False]
+
+
+class Shuttle:
+    """Robot 2 is in the way of 0 or of 1, and goes to and fro to let them pass."""
+
+    nodes = 1
+    still = Motion(np.zeros((1, 5)), np.zeros((1, 2)))
+
+    def __init__(self) -> None:
+        self.places = tuple(Motion(np.zeros((1, 5)), np.zeros((9, 2))) for _ in "01")
+
+    def find(
+        self,
+        r: int,
+        motions: Sequence[Motion],
+        above: np.ndarray,
+        *,
+        yielding: bool = False,
+    ) -> Motion | None:
+        """Return the other place of robot 2; others have none to go to."""
+        if r == 2:
+            return None if above.any() else self.places[motions[2] is self.places[0]]
+        in_the_way = above[2] and motions[2] is self.places[r]
+        return None if in_the_way else motions[r]
+
+    def conflicts(self, r: int, motions: Sequence[Motion]) -> np.ndarray:
+        """Return the step at which robot r is in conflict with each other one."""
+        met = self.places.index(motions[2])
+        conflict = np.full(3, np.inf)
+        if r in (met, 2):
+            conflict[2 if r == met else met] = 1.0
+        return conflict
+
+
+def test_robots_that_send_another_one_to_and_fro_end_the_search() -> None:
+    planning = Shuttle()
+    motions = [planning.still, planning.still, planning.places[0]]
+    assert search_priorities(motions, planning, 5, np.zeros(1, bool)) is None
