@@ -35,6 +35,8 @@ COMMANDS = {
     "first_plans": "bench --seeds 0-49",
     "bounds": "bench --bound --budget 30 --seeds 0-9",
     "table_1": "bench --seeds 0-49 --profile default paper --energy paper",
+    "fleet_sizes": "bench --scenes scene6_r1 scene6_r2 scene6 scene6_r6 scene6_r8 "
+    "--seeds 0-9 --profile default paper --energy paper",
     "missions": f"bench --scenes {SHIPPED} --seeds 0-4 --execute",
     "maps": "bench_maps",
     "clmapf": "bench_clmapf --seeds 0-2",
