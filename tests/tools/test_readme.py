@@ -71,13 +71,15 @@ def test_every_command_line_is_understood(line: str) -> None:
 @pytest.mark.parametrize(("tool", "arguments"), TOOLS)
 def test_every_tool_exists_with_its_options(tool: str, arguments: str) -> None:
     assert os.access(ROOT / "tools" / tool, os.X_OK)
-    texts = [
-        path.read_text()
-        for path in (ROOT / "tools" / tool, ROOT / "tools" / f"{tool}.py")
-        if path.exists()
-    ]
-    known = OPTION.findall("\n".join(texts))
-    assert set(OPTION.findall(arguments)) <= set(known)
+    own = "\n".join(map(tool_source, (tool, f"{tool}.py")))
+    imported = re.findall(r"^from (\w+) import", own, re.MULTILINE)
+    texts = [own, *(tool_source(f"{name}.py") for name in imported)]
+    assert set(OPTION.findall(arguments)) <= set(OPTION.findall("\n".join(texts)))
+
+
+def tool_source(name: str) -> str:
+    path = ROOT / "tools" / name
+    return path.read_text() if path.exists() else ""
 
 
 def test_the_first_page_is_short() -> None:
