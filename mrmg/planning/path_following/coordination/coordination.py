@@ -140,9 +140,10 @@ class _Planning:
         self._blocked: set[int] = set()
         """Robots whose short search has failed: they are searched for at length."""
         self._answers: dict[tuple[object, ...], Motion | None] = {}
-        """What came of each search for a motion ..."""
+        """Motions found, and None where there was none, by what was asked for."""
         self._known: dict[tuple[int, bytes], Motion] = {}
-        """... and the motions found, equal ones once: orders of robots repeat them."""
+        """Motions found, by robot and controls: equal ones are one object, so that
+        the same question is told by the identities of the motions in it."""
 
     def find(
         self,

@@ -113,10 +113,10 @@ def search_priorities(
 def _children(node: _Node, planning: MotionPlanning) -> Iterator[_Node]:
     """Yield the nodes in which one of two robots in conflict has priority.
 
-    They are those in conflict first, among the robots that priorities have been given
-    to if any of these are: so a dead end is met soon after the choice that leads there.
-    The one that takes longer has it first. The other order is looked at only where that
-    one leaves as many robots in conflict, or leads nowhere.
+    The two are those whose motions conflict soonest. Conflicts of robots that have been
+    given priorities come before all others: so a dead end is met soon after the choice
+    that leads there. The robot with the longer motion is given priority first; the
+    other order is looked at only where that leaves as many conflicts, or leads nowhere.
     """
     ordered = node.above.any(axis=0) | node.above.any(axis=1)
     conflict = np.where(np.logical_or.outer(ordered, ordered), node.conflict, np.inf)

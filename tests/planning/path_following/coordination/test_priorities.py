@@ -138,12 +138,7 @@ class Shuttle:
         self.places = tuple(Motion(np.zeros((1, 5)), np.zeros((9, 2))) for _ in "01")
 
     def find(
-        self,
-        r: int,
-        motions: Sequence[Motion],
-        above: np.ndarray,
-        *,
-        yielding: bool = False,
+        self, r: int, motions: Sequence[Motion], above: np.ndarray, **_: bool
     ) -> Motion | None:
         """Return the other place of robot 2; others have none to go to."""
         if r == 2:
