@@ -35,70 +35,73 @@ TURNING_SHARE = 0.5
 """Share of the acceleration of turning with which a turn on the spot is slowed down."""
 
 
+COURSE_NODE = np.dtype(
+    [
+        ("x", np.float64),  # [m]
+        ("y", np.float64),  # [m]
+        ("gear", np.int64),  # of the segment that begins there
+        ("bend", np.float64),  # curvature, left positive in the direction of travel
+        ("way", np.float64),  # to it [m]
+        ("end", np.int64),  # node at which the segment's stretch ends: see Course
+        ("fastest", np.float64),  # speed at which it is passed at most [m/s]
+        ("pause", np.int64),  # steps for which the robot stands there: see Course
+        ("rest_s", np.float64),  # what is left, as time on plain ground [s]
+    ]
+)
+"""A node of a path."""
+
+
 class Course(NamedTuple):
     """A path, and what its robot must know of it.
 
+    A stretch ends where the gear changes or the robot turns on the spot; robots pause
+    at the ends of stretches only.
+
     Attributes:
-        node: shape (N, 2).
-        gear: of each segment, shape (N,).
-        bend: curvature at each node, left positive in the direction of travel (N,).
-        way: way to each node [m], shape (N,).
-        end: number of the node at which the segment's stretch ends, where the gear
-            changes or the robot turns on the spot, shape (N,).
-        fastest: speed at which each node is passed at most [m/s], shape (N,).
-        pause: steps that it stands at each node where a stretch ends, shape (N,).
-        rest_s: what is left from each node on, as time on plain ground [s], shape (N,).
-        size: number of nodes, shape (1,).
+        node: `COURSE_NODE`, shape (N,).
+        size: number of nodes that count, shape (1,).
         ease: deceleration that costs nothing [m/s^2].
         stiffness: how fast it returns to its path: errors decay over about its inverse
             [1/m].
-        heading: in which a robot that turns on the spot ends [rad], shape (1,).
-        tolerance: allowed deviation from that [rad]; inf for any, shape (1,).
+        final: heading in which a robot that turns on the spot ends, and the allowed
+            deviation from that, inf for any [rad], shape (2,).
     """
 
     node: np.ndarray
-    gear: np.ndarray
-    bend: np.ndarray
-    way: np.ndarray
-    end: np.ndarray
-    fastest: np.ndarray
-    pause: np.ndarray
-    rest_s: np.ndarray
     size: np.ndarray
     ease: float
     stiffness: float
-    heading: np.ndarray
-    tolerance: np.ndarray
+    final: np.ndarray
 
 
 @kernel
 def advance(course, i, x, y):
     """Return (segment, way along the path) nearest to a point, from segment i on."""
     while True:
-        ax, ay = course.node[i, 0], course.node[i, 1]
-        bx, by = course.node[i + 1, 0] - ax, course.node[i + 1, 1] - ay
+        ax, ay = course.node[i].x, course.node[i].y
+        bx, by = course.node[i + 1].x - ax, course.node[i + 1].y - ay
         size = hypot(bx, by)
         along = ((x - ax) * bx + (y - ay) * by) / max(size, 1e-9)
-        if along < size or i + 1 >= course.end[i]:
-            return i, course.way[i] + along
+        if along < size or i + 1 >= course.node[i].end:
+            return i, course.node[i].way + along
         i += 1
 
 
 @kernel
 def bend_at(course, i, s):
     """Return the curvature of the path at a way, within the stretch of segment i."""
-    last = course.end[i]
-    while i + 1 < last and course.way[i + 1] < s:
+    last = course.node[i].end
+    while i + 1 < last and course.node[i + 1].way < s:
         i += 1
-    size = course.way[i + 1] - course.way[i]
-    t = min(1.0, max(0.0, (s - course.way[i]) / max(size, 1e-9)))
-    return course.bend[i] + t * (course.bend[i + 1] - course.bend[i])
+    size = course.node[i + 1].way - course.node[i].way
+    t = min(1.0, max(0.0, (s - course.node[i].way) / max(size, 1e-9)))
+    return course.node[i].bend + t * (course.node[i + 1].bend - course.node[i].bend)
 
 
 @kernel
 def turned(course, state):
     """Return whether a robot has the heading that it must end with."""
-    return abs(wrap(course.heading[0] - state[2])) < 0.5 * course.tolerance[0]
+    return abs(wrap(course.final[0] - state[2])) < 0.5 * course.final[1]
 
 
 @kernel
@@ -112,25 +115,25 @@ def turning_rate(own, lacking):
 def follow(own, course, i, state):
     """Return (segment, way, way left in this gear, off the path, wanted v and w)."""
     i, s = advance(course, i, state[0], state[1])
-    ax, ay = course.node[i, 0], course.node[i, 1]
-    bx, by = course.node[i + 1, 0] - ax, course.node[i + 1, 1] - ay
+    ax, ay = course.node[i].x, course.node[i].y
+    bx, by = course.node[i + 1].x - ax, course.node[i + 1].y - ay
     size = max(hypot(bx, by), 1e-9)
     tx, ty = bx / size, by / size
-    gear = course.gear[i]
+    gear = course.node[i].gear
     off = tx * (state[1] - ay) - ty * (state[0] - ax)
     heading = state[2] if gear > 0 else state[2] + pi
     # The chord's direction, turned to the tangent's at this place.
-    t = min(1.0, max(0.0, (s - course.way[i]) / size))
-    first, second = course.bend[i], course.bend[i + 1]
+    t = min(1.0, max(0.0, (s - course.node[i].way) / size))
+    first, second = course.node[i].bend, course.node[i + 1].bend
     swing = 0.5 * size * (t * t * second - (1.0 - t) ** 2 * first)
     tangent = atan2(ty, tx) + swing
     askew = wrap(heading - tangent)
-    left = course.way[course.end[i]] - s
+    left = course.node[course.node[i].end].way - s
     top = own[0].limit[1] if gear > 0 else -own[0].limit[0]
     ease = course.ease
     v = min(top, sqrt(2.0 * ease * max(left - 0.5 * ARRIVED_M, 0.0)) + 0.02)
-    near = max(course.way[i + 1] - s, 0.0)
-    v = min(v, sqrt(course.fastest[i + 1] ** 2 + 2.0 * ease * near))
+    near = max(course.node[i + 1].way - s, 0.0)
+    v = min(v, sqrt(course.node[i + 1].fastest ** 2 + 2.0 * ease * near))
     ahead = s + max(abs(state[3]), 0.2) * PREVIEW_S
     bend = bend_at(course, i, ahead)
     standing = abs(state[3]) < 0.05
@@ -168,7 +171,7 @@ def track_control(own, course, segment, stood, state, dt):
         if turned(course, state):
             u1, u2 = braking_control(own, 0, state, dt)
             return u1, u2, segment, stood, 0.0
-        rate = turning_rate(own, wrap(course.heading[0] - state[2]))
+        rate = turning_rate(own, wrap(course.final[0] - state[2]))
         u1, u2 = control_towards(own, 0, state, 0.0, rate, dt)
         return u1, u2, segment, stood, 0.0
     i, _, left, off, v, w = follow(own, course, segment, state)
@@ -177,9 +180,9 @@ def track_control(own, course, segment, stood, state, dt):
         if own[0].model == UNICYCLE:
             w = 0.0
         if stands(own, 0, state):
-            last = course.end[i]
+            last = course.node[i].end
             stood += 1
-            if stood > course.pause[last]:
+            if stood > course.node[last].pause:
                 stood = 0
                 i = size if last + 1 >= size else last
     u1, u2 = control_towards(own, 0, state, v, w, dt)

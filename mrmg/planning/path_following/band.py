@@ -258,9 +258,9 @@ def stops_of(targets: Targets, path: Path) -> Stops:
     """Return a path's targets, drawn in by what tracking may be off."""
     return Stops(
         node=path.stop,
-        center=targets.center[path.target],
-        reach=targets.reach[path.target],
+        center=targets.target["center"][path.target],
+        reach=targets.target["reach"][path.target],
         corner=targets.corner[path.target],
-        corners=targets.corners[path.target],
+        corners=targets.target["corners"][path.target],
         deeper=path.deeper,
     )

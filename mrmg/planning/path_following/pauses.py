@@ -26,7 +26,9 @@ def with_pauses(problem: Problem, r: int, path: Path) -> Path:
         path: from the robot's start; its pauses do not count.
     """
     targets, robot = problem.mission.targets, problem.mission.fleet[r]
-    pause_s = np.where(path.target < targets.places, targets.dwell[path.target], 0.0)
+    pause_s = np.where(
+        path.target < targets.places, targets.target["dwell"][path.target], 0.0
+    )
     if np.isfinite(robot["charge"]):
         used_J = MORE * _used_J(problem, r, path)[path.stop]
         power_W = robot["charge"] - robot["energy"][CONSUMERS_W]

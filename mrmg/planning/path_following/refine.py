@@ -196,7 +196,7 @@ def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, st
         elif len(visit_steps(targets, task.tour, drive.motion.state)) < len(task.tour):
             reason = f"{robot} misses targets of its tour"
             goals = [t for t in task.tour if t < targets.goals]
-            if (targets.tolerance[goals] < np.pi).any():
+            if (targets.target["tolerance"][goals] < np.pi).any():
                 return task.before, ""  # its motions are searched for
             _enter_deeper(problem, task, drive.motion.state)
         elif not ends_well(targets, r, end):

@@ -9,7 +9,7 @@ import numpy as np
 from mrmg.energy.model import EFFECTIVE_MASS_KG, ROLLING_N
 from mrmg.motion._kernels import UNICYCLE, USER
 from mrmg.planning.path_following import _tracking_kernels
-from mrmg.planning.path_following._following_kernels import Course
+from mrmg.planning.path_following._following_kernels import COURSE_NODE, Course
 from mrmg.planning.path_following.band import Path, nimble_share
 from mrmg.planning.path_following.cost_map import path_curvature
 from mrmg.planning.problem.problem import Problem
@@ -96,41 +96,45 @@ def drive_alone(problem: Problem, r: int, path: Path) -> Drive:
 def course_of(problem: Problem, r: int, path: Path) -> Course:
     """Return robot r's path in the form that driving needs."""
     robot, n = problem.mission.fleet[r], len(path.node)
-    most = max(2, n)
-    gear, end = np.ones(most, np.int64), np.zeros(most, np.int64)
-    bend, way, pause = np.zeros(most), np.zeros(most), np.zeros(most, np.int64)
-    fastest, rest_s = np.full(most, np.inf), np.zeros(most)
-    ease = deceleration(problem, r)
+    node, ease = empty_path(max(2, n)), deceleration(problem, r)
+    node["x"], node["y"] = np.resize(path.node, (len(node), 2)).T
     if n > 1:
         chord = np.diff(path.node, axis=0)
         size = np.hypot(*chord.T)
-        gear[: n - 1], way[:n] = path.gear, path.way
+        node["gear"][:-1], node["way"] = path.gear, path.way
         edges = path.edges.tolist()
         for a, b in zip(edges, edges[1:], strict=False):
-            end[a:b] = b
-            bend[a : b + 1] = _bends(chord[a:b], size[a:b])
-        np.add.at(pause, path.stop, np.ceil(path.pause_s / problem.dt_s).astype(int))
-        tight = steerable_speeds(problem, r, bend[:n], way[:n], end[: n - 1])
-        fastest[:n] = _speed_limits(path, tight, ease)
-        rest_s[:n] = (path.way[-1] - path.way) / robot["limit"][1]
+            node["end"][a:b] = b
+            node["bend"][a : b + 1] = _bends(chord[a:b], size[a:b])
+        pause = np.ceil(path.pause_s / problem.dt_s).astype(int)
+        np.add.at(node["pause"], path.stop, pause)
+        tight = steerable_speeds(
+            problem, r, node["bend"], node["way"], node["end"][:-1]
+        )
+        node["fastest"] = _speed_limits(path, tight, ease)
+        node["rest_s"] = (path.way[-1] - path.way) / robot["limit"][1]
     targets = problem.mission.targets
     finish = targets.finish[r]
-    turned = finish >= 0 and targets.tolerance[finish] < np.pi
+    final = np.array([0.0, np.inf])
+    if finish >= 0 and targets.target["tolerance"][finish] < np.pi:
+        final[:] = (
+            targets.target["heading"][finish],
+            targets.target["tolerance"][finish],
+        )
     return Course(
-        node=np.ascontiguousarray(np.resize(path.node, (most, 2))),
-        gear=gear,
-        bend=bend,
-        way=way,
-        end=end,
-        fastest=fastest,
-        pause=pause,
-        rest_s=rest_s,
+        node=node,
         size=np.array([n]),
         ease=ease,
         stiffness=STIFFNESS / nimble_share(path_curvature(robot)),
-        heading=targets.heading[finish : finish + 1].copy() if turned else np.zeros(1),
-        tolerance=np.array([targets.tolerance[finish] if turned else np.inf]),
+        final=final,
     )
+
+
+def empty_path(most: int) -> np.ndarray:
+    """Return room for the nodes of a path: `COURSE_NODE`, shape (most,)."""
+    node = np.zeros(most, COURSE_NODE)
+    node["gear"], node["fastest"] = 1, np.inf
+    return node
 
 
 def steerable_speeds(

@@ -1,11 +1,8 @@
-"""Whether a robot keeps clear of obstacles, and where only one robot may be."""
+"""Whether a robot keeps clear of obstacles."""
 
 from __future__ import annotations
 
-from math import cos, hypot, sin
-from typing import NamedTuple
-
-import numpy as np
+from math import cos, sin
 
 from mrmg.compilation import kernel
 from mrmg.planning.roadmap._fleet_kernels import space_of
@@ -13,33 +10,7 @@ from mrmg.world._kernels import (
     clearance_at_least,
     footprint_is_clear,
     place_footprint,
-    point_in_convex,
 )
-
-
-class Zones(NamedTuple):
-    """Convex mutual-exclusion zones.
-
-    Attributes:
-        center: shape (S, 2).
-        reach: radius of the circle about the centre that holds the region, shape (S,).
-        corner: padded corners of polygons, shape (S, M, 2).
-        corners: number of corners; 0 for a circle, shape (S,).
-    """
-
-    center: np.ndarray
-    reach: np.ndarray
-    corner: np.ndarray
-    corners: np.ndarray
-
-
-@kernel
-def in_zone(zones, zone, x, y):
-    """Return whether a point lies in a mutual-exclusion zone."""
-    n = zones.corners[zone]
-    if hypot(x - zones.center[zone, 0], y - zones.center[zone, 1]) > zones.reach[zone]:
-        return False
-    return n == 0 or point_in_convex(x, y, zones.corner[zone, :n])
 
 
 @kernel

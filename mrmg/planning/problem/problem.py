@@ -14,7 +14,7 @@ from mrmg.motion._kernels import CAR
 from mrmg.motion._kernels import step as motion_step
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
-from mrmg.planning.problem._clearance_kernels import Zones
+from mrmg.planning.problem._region_kernels import Zones
 from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.problem.leg_times import routing_times
 from mrmg.planning.problem.openings import (
@@ -100,7 +100,7 @@ class Problem:
         """
         targets = self.mission.targets
         aims = targets.finish >= 0
-        aims[aims] = targets.tolerance[targets.finish[aims]] < np.pi
+        aims[aims] = targets.target["tolerance"][targets.finish[aims]] < np.pi
         return np.asarray(aims & (self.mission.fleet["model"] == CAR))
 
     def trajectory(self, robot: int, control: np.ndarray) -> Trajectory:
@@ -204,13 +204,13 @@ def state_problem(
     targets = target_arrays(scene)
     # What robots draw while they stay counts as way.
     idle_m = fleet["energy"][:, CONSUMERS_W] / fleet["plain"]
-    stay_m = idle_m[:, None] * targets.dwell[:places]
+    stay_m = idle_m[:, None] * targets.target["dwell"][:places]
     last_leg = _last_legs(scene, roadmap, fleet)
     energy = np.array([robot.battery.start_J for robot in scene.robots])
     table = tables_of(fleet)
     owner = np.unique(table, return_index=True)[1]
     times = routing_times(
-        scene, roadmap, fleet, table, targets.dwell, params.route_margin
+        scene, roadmap, fleet, table, targets.target["dwell"], params.route_margin
     )
     start = np.zeros((len(scene.robots), 5))
     start[:, :3] = [robot.pose for robot in scene.robots]

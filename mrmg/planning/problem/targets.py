@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from mrmg.planning.problem._clearance_kernels import Zones
-from mrmg.planning.problem._target_kernels import Targets
+from mrmg.planning.problem._region_kernels import REGION, Zones
+from mrmg.planning.problem._target_kernels import TARGET, Targets
 from mrmg.planning.roadmap.vertices import planned_regions
+from mrmg.scene.region import Region
 from mrmg.scene.types import Finish, Goal, Scene, Station
 
 TARGET_MARGIN_M = 0.12
@@ -32,7 +35,7 @@ def finish_of(scene: Scene) -> np.ndarray:
 def target_arrays(scene: Scene) -> Targets:
     """Return goals, stations and finishes as the planner enters them."""
     regions = planned_regions(scene)
-    shrunk = []
+    shrunk, radius_m = [], []
     for region in regions:
         corners = region.corners
         if len(corners):
@@ -40,29 +43,41 @@ def target_arrays(scene: Scene) -> Targets:
             if not smaller.is_empty and smaller.geom_type == "Polygon":
                 corners = np.asarray(smaller.normalize().exterior.coords)[:-1][::-1]
         shrunk.append(corners)
-    most = max([3, *(len(corners) for corners in shrunk)])
-    corner = np.zeros((len(regions), most, 2))
-    reach = np.zeros(len(regions))
-    for i, (region, corners) in enumerate(zip(regions, shrunk, strict=True)):
-        corner[i, : len(corners)] = corners
-        if len(corners):
-            reach[i] = np.hypot(*(corners - region.center).T).max()
-        else:
-            reach[i] = max(region.radius_m - TARGET_MARGIN_M, 0.5 * region.radius_m)
-    heading, tolerance = _headings(scene)
+        radius_m.append(max(region.radius_m - TARGET_MARGIN_M, 0.5 * region.radius_m))
+    target = np.zeros(len(regions), TARGET)
+    corner = _fill_in(target, regions, shrunk, radius_m)
+    target["heading"], target["tolerance"] = _headings(scene)
+    target["dwell"], target["zone"] = _dwell_s(scene), _gates_of(scene)
     return Targets(
         goals=len(scene.goals),
         places=len(scene.targets()),
         finish=finish_of(scene),
-        center=np.array([region.center for region in regions], float).reshape(-1, 2),
-        reach=reach,
+        target=target,
         corner=corner,
-        corners=np.array([len(corners) for corners in shrunk], np.int64),
-        heading=heading,
-        tolerance=tolerance,
-        dwell=_dwell_s(scene),
-        zone=_gates_of(scene),
     )
+
+
+def _fill_in(
+    record: np.ndarray,
+    regions: Sequence[Region],
+    outlines: Sequence[np.ndarray],
+    radius_m: Sequence[float],
+) -> np.ndarray:
+    """Write what a `REGION` has into records; return the padded corners, (N, M, 2).
+
+    Args:
+        record: receives it, shape (N,).
+        regions: give the middles.
+        outlines: corners of each one, shape (n, 2); none of a circle.
+        radius_m: of those that are circles.
+    """
+    corner = np.zeros((len(regions), max([3, *map(len, outlines)]), 2))
+    for i, (region, outline) in enumerate(zip(regions, outlines, strict=True)):
+        corner[i, : len(outline)] = outline
+        reach = np.hypot(*(outline - region.center).T).max(initial=0.0)
+        record[i]["center"], record[i]["corners"] = region.center, len(outline)
+        record[i]["reach"] = reach if len(outline) else radius_m[i]
+    return corner
 
 
 def _headings(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
@@ -111,16 +126,6 @@ def gate_arrays(scene: Scene) -> Zones:
             wider = region.shape.buffer(GATE_MARGIN_M, join_style="mitre")
             corners = np.asarray(wider.normalize().exterior.coords)[:-1][::-1]
         outlines.append(corners)
-    corner = np.zeros((len(regions), max([3, *map(len, outlines)]), 2))
-    reach = np.zeros(len(regions))
-    for i, (region, corners) in enumerate(zip(regions, outlines, strict=True)):
-        corner[i, : len(corners)] = corners
-        reach[i] = region.radius_m + GATE_MARGIN_M
-        if len(corners):
-            reach[i] = np.hypot(*(corners - region.center).T).max()
-    return Zones(
-        center=np.array([region.center for region in regions], float).reshape(-1, 2),
-        reach=reach,
-        corner=corner,
-        corners=np.array([len(corners) for corners in outlines], np.int64),
-    )
+    zone = np.zeros(len(regions), REGION)
+    radius_m = [region.radius_m + GATE_MARGIN_M for region in regions]
+    return Zones(zone, _fill_in(zone, regions, outlines, radius_m))

@@ -119,5 +119,5 @@ def test_a_drive_ends_at_rest_with_the_heading_asked_for(
     drive = drive_alone(problem, 0, straight_path(problem, 25.0))
     assert drive.arrived
     assert np.abs(drive.motion.state[-1, 3:]).max() < 1e-9
-    tolerance = float(problem.mission.targets.tolerance[0])
+    tolerance = float(problem.mission.targets.target["tolerance"][0])
     assert abs(drive.motion.state[-1, 2] - 1.5) <= tolerance

@@ -10,7 +10,7 @@ from mrmg.compilation import kernel
 from mrmg.planning.path_following.coordination._motion_kernels import (
     first_conflict,
 )
-from mrmg.planning.problem._clearance_kernels import in_zone
+from mrmg.planning.problem._region_kernels import in_region
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 
 
@@ -26,7 +26,7 @@ def note_motion(fleet, zones, traffic, inside, r, count):
         count: number of its states.
     """
     mx, my = fleet[r].middle[0], fleet[r].middle[1]
-    traffic.last[r] = count - 1
+    traffic.robot[r].last = count - 1
     for k in range(inside.shape[2]):
         i = min(k, count - 1)
         x, y, theta = (
@@ -38,8 +38,8 @@ def note_motion(fleet, zones, traffic, inside, r, count):
             c, s = cos(theta), sin(theta)
             traffic.middle[r, k, 0] = x + c * mx - s * my
             traffic.middle[r, k, 1] = y + s * mx + c * my
-        for zone in range(len(zones.reach)):
-            inside[r, zone, k] = in_zone(zones, zone, x, y)
+        for zone in range(len(zones.zone)):
+            inside[r, zone, k] = in_region(zones.zone[zone], zones.corner[zone], x, y)
 
 
 @kernel
@@ -54,12 +54,12 @@ def conflicts_of(fleet, traffic, inside, r, conflict):
         conflict: receives the steps, shape (R,).
     """
     corner = np.empty((2, MOST_CORNERS, 2))
-    own = traffic.pose[r, : traffic.last[r] + 1]
+    own = traffic.pose[r, : traffic.robot[r].last + 1]
     for other in range(len(fleet)):
         conflict[other] = np.inf
         if other == r:
             continue
-        count = max(traffic.last[r], traffic.last[other])
+        count = max(traffic.robot[r].last, traffic.robot[other].last)
         k = first_conflict(fleet[r : r + 1], traffic, other, own, count, 0, corner)
         if k >= 0:
             conflict[other] = k

@@ -72,8 +72,8 @@ def steer_to(search, target, state, control):
     direction of its heading.
     """
     own, targets, dt = search.own, search.targets, search.dt
-    center, heading = targets.center[target], targets.heading[target]
-    near = 0.5 * targets.reach[target]
+    aim = targets.target[target]
+    center, heading, near = aim.center, aim.heading, 0.5 * aim.reach
     arrived = False
     for k in range(min(HOME_STEPS, len(control) - MOST_BRAKING_STEPS)):
         here = state[k]
@@ -98,13 +98,14 @@ def free_pose(search, target, corner):
     It is its own if there is none, or the heading is free.
     """
     own, targets = search.own, search.targets
-    x, y = targets.center[target, 0], targets.center[target, 1]
-    heading, tolerance = targets.heading[target], targets.tolerance[target]
+    aim = targets.target[target]
+    x, y = aim.center[0], aim.center[1]
+    heading, tolerance = aim.heading, aim.tolerance
     if tolerance >= pi:
         return x, y, heading
     margin, pose = own[0].margin + END_SLACK_M, np.zeros(3)
     for ring in range(RINGS + 1):
-        far = REGION_SHARE * targets.reach[target] * ring / RINGS
+        far = REGION_SHARE * aim.reach * ring / RINGS
         for bearing in range(BEARINGS if ring > 0 else 1):
             angle = 2.0 * pi * bearing / BEARINGS
             pose[0], pose[1] = x + far * cos(angle), y + far * sin(angle)
@@ -129,8 +130,8 @@ def drive_to(search, target, room, control):
     if own[0].model == USER:
         return steer_to(search, target, state, control)
     x, y, heading = free_pose(search, target, corner)
-    free = targets.tolerance[target] >= pi
-    course.heading[0], course.tolerance[0] = heading, np.inf
+    free = targets.target[target].tolerance >= pi
+    course.final[0], course.final[1] = heading, np.inf
     if own[0].model == CAR:
         if free:
             heading = np.arctan2(y - state[0, 1], x - state[0, 0])
@@ -142,7 +143,7 @@ def drive_to(search, target, room, control):
         return drive_curve(search, course, corner, state, control)
     curved = -1
     if not free:
-        course.tolerance[0] = targets.tolerance[target]
+        course.final[1] = targets.target[target].tolerance
         radius = smooth_radius(own[0])
         if write_curve(own, state[0], x, y, heading, course, radius) < np.inf:
             curved = drive_curve(search, course, corner, state, control)
@@ -161,8 +162,8 @@ def drive_to(search, target, room, control):
 def list_all(search, room):
     """Write which robots are minded at all; return their number."""
     count = 0
-    for other in range(len(search.traffic.last)):
-        if search.traffic.hard[other] or search.traffic.soft[other]:
+    for other in range(len(search.traffic.robot)):
+        if search.traffic.robot[other].hard or search.traffic.robot[other].soft:
             room.near[count] = other
             count += 1
     return count
@@ -173,17 +174,17 @@ def list_near(search, room, first):
     """Write which robots may be met within the next motion; return their number."""
     own, traffic, state = search.own, search.traffic, room.state[0]
     count = 0
-    for other in range(len(traffic.last)):
-        if not (traffic.hard[other] or traffic.soft[other]):
+    for other in range(len(traffic.robot)):
+        if not (traffic.robot[other].hard or traffic.robot[other].soft):
             continue
-        j = min(first, traffic.last[other])
+        j = min(first, traffic.robot[other].last)
         apart = hypot(
             state[0] - traffic.middle[other, j, 0],
             state[1] - traffic.middle[other, j, 1],
         )
         reach = 2.0 * own[0].radius + traffic.fleet[other].radius
         reach += max(own[0].spacing, traffic.fleet[other].spacing)
-        if apart < reach + (search.task.steps + 1) * traffic.closing[other]:
+        if apart < reach + (search.task.steps + 1) * traffic.robot[other].closing:
             room.near[count] = other
             count += 1
     return count
@@ -205,12 +206,12 @@ def conflict_cost(search, room, nears, first, steps):
         )
         if conflict < 0:
             continue
-        if traffic.hard[other]:
+        if traffic.robot[other].hard:
             return np.inf
         reach = search.own[0].radius + traffic.fleet[other].radius
         apart = reach
         for k in range(conflict, min(steps, conflict + search.task.steps) + 1):
-            j = min(first + k, traffic.last[other])
+            j = min(first + k, traffic.robot[other].last)
             dx = room.state[k, 0] - traffic.middle[other, j, 0]
             dy = room.state[k, 1] - traffic.middle[other, j, 1]
             apart = min(apart, hypot(dx, dy))
@@ -238,7 +239,7 @@ def add_end(search, nodes, room, a, motion, count):
 
     Returns whether it may be.
     """
-    first = nodes.step[a]
+    first = nodes.node[a].step
     last = room.state[count]
     if count < 0 or not may_end(search.targets, search.task, last):
         return False
@@ -249,10 +250,11 @@ def add_end(search, nodes, room, a, motion, count):
         return False
     b = nodes.size[0]
     nodes.size[0] = b + 1
-    nodes.parent[b], nodes.motion[b], nodes.step[b] = a, motion, first + count
-    nodes.cost[b] = nodes.cost[a] + count * search.dt + conflict_s
-    nodes.size[1] = push(nodes.key, nodes.entry, nodes.size[1], nodes.cost[b], 2 * b)
-    if nodes.size[2] < 0 or nodes.cost[b] < nodes.cost[nodes.size[2]]:
+    cost = nodes.node[a].cost + count * search.dt + conflict_s
+    end = nodes.node[b]
+    end.parent, end.motion, end.step, end.cost = a, motion, first + count, cost
+    nodes.size[1] = push(nodes.key, nodes.entry, nodes.size[1], cost, 2 * b)
+    if nodes.size[2] < 0 or cost < nodes.node[nodes.size[2]].cost:
         nodes.size[2] = b
     return True
 
@@ -260,7 +262,7 @@ def add_end(search, nodes, room, a, motion, count):
 @kernel
 def is_tried(search, target, state, tries):
     """Return whether to drive to a target from a state: from afar more rarely."""
-    center = search.targets.center[target]
+    center = search.targets.target[target].center
     far = hypot(state[0] - center[0], state[1] - center[1])
     return tries % (1 + int(0.2 * far / max(search.own[0].radius, 0.1))) == 0
 

@@ -164,8 +164,8 @@ def add_others(own, traffic, inner, grid, layer, soft_s, penalty):
     rows, columns = penalty.shape[1], penalty.shape[2]
     x_min, y_min, cell = grid
     corner = np.empty((MOST_CORNERS, 2))
-    for other in range(len(traffic.last)):
-        if not (traffic.hard[other] or traffic.soft[other]):
+    for other in range(len(traffic.robot)):
+        if not (traffic.robot[other].hard or traffic.robot[other].soft):
             continue
         it = traffic.fleet[other]
         placed = corner[: it.corners]
@@ -173,7 +173,7 @@ def add_others(own, traffic, inner, grid, layer, soft_s, penalty):
         reach = own[0].radius + it.radius
         far = near + it.radius
         for t in range(len(penalty)):
-            k = min(t * layer, traffic.last[other])
+            k = min(t * layer, traffic.robot[other].last)
             pose, middle = traffic.pose[other, k], traffic.middle[other, k]
             place_footprint(it.corner[: it.corners], pose[0], pose[1], pose[2], placed)
             first_row = max(0, int(floor((middle[1] - far - y_min) / cell)))
@@ -188,7 +188,7 @@ def add_others(own, traffic, inner, grid, layer, soft_s, penalty):
                         continue
                     if not convex_segment_distance(placed, x, y, x, y) < near:
                         continue
-                    if traffic.hard[other]:
+                    if traffic.robot[other].hard:
                         penalty[t, i, j] = np.inf
                     else:
                         penalty[t, i, j] += soft_s * max(0.0, 1.0 - apart / reach)
@@ -205,9 +205,9 @@ def add_region(targets, t, x_min, y_min, cell, region):
         region: receives them, shape (ny, nx).
     """
     rows, columns = region.shape
-    column = int(floor((targets.center[t, 0] - x_min) / cell))
-    row = int(floor((targets.center[t, 1] - y_min) / cell))
-    more = int(targets.reach[t] / cell) + 1
+    column = int(floor((targets.target[t].center[0] - x_min) / cell))
+    row = int(floor((targets.target[t].center[1] - y_min) / cell))
+    more = int(targets.target[t].reach / cell) + 1
     for i in range(max(0, row - more), min(rows, row + more + 1)):
         for j in range(max(0, column - more), min(columns, column + more + 1)):
             x, y = x_min + (j + 0.5) * cell, y_min + (i + 0.5) * cell

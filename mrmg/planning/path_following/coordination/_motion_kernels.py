@@ -22,12 +22,13 @@ from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
     MOST_PIECES,
     reeds_shepp,
 )
-from mrmg.planning.problem._clearance_kernels import clear_of_obstacles, in_zone
+from mrmg.planning.problem._clearance_kernels import clear_of_obstacles
 from mrmg.planning.problem._control_kernels import (
     braking_control,
     control_towards,
     stands,
 )
+from mrmg.planning.problem._region_kernels import in_region
 from mrmg.world._kernels import convex_convex_distance, place_footprint
 
 BRAKE, HOME, VISIT, STAY, WAIT, TRACK, HOLD, MOVE = range(-5, 3)
@@ -48,6 +49,17 @@ REACH_STEPS = 80
 """Steps that driving along a curve may take beyond its length at full speed."""
 
 
+OTHER = np.dtype(
+    [
+        ("last", np.int64),  # number of its last state
+        ("closing", np.float64),  # what it and own robot near in a step, at most [m]
+        ("hard", np.bool_),  # no conflict with it may be
+        ("soft", np.bool_),  # conflicts with it cost
+    ]
+)
+"""Another robot, as the one that plans sees it."""
+
+
 class Traffic(NamedTuple):
     """The other robots' motions; after its last state a robot stays.
 
@@ -55,12 +67,9 @@ class Traffic(NamedTuple):
         fleet: all robots, shape (R,).
         pose: states at each step, of which (x, y, theta) count, shape (R, K, 5).
         middle: middles of the footprints, shape (R, K, 2).
-        last: number of each robot's last state, shape (R,).
-        closing: by how much a robot and the one that plans come nearer to each other in
-            one step at most [m], shape (R,).
-        hard: robots with which no conflict may be, shape (R,).
-        soft: robots with which conflicts cost, shape (R,).
-        busy: whether such a robot is in a mutual-exclusion zone, shape (G, K).
+        robot: `OTHER`, shape (R,).
+        busy: whether a robot that must not be met is in a mutual-exclusion zone, shape
+            (G, K).
         busy_left: in how many of the steps from one on it is, shape (G, K).
         release: steps at which such a robot sets out or leaves a zone, sorted.
         end: step from which on all of them stand.
@@ -69,10 +78,7 @@ class Traffic(NamedTuple):
     fleet: np.ndarray
     pose: np.ndarray
     middle: np.ndarray
-    last: np.ndarray
-    closing: np.ndarray
-    hard: np.ndarray
-    soft: np.ndarray
+    robot: np.ndarray
     busy: np.ndarray
     busy_left: np.ndarray
     release: np.ndarray
@@ -98,7 +104,7 @@ def first_conflict(own, traffic, other, state, count, first, corner):
     mx, my = own[0].middle[0], own[0].middle[1]
     k = 1
     while k <= count:
-        i, j = min(k, len(state) - 1), min(first + k, traffic.last[other])
+        i, j = min(k, len(state) - 1), min(first + k, traffic.robot[other].last)
         x, y, theta = state[i, 0], state[i, 1], state[i, 2]
         c, s = cos(theta), sin(theta)
         apart = hypot(
@@ -106,7 +112,7 @@ def first_conflict(own, traffic, other, state, count, first, corner):
             y + s * mx + c * my - traffic.middle[other, j, 1],
         )
         if apart >= reach:  # until they may have come near to each other
-            k += max(1, int((apart - reach) / traffic.closing[other]))
+            k += max(1, int((apart - reach) / traffic.robot[other].closing))
             continue
         place_footprint(own[0].corner[:n], x, y, theta, corner[0, :n])
         pose = traffic.pose[other, j]
@@ -125,21 +131,21 @@ def blocked_for_good(own, traffic, state, first, corner):
     still = np.empty((2, 5))
     copy_numbers(state, still[0])
     copy_numbers(state, still[1])
-    for other in range(len(traffic.last)):
-        if not traffic.hard[other]:
+    for other in range(len(traffic.robot)):
+        if not traffic.robot[other].hard:
             continue
         k = first
-        while k <= max(first, traffic.last[other]):
+        while k <= max(first, traffic.robot[other].last):
             if first_conflict(own, traffic, other, still, 1, k - 1, corner) >= 0:
                 return True
-            j = min(k, traffic.last[other])
+            j = min(k, traffic.robot[other].last)
             apart = hypot(
                 state[0] - traffic.middle[other, j, 0],
                 state[1] - traffic.middle[other, j, 1],
             )
             reach = traffic.fleet[other].radius + own[0].radius + own[0].spacing
             reach += traffic.fleet[other].spacing + own[0].radius
-            k += max(1, int((apart - reach) / traffic.closing[other]))
+            k += max(1, int((apart - reach) / traffic.robot[other].closing))
     return False
 
 
@@ -159,9 +165,11 @@ def clear(own, spaces, zones, traffic, state, count, first, corner):
     for k in range(1, count + 1):
         if not clear_of_obstacles(own, spaces, state[k], corner[0]):
             return False
-        for zone in range(len(zones.reach)):
+        for zone in range(len(zones.zone)):
             j = min(first + k, traffic.busy.shape[1] - 1)
-            if traffic.busy[zone, j] and in_zone(zones, zone, state[k, 0], state[k, 1]):
+            if traffic.busy[zone, j] and in_region(
+                zones.zone[zone], zones.corner[zone], state[k, 0], state[k, 1]
+            ):
                 return False
     return True
 
@@ -178,14 +186,14 @@ def steer_along(own, course, segment, preview, state, dt):
         return u1, u2, segment
     i, s = advance(course, segment, state[0], state[1])
     ahead = i
-    while ahead + 2 <= last and course.way[ahead + 1] < s + preview:
+    while ahead + 2 <= last and course.node[ahead + 1].way < s + preview:
         ahead += 1
-    size = max(course.way[ahead + 1] - course.way[ahead], 1e-9)
-    t = min(1.0, max(0.0, (s + preview - course.way[ahead]) / size))
-    x = (1.0 - t) * course.node[ahead, 0] + t * course.node[ahead + 1, 0]
-    y = (1.0 - t) * course.node[ahead, 1] + t * course.node[ahead + 1, 1]
+    size = max(course.node[ahead + 1].way - course.node[ahead].way, 1e-9)
+    t = min(1.0, max(0.0, (s + preview - course.node[ahead].way) / size))
+    x = (1.0 - t) * course.node[ahead].x + t * course.node[ahead + 1].x
+    y = (1.0 - t) * course.node[ahead].y + t * course.node[ahead + 1].y
     u1, u2 = steer_user(own[0], state, x, y, 1.0, dt)
-    return u1, u2, last + 1 if s > course.way[last] - 0.5 * preview else i
+    return u1, u2, last + 1 if s > course.node[last].way - 0.5 * preview else i
 
 
 @kernel
@@ -278,19 +286,19 @@ def write_curve(own, state, x, y, theta, course, radius):
     if not total < SPACING_M * (len(course.node) - 2 * MOST_PIECES):
         return np.inf
     px, py = state[0], state[1]
-    course.node[0, 0], course.node[0, 1] = px, py
+    course.node[0].x, course.node[0].y = px, py
     n = stretch = 0
     for p in range(MOST_PIECES):
         if abs(length[p]) < 1e-6:
             continue
         gear = 1 if length[p] > 0.0 else -1
         bend = gear * turn[p] / radius
-        if n > 0 and course.gear[n - 1] != gear:
-            course.end[stretch:n] = n
+        if n > 0 and course.node[n - 1].gear != gear:
+            course.node.end[stretch:n] = n
             stretch = n
-            course.bend[n] = bend
+            course.node[n].bend = bend
         if n == 0:
-            course.bend[0] = bend
+            course.node[0].bend = bend
         pieces = int(abs(length[p]) / SPACING_M) + 1
         way = length[p] / pieces
         for _ in range(pieces):
@@ -300,12 +308,12 @@ def write_curve(own, state, x, y, theta, course, radius):
             px += chord * cos(heading + swing)
             py += chord * sin(heading + swing)
             heading += 2.0 * swing
-            course.gear[n] = gear
+            course.node[n].gear = gear
             n += 1
-            course.node[n, 0], course.node[n, 1] = px, py
-            course.way[n] = course.way[n - 1] + abs(chord)
-            course.bend[n] = bend
-    course.end[stretch : n + 1] = n
+            course.node[n].x, course.node[n].y = px, py
+            course.node[n].way = course.node[n - 1].way + abs(chord)
+            course.node[n].bend = bend
+    course.node.end[stretch : n + 1] = n
     course.size[0] = n + 1 if n > 0 else 0
     return total
 
@@ -324,7 +332,7 @@ def drive_curve(search, course, corner, state, control):
         control: shape (n, 2).
     """
     own, dt = search.own, search.dt
-    way = course.way[max(course.size[0] - 1, 0)]
+    way = course.node[max(course.size[0] - 1, 0)].way
     most = int(way / (own[0].limit[1] * dt)) + REACH_STEPS
     most = min(most, len(control) - 1)
     segment = 0 if course.size[0] > 1 else course.size[0]

@@ -19,8 +19,8 @@ from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
     MOST_PIECES,
     reeds_shepp,
 )
-from mrmg.planning.problem._clearance_kernels import Zones
 from mrmg.planning.problem._control_kernels import wrap
+from mrmg.planning.problem._region_kernels import Zones
 from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.roadmap._fleet_kernels import Spaces
 from mrmg.planning.roadmap._heap_kernels import push
@@ -103,18 +103,26 @@ class Setting(NamedTuple):
     dt: float
 
 
+NODE = np.dtype(
+    [
+        ("parent", np.int64),
+        ("motion", np.int64),  # that led to it
+        ("step", np.int64),  # that it is at
+        ("leg", np.int64),  # that the robot is on
+        ("segment", np.int64),  # of its path; OFF_PATH, or the nodes' number at its end
+        ("left", np.int64),  # last segment that it was on
+        ("cost", np.float64),  # what it took [s]
+    ]
+)
+"""A node of a search."""
+
+
 class Nodes(NamedTuple):
     """Nodes of a search, and what led to each.
 
     Attributes:
         state: shape (N, 5).
-        parent: shape (N,).
-        step: that a node is at, shape (N,).
-        leg: that the robot is on, shape (N,).
-        segment: of its path that it is on, or OFF_PATH; the number of nodes at its end.
-        left: last segment that it was on, shape (N,).
-        cost: what it took [s], shape (N,).
-        motion: that led to it, shape (N,).
+        node: `NODE`, shape (N,).
         key, entry: heap of open nodes; entries are 2 a, and 2 a + 1 for a node of which
             only the way along the path has been looked at.
         table: cells that have been reached.
@@ -122,13 +130,7 @@ class Nodes(NamedTuple):
     """
 
     state: np.ndarray
-    parent: np.ndarray
-    step: np.ndarray
-    leg: np.ndarray
-    segment: np.ndarray
-    left: np.ndarray
-    cost: np.ndarray
-    motion: np.ndarray
+    node: np.ndarray
     key: np.ndarray
     entry: np.ndarray
     table: np.ndarray
@@ -201,17 +203,17 @@ def cost_to_go_s(search, place, state):
         )
     if on_path and segment < search.course.size[0]:
         time_s = along_path_s(search, leg, left, state)
-    elif target >= 0 and search.targets.tolerance[target] < pi:
+    elif target >= 0 and search.targets.target[target].tolerance < pi:
         posed_s = posing_time_s(own, search.targets, target, x, y, state[2])
         if own[0].model != CAR:
             time_s += posed_s
         else:
             if leg + 1 < legs or (leg < legs and task.finish >= 0):
-                cx = search.targets.center[target, 0]
-                cy = search.targets.center[target, 1]
+                center = search.targets.target[target].center
                 posed_s += guide_at(
-                    task.guide, leg + 1, step_number, spaces.x_min, spaces.y_min, cx, cy
-                )
+                    task.guide, leg + 1, step_number, spaces.x_min, spaces.y_min,
+                    center[0], center[1],
+                )  # fmt: skip
             time_s = max(time_s, posed_s)
     return time_s + task.later_s[leg]
 
@@ -223,14 +225,14 @@ def posing_time_s(own, targets, target, x, y, theta):
     Of a car that is the time along the shortest curve; of robots that can turn on the
     spot, that of the turn alone.
     """
-    heading, reach = targets.heading[target], targets.reach[target]
+    aim = targets.target[target]
     if own[0].model == CAR:
         turn, length = np.empty(MOST_PIECES), np.empty(MOST_PIECES)
-        dx, dy = targets.center[target, 0] - x, targets.center[target, 1] - y
+        dx, dy = aim.center[0] - x, aim.center[1] - y
         radius = CURVE_SHARE * own[0].turning_radius
-        curve = reeds_shepp(dx, dy, theta, heading, radius, turn, length)
-        return max(0.0, curve - reach) / own[0].limit[1] if curve < np.inf else 0.0
-    off = abs(wrap(heading - theta)) - targets.tolerance[target]
+        curve = reeds_shepp(dx, dy, theta, aim.heading, radius, turn, length)
+        return max(0.0, curve - aim.reach) / own[0].limit[1] if curve < np.inf else 0.0
+    off = abs(wrap(aim.heading - theta)) - aim.tolerance
     return max(0.0, off) / own[0].limit[2]
 
 
@@ -239,14 +241,14 @@ def along_path_s(search, leg, left, state):
     """Return the time to the end of the task along the path [s]."""
     course, task = search.course, search.task
     i, s = advance(course, left, state[0], state[1])
-    size = course.way[i + 1] - course.way[i]
-    t = min(1.0, max(0.0, (s - course.way[i]) / max(size, 1e-9)))
-    px = (1.0 - t) * course.node[i, 0] + t * course.node[i + 1, 0]
-    py = (1.0 - t) * course.node[i, 1] + t * course.node[i + 1, 1]
-    rest_s = (1.0 - t) * course.rest_s[i] + t * course.rest_s[i + 1]
+    size = course.node[i + 1].way - course.node[i].way
+    t = min(1.0, max(0.0, (s - course.node[i].way) / max(size, 1e-9)))
+    px = (1.0 - t) * course.node[i].x + t * course.node[i + 1].x
+    py = (1.0 - t) * course.node[i].y + t * course.node[i + 1].y
+    rest_s = (1.0 - t) * course.node[i].rest_s + t * course.node[i + 1].rest_s
     way = SIDEWAYS * hypot(state[0] - px, state[1] - py)
     if leg < len(task.leg):
-        way += 2.0 * max(0.0, course.way[i] + t * size - task.along[leg])
+        way += 2.0 * max(0.0, course.node[i].way + t * size - task.along[leg])
     return rest_s + way / search.own[0].limit[1] + task.rest_s
 
 
@@ -257,9 +259,12 @@ def queueing_s(search, leg, step_number):
     Without it waits of minutes would be put off until all that takes less is tried.
     """
     task = search.task
-    if leg == len(task.leg) or search.targets.zone[task.leg[leg]] < 0:
+    if leg == len(task.leg):
         return 0.0
-    left = search.traffic.busy_left[search.targets.zone[task.leg[leg]]]
+    zone = search.targets.target[task.leg[leg]].zone
+    if zone < 0:
+        return 0.0
+    left = search.traffic.busy_left[zone]
     return task.hold_share * search.dt * left[min(step_number, len(left) - 1)]
 
 
@@ -286,9 +291,9 @@ def add(search, nodes, a, motion, state, place, cost):
         return -1
     nodes.size[0] = b + 1
     copy_numbers(state, nodes.state[b])
-    nodes.parent[b], nodes.motion[b], nodes.step[b] = a, motion, step_number
-    nodes.leg[b], nodes.segment[b], nodes.left[b] = leg, segment, left
-    nodes.cost[b] = cost
+    node = nodes.node[b]
+    node.parent, node.motion, node.step, node.leg = a, motion, step_number, leg
+    node.segment, node.left, node.cost = segment, left, cost
     value = cost + search.task.weight * rest_s + queueing_s(search, leg, step_number)
     entry = 2 * b + (1 if motion == TRACK else 0)
     nodes.size[1] = push(nodes.key, nodes.entry, nodes.size[1], value, entry)

@@ -79,17 +79,17 @@ def rejoined(course, left, state):
     """Return (segment or OFF_PATH, least segment it may rejoin) of a state."""
     i, s = advance(course, left, state[0], state[1])
     for _ in range(2):
-        dx = course.node[i + 1, 0] - course.node[i, 0]
-        dy = course.node[i + 1, 1] - course.node[i, 1]
+        dx = course.node[i + 1].x - course.node[i].x
+        dy = course.node[i + 1].y - course.node[i].y
         size = max(hypot(dx, dy), 1e-9)
-        ex, ey = state[0] - course.node[i, 0], state[1] - course.node[i, 1]
+        ex, ey = state[0] - course.node[i].x, state[1] - course.node[i].y
         along, off = (ex * dx + ey * dy) / size, (dx * ey - dy * ex) / size
-        ahead = atan2(dy, dx) + (0.0 if course.gear[i] > 0 else pi)
+        ahead = atan2(dy, dx) + (0.0 if course.node[i].gear > 0 else pi)
         near = abs(off) < REJOIN_M and -REJOIN_M < along < size + REJOIN_M
         if near and abs(wrap(state[2] - ahead)) < REJOIN_ANGLE:
             return i, i
-        last = course.end[i]
-        if last + 1 >= course.size[0] or s < course.way[last] - REJOIN_M:
+        last = course.node[i].end
+        if last + 1 >= course.size[0] or s < course.node[last].way - REJOIN_M:
             break
         i = last  # from the next stretch on
     return OFF_PATH, left
@@ -100,10 +100,11 @@ def expand(search, nodes, room, a, motion, nears):
     """Add what a motion leads to from node a if it is free and new; return it or -1."""
     task, course, state = search.task, search.course, room.state
     own, dt, steps = search.own, search.dt, task.steps
-    segment, left, first = nodes.segment[a], nodes.left[a], nodes.step[a]
+    node = nodes.node[a]
+    segment, left, first = node.segment, node.left, node.step
     segment = move(search, motion, segment, steps, state, room.control)
     after = state[steps]
-    leg = legs_done(search.targets, task, nodes.leg[a], state, 1, steps)
+    leg = legs_done(search.targets, task, node.leg, state, 1, steps)
     stamp = first + steps if first < search.traffic.end else 0
     key = cell_of(task, after, leg, stamp)
     at = place_of(nodes.table, key)
@@ -125,7 +126,7 @@ def expand(search, nodes, room, a, motion, nears):
     share = task.hold_share
     if motion != HOLD:
         share = multiplier_in(search.terrain, after[0], after[1])
-    cost = nodes.cost[a] + share * steps * dt + conflict_s
+    cost = node.cost + share * steps * dt + conflict_s
     place = (first + steps, leg, segment, left)
     return add(search, nodes, a, motion, after, place, cost)
 
@@ -140,25 +141,25 @@ def stand(search, nodes, room, a, motion, tail, last):
         motion: STAY, which ends the leg, or WAIT.
         tail, last: steps from node a on.
     """
-    task, first = search.task, nodes.step[a]
+    task, first = search.task, nodes.node[a].step
     if first + last + MOST_BRAKING_STEPS >= len(room.control):
         return
     for k in range(tail, last):
         copy_numbers(room.state[k], room.state[k + 1])
-    leg = nodes.leg[a] + (1 if motion == STAY else 0)
+    leg = nodes.node[a].leg + (1 if motion == STAY else 0)
     if not is_new(nodes.table, cell_of(task, room.state[last], leg, first + last)):
         return
     conflict_s = passing_cost(search, room, last, first)
     if conflict_s < np.inf:
-        cost = nodes.cost[a] + task.hold_share * last * search.dt + conflict_s
-        place = (first + last, leg, nodes.segment[a], nodes.left[a])
+        cost = nodes.node[a].cost + task.hold_share * last * search.dt + conflict_s
+        place = (first + last, leg, nodes.node[a].segment, nodes.node[a].left)
         add(search, nodes, a, motion, room.state[last], place, cost)
 
 
 @kernel
 def stay(search, nodes, room, a):
     """Open a stay in the leg's target, if braking from node a ends in it."""
-    task, targets, leg = search.task, search.targets, nodes.leg[a]
+    task, targets, leg = search.task, search.targets, nodes.node[a].leg
     tail = brake(search.own, search.dt, room.state, room.control)
     if at_target(targets, task.leg[leg], room.state[tail]):
         stand(search, nodes, room, a, STAY, tail, tail + task.stay[leg])
@@ -167,7 +168,7 @@ def stay(search, nodes, room, a):
 @kernel
 def visit(search, nodes, room, a):
     """Open a drive from node a to the pose that the leg's target wants."""
-    task, first, leg = search.task, nodes.step[a], nodes.leg[a]
+    task, first, leg = search.task, nodes.node[a].step, nodes.node[a].leg
     copy_numbers(nodes.state[a], room.state[0])
     count = drive_to(search, task.leg[leg], room, room.control)
     last = first + count
@@ -179,10 +180,10 @@ def visit(search, nodes, room, a):
     conflict_s = passing_cost(search, room, count, first)
     leg += 1 if task.stay[leg] == 0 else 0
     if conflict_s < np.inf and is_new(nodes.table, cell_of(task, after, leg, last)):
-        segment, left = OFF_PATH, nodes.left[a]
+        segment, left = OFF_PATH, nodes.node[a].left
         if search.course.size[0] > 1:
             segment, left = rejoined(search.course, left, after)
-        cost = nodes.cost[a] + count * search.dt + conflict_s
+        cost = nodes.node[a].cost + count * search.dt + conflict_s
         add(search, nodes, a, VISIT, after, (last, leg, segment, left), cost)
 
 
@@ -191,53 +192,54 @@ def wait(search, nodes, room, a):
     """Open a wait until a robot that must not be met sets out, or leaves a zone."""
     tail = brake(search.own, search.dt, room.state, room.control)
     release = search.traffic.release
-    i = np.searchsorted(release, nodes.step[a] + tail, side="right")
+    i = np.searchsorted(release, nodes.node[a].step + tail, side="right")
     if i < len(release):
-        stand(search, nodes, room, a, WAIT, tail, release[i] - nodes.step[a])
+        stand(search, nodes, room, a, WAIT, tail, release[i] - nodes.node[a].step)
 
 
 @kernel
 def write_controls(search, nodes, room, a, control):
     """Write the controls that lead to end a; return their number."""
     branch = np.empty(nodes.size[0], np.int64)
-    n, b = 0, nodes.parent[a]
+    n, b = 0, nodes.node[a].parent
     while b > 0:
         branch[n] = b
         n += 1
-        b = nodes.parent[b]
+        b = nodes.node[b].parent
     for i in range(n - 1, -1, -1):
         b = branch[i]
-        p, motion = nodes.parent[b], nodes.motion[b]
-        first, steps = nodes.step[p], nodes.step[b] - nodes.step[p]
+        p, motion = nodes.node[b].parent, nodes.node[b].motion
+        before = nodes.node[p]
+        first, steps = before.step, nodes.node[b].step - before.step
         copy_numbers(nodes.state[p], room.state[0])
         if motion == VISIT:
-            target = search.task.leg[nodes.leg[p]]
+            target = search.task.leg[before.leg]
             drive_to(search, target, room, control[first:])
             continue
         held = HOLD if motion in (STAY, WAIT) else motion
-        segment = nodes.segment[p]
-        move(search, held, segment, steps, room.state, control[first:])
-    p = nodes.parent[a]
+        move(search, held, before.segment, steps, room.state, control[first:])
+    p = nodes.node[a].parent
+    first = nodes.node[p].step
     copy_numbers(nodes.state[p], room.state[0])
-    if nodes.motion[a] == BRAKE:
-        brake(search.own, search.dt, room.state, control[nodes.step[p] :])
+    if nodes.node[a].motion == BRAKE:
+        brake(search.own, search.dt, room.state, control[first:])
     else:
         finish = search.task.finish
-        drive_to(search, finish, room, control[nodes.step[p] :])
-    return nodes.step[a]
+        drive_to(search, finish, room, control[first:])
+    return nodes.node[a].step
 
 
 @kernel
 def offer(search, nodes, room, a, tries):
     """Open what ends node a's leg there, or the task; return the tries until now."""
-    task, leg = search.task, nodes.leg[a]
+    task, leg = search.task, nodes.node[a].leg
     if leg == len(task.leg):
         end_from(search, nodes, room, a, tries)
         return tries + 1
     if task.stay[leg] > 0:
         copy_numbers(nodes.state[a], room.state[0])
         stay(search, nodes, room, a)
-    if search.targets.tolerance[task.leg[leg]] < pi:
+    if search.targets.target[task.leg[leg]].tolerance < pi:
         if is_tried(search, task.leg[leg], nodes.state[a], tries):
             visit(search, nodes, room, a)
         return tries + 1
@@ -252,11 +254,12 @@ def follow_path(search, nodes, room, a, tries):
     """
     while a >= 0 and nodes.size[0] + WAYS_ON < search.task.most:
         tries = offer(search, nodes, room, a, tries)
-        on_path = 0 <= nodes.segment[a] < search.course.size[0]
-        if not on_path or nodes.step[a] + 2 * MOST_BRAKING_STEPS >= len(room.control):
+        segment, first = nodes.node[a].segment, nodes.node[a].step
+        on_path = 0 <= segment < search.course.size[0]
+        if not on_path or first + 2 * MOST_BRAKING_STEPS >= len(room.control):
             return tries
         copy_numbers(nodes.state[a], room.state[0])
-        nears = list_near(search, room, nodes.step[a])
+        nears = list_near(search, room, first)
         a = expand(search, nodes, room, a, TRACK, nears)
     return tries
 
@@ -284,13 +287,14 @@ def find_motion(search, nodes, room, start, control):
         value, number = nodes.key[0], nodes.entry[0]
         nodes.size[1] = pop(nodes.key, nodes.entry, nodes.size[1])
         a, widened = number >> 1, number & 1
-        if nodes.motion[a] <= HOME:
+        node = nodes.node[a]
+        if node.motion <= HOME:
             return write_controls(search, nodes, room, a, control), nodes.size[0]
-        if nodes.step[a] + 2 * MOST_BRAKING_STEPS >= len(control):
+        if node.step + 2 * MOST_BRAKING_STEPS >= len(control):
             continue
         if widened == 0:
             tries = follow_path(search, nodes, room, a, tries)
-            if 0 <= nodes.segment[a] < search.course.size[0]:
+            if 0 <= node.segment < search.course.size[0]:
                 later = value + WIDENING_SHARE * task.steps * search.dt
                 entry = 2 * a + 1
                 nodes.size[1] = push(
@@ -299,7 +303,7 @@ def find_motion(search, nodes, room, start, control):
                 continue
         copy_numbers(nodes.state[a], room.state[0])
         wait(search, nodes, room, a)  # lists robots of its own
-        nears = list_near(search, room, nodes.step[a])
+        nears = list_near(search, room, node.step)
         for motion in range(HOLD, MOVE + motions):
             expand(search, nodes, room, a, motion, nears)
         if nodes.size[2] >= 0:

@@ -26,6 +26,7 @@ from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.coordination import _search_kernels, priorities
 from mrmg.planning.path_following.coordination._motion_kernels import Traffic
 from mrmg.planning.path_following.coordination._node_kernels import (
+    NODE,
     Nodes,
     Scratch,
     Setting,
@@ -48,7 +49,7 @@ from mrmg.planning.path_following.coordination.tasks import (
     task_of,
 )
 from mrmg.planning.path_following.coordination.traffic import FleetTraffic
-from mrmg.planning.path_following.tracking import Drive, Motion, course_of
+from mrmg.planning.path_following.tracking import Drive, Motion, course_of, empty_path
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.plans import Trajectory
@@ -69,19 +70,11 @@ BRAKING_SHARE = 0.8
 def empty_course(most: int) -> Course:
     """Return room for a path."""
     return Course(
-        node=np.zeros((most, 2)),
-        gear=np.ones(most, np.int64),
-        bend=np.zeros(most),
-        way=np.zeros(most),
-        end=np.zeros(most, np.int64),
-        fastest=np.full(most, np.inf),
-        pause=np.zeros(most, np.int64),
-        rest_s=np.zeros(most),
+        node=empty_path(most),
         size=np.zeros(1, np.int64),
         ease=0.0,
         stiffness=1.0,
-        heading=np.zeros(1),
-        tolerance=np.full(1, np.inf),
+        final=np.array([0.0, np.inf]),
     )
 
 
@@ -94,13 +87,7 @@ def empty_nodes(task: Task) -> Nodes:
     most, ways_on = task.most, len(task.motion) + _search_kernels.WAYS_ON
     return Nodes(
         state=np.empty((most, 5)),
-        parent=np.empty(most, np.int64),
-        step=np.empty(most, np.int64),
-        leg=np.empty(most, np.int64),
-        segment=np.empty(most, np.int64),
-        left=np.empty(most, np.int64),
-        cost=np.empty(most),
-        motion=np.empty(most, np.int64),
+        node=np.empty(most, NODE),
         key=np.empty(2 * most + 2),
         entry=np.empty(2 * most + 2, np.int64),
         table=np.full(1 << (ways_on * most).bit_length(), -1, np.int64),
@@ -206,7 +193,9 @@ class _Planning:
         led = len(path.target) == len(tour) or (
             problem.steered_home[r] and not tour[1:]
         )
-        led &= bool((problem.mission.targets.tolerance[task.leg] >= np.pi).all())
+        led &= bool(
+            (problem.mission.targets.target["tolerance"][task.leg] >= np.pi).all()
+        )
         guide = NO_GUIDE
         if not (led and self.round is ROUNDS[0]):
             guide = self._fields.static(r, tour)
@@ -330,7 +319,7 @@ def _course_with_rest(
     course = course_of(problem, r, path)
     if drive is None or len(drive.spent_s) == 0:
         return course
-    course.rest_s[: len(path.node)] = drive.spent_s[-1] - drive.spent_s
+    course.node["rest_s"][: len(path.node)] = drive.spent_s[-1] - drive.spent_s
     return course
 
 

@@ -94,7 +94,7 @@ def no_path(problem: Problem, r: int) -> Path:
 def stays_s(problem: Problem, r: int, legs: Sequence[int]) -> np.ndarray:
     """Return how long robot r stays at targets at most [s], shape (L,)."""
     targets, robot = problem.mission.targets, problem.mission.fleet[r]
-    stay_s = targets.dwell[list(legs)].astype(float)
+    stay_s = targets.target["dwell"][list(legs)].astype(float)
     if np.isfinite(robot["charge"]):
         filling_s = robot["capacity"] / (robot["charge"] - robot["energy"][CONSUMERS_W])
         stations = np.array([t >= targets.goals for t in legs], bool)
@@ -121,10 +121,12 @@ def task_of(
     led = min(len(legs), len(path.stop))
     along[:led] = path.way[path.stop[:led]]
     # A path may well pass through a target with another heading than it wants.
-    along[targets.tolerance[legs] < pi] = np.inf
+    along[targets.target["tolerance"][legs] < pi] = np.inf
     stay_s[:led] = path.pause_s[:led]
     standing = (
-        LONG_HOLD_SHARE if problem.mission.targets.zone.max() >= 0 else HOLD_SHARE
+        LONG_HOLD_SHARE
+        if problem.mission.targets.target["zone"].max() >= 0
+        else HOLD_SHARE
     )
     # Stays yet to come cost what they cost, whatever the weight of the rest.
     ahead_s = np.append(np.cumsum(stay_s[::-1])[::-1], 0.0)
@@ -176,17 +178,19 @@ def poses_s(problem: Problem, r: int, task: Task, guide: Guide) -> np.ndarray:
     excess_s = np.zeros(len(task.leg) + 1)
 
     def rest_s(leg: int, target: int) -> float:
-        x, y = targets.center[target]
+        x, y = targets.target["center"][target]
         return float(guide_at(guide, leg, 0, spaces.x_min, spaces.y_min, x, y))
 
     stop_s = float(own[0]["limit"][1] / own[0]["limit"][3])
     for leg, target in enumerate(task.leg):
-        excess_s[: leg + 1] += stop_s * (targets.tolerance[target] < pi)
+        excess_s[: leg + 1] += stop_s * (targets.target["tolerance"][target] < pi)
     for leg, (one, other) in enumerate(pairwise(tour)):
-        if (targets.tolerance[[one, other]] >= pi).any():
+        if (targets.target["tolerance"][[one, other]] >= pi).any():
             continue
-        x, y = targets.center[one]
-        time_s = posing_time_s(own, targets, other, x, y, targets.heading[one])
+        x, y = targets.target["center"][one]
+        time_s = posing_time_s(
+            own, targets, other, x, y, targets.target["heading"][one]
+        )
         if own[0]["model"] == CAR:
             time_s -= rest_s(leg + 1, one)
             time_s += rest_s(leg + 2, other) if leg + 2 < len(tour) else 0.0
@@ -203,7 +207,9 @@ def horizon_steps(
     top = mission.fleet["limit"][:, 1]
     spans_s, standing_s = [], 0.0
     for r, (tour, path) in enumerate(zip(tours, paths, strict=True)):
-        way = np.vstack([problem.start[r, :2], mission.targets.center[list(tour)]])
+        way = np.vstack(
+            [problem.start[r, :2], mission.targets.target["center"][list(tour)]]
+        )
         straight_m = float(np.hypot(*np.diff(way, axis=0).T).sum())
         longest_m = max(straight_m, float(path.way[-1]))
         spans_s.append(longest_m / float(top[r]))

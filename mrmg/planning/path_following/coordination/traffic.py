@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mrmg.planning.path_following.coordination import _conflict_kernels
-from mrmg.planning.path_following.coordination._motion_kernels import Traffic
+from mrmg.planning.path_following.coordination._motion_kernels import OTHER, Traffic
 from mrmg.planning.path_following.tracking import Motion
 from mrmg.planning.problem.problem import Problem
 
@@ -25,7 +25,7 @@ class FleetTraffic:
     def __init__(self, problem: Problem, horizon: int) -> None:
         """Make room for motions of so many steps."""
         mission = problem.mission
-        robots, zones = len(mission.fleet), len(mission.zones.reach)
+        robots, zones = len(mission.fleet), len(mission.zones.zone)
         top = np.maximum(mission.fleet["limit"][:, 1], -mission.fleet["limit"][:, 0])
         middle = np.hypot(*mission.fleet["middle"].T)
         turning = middle * np.where(
@@ -43,10 +43,7 @@ class FleetTraffic:
             fleet=mission.fleet,
             pose=np.zeros((robots, horizon + 1, 5)),
             middle=np.zeros((robots, horizon + 1, 2)),
-            last=np.zeros(robots, np.int64),
-            closing=np.zeros(robots),
-            hard=np.zeros(robots, bool),
-            soft=np.zeros(robots, bool),
+            robot=np.zeros(robots, OTHER),
             busy=np.zeros((zones, horizon), bool),
             busy_left=np.zeros((zones, horizon), np.int64),
             release=np.zeros(0, np.int64),
@@ -74,14 +71,15 @@ class FleetTraffic:
         known = np.array([motion is not None for motion in motions])
         known[r] = False
         hard = above & known
-        lasting = self._traffic.last[known]
+        lasting = self._traffic.robot["last"][known]
         busy = self._inside[hard].any(axis=0)
         free = np.flatnonzero((busy[:, :-1] & ~busy[:, 1:]).any(axis=0)) + 1
         starts = [self._starts[other] for other in np.flatnonzero(hard)]
+        robot = self._traffic.robot.copy()
+        robot["closing"] = self._closing[r]
+        robot["hard"], robot["soft"] = hard, known & ~hard
         return self._traffic._replace(
-            closing=np.ascontiguousarray(self._closing[r]),
-            hard=hard,
-            soft=known & ~hard,
+            robot=robot,
             busy=busy,
             busy_left=np.ascontiguousarray(busy[:, ::-1].cumsum(axis=1)[:, ::-1]),
             release=np.unique(np.concatenate([*starts, free])),
@@ -92,9 +90,9 @@ class FleetTraffic:
         """Return the step of r's first conflict with each robot, inf for never."""
         self._note(motions)
         fleet = self._problem.mission.fleet
-        traffic = self._traffic._replace(closing=np.ascontiguousarray(self._closing[r]))
+        self._traffic.robot["closing"] = self._closing[r]
         conflict = np.full(len(fleet), np.inf)
-        _conflict_kernels.conflicts_of(fleet, traffic, self._inside, r, conflict)
+        _conflict_kernels.conflicts_of(fleet, self._traffic, self._inside, r, conflict)
         return conflict
 
 

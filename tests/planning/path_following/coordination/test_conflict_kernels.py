@@ -9,6 +9,7 @@ import pytest
 import shapely
 
 from mrmg.planning.path_following.coordination._motion_kernels import (
+    OTHER,
     Traffic,
     blocked_for_good,
     clear,
@@ -49,15 +50,16 @@ def traffic_of(problem: Problem, states: np.ndarray, *, hard: bool = True) -> Tr
     footprint = shapely.MultiPoint(model.footprint_m).bounds
     ahead, aside = (footprint[2] + footprint[0]) / 2, (footprint[3] + footprint[1]) / 2
     c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
+    closing_m = 3.0 * STEP_M
     offset = np.stack([c * ahead - s * aside, s * ahead + c * aside], axis=1)
     return Traffic(
         fleet=fleet,
         pose=pose,
         middle=pose[:, :, :2] + np.stack([np.zeros_like(offset), offset]),
-        last=np.array([0, len(states) - 1]),
-        closing=np.full(2, 3.0 * STEP_M),
-        hard=np.array([False, hard]),
-        soft=np.zeros(2, bool),
+        robot=np.array(
+            [(0, closing_m, False, False), (len(states) - 1, closing_m, hard, False)],
+            OTHER,
+        ),
         busy=np.zeros((1, len(states)), bool),
         busy_left=np.zeros((1, len(states)), np.int64),
         release=np.zeros(0, np.int64),
