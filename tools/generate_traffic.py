@@ -53,7 +53,11 @@ JITTER_M, JITTER_RAD = 0.15, 0.3
 
 def main() -> int:
     """Write the files."""
-    parser = argparse.ArgumentParser(description=__doc__, prog="tools/generate_traffic")
+    parser = argparse.ArgumentParser(
+        description=__doc__,
+        prog="tools/generate_traffic",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
     parser.add_argument("folder", type=Path, help="receives CLASS_SEED.yaml")
     parser.add_argument("--only", default="", help="part of the class's name")
     parser.add_argument(

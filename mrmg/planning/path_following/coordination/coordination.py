@@ -5,9 +5,9 @@ who has priority over whom by a search over the orders of robots (`priorities`).
 that is found can be driven exactly, and keeps clear at every step.
 
 What is promised: every plan found keeps all margins. A round of the search ends without
-a plan only if none of the orders that it may look at has one, with cells as fine and
-searches as long as the round allows; each round is finer and longer than the one
-before, and begins with other motions.
+a plan when no order of the robots has one, with cells as fine and searches as long as
+the round allows, or when it has looked at as many nodes as it may; each round is finer
+and longer than the one before, and begins with other motions.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ from mrmg.planning.path_following.coordination.rounds import (
     FIRST_MOST,
     ROUNDS,
     ROUNDS_ALONE,
+    SEARCHES,
     UNTIMED_SHARE,
     Round,
 )
@@ -141,6 +142,7 @@ class _Planning:
         yielding: bool = False,
     ) -> Motion | None:
         """Return a motion of robot r without conflicts with the robots marked."""
+        self.nodes += 1
         options = self.round, yielding, r in self._blocked
         asked = (r, *options, above.tobytes(), *map(id, motions))
         if asked not in self._answers:
@@ -305,7 +307,8 @@ def coordinated(
                 return ()
         alone = [motion for motion in motions if motion is not None]
         planning.round = now
-        found = priorities.search_priorities(alone, planning, now.dead_ends, halt)
+        most = SEARCHES * now.most * robots
+        found = priorities.search_priorities(alone, planning, most, halt)
         if found is not None:
             found = priorities.shortened(found, alone, planning, halt)
             return trajectories_of(problem, found)

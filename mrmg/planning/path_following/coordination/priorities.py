@@ -80,7 +80,7 @@ class _Node:
 def search_priorities(
     motions: Sequence[Motion],
     planning: MotionPlanning,
-    most_dead_ends: int,
+    most: float,
     halt: np.ndarray,
 ) -> tuple[Motion, ...] | None:
     """Return motions that do not meet, or None.
@@ -88,7 +88,7 @@ def search_priorities(
     Args:
         motions: one for each robot, found without regard to the others.
         planning: finds motions.
-        most_dead_ends: nodes all of whose children lead nowhere, at most.
+        most: nodes that all searches for motions may look at.
         halt: shape (1,); the search ends soon after it has turned true.
     """
     robots = len(motions)
@@ -96,11 +96,11 @@ def search_priorities(
     root = _Node(np.zeros((robots, robots), bool), tuple(motions), conflict)
     stack: list[Iterator[_Node]] = [iter([root])]
     seen: dict[tuple[object, ...], _Node] = {}  # two may make room for a third in turn
-    while stack and most_dead_ends > 0 and not halt[0]:
+    most += planning.nodes
+    while stack and planning.nodes < most and not halt[0]:
         node = next(stack[-1], None)
         if node is None:
             stack.pop()
-            most_dead_ends -= 1
         elif seen.setdefault(node.key, node) is not node:
             continue
         elif not np.isfinite(node.conflict).any():

@@ -12,26 +12,29 @@ class Round:
 
     Attributes:
         most: nodes of one robot's search at most.
-        dead_ends: of the search over priorities at most.
         weight: of costs-to-go: motions take at most so many times the least cost.
         fineness: how much shorter motions, and finer cells, are than usual.
         soft_s: cost of conflicts with robots of lower priority [s].
     """
 
     most: int
-    dead_ends: int
     weight: float
     fineness: float
     soft_s: float
 
 
 ROUNDS = (
-    Round(most=1_000, dead_ends=1, weight=1.5, fineness=1.0, soft_s=2.0),
-    Round(most=4_000, dead_ends=10, weight=1.5, fineness=1.0, soft_s=4.0),
-    Round(most=16_000, dead_ends=50, weight=2.0, fineness=2.0, soft_s=1.0),
-    Round(most=64_000, dead_ends=200, weight=2.0, fineness=3.0, soft_s=4.0),
+    Round(most=1_000, weight=1.5, fineness=1.0, soft_s=2.0),
+    Round(most=4_000, weight=1.5, fineness=1.0, soft_s=4.0),
+    Round(most=16_000, weight=2.0, fineness=2.0, soft_s=1.0),
+    Round(most=64_000, weight=2.0, fineness=3.0, soft_s=4.0),
 )
 """Rounds one after the other."""
+
+SEARCHES = 2
+"""How many searches of a round's length the search over priorities may take for each
+robot: most orders of robots are found with few, so that after these another round, or
+other paths, promise more than further orders."""
 
 ROUNDS_ALONE = 2
 """Rounds in which a robot's motion without regard to the others is searched for: one

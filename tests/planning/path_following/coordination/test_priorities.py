@@ -25,8 +25,12 @@ class Crossing:
 
     def __init__(self, approach: Sequence[int], latest: Sequence[int]) -> None:
         self.approach, self.latest = approach, latest
-        self.nodes = 1
         self.asked: list[int] = []
+
+    @property
+    def nodes(self) -> int:
+        """One for each motion that was asked for, and some from before."""
+        return 100 + len(self.asked)
 
     def motion(self, r: int, delay: int) -> Motion:
         """Return robot r's motion that crosses `delay` steps later than it could."""
@@ -88,6 +92,14 @@ def test_none_is_found_where_nobody_can_wait() -> None:
     planning = Crossing([3, 3], [0, 0])
     alone = [planning.motion(r, 0) for r in range(2)]
     assert search_priorities(alone, planning, 100, np.zeros(1, bool)) is None
+
+
+def test_it_is_given_up_after_so_many_nodes() -> None:
+    alone = [Crossing([3] * 3, [9] * 3).motion(r, 0) for r in range(3)]
+    for most, is_found in ((1, False), (100, True)):
+        planning = Crossing([3] * 3, [9] * 3)
+        found = search_priorities(alone, planning, most, np.zeros(1, bool))
+        assert (found is not None) == is_found
 
 
 def test_halted_it_finds_nothing() -> None:
