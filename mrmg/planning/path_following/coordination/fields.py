@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy import ndimage
 
 from mrmg.planning.path_following.coordination import _field_kernels
 from mrmg.planning.path_following.coordination._field_kernels import Guide
@@ -21,6 +22,14 @@ MOST_CELLS = 60_000
 MOST_TIMED_CELLS = 3_000_000
 """Cells of fields that know where the other robots are when, over all layers and legs,
 at most: it bounds their time and memory."""
+
+LATE_S = 1.5
+"""How much later, or sooner, than costs-to-go tell a robot may be somewhere: they know
+neither how it turns nor how it gains speed [s]."""
+
+NEAR_MISS_SHARE = 3.0
+"""Cost of a second where another robot is so much later or sooner, over that of driving
+for it."""
 
 NO_GUIDE = Guide(np.zeros((1, 1, 1, 1)), 1e9, 1 << 30)
 """Costs-to-go of those who do without."""
@@ -78,11 +87,7 @@ class Fields:
         price = self._price(r, targets) * cell_m / top
         hold_share, soft_share = costs
         penalty = np.zeros((layers, *price.shape))
-        grid = float(mission.spaces.x_min), float(mission.spaces.y_min), cell_m
-        _field_kernels.add_others(
-            own, traffic, inner_m(own[0]), grid, layer, soft_share * layer * dt_s,
-            penalty,
-        )  # fmt: skip
+        self._add_others(r, traffic, layer, soft_share, penalty)
         standing, stood = hold_share * layer * dt_s, np.full(len(targets), -1)
         stood[: len(stay)] = -(-stay // layer)
         lasting = np.where(penalty[-1] < np.inf, price, np.inf)
@@ -107,6 +112,31 @@ class Fields:
         field = np.stack(legs[::-1])
         way = self._way_down(r, targets, stood, (price, standing, field))
         return Guide(field, cell_m, layer), way
+
+    def _add_others(
+        self,
+        r: int,
+        traffic: Traffic,
+        layer: int,
+        soft_share: float,
+        penalty: np.ndarray,
+    ) -> None:
+        """Add to penalties where the others are, and where robot r just misses them.
+
+        Args:
+            r: robot.
+            traffic: how the others move.
+            layer: steps that a layer lasts.
+            soft_share: cost of a second in conflict with a robot of lower priority.
+            penalty: of cells, shape (T, ny, nx).
+        """
+        mission, layer_s = self._problem.mission, layer * self._problem.dt_s
+        own, spaces = mission.fleet[r : r + 1], mission.spaces
+        grid = float(spaces.x_min), float(spaces.y_min), self._cell_m
+        _field_kernels.add_others(
+            own, traffic, inner_m(own[0]), grid, layer, soft_share * layer_s, penalty
+        )
+        _add_near_misses(penalty, layer_s)
 
     def _way_down(
         self,
@@ -176,6 +206,22 @@ class Fields:
                 self._cell_m, region,
             )  # fmt: skip
         return region
+
+
+def _add_near_misses(penalty: np.ndarray, layer_s: float) -> None:
+    """Add the cost of being where another robot is a little later, or was before.
+
+    Else a search that is led by a gap in traffic which its robot just misses looks at
+    all ways to get there in time, before it lets the others pass.
+
+    Args:
+        penalty: of cells, inf where other robots are, shape (T, ny, nx).
+        layer_s: time of a layer [s].
+    """
+    taken = np.isinf(penalty)
+    late = round(LATE_S / layer_s)
+    near = ndimage.maximum_filter1d(taken, 2 * late + 1, axis=0, mode="nearest")
+    penalty[near & ~taken] += NEAR_MISS_SHARE * layer_s
 
 
 def inner_m(robot: np.ndarray) -> float:
