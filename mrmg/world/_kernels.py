@@ -118,6 +118,20 @@ def point_in_convex(px, py, corners):
 
 
 @kernel
+def point_convex_distance(px, py, corners):
+    """Return the distance of a point from a convex polygon; 0 where it lies in it."""
+    if point_in_convex(px, py, corners):
+        return 0.0
+    best = np.inf
+    n = len(corners)
+    for i in range(n):
+        j = i + 1 if i + 1 < n else 0
+        ax, ay, bx, by = corners[i, 0], corners[i, 1], corners[j, 0], corners[j, 1]
+        best = min(best, point_segment_distance(px, py, ax, ay, bx, by))
+    return best
+
+
+@kernel
 def convex_segment_distance(corners, ax, ay, bx, by):
     """Return the distance of a convex polygon from a segment; 0 where they meet."""
     if point_in_convex(ax, ay, corners):

@@ -86,6 +86,16 @@ def test_segments_are_as_far_from_polygons_as_shapely_says() -> None:
         )
 
 
+def test_points_are_as_far_from_polygons_as_shapely_says() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(1500):
+        corners, (x, y) = random_convex(rng), rng.uniform(-5.0, 5.0, 2)
+        exact = shapely.distance(shapely.Polygon(corners), shapely.Point(x, y))
+        assert _kernels.point_convex_distance(x, y, corners) == pytest.approx(
+            exact, abs=1e-12
+        )
+
+
 def test_a_segment_without_length_is_a_point() -> None:
     assert _kernels.point_segment_distance(3.0, 4.0, 0.0, 0.0, 0.0, 0.0) == 5.0
 

@@ -14,7 +14,7 @@ from mrmg.compilation import kernel
 from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.planning.roadmap._heap_kernels import pop, push
-from mrmg.world._kernels import convex_segment_distance, place_footprint
+from mrmg.world._kernels import place_footprint, point_convex_distance
 
 DIAGONAL = sqrt(2.0)
 
@@ -186,7 +186,7 @@ def add_others(own, traffic, inner, grid, layer, soft_s, penalty):
                     apart = hypot(x - middle[0], y - middle[1])
                     if apart >= far or penalty[t, i, j] == np.inf:
                         continue
-                    if not convex_segment_distance(placed, x, y, x, y) < near:
+                    if not point_convex_distance(x, y, placed) < near:
                         continue
                     if traffic.robot[other].hard:
                         penalty[t, i, j] = np.inf

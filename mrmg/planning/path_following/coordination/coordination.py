@@ -40,6 +40,7 @@ from mrmg.planning.path_following.coordination.rounds import (
     ROUNDS,
     ROUNDS_ALONE,
     SEARCHES,
+    SHORTENING_MOST,
     UNTIMED_SHARE,
     Round,
 )
@@ -170,7 +171,7 @@ class _Planning:
                 if found is not None:
                     return found
                 self._blocked.add(r)
-                all_tried = nodes < task.most
+                all_tried = 0 < nodes < task.most  # without any there is no way at all
             if not all_tried:
                 break
         return None
@@ -189,9 +190,7 @@ class _Planning:
         now = replace(now, fineness=finer * now.fineness)
         if yielding:
             now = replace(now, weight=YIELDING_WEIGHT, soft_s=YIELDING_S)
-        task = task_of(problem, r, tour, path, now)
-        if not yielding:
-            task = task._replace(enough=FIRST_MOST)
+        task = task_of(problem, r, tour, path, now)._replace(enough=FIRST_MOST)
         led = len(path.target) == len(tour) or (
             problem.steered_home[r] and not tour[1:]
         )
@@ -310,6 +309,7 @@ def coordinated(
         most = SEARCHES * now.most * robots
         found = priorities.search_priorities(alone, planning, most, halt)
         if found is not None:
+            planning.round = replace(now, most=max(now.most, SHORTENING_MOST))
             found = priorities.shortened(found, alone, planning, halt)
             return trajectories_of(problem, found)
     return ()

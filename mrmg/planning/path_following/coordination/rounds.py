@@ -43,6 +43,9 @@ more than with regard to them, as all else depends on it."""
 FIRST_MOST = 300
 """Nodes of a robot's first search at most, and of one that has found an end."""
 
+SHORTENING_MOST = 2_000
+"""Nodes of a search that is to shorten a motion, at least: fewer seldom do."""
+
 FINER = (1.0, 2.0, 4.0)
 """How much finer than its round's a robot's motions are: the next ones where all of
 these have been tried."""
