@@ -266,13 +266,11 @@ def follow_path(search, nodes, room, a, tries):
 
 @kernel
 def find_motion(search, nodes, room, start, control):
-    """Find controls for one robot's task; return (their number or -1, nodes).
-
-    With fewer nodes than it may have, a search that fails has tried all motions.
+    """Find controls for one robot's task; return their number or -1.
 
     Args:
         search: the robot, its surroundings, its task and the others.
-        nodes: empty room for nodes.
+        nodes: empty room for nodes; receives those that were looked at.
         room: for motions as long as `control`.
         start: its state, shape (5,).
         control: receives the controls, shape (n, 2).
@@ -289,7 +287,7 @@ def find_motion(search, nodes, room, start, control):
         a, widened = number >> 1, number & 1
         node = nodes.node[a]
         if node.motion <= HOME:
-            return write_controls(search, nodes, room, a, control), nodes.size[0]
+            return write_controls(search, nodes, room, a, control)
         if node.step + 2 * MOST_BRAKING_STEPS >= len(control):
             continue
         if widened == 0:
@@ -308,7 +306,6 @@ def find_motion(search, nodes, room, start, control):
             expand(search, nodes, room, a, motion, nears)
         if nodes.size[2] >= 0:
             most = min(most, max(task.enough, 2 * nodes.size[0]))
-    looked_at = nodes.size[0] if nodes.size[1] == 0 else task.most
     if nodes.size[2] >= 0:  # the best there is, if not good enough to end sooner
-        return write_controls(search, nodes, room, nodes.size[2], control), looked_at
-    return -1, looked_at
+        return write_controls(search, nodes, room, nodes.size[2], control)
+    return -1

@@ -35,7 +35,6 @@ from mrmg.planning.path_following.coordination._node_kernels import (
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE, Fields
 from mrmg.planning.path_following.coordination.leads import rounded_path
 from mrmg.planning.path_following.coordination.rounds import (
-    FINER,
     FIRST_MOST,
     ROUNDS,
     ROUNDS_ALONE,
@@ -161,23 +160,18 @@ class _Planning:
         yielding: bool,
     ) -> Motion | None:
         traffic = self._traffic.around(r, motions, above)
-        for finer in FINER:
-            all_tried = False
-            at_length = yielding or r in self._blocked
-            for task, course in islice(
-                self._tasks(r, traffic, yielding, finer), int(at_length), None
-            ):
-                found, nodes = self._search(r, task, traffic, course)
-                if found is not None:
-                    return found
-                self._blocked.add(r)
-                all_tried = 0 < nodes < task.most  # without any there is no way at all
-            if not all_tried:
-                break
+        at_length = yielding or r in self._blocked
+        for task, course in islice(
+            self._tasks(r, traffic, yielding), int(at_length), None
+        ):
+            found = self._search(r, task, traffic, course)
+            if found is not None:
+                return found
+            self._blocked.add(r)
         return None
 
     def _tasks(
-        self, r: int, traffic: Traffic, yielding: bool, finer: float
+        self, r: int, traffic: Traffic, yielding: bool
     ) -> Iterator[tuple[Task, Course]]:
         """Yield what to search for, and along which path.
 
@@ -187,7 +181,6 @@ class _Planning:
         """
         problem, path, tour = self._problem, self._paths[r], self._tours[r]
         now, course = self.round, self._courses[r]
-        now = replace(now, fineness=finer * now.fineness)
         if yielding:
             now = replace(now, weight=YIELDING_WEIGHT, soft_s=YIELDING_S)
         task = task_of(problem, r, tour, path, now)._replace(enough=FIRST_MOST)
@@ -220,7 +213,7 @@ class _Planning:
 
     def _search(
         self, r: int, task: Task, traffic: Traffic, course: Course
-    ) -> tuple[Motion | None, int]:
+    ) -> Motion | None:
         mission, dt_s, own = self._problem.mission, self._problem.dt_s, slice(r, r + 1)
         search = Setting(
             own=mission.fleet[own],
@@ -237,21 +230,22 @@ class _Planning:
             ease=float(BRAKING_SHARE * mission.fleet["limit"][r, 3]),
             stiffness=self._courses[r].stiffness,
         )
-        count, nodes = _search_kernels.find_motion(
+        nodes = empty_nodes(task)
+        count = _search_kernels.find_motion(
             search,
-            empty_nodes(task),
+            nodes,
             self._room._replace(curve=curve),
             self._problem.start[r],
             self._control,
         )
-        self.nodes += nodes
+        self.nodes += int(nodes.size[0])
         if count < 0:
-            return None, nodes
+            return None
         control = self._control[:count].copy()
         state = np.zeros((count + 1, 5))
         state[0] = self._problem.start[r]
         _tracking_kernels.write_states(mission.fleet, r, dt_s, control, state)
-        return Motion(state, control), nodes
+        return Motion(state, control)
 
     def find_alone(
         self, r: int, motions: Sequence[Motion | None], first: Round, halt: np.ndarray

@@ -46,10 +46,6 @@ FIRST_MOST = 300
 SHORTENING_MOST = 2_000
 """Nodes of a search that is to shorten a motion, at least: fewer seldom do."""
 
-FINER = (1.0, 2.0, 4.0)
-"""How much finer than its round's a robot's motions are: the next ones where all of
-these have been tried."""
-
 UNTIMED_SHARE = 10
 """How many times as many nodes a search along several targets may have, where its
 costs-to-go do not know when the other robots are where."""

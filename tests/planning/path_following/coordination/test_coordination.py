@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+import mrmg
 from mrmg.planning.path_following.coordination.coordination import (
     coordinated,
     empty_nodes,
@@ -60,9 +61,9 @@ def test_a_robot_ends_where_its_tolerances_leave_room(
 
 
 def test_a_robot_sets_out_by_shorter_motions_where_there_is_no_room_for_longer_ones(
-    yard: Callable[..., Scene], state: Callable[..., Problem]
+    yard: Callable[..., Scene],
 ) -> None:
-    """Every motion of the first length runs into a wall."""
+    """Every motion of the first length runs into a wall; later rounds' are shorter."""
     obstacles = [
         {"id": name, "polygon": [[x, 4], [x + 0.5, 4], [x + 0.5, 16], [x, 16]]}
         for name, x in (("ahead", 12.3), ("behind", 8.4))
@@ -72,7 +73,6 @@ def test_a_robot_sets_out_by_shorter_motions_where_there_is_no_room_for_longer_o
         robots=[{"id": "r", "model": "car", "pose": [10, 10, 0]}],
         obstacles=obstacles,
     )
-    problem = state(scene, samples=50)
-    assert coordinated(
-        problem, [[0]], [no_path(problem, 0)], np.zeros(1, bool), rounds=ROUNDS[:1]
-    )
+    plan = mrmg.plan(scene).plan
+    assert plan is not None
+    assert mrmg.verify(scene, plan).ok

@@ -60,7 +60,7 @@ def test_near_robots_are_minded_where_a_wait_is_open(
     )
     control = np.zeros((HORIZON, 2))
     start = problem.start[2]
-    count, _ = find_motion(search, empty_nodes(search.task), room, start, control)
+    count = find_motion(search, empty_nodes(search.task), room, start, control)
     assert count > 0
     own = problem.trajectory(2, control[:count])
     found = [*motions[:2], Motion(own.state, own.control)]
