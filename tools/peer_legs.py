@@ -22,12 +22,8 @@ from mrmg.planning.roadmap.fleet import fleet_array
 from mrmg.plans import Plan, Trajectory
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
-from mrmg.world._kernels import (
-    FreeSpace,
-    convex_convex_distance,
-    footprint_is_clear,
-    place_footprint,
-)
+from mrmg.world._kernels import FreeSpace, footprint_is_clear
+from mrmg.world._polygon_kernels import convex_convex_distance, place_footprint
 from mrmg.world.world import World
 
 LEGS = {

@@ -10,7 +10,7 @@ from math import ceil, floor, log2, sqrt
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.world._kernels import point_segment_distance
+from mrmg.world._polygon_kernels import point_segment_distance
 
 
 @kernel

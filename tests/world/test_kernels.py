@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from mrmg.world import _kernels
+from mrmg.world import _kernels, _polygon_kernels
 from mrmg.world.world import BUCKET_M, CELL_M
 
 CAR = np.array([(-0.3, -0.55), (1.5, -0.55), (1.5, 0.55), (-0.3, 0.55)])
@@ -48,7 +48,7 @@ def test_convex_polygons_are_as_far_apart_as_shapely_says() -> None:
     for _ in range(1500):
         first, second = random_convex(rng), random_convex(rng)
         exact = shapely.distance(shapely.Polygon(first), shapely.Polygon(second))
-        assert _kernels.convex_convex_distance(first, second) == pytest.approx(
+        assert _polygon_kernels.convex_convex_distance(first, second) == pytest.approx(
             exact, abs=1e-12
         )
         apart.append(exact > 0.0)
@@ -71,7 +71,9 @@ def test_convex_polygons_in_special_positions(
     second: np.ndarray, expected: float
 ) -> None:
     for one, other in ((CAR, second), (second, CAR)):
-        distance = _kernels.convex_convex_distance(one, np.ascontiguousarray(other))
+        distance = _polygon_kernels.convex_convex_distance(
+            one, np.ascontiguousarray(other)
+        )
         assert distance == pytest.approx(expected, abs=1e-12)
 
 
@@ -81,9 +83,9 @@ def test_segments_are_as_far_from_polygons_as_shapely_says() -> None:
         corners = random_convex(rng)
         a, b = rng.uniform(-5.0, 5.0, (2, 2))
         exact = shapely.distance(shapely.Polygon(corners), shapely.LineString([a, b]))
-        assert _kernels.convex_segment_distance(corners, *a, *b) == pytest.approx(
-            exact, abs=1e-12
-        )
+        assert _polygon_kernels.convex_segment_distance(
+            corners, *a, *b
+        ) == pytest.approx(exact, abs=1e-12)
 
 
 def test_points_are_as_far_from_polygons_as_shapely_says() -> None:
@@ -91,13 +93,13 @@ def test_points_are_as_far_from_polygons_as_shapely_says() -> None:
     for _ in range(1500):
         corners, (x, y) = random_convex(rng), rng.uniform(-5.0, 5.0, 2)
         exact = shapely.distance(shapely.Polygon(corners), shapely.Point(x, y))
-        assert _kernels.point_convex_distance(x, y, corners) == pytest.approx(
+        assert _polygon_kernels.point_convex_distance(x, y, corners) == pytest.approx(
             exact, abs=1e-12
         )
 
 
 def test_a_segment_without_length_is_a_point() -> None:
-    assert _kernels.point_segment_distance(3.0, 4.0, 0.0, 0.0, 0.0, 0.0) == 5.0
+    assert _polygon_kernels.point_segment_distance(3.0, 4.0, 0.0, 0.0, 0.0, 0.0) == 5.0
 
 
 # --- the distance field ------------------------------------------------------------
@@ -205,8 +207,8 @@ def is_clear(
 ) -> tuple[bool, shapely.Polygon]:
     middle = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
     placed, centre = np.empty_like(outline), np.empty((1, 2))
-    _kernels.place_footprint(outline, *pose, placed)
-    _kernels.place_footprint(middle[None], *pose, centre)
+    _polygon_kernels.place_footprint(outline, *pose, placed)
+    _polygon_kernels.place_footprint(middle[None], *pose, centre)
     radius = float(np.hypot(*(outline - middle).T).max())
     answer = _kernels.footprint_is_clear(space, placed, *centre[0], radius, margin_m)
     return bool(answer), shapely.Polygon(placed)

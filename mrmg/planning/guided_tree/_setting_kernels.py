@@ -12,12 +12,8 @@ from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.roadmap._fleet_kernels import Spaces, space_of
 from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.world._kernels import (
-    TerrainGrid,
-    convex_convex_distance,
-    footprint_is_clear,
-    place_footprint,
-)
+from mrmg.world._kernels import TerrainGrid, footprint_is_clear
+from mrmg.world._polygon_kernels import convex_convex_distance, place_footprint
 
 STATE_ROUNDING = 1e-9
 """Rounding of summed steps that is forgiven in the limits of speed and steering."""

@@ -6,11 +6,8 @@ from math import cos, sin
 
 from mrmg.compilation import kernel
 from mrmg.planning.roadmap._fleet_kernels import space_of
-from mrmg.world._kernels import (
-    clearance_at_least,
-    footprint_is_clear,
-    place_footprint,
-)
+from mrmg.world._kernels import clearance_at_least, footprint_is_clear
+from mrmg.world._polygon_kernels import place_footprint
 
 
 @kernel

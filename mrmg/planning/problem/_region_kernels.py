@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.world._kernels import point_in_convex
+from mrmg.world._polygon_kernels import point_in_convex
 
 REGION = np.dtype(
     [

@@ -8,10 +8,7 @@ import numpy as np
 
 from mrmg.compilation import kernel
 from mrmg.planning.roadmap._bucket_kernels import Buckets
-from mrmg.world._kernels import (
-    segment_clearance,
-    segment_cost,
-)
+from mrmg.world._kernels import segment_clearance, segment_cost
 
 
 class RoadmapArrays(NamedTuple):

@@ -13,7 +13,7 @@ from mrmg.planning.roadmap.slopes import SlopeCost
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.margins import Margins
 from mrmg.scene.types import Scene
-from mrmg.world import _kernels
+from mrmg.world import _kernels, _polygon_kernels
 from mrmg.world.world import World
 
 CAR = np.array([(-0.3, -0.55), (1.5, -0.55), (1.5, 0.55), (-0.3, 0.55)])
@@ -49,7 +49,7 @@ def test_a_stack_answers_as_each_of_its_spaces_does() -> None:
     rng = np.random.default_rng(1)
     placed, told = np.empty_like(CAR), []
     for x, y, theta in rng.uniform((0, 0, -3), (40, 20, 3), (1500, 3)):
-        _kernels.place_footprint(CAR, x, y, theta, placed)
+        _polygon_kernels.place_footprint(CAR, x, y, theta, placed)
         middle = placed.mean(axis=0)
         answers = []
         for i, alone in enumerate(world.spaces):

@@ -14,7 +14,7 @@ from mrmg.compilation import kernel
 from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.planning.roadmap._heap_kernels import pop, push
-from mrmg.world._kernels import place_footprint, point_convex_distance
+from mrmg.world._polygon_kernels import place_footprint, point_convex_distance
 
 DIAGONAL = sqrt(2.0)
 

@@ -29,7 +29,7 @@ from mrmg.planning.problem._control_kernels import (
     stands,
 )
 from mrmg.planning.problem._region_kernels import in_region
-from mrmg.world._kernels import convex_convex_distance, place_footprint
+from mrmg.world._polygon_kernels import convex_convex_distance, place_footprint
 
 BRAKE, HOME, VISIT, STAY, WAIT, TRACK, HOLD, MOVE = range(-5, 3)
 """Brake, or drive home, and be through; drive to a target's pose; stand in a target, or

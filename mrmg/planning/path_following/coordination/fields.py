@@ -11,7 +11,7 @@ from mrmg.planning.path_following.coordination import _field_kernels
 from mrmg.planning.path_following.coordination._field_kernels import Guide
 from mrmg.planning.path_following.coordination._motion_kernels import Traffic
 from mrmg.planning.problem.problem import Problem
-from mrmg.world._kernels import point_in_convex, point_segment_distance
+from mrmg.world._polygon_kernels import point_in_convex, point_segment_distance
 
 TIGHT_PRICE = 2.0
 """Factor on the cost of a metre where a robot cannot turn round."""
