@@ -12,8 +12,9 @@ Two text formats are read:
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,9 @@ M_PER_CM = 0.01
 _POINTS_TAG = "MAP_POINTS"
 _BORDER_TAGS = ("BORDER", "MAP_BORDER")
 _OBSTACLE_TAGS = ("OBSTACLE", "MAP_OBSTACLE")
+
+_Line = tuple[int, str]
+"""Number of a line, from 1, and its text."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,41 +63,35 @@ def read_map(path: Path) -> RawMap:
         SceneError: naming every line that cannot be used.
     """
     text = read_text(path, source=str(path))
-    lines = [(n + 1, line.strip()) for n, line in enumerate(text.splitlines())]
+    lines = [(n, line.strip()) for n, line in enumerate(text.splitlines(), start=1)]
     lines = [(number, line) for number, line in lines if line]
     if not lines:
         message = "empty; expected a sectioned map or rows of 6, 4 or 2 numbers"
         raise SceneError(str(path), [Fault("", message)])
-    reader = _Reader(str(path))
+    reader = _Reader()
     if any(line.startswith("[") for _, line in lines):
-        result = reader.sectioned(lines)
+        found = reader.sectioned(lines)
     else:
-        result = reader.rows(lines)
+        found = reader.rows(lines)
     if reader.faults:
         raise SceneError(str(path), reader.faults)
-    assert result is not None
-    return result
+    return found
 
 
 class _Reader:
     """Turns lines into shapes and collects the faults of the lines."""
 
-    def __init__(self, source: str) -> None:
-        self.source = source
+    def __init__(self) -> None:
         self.faults: list[Fault] = []
 
-    def rows(self, lines: list[tuple[int, str]]) -> RawMap | None:
+    def rows(self, lines: Sequence[_Line]) -> RawMap:
         shapes: list[BaseGeometry] = []
-        for number, line in lines:
-            values = self._numbers(number, line)
-            if values is None:
-                continue
-            if len(values) not in (2, 4, 6):
-                message = f"has {len(values)} numbers; expected 6, 4 or 2"
-                self._fault(number, message)
-                continue
-            points = np.reshape(values, (-1, 2))
-            shapes.append((Point, LineString, Polygon)[len(points) - 1](points))
+        for number, values in self._numbers(lines):
+            if len(values) in (2, 4, 6):
+                points = np.reshape(values, (-1, 2))
+                shapes.append((Point, LineString, Polygon)[len(points) - 1](points))
+            else:
+                self._fault(number, f"has {len(values)} numbers; expected 6, 4 or 2")
         if not shapes:
             # Not one usable row: some other kind of file.
             message = (
@@ -101,12 +99,10 @@ class _Reader:
                 "or rows of 6, 4 or 2 numbers"
             )
             self.faults = [Fault("", message)]
-        if self.faults:
-            return None
-        border = _drawn_border(shapes)
+        border = None if self.faults else _drawn_border(shapes)
         return RawMap(border=border, obstacles=tuple(shapes), unit_m=1.0)
 
-    def sectioned(self, lines: list[tuple[int, str]]) -> RawMap | None:
+    def sectioned(self, lines: Sequence[_Line]) -> RawMap:
         sections = list(self._sections(lines))
         points = self._points(sections)
         unit_m = 1.0 if points is None else M_PER_CM
@@ -118,29 +114,22 @@ class _Reader:
             elif section.tag in _BORDER_TAGS:
                 border = self._polygon(section, points)
             elif section.tag in _OBSTACLE_TAGS:
-                shape = self._polygon(section, points)
-                if shape is not None:
-                    obstacles.append(shape)
+                obstacles.append(self._polygon(section, points))
         if border is None and not self.faults:
             self.faults.append(Fault("", "has no [BORDER] section; expected one"))
         return RawMap(border=border, obstacles=tuple(obstacles), unit_m=unit_m)
 
-    def _sections(self, lines: list[tuple[int, str]]) -> Iterator[_Section]:
+    def _sections(self, lines: Sequence[_Line]) -> Iterator[_Section]:
+        """Yield all sections; only those of known tags have rows."""
         known = ("SCALE", _POINTS_TAG, *_BORDER_TAGS, *_OBSTACLE_TAGS)
-        section: _Section | None = None
-        for number, line in lines:
-            if line.startswith("["):
-                if section is not None:
-                    yield section
-                section = _Section(line.strip("[] \t").upper(), number, [])
-            elif section is None:
-                self._fault(number, f"'{line[:30]}' stands before the first [TAG]")
-            elif section.tag in known:
-                values = self._numbers(number, line)
-                if values is not None:
-                    section.rows.append((number, values))
-        if section is not None:
-            yield section
+        starts = [at for at, (_, line) in enumerate(lines) if line.startswith("[")]
+        for number, line in lines[: starts[0]]:
+            self._fault(number, f"'{line[:30]}' stands before the first [TAG]")
+        for start, end in pairwise([*starts, len(lines)]):
+            number, title = lines[start]
+            tag = title.strip("[] \t").upper()
+            rows = self._numbers(lines[start + 1 : end]) if tag in known else ()
+            yield _Section(tag, number, list(rows))
 
     def _points(self, sections: list[_Section]) -> dict[int, list[float]] | None:
         tables = [section for section in sections if section.tag == _POINTS_TAG]
@@ -163,7 +152,7 @@ class _Reader:
 
     def _polygon(
         self, section: _Section, points: dict[int, list[float]] | None
-    ) -> Polygon | None:
+    ) -> Polygon:
         corners: list[list[float]] = []
         for number, values in section.rows:
             if points is not None and section.tag.startswith("MAP_"):
@@ -178,19 +167,21 @@ class _Reader:
         if len(corners) < 3:
             message = f"[{section.tag}] has {len(corners)} corners; expected 3 or more"
             self._fault(section.line, message)
-            return None
+            return Polygon()
         return Polygon(corners)
 
-    def _numbers(self, number: int, line: str) -> list[float] | None:
-        try:
-            values = [float(word) for word in line.split()]
-        except ValueError:
-            self._fault(number, f"got '{line[:30]}'; expected numbers")
-            return None
-        if not np.isfinite(values).all():
-            self._fault(number, f"got '{line[:30]}'; expected finite numbers")
-            return None
-        return values
+    def _numbers(self, lines: Sequence[_Line]) -> Iterator[tuple[int, list[float]]]:
+        """Yield the numbers of each line that has nothing else."""
+        for number, line in lines:
+            try:
+                values = [float(word) for word in line.split()]
+            except ValueError:
+                self._fault(number, f"got '{line[:30]}'; expected numbers")
+                continue
+            if np.isfinite(values).all():
+                yield number, values
+            else:
+                self._fault(number, f"got '{line[:30]}'; expected finite numbers")
 
     def _fault(self, line: int, message: str) -> None:
         self.faults.append(Fault(f"line {line}", message))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import shapely
@@ -40,7 +39,7 @@ def read_polygon_map(path: Path, options: ImportOptions) -> Layer:
         raise UsageError(message)
     raw = read_map(path)
     border, solid = _in_metres(raw, longest_m, str(path))
-    shapes = list(_polygons(solid))
+    shapes = _polygons(solid)
     x_min, y_min, x_max, y_max = (round(value, 3) for value in border.bounds)
     became = counted(len(shapes), "polygon")
     notes = [f"{counted(len(raw.obstacles), 'shape')} became {became}"]
@@ -59,11 +58,8 @@ def _in_metres(
     raw: RawMap, longest_side_m: float | None, source: str
 ) -> tuple[Polygon, BaseGeometry]:
     """Return the border and the blocked ground inside its box, lower left at (0, 0)."""
-    extent = (
-        shapely.box(*raw.border.bounds)
-        if raw.border is not None
-        else shapely.box(*shapely.total_bounds(list(raw.obstacles)))
-    )
+    drawn = list(raw.obstacles) if raw.border is None else [raw.border]
+    extent = shapely.box(*shapely.total_bounds(drawn))
     x_min, y_min, x_max, y_max = extent.bounds
     longest = max(x_max - x_min, y_max - y_min)
     if min(x_max - x_min, y_max - y_min) <= 0.0:
@@ -91,14 +87,14 @@ def _solid(shape: BaseGeometry) -> BaseGeometry:
     return valid
 
 
-def _polygons(shape: BaseGeometry) -> Iterator[Polygon]:
-    """Yield the polygons of a shape from lower left to upper right, without slivers."""
+def _polygons(shape: BaseGeometry) -> list[Polygon]:
+    """Return the polygons of a shape from lower left to upper right, no slivers."""
     parts = [
         part
         for part in shapely.get_parts(shape)
         if isinstance(part, Polygon) and part.area > SLIVER_M2
     ]
-    yield from sorted(parts, key=lambda part: (part.bounds[1], part.bounds[0]))
+    return sorted(parts, key=lambda part: (part.bounds[1], part.bounds[0]))
 
 
 def _recognises(head: Head) -> bool:
