@@ -9,8 +9,9 @@ import math
 import sys
 import types
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -57,9 +58,18 @@ class Description:
     """
 
     model: Any
-    limits: Mapping[str, JointLimit] = field(default_factory=dict)
-    friction: Mapping[str, float] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    limits: Mapping[str, JointLimit]
+    friction: Mapping[str, float]
+    notes: tuple[str, ...]
+
+    @cached_property
+    def data(self) -> Any:
+        """The model at rest."""
+        from mrmg.mujoco_import import mujoco
+
+        data = mujoco.MjData(self.model)
+        mujoco.mj_forward(self.model, data)
+        return data
 
 
 def read_description(path: Path, arguments: Mapping[str, str]) -> Description:
@@ -87,21 +97,17 @@ def read_description(path: Path, arguments: Mapping[str, str]) -> Description:
     if root.tag not in ("robot", "mujoco"):
         message = f"got <{root.tag}>; expected <robot> (URDF, xacro) or <mujoco> (MJCF)"
         raise SceneError(source, [Fault("", message)])
-    is_urdf = root.tag == "robot"
     notes = []
-    if is_urdf:
+    if root.tag == "robot":
         notes = [*_without_lost_meshes(root, path.parent), *_assumed_masses(root)]
     try:
         with no_warning_file():
-            model = _compiled_urdf(root) if is_urdf else _compiled_mjcf(path, notes)
+            return _of_urdf(root, notes) if root.tag == "robot" else _of_mjcf(path)
     except (ValueError, OSError) as error:
         reason = " ".join(str(error).split())
         raise SceneError(
             source, [Fault("", f"MuJoCo cannot use it: {reason}")]
         ) from error
-    if is_urdf:
-        return Description(model, _limits(root), _gazebo_friction(root), tuple(notes))
-    return Description(model, {}, _geom_friction(model), tuple(notes))
 
 
 def _expanded(path: Path, arguments: Mapping[str, str]) -> str:
@@ -194,16 +200,18 @@ def _mesh_file(name: str, folder: Path) -> Path | None:
     return next((file.resolve() for file in files if name and file.is_file()), None)
 
 
-def _compiled_urdf(root: ET.Element) -> Any:
+def _of_urdf(root: ET.Element, notes: Sequence[str]) -> Description:
     from mrmg.mujoco_import import mujoco
 
     for extension in root.findall("mujoco"):
         root.remove(extension)
     ET.SubElement(ET.SubElement(root, "mujoco"), "compiler", _COMPILER)
-    return mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode")).compile()
+    spec = mujoco.MjSpec.from_string(ET.tostring(root, encoding="unicode"))
+    model = spec.compile()
+    return Description(model, _limits(root), _gazebo_friction(root), tuple(notes))
 
 
-def _compiled_mjcf(path: Path, notes: list[str]) -> Any:
+def _of_mjcf(path: Path) -> Description:
     from mrmg.mujoco_import import mujoco
 
     spec = mujoco.MjSpec.from_file(str(path))
@@ -217,8 +225,7 @@ def _compiled_mjcf(path: Path, notes: list[str]) -> Any:
         spec.delete(geom)
     for mesh in lost.values():
         spec.delete(mesh)
-    if lost:
-        notes.append(f"meshes left out, as their files are missing: {', '.join(lost)}")
+    left_out = f"meshes left out, as their files are missing: {', '.join(lost)}"
     # Neither surfaces nor grounds are taken over.
     unused = [geom for geom in spec.geoms if geom.type == mujoco.mjtGeom.mjGEOM_HFIELD]
     unused += [item for item in spec.textures if item.file]
@@ -230,7 +237,8 @@ def _compiled_mjcf(path: Path, notes: list[str]) -> Any:
     for joint in np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE):
         first = model.jnt_qposadr[joint]  # where it stands is no part of a robot
         model.qpos0[first : first + 7] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-    return model
+    notes = (left_out,) if lost else ()
+    return Description(model, {}, _geom_friction(model), notes)
 
 
 def _limits(root: ET.Element) -> dict[str, JointLimit]:

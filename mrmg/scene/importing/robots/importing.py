@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import tempfile
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +17,7 @@ import numpy as np
 from mrmg import shipped, storage
 from mrmg.errors import Fault, SceneError, UsageError
 from mrmg.scene.importing.robots.description import Description, read_description
-from mrmg.scene.importing.robots.mjcf_text import mjcf_text
+from mrmg.scene.importing.robots.mjcf_text import DrawnGeom, mjcf_text
 from mrmg.scene.importing.robots.parameters import Parameter, parameters_of
 from mrmg.scene.importing.robots.survey import Survey, survey
 from mrmg.scene.loading.models import load_model
@@ -81,8 +82,8 @@ def import_robot(
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=".import-") as place:
         work = Path(place) / name
-        drawn, assets = _drawn(description, found, work / "meshes")
-        text = mjcf_text(name, path.name, found, values, drawn, assets)
+        drawn = _drawn(description, found, work / "meshes")
+        text = mjcf_text(name, path.name, found, values, drawn)
         storage.write_text(work / f"{name}.xml", text)
         storage.write_text(work / "robot.yaml", _robot_yaml(name, path, found, values))
         try:
@@ -133,13 +134,11 @@ def _robot_yaml(
 
 def _drawn(
     description: Description, found: Survey, folder: Path
-) -> tuple[dict[int, list[str]], list[str]]:
+) -> dict[int, list[DrawnGeom]]:
     """Return the geoms to draw, by wheel (-1: chassis), and write their meshes."""
     from mrmg.mujoco_import import mujoco
 
-    model, data = description.model, mujoco.MjData(description.model)
-    mujoco.mj_forward(model, data)
-    kinds = mujoco.mjtGeom
+    model, data, kinds = description.model, description.data, mujoco.mjtGeom
     shapes = {
         kinds.mjGEOM_SPHERE: "sphere",
         kinds.mjGEOM_CAPSULE: "capsule",
@@ -152,37 +151,25 @@ def _drawn(
     of_body = {body: index for index, w in enumerate(wheels) for body in w.bodies}
     seen = model.geom_contype | model.geom_conaffinity
     looks = {int(model.geom_bodyid[at]) for at in np.flatnonzero(seen == 0)}
-    own = np.flatnonzero(np.isin(model.geom_bodyid, found.bodies)).tolist()
-    lines: dict[int, list[str]] = {}
-    meshes: dict[int, str] = {}
-    for geom in own:
+    drawn: dict[int, list[DrawnGeom]] = defaultdict(list)
+    meshes: dict[str, int] = {}
+    for geom in np.flatnonzero(np.isin(model.geom_bodyid, found.bodies)).tolist():
         body, kind = int(model.geom_bodyid[geom]), kinds(model.geom_type[geom])
-        if (
-            kind not in shapes
-            or body not in found.bodies
-            or (seen[geom] and body in looks)
-        ):
+        if kind not in shapes or (seen[geom] and body in looks):
             continue
         wheel = of_body.get(body, -1)
         center = found.origin_m + (wheels[wheel].place_m if wheel >= 0 else 0.0)
-        pos = _row(data.geom_xpos[geom] - center)
         quat = np.zeros(4)
         mujoco.mju_mat2Quat(quat, data.geom_xmat[geom])
+        mesh = None
         if kind == kinds.mjGEOM_MESH:
-            mesh = int(model.geom_dataid[geom])
-            meshes.setdefault(mesh, f"mesh_{mesh}")
-            size = f'mesh="{meshes[mesh]}"'
-        else:
-            size = f'size="{_row(model.geom_size[geom])}"'
-        paint = "rubber" if wheel >= 0 else "paint"
-        lines.setdefault(wheel, []).append(
-            f'<geom type="{shapes[kind]}" {size} pos="{pos}" quat="{_row(quat)}" '
-            f'material="{paint}"/>'
-        )
-    for mesh, name in meshes.items():
-        _write_mesh(model, mesh, folder / f"{name}.stl")
-    files = [f'<mesh name="{n}" file="meshes/{n}.stl"/>' for n in meshes.values()]
-    return lines, files
+            mesh = f"mesh_{model.geom_dataid[geom]}"
+            meshes[mesh] = int(model.geom_dataid[geom])
+        pos, size = data.geom_xpos[geom] - center, model.geom_size[geom]
+        drawn[wheel].append(DrawnGeom(shapes[kind], size, pos, quat, mesh))
+    for name, number in meshes.items():
+        _write_mesh(model, number, folder / f"{name}.stl")
+    return drawn
 
 
 def _write_mesh(model: Any, mesh: int, path: Path) -> None:
@@ -197,7 +184,3 @@ def _write_mesh(model: Any, mesh: int, path: Path) -> None:
     )
     path.parent.mkdir(parents=True, exist_ok=True)
     shape.export(str(path))
-
-
-def _row(values: Any) -> str:
-    return " ".join(f"{float(value) + 0.0:.9g}" for value in values)

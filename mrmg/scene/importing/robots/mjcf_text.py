@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,13 +18,30 @@ _GAP_SHARE = 0.04
 """Height of the support that carries nothing, as a share of the wheels' radius."""
 
 
+class DrawnGeom(NamedTuple):
+    """A geom that is only drawn.
+
+    Attributes:
+        type: as MJCF calls it.
+        size: as MJCF has it; of a mesh without meaning.
+        pos: relative to its wheel, or to the chassis [m].
+        quat: its turn.
+        mesh: name of its mesh, if it is one.
+    """
+
+    type: str
+    size: np.ndarray
+    pos: np.ndarray
+    quat: np.ndarray
+    mesh: str | None
+
+
 def mjcf_text(
     name: str,
     source: str,
     found: Survey,
     values: Mapping[str, Parameter],
-    drawn: Mapping[int, Sequence[str]],
-    assets: Sequence[str],
+    drawn: Mapping[int, Sequence[DrawnGeom]],
 ) -> str:
     """Return the MJCF file of a robot.
 
@@ -35,9 +51,7 @@ def mjcf_text(
         found: measurements.
         values: parameters of `robot.yaml`.
         drawn: geoms by index of the wheel they turn with; -1 for the chassis.
-        assets: meshes.
     """
-    mass_kg, center_m, inertia = found.chassis
     outline = np.array(values["footprint"].value)
     low, high = outline.min(axis=0), outline.max(axis=0)
     radius, height = values["wheel.radius"].value, values["height"].value
@@ -55,25 +69,19 @@ def mjcf_text(
         {"row": _row, "number": "{:.9g}".format},
         name=name,
         source=source.replace("--", "- -"),
-        rolling_coefficient=values["rolling_coefficient"].value,
-        turning_coefficient=values["turning_coefficient"].value,
-        friction=values["friction_coefficient"].value,
+        found=found,
+        values=values,
         radius=radius,
-        mass_kg=mass_kg,
-        center_m=center_m,
-        inertia=inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]],
+        inertia=found.chassis[2][[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]],
         half_m=[*(high - low) / 2, height / 2],
         middle_m=[*(high + low) / 2, height / 2],
-        is_car=bool(found.steered),
-        supports=[]
-        if found.steered
-        else [(e, x, support_m + z) for e, x, z in supports],
+        supports=[] if found.steered else supports,
         support_m=support_m,
         wheels=dict(zip(names, (*found.driven, *found.steered), strict=True)),
         stiffness=servo * _RATE_RAD_S**2,
         damping=2 * servo * _RATE_RAD_S,
-        drawn=defaultdict(tuple, drawn),
-        assets=assets,
+        drawn=drawn,
+        meshes=dict.fromkeys(geom.mesh for own in drawn.values() for geom in own),
     )
 
 

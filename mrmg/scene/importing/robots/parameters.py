@@ -60,7 +60,9 @@ def parameters_of(found: Survey, description: Description) -> dict[str, Paramete
     """
     wheels = (*found.driven, *found.steered)
     radius = float(np.mean([wheel.radius_m for wheel in wheels]))
-    track = float(np.mean([_track(pair) for pair in _pairs(found)]))
+    pairs = [found.driven, found.steered] if found.steered else [found.driven]
+    tracks_m = [abs(left.place_m[1] - right.place_m[1]) for left, right in pairs]
+    track = float(np.mean(tracks_m))
     spin = float(np.mean([wheel.inertia[0] + wheel.armature for wheel in wheels]))
     low, high = found.box_m
     half_width = float(max(-low[1], high[1], track / 2))
@@ -183,15 +185,6 @@ def _wheelbase(found: Survey, back: float, front: float) -> Parameter:
         return Parameter(_rounded(length), "m", "its supports: driven axle to caster")
     reason = "driven axle to the farther end of the footprint; no caster was found"
     return Parameter(_rounded(max(-back, front)), "m", None, reason)
-
-
-def _pairs(found: Survey) -> list[Any]:
-    return [found.driven, *([found.steered] if found.steered else [])]
-
-
-def _track(pair: Any) -> float:
-    left, right = pair
-    return float(abs(left.place_m[1] - right.place_m[1]))
 
 
 def _rounded(value: Any) -> Any:

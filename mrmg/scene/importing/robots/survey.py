@@ -18,7 +18,7 @@ from mrmg.errors import Fault, SceneError
 from mrmg.scene.importing.robots.description import Description
 from mrmg.scene.loading.mjcf import support_m
 
-_UPRIGHT, _ACROSS = 0.9, 0.9
+_ALONG = 0.9
 """Least share of a joint's axis along z (steering), or y (wheels)."""
 
 _GROUND_SHARE = 0.3
@@ -35,7 +35,7 @@ class Wheel:
         place_m: of its centre, shape (3,).
         radius_m: of its tyre.
         mass_kg: of what turns.
-        inertia: about its axis and across it [kg m^2].
+        inertia: about its axis and across it [kg m^2], shape (2,).
         armature: inertia of its drive, about the axis [kg m^2].
         names: of its joints.
         bodies: that turn with it.
@@ -44,7 +44,7 @@ class Wheel:
     place_m: np.ndarray
     radius_m: float
     mass_kg: float
-    inertia: tuple[float, float]
+    inertia: np.ndarray
     armature: float
     names: tuple[str, ...]
     bodies: tuple[int, ...]
@@ -84,27 +84,24 @@ class Survey:
 class _Scan:
     """A compiled description at rest."""
 
-    def __init__(self, model: Any) -> None:
-        from mrmg.mujoco_import import mujoco
-
-        self.mujoco, self.model, self.data = mujoco, model, mujoco.MjData(model)
-        mujoco.mj_forward(model, self.data)
+    def __init__(self, description: Description) -> None:
+        self.model, self.data = description.model, description.data
 
     @cached_property
     def hinges(self) -> dict[str, int]:
         """Joints that turn, by name."""
-        hinge = self.mujoco.mjtJoint.mjJNT_HINGE
+        from mrmg.mujoco_import import mujoco
+
+        hinge = mujoco.mjtJoint.mjJNT_HINGE
         return {
             self.model.joint(at).name or f"#{at}": at
             for at in range(self.model.njnt)
             if self.model.jnt_type[at] == hinge
         }
 
-    def is_across(self, joint: int) -> bool:
-        return bool(abs(self.data.xaxis[joint][1]) > _ACROSS)
-
-    def is_upright(self, joint: int) -> bool:
-        return bool(abs(self.data.xaxis[joint][2]) > _UPRIGHT)
+    def is_along(self, joint: int, axis: str) -> bool:
+        """Return whether a joint turns about an axis: x, y or z."""
+        return bool(abs(self.data.xaxis[joint]["xyz".index(axis)]) > _ALONG)
 
     def above(self, joint: int) -> list[int]:
         """Return the hinges between a joint's body and the root, nearest first."""
@@ -134,17 +131,11 @@ class _Scan:
         corners = np.array(points).reshape(-1, 3)
         return np.asarray(corners[np.isfinite(corners).all(axis=1)])
 
-    def geoms(self, bodies: Iterable[int]) -> list[int]:
+    def geoms(self, bodies: Sequence[int]) -> list[int]:
         """Return the shapes of bodies that collide; drawn ones if none does."""
-        own = [
-            at for at in range(self.model.ngeom) if self.model.geom_bodyid[at] in bodies
-        ]
-        solid = [
-            at
-            for at in own
-            if self.model.geom_contype[at] or self.model.geom_conaffinity[at]
-        ]
-        return solid or own
+        own = np.isin(self.model.geom_bodyid, bodies)
+        solid = own & ((self.model.geom_contype | self.model.geom_conaffinity) != 0)
+        return list(np.flatnonzero(solid if solid.any() else own).tolist())
 
     def mass(self, bodies: Sequence[int]) -> tuple[float, np.ndarray, np.ndarray]:
         """Return mass, centre and inertia about it of bodies that move as one."""
@@ -177,7 +168,8 @@ class _Scan:
         radius = float(-points[:, 2].min())
         place = np.array(self.data.xanchor[joint])
         armature = float(self.model.dof_armature[self.model.jnt_dofadr[joint]])
-        return Wheel(place, radius, mass, (spin, across), armature, (name,), bodies)
+        own = np.array([spin, across])
+        return Wheel(place, radius, mass, own, armature, (name,), bodies)
 
 
 def survey(
@@ -194,7 +186,7 @@ def survey(
     Raises:
         SceneError: if its wheels are not found; names the joints there are.
     """
-    scan = _Scan(description.model)
+    scan = _Scan(description)
     _require_known(scan, source, (*drive, *steer))
     fixed, steered, steering = _wheels(scan, drive, steer)
     left = [wheel for wheel in fixed if wheel.place_m[1] > _middle_y(fixed)]
@@ -250,12 +242,12 @@ def _wheels(
 ) -> tuple[list[Wheel], list[Wheel], float]:
     """Return wheels that do not steer, those that do, and the range of steering."""
     fixed, steered, ranges = [], [], []
-    found = [(at, scan.wheel(at)) for at in scan.hinges.values() if scan.is_across(at)]
-    wheels = [(at, wheel) for at, wheel in found if wheel is not None]
+    across = [at for at in scan.hinges.values() if scan.is_along(at, "y")]
+    wheels = [(at, wheel) for at in across if (wheel := scan.wheel(at)) is not None]
     ground = min((w.place_m[2] - w.radius_m for _, w in wheels), default=0.0)
     for joint, wheel in wheels:
         name, hinges = wheel.names[0], scan.above(joint)
-        upright = [at for at in hinges if scan.is_upright(at)]
+        upright = [at for at in hinges if scan.is_along(at, "z")]
         limited = [at for at in upright if scan.model.jnt_limited[at]]
         bottom = wheel.place_m[2] - wheel.radius_m - ground
         if drive and name in drive:
@@ -308,10 +300,7 @@ def _as_one(wheels: Sequence[Wheel]) -> Wheel:
         np.mean([wheel.place_m for wheel in wheels], axis=0),
         float(np.mean([wheel.radius_m for wheel in wheels])),
         sum(wheel.mass_kg for wheel in wheels),
-        (
-            sum(wheel.inertia[0] for wheel in wheels),
-            sum(wheel.inertia[1] for wheel in wheels),
-        ),
+        np.sum([wheel.inertia for wheel in wheels], axis=0),
         sum(wheel.armature for wheel in wheels),
         tuple(name for wheel in wheels for name in wheel.names),
         tuple(body for wheel in wheels for body in wheel.bodies),
