@@ -12,11 +12,20 @@ import shapely
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra, shortest_path
 from shapely.geometry import Polygon
-from shapely.geometry.base import BaseGeometry
 
-# Half of the 16 directions to neighbours; the graph is symmetric. With knight's moves a
-# path over the grid is at most 2.8 % longer than the straight line.
-_OFFSETS = ((1, 0), (0, 1), (1, 1), (1, -1), (2, 1), (1, 2), (2, -1), (1, -2))
+_STEPS = {
+    (1, 0): (),
+    (0, 1): (),
+    (1, 1): (),
+    (1, -1): (),
+    (2, 1): ((1, 0), (1, 1)),
+    (1, 2): ((0, 1), (1, 1)),
+    (2, -1): ((1, 0), (1, -1)),
+    (1, -2): ((0, -1), (1, -1)),
+}
+"""Half of the 16 steps to neighbours, and the cells that each passes over; the graph is
+symmetric. With knight's moves a path over the grid is at most 2.8 % longer than the
+straight line."""
 
 _FEW_PLACES = 300
 """Places between which all costs are found on the grid itself."""
@@ -96,37 +105,26 @@ class Ground:
         rows, columns = self.shape
         index = np.arange(rows * columns).reshape(rows, columns)
         free = self.free.reshape(rows, columns)
-        step = np.array(
-            [
-                (self.points_m[:, 0].max() - self.points_m[:, 0].min()) / (columns - 1),
-                (self.points_m[:, 1].max() - self.points_m[:, 1].min()) / (rows - 1),
-            ]
-        )
-        heads, tails, costs = [], [], []
-        for dx, dy in _OFFSETS:
-            tail = _shifted(index, 0, 0, dx, dy)
-            head = _shifted(index, dx, dy, dx, dy)
-            passable = _shifted(free, 0, 0, dx, dy) & _shifted(free, dx, dy, dx, dy)
-            for mx, my in _between(dx, dy):
-                passable &= _shifted(free, mx, my, dx, dy)
-            tail, head = tail[passable], head[passable]
+        spacing_m = np.ptp(self.points_m, axis=0) / (columns - 1, rows - 1)
+        links = []
+        for (dx, dy), passed in _STEPS.items():
+            passable = np.logical_and.reduce(
+                [_shifted(free, x, y, dx, dy) for x, y in ((0, 0), (dx, dy), *passed)]
+            )
+            tail = _shifted(index, 0, 0, dx, dy)[passable]
+            head = _shifted(index, dx, dy, dx, dy)[passable]
             mean = 0.5 * (self.multiplier[tail] + self.multiplier[head])
-            heads.append(head)
-            tails.append(tail)
-            costs.append(np.hypot(*(step * (dx, dy))) * mean)
-        size = rows * columns
-        entries = (
-            np.concatenate(costs),
-            (np.concatenate(tails), np.concatenate(heads)),
-        )
-        half = coo_array(entries, shape=(size, size))
+            links.append((np.hypot(*(spacing_m * (dx, dy))) * mean, tail, head))
+        cost, tail, head = map(np.concatenate, zip(*links, strict=True))
+        half = coo_array((cost, (tail, head)), shape=(index.size, index.size))
         return csr_array(half + half.T)
 
     @cached_property
-    def component(self) -> np.ndarray:
-        """Number of the connected free area of each point; -1 where not free."""
+    def largest(self) -> np.ndarray:
+        """Mask of the largest connected free area, shape (rows * columns,)."""
         _, label = connected_components(self.roads, directed=False)
-        return np.where(self.free, label, -1)
+        sizes = np.bincount(label, weights=self.free)
+        return np.asarray(self.free & (label == sizes.argmax()))
 
     def nearest(self, point: Sequence[float]) -> int:
         """Return the index of the nearest free grid point."""
@@ -183,10 +181,12 @@ class Ground:
 def _clearance(
     points: np.ndarray, bounds: Sequence[float], obstacles: Sequence[Polygon]
 ) -> np.ndarray:
-    outline = shapely.box(*bounds).exterior
-    rings: list[BaseGeometry] = [outline, *(shape.boundary for shape in obstacles)]
-    sides = np.concatenate([_sides(ring) for ring in rings])
-    tree = shapely.STRtree(sides)
+    boundaries = [shape.boundary for shape in (shapely.box(*bounds), *obstacles)]
+    corners, ring = shapely.get_coordinates(
+        shapely.get_parts(boundaries), return_index=True
+    )
+    sides = np.stack([corners[:-1], corners[1:]], axis=1)[ring[1:] == ring[:-1]]
+    tree = shapely.STRtree(shapely.linestrings(sides))
     _, distance = tree.query_nearest(
         shapely.points(points), return_distance=True, all_matches=False
     )
@@ -194,27 +194,8 @@ def _clearance(
     return np.asarray(np.where(blocked, -distance, distance))
 
 
-def _sides(lines: BaseGeometry) -> np.ndarray:
-    coordinates, ring = shapely.get_coordinates(
-        shapely.get_parts(lines), return_index=True
-    )
-    same = ring[1:] == ring[:-1]
-    pairs = np.stack([coordinates[:-1], coordinates[1:]], axis=1)[same]
-    return np.asarray(shapely.linestrings(pairs))
-
-
 def _shifted(grid: np.ndarray, x: int, y: int, dx: int, dy: int) -> np.ndarray:
     """Return the grid moved by (x, y), cut to where a step (dx, dy) stays inside."""
     rows, columns = grid.shape
     low = max(0, -dy)
     return grid[low + y : rows - max(0, dy) + y, x : columns - max(0, dx) + x]
-
-
-def _between(dx: int, dy: int) -> list[tuple[int, int]]:
-    """Return the cells a knight's move passes over."""
-    sign = 1 if dy > 0 else -1
-    if abs(dx) == 2:
-        return [(1, 0), (1, sign)]
-    if abs(dy) == 2:
-        return [(0, sign), (1, sign)]
-    return []

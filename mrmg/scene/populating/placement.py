@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse.csgraph import minimum_spanning_tree
 
 from mrmg.counted import counted
 from mrmg.errors import UsageError
@@ -161,24 +162,7 @@ def _least_capacity_m(
 def _widest_gap(road_m: np.ndarray, posts: list[int]) -> float:
     """Return the longest leg one must drive to get from any station to any other."""
     between = road_m[np.ix_(posts, posts)]
-    return float(_tree_legs_m(between[1:, 1:], between[0, 1:]).max(initial=0.0))
-
-
-def _tree_legs_m(between_m: np.ndarray, reach_m: np.ndarray) -> np.ndarray:
-    """Return the legs of the shortest tree from a root to all places (Prim).
-
-    Args:
-        between_m: length from place to place [m], shape (n, n).
-        reach_m: from the root to each of them [m], shape (n,).
-    """
-    near_m, legs_m = reach_m.copy(), np.zeros(len(reach_m))
-    away = np.ones(len(reach_m), bool)
-    for n in range(len(legs_m)):
-        closest = int(np.where(away, near_m, np.inf).argmin())
-        legs_m[n] = near_m[closest]
-        away[closest] = False
-        near_m = np.minimum(near_m, between_m[closest])
-    return legs_m
+    return float(minimum_spanning_tree(between).data.max(initial=0.0))
 
 
 def _most_capacity_m(road_m: np.ndarray, starts: list[int], sites: list[int]) -> float:
@@ -188,6 +172,8 @@ def _most_capacity_m(road_m: np.ndarray, starts: list[int], sites: list[int]) ->
     short of the spanning forest of the goals, rooted at the robots.
     """
     reach = road_m[np.ix_(starts, sites)].min(axis=0)
-    forest_m = float(_tree_legs_m(road_m[np.ix_(sites, sites)], reach).sum())
+    from_root = np.append(0.0, reach)  # all robots as one
+    rooted = np.vstack([reach, road_m[np.ix_(sites, sites)]])
+    forest_m = float(minimum_spanning_tree(np.column_stack([from_root, rooted])).sum())
     need_m = max(float(reach.max()), forest_m / len(starts))
     return need_m / (1.0 - RESERVE)

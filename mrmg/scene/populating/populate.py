@@ -144,7 +144,7 @@ def _drivable(scene: Scene, model: RobotModel) -> Ground:
     grounds = [
         replace(bare, margin_m=model.half_width_m + margin_m) for margin_m in margins_m
     ]
-    sizes = [_largest(ground).sum() for ground in grounds]
+    sizes = [ground.largest.sum() for ground in grounds]
     share = max(sizes) / max(1, (bare.clearance_m > 0.0).sum())
     if share < _LEAST_SHARE:
         message = (
@@ -183,14 +183,6 @@ def _climbs_m(scene: Scene, model: RobotModel, points_m: np.ndarray) -> np.ndarr
     return np.asarray(rise_m / model.rolling_coefficient)
 
 
-def _largest(ground: Ground) -> np.ndarray:
-    """Return the mask of the largest connected free area."""
-    labels = ground.component[ground.free]
-    if not len(labels):
-        return np.zeros(len(ground.free), dtype=bool)
-    return np.asarray(ground.component == np.bincount(labels).argmax())
-
-
 def _candidates(
     ground: Ground, model: RobotModel, count: int, rng: np.random.Generator
 ) -> list[int]:
@@ -198,7 +190,7 @@ def _candidates(
 
     Wanted is room about the point, and a wide place to turn round not far away by road.
     """
-    connected = _largest(ground)
+    connected = ground.largest
     turning_m = model.turning_radius_m + model.half_width_m
     wide = np.flatnonzero(connected & (ground.clearance_m >= turning_m))
     near_wide = connected & (

@@ -81,7 +81,7 @@ def test_road_round_a_wall() -> None:
 def test_walls_part_the_ground() -> None:
     grid = ground([shapely.box(19.5, 0, 20.5, 30)])
     left, right = grid.nearest((5, 5)), grid.nearest((35, 5))
-    assert grid.component[left] != grid.component[right]
+    assert grid.largest[left] != grid.largest[right]
     assert np.isinf(grid.distances([left])[0, right])
 
 
