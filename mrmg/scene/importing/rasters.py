@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,7 +11,7 @@ import numpy as np
 
 from mrmg.errors import Fault, SceneError
 from mrmg.extras import import_extra
-from mrmg.scene.importing.frames import known_crs
+from mrmg.scene.importing.frames import LOCAL, known_crs
 from mrmg.scene.importing.layers import Box, ImportOptions
 
 _NOWHERE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
@@ -61,32 +59,23 @@ def read_raster(path: Path, options: ImportOptions) -> Raster:
     Raises:
         SceneError: if it cannot be read or nothing of it is asked for.
     """
-    with _opened(path) as source:
-        if options.crs is not None:
-            crs = known_crs(options.crs, str(path))
-        else:
-            crs = known_crs(source.crs.to_wkt(), str(path)) if source.crs else None
-        return Raster(crs, *_window(source, options, str(path)))
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[Any]:
     rasterio = import_extra("rasterio", extra="geo", purpose="reads GeoTIFF")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", rasterio.errors.NotGeoreferencedWarning)
             with rasterio.open(path) as source:
-                yield source
+                return _first_band(source, options, str(path))
     except rasterio.errors.RasterioError as error:
         reason = " ".join(str(error.__cause__ or error).split())
         message = f"no readable raster: {reason}"
         raise SceneError(str(path), [Fault("", message)]) from error
 
 
-def _window(
-    source: Any, options: ImportOptions, name: str
-) -> tuple[np.ndarray, tuple[float, ...], list[str]]:
-    """Return the first band as numbers (NaN: no data), its transform, and notes."""
+def _first_band(source: Any, options: ImportOptions, name: str) -> Raster:
+    stated = options.crs
+    if stated is None:
+        stated = source.crs.to_wkt() if source.crs else LOCAL
+    crs = known_crs(stated, name)
     transform, notes = tuple(source.transform[:6]), []
     if transform == _NOWHERE and source.crs is None:
         transform = (1.0, 0.0, 0.0, 0.0, -1.0, float(source.height))
@@ -118,7 +107,7 @@ def _window(
         values = values[:: 1 if e < 0.0 else -1, :: 1 if a > 0.0 else -1]
         c, f = min(c, c + a * values.shape[1]), max(f, f + e * values.shape[0])
         a, e = abs(a), -abs(e)
-    return values, (a, b, c, d, e, f), notes
+    return Raster(crs, values, (a, b, c, d, e, f), notes)
 
 
 def _cells_in(
