@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import shapely
 
 from mrmg.errors import Fault, SceneError
 from mrmg.extras import import_extra
@@ -19,8 +20,6 @@ SCALE_ERROR = 0.002
 FAR_M = 100_000.0
 """Coordinates from which on the scene begins at an origin of its own, so that
 single-precision numbers resolve millimetres."""
-
-Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
@@ -59,12 +58,9 @@ class Frame:
             raise SceneError(source, [Fault("", message)])
         return np.asarray(moved if crs is None else moved - self.origin_m)
 
-    def box(self, box: Box, crs: str | None) -> Box:
-        """Return the extent in this frame of a box of the first file's coordinates."""
-        x_min, y_min, x_max, y_max = box
-        corners = [(x_min, y_min), (x_max, y_min), (x_min, y_max), (x_max, y_max)]
-        moved = self.metres(corners, crs)
-        return (*moved.min(axis=0).tolist(), *moved.max(axis=0).tolist())
+    def placed(self, shape: Any, crs: str | None, source: str = "") -> Any:
+        """Return a shape of another coordinate system in this frame; see `metres`."""
+        return shapely.transform(shape, lambda points: self.metres(points, crs, source))
 
     def note(self) -> str:
         """Return what a reader of the scene must know of its coordinates."""

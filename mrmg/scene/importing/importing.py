@@ -10,7 +10,7 @@ from typing import Any
 from mrmg.errors import UsageError
 from mrmg.scene.importing.formats import nav2_map
 from mrmg.scene.importing.layers import ImportOptions, Layer, scene_of_layers
-from mrmg.scene.importing.registry import format_of
+from mrmg.scene.importing.registry import Reader, format_of
 
 
 @dataclass(frozen=True)
@@ -47,32 +47,24 @@ def import_files(
     if not files:
         raise UsageError("nothing to import; name a file at least")
     asked = options or ImportOptions()
+    plain = replace(asked, classes=None) if land_cover else asked
     layers: list[Layer] = []
     notes: list[str] = []
 
-    def add(path: Path, layer: Layer) -> None:
-        nonlocal asked
+    def add(path: Path, read: Reader, options: ImportOptions = plain) -> None:
+        layer = read(path, replace(options, before=tuple(layers)))
         layers.append(layer)
         notes.extend(f"{path.name}: {note}" for note in layer.notes)
-        asked = replace(asked, frame=layer.frame)
 
-    plain = replace(asked, classes=None) if land_cover else asked
     for path in files:
-        reader = format_of(path, kind)
-        add(path, reader.read(path, replace(plain, frame=asked.frame)))
+        add(path, format_of(path, kind).read)
     if keepout is not None:
-        if format_of(keepout).read is nav2_map.read_map:
-            add(keepout, nav2_map.read_keepout(keepout, asked, layers))
-        else:
-            add(
-                keepout,
-                format_of(keepout).read(keepout, replace(plain, frame=asked.frame)),
-            )
+        read = format_of(keepout).read
+        add(keepout, nav2_map.read_keepout if read is nav2_map.read_map else read)
     if terrain_mask is not None:
-        add(terrain_mask, nav2_map.read_mask(terrain_mask, asked, layers))
+        add(terrain_mask, nav2_map.read_mask)
     if land_cover is not None:
-        reader = format_of(land_cover, "land-cover")
-        add(land_cover, reader.read(land_cover, asked))
+        add(land_cover, format_of(land_cover, "land-cover").read, asked)
     document, left = scene_of_layers(files[0], layers, asked)
     return Imported(document, (layers[0].frame.note(), *notes, *left))
 

@@ -42,7 +42,7 @@ class ImportOptions:
     """What the user requests of an import.
 
     Attributes:
-        frame: coordinates of the scene so far; None before the first file.
+        before: layers of the files before.
         unknown: what cells that were never seen become.
         tolerance: how far polygons may reach beyond the cells of a raster [cells].
         crs: coordinate reference system that replaces what files state; "local" for
@@ -53,7 +53,7 @@ class ImportOptions:
         lane_width_m: width of the lanes that robots must keep to; None for none.
     """
 
-    frame: Frame | None = None
+    before: Sequence[Layer] = ()
     unknown: Literal["obstacle", "free"] = "obstacle"
     tolerance: float = 0.5
     crs: str | None = None
@@ -62,6 +62,11 @@ class ImportOptions:
     classes: Path | None = None
     lane_width_m: float | None = None
 
+    @property
+    def frame(self) -> Frame | None:
+        """Coordinates of the scene so far; None before the first file."""
+        return self.before[0].frame if self.before else None
+
 
 @dataclass(frozen=True)
 class Area:
@@ -69,14 +74,6 @@ class Area:
 
     shape: BaseGeometry
     entry: Entry = field(default_factory=dict)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Heights:
-    """Heights [m] of nodes, rows from north to south, over `bounds`."""
-
-    bounds: Box
-    metres: np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,7 +86,7 @@ class Layer:
         bounds: extent of the ground that the file describes; None if it states none.
         obstacles: ground that robots must keep off.
         terrain: ground that costs more or less.
-        heights: of the ground.
+        heights: of nodes over `bounds` [m], rows from north to south, shape (ny, nx).
         goals, stations, robots: entries of a scene file.
         lanes: lines that robots may drive along.
         cells: placement and mask of the raster cells that obstacles cover.
@@ -101,7 +98,7 @@ class Layer:
     bounds: Box | None = None
     obstacles: Sequence[Area] = ()
     terrain: Sequence[Area] = ()
-    heights: Heights | None = None
+    heights: np.ndarray | None = None
     goals: Sequence[Entry] = ()
     stations: Sequence[Entry] = ()
     robots: Sequence[Entry] = ()
@@ -133,20 +130,19 @@ def scene_of_layers(
         raise SceneError(source, [Fault("bounds", message)])
     notes: list[str]
     box, notes = shapely.box(*bounds), []
-    obstacles = [area for layer in layers for area in layer.obstacles]
-    obstacles += _beside_lanes(layers, box, options.lane_width_m)
-    heights = next((layer.heights for layer in layers if layer.heights), None)
+    obstacles = _all(layers, "obstacles")
+    obstacles += _beside_lanes(_all(layers, "lanes"), box, options.lane_width_m)
     document: Entry = {
         "format": 1,
         "name": _NOT_IN_IDS.sub("_", first.stem),
         "bounds": [round(value, _DECIMALS) + 0.0 for value in bounds],
         "obstacles": list(_entries(obstacles, box)),
-        "terrain": list(
-            _entries([area for layer in layers for area in layer.terrain], box)
-        ),
+        "terrain": list(_entries(_all(layers, "terrain"), box)),
     }
+    heights = next((one.heights for one in layers if one.heights is not None), None)
     if heights is not None:
-        document["elevation"] = _elevation(heights)
+        steps = np.round(heights / PACKED_M).astype("<i4")
+        document["elevation"] = {**packed_heights(steps), "slope": "avoid"}
     areas = (*document["obstacles"], *document["terrain"])
     used = {str(entry.get("id")): 1 for entry in areas}
     solid = shapely.disjoint_subset_union_all(
@@ -156,7 +152,7 @@ def scene_of_layers(
         message = "no free ground is left; --unknown free opens what was never seen"
         raise SceneError(source, [Fault("obstacles", message)])
     for section in ("goals", "stations", "robots"):
-        entries = [entry for layer in layers for entry in getattr(layer, section)]
+        entries = _all(layers, section)
         fitting = [
             entry
             for entry in entries
@@ -172,43 +168,45 @@ def scene_of_layers(
     return {key: value for key, value in document.items() if value != []}, notes
 
 
+def _all(layers: Sequence[Layer], section: str) -> list[Any]:
+    """Return what all layers have of a kind, such as "obstacles"."""
+    return [item for layer in layers for item in getattr(layer, section)]
+
+
 def _bounds(source: str, layers: Sequence[Layer], options: ImportOptions) -> Box:
-    heights = next((layer.heights for layer in layers if layer.heights), None)
-    if heights is not None:
-        return heights.bounds
+    for layer in layers:
+        if layer.heights is not None and layer.bounds is not None:
+            return layer.bounds
     shown = [shapely.box(*layer.bounds) for layer in layers if layer.bounds]
     states_bounds = bool(shown)
     if not states_bounds:
-        areas = [
-            area for layer in layers for area in (*layer.obstacles, *layer.terrain)
-        ]
-        shown = [area.shape for area in areas] + [
+        shown = [
+            area.shape
+            for section in ("obstacles", "terrain")
+            for area in _all(layers, section)
+        ] + [
             _point(entry).buffer(PLACE_MARGIN_M)
-            for layer in layers
-            for entry in (*layer.goals, *layer.stations, *layer.robots)
+            for section in ("goals", "stations", "robots")
+            for entry in _all(layers, section)
         ]
     if not shown:
         raise SceneError(source, [Fault("", "holds nothing that a scene could show")])
     whole = shapely.box(*shapely.total_bounds(shown))
-    if options.crop is None:
-        return _box_of(whole)
-    cropped = shapely.box(*layers[0].frame.box(options.crop, layers[0].crs))
-    if not cropped.intersection(whole).area:
-        extent = ", ".join(f"{value:g}" for value in whole.bounds)
-        message = f"{options.crop} lies beside the map, which covers {extent} in metres"
-        raise SceneError(source, [Fault("--crop", message)])
-    return _box_of(cropped.intersection(whole) if states_bounds else cropped)
-
-
-def _box_of(shape: BaseGeometry) -> Box:
-    x_min, y_min, x_max, y_max = shape.bounds
-    return x_min, y_min, x_max, y_max
+    if options.crop is not None:
+        crop, first = shapely.box(*options.crop), layers[0]
+        cropped = first.frame.placed(crop, first.crs).envelope
+        if not cropped.intersection(whole).area:
+            extent = ", ".join(f"{value:g}" for value in whole.bounds)
+            message = f"{options.crop} lies beside the map, which covers {extent}"
+            raise SceneError(source, [Fault("--crop", f"{message} in metres")])
+        whole = cropped.intersection(whole) if states_bounds else cropped
+    bounds: Box = whole.bounds
+    return bounds
 
 
 def _beside_lanes(
-    layers: Sequence[Layer], box: Polygon, width_m: float | None
+    lanes: Sequence[BaseGeometry], box: Polygon, width_m: float | None
 ) -> list[Area]:
-    lanes = [line for layer in layers for line in layer.lanes]
     if width_m is None or not lanes:
         return []
     allowed = shapely.union_all(lanes).buffer(0.5 * width_m)
@@ -237,11 +235,6 @@ def _polygon(shape: Polygon) -> Entry:
 def _corners(ring: Any) -> list[list[float]]:
     corners = np.round(np.array(ring.coords[:-1])[:, :2], _DECIMALS) + 0.0
     return list(corners.tolist())
-
-
-def _elevation(heights: Heights) -> Entry:
-    steps = np.round(heights.metres / PACKED_M).astype("<i4")
-    return {**packed_heights(steps), "slope": "avoid"}
 
 
 def _point(entry: Entry) -> shapely.Point:

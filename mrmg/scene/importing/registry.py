@@ -18,6 +18,9 @@ from mrmg.errors import Fault, SceneError, UsageError, nearest
 from mrmg.scene.importing.layers import ImportOptions, Layer
 from mrmg.scene.loading.yaml_text import parse_yaml, read_text, read_yaml
 
+Reader = Callable[[Path, ImportOptions], Layer]
+"""Turns a file into a layer of a scene."""
+
 _SNIFFED_BYTES = 1 << 16
 
 
@@ -85,7 +88,7 @@ class Format:
     kind: str
     title: str
     recognises: Callable[[Head], bool]
-    read: Callable[[Path, ImportOptions], Layer]
+    read: Reader
 
 
 def formats() -> dict[str, Format]:

@@ -17,7 +17,7 @@ from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError
 from mrmg.extras import import_extra
 from mrmg.scene.importing.frames import Frame, frame_of
-from mrmg.scene.importing.layers import Area, Heights, ImportOptions, Layer
+from mrmg.scene.importing.layers import Area, Box, ImportOptions, Layer
 from mrmg.scene.importing.raster_shapes import enclosing_polygons
 from mrmg.scene.importing.rasters import Raster, read_raster
 from mrmg.scene.importing.registry import Format, Head
@@ -62,7 +62,7 @@ def read_elevation(path: Path, options: ImportOptions) -> Layer:
 
 def _layer(
     frame: Frame,
-    bounds: tuple[float, float, float, float],
+    bounds: Box,
     heights: np.ndarray,
     options: ImportOptions,
     notes: list[str],
@@ -94,7 +94,7 @@ def _layer(
     return Layer(
         frame=frame,
         bounds=bounds,
-        heights=Heights(bounds=bounds, metres=heights),
+        heights=heights,
         obstacles=obstacles,
         notes=notes,
     )
@@ -140,7 +140,7 @@ def _placed(shape: Any, bounds: Any, grid: tuple[int, ...]) -> Any:
     return shapely.transform(shape, lambda p: (p - 0.5) * steps + [x_min, y_max])
 
 
-def _box(bounds: Any) -> tuple[float, float, float, float]:
+def _box(bounds: Any) -> Box:
     x_min, y_min, x_max, y_max = (float(value) for value in bounds)
     return x_min, y_min, x_max, y_max
 

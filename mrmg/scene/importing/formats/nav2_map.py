@@ -20,7 +20,7 @@ from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.importing.frames import Frame
 from mrmg.scene.importing.layers import Area, ImportOptions, Layer
-from mrmg.scene.importing.raster_shapes import enclosing_polygons, polygons_of_cells
+from mrmg.scene.importing.raster_shapes import enclosing_polygons
 from mrmg.scene.importing.registry import Format, Head
 from mrmg.scene.loading.faults import faults_of
 from mrmg.scene.loading.places import lines_of
@@ -83,24 +83,37 @@ class OccupancyGrid:
         turned = affinity.rotate(upright, yaw, origin=(0.0, 0.0), use_radians=True)
         return affinity.translate(turned, x, y)
 
+    def areas(self, cells: np.ndarray, tolerance: float, **entry: Any) -> list[Area]:
+        """Return areas of an entry about cells; see `enclosing_polygons`."""
+        shapes = enclosing_polygons(cells, tolerance)
+        return [Area(self.placed(shape), entry) for shape in shapes]
+
+    def uncovered(self, known: Sequence[Layer]) -> np.ndarray:
+        """Return which cells no obstacle of known layers on the same grid covers."""
+        free = np.ones(self.occupied.shape, dtype=bool)
+        for place, mask in (layer.cells for layer in known if layer.cells is not None):
+            if place == self.place and mask.shape == free.shape:
+                free &= ~mask
+        return free
+
 
 def read_map(path: Path, options: ImportOptions) -> Layer:
     """Read an occupancy map: its occupied cells, and unknown ones, become obstacles."""
     grid = read_grid(path)
     unknown = grid.occupancy == UNKNOWN
     solid = grid.occupied | unknown if options.unknown == "obstacle" else grid.occupied
-    shapes = [grid.placed(s) for s in enclosing_polygons(solid, options.tolerance)]
+    obstacles = grid.areas(solid, options.tolerance)
     rows, columns = solid.shape
     extent = grid.placed(shapely.box(0, 0, columns, rows))
     bounds = extent.bounds
     beside = shapely.box(*bounds) - extent
     if beside.area > 1e-6 * extent.area:  # turned: nothing is known beside it
-        shapes += list(shapely.get_parts(beside))
+        obstacles += [Area(part) for part in shapely.get_parts(beside)]
     tolerance_m = options.tolerance * grid.document.resolution
     cells = counted(int(grid.occupied.sum()), "occupied cell")
     notes = [
         f"{cells} and {int(unknown.sum())} unknown (taken as {options.unknown}) became "
-        f"{counted(len(shapes), 'polygon')}, reaching at most {tolerance_m:.3g} m "
+        f"{counted(len(obstacles), 'polygon')}, reaching at most {tolerance_m:.3g} m "
         "beyond their cells",
         *_notes(grid),
     ]
@@ -113,58 +126,52 @@ def read_map(path: Path, options: ImportOptions) -> Layer:
     return Layer(
         frame=options.frame or Frame(),
         bounds=bounds,
-        obstacles=[Area(shape) for shape in shapes],
+        obstacles=obstacles,
         cells=(grid.place, solid),
         notes=notes,
     )
 
 
-def read_keepout(path: Path, options: ImportOptions, known: Sequence[Layer]) -> Layer:
+def read_keepout(path: Path, options: ImportOptions) -> Layer:
     """Read a keep-out mask: its occupied cells become obstacles.
 
-    Cells that are obstacles of `known` layers on the same grid already stay out.
+    Cells that are obstacles of layers before on the same grid already stay out.
     """
     grid = read_grid(path)
-    closed = grid.occupied & ~_covered(grid, known)
-    shapes = [grid.placed(s) for s in enclosing_polygons(closed, options.tolerance)]
+    closed = grid.occupied & grid.uncovered(options.before)
+    obstacles = grid.areas(closed, options.tolerance, id="keepout")
     cells = counted(int(closed.sum()), "cell")
-    note = f"{cells} became {counted(len(shapes), 'obstacle')}"
+    note = f"{cells} became {counted(len(obstacles), 'obstacle')}"
     return Layer(
         frame=options.frame or Frame(),
-        obstacles=[Area(shape, {"id": "keepout"}) for shape in shapes],
+        obstacles=obstacles,
         notes=[note, *_notes(grid)],
     )
 
 
-def _covered(grid: OccupancyGrid, known: Sequence[Layer]) -> np.ndarray:
-    covered = np.zeros(grid.occupied.shape, dtype=bool)
-    for place, mask in (layer.cells for layer in known if layer.cells is not None):
-        if place == grid.place and mask.shape == covered.shape:
-            covered |= mask
-    return covered
-
-
-def read_mask(path: Path, options: ImportOptions, known: Sequence[Layer]) -> Layer:
+def read_mask(path: Path, options: ImportOptions) -> Layer:
     """Read a speed or cost mask: its values become multipliers of terrain.
 
     A value v of 1 to 99 leaves 100 - v % of the speed, and multiplies by
-    100 / (100 - v); ground of value 100 is closed. Cells that are obstacles of `known`
-    layers on the same grid stay out.
+    100 / (100 - v); ground of value 100 is closed. Cells that are obstacles of layers
+    before on the same grid stay out.
     """
     grid = read_grid(path)
-    covered = _covered(grid, known)
-    value = np.where(covered | grid.occupied, 0, np.maximum(grid.occupancy, 0))
+    free = grid.uncovered(options.before)
+    value = np.where(free & ~grid.occupied, np.maximum(grid.occupancy, 0), 0)
     values = np.unique(value[value > 0])
     if len(values) > MOST_CLASSES:
         steps = np.linspace(0, LETHAL, MOST_CLASSES + 1)
         middle = 0.5 * (steps[1:] + steps[:-1])
         value = np.where(value > 0, middle[np.digitize(value, steps[1:-1])], 0.0)
     terrain = [
-        Area(grid.placed(shape), {"multiplier": round(100.0 / (100.0 - float(v)), 3)})
+        area
         for v in np.unique(value[value > 0])
-        for shape in polygons_of_cells(value == v)
+        for area in grid.areas(
+            value == v, 0.0, multiplier=round(100.0 / (100.0 - float(v)), 3)
+        )
     ]
-    closed = enclosing_polygons(grid.occupied & ~covered, options.tolerance)
+    closed = grid.areas(grid.occupied & free, options.tolerance, id="closed")
     notes = [
         f"{counted(len(values), 'value')} of 1 to 99 became "
         f"{counted(len(terrain), 'terrain area')} of multiplier 100 / (100 - value); "
@@ -174,7 +181,7 @@ def read_mask(path: Path, options: ImportOptions, known: Sequence[Layer]) -> Lay
         notes.append(f"its {len(values)} values were rounded to {MOST_CLASSES}")
     return Layer(
         frame=options.frame or Frame(),
-        obstacles=[Area(grid.placed(s), {"id": "closed"}) for s in closed],
+        obstacles=closed,
         terrain=terrain,
         notes=[*notes, *_notes(grid)],
     )
@@ -208,7 +215,7 @@ def read_grid(path: Path) -> OccupancyGrid:
 
 def _picture(path: Path, document: MapDocument) -> tuple[np.ndarray, np.ndarray]:
     """Return brightness in [0, 1] and where the picture is opaque, as (h, w)."""
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image
 
     file = path.parent / document.image
     try:
@@ -223,24 +230,16 @@ def _picture(path: Path, document: MapDocument) -> tuple[np.ndarray, np.ndarray]
                 else:
                     data = np.asarray(picture)
                 white = 65535.0 if picture.mode.startswith("I") else 255.0
-    except (
-        OSError,
-        SyntaxError,
-        ValueError,
-        UnidentifiedImageError,
-        Image.DecompressionBombError,
-    ) as error:
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
         reason = "no readable picture" if file.exists() else "no such file"
         message = f"'{document.image}': {reason}; expected a PGM or PNG beside the YAML"
         raise SceneError(str(path), [Fault("image", message)]) from error
-    data = data.astype(float) / white
-    if data.ndim == 2:
-        return data, np.ones(data.shape, dtype=bool)
-    alpha = data[..., -1] if data.shape[2] in (2, 4) else np.ones(data.shape[:2])
-    colours = data[..., :-1] if data.shape[2] in (2, 4) else data
-    if document.mode == "trinary" and data.shape[2] in (2, 4):
-        colours = data  # as the map server has it
-    return colours.mean(axis=2), alpha >= 1.0
+    data = np.atleast_3d(data.astype(float) / white)
+    if data.shape[2] not in (2, 4):
+        return data.mean(axis=2), np.ones(data.shape[:2], dtype=bool)
+    # As the map server has it.
+    colours = data if document.mode == "trinary" else data[..., :-1]
+    return colours.mean(axis=2), data[..., -1] >= 1.0
 
 
 def _occupancy(
