@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import RootModel, ValidationError
+from pydantic import Field, RootModel, ValidationError
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.counted import counted
@@ -23,10 +23,10 @@ OBSTACLE = "obstacle"
 
 
 class ClassEntry(Strict):
-    """What a class is as terrain."""
+    """What a class is as terrain: keys of its entry in a scene."""
 
     multiplier: Positive = 1.0
-    turning: Positive | None = None
+    turning_multiplier: Annotated[Positive | None, Field(alias="turning")] = None
 
 
 class ClassTable(RootModel[dict[str, ClassEntry | Literal["obstacle"]]]):
@@ -57,42 +57,39 @@ def read_classes(path: Path | None, source: str) -> dict[str, Any]:
             raise SceneError(str(path), faults_of(error, ClassEntry)) from error
 
 
-class LandCover:
-    """Shapes of classes, gathered one class after the other."""
+def land_cover_layer(
+    table: dict[str, Any],
+    shapes_by_class: Iterable[tuple[str, Sequence[BaseGeometry]]],
+    frame: Frame,
+    bounds: Box | None,
+    notes: Sequence[str],
+) -> Layer:
+    """Return classes as terrain and obstacles; what the table lacks is plain ground.
 
-    def __init__(self, table: dict[str, Any]) -> None:
-        """Begin without shapes."""
-        self._table = table
-        self._terrain: list[Area] = []
-        self._obstacles: list[Area] = []
-        self._notes: list[str] = []
-
-    def is_obstacle(self, name: str) -> bool:
-        """Return whether robots must keep off a class."""
-        return bool(self._table.get(name) == OBSTACLE)
-
-    def add(self, name: str, shapes: Sequence[BaseGeometry]) -> None:
-        """Add the shapes of a class; one that the table lacks is plain ground."""
-        entry = self._table.get(name)
-        areas = self._obstacles if entry == OBSTACLE else self._terrain
+    Args:
+        table: of classes, as `read_classes` returns it.
+        shapes_by_class: names and shapes, in metres of the frame.
+        frame: of the layer.
+        bounds: of the layer.
+        notes: on the file.
+    """
+    terrain: list[Area] = []
+    obstacles: list[Area] = []
+    unknown = []
+    for name, shapes in shapes_by_class:
+        entry, keys = table.get(name), {"id": f"class_{name}"}
         if entry is None:
-            self._notes.append(f"class {name} is not in the table: plain ground")
-            return
-        keys: dict[str, Any] = {"id": f"class_{name}"}
-        if entry != OBSTACLE:
-            keys["multiplier"] = entry.multiplier
-            if entry.turning is not None:
-                keys["turning_multiplier"] = entry.turning
-        areas += [Area(shape, keys) for shape in shapes]
-
-    def layer(self, frame: Frame, bounds: Box | None, notes: Sequence[str]) -> Layer:
-        """Return what was added."""
-        areas = counted(len(self._terrain), "terrain area")
-        count = f"{areas}, {counted(len(self._obstacles), 'obstacle')}"
-        return Layer(
-            frame=frame,
-            bounds=bounds,
-            obstacles=self._obstacles,
-            terrain=self._terrain,
-            notes=[*notes, count, *self._notes],
-        )
+            unknown.append(f"class {name} is not in the table: plain ground")
+        elif entry == OBSTACLE:
+            obstacles += [Area(shape, keys) for shape in shapes]
+        else:
+            keys |= entry.model_dump(exclude_none=True)
+            terrain += [Area(shape, keys) for shape in shapes]
+    areas = counted(len(terrain), "terrain area")
+    return Layer(
+        frame=frame,
+        bounds=bounds,
+        obstacles=obstacles,
+        terrain=terrain,
+        notes=[*notes, f"{areas}, {counted(len(obstacles), 'obstacle')}", *unknown],
+    )

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from mrmg.scene.importing.formats import geojson
 from mrmg.scene.importing.frames import frame_of
-from mrmg.scene.importing.land_cover import LandCover, read_classes
+from mrmg.scene.importing.land_cover import (
+    OBSTACLE,
+    land_cover_layer,
+    read_classes,
+)
 from mrmg.scene.importing.layers import ImportOptions, Layer
-from mrmg.scene.importing.raster_shapes import enclosing_polygons, polygons_of_cells
+from mrmg.scene.importing.raster_shapes import enclosing_polygons
 from mrmg.scene.importing.rasters import read_raster
 from mrmg.scene.importing.registry import Format, Head
 
@@ -28,18 +34,16 @@ def read_land_cover(path: Path, options: ImportOptions) -> Layer:
     def placed(points: np.ndarray) -> np.ndarray:
         return frame.metres(raster.at(points), crs, str(path))
 
-    cover = LandCover(table)
-    for value in np.unique(classes[~np.isnan(classes)]):
-        mask = classes == value
-        shapes = (
-            enclosing_polygons(mask, options.tolerance)
-            if cover.is_obstacle(f"{value:g}")
-            else polygons_of_cells(mask)
-        )
-        cover.add(f"{value:g}", [shapely.transform(s, placed) for s in shapes])
-    corners = frame.metres(raster.corners, crs)
-    bounds = (*corners.min(axis=0).tolist(), *corners.max(axis=0).tolist())
-    return cover.layer(frame, bounds, notes)
+    def shapes_by_class() -> Iterator[tuple[str, list[BaseGeometry]]]:
+        for value in np.unique(classes[~np.isnan(classes)]):
+            name = f"{value:g}"
+            # What is terrain must not grow over its neighbours.
+            tolerance = options.tolerance if table.get(name) == OBSTACLE else 0.0
+            shapes = enclosing_polygons(classes == value, tolerance)
+            yield name, [shapely.transform(shape, placed) for shape in shapes]
+
+    bounds = shapely.MultiPoint(frame.metres(raster.corners, crs)).bounds
+    return land_cover_layer(table, shapes_by_class(), frame, bounds, notes)
 
 
 FORMAT = Format(
