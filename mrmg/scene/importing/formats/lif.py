@@ -89,7 +89,7 @@ def read_lif(path: Path, options: ImportOptions) -> Layer:
         raise SceneError(str(path), faults_of(error, LifDocument)) from error
     nodes: dict[str, NodeEntry] = {}
     charging: set[str] = set()
-    pairs: set[frozenset[str]] = set()
+    pairs: dict[tuple[str, ...], None] = {}  # in the order of the file
     faults: list[Fault] = []
     keys = []  # of nodes, by their ids, which another layout may use again
     for layout in layouts:
@@ -113,7 +113,8 @@ def read_lif(path: Path, options: ImportOptions) -> Layer:
             if name not in key_of
         ]
         if not faults:
-            pairs |= {frozenset(key_of[name] for name in names) for _, names in ends}
+            for _, names in ends:
+                pairs[tuple(sorted(key_of[name] for name in names))] = None
             for station, (_, names) in zip(layout.stations, served, strict=True):
                 charging |= {key_of[name] for name in names if _charges(station)}
     if faults:
@@ -136,7 +137,7 @@ def read_lif(path: Path, options: ImportOptions) -> Layer:
         lanes=[
             shapely.LineString([places[end]["circle"]["center"] for end in pair])
             for pair in pairs
-            if len(pair) == 2
+            if pair[0] != pair[1]
         ],
         notes=notes,
     )
