@@ -144,8 +144,8 @@ def _drivable(scene: Scene, model: RobotModel) -> Ground:
     grounds = [
         replace(bare, margin_m=model.half_width_m + margin_m) for margin_m in margins_m
     ]
-    sizes = [ground.largest.sum() for ground in grounds]
-    share = max(sizes) / max(1, (bare.clearance_m > 0.0).sum())
+    most = max(ground.largest.sum() for ground in grounds)
+    share = most / max(1, (bare.clearance_m > 0.0).sum())
     if share < _LEAST_SHARE:
         message = (
             f"roads wide enough for this robot join only {100 * share:.0f} % of the "
@@ -153,11 +153,7 @@ def _drivable(scene: Scene, model: RobotModel) -> Ground:
         )
         raise UsageError(message)
     # Wide margins lose a seam along every wall; lost rooms lose much more.
-    return next(
-        ground
-        for ground, size in zip(grounds, sizes, strict=True)
-        if size >= 0.6 * max(sizes)
-    )
+    return next(ground for ground in grounds if ground.largest.sum() >= 0.6 * most)
 
 
 def _size(model: RobotModel) -> float:
