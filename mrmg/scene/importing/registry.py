@@ -61,10 +61,8 @@ class Head:
     @cached_property
     def mapping(self) -> dict[str, Any]:
         """The keys of a JSON or YAML file; none if it is something else."""
-        if self.kind == "json":
-            found = read_json(self.path)
-            return found if isinstance(found, dict) else {}
-        return self._yaml if isinstance(self._yaml, dict) else {}
+        found = read_json(self.path) if self.kind == "json" else self._yaml
+        return found if isinstance(found, dict) else {}
 
     @cached_property
     def _yaml(self) -> Any:

@@ -134,9 +134,8 @@ def _resampled(raster: Raster, crs: str, frame: Frame) -> tuple[np.ndarray, np.n
 def _placed(shape: Any, bounds: Any, grid: tuple[int, ...]) -> Any:
     """Return a shape of cells in metres; a cell's middle is a node."""
     x_min, y_min, x_max, y_max = bounds
-    steps = np.array([x_max - x_min, y_min - y_max]) / np.array(
-        [grid[1] - 1, grid[0] - 1]
-    )
+    rows, columns = grid
+    steps = np.array([x_max - x_min, y_min - y_max]) / [columns - 1, rows - 1]
     return shapely.transform(shape, lambda p: (p - 0.5) * steps + [x_min, y_max])
 
 
