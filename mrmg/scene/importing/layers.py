@@ -81,7 +81,7 @@ class Layer:
     """The content of one file in the coordinates of the scene.
 
     Attributes:
-        frame: the coordinates.
+        frame: the coordinates, if this is the first file; others lie in those of it.
         crs: coordinate system of the file itself; None for local metres.
         bounds: extent of the ground that the file describes; None if it states none.
         obstacles: ground that robots must keep off.
@@ -93,7 +93,7 @@ class Layer:
         notes: what was dropped, changed or assumed.
     """
 
-    frame: Frame
+    frame: Frame = Frame()
     crs: str | None = None
     bounds: Box | None = None
     obstacles: Sequence[Area] = ()

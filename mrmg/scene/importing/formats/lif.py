@@ -15,7 +15,6 @@ from pydantic import Field, ValidationError
 
 from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError
-from mrmg.scene.importing.frames import Frame
 from mrmg.scene.importing.layers import CHARGING, ImportOptions, Layer, lanes_note
 from mrmg.scene.importing.registry import Format, Head, read_json
 from mrmg.scene.loading.faults import faults_of
@@ -54,6 +53,11 @@ class EdgeEntry(_Open):
     edgeId: str
     startNodeId: str
     endNodeId: str
+
+    @property
+    def ends(self) -> list[str]:
+        """Ids of its nodes."""
+        return [self.startNodeId, self.endNodeId]
 
 
 class StationEntry(Strict):
@@ -98,25 +102,21 @@ def read_lif(path: Path, options: ImportOptions) -> Layer:
     everywhere = {node.nodeId: key for key, node in reversed(nodes.items())}
     for layout, own in zip(layouts, keys, strict=True):
         key_of = everywhere | own
-        ends = [
-            (f"edges.{edge.edgeId}", (edge.startNodeId, edge.endNodeId))
-            for edge in layout.edges
-        ]
-        served = [
-            (f"stations.{station.stationId}", station.interactionNodeIds)
-            for station in layout.stations
-        ]
+        named = [(f"edges.{edge.edgeId}", edge.ends) for edge in layout.edges]
+        for station in layout.stations:
+            named.append((f"stations.{station.stationId}", station.interactionNodeIds))
         faults += [
             Fault(place, f"names the unknown node '{name}'")
-            for place, names in (*ends, *served)
+            for place, names in named
             for name in names
             if name not in key_of
         ]
-        if not faults:
-            for _, names in ends:
-                pairs[tuple(sorted(key_of[name] for name in names))] = None
-            for station, (_, names) in zip(layout.stations, served, strict=True):
-                charging |= {key_of[name] for name in names if _charges(station)}
+        if faults:
+            continue
+        for edge in layout.edges:
+            pairs[tuple(sorted(key_of[name] for name in edge.ends))] = None
+        for station in filter(_charges, layout.stations):
+            charging |= {key_of[name] for name in station.interactionNodeIds}
     if faults:
         raise SceneError(str(path), faults)
     charging |= {
@@ -131,7 +131,6 @@ def read_lif(path: Path, options: ImportOptions) -> Layer:
     if pairs:
         notes.append(lanes_note(len(pairs)))
     return Layer(
-        frame=options.frame or Frame(),
         goals=[entry for name, entry in places.items() if name not in charging],
         stations=[entry for name, entry in places.items() if name in charging],
         lanes=[

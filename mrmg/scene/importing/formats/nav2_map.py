@@ -18,7 +18,6 @@ from shapely import affinity
 
 from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError
-from mrmg.scene.importing.frames import Frame
 from mrmg.scene.importing.layers import Area, ImportOptions, Layer
 from mrmg.scene.importing.raster_shapes import enclosing_polygons
 from mrmg.scene.importing.registry import Format, Head
@@ -124,7 +123,6 @@ def read_map(path: Path, options: ImportOptions) -> Layer:
             "occupied taken as free"
         )
     return Layer(
-        frame=options.frame or Frame(),
         bounds=bounds,
         obstacles=obstacles,
         cells=(grid.place, solid),
@@ -143,7 +141,6 @@ def read_keepout(path: Path, options: ImportOptions) -> Layer:
     cells = counted(int(closed.sum()), "cell")
     note = f"{cells} became {counted(len(obstacles), 'obstacle')}"
     return Layer(
-        frame=options.frame or Frame(),
         obstacles=obstacles,
         notes=[note, *_notes(grid)],
     )
@@ -180,7 +177,6 @@ def read_mask(path: Path, options: ImportOptions) -> Layer:
     if len(values) > MOST_CLASSES:
         notes.append(f"its {len(values)} values were rounded to {MOST_CLASSES}")
     return Layer(
-        frame=options.frame or Frame(),
         obstacles=closed,
         terrain=terrain,
         notes=[*notes, *_notes(grid)],

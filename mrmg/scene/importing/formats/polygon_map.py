@@ -11,7 +11,6 @@ from shapely.geometry.base import BaseGeometry
 
 from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError, UsageError
-from mrmg.scene.importing.frames import Frame
 from mrmg.scene.importing.layers import Area, ImportOptions, Layer
 from mrmg.scene.importing.map_text import RawMap, read_map
 from mrmg.scene.importing.registry import Format, Head
@@ -46,7 +45,6 @@ def read_polygon_map(path: Path, options: ImportOptions) -> Layer:
     if longest_m is not None:
         notes.append(f"scaled to a longest side of {longest_m:g} m (--longest-side)")
     return Layer(
-        frame=options.frame or Frame(),
         bounds=(x_min, y_min, x_max, y_max),
         # Corners on a straight side come from unions of touching shapes.
         obstacles=[Area(shape.simplify(0.1 * GRID_M)) for shape in shapes],
