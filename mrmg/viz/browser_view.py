@@ -146,7 +146,7 @@ class BrowserView:
     def _add_targets(self) -> dict[str, Any]:
         handles = {}
         stations = {station.id for station in self._scene.stations}
-        names = {**style.goal_labels(self._scene), **style.station_labels(self._scene)}
+        names = style.target_labels(self._scene)
         for target in self._scene.targets():
             mesh = geom_mesh(self._world.model, self._world.target_geom[target.id])
             station = target.id in stations
@@ -161,7 +161,7 @@ class BrowserView:
             )
             self._server.scene.add_label(
                 f"/targets/{target.id}/name",
-                f"⚡{names[target.id]}" if station else names[target.id],
+                names[target.id],
                 position=tuple(lifted(self._scene, target.region.center, 0.5)[0]),
                 anchor="bottom-center",
             )

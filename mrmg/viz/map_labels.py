@@ -141,12 +141,12 @@ def _wanted(
 
 def _targets(scene: Scene, plan: Plan | None, em_m: float) -> Iterator[_Wanted]:
     ranks = visit_ranks(plan) if plan else {}
-    goals, stations = style.goal_labels(scene), style.station_labels(scene)
+    names = style.target_labels(scene)
     for goal in scene.goals:
-        shape, text = drawn_region(goal.region, em_m), goals[goal.id]
-        yield _beside("goal", goal.id, text, shape, em_m, _UPPER_RIGHT)
+        shape = drawn_region(goal.region, em_m)
+        yield _beside("goal", goal.id, names[goal.id], shape, em_m, _UPPER_RIGHT)
     for station in scene.stations:
-        shape, text = drawn_region(station.region, em_m), f"⚡{stations[station.id]}"
+        shape, text = drawn_region(station.region, em_m), names[station.id]
         yield _beside("station", station.id, text, shape, em_m, _UPPER_RIGHT)
         for robot, rank in ranks.get(station.id, ()):
             yield _beside("stop", robot, str(rank), shape, em_m, _LOWER_RIGHT)

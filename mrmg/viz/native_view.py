@@ -168,10 +168,11 @@ def _look_from_above(camera: mujoco.MjvCamera, scene: Scene) -> None:
 def annotate(extra: mujoco.MjvScene, scene: Scene, replay: Replay) -> None:
     """Put driven paths, names and charges into the window's extra geoms."""
     extra.ngeom = 0
-    names = {**style.goal_labels(scene), **style.station_labels(scene)}
+    names = style.target_labels(scene)
     for target in scene.targets():
         at = lifted(scene, target.region.center, 0.3)[0]
-        _add_label(extra, at, names[target.id])
+        # The window's letters have no such sign.
+        _add_label(extra, at, names[target.id].removeprefix("⚡"))
     log, reading = replay.film.log, replay.reading()
     for robot, state, shown in zip(
         scene.robots, log.state, reading.robots, strict=True

@@ -67,42 +67,6 @@ _LIGHTEST_LUMINANCE = 0.22
 
 
 @dataclass(frozen=True, slots=True)
-class TerrainClass:
-    """All terrain areas of one multiplier, drawn alike.
-
-    Attributes:
-        multiplier: energy multiplier of the class.
-        color: fill.
-        hatch: matplotlib hatch pattern.
-    """
-
-    multiplier: float
-    color: str
-    hatch: str
-
-    @property
-    def label(self) -> str:
-        """What legends call the class."""
-        return f"terrain ×{self.multiplier:g}"
-
-
-def terrain_classes(scene: Scene) -> dict[float, TerrainClass]:
-    """Return the terrain classes of a scene by multiplier, from easy to hard."""
-    multipliers = sorted({area.multiplier for area in scene.terrain} - {1.0})
-    classes = {
-        value: TerrainClass(
-            value,
-            _hex(_blend(palette.terrain_colour(value), _WHITE, _PALENESS)),
-            _HATCHES[rank % len(_HATCHES)],
-        )
-        for rank, value in enumerate(multipliers)
-    }
-    if any(area.multiplier == 1.0 for area in scene.terrain):
-        classes[1.0] = TerrainClass(1.0, GROUND, "")
-    return classes
-
-
-@dataclass(frozen=True, slots=True)
 class KeyEntry:
     """A line of a map's legend.
 
@@ -121,6 +85,24 @@ class KeyEntry:
     edge: str = MUTED
     hatch: str = ""
     dashed: bool = False
+
+
+def terrain_classes(scene: Scene) -> dict[float, KeyEntry]:
+    """Return how terrain of each multiplier is drawn, from easy to hard."""
+    multipliers = sorted({area.multiplier for area in scene.terrain} - {1.0})
+    looks = {
+        value: (
+            _hex(_blend(palette.terrain_colour(value), _WHITE, _PALENESS)),
+            _HATCHES[rank % len(_HATCHES)],
+        )
+        for rank, value in enumerate(multipliers)
+    }
+    if any(area.multiplier == 1.0 for area in scene.terrain):
+        looks[1.0] = (GROUND, "")
+    return {
+        value: KeyEntry(f"terrain ×{value:g}", "area", color, hatch=hatch)
+        for value, (color, hatch) in looks.items()
+    }
 
 
 def obstacle_color(obstacle: Obstacle) -> str:
@@ -159,11 +141,7 @@ def map_key(scene: Scene) -> list[KeyEntry]:
         and 1.0 not in classes,
         KeyEntry("contour line", "line", CONTOUR): scene.elevation is not None,
     }
-    areas = [
-        KeyEntry(look.label, "area", look.color, hatch=look.hatch)
-        for look in classes.values()
-    ]
-    return [*(entry for entry, shown in entries.items() if shown), *areas]
+    return [*(entry for entry, shown in entries.items() if shown), *classes.values()]
 
 
 def robot_colors(robots: Sequence[str]) -> dict[str, str]:
@@ -189,9 +167,11 @@ def goal_labels(scene: Scene) -> dict[str, str]:
     return _labels([goal.id for goal in scene.goals], "")
 
 
-def station_labels(scene: Scene) -> dict[str, str]:
-    """Return a text for each station, as `goal_labels` does."""
-    return _labels([station.id for station in scene.stations], "S")
+def target_labels(scene: Scene) -> dict[str, str]:
+    """Return a text for each goal and station, those of stations with their sign."""
+    stations = _labels([station.id for station in scene.stations], "S")
+    signs = {name: f"⚡{text}" for name, text in stations.items()}
+    return {**goal_labels(scene), **signs}
 
 
 def _labels(ids: Sequence[str], prefix: str) -> dict[str, str]:

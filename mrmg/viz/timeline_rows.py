@@ -103,11 +103,8 @@ def named_visits(
 ) -> tuple[NamedVisit, ...]:
     """Return the names of visits in lines; see `timeline_rows`."""
     visits = sorted(visits, key=lambda visit: visit.time_s)
-    names = {**style.goal_labels(scene), **style.station_labels(scene)}
-    texts = [
-        f"⚡{names[visit.target]}" if visit.kind == "station" else names[visit.target]
-        for visit in visits
-    ]
+    names = style.target_labels(scene)
+    texts = [names[visit.target] for visit in visits]
     sizes = [text_width_em(text, bold=True) for text in texts]
     shares = [visit.time_s / end_s for visit in visits]
     layouts = [name_lines(shares, sizes, width_em) for width_em in widths_em]
