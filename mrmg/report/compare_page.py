@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,16 @@ from mrmg.report import chart_spec
 from mrmg.report.compare import Comparison
 from mrmg.report.map import mission_map
 from mrmg.report.page import page, rendered
-from mrmg.runs.record import RunRecord
-from mrmg.viz import style
+from mrmg.scene.types import Scene
 
 _SAMPLES = 800
 _SHORTEST_S = 0.1
+_CHARTS = (
+    ("used", "Energy drawn by the fleet", "kJ", 1),
+    ("goals", "Goals visited", "", 0),
+    ("lowest", "Lowest charge in the fleet", "%", 1),
+)
+"""Name, title, unit and digits of each chart."""
 
 
 def write_comparison(comparison: Comparison, path: Path) -> None:
@@ -34,26 +39,26 @@ def write_comparison(comparison: Comparison, path: Path) -> None:
 def comparison_html(comparison: Comparison) -> str:
     """Return the comparison as HTML."""
     names, records = comparison.names, comparison.records
-    # Courses have a colour for each run; maps have one for each robot.
-    colored = range(max(len(names), *(len(item.scene.robots) for item in records)))
-    numbers = [str(at) for at in colored]
-    light, dark = style.robot_colors(numbers), style.robot_colors_on_dark(numbers)
-    solved = [number for number, item in enumerate(records) if item.plan is not None]
-    charts = _charts(comparison, solved) if solved else None
+    curves = {
+        number: shown_curves(item.scene, item.plan, item.log)
+        for number, item in enumerate(records)
+        if item.plan is not None
+    }
     body = rendered(
         "compare.html.jinja",
         comparison=comparison,
-        owners={number: _owner(number) for number in solved},
-        charts=[(item["id"], item["title"]) for item in charts["charts"]]
-        if charts
-        else [],
+        owners={number: _owner(number) for number in curves},
+        charts=[(name, title) for name, title, *_ in _CHARTS if curves],
         maps=[
             (name, mission_map(record.scene, record.plan, record.log))
             for name, record in zip(names, records, strict=True)
         ],
     )
-    colors = [(light[at], dark[at]) for at in numbers]
-    return page("Comparison of runs", body, colors=colors, data=charts)
+    data = _charts(comparison, curves) if curves else None
+    # Courses have a colour for each run; maps have one for each robot.
+    colored = max(len(names), *(len(item.scene.robots) for item in records))
+    owners = [str(number) for number in range(colored)]
+    return page("Comparison of runs", body, robots=owners, data=data)
 
 
 def _owner(number: int) -> str:
@@ -61,42 +66,39 @@ def _owner(number: int) -> str:
     return f"run {number}"
 
 
-def _charts(comparison: Comparison, solved: Sequence[int]) -> dict[str, Any]:
-    curves = {
-        number: shown_curves(record.scene, record.plan, record.log)
-        for number, record in enumerate(comparison.records)
-        if record.plan is not None
-    }
+def _charts(
+    comparison: Comparison, curves: Mapping[int, Sequence[BatteryCurve]]
+) -> dict[str, Any]:
+    """Return the charts of all runs that have curves, by their number."""
     ends_s = [float(curve.time_s[-1]) for run in curves.values() for curve in run]
-    end_s = max(_SHORTEST_S, *ends_s)
-    time_s = np.linspace(0.0, end_s, _SAMPLES)
-
-    def drawn(
-        name: str, title: str, unit: str, of: Callable[[int], Any], digits: int = 1
-    ) -> Any:
-        lines = [
-            chart_spec.line(comparison.names[at], "own", (at, _owner(at)), of(at))
-            for at in solved
-        ]
-        return chart_spec.chart(name, title, unit, lines, digits=digits)
-
-    def lowest(at: int) -> np.ndarray:
-        return _lowest_percent(comparison.records[at], curves[at], time_s)
-
-    def used(at: int) -> np.ndarray:
-        return _used_kJ(curves[at], time_s)
-
-    def goals(at: int) -> np.ndarray:
-        return _goals_visited(curves[at], time_s)
-
-    return {
-        "time_s": chart_spec.rounded(time_s, 3),
-        "charts": [
-            drawn("used", "Energy drawn by the fleet", "kJ", used),
-            drawn("goals", "Goals visited", "", goals, digits=0),
-            drawn("lowest", "Lowest charge in the fleet", "%", lowest),
-        ],
+    time_s = np.linspace(0.0, max(_SHORTEST_S, *ends_s), _SAMPLES)
+    courses = {
+        number: _courses(comparison.records[number].scene, run, time_s)
+        for number, run in curves.items()
     }
+    charts = []
+    for name, title, unit, digits in _CHARTS:
+        lines = [
+            chart_spec.line(
+                comparison.names[number], "own", (number, _owner(number)), own[name]
+            )
+            for number, own in courses.items()
+        ]
+        charts.append(chart_spec.chart(name, title, unit, lines, digits=digits))
+    return {"time_s": chart_spec.rounded(time_s, 3), "charts": charts}
+
+
+def _courses(
+    scene: Scene, curves: Sequence[BatteryCurve], time_s: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Return the values of a run in each chart by its name, NaN after the run."""
+    courses = {
+        "used": _used_kJ(curves, time_s),
+        "goals": _goals_visited(curves, time_s),
+        "lowest": _lowest_percent(scene, curves, time_s),
+    }
+    over = time_s > max(float(curve.time_s[-1]) for curve in curves)
+    return {name: np.where(over, np.nan, own) for name, own in courses.items()}
 
 
 def _used_kJ(curves: Sequence[BatteryCurve], time_s: np.ndarray) -> np.ndarray:
@@ -109,29 +111,21 @@ def _used_kJ(curves: Sequence[BatteryCurve], time_s: np.ndarray) -> np.ndarray:
                 drop_J[visit.step - 1] = curve.energy_J[visit.step - 1] - visit.energy_J
         drawn_J = np.concatenate([[0.0], np.cumsum(drop_J)])
         used += np.interp(time_s, curve.time_s, drawn_J)
-    return _until_end(used / 1000.0, curves, time_s)
+    return used / 1000.0
 
 
 def _goals_visited(curves: Sequence[BatteryCurve], time_s: np.ndarray) -> np.ndarray:
     visits = [visit for curve in curves for visit in curve.visits]
     at_s = np.sort([visit.time_s for visit in visits if visit.kind == "goal"])
-    count = np.searchsorted(at_s, time_s, side="right")
-    return _until_end(count.astype(float), curves, time_s)
+    return np.searchsorted(at_s, time_s, side="right").astype(float)
 
 
 def _lowest_percent(
-    record: RunRecord, curves: Sequence[BatteryCurve], time_s: np.ndarray
+    scene: Scene, curves: Sequence[BatteryCurve], time_s: np.ndarray
 ) -> np.ndarray:
     shares = [
         np.interp(time_s, curve.time_s, curve.energy_J)
-        / record.scene.robot(curve.robot).battery.capacity_J
+        / scene.robot(curve.robot).battery.capacity_J
         for curve in curves
     ]
-    return _until_end(100.0 * np.min(shares, axis=0), curves, time_s)
-
-
-def _until_end(
-    values: np.ndarray, curves: Sequence[BatteryCurve], time_s: np.ndarray
-) -> np.ndarray:
-    end_s = max(float(curve.time_s[-1]) for curve in curves)
-    return np.where(time_s > end_s, np.nan, values)
+    return np.asarray(100.0 * np.min(shares, axis=0))

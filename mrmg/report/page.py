@@ -41,7 +41,7 @@ def page(
     title: str,
     body: Markup,
     *,
-    colors: Sequence[tuple[str, str]] = (),
+    robots: Sequence[str] = (),
     data: Mapping[str, Any] | None = None,
 ) -> str:
     """Return the whole page.
@@ -49,8 +49,7 @@ def page(
     Args:
         title: of the window.
         body: what it shows.
-        colors: of the robots, in their order, on light and on dark; styles and script
-            know them as `--r0`, `--r1`, ...
+        robots: whose colours styles and script know as `--r0`, `--r1`, ...
         data: what the page's script draws charts of; None for a page without charts.
     """
     text = (
@@ -60,7 +59,8 @@ def page(
         "page.html.jinja",
         title=title,
         body=body,
-        colors=colors,
+        light=style.robot_colors(robots).values(),
+        dark=style.robot_colors_on_dark(robots).values(),
         looks={"planned": style.PLANNED, "driven": style.DRIVEN},
         # A closing tag inside a string would end the element that holds the data.
         data=Markup(text.replace("</", "<\\/")),

@@ -28,7 +28,6 @@ from mrmg.scene.types import Scene
 from mrmg.studies.outcomes import CONFIDENCE, Study
 from mrmg.viz import style
 from mrmg.viz.activities import breakdowns, lengths_along, standing_of
-from mrmg.viz.style import terrain_classes
 
 _STILL_M = 0.1
 """Way of a robot that stays where it is."""
@@ -51,8 +50,6 @@ def write_report(run_folder: Path, *, trust_code: bool = False) -> None:
 def report_html(record: RunRecord) -> str:
     """Return the page of a run."""
     scene, plan, log = record.scene, record.plan, record.log
-    ids = [robot.id for robot in scene.robots]
-    light, dark = style.robot_colors(ids), style.robot_colors_on_dark(ids)
     data = chart_data(scene, plan, log) if plan else None
     cost = cost_chart(record)
     if data and cost:
@@ -77,14 +74,14 @@ def report_html(record: RunRecord) -> str:
         **(_of_plan(record, plan) if plan else {}),
         **_of_studies(record.studies),
     )
-    colors = [(light[name], dark[name]) for name in ids]
-    return page(f"{scene.name}: mission report", body, colors=colors, data=data)
+    ids = [robot.id for robot in scene.robots]
+    return page(f"{scene.name}: mission report", body, robots=ids, data=data)
 
 
 def _of_plan(record: RunRecord, plan: Plan) -> dict[str, Any]:
     """Return what the page knows of a plan and its drive beside their records."""
     scene, log = record.scene, record.log
-    looks = terrain_classes(scene)
+    looks = style.terrain_classes(scene)
     return {
         "parts": PARTS,
         "by_terrain": energy_by_terrain(scene, plan, log),
