@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -77,8 +78,6 @@ def line(
 def rounded(values: np.ndarray, digits: int) -> list[float | None]:
     """Return numbers for JSON; NaN becomes None."""
     return [
-        None if missing else value
-        for missing, value in zip(
-            np.isnan(values).tolist(), np.round(values, digits).tolist(), strict=True
-        )
+        None if math.isnan(value) else value
+        for value in np.round(values, digits).tolist()
     ]
