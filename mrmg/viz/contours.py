@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator
 
 from mrmg.scene.types import Scene
 from mrmg.viz import style
@@ -40,11 +41,9 @@ def levels_m(low: float, high: float) -> np.ndarray:
     """Return round heights between two, 1, 2 or 5 times a power of ten apart [m]."""
     if high - low < 1e-6:
         return np.zeros(0)
-    least = (high - low) / _MOST_LEVELS
-    power = 10.0 ** np.floor(np.log10(least))
-    step = next(power * n for n in (1, 2, 5, 10) if power * n >= least)
-    first, last = np.floor(low / step) + 1.0, np.ceil(high / step) - 1.0
-    return np.asarray(np.round(np.arange(first, last + 0.5) * step, 6))
+    ticks = MaxNLocator(_MOST_LEVELS, steps=(1, 2, 5, 10)).tick_values(low, high)
+    levels = np.round(ticks, 6)
+    return np.asarray(levels[(levels > low) & (levels < high)])
 
 
 def draw_contours(axes: Axes, scene: Scene) -> None:
