@@ -195,14 +195,25 @@ def draw_bar(
     pen.line((mark, top - 1, mark, bottom + 1), fill=_TEXT, width=1)
 
 
-def _paste(picture: np.ndarray, patch: np.ndarray, column: int, row: int) -> None:
+def overlap(
+    picture: np.ndarray, patch: np.ndarray, column: int, row: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the parts of both, as views, where a patch covers a picture.
+
+    Args:
+        picture: shape (height, width, ...).
+        patch: shape (height, width, ...).
+        column: of the patch's upper left corner, which may lie outside the picture.
+        row: of that corner.
+    """
     height, width = patch.shape[:2]
     top, left = max(row, 0), max(column, 0)
-    bottom = min(row + height, picture.shape[0])
-    right = min(column + width, picture.shape[1])
-    if top >= bottom or left >= right:
-        return
-    shown = patch[top - row : bottom - row, left - column : right - column]
-    under = picture[top:bottom, left:right]
+    under = picture[top : max(row + height, 0), left : max(column + width, 0)]
+    over = patch[top - row :, left - column :]
+    return under, over[: under.shape[0], : under.shape[1]]
+
+
+def _paste(picture: np.ndarray, patch: np.ndarray, column: int, row: int) -> None:
+    under, shown = overlap(picture, patch, column, row)
     cover = shown[:, :, 3:] / 255.0 if patch.shape[2] == 4 else 1.0
     under[:] = np.round(under + cover * (shown[:, :, :3] - under.astype(float)))

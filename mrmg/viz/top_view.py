@@ -15,7 +15,7 @@ import numpy as np
 
 from mrmg.viz import style
 from mrmg.viz.ground_image import paint_line
-from mrmg.viz.tags import Label, letter_px
+from mrmg.viz.tags import Label, letter_px, overlap
 from mrmg.viz.world_view import WorldView, top_camera
 
 _LEAST_TRAIL_PIXELS = 2.0
@@ -110,17 +110,7 @@ class TopView:
         fovy = 2 * half * self.pixel_m
         camera = top_camera(at, self._view.highest_m)
         self._view.draw(camera, fovy=fovy, shadows=False, out=patch)
-        top, left = max(row - half, 0), max(column - half, 0)
-        bottom, right = (
-            min(row + half, self._size[1]),
-            min(column + half, self._size[0]),
-        )
-        if top >= bottom or left >= right:
-            return
-        inner = patch[
-            top - row + half : bottom - row + half,
-            left - column + half : right - column + half,
-        ]
-        still = self._still[top:bottom, left:right]
+        shown, inner = overlap(out, patch, column - half, row - half)
+        still, _ = overlap(self._still, patch, column - half, row - half)
         moved = np.abs(inner.astype(np.int16) - still).max(axis=2) > _DIFFERENCE
-        out[top:bottom, left:right][moved] = inner[moved]
+        shown[moved] = inner[moved]
