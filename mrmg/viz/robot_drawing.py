@@ -18,7 +18,7 @@ from mrmg.simulation.world_model import build_world
 from mrmg.viz import style
 from mrmg.viz.figures import new_figure, require_format, write_figure
 from mrmg.viz.scene_drawing import HALO
-from mrmg.viz.world_view import open_view, top_camera
+from mrmg.viz.world_view import camera_at, open_view, top_camera
 
 _PIXELS = (1100, 800)
 _GROUND = np.array([228, 232, 224], dtype=np.uint8)
@@ -85,13 +85,8 @@ def _draw_rendered(
     world = build_world(_alone(model, size_m))
     ground = np.broadcast_to(_GROUND, (16, 16, 3)).copy()
     middle = 0.5 * (model.footprint_m.min(axis=0) + model.footprint_m.max(axis=0))
-    corner = mujoco.MjvCamera()
-    corner.type = mujoco.mjtCamera.mjCAMERA_FREE
-    corner.lookat[:] = [*middle, 0.4 * model.height_m]
-    corner.azimuth, corner.elevation = 215.0, -22.0
-    corner.distance = (
-        0.7 * (size_m + model.height_m) / math.tan(math.radians(_FOVY_DEG))
-    )
+    away_m = 0.7 * (size_m + model.height_m) / math.tan(math.radians(_FOVY_DEG))
+    corner = camera_at([*middle, 0.4 * model.height_m], 215.0, -22.0, away_m)
     top = top_camera(middle)
     extent = np.ptp(model.footprint_m, axis=0)
     width, height = _PIXELS

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -28,6 +28,17 @@ _CHASE_ELEVATION_DEG = -24.0
 _CHASE_AHEAD_M = 2.0
 
 
+def camera_at(
+    looked_at: Sequence[float], azimuth: float, elevation: float, distance_m: float
+) -> mujoco.MjvCamera:
+    """Return a camera that looks at a point [m] from a direction [deg]."""
+    camera = mujoco.MjvCamera()
+    camera.lookat[:] = looked_at
+    camera.azimuth, camera.elevation = azimuth, elevation
+    camera.distance = distance_m
+    return camera
+
+
 def top_camera(scene_center: np.ndarray, ground_m: float = 0.0) -> mujoco.MjvCamera:
     """Return an orthographic camera that looks straight down, north up.
 
@@ -35,12 +46,8 @@ def top_camera(scene_center: np.ndarray, ground_m: float = 0.0) -> mujoco.MjvCam
         scene_center: what is in the middle [m], shape (2,).
         ground_m: height of the highest ground.
     """
-    camera = mujoco.MjvCamera()
-    camera.type = mujoco.mjtCamera.mjCAMERA_FREE
+    camera = camera_at([*scene_center, ground_m], 90.0, -90.0, 50.0)
     camera.orthographic = 1
-    camera.lookat[:] = [*scene_center, ground_m]
-    camera.azimuth, camera.elevation = 90.0, -90.0
-    camera.distance = 50.0
     return camera
 
 
@@ -48,17 +55,14 @@ def chase_camera(
     x_m: float, y_m: float, z_m: float, yaw_rad: float
 ) -> mujoco.MjvCamera:
     """Return a camera behind and above a robot at a pose."""
-    camera = mujoco.MjvCamera()
-    camera.type = mujoco.mjtCamera.mjCAMERA_FREE
-    camera.lookat[:] = [
-        x_m + _CHASE_AHEAD_M * math.cos(yaw_rad),
-        y_m + _CHASE_AHEAD_M * math.sin(yaw_rad),
-        z_m + 0.4,
-    ]
-    camera.azimuth = math.degrees(yaw_rad)
-    camera.elevation = _CHASE_ELEVATION_DEG
-    camera.distance = _CHASE_DISTANCE_M
-    return camera
+    ahead_x_m = x_m + _CHASE_AHEAD_M * math.cos(yaw_rad)
+    ahead_y_m = y_m + _CHASE_AHEAD_M * math.sin(yaw_rad)
+    return camera_at(
+        [ahead_x_m, ahead_y_m, z_m + 0.4],
+        math.degrees(yaw_rad),
+        _CHASE_ELEVATION_DEG,
+        _CHASE_DISTANCE_M,
+    )
 
 
 class WorldView:
