@@ -103,17 +103,11 @@ class Comparison:
 
 
 def _aligned(table: Sequence[Sequence[str]]) -> str:
-    widths = [max(len(line[at]) for line in table) for at in range(len(table[0]))]
-    return "\n".join(
-        "  ".join(
-            [line[0].ljust(widths[0])]
-            + [
-                cell.rjust(width)
-                for cell, width in zip(line[1:], widths[1:], strict=True)
-            ]
-        ).rstrip()
-        for line in table
-    )
+    first, *others = (max(map(len, column)) for column in zip(*table, strict=True))
+    lines = []
+    for name, *cells in table:
+        lines.append("  ".join([name.ljust(first), *map(str.rjust, cells, others)]))
+    return "\n".join(line.rstrip() for line in lines)
 
 
 def compare_runs(folders: Sequence[Path], *, trust_code: bool = False) -> Comparison:
