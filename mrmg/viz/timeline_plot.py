@@ -22,25 +22,13 @@ _WIDTH_INCHES, _BAR_INCHES, _LINE_INCHES = 9.5, 0.24, 0.16
 _NAME_POINTS = 8.5
 _NAMES_EM = 8.0 * 72.0 / _NAME_POINTS
 """Width of the time axis, at least, in letters of the names."""
-_WAITING: dict[str, Any] = {
-    "facecolor": "white",
-    "edgecolor": style.MUTED,
-    "hatch": "////",
+_LOOKS: dict[str, dict[str, Any]] = {
+    WAITING: {"facecolor": "white", "edgecolor": style.MUTED, "hatch": "////"},
+    CHARGING: {"facecolor": style.STATION, "edgecolor": style.STATION_EDGE},
+    BROKEN: {"facecolor": "white", "edgecolor": style.RESERVE, "hatch": "xxx"},
 }
-_EVENT: dict[str, Any] = {
-    "color": style.RESERVE,
-    "linewidth": 1.2,
-    "linestyle": ":",
-}
-_BROKEN: dict[str, Any] = {
-    "facecolor": "white",
-    "edgecolor": style.RESERVE,
-    "hatch": "xxx",
-}
-_CHARGING: dict[str, Any] = {
-    "facecolor": style.STATION,
-    "edgecolor": style.STATION_EDGE,
-}
+"""Bars by activity; driving has the robot's colour, and having finished no bar."""
+_EVENT: dict[str, Any] = {"color": style.RESERVE, "linewidth": 1.2, "linestyle": ":"}
 
 
 def draw_timeline(
@@ -75,11 +63,11 @@ def draw_timeline(
     axes.tick_params(axis="y", length=0)
     handles: list[Patch | Line2D] = [
         Patch(facecolor=style.MUTED, label="driving"),
-        Patch(**_WAITING, label="waiting"),
-        Patch(**_CHARGING, label="at a station"),
+        Patch(**_LOOKS[WAITING], label="waiting"),
+        Patch(**_LOOKS[CHARGING], label="at a station"),
     ]
     if any(row.standing == "broken down" for row in rows):
-        handles.append(Patch(**_BROKEN, label="broken down"))
+        handles.append(Patch(**_LOOKS[BROKEN], label="broken down"))
     if log and log.events:
         handles.append(Line2D([], [], **_EVENT, label="stop or new plan"))
     add_legend_above(figure, handles)
@@ -94,12 +82,8 @@ def _draw_row(
     axes: Axes, scene: Scene, row: TimelineRow, middle_in: float, end_s: float
 ) -> None:
     """Draw a robot's bar about `middle_in` below the top, and names above it."""
-    looks: dict[str, dict[str, Any]] = {
-        DRIVING: {"facecolor": style.scene_robot_colors(scene)[row.robot]},
-        WAITING: _WAITING,
-        CHARGING: _CHARGING,
-        BROKEN: _BROKEN,
-    }
+    colors = style.scene_robot_colors(scene)
+    looks = {**_LOOKS, DRIVING: {"facecolor": colors[row.robot]}}
     for span in row.spans:
         if span.kind in looks:
             axes.broken_barh(
