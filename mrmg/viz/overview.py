@@ -36,6 +36,13 @@ _NARROW: Any = {
     "markerfacecolor": "none",
     "markeredgecolor": style.RESERVE,
 }
+_END: Any = {
+    "marker": "o",
+    "markersize": 10,
+    "markerfacecolor": "none",
+    "markeredgecolor": style.INK,
+}
+_RANK: Any = {"marker": "$n$", "markersize": 8, "color": style.INK}
 
 
 def draw_overview(
@@ -217,18 +224,18 @@ def _legend(
         for label, (look, shown) in looks.items()
         if shown is not None
     ]
-    if plan is not None:
-        handles.append(_ring("end of the drive"))
-        handles.append(_ring("n: nth stop of the tour", text="$n$"))
-    crosses = {"contact": log.contacts if log else (), "broken down": breakdowns(log)}
+    marks = {
+        "end of the drive": (_END, plan is not None),
+        "n: nth stop of the tour": (_RANK, plan is not None),
+        "contact": (_CROSS, log is not None and log.contacts),
+        "broken down": (_CROSS, breakdowns(log)),
+        "less than the margin kept": (_NARROW, plan is not None and plan.narrow),
+    }
     handles += [
-        Line2D([], [], linestyle="none", label=label, **_CROSS)
-        for label, shown in crosses.items()
+        scene_drawing.marker_handle(label, **look)
+        for label, (look, shown) in marks.items()
         if shown
     ]
-    if plan is not None and plan.narrow:
-        label = "less than the margin kept"
-        handles.append(Line2D([], [], linestyle="none", label=label, **_NARROW))
     return handles + scene_drawing.map_legend(scene)
 
 
@@ -238,19 +245,6 @@ def _work(scene: Scene, plan: Plan, log: ExecutionLog | None, robot: str) -> str
     goals = sum(target in {goal.id for goal in scene.goals} for target in tour)
     words = [counted(goals, "goal")] if tour else []
     return ", ".join([*words, *filter(None, [standing_of(robot, plan, log)])])
-
-
-def _ring(label: str, text: str = "o") -> Line2D:
-    return Line2D(
-        [],
-        [],
-        linestyle="none",
-        marker=text,
-        markersize=10 if text == "o" else 8,
-        markerfacecolor="none" if text == "o" else style.INK,
-        markeredgecolor=style.INK,
-        label=label,
-    )
 
 
 def _title(scene: Scene, plan: Plan | None) -> str:

@@ -271,7 +271,13 @@ def _handle(entry: style.KeyEntry) -> Patch | Line2D:
             linestyle="--" if entry.dashed else "-",
             label=entry.label,
         )
-    return _marker(_MARKERS[entry.look], entry.color, entry.edge, entry.label)
+    look = {"markerfacecolor": entry.color, "markeredgecolor": entry.edge}
+    return marker_handle(entry.label, marker=_MARKERS[entry.look], markersize=9, **look)
+
+
+def marker_handle(label: str, **look: Any) -> Line2D:
+    """Return the legend's handle of a marker; `look` as of matplotlib's `Line2D`."""
+    return Line2D([], [], linestyle="none", label=label, **look)
 
 
 def add_legend(axes: Axes, handles: list[Patch | Line2D]) -> None:
@@ -297,19 +303,6 @@ def _title(scene: Scene) -> str:
     ]
     words = [counted(count, noun) for count, noun in counts]
     return f"{scene.name}: " + ", ".join(words)
-
-
-def _marker(shape: str, face: str, edge: str, label: str) -> Line2D:
-    return Line2D(
-        [],
-        [],
-        linestyle="none",
-        marker=shape,
-        markersize=9,
-        markerfacecolor=face,
-        markeredgecolor=edge,
-        label=label,
-    )
 
 
 def _add_shape(axes: Axes, shape: BaseGeometry, **look: object) -> None:
