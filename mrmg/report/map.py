@@ -15,7 +15,7 @@ from mrmg.report.page import rendered
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.viz import style
-from mrmg.viz.activities import breakdowns, lengths_along, visit_ranks
+from mrmg.viz.activities import breakdowns, lengths_along, thinned, visit_ranks
 from mrmg.viz.contours import contour_lines
 from mrmg.viz.map_labels import KINDS, map_labels
 from mrmg.viz.map_shapes import enclosing_circle, end_poses, wanted_headings
@@ -69,7 +69,7 @@ def mission_map(scene: Scene, plan: Plan | None, log: ExecutionLog | None) -> Ma
         point=frame.point,
         points=frame.points,
         outline=frame.outline,
-        thinned=_thinned,
+        thinned=lambda state: thinned(state[:, :2], _PATH_SPACING_M),
         lengths=lengths_along,
         degrees=np.degrees,
     )
@@ -94,11 +94,3 @@ class _Frame:
             for ring in (shape.exterior, *shape.interiors)
         ]
         return f"{''.join(rings)}Z"
-
-
-def _thinned(state: np.ndarray) -> np.ndarray:
-    """Return points of a motion about `_PATH_SPACING_M` apart, both ends included."""
-    way_m = lengths_along(state)
-    marks = np.diff(np.floor(way_m / _PATH_SPACING_M), prepend=-1.0) > 0.0
-    marks[-1] = True
-    return np.asarray(state[marks, :2])

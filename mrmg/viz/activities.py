@@ -100,6 +100,14 @@ def lengths_along(states: np.ndarray) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(steps_m)])
 
 
+def thinned(points: np.ndarray, spacing_m: float) -> np.ndarray:
+    """Return points of a path about `spacing_m` apart, both ends included."""
+    marks = np.floor(lengths_along(points) / spacing_m)
+    kept = np.diff(marks, prepend=-1.0) > 0.0
+    kept[-1] = True
+    return np.asarray(points[kept])
+
+
 def breakdowns(log: ExecutionLog | None) -> dict[str, float]:
     """Return when each robot that broke down did so [s], by robot."""
     events = log.events if log is not None else ()

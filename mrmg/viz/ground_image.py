@@ -19,6 +19,7 @@ from PIL import Image, ImageDraw
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.viz import scene_drawing, style
+from mrmg.viz.activities import thinned
 from mrmg.viz.map_labels import MapLabel, map_labels
 from mrmg.world.elevation import ground_mesh
 
@@ -141,7 +142,8 @@ class TrailPainter:
         """
         if len(points) < 2:
             return
-        pixels = self._frame.to_pixels(_spaced(points, _SPACING_M))
+        # Pieces shorter than the line is wide would leave ragged edges.
+        pixels = self._frame.to_pixels(thinned(points, _SPACING_M))
         changed = paint_line(self._image, pixels, self._width, color)
         target[changed] = self._image[changed]
 
@@ -182,16 +184,6 @@ def _line_cover(pixels: np.ndarray, size: tuple[int, int], width: float) -> np.n
     for x, y in (corners[0], corners[-1]):
         pen.ellipse((x - radius, y - radius, x + radius, y + radius), fill=255)
     return np.asarray(image.reduce(fine)) / 255.0
-
-
-def _spaced(points: np.ndarray, spacing_m: float) -> np.ndarray:
-    """Return points about `spacing_m` apart, ends included."""
-    # Pieces shorter than the line is wide would leave ragged edges.
-    steps_m = np.hypot(*np.diff(points, axis=0).T)
-    marks = np.floor(np.cumsum(steps_m) / spacing_m)
-    keep = np.concatenate([[True], np.diff(marks, prepend=0.0) > 0.0])
-    keep[-1] = True
-    return np.asarray(points[keep])
 
 
 def _paint_paths(axes: Axes, scene: Scene, plan: Plan, letter_points: float) -> None:
