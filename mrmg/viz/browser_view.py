@@ -107,9 +107,9 @@ class BrowserView:
                 )
             mission, lines = spoken(self._scene, reading)
             for robot_reading, (name, words) in zip(reading.robots, lines, strict=True):
-                charge = robot_reading.charge
-                self.tags[name].text = f"{name} {100.0 * charge:.0f} %"
-                self._bars[name].content = f"**{name}** {_bar(charge)}\n\n{words}"
+                bar = _bar(robot_reading.charge)
+                self.tags[name].text = f"{name} {robot_reading.percent}"
+                self._bars[name].content = f"**{name}** {bar}\n\n{words}"
             self._mission.content = f"**{mission}**"
 
     def _place(self, qpos: np.ndarray) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -55,13 +55,11 @@ class Film:
         self.curves = measured_curves(scene, plan, log)
         self.capacity_J = [robot.battery.capacity_J for robot in scene.robots]
         self.used_J = _used_J(self.curves)
-        self.followed = self._followed()
+        self.broken_s = breakdowns(log)
+        ids = [robot.id for robot in scene.robots]
+        self.followed = ids.index(options.robot or ids[0])
         self.yaw = self._smooth_yaw()
         self._place_panes()
-
-    def _followed(self) -> int:
-        ids = [robot.id for robot in self.scene.robots]
-        return 0 if self.options.robot is None else ids.index(self.options.robot)
 
     def _smooth_yaw(self) -> np.ndarray:
         yaw = np.unwrap(self.log.state[self.followed, :, 2])
@@ -91,12 +89,9 @@ class Film:
     def reading(self, tick: int) -> Reading:
         """Return what the panel shows at a tick."""
         goals = {goal.id for goal in self.scene.goals}
-        now_s = self.log.time_s[tick]
-        broken_down = {
-            robot for robot, at_s in breakdowns(self.log).items() if at_s <= now_s
-        }
+        now_s = float(self.log.time_s[tick])
         return Reading(
-            time_s=float(self.log.time_s[tick]),
+            time_s=now_s,
             used_J=float(self.used_J[tick]),
             visited={
                 visit.target: visit.robot
@@ -110,8 +105,7 @@ class Film:
                     charge=float(curve.energy_J[tick]) / capacity_J,
                     speed_m_s=round(float(state[tick, 3]), 1) + 0.0,
                     heading_for=self._heading_for(curve, tick),
-                    broken_down=curve.robot in broken_down,
-                    used=standing_of(curve.robot, self.plan, self.log) != "not used",
+                    standing=self._standing(curve.robot, now_s),
                 )
                 for curve, state, capacity_J in zip(
                     self.curves, self.log.state, self.capacity_J, strict=True
@@ -119,13 +113,17 @@ class Film:
             ),
         )
 
+    def _standing(self, robot: str, now_s: float) -> str:
+        whole = now_s < self.broken_s.get(robot, 0.0)
+        return "" if whole else standing_of(robot, self.plan, self.log)
+
     def _heading_for(self, curve: BatteryCurve, tick: int) -> str:
         done = sum(visit.step <= tick for visit in curve.visits)
         tour = self.plan.tours.get(curve.robot, ())
         if done < len(tour):
             return tour[done]
         # The plan in force does not know where one was going that broke down.
-        return "…" if curve.robot in breakdowns(self.log) else ""
+        return "…" if curve.robot in self.broken_s else ""
 
 
 def _used_J(curves: Iterable[MeasuredCurve]) -> np.ndarray:
@@ -153,8 +151,11 @@ class Stage:
         self._tags = [
             Tag(robot, film.colors[robot.id], height) for robot in film.scene.robots
         ]
-        self._target_labels = _labels(film, height, ("goal", "station"))
-        self._labels = self._target_labels + _labels(film, height, ("obstacle",))
+        named = _labels(film)
+        self._labels = [(label, spot) for _, label, spot in named]
+        self._target_labels = [
+            (label, spot) for kind, label, spot in named if kind != "obstacle"
+        ]
         self._cross = Label("✖", style.RESERVE, height, size_em=1.6)
         self._painter = TrailPainter(ground, film.frame)
         self._painted = 0
@@ -291,17 +292,17 @@ def _rgba(color: str) -> tuple[float, float, float, float]:
     return red / 255.0, green / 255.0, blue / 255.0, 0.9
 
 
-def _labels(
-    film: Film, height: int, kinds: Collection[str]
-) -> list[tuple[Label, np.ndarray]]:
-    """Return the names laid over the map, each with its place [m]."""
+def _labels(film: Film) -> list[tuple[str, Label, np.ndarray]]:
+    """Return the names laid over the map: kind, name and place [m] of each."""
     colors = {"goal": style.INK, "station": style.STATION_EDGE}
     colors["obstacle"] = style.ON_OBSTACLE
+    height = film.options.size[1]
     return [
         (
+            label.kind,
             Label(label.text, colors[label.kind], height, size_em=label.size_em),
             np.array([label.x_m, label.y_m]),
         )
         for label in video_labels(film.scene, film.plan, film.em_m)
-        if label.kind in kinds
+        if label.kind in colors
     ]

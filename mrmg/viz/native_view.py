@@ -179,7 +179,7 @@ def annotate(extra: mujoco.MjvScene, scene: Scene, replay: Replay) -> None:
     ):
         above = robot.model.height_m + _TAG_LIFT_M
         at = lifted(scene, state[replay.tick, :2], above)[0]
-        _add_label(extra, at, f"{robot.id} {100.0 * shown.charge:.0f} %")
+        _add_label(extra, at, f"{robot.id} {shown.percent}")
     room = (extra.maxgeom - extra.ngeom) // len(scene.robots)
     for robot, state in zip(scene.robots, log.state, strict=True):
         color = np.array([*style.rgb(replay.film.colors[robot.id]), 255.0]) / 255.0

@@ -30,23 +30,29 @@ class RobotReading:
         charge: battery content over capacity.
         speed_m_s: signed speed.
         heading_for: label of the next target; "" after the last.
-        broken_down: whether it will not move any more.
-        used: whether it has a tour.
+        standing: "broken down", "not used" or "", as of `activities.standing_of`.
     """
 
     robot: str
     charge: float
     speed_m_s: float
     heading_for: str
-    broken_down: bool = False
-    used: bool = True
+    standing: str = ""
+
+    @property
+    def broken_down(self) -> bool:
+        """Whether it will not move any more."""
+        return self.standing == "broken down"
+
+    @property
+    def percent(self) -> str:
+        """The charge as text."""
+        return f"{100.0 * self.charge:.0f} %"
 
     def way(self, towards: str) -> str:
         """Return where the robot is going, after the word for towards."""
-        if self.broken_down:
-            return "broken down"
-        if not self.used:
-            return "not used"
+        if self.standing:
+            return self.standing
         return f"{towards} {self.heading_for}" if self.heading_for else "tour done"
 
 
@@ -65,6 +71,21 @@ class Reading:
     used_J: float
     visited: dict[str, str]
     robots: tuple[RobotReading, ...]
+
+    @property
+    def clock(self) -> str:
+        """The time as minutes and seconds."""
+        minutes, seconds = divmod(self.time_s, 60.0)
+        return f"{int(minutes):02d}:{seconds:04.1f}"
+
+    @property
+    def used(self) -> str:
+        """The energy drawn, with its unit."""
+        return f"{self.used_J / 1000.0:.1f} kJ"
+
+    def goals_of(self, scene: Scene) -> str:
+        """Return how many of a scene's goals are visited."""
+        return f"{len(self.visited)} of {counted(len(scene.goals), 'goal')}"
 
 
 class Panel:
@@ -117,21 +138,12 @@ class Panel:
         return font(max(round(self._px(size)), 9), bold=bold)
 
     def _draw_head(self, pen: ImageDraw.ImageDraw) -> float:
-        left = self._px(18)
-        pen.text(
-            (left, self._px(12)),
-            self._scene.name,
-            font=self._font(17, bold=True),
-            fill=_FAINT,
-        )
+        left, top = self._px(18), self._px(12)
+        bold = self._font(17, bold=True)
+        pen.text((left, top), self._scene.name, font=bold, fill=_FAINT)
+        end = (self._size[0] - left, top)
         speed = f"×{self._speed:g} speed"
-        pen.text(
-            (self._size[0] - left, self._px(12)),
-            speed,
-            font=self._font(15),
-            fill=_FAINT,
-            anchor="ra",
-        )
+        pen.text(end, speed, font=self._font(15), fill=_FAINT, anchor="ra")
         per_row, _ = self._chips()
         rows = 1 + (len(self._scene.goals) - 1) // per_row
         return self._px(122) + rows * self._px(26)
@@ -153,21 +165,11 @@ class Panel:
 
     def _draw_clock(self, pen: ImageDraw.ImageDraw, reading: Reading) -> None:
         left = self._px(18)
-        minutes, seconds = divmod(reading.time_s, 60.0)
-        clock = f"{int(minutes):02d}:{seconds:04.1f}"
-        pen.text(
-            (left, self._px(37)), clock, font=self._font(37, bold=True), fill=_TEXT
-        )
-        used = f"{reading.used_J / 1000.0:.1f} kJ used"
-        pen.text(
-            (self._size[0] - left, self._px(54)),
-            used,
-            font=self._font(16, bold=True),
-            fill=_TEXT,
-            anchor="ra",
-        )
-        goals = counted(len(self._scene.goals), "goal")
-        goals = f"{len(reading.visited)} of {goals} visited"
+        large, bold = self._font(37, bold=True), self._font(16, bold=True)
+        pen.text((left, self._px(37)), reading.clock, font=large, fill=_TEXT)
+        end = (self._size[0] - left, self._px(54))
+        pen.text(end, f"{reading.used} used", font=bold, fill=_TEXT, anchor="ra")
+        goals = f"{reading.goals_of(self._scene)} visited"
         pen.text((left, self._px(90)), goals, font=self._font(16), fill=_TEXT)
 
     def _draw_goals(self, pen: ImageDraw.ImageDraw, reading: Reading) -> None:
@@ -178,20 +180,17 @@ class Panel:
             x = self._px(18) + column * (width + self._px(4))
             y = self._px(115) + row * self._px(26)
             robot = reading.visited.get(goal.id)
+            color = _TEXT if robot else _FAINT
             pen.rounded_rectangle(
                 (x, y, x + width, y + self._px(21)),
                 radius=self._px(5),
                 fill=self._colors[robot] if robot else _BACKGROUND,
-                outline=_TEXT if robot else _FAINT,
+                outline=color,
             )
             if width > self._px(_UNNAMED_CHIP):
-                pen.text(
-                    (x + 0.5 * width, y + self._px(10.5)),
-                    self._labels[goal.id],
-                    font=small,
-                    fill=_TEXT if robot else _FAINT,
-                    anchor="mm",
-                )
+                middle = (x + 0.5 * width, y + self._px(10.5))
+                name = self._labels[goal.id]
+                pen.text(middle, name, font=small, fill=color, anchor="mm")
 
     def _draw_card(
         self,
@@ -205,34 +204,22 @@ class Panel:
         bottom = top + pitch - self._px(6)
         middle = top + 0.30 * (bottom - top)
         pen.rounded_rectangle((left, top, right, bottom), self._px(7), fill=_CARD)
-        pen.rounded_rectangle(
-            (left, top, left + self._px(9), bottom),
-            self._px(4),
-            fill=self._colors[robot.id],
-        )
+        edge = (left, top, left + self._px(9), bottom)
+        pen.rounded_rectangle(edge, self._px(4), fill=self._colors[robot.id])
         way, speed = reading.way("→"), f"{reading.speed_m_s:.1f} m/s"
         way_em = max(_SHORTEST_ID_EM, self._widest_id_em) + 0.7
         needed_em = way_em + text_width_em(f"{way}  {speed}", bold=True)
         room = (right - left) / self._unit - 34.0
         size = min(16.0, 0.27 * pitch / self._unit, room / needed_em)
         text = self._font(size, bold=True)
-        pen.text(
-            (left + self._px(20), middle), robot.id, font=text, fill=_TEXT, anchor="lm"
-        )
+        name = (left + self._px(20), middle)
+        pen.text(name, robot.id, font=text, fill=_TEXT, anchor="lm")
         start = (left + self._px(20.0 + way_em * size), middle)
         pen.text(start, way, font=text, fill=_TEXT, anchor="lm")
-        pen.text(
-            (right - self._px(14), middle),
-            speed,
-            font=text,
-            fill=_FAINT,
-            anchor="rm",
-        )
-        percent = f"{100.0 * reading.charge:.0f} %"
         row = top + 0.73 * (bottom - top)
-        pen.text(
-            (right - self._px(14), row), percent, font=text, fill=_TEXT, anchor="rm"
-        )
+        end = right - self._px(14)
+        pen.text((end, middle), speed, font=text, fill=_FAINT, anchor="rm")
+        pen.text((end, row), reading.percent, font=text, fill=_TEXT, anchor="rm")
         half = 0.13 * (bottom - top)
         bar = (left + self._px(20), row - half, right - self._px(74), row + half)
         draw_bar(pen, bar, reading.charge, robot.battery.reserve_fraction)
@@ -255,18 +242,14 @@ class Panel:
             middle = y + self._px(7)
             area = (x, y, x + self._px(18), y + self._px(14))
             line = entry.look == "line"
-            pen.rectangle(
-                area, fill=style.GROUND if line else entry.color, outline=_FAINT
-            )
+            fill = style.GROUND if line else entry.color
+            pen.rectangle(area, fill=fill, outline=_FAINT)
             if line:
                 across = (x, middle, x + self._px(18), middle)
                 pen.line(across, fill=entry.color, width=max(round(self._px(2)), 1))
             spot = (x + self._px(26), middle)
             pen.text(spot, entry.label, font=small, fill=_FAINT, anchor="lm")
-        pen.text(
-            (self._px(18), top + rows * self._px(22) + self._px(4)),
-            "wide, pale line: planned    thin line: driven",
-            font=self._font(13),
-            fill=_FAINT,
-        )
+        lines = "wide, pale line: planned    thin line: driven"
+        spot = (self._px(18), top + rows * self._px(22) + self._px(4))
+        pen.text(spot, lines, font=self._font(13), fill=_FAINT)
         return top - self._px(12)

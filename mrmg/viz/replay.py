@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from mrmg.counted import counted
 from mrmg.errors import Fault, RunFolderError
 from mrmg.plans import Plan, plan_in_force
 from mrmg.scene.loading import load_scene
@@ -14,7 +13,7 @@ from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.viz.film import Film
 from mrmg.viz.overlay import Reading
-from mrmg.viz.video_options import VideoOptions
+from mrmg.viz.video_options import VideoOptions, ticks_at
 
 SPEEDS = (1, 2, 4, 8, 16, 32)
 """Mission seconds per second that a viewer offers."""
@@ -38,8 +37,7 @@ class Replay:
     @property
     def tick(self) -> int:
         """The log's last tick that is not after the time."""
-        after = np.searchsorted(self.film.log.time_s, self.time_s + 1e-9, "right")
-        return max(int(after) - 1, 0)
+        return int(ticks_at(self.film.log, np.array(self.time_s)))
 
     def reading(self) -> Reading:
         """Return what is shown at the time."""
@@ -73,25 +71,21 @@ def replay_of(run_folder: Path, *, trust_code: bool = False) -> Replay:
         RunFolderError: if the run was not driven yet, or cannot be read.
     """
     scene = load_scene(run_folder / "scene.yaml", trust_code=trust_code)
-    if not (run_folder / "plan.json").exists():
-        fault = Fault("plan.json", "missing: there is no plan; view the scene instead")
-        raise RunFolderError(str(run_folder), [fault])
-    if not (run_folder / "log.json").exists():
-        fault = Fault("log.json", "missing: nothing was driven; run 'mrmg execute'")
-        raise RunFolderError(str(run_folder), [fault])
+    needed = {
+        "plan.json": "missing: there is no plan; view the scene instead",
+        "log.json": "missing: nothing was driven; run 'mrmg execute'",
+    }
+    for name, reason in needed.items():
+        if not (run_folder / name).exists():
+            raise RunFolderError(str(run_folder), [Fault(name, reason)])
     return Replay(scene, plan_in_force(run_folder), ExecutionLog.load(run_folder))
 
 
 def spoken(scene: Scene, reading: Reading) -> tuple[str, list[tuple[str, str]]]:
     """Return a reading in words: the mission's line, and (robot, line) for each."""
-    minutes, seconds = divmod(reading.time_s, 60.0)
-    mission = (
-        f"{int(minutes):02d}:{seconds:04.1f}, {len(reading.visited)} of "
-        f"{counted(len(scene.goals), 'goal')}, {reading.used_J / 1000.0:.1f} kJ used"
-    )
-    lines = []
-    for robot in reading.robots:
-        going = f"{robot.speed_m_s:.1f} m/s, {robot.way('to')}"
-        words = f"{100.0 * robot.charge:.0f} %, {going}"
-        lines.append((robot.robot, words))
+    mission = f"{reading.clock}, {reading.goals_of(scene)}, {reading.used} used"
+    lines = [
+        (robot.robot, f"{robot.percent}, {robot.speed_m_s:.1f} m/s, {robot.way('to')}")
+        for robot in reading.robots
+    ]
     return mission, lines

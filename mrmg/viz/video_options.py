@@ -43,7 +43,8 @@ def video_options(
     """
     given = asdict(asked)
     end_s = float(log.time_s[-1]) if asked.to_s is None else asked.to_s
-    speed = asked.speed or fitting_speed(end_s - asked.from_s, fitting_s)
+    fitting = float(max(np.ceil((end_s - asked.from_s) / fitting_s), 1.0))
+    speed = asked.speed or fitting
     options = VideoOptions(**{**given, "to_s": end_s, "speed": speed})
     _check(scene, log, options)
     return options
@@ -54,14 +55,13 @@ def frame_ticks(log: ExecutionLog, options: VideoOptions) -> np.ndarray:
     end_s = min(options.to_s, float(log.time_s[-1]))
     step_s = options.speed / options.fps
     count = int((end_s - options.from_s) / step_s + 1e-9) + 1
-    time_s = options.from_s + step_s * np.arange(count)
+    return ticks_at(log, options.from_s + step_s * np.arange(count))
+
+
+def ticks_at(log: ExecutionLog, time_s: np.ndarray) -> np.ndarray:
+    """Return the last tick of a log that is not after each time, at least the first."""
     after = np.searchsorted(log.time_s, time_s + 1e-9, side="right")
     return np.asarray(np.maximum(after - 1, 0))
-
-
-def fitting_speed(window_s: float, video_s: float) -> float:
-    """Return the least whole speed that fits a window of the mission to `video_s`."""
-    return float(max(np.ceil(window_s / video_s), 1.0))
 
 
 def _check(scene: Scene, log: ExecutionLog, options: VideoOptions) -> None:

@@ -75,17 +75,17 @@ def test_the_legend_names_obstacles_for_some_robots_where_there_are_any(
 
 
 @pytest.mark.parametrize(
-    ("heading_for", "broken_down", "output"),
-    [("g1", False, "to g1"), ("", False, "tour done"), ("g1", True, "broken down")],
+    ("heading_for", "standing", "output"),
+    [("g1", "", "to g1"), ("", "", "tour done"), ("g1", "broken down", "broken down")],
 )
 def test_a_robot_s_target_is_shown(
-    heading_for: str, broken_down: bool, output: str
+    heading_for: str, standing: str, output: str
 ) -> None:
     robot = RobotReading(
         robot="r1",
         charge=0.5,
         speed_m_s=0.0,
         heading_for=heading_for,
-        broken_down=broken_down,
+        standing=standing,
     )
     assert robot.way("to") == output
