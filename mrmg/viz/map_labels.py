@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -33,11 +33,10 @@ from mrmg.viz.map_shapes import (
 )
 from mrmg.viz.tags import text_width_em
 
-KINDS = (
-    *("goal", "station", "robot", "stop", "breakdown"),
-    *("path", "terrain", "obstacle", "height"),
-)
-"""What labels name; those of the second line are optional, in order of importance."""
+_OPTIONAL = ("path", "terrain", "obstacle", "height")
+"""Kinds that are named where there is room, in order of importance."""
+KINDS = ("goal", "station", "robot", "stop", "breakdown", *_OPTIONAL)
+"""What labels name."""
 
 _SIZES = {"stop": 0.85, "path": 0.9, "terrain": 0.9, "obstacle": 0.75, "height": 0.7}
 """Size of the letters of each kind, in em; others 1."""
@@ -65,15 +64,17 @@ class MapLabel:
     of: str
     text: str
     size_em: float
-    x_m: float = math.nan
-    y_m: float = math.nan
+    x_m: float
+    y_m: float
 
 
 @dataclass(frozen=True, slots=True)
 class _Wanted:
-    """A label without a place, and its candidates."""
+    """A label without a place, and its candidates; see `MapLabel`."""
 
-    label: MapLabel
+    kind: str
+    of: str
+    text: str
     box: LabelBox
 
 
@@ -94,17 +95,21 @@ def map_labels(
         em_m: size of the picture's letters on the ground.
         kinds: what to name.
     """
-    wanted = [
-        item for item in _wanted(scene, plan, log, em_m) if item.label.kind in kinds
-    ]
+    wanted = [item for item in _wanted(scene, plan, log, em_m) if item.kind in kinds]
     shapes, lines = occupied(scene, plan, log, em_m)
     spots = place([item.box for item in wanted], shapes, lines, em_m)
-    placed = []
-    for item, spot in zip(wanted, spots, strict=True):
-        if spot is not None:
-            x_m, y_m = spot.tolist()
-            placed.append(replace(item.label, x_m=x_m, y_m=y_m))
-    return tuple(placed)
+    return tuple(
+        MapLabel(
+            kind=item.kind,
+            of=item.of,
+            text=item.text,
+            size_em=_SIZES.get(item.kind, 1.0),
+            x_m=float(spot[0]),
+            y_m=float(spot[1]),
+        )
+        for item, spot in zip(wanted, spots, strict=True)
+        if spot is not None
+    )
 
 
 def half_size_m(kind: str, text: str, em_m: float) -> np.ndarray:
@@ -152,29 +157,29 @@ def _targets(scene: Scene, plan: Plan | None, em_m: float) -> Iterator[_Wanted]:
             yield _beside("stop", robot, str(rank), shape, em_m, _LOWER_RIGHT)
 
 
-def _label(kind: str, of: str, text: str) -> MapLabel:
-    return MapLabel(kind=kind, of=of, text=text, size_em=_SIZES.get(kind, 1.0))
-
-
 def _beside(
     kind: str, of: str, text: str, shape: BaseGeometry, em_m: float, towards_rad: float
 ) -> _Wanted:
     """Return a label with candidates around a shape."""
     half_m = half_size_m(kind, text, em_m)
-    spots, cost = spots_around(shape, half_m, em_m, towards_rad)
-    own = LabelBox(half_m=half_m, spots_m=spots, cost=cost, owner="")
-    return _Wanted(_label(kind, of, text), own)
+    spots_m, cost = spots_around(shape, half_m, em_m, towards_rad)
+    return _at_spots(kind, of, text, em_m, spots_m, cost)
 
 
-def _optional(
+def _at_spots(
     kind: str, of: str, text: str, em_m: float, spots_m: np.ndarray, cost: np.ndarray
 ) -> _Wanted:
-    half_m = half_size_m(kind, text, em_m)
+    """Return a label with its candidates; optional ones lie on what they name."""
+    optional = kind in _OPTIONAL
     owner = path_of(of) if kind == "path" else of
-    own = LabelBox(
-        half_m=half_m, spots_m=spots_m, cost=cost, owner=owner, optional=True
+    box = LabelBox(
+        half_m=half_size_m(kind, text, em_m),
+        spots_m=spots_m,
+        cost=cost,
+        owner=owner if optional else "",
+        optional=optional,
     )
-    return _Wanted(_label(kind, of, text), own)
+    return _Wanted(kind, of, text, box)
 
 
 def _paths(scene: Scene, plan: Plan | None, em_m: float) -> Iterator[_Wanted]:
@@ -188,7 +193,7 @@ def _paths(scene: Scene, plan: Plan | None, em_m: float) -> Iterator[_Wanted]:
             points = item.state[np.searchsorted(way_m, marks_m), :2]
             apart_m = np.hypot(*(points[:, None] - np.array(names)).T).min(axis=0)
             cost = _FAR_COST * (1.0 - apart_m / max(apart_m.max(), 1e-9))
-            yield _optional("path", item.robot, item.robot, em_m, points, cost)
+            yield _at_spots("path", item.robot, item.robot, em_m, points, cost)
 
 
 def _terrain(scene: Scene, em_m: float) -> Iterator[_Wanted]:
@@ -207,7 +212,7 @@ def _terrain(scene: Scene, em_m: float) -> Iterator[_Wanted]:
             covered = shapely.area(shapely.intersection(boxes, visible))
             cost = _OUTSIDE_COST * (1.0 - covered / shapely.area(boxes))
             cost += _FAR_COST * np.linspace(0.0, 1.0, len(spots))
-            yield _optional("terrain", area.id, text, em_m, spots, cost)
+            yield _at_spots("terrain", area.id, text, em_m, spots, cost)
 
 
 def _obstacle(name: str, shape: BaseGeometry, em_m: float) -> _Wanted:
@@ -217,7 +222,7 @@ def _obstacle(name: str, shape: BaseGeometry, em_m: float) -> _Wanted:
     boxes = shapely.box(*(spots - half_m).T, *(spots + half_m).T)
     spots = spots[shapely.covers(shape, boxes)]
     cost = np.linspace(0.0, 1.0, len(spots))
-    return _optional("obstacle", name, name, em_m, spots, cost)
+    return _at_spots("obstacle", name, name, em_m, spots, cost)
 
 
 def _spots_within(shape: BaseGeometry) -> np.ndarray:
@@ -247,4 +252,4 @@ def _heights(scene: Scene, em_m: float) -> Iterator[_Wanted]:
             share = np.linspace(0.1, 0.9, _SPOTS_ALONG)
             spots = line[np.searchsorted(way_m, share * way_m[-1])]
             cost = _FAR_COST * np.abs(share - 0.5)
-            yield _optional("height", "", f"{level_m:g} m", em_m, spots, cost)
+            yield _at_spots("height", "", f"{level_m:g} m", em_m, spots, cost)

@@ -48,17 +48,11 @@ def heading_arrow(region: Region, heading_rad: float) -> Polygon:
 
 def wanted_headings(scene: Scene) -> Iterator[tuple[str, Polygon, float]]:
     """Yield whose heading it is (of a goal, or a robot's finish), its arrow and it."""
-    for goal in scene.goals:
-        if goal.heading_rad is not None:
-            yield (
-                goal.id,
-                heading_arrow(goal.region, goal.heading_rad),
-                goal.heading_rad,
-            )
-    for robot in scene.robots:
-        if robot.finish and robot.finish.heading_rad is not None:
-            yaw = robot.finish.heading_rad
-            yield f"finish of {robot.id}", heading_arrow(robot.finish.region, yaw), yaw
+    ends = [(f"finish of {robot.id}", robot.finish) for robot in scene.robots]
+    for name, place in [*((goal.id, goal) for goal in scene.goals), *ends]:
+        if place and place.heading_rad is not None:
+            arrow = heading_arrow(place.region, place.heading_rad)
+            yield name, arrow, place.heading_rad
 
 
 def enclosing_circle(
