@@ -189,8 +189,8 @@ def _line_cover(pixels: np.ndarray, size: tuple[int, int], width: float) -> np.n
 def _paint_paths(axes: Axes, scene: Scene, plan: Plan, letter_points: float) -> None:
     colors = style.scene_robot_colors(scene)
     for trajectory in plan.trajectories:
-        color, look = colors[trajectory.robot], style.PLANNED.stroke(letter_points)
-        scene_drawing.draw_path(axes, trajectory.state, color, zorder=4, **look)
+        color, look = colors[trajectory.robot], style.PLANNED
+        scene_drawing.draw_path(axes, trajectory.state, color, look, letter_points)
 
 
 def _paint_rims(axes: Axes, scene: Scene) -> None:

@@ -81,13 +81,11 @@ def draw_mission(
     if plan is not None:
         for trajectory in plan.trajectories:
             color = colors[trajectory.robot]
-            look = style.PLANNED.stroke(scene_drawing.LETTER_POINTS)
-            scene_drawing.draw_path(axes, trajectory.state, color, zorder=4.2, **look)
+            scene_drawing.draw_path(axes, trajectory.state, color, style.PLANNED)
             _draw_arrows(axes, trajectory.state, color)
     if log is not None:
         for robot, state in zip(log.robots, log.state, strict=True):
-            look = style.DRIVEN.stroke(scene_drawing.LETTER_POINTS)
-            scene_drawing.draw_path(axes, state, colors[robot], zorder=4.4, **look)
+            scene_drawing.draw_path(axes, state, colors[robot], style.DRIVEN)
         for contact in log.contacts:
             _draw_cross(axes, contact.x_m, contact.y_m)
     _draw_targets(axes, scene, plan)
@@ -149,15 +147,12 @@ def _draw_cross(axes: Axes, x_m: float, y_m: float) -> None:
 def _draw_targets(axes: Axes, scene: Scene, plan: Plan | None) -> None:
     ranks = visit_ranks(plan) if plan is not None else {}
     colors = style.scene_robot_colors(scene)
+    first = {target: visits[0] for target, visits in ranks.items()}
+    faces = {target: colors[robot] for target, (robot, _) in first.items()}
+    scene_drawing.draw_targets(axes, scene, faces)
     for goal in scene.goals:
-        visits = ranks.get(goal.id, [])
-        face = colors[visits[0][0]] if visits else style.GOAL_OPEN
-        scene_drawing.draw_goal(axes, goal, color=face)
-        if visits:
-            _draw_rank(axes, goal.region.center, str(visits[0][1]))
-    for station in scene.stations:
-        scene_drawing.draw_station(axes, station)
-    scene_drawing.draw_wanted_poses(axes, scene)
+        if goal.id in first:
+            _draw_rank(axes, goal.region.center, str(first[goal.id][1]))
 
 
 def _draw_rank(axes: Axes, center: np.ndarray, text: str) -> None:

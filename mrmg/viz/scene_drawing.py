@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -76,11 +77,7 @@ def draw_scene(scene: Scene, path: Path) -> None:
     """
     figure, axes = new_map_figure(scene)
     draw_ground(axes, scene)
-    for goal in scene.goals:
-        draw_goal(axes, goal)
-    for station in scene.stations:
-        draw_station(axes, station)
-    draw_wanted_poses(axes, scene)
+    draw_targets(axes, scene, {})
     draw_robots(axes, scene)
     axes.set_title(_title(scene), loc="left", fontsize=12, color=style.INK)
     add_legend(axes, map_legend(scene))
@@ -204,6 +201,15 @@ def draw_station(
     )
 
 
+def draw_targets(axes: Axes, scene: Scene, colors: Mapping[str, str]) -> None:
+    """Draw goals, stations and wanted poses; `colors` has those of visited goals."""
+    for goal in scene.goals:
+        draw_goal(axes, goal, color=colors.get(goal.id, style.GOAL_OPEN))
+    for station in scene.stations:
+        draw_station(axes, station)
+    draw_wanted_poses(axes, scene)
+
+
 def draw_wanted_poses(axes: Axes, scene: Scene) -> None:
     """Draw where robots must end, and the headings of finishes and goals."""
     colors = style.scene_robot_colors(scene)
@@ -250,9 +256,16 @@ def draw_footprint(
     )
 
 
-def draw_path(axes: Axes, state: np.ndarray, color: str, **look: Any) -> None:
+def draw_path(
+    axes: Axes,
+    state: np.ndarray,
+    color: str,
+    look: style.LineLook,
+    points: float = LETTER_POINTS,
+) -> None:
     """Draw a way through the places of states (x [m], y [m], ...) with round ends."""
-    axes.plot(state[:, 0], state[:, 1], color=color, solid_capstyle="round", **look)
+    stroke = look.stroke(points) | {"solid_capstyle": "round", "zorder": 4.2}
+    axes.plot(state[:, 0], state[:, 1], color=color, **stroke)
 
 
 def map_legend(scene: Scene) -> list[Patch | Line2D]:
@@ -316,6 +329,5 @@ def _add_shape(axes: Axes, shape: BaseGeometry, **look: object) -> None:
 
 def polygons_of(shape: BaseGeometry) -> list[Polygon]:
     """Return the polygons a geometry is made of; lines and points are left out."""
-    if isinstance(shape, Polygon):
-        return [shape] if not shape.is_empty else []
-    return [part for item in getattr(shape, "geoms", ()) for part in polygons_of(item)]
+    parts = shapely.get_parts(shape)
+    return [part for part in parts if isinstance(part, Polygon) and not part.is_empty]
