@@ -18,7 +18,7 @@ from mrmg.simulation.log import ExecutionLog, require_same_mission
 from mrmg.simulation.world_model import build_world
 from mrmg.viz import style
 from mrmg.viz.activities import breakdowns, standing_of
-from mrmg.viz.ground_image import TrailPainter, video_labels
+from mrmg.viz.ground_image import paint_trail, video_labels
 from mrmg.viz.map_shapes import enclosing_circle
 from mrmg.viz.overlay import Panel, Reading, RobotReading
 from mrmg.viz.tags import Label, Tag, letter_px, place_tags
@@ -135,14 +135,8 @@ def _used_J(curves: Iterable[MeasuredCurve]) -> np.ndarray:
 class Stage:
     """The changing side of a video: trails on the ground, marks, tags."""
 
-    def __init__(self, film: Film, view: WorldView, ground: np.ndarray) -> None:
-        """Set the stage for the first frame.
-
-        Args:
-            film: what is shown.
-            view: the renderer.
-            ground: image the renderer's floor was painted with.
-        """
+    def __init__(self, film: Film, view: WorldView) -> None:
+        """Set the stage for the first frame."""
         self._film, self._view = film, view
         self._panel = Panel(
             film.scene, film.panel_size, film.options.speed, film.options.size[1]
@@ -152,21 +146,15 @@ class Stage:
             Tag(robot, film.colors[robot.id], height) for robot in film.scene.robots
         ]
         named = _labels(film)
-        self._labels = [(label, spot) for _, label, spot in named]
         self._target_labels = [
             (label, spot) for kind, label, spot in named if kind != "obstacle"
         ]
         self._cross = Label("✖", style.RESERVE, height, size_em=1.6)
-        self._painter = TrailPainter(ground, film.frame)
         self._painted = 0
         self._trailed = 0
         self._top = self._make_top_view()
-        places = np.array([at for _, at in self._labels]).reshape(-1, 2)
-        self._named = [
-            (spot, label.half)
-            for (label, _), spot in zip(
-                self._labels, self._top.to_pixels(places), strict=True
-            )
+        self._map_labels = [
+            (label, self._top.to_pixels(spot[None])[0]) for _, label, spot in named
         ]
         self._marked: set[str] = set()
         for goal in film.scene.goals:
@@ -212,7 +200,7 @@ class Stage:
             for robot, state in zip(log.robots, log.state, strict=True)
         }
         if anew or self._trailed == 0:
-            self._top.draw_background(log.qpos[tick], trails, self._labels)
+            self._top.draw_background(log.qpos[tick], trails, self._map_labels)
         else:
             for color, points in trails.items():
                 self._top.extend_trail(points[self._trailed - 1 :], color)
@@ -226,7 +214,8 @@ class Stage:
         spots = self._top.to_pixels(np.array([middle for middle, _ in circles]))
         reaches = [radius_m / self._top.pixel_m for _, radius_m in circles]
         size = (pane.shape[1], pane.shape[0])
-        beside = place_tags(self._tags, spots, reaches, self._named, size)
+        taken = [(spot, label.half) for label, spot in self._map_labels]
+        beside = place_tags(self._tags, spots, reaches, taken, size)
         self._lay_tags(pane, spots, beside, reading)
 
     def _draw_chase(self, pane: np.ndarray, tick: int, reading: Reading) -> None:
@@ -266,14 +255,14 @@ class Stage:
         # Painting ahead, by less than a car's length, makes uploads rare.
         if self._painted > tick:
             return
-        log = self._film.log
+        film, log = self._film, self._film.log
         way_m = np.cumsum(np.abs(log.state[:, tick:, 3]).max(axis=0))
         way_m *= log.control_period_s
         end = tick + 1 + int(np.searchsorted(way_m, _TRAIL_AHEAD_M))
         for robot, state in zip(log.robots, log.state, strict=True):
             start = max(self._painted - 1, 0)
-            points = state[start:end, :2]
-            self._painter.paint(points, self._film.colors[robot], self._view.ground)
+            points, color = state[start:end, :2], film.colors[robot]
+            paint_trail(self._view.ground, film.frame, points, color)
         self._painted = end
         self._view.update_ground()
 

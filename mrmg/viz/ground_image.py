@@ -123,35 +123,25 @@ def painted_elevation(
     )
 
 
-class TrailPainter:
-    """Paints driven trails onto a ground image, piece by piece."""
+def paint_trail(
+    ground: np.ndarray, frame: GroundFrame, points: np.ndarray, color: str
+) -> None:
+    """Paint a driven trail onto a ground image.
 
-    def __init__(self, ground: np.ndarray, frame: GroundFrame) -> None:
-        """Start on a ground image, which is copied."""
-        self._image = ground.copy()
-        self._frame = frame
-        self._width = style.DRIVEN.width_em * _LETTER_PIXELS
-
-    def paint(self, points: np.ndarray, color: str, target: np.ndarray) -> None:
-        """Paint a line through `points` [m] and copy what changed to `target`.
-
-        Args:
-            points: shape (n, 2); fewer than two leave the image as it is.
-            color: `#RRGGBB`.
-            target: pixels of the image's shape, changed in place.
-        """
-        if len(points) < 2:
-            return
+    Args:
+        ground: pixels of the frame's size, changed in place.
+        frame: what the image covers.
+        points: of the trail [m], shape (n, 2); fewer than two leave the image as it is.
+        color: `#RRGGBB`.
+    """
+    if len(points) > 1:
         # Pieces shorter than the line is wide would leave ragged edges.
-        pixels = self._frame.to_pixels(thinned(points, _SPACING_M))
-        changed = paint_line(self._image, pixels, self._width, color)
-        target[changed] = self._image[changed]
+        pixels = frame.to_pixels(thinned(points, _SPACING_M))
+        paint_line(ground, pixels, style.DRIVEN.width_em * _LETTER_PIXELS, color)
 
 
-def paint_line(
-    image: np.ndarray, pixels: np.ndarray, width: float, color: str
-) -> tuple[slice, slice]:
-    """Paint a line with smooth edges into an image; return the part that changed.
+def paint_line(image: np.ndarray, pixels: np.ndarray, width: float, color: str) -> None:
+    """Paint a line with smooth edges into an image.
 
     Args:
         image: shape (height, width, 3) of bytes, changed in place.
@@ -164,13 +154,11 @@ def paint_line(
     high = np.ceil(pixels.max(axis=0)).astype(int) + reach
     left, top = np.clip(low, 0, size)
     right, bottom = np.clip(high, 0, size)
-    changed = slice(top, bottom), slice(left, right)
     if left < right and top < bottom:
-        patch = image[changed]
+        patch = image[top:bottom, left:right]
         cover = _line_cover(pixels - (left, top), (right - left, bottom - top), width)
         paint = np.array(style.rgb(color)) - patch.astype(float)
         patch[:] = np.round(patch + cover[:, :, None] * paint)
-    return changed
 
 
 def _line_cover(pixels: np.ndarray, size: tuple[int, int], width: float) -> np.ndarray:

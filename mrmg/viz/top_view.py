@@ -71,7 +71,7 @@ class TopView:
         Args:
             qpos: any positions of the model.
             trails: what was driven so far [m], shape (n, 2) each, by colour.
-            labels: names and where they belong [m], shape (2,).
+            labels: names and their middles (column, row).
         """
         self._view.place_robots_away(qpos)
         camera = top_camera(self._center_m, self._view.highest_m)
@@ -81,7 +81,7 @@ class TopView:
         for color, points in trails.items():
             self.extend_trail(points, color)
         for label, spot in labels:
-            label.blit(self._background, self.to_pixels(spot[None])[0])
+            label.blit(self._background, spot)
 
     def extend_trail(self, points: np.ndarray, color: str) -> None:
         """Paint a driven way through points [m], shape (n, 2), onto the background."""

@@ -76,7 +76,7 @@ def pictures(
     # All of a chase is drawn anew in every frame, where moving edges are seldom seen.
     smooth = film.options.view != "chase"
     with open_view(film.world, ground, film.options.size, smooth=smooth) as view:
-        stage = Stage(film, view, ground)
+        stage = Stage(film, view)
         for number, tick in enumerate(ticks):
             yield stage.draw(int(tick))
             if on_progress is not None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mrmg.viz import style
-from mrmg.viz.ground_image import GroundFrame, TrailPainter, paint_ground
+from mrmg.viz.ground_image import GroundFrame, paint_ground, paint_trail
 
 FRAME = GroundFrame(center_m=np.array([20.0, 10.0]), half_m=np.array([24.0, 14.0]))
 
@@ -45,10 +45,9 @@ def test_trails_change_only_the_pixels_along_the_way() -> None:
     ground = np.full((*FRAME.size[::-1], 3), 200, dtype=np.uint8)
     target = ground.copy()
     way = np.stack([np.linspace(0.0, 30.0, 301), np.full(301, 12.0)], axis=1)
-    painter = TrailPainter(ground, FRAME)
-    painter.paint(way[:1], "#FF0000", target)
+    paint_trail(target, FRAME, way[:1], "#FF0000")
     assert np.array_equal(target, ground)
-    painter.paint(way, "#FF0000", target)
+    paint_trail(target, FRAME, way, "#FF0000")
     rows, columns = np.nonzero((target != ground).any(axis=2))
     on_way = FRAME.to_pixels(way)
     assert np.abs(rows - on_way[0, 1]).max() <= 6
