@@ -69,6 +69,7 @@ class BrowserView:
         self.targets = self._add_targets()
         self._frames = self._add_bodies()
         self.tags = self._add_tags()
+        self._place(self._world.model.qpos0)
         self._look_from_above()
         if replay is not None:
             self._add_driven(replay)
@@ -202,13 +203,6 @@ class BrowserView:
             tags[robot.id] = self._server.scene.add_label(
                 f"/tags/{robot.id}",
                 f"{robot.id} {100.0 * start:.0f} %",
-                position=tuple(
-                    lifted(
-                        self._scene,
-                        np.array(robot.pose[:2]),
-                        robot.model.height_m + _TAG_LIFT_M,
-                    )[0]
-                ),
                 anchor="bottom-center",
             )
         return tags
