@@ -30,9 +30,7 @@ def end_poses(
     ends = {item.robot: item.state[-1] for item in plan.trajectories} if plan else {}
     if log is not None:
         ends = dict(zip(log.robots, log.state[:, -1], strict=True))
-    return {
-        robot: (float(at[0]), float(at[1]), float(at[2])) for robot, at in ends.items()
-    }
+    return {robot: tuple(state[:3].tolist()) for robot, state in ends.items()}
 
 
 def heading_arrow(region: Region, heading_rad: float) -> Polygon:
@@ -100,14 +98,11 @@ def occupied(
     for robot_id, pose in end_poses(plan, log).items():
         middle, radius_m = end_ring(scene.robot(robot_id), pose, em_m)
         shapes.append(Occupied(Point(middle).buffer(radius_m), robot_id))
-    paths = [(item.robot, item.state) for item in plan.trajectories] if plan else []
-    lines = [
-        Occupied(
-            LineString(state[:, :2]).simplify(_SIMPLIFIED_EM * em_m), path_of(robot)
-        )
-        for robot, state in paths
-        if len(state) > 1
-    ]
+    lines = []
+    for item in plan.trajectories if plan else ():
+        if len(item.state) > 1:
+            path = LineString(item.state[:, :2]).simplify(_SIMPLIFIED_EM * em_m)
+            lines.append(Occupied(path, path_of(item.robot)))
     return shapes, lines
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from typing import Any
 
 import numpy as np
@@ -204,10 +204,8 @@ def open_view(
             view = WorldView(world, model, size)
         except mujoco.FatalError as error:
             raise MachineError(f"OpenGL could not be set up: {error}") from error
-        try:
+        with closing(view):
             yield view
-        finally:
-            view.close()
 
 
 def floor_frame(world: MujocoWorld) -> GroundFrame:
