@@ -7,8 +7,9 @@ a message that states what is allowed.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Any, TypeVar
 
 from mrmg.errors import UsageError
 from mrmg.scene.margins import margins_from
@@ -16,67 +17,67 @@ from mrmg.scene.objective import Objective
 
 LAST_PORT = 65535
 
+_Number = TypeVar("_Number", int, float)
+
 
 def seed(value: Any) -> int:
     """Read a seed: a whole number of at least 0."""
-    return _whole(value, at_least=0)
+    allowed = "a whole number of at least 0"
+    return _number(int, value, lambda number: number >= 0, allowed)
 
 
 def count(value: Any) -> int:
     """Read a number of things: a whole number of at least 1."""
-    return _whole(value, at_least=1)
+    allowed = "a whole number of at least 1"
+    return _number(int, value, lambda number: number >= 1, allowed)
 
 
 def port(value: Any) -> int:
     """Read the number of a port."""
-    read = _whole(value, at_least=1)
-    if read > LAST_PORT:
-        raise ValueError(f"{value!r} is not a port: a whole number of 1 to {LAST_PORT}")
-    return read
-
-
-def _whole(value: Any, *, at_least: int) -> int:
-    try:
-        read = int(str(value))
-    except ValueError:
-        read = at_least - 1
-    if read < at_least:
-        raise ValueError(f"{value!r} is not a whole number of at least {at_least}")
-    return read
-
-
-def _number(value: Any) -> float:
-    """Return the number that a text or value stands for; NaN if it is none."""
-    try:
-        return float(str(value))
-    except ValueError:
-        return math.nan
+    allowed = f"a port: a whole number of 1 to {LAST_PORT}"
+    return _number(int, value, lambda number: 1 <= number <= LAST_PORT, allowed)
 
 
 def positive(value: Any) -> float:
     """Read a positive number."""
-    read = _number(value)
-    if not 0.0 < read < math.inf:
-        raise ValueError(f"{value!r} is not a positive number")
-    return read
+    allowed = "a positive number"
+    return _number(float, value, lambda number: 0.0 < number < math.inf, allowed)
 
 
 def time(value: Any) -> float:
     """Read a time: a number of at least 0."""
-    read = _number(value)
-    if not 0.0 <= read < math.inf:
-        raise ValueError(f"{value!r} is not a number of at least 0")
-    return read
+    allowed = "a number of at least 0"
+    return _number(float, value, lambda number: 0.0 <= number < math.inf, allowed)
 
 
 def share(value: Any) -> float:
     """Read a share: a number of at least 0 and less than 1."""
-    read = _number(value)
-    if not 0.0 <= read < 1.0:
-        raise ValueError(
-            f"{value!r} is not a share: a number of at least 0 and less than 1"
-        )
-    return read
+    allowed = "a share: a number of at least 0 and less than 1"
+    return _number(float, value, lambda number: 0.0 <= number < 1.0, allowed)
+
+
+def _number(
+    read: Callable[[str], _Number],
+    value: Any,
+    is_allowed: Callable[[_Number], bool],
+    allowed: str,
+) -> _Number:
+    """Return the number that a text or value stands for.
+
+    Args:
+        read: makes a number of a text: int or float.
+        value: the text or value.
+        is_allowed: whether a number is.
+        allowed: which are, for the message.
+
+    Raises:
+        ValueError: if the value stands for no number, or for one that is not allowed.
+    """
+    with suppress(ValueError):  # a text that is no number is refused below, too
+        number = read(str(value))
+        if is_allowed(number):
+            return number
+    raise ValueError(f"{value!r} is not {allowed}")
 
 
 def switch(value: Any) -> bool:
@@ -134,8 +135,8 @@ def margins(value: Any) -> dict[str, float]:
         read = margins_from(value)
     except UsageError as error:
         raise ValueError(str(error).removeprefix("margins: ")) from error
-    stated = {"obstacle": read.obstacle_m, "robot": read.robot_m}
-    return {key: margin_m for key, margin_m in stated.items() if margin_m is not None}
+    stated = read.entry.items()
+    return {key: margin_m for key, margin_m in stated if margin_m is not None}
 
 
 def size(value: Any) -> tuple[int, int]:
