@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from mrmg import extensions
 from mrmg.cli.usage import reader
-from mrmg.errors import UsageError
 from mrmg.runs.arguments import RunArguments, VideoArguments
 from mrmg.runs.options import Option, options_of
 
@@ -19,31 +18,25 @@ def add_options(
     parser: argparse.ArgumentParser, verb: str, arguments: _Arguments = RunArguments
 ) -> None:
     """Add the options of a class of arguments that a verb takes."""
-    groups: dict[str, Any] = {}
+    groups: dict[str, Any] = {"": parser}
     for option in options_of(arguments):
         if verb not in option.verbs:
             continue
-        place: Any = parser
-        if option.group:
-            exclusive = parser.add_mutually_exclusive_group
-            place = groups.setdefault(option.group, None) or exclusive()
-            groups[option.group] = place
-        argument = place.add_argument(
-            option.flag,
-            dest=option.name,
-            default=argparse.SUPPRESS,
-            help=_escaped(option),
-            **_details(option),
-        )
-        argument.suggested = option.choices  # to complete
+        if option.group not in groups:
+            groups[option.group] = parser.add_mutually_exclusive_group()
+        helps = {option.flag: _escaped(option)}
         for retired in option.formerly:
-            place.add_argument(
-                "--" + retired.replace("_", "-"),
+            helps["--" + retired.replace("_", "-")] = argparse.SUPPRESS
+        for flag, help in helps.items():
+            argument = groups[option.group].add_argument(
+                flag,
                 dest=option.name,
                 default=argparse.SUPPRESS,
-                help=argparse.SUPPRESS,
+                help=help,
                 **_details(option),
             )
+            if option.extended:
+                argument.suggested = extensions.BUILT_IN[option.extended]  # to complete
 
 
 def help_of(name: str) -> str:
@@ -65,30 +58,18 @@ def given(
     return {name: value for name, value in vars(options).items() if name in known}
 
 
-def _name(group: str) -> Callable[[str], str]:
-    """Return a reader of names of planners or routers."""
-
-    def read_name(text: str) -> str:
-        try:
-            return extensions.require(group, text)
-        except UsageError as error:
-            raise argparse.ArgumentTypeError(str(error)) from error
-
-    return read_name
-
-
 def _details(option: Option) -> dict[str, Any]:
     """Return the keywords of `add_argument` for one option."""
     if isinstance(option.default, bool):
         both = option.verbs == ("render",)  # which keeps what was chosen before
         action: Any = argparse.BooleanOptionalAction if both else "store_true"
         return {"action": action}
-    if option.extended:
-        return {"type": _name(option.extended), "metavar": option.metavar}
     if option.choices:
         return {"choices": option.choices}
     if option.default == ():
         return {"action": "append", "metavar": option.metavar}
-    details = {"type": reader(option.read), "metavar": option.metavar}
+    group = option.extended
+    read = partial(extensions.require, group) if group else option.read
+    details = {"type": reader(read), "metavar": option.metavar}
     bare = {} if option.bare is None else {"nargs": "?", "const": option.bare}
     return {**details, **bare}

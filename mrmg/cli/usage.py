@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from mrmg import shipped
-from mrmg.errors import ExitCode, nearest
+from mrmg.errors import ExitCode, UsageError, nearest
 
 OPTION_SIMILARITY = 0.7
 """Least similarity of a suggested option: two dashes alone make half of some."""
@@ -162,7 +162,7 @@ def reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
     def read_text(text: str) -> Any:
         try:
             return read(text)
-        except ValueError as error:
+        except (ValueError, UsageError) as error:
             raise argparse.ArgumentTypeError(str(error)) from error
 
     return read_text

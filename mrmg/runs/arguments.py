@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 
 _shown = partial(option, verbs=("render",))
+_named = partial(option, None, decides="plan", read=values.name, metavar="NAME")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,24 +59,10 @@ class RunArguments(Checked):
     """of all random streams; default 0"""
     profile: str = option("default", decides="plan", choices=("default", "paper"))
     """'paper' is the published method: planner guided_tree with router nrpa"""
-    planner: str | None = option(
-        None,
-        decides="plan",
-        choices=extensions.BUILT_IN[extensions.PLANNERS],
-        extended=extensions.PLANNERS,
-        read=values.name,
-        metavar="NAME",
-    )
+    planner: str | None = _named(extended=extensions.PLANNERS)
     """path_following, which is the default, guided_tree, the published method, or one
     that another package adds"""
-    router: str | None = option(
-        None,
-        decides="plan",
-        choices=extensions.BUILT_IN[extensions.ROUTERS],
-        extended=extensions.ROUTERS,
-        read=values.name,
-        metavar="NAME",
-    )
+    router: str | None = _named(extended=extensions.ROUTERS)
     """what finds tours: search, which is the default, nrpa, exact, or one that another
     package adds; guided_tree takes nrpa only"""
     objective: str | Mapping[str, float] | None = option(

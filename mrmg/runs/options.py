@@ -45,11 +45,11 @@ class Option:
         verbs: of the command line that take it.
         metavar: name of its value in the help; None for a switch or with `choices`.
         choices: allowed values, where they are few.
-        extended: group of entry points by which other packages add further choices;
+        extended: group of entry points whose names are allowed;
             `RunArguments.require_names` checks them, as recorded ones need not be
             installed.
         bare: value of the flag alone, where its value may be left out.
-        group: name of a set of options that exclude each other.
+        group: name of a set of options that exclude each other; "" for none.
         formerly: retired names of the field, still read everywhere and shown nowhere.
         default: of the field.
     """
@@ -66,7 +66,7 @@ class Option:
     choices: tuple[str, ...] | None = None
     extended: str | None = None
     bare: str | None = None
-    group: str | None = None
+    group: str = ""
     formerly: tuple[str, ...] = ()
 
     def words(self, value: Any) -> list[str]:
@@ -157,9 +157,8 @@ class Checked:
                 value = option.read(value)
             except ValueError as error:
                 raise UsageError(f"{option.name}: {error}") from error
-            choices = () if option.extended else option.choices
-            if choices and value not in choices:
-                allowed = ", ".join(choices)
+            if option.choices and value not in option.choices:
+                allowed = ", ".join(option.choices)
                 raise UsageError(f"{option.name}: {value!r}; allowed: {allowed}")
             object.__setattr__(self, option.name, value)
             other = groups.setdefault(option.group or option.name, option.name)
