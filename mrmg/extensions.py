@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache, wraps
-from importlib.metadata import EntryPoint, PackageNotFoundError, entry_points, version
+from importlib.metadata import PackageNotFoundError, entry_points, version
 from typing import Any
 
 from mrmg.errors import MachineError, MrmgError, UsageError, nearest
@@ -33,7 +33,8 @@ _KIND = {PLANNERS: "planner", ROUTERS: "router"}
 
 def names(group: str) -> list[str]:
     """Return all names of a group, this package's own first, without importing any."""
-    return list(dict.fromkeys([*BUILT_IN[group], *sorted(_added(group))]))
+    added = entry_points(group=group).names - {*BUILT_IN[group]}
+    return [*BUILT_IN[group], *sorted(added)]
 
 
 def require(group: str, name: str) -> str:
@@ -42,8 +43,10 @@ def require(group: str, name: str) -> str:
     Raises:
         UsageError: if there is none of that name; lists those there are.
     """
-    if name not in BUILT_IN[group] and name not in _added(group):
-        known = names(group)
+    if name in BUILT_IN[group]:
+        return name  # what is installed need not be looked through
+    known = names(group)
+    if name not in known:
         raise UsageError(
             f"{_KIND[group]} {name!r} is not known{nearest(name, known)}; allowed: "
             f"{', '.join(known)}"
@@ -62,7 +65,7 @@ def load(group: str, name: str) -> Callable[..., Any]:
         MachineError: if it cannot be imported or called.
     """
     require(group, name)
-    found = _added(group)[name]
+    found = tuple(entry_points(group=group, name=name))
     if len(found) > 1:
         raise UsageError(
             f"{_KIND[group]} {name!r} is added by several packages: "
@@ -100,18 +103,9 @@ def origin(group: str, name: str) -> str:
         return ""
     return ", ".join(
         f"{entry.dist.name} {entry.dist.version}"
-        for entry in _added(group).get(name, ())
+        for entry in entry_points(group=group, name=name)
         if entry.dist
     )
-
-
-def _added(group: str) -> dict[str, list[EntryPoint]]:
-    """Return what other packages add to a group, by name."""
-    added: dict[str, list[EntryPoint]] = {}
-    for entry in entry_points(group=group):
-        if entry.name not in BUILT_IN[group]:
-            added.setdefault(entry.name, []).append(entry)
-    return added
 
 
 def fault(group: str, name: str, what: str) -> MachineError:
