@@ -22,8 +22,8 @@ PLAN_FORMAT = 1
 DRIVEN_PLAN = "driven_plan"
 """Name of the files of a plan that was joined on the way."""
 
-_CONTENT = ".content"
-_FACTOR = ".rolling_factor"
+_BY_ROBOT = {"content_J": ".content", "rolling_factor": ".rolling_factor"}
+"""Fields with an array for each robot, and what follows its id in the array's name."""
 
 
 class PlanStatus(Enum):
@@ -204,31 +204,28 @@ class Plan:
     def save(self, folder: Path, name: str = "plan") -> None:
         """Write `<name>.npz`, then `<name>.json`; equal plans give equal bytes."""
         arrays = {
-            f"{robot}{_CONTENT}": value for robot, value in self.content_J.items()
+            f"{robot}{ending}": value
+            for field_name, ending in _BY_ROBOT.items()
+            for robot, value in getattr(self, field_name).items()
         }
-        for robot, value in self.rolling_factor.items():
-            arrays[f"{robot}{_FACTOR}"] = value
         for trajectory in self.trajectories:
             arrays[f"{trajectory.robot}.state"] = trajectory.state
             arrays[f"{trajectory.robot}.control"] = trajectory.control
         storage.write_arrays(folder / f"{name}.npz", arrays)
         # Not part of the digest: the scene decides it, and older plans lack it.
-        motions = {each.robot: each.motion for each in self.trajectories}
-        header = {**self._header(), "motions": motions, **self._kept()}
-        storage.write_json(folder / f"{name}.json", header)
-
-    def _kept(self) -> dict[str, Any]:
-        kept = {
-            robot: {"obstacle": obstacle_m, "robot": robot_m}
-            for robot, (obstacle_m, robot_m) in self.margins.items()
+        later = {
+            "motions": {each.robot: each.motion for each in self.trajectories},
+            "margins": {
+                robot: {"obstacle": obstacle_m, "robot": robot_m}
+                for robot, (obstacle_m, robot_m) in self.margins.items()
+            },
+            "narrow": [asdict(each) for each in self.narrow],
+            "skipped": dict(self.skipped),
         }
-        narrow = [asdict(each) for each in self.narrow]
-        return {"margins": kept, "narrow": narrow, "skipped": dict(self.skipped)}
-
-    def _makers(self) -> dict[str, str]:
-        return {"planner": self.planner, "router": self.router}
+        storage.write_json(folder / f"{name}.json", {**self._header(), **later})
 
     def _header(self) -> dict[str, Any]:
+        makers = {"planner": self.planner, "router": self.router}
         return {
             "format": PLAN_FORMAT,
             "scene_name": self.scene_name,
@@ -237,7 +234,7 @@ class Plan:
             "profile": self.profile,
             "parameters_digest": self.parameters_digest,
             "versions": dict(self.versions),
-            **{name: made for name, made in self._makers().items() if made},
+            **{name: made for name, made in makers.items() if made},
             "dt_s": self.dt_s,
             "robots": [trajectory.robot for trajectory in self.trajectories],
             "tours": {robot: list(tour) for robot, tour in self.tours.items()},
@@ -288,22 +285,20 @@ def _plan_of(stated: bytes, packed: bytes, name: str) -> Plan:
         robot: (kept["obstacle"], kept["robot"])
         for robot, kept in header.get("margins", {}).items()
     }
+    by_robot = {
+        field_name: {
+            key.removesuffix(ending): value
+            for key, value in arrays.items()
+            if key.endswith(ending)
+        }
+        for field_name, ending in _BY_ROBOT.items()
+    }
     found = {
         "trajectories": trajectories,
         "ledger": {"entries": header["ledger"]},
-        "content_J": _by_robot(arrays, _CONTENT),
-        "rolling_factor": _by_robot(arrays, _FACTOR),
         "margins": margins,
     }
-    return storage.typed(Plan, header | found)
-
-
-def _by_robot(arrays: Mapping[str, np.ndarray], suffix: str) -> dict[str, np.ndarray]:
-    return {
-        name.removesuffix(suffix): value
-        for name, value in arrays.items()
-        if name.endswith(suffix)
-    }
+    return storage.typed(Plan, header | found | by_robot)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
