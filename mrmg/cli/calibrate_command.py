@@ -14,6 +14,7 @@ from mrmg.counted import counted
 from mrmg.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
+    from mrmg.scene.robot_model import RobotModel
     from mrmg.studies.calibration import Calibration, LogCalibration
 
 
@@ -52,23 +53,13 @@ def calibrate(options: argparse.Namespace) -> int:
     """Calibrate a robot model, and leave a calibrated copy with the plot of the fit."""
     if options.groups:
         return _calibrate_from_logs(options)
-    from mrmg.runs.replacing import require_absent
-    from mrmg.scene.loading.models import load_model
-    from mrmg.studies.calibration import (
-        calibrate,
-        require_other_folder,
-        write_calibration,
-    )
+    from mrmg.studies.calibration import calibrate, write_calibration
     from mrmg.viz.calibration_plot import draw_calibration
     from mrmg.viz.figures import require_format
 
-    folder = folder_of_model(options.model)
-    out = options.out or Path(f"calibrated-{folder.name}")
+    model, folder, out = _model_and_places(options)
     plot = options.plot or out / "calibration.png"
     require_format(plot)
-    require_other_folder(folder, out)
-    require_absent(out, overwrite=options.overwrite)
-    model, _ = load_model(folder, trust_code=options.trust_code)
     with terminal.progress_of("measuring") as on_progress:
         calibration = calibrate(model, on_progress=on_progress, **given(options))
     with writing_to(out, overwrite=options.overwrite):
@@ -82,13 +73,10 @@ def calibrate(options: argparse.Namespace) -> int:
 def _calibrate_from_logs(options: argparse.Namespace) -> int:
     """Fit a robot model to logs, and leave a calibrated copy with page and terrain."""
     from mrmg.report.log_page import calibration_html
-    from mrmg.runs.replacing import require_absent
-    from mrmg.scene.loading.models import load_model
     from mrmg.storage import write_text
     from mrmg.studies.calibration import (
         calibrate_from_logs,
         read_run,
-        require_other_folder,
         write_calibration,
         write_terrain,
     )
@@ -99,11 +87,7 @@ def _calibrate_from_logs(options: argparse.Namespace) -> int:
             f"--plot is of MuJoCo; with --log the plots are in {PAGE_FILE}"
         )
     logs, tests = log_options.files_by_use(options.groups)
-    folder = folder_of_model(options.model)
-    out = options.out or Path(f"calibrated-{folder.name}")
-    require_other_folder(folder, out)
-    require_absent(out, overwrite=options.overwrite)
-    model, _ = load_model(folder, trust_code=options.trust_code)
+    model, folder, out = _model_and_places(options)
     runs, tested = (
         [read_run(file, terrain, model) for file, terrain in named]
         for named in (logs, tests)
@@ -118,6 +102,24 @@ def _calibrate_from_logs(options: argparse.Namespace) -> int:
     lines = [*_log_lines(calibration), *files]
     terminal.print_result(options, calibration.to_json(), lines)
     return ExitCode.OK
+
+
+def _model_and_places(options: argparse.Namespace) -> tuple[RobotModel, Path, Path]:
+    """Return the model to calibrate, its folder, and where the copy is to lie.
+
+    Raises:
+        UsageError: if there is no such model, or something lies where the copy would.
+    """
+    from mrmg.runs.replacing import require_absent
+    from mrmg.scene.loading.models import load_model
+    from mrmg.studies.calibration import require_other_folder
+
+    folder = folder_of_model(options.model)
+    out = options.out or Path(f"calibrated-{folder.name}")
+    require_other_folder(folder, out)
+    require_absent(out, overwrite=options.overwrite)
+    model, _ = load_model(folder, trust_code=options.trust_code)
+    return model, folder, out
 
 
 @contextmanager
