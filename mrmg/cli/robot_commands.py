@@ -119,11 +119,7 @@ def new_robot(options: argparse.Namespace) -> int:
     folder = Path(options.name)
     for file in written(folder, like=options.like):
         print(file)
-    name = shlex.quote(str(folder))
-    reference = str(folder) if folder.is_absolute() else f"./{folder}"
-    print(f"next, after changing both files:\n  mrmg robot check {name}")
-    print(f"  mrmg calibrate {name}")
-    print(f"in a scene: {{id: r1, model: {reference}, pose: [5, 5, 0]}}")
+    _print_next(folder, "next, after changing both files")
     return ExitCode.OK
 
 
@@ -150,11 +146,16 @@ def import_robot(options: argparse.Namespace) -> int:
     print("not in the file, and assumed (marked in robot.yaml):")
     for line in found.assumed:
         print(f"  {line}")
+    _print_next(folder, "next")
+    return ExitCode.OK
+
+
+def _print_next(folder: Path, when: str) -> None:
+    """Print what may be done with the folder of a new model."""
     name = shlex.quote(str(folder))
     reference = str(folder) if folder.is_absolute() else f"./{folder}"
-    print(f"next:\n  mrmg robot check {name}\n  mrmg calibrate {name}")
+    print(f"{when}:\n  mrmg robot check {name}\n  mrmg calibrate {name}")
     print(f"in a scene: {{id: r1, model: {reference}, pose: [5, 5, 0]}}")
-    return ExitCode.OK
 
 
 def list_robots(options: argparse.Namespace) -> int:
