@@ -39,8 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return int(code)
     except MrmgError as error:
-        print(f"mrmg: {_printable(str(error))}", file=sys.stderr)
-        return int(error.exit_code)
+        return _refused(str(error), error.exit_code)
     except KeyboardInterrupt:
         print(interruption.MESSAGE, file=sys.stderr)
         return interruption.EXIT_CODE
@@ -50,8 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return int(ExitCode.OK)
         about = f"{error.filename}: {error.strerror}" if error.filename else error
-        print(_printable(f"mrmg: cannot read or write {about}"), file=sys.stderr)
-        return int(ExitCode.MACHINE)
+        return _refused(f"cannot read or write {about}", ExitCode.MACHINE)
     except Exception as error:
         altered = [*_altered_files(vars(options).values())]
         if not altered:
@@ -59,9 +57,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         reason = f"{type(error).__name__}: {error}".partition("\n")[0]
         message = "not as this version of mrmg wrote it, and of no use"
         remedy = "'mrmg run SCENE --out RUN --overwrite' makes all anew"
-        text = f"mrmg: {altered[0]}: {message} ({reason}); {remedy}"
-        print(_printable(text), file=sys.stderr)
-        return int(ExitCode.INVALID_FILE)
+        text = f"{altered[0]}: {message} ({reason}); {remedy}"
+        return _refused(text, ExitCode.INVALID_FILE)
+
+
+def _refused(text: str, code: ExitCode) -> int:
+    """Print why a command ends with an exit code."""
+    print(_printable(f"mrmg: {text}"), file=sys.stderr)
+    return int(code)
 
 
 def _altered_files(values: Iterable[Any]) -> Iterator[Path]:
