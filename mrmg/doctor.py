@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import platform
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
@@ -24,14 +23,17 @@ class Finding:
     Attributes:
         name: of the thing.
         found: what is there.
-        ok: False where something that is needed is missing.
-        remedy: what to do about it; "" where nothing is to be done.
+        remedy: what to do where something that is needed is missing, else "".
     """
 
     name: str
     found: str
-    ok: bool = True
     remedy: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing that is needed is missing."""
+        return not self.remedy
 
 
 def examine() -> list[Finding]:
@@ -51,10 +53,7 @@ def required_packages() -> list[str]:
 
 def _python() -> Finding:
     found = f"mrmg {__version__} on Python {platform.python_version()}"
-    good = sys.version_info >= (3, 11)
-    return Finding(
-        name="python", found=found, ok=good, remedy="" if good else "use Python >= 3.11"
-    )
+    return Finding(name="python", found=found)
 
 
 def _cpu() -> Finding:
@@ -75,24 +74,19 @@ def _packages() -> Iterator[Finding]:
         try:
             yield Finding(name=name, found=version(name))
         except PackageNotFoundError:
-            yield Finding(
-                name=name,
-                found="not installed",
-                ok=False,
-                remedy=f"pip install {name}",
-            )
+            remedy = f"pip install {name}"
+            yield Finding(name=name, found="not installed", remedy=remedy)
 
 
 def _shipped_files() -> Finding:
     scenes, models = shipped.scene_names(), shipped.model_names()
-    complete = bool(scenes and models)
+    again = "install mrmg again: its scenes or models are gone"
     return Finding(
         name="shipped files",
         found=", ".join(
             (counted(len(scenes), "scene"), counted(len(models), "robot model"))
         ),
-        ok=complete,
-        remedy="" if complete else "install mrmg again: its scenes or models are gone",
+        remedy="" if scenes and models else again,
     )
 
 
@@ -106,7 +100,6 @@ def _kernel_cache() -> Finding:
         return Finding(
             name="kernel cache",
             found=f"{nearest} cannot be written",
-            ok=False,
             remedy="set NUMBA_CACHE_DIR to a folder that can be written",
         )
     state = (
@@ -124,9 +117,5 @@ def _offscreen_drawing() -> Finding:
         return Finding(name="offscreen GL", found=choose_backend())
     except MachineError as error:
         found, _, remedy = str(error).partition("\n")
-        return Finding(
-            name="offscreen GL",
-            found=found,
-            ok=False,
-            remedy=remedy.replace("\n", "; "),
-        )
+        remedy = remedy.replace("\n", "; ")
+        return Finding(name="offscreen GL", found=found, remedy=remedy)

@@ -33,7 +33,8 @@ def doctor(options: argparse.Namespace) -> int:
         lines.append(f"{mark} {finding.name:<14} {finding.found}")
         if finding.remedy:
             lines.append(f"{'':22} remedy: {finding.remedy}")
-    terminal.print_result(options, [asdict(each) for each in findings], lines)
+    found = [{**asdict(each), "ok": each.ok} for each in findings]
+    terminal.print_result(options, found, lines)
     return ExitCode.OK if all(item.ok for item in findings) else ExitCode.MACHINE
 
 
