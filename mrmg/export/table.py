@@ -24,14 +24,12 @@ class Format:
     """A format that a run can be exported to; a module calls its own `FORMAT`.
 
     Attributes:
-        description: what it is, for the command line.
         suffix: of its file; "" of a format that is a folder of files.
         versions: of its standard that can be written; all of them are by default.
         files: returns the files of a mission in the versions asked for. A single file
             is called "mission" with its suffix.
     """
 
-    description: str
     suffix: str = ""
     versions: tuple[str, ...] = ()
     files: Callable[[Mission, tuple[str, ...]], Files]

@@ -34,8 +34,4 @@ def _rows(course: Course) -> list[tuple[object, ...]]:
     return list(zip(robots, *columns, course.target.tolist(), strict=True))
 
 
-FORMAT = Format(
-    description="a table of time, pose, speed, charge and target of every robot",
-    suffix=".csv",
-    files=files,
-)
+FORMAT = Format(suffix=".csv", files=files)

@@ -118,8 +118,4 @@ def _feature(shape: BaseGeometry, **properties: Any) -> dict[str, Any]:
     }
 
 
-FORMAT = Format(
-    description="map, goals, robots and their paths as features, for GIS",
-    suffix=".geojson",
-    files=files,
-)
+FORMAT = Format(suffix=".geojson", files=files)

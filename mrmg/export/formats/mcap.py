@@ -133,20 +133,19 @@ def _still(
 ) -> Iterator[_Message]:
     """Yield what does not change: map, scene, shapes of the robots, and paths."""
     scene = mission.scene
-    grid = ros.encoded(_GRID, occupancy_grid(ros, scene))
-    yield _Message(0.0, "/map", _GRID, grid)
-    things = ros.encoded(_MARKERS, scene_markers(ros, scene))
-    yield _Message(0.0, "/scene", _MARKERS, things)
-    robots = ros.encoded(_MARKERS, robot_markers(ros, scene, names))
-    yield _Message(0.0, "/robots", _MARKERS, robots)
-    motions: list[tuple[str, Motion]] = [
-        ("planned", trajectory) for trajectory in mission.plan.trajectories
+    shown = [
+        ("/map", _GRID, occupancy_grid(ros, scene)),
+        ("/scene", _MARKERS, scene_markers(ros, scene)),
+        ("/robots", _MARKERS, robot_markers(ros, scene, names)),
     ]
-    if mission.log is not None:
-        motions += [("driven", motion) for motion in mission.log.driven_motions()]
-    for kind, motion in motions:
-        path = ros.encoded(_PATH, _path(ros, scene, motion))
-        yield _Message(0.0, f"/{names[motion.robot]}/{kind}_path", _PATH, path)
+    driven = mission.log.driven_motions() if mission.log is not None else ()
+    for word, motions in (("planned", mission.plan.trajectories), ("driven", driven)):
+        shown += [
+            (f"/{names[each.robot]}/{word}_path", _PATH, _path(ros, scene, each))
+            for each in motions
+        ]
+    for topic, kind, message in shown:
+        yield _Message(0.0, topic, kind, ros.encoded(kind, message))
 
 
 def _path(ros: RosTypes, scene: Scene, motion: Motion) -> Any:
@@ -271,8 +270,4 @@ def _poses_3d(scene: Scene, state: np.ndarray) -> np.ndarray:
     return np.column_stack([lifted(scene, points, 0.0), turn])
 
 
-FORMAT = Format(
-    description="a recording of ROS 2 messages, for Foxglove, RViz and others",
-    suffix=".mcap",
-    files=files,
-)
+FORMAT = Format(suffix=".mcap", files=files)

@@ -295,8 +295,4 @@ def _rounded(value: float) -> float:
     return round(float(value), _DECIMALS) + 0.0
 
 
-FORMAT = Format(
-    description="orders and states for fleet managers",
-    versions=("2.1.0", "3.0.0"),
-    files=files,
-)
+FORMAT = Format(versions=("2.1.0", "3.0.0"), files=files)
