@@ -200,10 +200,18 @@ class RunArguments(Checked):
 
     @staticmethod
     def from_json(data: Mapping[str, Any]) -> RunArguments:
-        """Rebuild arguments from `to_json`, also of versions that knew fewer."""
-        named = {keyword(name): value for name, value in data.items()}
-        video = VideoArguments(**named.pop("video", {}))
-        return RunArguments(**named, video=video)
+        """Rebuild arguments from `to_json`, also of versions that knew fewer.
+
+        Raises:
+            UsageError: if they are damaged, or of a later version.
+        """
+        try:
+            named = {keyword(name): value for name, value in data.items()}
+            video = VideoArguments(**named.pop("video", {}))
+            return RunArguments(**named, video=video)
+        except (*storage.UNREADABLE, UsageError) as error:
+            message = f"arguments that this version does not know ({error})"
+            raise UsageError(message) from error
 
 
 def recorded(folder: RunFolder) -> RunArguments:
@@ -214,9 +222,8 @@ def recorded(folder: RunFolder) -> RunArguments:
     """
     try:
         return RunArguments.from_json(folder.arguments())
-    except (*storage.UNREADABLE, UsageError) as error:
-        message = f"arguments that this version does not know ({error})"
-        fault = Fault("run.json", f"{message}; run 'mrmg run' into another folder")
+    except UsageError as error:
+        fault = Fault("run.json", f"{error}; run 'mrmg run' into another folder")
         raise RunFolderError(str(folder.path), [fault]) from error
 
 

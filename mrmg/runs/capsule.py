@@ -10,7 +10,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,6 @@ import numpy as np
 from mrmg import storage
 from mrmg.errors import Fault, FileError
 from mrmg.scene.loading.carrying import safe_path
-from mrmg.scene.model_files import MODELS_FOLDER
 from mrmg.simulation.log import ExecutionLog, package_versions
 
 CAPSULE_FORMAT = 2
@@ -48,6 +47,8 @@ class Failure:
         last: the last states by name of the log's arrays, up to `LAST_TICKS` of them.
         versions: of the packages that decided the outcome.
     """
+
+    __pydantic_config__ = storage.WITH_ARRAYS
 
     causes: tuple[str, ...]
     reasons: tuple[str, ...]
@@ -107,7 +108,7 @@ class Capsule:
         folder: Path,
         arguments: Mapping[str, Any],
         failure: Failure,
-        carried: Mapping[str, bytes] | None = None,
+        carried: Mapping[str, bytes],
     ) -> Capsule:
         """Return the capsule of an execution of the plan that lies in a run folder.
 
@@ -115,35 +116,20 @@ class Capsule:
             folder: of the run.
             arguments: of the run, as JSON data.
             failure: what came of it.
-            carried: the scene and its models (`scene.loading.carrying`); those of the
-                folder if None.
+            carried: the scene and its models (`scene.loading.carrying`).
         """
         files = {name: (folder / name).read_bytes() for name in _RUN_FILES}
-        if carried is None:
-            found = sorted((folder / MODELS_FOLDER).rglob("*"))
-            models = [path for path in found if path.is_file()]
-            carried = {
-                path.relative_to(folder).as_posix(): path.read_bytes()
-                for path in models
-            }
-        files |= carried
-        return Capsule(arguments=arguments, failure=failure, files=files)
+        return Capsule(arguments=arguments, failure=failure, files={**files, **carried})
 
     def save(self, path: Path) -> None:
         """Write the capsule; equal ones give equal bytes."""
-        failure = self.failure
-        header = {
-            "format": CAPSULE_FORMAT,
-            "arguments": self.arguments,
-            "causes": failure.causes,
-            "reasons": failure.reasons,
-            "log_digest": failure.log_digest,
-            "versions": dict(failure.versions),
-        }
+        failure = asdict(self.failure)
+        last = storage.array_bytes(failure.pop("last"))
+        header = {"format": CAPSULE_FORMAT, "arguments": self.arguments, **failure}
         members = {
             _HEADER: storage.canonical_json(header).encode(),
             **self.files,
-            _LAST: storage.array_bytes(failure.last),
+            _LAST: last,
         }
         buffer = io.BytesIO()
         with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -163,16 +149,11 @@ class Capsule:
         try:
             members = _members(path)
             header = storage.json_of(members.pop(_HEADER))
-            if header["format"] not in (1, CAPSULE_FORMAT):
+            if header.pop("format") not in (1, CAPSULE_FORMAT):
                 raise ValueError(f"this version reads formats 1 and {CAPSULE_FORMAT}")
-            failure = Failure(
-                causes=tuple(header["causes"]),
-                reasons=tuple(header["reasons"]),
-                log_digest=header["log_digest"],
-                last=storage.arrays_of(members.pop(_LAST), _LAST),
-                versions=dict(header["versions"]),
-            )
-            arguments = dict(header["arguments"])
+            arguments = dict(header.pop("arguments"))
+            last = storage.arrays_of(members.pop(_LAST), _LAST)
+            failure = storage.typed(Failure, {**header, "last": last})
             return Capsule(arguments=arguments, failure=failure, files=members)
         except OSError as error:
             raise _refused(path, f"cannot be read ({error.strerror})") from error

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from mrmg import storage
 from mrmg.errors import Fault, FileError, UsageError
 from mrmg.plans import Plan
 from mrmg.runs.arguments import RunArguments, recorded
@@ -50,8 +49,7 @@ class Reproduction:
         """How far the last positions differ at most; None if not comparable."""
         if self.after is None:
             return None
-        places = [failure.last.get("state") for failure in (self.before, self.after)]
-        before, after = places
+        before, after = self.before.last.get("state"), self.after.last.get("state")
         if before is None or after is None or before.shape != after.shape:
             return None
         return float(np.hypot(*(after - before)[..., :2].T).max())
@@ -82,22 +80,21 @@ class Reproduction:
 
     def to_json(self) -> dict[str, Any]:
         """Return the comparison as JSON data."""
-        after = self.after
         return {
             "verdict": self.verdict(),
             "same_causes": self.same_causes,
             "same_bits": self.same_bits,
             "drift_m": self.drift_m,
-            "before": {
-                "causes": list(self.before.causes),
-                "reasons": list(self.before.reasons),
-            },
-            "after": after
-            and {"causes": list(after.causes), "reasons": list(after.reasons)},
+            "before": _why(self.before),
+            "after": self.after and _why(self.after),
             "changed_versions": {
                 name: list(pair) for name, pair in self.changed_versions.items()
             },
         }
+
+
+def _why(failure: Failure) -> dict[str, list[str]]:
+    return {"causes": list(failure.causes), "reasons": list(failure.reasons)}
 
 
 def reproduce(
@@ -122,8 +119,7 @@ def reproduce(
         UsageError: if `out` holds something else that is not to be replaced.
     """
     capsule = Capsule.load(path)
-    arguments = _arguments(capsule, path)
-    _require_usable(capsule, path, arguments, trust_code)
+    arguments = _checked_arguments(capsule, path, trust_code)
     folder = RunFolder(out)
     with folder.opened_for_writing():
         repeated = capsule.lies_in(out) and recorded(folder) == arguments
@@ -151,13 +147,16 @@ def reproduce(
     return Reproduction(before=capsule.failure, after=after)
 
 
-def _require_usable(
-    capsule: Capsule, path: Path, arguments: RunArguments, trust_code: bool
-) -> None:
-    """Refuse a capsule that cannot be driven from, before there is a folder."""
+def _checked_arguments(capsule: Capsule, path: Path, trust_code: bool) -> RunArguments:
+    """Return the arguments of a capsule, of which all can be used.
+
+    Raises:
+        FileError: if not; there is no run folder yet.
+    """
     with tempfile.TemporaryDirectory(prefix="mrmg-") as place:
         capsule.unpack(Path(place))
         try:
+            arguments = RunArguments.from_json(capsule.arguments)
             scene = load_scene(Path(place) / "scene.yaml", trust_code=trust_code)
             require_same_mission(scene, Plan.load(Path(place)))
             checked_drive(scene, arguments)
@@ -165,11 +164,4 @@ def _require_usable(
             raise FileError(str(path), error.faults) from error
         except UsageError as error:
             raise FileError(str(path), [Fault("capsule.json", str(error))]) from error
-
-
-def _arguments(capsule: Capsule, path: Path) -> RunArguments:
-    try:
-        return RunArguments.from_json(dict(capsule.arguments))
-    except (*storage.UNREADABLE, UsageError) as error:
-        fault = Fault("capsule.json", f"arguments this version does not know ({error})")
-        raise FileError(str(path), [fault]) from error
+    return arguments

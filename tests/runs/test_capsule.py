@@ -26,7 +26,8 @@ def log(quickstart_run: Path) -> ExecutionLog:
 @pytest.fixture(scope="session")
 def capsule(quickstart_run: Path, log: ExecutionLog) -> Capsule:
     failure = Failure.of(log, ("contact",), ("r1 touched rock",))
-    return Capsule.of_run(quickstart_run, {"seed": 0, "profile": "default"}, failure)
+    arguments = {"seed": 0, "profile": "default"}
+    return Capsule.of_run(quickstart_run, arguments, failure, {})
 
 
 @pytest.fixture
@@ -183,7 +184,7 @@ def test_flipped_bytes_are_noticed_or_harmless(saved: Path) -> None:
 
 def test_a_crash_is_kept_without_states(quickstart_run: Path, tmp_path: Path) -> None:
     failure = Failure.of_crash(ZeroDivisionError("division by zero"))
-    Capsule.of_run(quickstart_run, {}, failure).save(tmp_path / "crash.zip")
+    Capsule.of_run(quickstart_run, {}, failure, {}).save(tmp_path / "crash.zip")
     loaded = Capsule.load(tmp_path / "crash.zip").failure
     assert loaded.causes == ("crash",)
     assert loaded.reasons == ("ZeroDivisionError: division by zero",)

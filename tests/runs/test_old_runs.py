@@ -75,7 +75,7 @@ def test_a_capsule_of_format_1_is_replayed(
     arguments = json.loads((quickstart_run / "run.json").read_text())["arguments"]
     failure = Failure.of(ExecutionLog.load(quickstart_run), ("contact",), ("touched",))
     new = tmp_path / "new.zip"
-    Capsule.of_run(quickstart_run, arguments, failure).save(new)
+    Capsule.of_run(quickstart_run, arguments, failure, {}).save(new)
     path = tmp_path / "old.zip"
     with zipfile.ZipFile(new) as source, zipfile.ZipFile(path, "w") as target:
         for name in source.namelist():

@@ -21,6 +21,7 @@ from mrmg.motion.user_motion import user_motion
 from mrmg.runs.arguments import RunArguments
 from mrmg.runs.capsule import Capsule, Failure
 from mrmg.scene.loading import load_scene
+from mrmg.scene.loading.carrying import carried_files
 from mrmg.scene.loading.models import load_model
 
 SLIDER = (Path(__file__).parents[3] / "tools" / "first_order.py").read_text()
@@ -108,7 +109,8 @@ def planned(tmp_path_factory: pytest.TempPathFactory) -> Foreign:
     assert foreign.plan() == ExitCode.OK
     assert foreign.marker.exists()
     failure = Failure.of_crash(ValueError("no log"))
-    capsule = Capsule.of_run(foreign.run, RunArguments().to_json(), failure)
+    carried = carried_files(load_scene(foreign.run / "scene.yaml", trust_code=True))
+    capsule = Capsule.of_run(foreign.run, RunArguments().to_json(), failure, carried)
     capsule.save(foreign.folder / "capsule.zip")
     return foreign
 
