@@ -115,7 +115,7 @@ def execute(options: argparse.Namespace) -> int:
     driven = log["completed"] and not lost
     ended = "driven to the end" if driven else "given up on the way"
     events = [f"{item['time_s']:>7.1f} s  {item['message']}" for item in log["events"]]
-    account = work.account(work.plan_in_force(), work.log())
+    account = work.account()
     contacts = counted(len(log["contacts"]), "contact")
     lines = [
         *terminal.because(f"{ended}, {contacts}", account.reasons),

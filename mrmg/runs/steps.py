@@ -124,8 +124,8 @@ class Run:
 
         return ExecutionLog.load(self.folder.path)
 
-    def account(self, plan: Plan, log: ExecutionLog) -> EnergyAudit:
-        """Return the audit of the folder's drive of a plan, made once for its files."""
+    def account(self) -> EnergyAudit:
+        """Return the audit of the folder's drive, made once for its files."""
         from mrmg.energy.audit import audit
 
         decided = self.arguments.deciding("audit")
@@ -133,7 +133,9 @@ class Run:
         made_of = storage.canonical_json([self.scene.digest, decided, files])
         if made_of not in _last_audit:
             _last_audit.clear()
-            _last_audit[made_of] = audit(self.scene, plan, log, **decided)
+            _last_audit[made_of] = audit(
+                self.scene, self.plan_in_force(), self.log(), **decided
+            )
         return _last_audit[made_of]
 
     def reason(self) -> str:
@@ -260,7 +262,7 @@ def _execute(run: Run) -> Write:
         from mrmg.energy.mission_failures import GOAL_SKIPPED
 
         driven.save(run.folder.path)
-        account = run.account(driven.plan, driven.log)
+        account = run.account()
         # A drive that only took another energy has nothing to be repeated for.
         if {*account.causes} - {MODEL_MISMATCH, GOAL_SKIPPED}:
             _keep(run, Failure.of(driven.log, account.causes, account.reasons))
@@ -279,7 +281,7 @@ def _keep(run: Run, failure: Failure) -> Path:
 
 
 def _audit(run: Run) -> Write:
-    account = run.account(run.plan_in_force(), run.log())
+    account = run.account()
     return lambda: account.save(run.folder.path)
 
 
@@ -305,17 +307,14 @@ def _render(run: Run) -> Write:
 
     plan, log = run.plan_in_force(), run.log()
     asked = asdict(run.arguments.video) | {"on_progress": run.progress_of(Step.RENDER)}
-    with_gif = asked.pop("gif")
-    made = {}
-    if with_gif:
-        made["mission.gif"] = run.folder.unfinished("mission.gif")
-        render_gif(run.scene, plan, log, made["mission.gif"], **asked)
-    made["mission.mp4"] = run.folder.unfinished("mission.mp4")
-    render_video(run.scene, plan, log, made["mission.mp4"], **asked)
+    films = {"mission.gif": render_gif} if asked.pop("gif") else {}
+    films["mission.mp4"] = render_video
+    for name, film in films.items():
+        film(run.scene, plan, log, run.folder.unfinished(name), **asked)
 
     def write() -> None:
-        for name, path in made.items():
-            path.replace(run.folder.file(name))
+        for name in films:
+            run.folder.unfinished(name).replace(run.folder.file(name))
 
     return write
 
