@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import argparse
 import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrmg.cli import terminal
@@ -94,6 +97,17 @@ def plan(options: argparse.Namespace) -> int:
     return ExitCode.MISSION_FAILED if skipped else work.status().exit_code
 
 
+@contextmanager
+def opened_run(path: Path, *, trust_code: bool) -> Iterator[Run]:
+    """Take up the run of a folder, show its progress, and keep other commands out."""
+    from mrmg.runs.folder import existing
+    from mrmg.runs.steps import taken_up
+
+    folder = existing(path)
+    with folder.opened_for_writing(), terminal.progress() as on_progress:
+        yield taken_up(folder, on_progress, trust_code=trust_code)
+
+
 def verify(options: argparse.Namespace) -> int:
     """Judge the plan of a run folder."""
     from mrmg.runs.folder import Step
@@ -133,14 +147,13 @@ def _driven(options: argparse.Namespace) -> tuple[Run, str]:
     A drive other than that of the run goes to a folder of its own.
     """
     from mrmg.runs.drive import checked_drive
-    from mrmg.runs.folder import RunFolder, existing
+    from mrmg.runs.folder import RunFolder
     from mrmg.runs.separate_drives import (
         begin_drive,
         drive_again,
         drive_apart,
         folder_beside,
     )
-    from mrmg.runs.steps import taken_up
     from mrmg.simulation.log import require_same_mission
 
     undisturbed = RunArguments().deciding("drive")
@@ -148,8 +161,8 @@ def _driven(options: argparse.Namespace) -> tuple[Run, str]:
         del undisturbed[name]
     again = {"overwrite": options.overwrite}
     kept = "driven before, --overwrite drives again"
-    with existing(options.run).opened_for_writing() as folder, terminal.progress() as p:
-        run = taken_up(folder, p, trust_code=options.trust_code)
+    with opened_run(options.run, trust_code=options.trust_code) as run:
+        folder = run.folder
         drive = {**undisturbed, **given(options)}
         asked = checked_drive(run.scene, replace(run.arguments, **drive))
         own = asked.deciding("drive") == run.arguments.deciding("drive")
@@ -211,12 +224,10 @@ def _make(
 ) -> Run:
     """Make steps of a run anew, with some of its arguments changed."""
     from mrmg.runs.drive import checked_drive
-    from mrmg.runs.folder import Step, existing
-    from mrmg.runs.steps import taken_up
+    from mrmg.runs.folder import Step
 
-    folder = existing(options.run)
-    with folder.opened_for_writing(), terminal.progress() as on_progress:
-        work = taken_up(folder, on_progress, trust_code=options.trust_code)
+    with opened_run(options.run, trust_code=options.trust_code) as work:
+        folder = work.folder
         changed = work.arguments.changed(video or {}, **changes)
         work = replace(work, arguments=checked_drive(work.scene, changed))
         shown = [step for step in (Step.DRAW, Step.REPORT) if folder.holds(step)]

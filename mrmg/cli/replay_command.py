@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrmg.cli import show_commands, terminal
+from mrmg.cli.commands import opened_run
 from mrmg.errors import ExitCode
 
 if TYPE_CHECKING:
@@ -56,14 +57,10 @@ def replay(options: argparse.Namespace) -> int:
 
 
 def _render(folder: Path, trust_code: bool) -> None:
-    from mrmg.runs.folder import Step, existing
-    from mrmg.runs.steps import taken_up
+    from mrmg.runs.folder import Step
 
-    with (
-        existing(folder).opened_for_writing() as opened,
-        terminal.progress() as on_progress,
-    ):
-        taken_up(opened, on_progress, trust_code=trust_code).make(Step.RENDER)
+    with opened_run(folder, trust_code=trust_code) as run:
+        run.make(Step.RENDER)
     print(folder / "mission.mp4")
 
 
