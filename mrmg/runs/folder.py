@@ -10,13 +10,12 @@ file is put in place by renaming, so a killed run can be taken up at any moment.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from mrmg import storage
@@ -88,6 +87,11 @@ CLOCK_FILES = ("timing.json",)
 """Outputs that differ between equal executions: they hold readings of the clock."""
 
 
+def _files(step: Step) -> tuple[str, ...]:
+    """Return the names of all files that a step may leave, in their order."""
+    return (*ON_REQUEST.get(step, ()), *OUTPUTS[step])
+
+
 def stale_after(step: Step) -> list[Step]:
     """Return `step` and every step that is made from it, in order."""
     stale = [step]
@@ -155,12 +159,14 @@ class RunFolder:
 
     def content(self, step: Step) -> dict[str, str]:
         """Return a digest of each file that `step` left, those of the clock apart."""
-        names = {*OUTPUTS[step], *ON_REQUEST.get(step, ())} - {*CLOCK_FILES}
-        paths = [self.file(name) for name in sorted(names)]
+        return self._digests(name for name in _files(step) if name not in CLOCK_FILES)
+
+    def _digests(self, names: Iterable[str]) -> dict[str, str]:
+        """Return a digest of each of the named files that is there."""
         return {
-            path.name: storage.bytes_digest(path.read_bytes())
-            for path in paths
-            if path.exists()
+            name: storage.bytes_digest(self.file(name).read_bytes())
+            for name in names
+            if self.file(name).exists()
         }
 
     def begin(
@@ -179,10 +185,13 @@ class RunFolder:
         self._remove([step for step in Step if step in steps], self.arguments())
 
     def _remove(self, steps: list[Step], arguments: dict[str, Any]) -> None:
-        marks = {name: mark for name, mark in self.marks().items() if name not in steps}
-        self._write(arguments, marks)
+        record = self._record()
+        for step in steps:
+            record.finished.pop(step, None)
+            record.files.pop(step, None)
+        self._write(replace(record, arguments=arguments))
         for step in reversed(steps):
-            for name in reversed((*ON_REQUEST.get(step, ()), *OUTPUTS[step])):
+            for name in reversed(_files(step)):
                 self.file(name).unlink(missing_ok=True)
         if Step.PLAN in steps:
             shutil.rmtree(self.file(MODELS_FOLDER), ignore_errors=True)
@@ -191,14 +200,13 @@ class RunFolder:
 
     def finish(self, step: Step, fingerprint: str) -> None:
         """Mark `step` as finished under `fingerprint`."""
-        names = {*OUTPUTS[step], *ON_REQUEST.get(step, ())}
-        made = {
-            name: storage.bytes_digest(self.file(name).read_bytes())
-            for name in sorted(names)
-            if name.endswith(_READ_AGAIN) and self.file(name).exists()
-        }
-        marks = {**self.marks(), str(step): fingerprint}
-        self._write(self.arguments(), marks, {str(step): made})
+        made = self._digests(
+            name for name in _files(step) if name.endswith(_READ_AGAIN)
+        )
+        record = self._record()
+        finished = {**record.finished, str(step): fingerprint}
+        files = {**record.files, str(step): made}
+        self._write(replace(record, finished=finished, files=files))
 
     def altered(self) -> list[str]:
         """Return the files that are not as the steps left them.
@@ -212,11 +220,10 @@ class RunFolder:
             name
             for files in left.values()
             for name, digest in files.items()
-            if not self.file(name).exists()
-            or storage.bytes_digest(self.file(name).read_bytes()) != digest
+            if self._digests([name]) != {name: digest}
         ]
 
-    def read_json(self, name: str, *, remedy: str) -> Any:
+    def read_json(self, name: str, *, remedy: str) -> dict[str, Any]:
         """Read one of the folder's JSON files.
 
         Raises:
@@ -224,7 +231,7 @@ class RunFolder:
         """
         path = self.file(name)
         with storage.damage_reported(path, "not readable", f"run '{remedy}'"):
-            return storage.read_json(path)
+            return dict(storage.read_json(path))
 
     def _record(self) -> _Record:
         if not self.file("run.json").exists():
@@ -234,18 +241,7 @@ class RunFolder:
             content = storage.of_format(path.read_bytes(), RUN_FORMAT)
             return storage.typed(_Record, content)
 
-    def _write(
-        self,
-        arguments: dict[str, Any],
-        marks: dict[str, str],
-        made: Mapping[str, dict[str, str]] = MappingProxyType({}),
-    ) -> None:
-        files = {**self._record().files, **made}
-        record = _Record(
-            arguments=arguments,
-            finished=marks,
-            files={step: files[step] for step in files if step in marks},
-        )
+    def _write(self, record: _Record) -> None:
         storage.write_json(self.file("run.json"), asdict(record))
 
 

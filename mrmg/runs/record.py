@@ -10,8 +10,9 @@ from typing import Any
 from mrmg.energy.audit_record import EnergyAudit
 from mrmg.errors import Fault, RunFolderError
 from mrmg.plans import Plan, PlanStatus, plan_in_force
+from mrmg.runs.folder import RunFolder
 from mrmg.runs.paths import why_no_run
-from mrmg.runs.summary import outcomes_in, read_file, summarize
+from mrmg.runs.summary import outcomes_in, summarize
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
@@ -58,9 +59,8 @@ def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
     """
     if not (run_folder / "planning.json").exists():
         raise RunFolderError(str(run_folder), [_why_no_record(run_folder)])
-    planning = read_file(run_folder, "planning.json", "mrmg plan")
-    has_run = (run_folder / "run.json").exists()
-    run = read_file(run_folder, "run.json", "mrmg run") if has_run else {}
+    run = RunFolder(run_folder)
+    planning = run.read_json("planning.json", remedy="mrmg plan")
     scene = load_scene(run_folder / "scene.yaml", trust_code=trust_code)
     found: dict[str, Any] = dict.fromkeys(("plan", "verdict", "log", "audit"))
     solved = planning["status"] == PlanStatus.SOLVED.value
@@ -71,7 +71,7 @@ def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
         if (run_folder / ROBUSTNESS_FILE).exists():
             found["studies"] = load_studies(run_folder, Plan.load(run_folder))
     if (run_folder / "summary.json").exists():
-        summary = read_file(run_folder, "summary.json", "mrmg report")
+        summary = run.read_json("summary.json", remedy="mrmg report")
     else:
         summary = summarize(scene, run_folder)
     return RunRecord(
@@ -79,7 +79,7 @@ def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
         scene=scene,
         summary=summary,
         planning=planning,
-        arguments=run.get("arguments", {}),
+        arguments=run.arguments(),
         **found,
     )
 

@@ -102,9 +102,7 @@ class Run:
 
     def planning(self) -> dict[str, Any]:
         """Return how planning ended: status, reason, statistics."""
-        return dict(
-            self.folder.read_json("planning.json", remedy="mrmg plan --overwrite")
-        )
+        return self.folder.read_json("planning.json", remedy="mrmg plan --overwrite")
 
     def status(self) -> PlanStatus:
         """Return the status planning ended with."""
@@ -149,7 +147,7 @@ class Run:
 
     def summary(self) -> dict[str, Any]:
         """Return the content of `summary.json`."""
-        return dict(self.folder.read_json("summary.json", remedy="mrmg report"))
+        return self.folder.read_json("summary.json", remedy="mrmg report")
 
     def exit_code(self) -> ExitCode:
         """Return the exit code the whole run ends with."""

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import mrmg
-from mrmg import storage
 from mrmg.energy.audit_record import ENERGY_IMBALANCE, MODEL_MISMATCH, EnergyAudit
 from mrmg.plans import Plan, PlanStatus
+from mrmg.runs.folder import RunFolder
 from mrmg.runs.summary_model import Summary
 from mrmg.scene.margins import sentences_on_margins
 from mrmg.scene.types import Scene
@@ -30,16 +30,16 @@ def summarize(scene: Scene, folder: Path) -> dict[str, Any]:
         RunFolderError: if nothing was planned, a file cannot be read, or plan or log
             are of another scene.
     """
-    planning = read_file(folder, "planning.json", "mrmg plan")
+    run = RunFolder(folder)
+    planning = run.read_json("planning.json", remedy="mrmg plan")
     solved = planning["status"] == PlanStatus.SOLVED.value
     plan = Plan.load(folder) if solved else None
     require_same_mission(scene, plan)
-    if plan is not None:
-        seed = plan.seed
-    else:
-        seed = read_file(folder, "run.json", "mrmg plan")["arguments"]["seed"]
-    outcomes = outcomes_in(folder, scene) if solved else {}
-    return summary_of(scene, planning, seed=seed, plan=plan, **outcomes)
+    if plan is None:
+        seed = run.read_json("run.json", remedy="mrmg plan")["arguments"]["seed"]
+        return summary_of(scene, planning, seed=seed)
+    outcomes = outcomes_in(folder, scene)
+    return summary_of(scene, planning, seed=plan.seed, plan=plan, **outcomes)
 
 
 def outcomes_in(folder: Path, scene: Scene) -> dict[str, Any]:
@@ -197,13 +197,3 @@ def _energy_figures(audit: EnergyAudit) -> dict[str, Any]:
         "min_charge_fraction": min(robot.min_charge_fraction for robot in audit.robots),
         "recharges": len(audit.recharges),
     }
-
-
-def read_file(folder: Path, name: str, remedy: str) -> dict[str, Any]:
-    """Read a JSON file of a run folder.
-
-    Raises:
-        RunFolderError: if it is missing or damaged; names the command `remedy`.
-    """
-    with storage.damage_reported(folder / name, "cannot be read", f"run '{remedy}'"):
-        return dict(storage.read_json(folder / name))

@@ -87,7 +87,9 @@ def fill(folder: Path, scene, plan, log) -> None:
     planning = {"status": "solved", "reason": "", "statistics": STATISTICS}
     storage.write_text(folder / "scene.yaml", dump_scene(scene))
     storage.write_json(folder / "planning.json", planning)
-    storage.write_json(folder / "run.json", {"arguments": {"seed": plan.seed}})
+    storage.write_json(
+        folder / "run.json", {"format": 1, "arguments": {"seed": plan.seed}}
+    )
     plan.save(folder)
     log.save(folder)
     verdict, account = verify(scene, plan), audit(scene, plan, log)
@@ -266,7 +268,7 @@ def test_command_names_a_shipped_scene_only_where_it_is_the_same(
 def test_a_folder_without_a_plan_is_refused(tmp_path) -> None:
     with pytest.raises(RunFolderError, match="planning.json: missing: this is not a"):
         write_report(tmp_path)
-    storage.write_json(tmp_path / "run.json", {"arguments": {}})
+    storage.write_json(tmp_path / "run.json", {"format": 1, "arguments": {}})
     with pytest.raises(RunFolderError, match="the run was stopped early; 'mrmg run"):
         write_report(tmp_path)
     with pytest.raises(RunFolderError, match="no such folder"):
