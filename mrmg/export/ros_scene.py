@@ -71,16 +71,9 @@ def scene_markers(ros: RosTypes, scene: Scene) -> Any:
     line = lifted(scene, border, _LIFT_M)
     markers = [_marker(ros, "bounds", _LINE_STRIP, line, palette.WALL)]
     if scene.elevation is None:
-        markers += [
-            _flat(
-                ros,
-                scene,
-                "terrain",
-                area.shape,
-                palette.terrain_colour(area.multiplier),
-            )
-            for area in scene.terrain
-        ]
+        for area in scene.terrain:
+            color = palette.terrain_colour(area.multiplier)
+            markers.append(_flat(ros, scene, "terrain", area.shape, color))
     else:
         markers.append(_ground(ros, scene))
     markers += [_solid(ros, scene, obstacle) for obstacle in scene.obstacles]
