@@ -80,13 +80,13 @@ def _packages() -> Iterator[Finding]:
 
 def _shipped_files() -> Finding:
     scenes, models = shipped.scene_names(), shipped.model_names()
-    again = "install mrmg again: its scenes or models are gone"
+    remedy = "install mrmg again: its scenes or models are gone"
     return Finding(
         name="shipped files",
         found=", ".join(
             (counted(len(scenes), "scene"), counted(len(models), "robot model"))
         ),
-        remedy="" if scenes and models else again,
+        remedy="" if scenes and models else remedy,
     )
 
 

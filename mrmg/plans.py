@@ -212,8 +212,8 @@ class Plan:
             arrays[f"{trajectory.robot}.state"] = trajectory.state
             arrays[f"{trajectory.robot}.control"] = trajectory.control
         storage.write_arrays(folder / f"{name}.npz", arrays)
-        # Not part of the digest: the scene decides it, and older plans lack it.
-        later = {
+        # The scene decides this, and older plans lack it.
+        not_digested = {
             "motions": {each.robot: each.motion for each in self.trajectories},
             "margins": {
                 robot: {"obstacle": obstacle_m, "robot": robot_m}
@@ -222,7 +222,7 @@ class Plan:
             "narrow": [asdict(each) for each in self.narrow],
             "skipped": dict(self.skipped),
         }
-        storage.write_json(folder / f"{name}.json", {**self._header(), **later})
+        storage.write_json(folder / f"{name}.json", {**self._header(), **not_digested})
 
     def _header(self) -> dict[str, Any]:
         makers = {"planner": self.planner, "router": self.router}

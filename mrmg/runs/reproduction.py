@@ -85,15 +85,15 @@ class Reproduction:
             "same_causes": self.same_causes,
             "same_bits": self.same_bits,
             "drift_m": self.drift_m,
-            "before": _why(self.before),
-            "after": self.after and _why(self.after),
+            "before": _causes_and_reasons(self.before),
+            "after": self.after and _causes_and_reasons(self.after),
             "changed_versions": {
                 name: list(pair) for name, pair in self.changed_versions.items()
             },
         }
 
 
-def _why(failure: Failure) -> dict[str, list[str]]:
+def _causes_and_reasons(failure: Failure) -> dict[str, list[str]]:
     return {"causes": list(failure.causes), "reasons": list(failure.reasons)}
 
 
