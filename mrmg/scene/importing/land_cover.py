@@ -61,6 +61,7 @@ def land_cover_layer(
     table: dict[str, Any],
     shapes_by_class: Iterable[tuple[str, Sequence[BaseGeometry]]],
     frame: Frame,
+    crs: str | None,
     bounds: Box | None,
     notes: Sequence[str],
 ) -> Layer:
@@ -70,6 +71,7 @@ def land_cover_layer(
         table: of classes, as `read_classes` returns it.
         shapes_by_class: names and shapes, in metres of the frame.
         frame: of the layer.
+        crs: coordinate system of the file; None for local metres.
         bounds: of the layer.
         notes: on the file.
     """
@@ -88,6 +90,7 @@ def land_cover_layer(
     areas = counted(len(terrain), "terrain area")
     return Layer(
         frame=frame,
+        crs=crs,
         bounds=bounds,
         obstacles=obstacles,
         terrain=terrain,

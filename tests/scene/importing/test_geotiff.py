@@ -222,6 +222,23 @@ def test_land_cover_raster(tmp_path: Path, write_tiff: Any) -> None:
         assert pond.shape.equals(shapely.box(3, 12, 6, 15))
 
 
+def test_a_part_of_land_cover_far_from_the_origin(
+    tmp_path: Path, write_tiff: Any
+) -> None:
+    table = tmp_path / "classes.yaml"
+    table.write_text("1: {multiplier: 2}\n")
+    keys = {"corner": (450_000.0, 5.3e6), "cell": 2.0, "crs": "EPSG:32632"}
+    cover = write_tiff(tmp_path / "cover.tif", np.ones((30, 40), "uint8"), **keys)
+    box = (450_010.0, 5_299_960.0, 450_050.0, 5_299_980.0)
+    options = ImportOptions(classes=table, crop=box)
+    found = import_files([cover], options, kind="land-cover")
+    scene = scene_from_document(found.document, source="test")
+    x_min, y_min, x_max, y_max = scene.bounds
+    assert (x_max - x_min, y_max - y_min) == pytest.approx((40.0, 20.0))
+    (area,) = scene.terrain
+    assert area.shape.area == pytest.approx(40.0 * 20.0)
+
+
 def test_land_cover_polygons(tmp_path: Path, write_tiff: Any) -> None:
     table = tmp_path / "classes.yaml"
     table.write_text("forest: {multiplier: 3}\nlake: obstacle\n")

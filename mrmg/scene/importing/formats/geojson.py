@@ -63,7 +63,7 @@ def read_geojson(path: Path, options: ImportOptions) -> Layer:
         for feature in features
     ]
     if options.classes is not None and not any("kind" in f.keys for f in features):
-        return _land_cover(features, frame, options, str(path))
+        return _land_cover(features, frame, crs, options, str(path))
     found: dict[str, list[Any]] = {kind: [] for kind in (*KINDS, "lane")}
     for feature in features:
         _add(feature, found)
@@ -85,7 +85,11 @@ def read_geojson(path: Path, options: ImportOptions) -> Layer:
 
 
 def _land_cover(
-    features: Sequence[Feature], frame: Frame, options: ImportOptions, source: str
+    features: Sequence[Feature],
+    frame: Frame,
+    crs: str | None,
+    options: ImportOptions,
+    source: str,
 ) -> Layer:
     table = read_classes(options.classes, source)
     by_class: dict[str, list[BaseGeometry]] = {}
@@ -96,7 +100,7 @@ def _land_cover(
     unnamed, notes = len(features) - len(named), []
     if unnamed:
         notes = [f"{counted(unnamed, 'feature')} without 'class' left out"]
-    return land_cover_layer(table, by_class.items(), frame, None, notes)
+    return land_cover_layer(table, by_class.items(), frame, crs, None, notes)
 
 
 def _add(feature: Feature, found: dict[str, list[Any]]) -> None:

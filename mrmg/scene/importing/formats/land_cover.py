@@ -43,7 +43,7 @@ def read_land_cover(path: Path, options: ImportOptions) -> Layer:
             yield name, [shapely.transform(shape, placed) for shape in shapes]
 
     bounds = shapely.MultiPoint(frame.metres(raster.corners, crs)).bounds
-    return land_cover_layer(table, shapes_by_class(), frame, bounds, notes)
+    return land_cover_layer(table, shapes_by_class(), frame, crs, bounds, notes)
 
 
 FORMAT = Format(
