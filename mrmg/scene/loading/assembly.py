@@ -7,30 +7,38 @@ well-formed entries, also when others are malformed: a user sees everything at o
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import shapely
 from shapely.geometry import Polygon
 
 from mrmg import storage
 from mrmg.errors import Fault, SceneError, nearest
+from mrmg.scene.document import elevation_entry
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.loading.batteries import battery_of
 from mrmg.scene.loading.elevation import elevation_of
 from mrmg.scene.loading.elevation_schema import ElevationEntry
-from mrmg.scene.loading.faults import parsed
+from mrmg.scene.loading.faults import EntryError, parsed
 from mrmg.scene.loading.geometry import region_of, shape_of
 from mrmg.scene.loading.margins_schema import MarginsEntry
-from mrmg.scene.loading.models import load_model, model_folder
+from mrmg.scene.loading.models import load_model, model_folder, with_reference
 from mrmg.scene.loading.schema import (
     SECTIONS,
     BatteryEntry,
     BlendEntry,
     FinishEntry,
+    GoalEntry,
+    ObstacleEntry,
+    RegionEntry,
+    RobotEntry,
     SceneDocument,
+    StationEntry,
+    TerrainEntry,
 )
 from mrmg.scene.loading.shape_schema import LARGEST_M, CircleEntry
 from mrmg.scene.loading.starts import crowded_robots, misplaced_robots
@@ -47,6 +55,8 @@ HOME_RADIUS_M = 1.0
 RESERVED_IDS = ("bounds", "floor", "world")
 """Names that logs and the simulated world use for other things."""
 
+_Part = TypeVar("_Part")
+
 
 class Assembly:
     """Collects the parts of a scene and their faults."""
@@ -59,36 +69,19 @@ class Assembly:
         self.faults: list[Fault] = []
         self._document = document
         self._base = base
-        self._models: dict[str, tuple[RobotModel, dict[str, Any]]] = {}
-        self._loaded: dict[str, tuple[RobotModel, dict[str, Any]] | None] = {}
-        self._references: dict[str, Any] = {}
-        self._elevation_document: dict[str, Any] = {}
+        self._models: dict[str, tuple[RobotModel, dict[str, Any]] | None] = {}
+        self._parameters: dict[str, dict[str, Any]] = {}
         self._steep: list[tuple[Polygon, tuple[str, ...]]] = []
         self.ids = self._unique_ids()
         self.bounds = self._bounds()
-        self.robots = list(self._robots())
-        self.obstacles = list(self._obstacles())
-        self.terrain = list(self._terrain())
+        self.robots = self._parts("robots", self._robot)
+        self.obstacles = self._parts("obstacles", self._obstacle)
+        self.terrain = self._parts("terrain", _terrain_area)
         self.elevation = self._elevation()
-        self.goals = [
-            Goal(
-                id=entry.id,
-                region=region,
-                dwell_s=entry.dwell or 0.0,
-                heading_rad=entry.heading,
-                heading_tolerance_rad=entry.heading_tolerance or HEADING_TOLERANCE_RAD,
-            )
-            for entry, region in self._regions("goals")
-        ]
-        self.stations = [
-            Station(
-                id=entry.id,
-                region=region,
-                dwell_s=entry.dwell or 0.0,
-                one_at_a_time=entry.capacity == 1,
-            )
-            for entry, region in self._regions("stations")
-        ]
+        walls = [wall.shape for wall in self.obstacles if wall.blocks is None]
+        self._blocked = shapely.disjoint_subset_union_all(walls)
+        self.goals = self._parts("goals", self._goal)
+        self.stations = self._parts("stations", self._station)
         self.objective = self._objective()
         self.faults += self._faults_of_starts()
 
@@ -101,19 +94,23 @@ class Assembly:
             *crowded_robots(self.robots, places, self.stations),
         ]
 
-    def scene(self) -> Scene:
-        """Return the scene; call it only when there are no faults."""
-        document = SceneDocument.model_validate(self._document).model_dump(
-            mode="json", exclude_none=True
-        )
-        for robot in document["robots"]:
-            robot["model"] = self._references[robot["id"]]
-        if self.elevation is not None:
-            document["elevation"] = self._elevation_document
+    def scene(self, checked: SceneDocument) -> Scene:
+        """Return the scene; call it only when there are no faults.
+
+        Args:
+            checked: the document.
+        """
+        document = checked.model_dump(mode="json", exclude_none=True)
+        for entry, robot in zip(document["robots"], self.robots, strict=True):
+            assert robot.model.origin is not None
+            reference = robot.model.origin.reference
+            entry["model"] = with_reference(entry["model"], reference)
+        if self.elevation is not None and "file" in document["elevation"]:
+            document["elevation"] = elevation_entry(self.elevation)
         # Older versions took digests of documents with the models' parameters in place.
-        parameters = {robot.id: self._models[robot.id][1] for robot in self.robots}
         robots = [
-            {**robot, "model": parameters[robot["id"]]} for robot in document["robots"]
+            {**robot, "model": self._parameters[robot["id"]]}
+            for robot in document["robots"]
         ]
         content = {**document, "robots": robots}
         assert self.bounds is not None
@@ -138,12 +135,28 @@ class Assembly:
     def _fault(self, path: str, message: str) -> None:
         self.faults.append(Fault(path, message))
 
-    def _entries(self, section: str) -> Iterator[tuple[int, str, Any]]:
-        """Yield (index, path, entry) of the well-formed entries of one list."""
+    @contextmanager
+    def _faults_noted(self) -> Iterator[None]:
+        """Note the faults of an entry that cannot be used, and leave it out."""
+        try:
+            yield
+        except EntryError as error:
+            self.faults += error.faults
+
+    def _parts(self, section: str, build: Callable[[Any, str], _Part]) -> list[_Part]:
+        """Return what is built of the well-formed entries of one list.
+
+        Args:
+            section: key of the list.
+            build: takes an entry and its path.
+        """
+        parts = []
         for index, item in enumerate(self._items(section)):
             entry = parsed(SECTIONS[section], item)
             if entry is not None:
-                yield index, f"{section}.{index}", entry
+                with self._faults_noted():
+                    parts.append(build(entry, f"{section}.{index}"))
+        return parts
 
     def _items(self, section: str) -> list[Any]:
         raw = self._document.get(section)
@@ -156,7 +169,7 @@ class Assembly:
             for index, item in enumerate(self._items(section)):
                 path = f"{section}.{index}"
                 given = item.get("id") if isinstance(item, dict) else None
-                name = _default_id(section, index) if given is None else str(given)
+                name = _default_id(path) if given is None else str(given)
                 where = path if given is None else f"{path}.id"
                 if name in RESERVED_IDS:
                     self._fault(where, f"the id '{name}' is reserved; choose another")
@@ -182,127 +195,89 @@ class Assembly:
             return None
         return x_min, y_min, x_max, y_max
 
-    def _robots(self) -> Iterator[Robot]:
-        fleet = self._document.get("battery", {})
-        default = parsed(BatteryEntry, fleet) or BatteryEntry()
+    def _robot(self, entry: RobotEntry, path: str) -> Robot:
+        model, self._parameters[entry.id] = self._model(entry.model, f"{path}.model")
+        if entry.energy is not None:
+            model = replace(model, energy_preset=entry.energy)
+        default = parsed(BatteryEntry, self._document.get("battery", {}))
+        battery = battery_of(entry, default or BatteryEntry(), model, path)
+        finish = None
+        with self._faults_noted():
+            finish = _finish(entry, f"{path}.finish")
+        if entry.rolling_factor is not None:
+            rolling = model.rolling_coefficient * entry.rolling_factor
+            model = replace(model, rolling_coefficient=rolling)
         stated = parsed(MarginsEntry, self._document.get("margins")) or MarginsEntry()
-        for _, path, entry in self._entries("robots"):
-            model = self._model(entry.id, entry.model, path)
-            if model is None:
-                continue
-            if entry.energy is not None:
-                model = replace(model, energy_preset=entry.energy)
-            battery = battery_of(entry, default, model, path)
-            if isinstance(battery, list):
-                self.faults += battery
-                continue
-            finish = self._finish(entry, model, f"{path}.finish")
-            x, y, yaw = entry.pose
-            if entry.rolling_factor is not None:
-                rolling = model.rolling_coefficient * entry.rolling_factor
-                model = replace(model, rolling_coefficient=rolling)
-            yield Robot(
-                id=entry.id,
-                model=model,
-                pose=(x, y, yaw),
-                battery=battery,
-                finish=finish,
-                margins=(entry.margins or MarginsEntry()).margins.over(stated.margins),
-            )
-
-    def _finish(self, entry: Any, model: RobotModel, path: str) -> Finish | None:
-        if entry.finish is None:
-            return None
-        wanted = entry.finish
-        if wanted == "start":
-            circle = CircleEntry(center=list(entry.pose[:2]), radius=HOME_RADIUS_M)
-            wanted = FinishEntry(circle=circle)
-        region = region_of(wanted, path)
-        if isinstance(region, list):
-            self.faults += region
-            return None
-        return Finish(
-            region=region,
-            heading_rad=wanted.heading,
-            heading_tolerance_rad=wanted.heading_tolerance,
+        x, y, yaw = entry.pose
+        return Robot(
+            id=entry.id,
+            model=model,
+            pose=(x, y, yaw),
+            battery=battery,
+            finish=finish,
+            margins=(entry.margins or MarginsEntry()).margins.over(stated.margins),
         )
 
-    def _model(self, robot_id: str, wanted: Any, path: str) -> RobotModel | None:
+    def _model(self, wanted: Any, path: str) -> tuple[RobotModel, dict[str, Any]]:
+        """Return the model that a robot names, and its parameters.
+
+        Raises:
+            EntryError: if it cannot be used. Its faults are those of the first robot
+                of that kind alone.
+        """
         changes = dict(wanted) if isinstance(wanted, dict) else {}
         reference: str = changes.pop("like", wanted)
         folder = model_folder(reference, self._base)
         if isinstance(folder, str):
-            self._fault(f"{path}.model", folder)
-            return None
+            raise EntryError(Fault(path, folder))
         kind = f"{folder} {changes}"
-        if kind not in self._loaded:
-            # Once for all robots of a kind: its faults are reported once, too.
+        if kind not in self._models:
+            self._models[kind] = None
             try:
-                self._loaded[kind] = load_model(
+                self._models[kind] = load_model(
                     folder,
                     source=f"{reference}/robot.yaml",
                     changes=changes,
                     trust_code=self._trust_code,
                 )
             except SceneError as error:
-                self._loaded[kind] = None
-                for fault in error.faults:
-                    self._fault(f"{path}.model", f"{error.source}: {fault}")
-        loaded = self._loaded[kind]
+                texts = [f"{error.source}: {fault}" for fault in error.faults]
+                raise EntryError(*(Fault(path, text) for text in texts)) from error
+        loaded = self._models[kind]
         if loaded is None:
-            return None
-        self._models[robot_id] = loaded
-        found = str(folder) if "/" in reference else reference
-        self._references[robot_id] = {"like": found, **changes} if changes else found
-        return self._models[robot_id][0]
+            raise EntryError
+        return loaded
 
-    def _obstacles(self) -> Iterator[Obstacle]:
+    def _obstacle(self, entry: ObstacleEntry, path: str) -> Obstacle:
         items = self._items("robots")
         robots = [str(item.get("id")) for item in items if isinstance(item, dict)]
-        for index, path, entry in self._entries("obstacles"):
-            for place, name in enumerate(entry.blocks or []):
-                if name not in robots:
-                    known = ", ".join(robots) if robots else "none"
-                    self._fault(
-                        f"{path}.blocks.{place}",
-                        f"no robot '{name}'{nearest(name, robots)}; robots: {known}",
-                    )
-            shape = self._shape(entry, path)
-            if shape is not None:
-                yield Obstacle(
-                    id=entry.id or _default_id("obstacles", index),
-                    shape=shape,
-                    height_m=entry.height,
-                    blocks=None if entry.blocks is None else tuple(entry.blocks),
+        for place, name in enumerate(entry.blocks or []):
+            if name not in robots:
+                known = ", ".join(robots) if robots else "none"
+                self._fault(
+                    f"{path}.blocks.{place}",
+                    f"no robot '{name}'{nearest(name, robots)}; robots: {known}",
                 )
-
-    def _terrain(self) -> Iterator[TerrainArea]:
-        for index, path, entry in self._entries("terrain"):
-            shape = self._shape(entry, path)
-            if shape is not None:
-                yield TerrainArea(
-                    id=entry.id or _default_id("terrain", index),
-                    shape=shape,
-                    multiplier=entry.multiplier,
-                    turning_multiplier=entry.turning_multiplier,
-                    energy_spread=entry.energy_spread,
-                )
+        return Obstacle(
+            id=entry.id or _default_id(path),
+            shape=shape_of(entry, path),
+            height_m=entry.height,
+            blocks=None if entry.blocks is None else tuple(entry.blocks),
+        )
 
     def _elevation(self) -> Elevation | None:
         entry = parsed(ElevationEntry, self._document.get("elevation"))
         if entry is None or self.bounds is None:
             return None
-        found = elevation_of(entry, self.bounds, self._base)
-        if isinstance(found, list):
-            self.faults += found
-            return None
-        elevation, self._elevation_document = found
-        if elevation.avoid_steep:
-            self._steep = steep_ground(elevation, self.robots, self.terrain)
-        else:
-            ground = (self.obstacles, self.terrain)
-            self.faults += slope_faults(elevation, self.robots, *ground)
-        return elevation
+        with self._faults_noted():
+            elevation = elevation_of(entry, self.bounds, self._base)
+            if elevation.avoid_steep:
+                self._steep = steep_ground(elevation, self.robots, self.terrain)
+            else:
+                ground = (self.obstacles, self.terrain)
+                self.faults += slope_faults(elevation, self.robots, *ground)
+            return elevation
+        return None
 
     def _objective(self) -> Objective:
         wanted = self._document.get("objective")
@@ -314,32 +289,62 @@ class Assembly:
             self._fault("objective", message)
         return Objective(energy_weight=blend.energy, makespan_weight=blend.makespan)
 
-    def _shape(self, entry: Any, path: str) -> Polygon | None:
-        shape = shape_of(entry, path)
-        if isinstance(shape, list):
-            self.faults += shape
-            return None
-        return shape
+    def _goal(self, entry: GoalEntry, path: str) -> Goal:
+        return Goal(
+            id=entry.id,
+            region=self._region(entry, path),
+            dwell_s=entry.dwell or 0.0,
+            heading_rad=entry.heading,
+            heading_tolerance_rad=entry.heading_tolerance or HEADING_TOLERANCE_RAD,
+        )
 
-    def _regions(self, section: str) -> Iterator[tuple[Any, Region]]:
-        walls = [wall.shape for wall in self.obstacles if wall.blocks is None]
-        blocked = shapely.disjoint_subset_union_all(walls)
-        for _, path, entry in self._entries(section):
-            region = region_of(entry, path)
-            if isinstance(region, list):
-                self.faults += region
-                continue
-            if self.bounds and not region.shape.intersects(shapely.box(*self.bounds)):
-                self._fault(path, f"lies outside the bounds {list(self.bounds)}")
-            elif blocked.covers(region.shape):
-                names = [
-                    wall.id
-                    for wall in self.obstacles
-                    if wall.blocks is None and wall.shape.intersects(region.shape)
-                ]
-                self._fault(path, f"lies wholly inside {', '.join(names)}")
-            yield entry, region
+    def _station(self, entry: StationEntry, path: str) -> Station:
+        return Station(
+            id=entry.id,
+            region=self._region(entry, path),
+            dwell_s=entry.dwell or 0.0,
+            one_at_a_time=entry.capacity == 1,
+        )
+
+    def _region(self, entry: RegionEntry, path: str) -> Region:
+        region = region_of(entry, path)
+        if self.bounds and not region.shape.intersects(shapely.box(*self.bounds)):
+            self._fault(path, f"lies outside the bounds {list(self.bounds)}")
+        elif self._blocked.covers(region.shape):
+            names = [
+                wall.id
+                for wall in self.obstacles
+                if wall.blocks is None and wall.shape.intersects(region.shape)
+            ]
+            self._fault(path, f"lies wholly inside {', '.join(names)}")
+        return region
 
 
-def _default_id(section: str, index: int) -> str:
+def _terrain_area(entry: TerrainEntry, path: str) -> TerrainArea:
+    return TerrainArea(
+        id=entry.id or _default_id(path),
+        shape=shape_of(entry, path),
+        multiplier=entry.multiplier,
+        turning_multiplier=entry.turning_multiplier,
+        energy_spread=entry.energy_spread,
+    )
+
+
+def _finish(entry: RobotEntry, path: str) -> Finish | None:
+    if entry.finish is None:
+        return None
+    wanted = entry.finish
+    if wanted == "start":
+        circle = CircleEntry(center=entry.pose[:2], radius=HOME_RADIUS_M)
+        wanted = FinishEntry(circle=circle)
+    return Finish(
+        region=region_of(wanted, path),
+        heading_rad=wanted.heading,
+        heading_tolerance_rad=wanted.heading_tolerance,
+    )
+
+
+def _default_id(path: str) -> str:
+    """Return the id of an obstacle or terrain area that has none of its own."""
+    section, _, index = path.partition(".")
     return f"{section.removesuffix('s')}_{index}"

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import os
 from pathlib import Path, PurePosixPath
-from typing import Any
 
+from mrmg.scene.loading.models import with_reference
 from mrmg.scene.loading.reading import require_faithful
 from mrmg.scene.loading.yaml_text import dump_yaml
 from mrmg.scene.model_files import MODELS_FOLDER
@@ -40,7 +40,8 @@ def carried_files(scene: Scene) -> dict[str, bytes]:
             place, own = _files_of(robot.model)
             places[origin.reference] = f"{name}/{place}".removesuffix("/.")
             files |= {f"{name}/{path}": data for path, data in own.items()}
-        entry["model"] = _moved(entry["model"], places[origin.reference])
+        place = places[origin.reference]
+        entry["model"] = with_reference(entry["model"], place)
     files[SCENE_FILE] = dump_yaml(document).encode()
     return files
 
@@ -85,8 +86,3 @@ def _files_of(model: RobotModel) -> tuple[str, dict[str, bytes]]:
         Path(os.path.relpath(path, top)).as_posix(): data
         for path, data in sorted(found.items())
     }
-
-
-def _moved(reference: Any, place: str) -> Any:
-    """Return a robot's `model` with the model in another place."""
-    return {**reference, "like": place} if isinstance(reference, dict) else place

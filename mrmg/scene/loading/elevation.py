@@ -11,18 +11,14 @@ import binascii
 import math
 import zlib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mrmg.errors import Fault, nearest
-from mrmg.scene.document import PACKED_M, packed_heights
+from mrmg.scene.document import PACKED_M
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.loading.elevation_schema import ElevationEntry, HillEntry
-from mrmg.scene.loading.faults import shown
-
-FORMS = ("file", "grid", "hills", "packed")
-"""Exactly one of these keys states how high the ground is."""
+from mrmg.scene.loading.faults import EntryError, shown
 
 DEFAULT_CELL_M = 0.5
 MOST_NODES = 1_000_000
@@ -30,10 +26,8 @@ MOST_NODES = 1_000_000
 Bounds = tuple[float, float, float, float]
 
 
-def elevation_of(
-    entry: ElevationEntry, bounds: Bounds, base: Path | None
-) -> tuple[Elevation, dict[str, Any]] | list[Fault]:
-    """Return the elevation of a scene, or what is wrong with its entry.
+def elevation_of(entry: ElevationEntry, bounds: Bounds, base: Path | None) -> Elevation:
+    """Return the elevation of a scene.
 
     Args:
         entry: the scene's `elevation`.
@@ -41,34 +35,23 @@ def elevation_of(
         base: folder that a relative path of a file starts from; default the working
             directory.
 
-    Returns:
-        The elevation, and the entry for a document that needs no other file.
+    Raises:
+        EntryError: naming what is wrong with the entry.
     """
-    given = [key for key in FORMS if getattr(entry, key) is not None]
-    if len(given) != 1:
-        found = " and ".join(given) if given else "none"
-        message = f"has {found} of {', '.join(FORMS)}; expected exactly one of them"
-        return [Fault("elevation", message)]
-    (form,) = given
+    form = entry.given("elevation")
     faults = _misplaced_options(entry, form)
     if faults:
-        return faults
-    heights = _heights(entry, form, bounds, base)
-    if isinstance(heights, Fault):
-        return [heights]
+        raise EntryError(*faults)
+    heights = _heights(entry, bounds, base)
     fault = _grid_fault(heights)
     if fault:
-        return [Fault(f"elevation.{form}", fault)]
-    document = entry.model_dump(mode="json", exclude_none=True)
-    if form == "file":
-        heights, document = _packed(heights)
+        raise EntryError(Fault(f"elevation.{form}", fault))
+    if form == "file":  # what saved scenes hold of it
+        heights = np.round(heights / PACKED_M) * PACKED_M
     southward = np.ascontiguousarray(heights[::-1], dtype=float)
     southward.setflags(write=False)
     avoids = entry.slope == "avoid"
-    if avoids:
-        document["slope"] = "avoid"
-    elevation = Elevation(bounds=bounds, height_m=southward, avoid_steep=avoids)
-    return elevation, document
+    return Elevation(bounds=bounds, height_m=southward, avoid_steep=avoids)
 
 
 def _misplaced_options(entry: ElevationEntry, form: str) -> list[Fault]:
@@ -82,9 +65,7 @@ def _misplaced_options(entry: ElevationEntry, form: str) -> list[Fault]:
     return faults
 
 
-def _heights(
-    entry: ElevationEntry, form: str, bounds: Bounds, base: Path | None
-) -> np.ndarray | Fault:
+def _heights(entry: ElevationEntry, bounds: Bounds, base: Path | None) -> np.ndarray:
     """Return heights [m], rows from north to south."""
     if entry.file is not None:
         return _from_file(entry.file, entry.range, base)
@@ -94,7 +75,7 @@ def _heights(
         lengths = {len(row) for row in entry.grid}
         if len(lengths) > 1:
             message = f"rows of {min(lengths)} to {max(lengths)} numbers; must be equal"
-            return Fault("elevation.grid", message)
+            raise EntryError(Fault("elevation.grid", message))
         return np.array(entry.grid)
     assert entry.hills is not None
     return _sampled(entry.hills, entry.cell or DEFAULT_CELL_M, bounds)
@@ -114,92 +95,85 @@ def _grid_fault(heights: np.ndarray) -> str | None:
     return None
 
 
-def _from_file(
-    name: str, span: list[float] | None, base: Path | None
-) -> np.ndarray | Fault:
+def _from_file(name: str, span: list[float] | None, base: Path | None) -> np.ndarray:
     path = (base or Path.cwd()) / name
     if not path.is_file():
         folder = path.parent
         others = [item.name for item in folder.iterdir()] if folder.is_dir() else []
         guess = nearest(path.name, others)
-        return Fault("elevation.file", f"got '{name}'; no such file{guess}")
+        message = f"got '{name}'; no such file{guess}"
+        raise EntryError(Fault("elevation.file", message))
     kind = path.suffix.lower()
     if kind == ".npy":
         return _from_npy(path, name)
     if kind == ".png":
         return _from_picture(path, name, span)
     message = f"got '{name}'; expected .npy (heights in m) or .png (grey values)"
-    return Fault("elevation.file", message)
+    raise EntryError(Fault("elevation.file", message))
 
 
-def _from_npy(path: Path, name: str) -> np.ndarray | Fault:
+def _from_npy(path: Path, name: str) -> np.ndarray:
     try:
         heights = np.load(path, allow_pickle=False)
     except (OSError, ValueError, EOFError) as error:
-        return Fault("elevation.file", f"'{name}' is no readable .npy file ({error})")
+        message = f"'{name}' is no readable .npy file ({error})"
+        raise EntryError(Fault("elevation.file", message)) from error
     if heights.dtype.kind not in "fiu":
         message = f"'{name}' holds {heights.dtype}; expected numbers, metres"
-        return Fault("elevation.file", message)
+        raise EntryError(Fault("elevation.file", message))
     return np.asarray(heights, dtype=float)
 
 
-def _from_picture(
-    path: Path, name: str, span: list[float] | None
-) -> np.ndarray | Fault:
+def _from_picture(path: Path, name: str, span: list[float] | None) -> np.ndarray:
     from PIL import Image, UnidentifiedImageError
 
     if span is None:
         message = "missing; expected [height of black in m, height of white in m]"
-        return Fault("elevation.range", message)
+        raise EntryError(Fault("elevation.range", message))
     try:
         with Image.open(path) as picture:
             mode, grey = picture.mode, np.asarray(picture, dtype=float)
     except (OSError, UnidentifiedImageError, ValueError) as error:
-        return Fault("elevation.file", f"'{name}' is no readable picture ({error})")
+        message = f"'{name}' is no readable picture ({error})"
+        raise EntryError(Fault("elevation.file", message)) from error
     white = {"L": 255.0, "I;16": 65535.0, "I": 65535.0}.get(mode)
     if white is None:
         message = (
             f"'{name}' is a picture of kind {mode}; expected plain grey, 8 or 16 bits"
         )
-        return Fault("elevation.file", message)
+        raise EntryError(Fault("elevation.file", message))
     low, high = span
     return low + grey / white * (high - low)
 
 
-def _packed(heights: np.ndarray) -> tuple[np.ndarray, dict[str, Any]]:
-    """Return heights as they are kept, and the entry that keeps them."""
-    steps = np.round(heights / PACKED_M).astype("<i4")
-    return steps * PACKED_M, packed_heights(steps)
-
-
-def _unpacked(rows: int, columns: int, text: str) -> np.ndarray | Fault:
+def _unpacked(rows: int, columns: int, text: str) -> np.ndarray:
     where = "elevation.packed.heights"
     if rows * columns > MOST_NODES:
-        return Fault("elevation.packed", f"at most {MOST_NODES} heights in all")
+        message = f"at most {MOST_NODES} heights in all"
+        raise EntryError(Fault("elevation.packed", message))
     inflate = zlib.decompressobj()
     try:
         data = inflate.decompress(base64.b64decode(text, validate=True), 4 * MOST_NODES)
     except (binascii.Error, zlib.error) as error:
-        return Fault(where, f"got {shown(text)}; not what was once packed ({error})")
+        message = f"got {shown(text)}; not what was once packed ({error})"
+        raise EntryError(Fault(where, message)) from error
     if len(data) != 4 * rows * columns:
         message = f"holds {len(data) // 4} heights; expected {rows} x {columns}"
-        return Fault(where, message)
+        raise EntryError(Fault(where, message))
     return np.frombuffer(data, "<i4").reshape(rows, columns) * PACKED_M
 
 
-def _sampled(
-    hills: list[HillEntry], cell_m: float, bounds: Bounds
-) -> np.ndarray | Fault:
+def _sampled(hills: list[HillEntry], cell_m: float, bounds: Bounds) -> np.ndarray:
     """Return the sum of round hills, each h cos^2(pi d / 2 R) at distance d < R."""
     x_min, y_min, x_max, y_max = bounds
     # Counted as floats, which may be as large as they like.
     across, down = (x_max - x_min) / cell_m + 1.0, (y_max - y_min) / cell_m + 1.0
     if across * down > MOST_NODES:
-        return Fault(
-            "elevation.hills",
+        message = (
             f"would have {down:.7g} x {across:.7g} heights within these bounds; "
-            f"at most {MOST_NODES} in all: a larger cell makes them fewer",
+            f"at most {MOST_NODES} in all: a larger cell makes them fewer"
         )
+        raise EntryError(Fault("elevation.hills", message))
     columns, rows = max(2, math.ceil(across)), max(2, math.ceil(down))
     x, y = np.meshgrid(
         np.linspace(x_min, x_max, columns), np.linspace(y_max, y_min, rows)

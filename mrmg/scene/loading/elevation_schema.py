@@ -6,13 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from mrmg.scene.loading.shape_schema import (
-    Height,
-    Length,
-    Point,
-    Strict,
-    exactly_one,
-)
+from mrmg.scene.loading.shape_schema import Height, Length, OneOf, Point, Strict
 
 
 class HillEntry(Strict):
@@ -36,10 +30,11 @@ class PackedEntry(Strict):
     """tenths of mm, int32, zlib, base64"""
 
 
-class ElevationEntry(Strict):
+class ElevationEntry(OneOf):
     """The elevation: exactly one of file, grid, hills, packed."""
 
-    model_config = exactly_one("file", "grid", "hills", "packed")
+    one_of = ("file", "grid", "hills", "packed")
+    none_of = "no heights"
 
     file: Annotated[str, Field(min_length=1)] | None = None
     """path of an .npy or .png file"""

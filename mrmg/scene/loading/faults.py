@@ -26,6 +26,14 @@ _KINDS = {
 }
 
 
+class EntryError(Exception):
+    """A well-formed entry states what cannot be; carries its faults."""
+
+    def __init__(self, *faults: Fault) -> None:
+        super().__init__(*faults)
+        self.faults = faults
+
+
 def parsed(model: type[BaseModel], item: Any) -> Any:
     """Return `item` as an entry, or None: its faults are reported with the file's."""
     try:

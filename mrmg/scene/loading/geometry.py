@@ -9,6 +9,7 @@ import shapely
 from shapely.geometry import Polygon
 
 from mrmg.errors import Fault
+from mrmg.scene.loading.faults import EntryError
 from mrmg.scene.loading.schema import FinishEntry, RegionEntry
 from mrmg.scene.loading.shape_schema import ShapedEntry
 from mrmg.scene.region import Region
@@ -35,51 +36,49 @@ def box_at(center: list[float], size: list[float], yaw_rad: float) -> Polygon:
     return Polygon(corners @ np.array([[c, s], [-s, c]]) + np.asarray(center))
 
 
-def shape_of(entry: ShapedEntry, path: str) -> Polygon | list[Fault]:
-    """Return the outline of an obstacle or terrain area, or its faults."""
-    given = [key for key in ("polygon", "box", "circle") if getattr(entry, key)]
-    if len(given) != 1:
-        return [_not_one_of(path, "polygon, box, circle", given)]
+def shape_of(entry: ShapedEntry, path: str) -> Polygon:
+    """Return the outline of an obstacle or terrain area.
+
+    Raises:
+        EntryError: if the entry at `path` states none.
+    """
+    form = entry.given(path)
     if entry.holes and not entry.polygon:
-        return [Fault(f"{path}.holes", f"only a polygon has holes, not a {given[0]}")]
+        message = f"only a polygon has holes, not a {form}"
+        raise EntryError(Fault(f"{path}.holes", message))
     if entry.box:
         return box_at(entry.box.center, entry.box.size, entry.box.yaw)
     if entry.circle:
         return circle_around(entry.circle.center, entry.circle.radius)
     assert entry.polygon is not None
     shape = Polygon(entry.polygon, entry.holes or [])
-    reason = _ring_fault(shape)
-    if reason:
-        return [Fault(f"{path}.polygon", reason)]
+    _require_simple(shape, path)
     return shapely.orient_polygons(shape)
 
 
-def region_of(entry: RegionEntry | FinishEntry, path: str) -> Region | list[Fault]:
-    """Return the convex region of a goal, station or finish, or its faults."""
-    given = [key for key in ("circle", "polygon") if getattr(entry, key)]
-    if len(given) != 1:
-        return [_not_one_of(path, "circle, polygon", given)]
+def region_of(entry: RegionEntry | FinishEntry, path: str) -> Region:
+    """Return the convex region of a goal, station or finish.
+
+    Raises:
+        EntryError: if the entry at `path` states none.
+    """
+    entry.given(path)
     if entry.circle:
         center = np.array(entry.circle.center, dtype=float)
         return _region(center, entry.circle.radius, np.zeros((0, 2)))
     assert entry.polygon is not None
     shape = Polygon(entry.polygon)
-    reason = _ring_fault(shape)
-    if reason is None and _dent_m2(shape) > _ROUNDING_M2:
-        reason = (
-            f"not convex: it covers {shape.area:.4g} m2 of its hull's "
-            f"{shape.convex_hull.area:.4g} m2; expected a convex polygon"
-        )
-    if reason:
-        return [Fault(f"{path}.polygon", reason)]
+    _require_simple(shape, path)
     # The hull drops corners that lie on a straight side.
     hull = shapely.orient_polygons(shape.convex_hull)
+    if hull.area - shape.area > _ROUNDING_M2:
+        message = (
+            f"not convex: it covers {shape.area:.4g} m2 of its hull's "
+            f"{hull.area:.4g} m2; expected a convex polygon"
+        )
+        raise EntryError(Fault(f"{path}.polygon", message))
     corners = np.array(hull.exterior.coords[:-1])
     return _region(np.array(shape.centroid.coords[0]), 0.0, corners)
-
-
-def _dent_m2(shape: Polygon) -> float:
-    return float(shape.convex_hull.area - shape.area)
 
 
 def _region(center: np.ndarray, radius_m: float, corners: np.ndarray) -> Region:
@@ -88,14 +87,10 @@ def _region(center: np.ndarray, radius_m: float, corners: np.ndarray) -> Region:
     return Region(center=center, radius_m=radius_m, corners=corners)
 
 
-def _ring_fault(shape: Polygon) -> str | None:
+def _require_simple(shape: Polygon, path: str) -> None:
     if shape.convex_hull.area == 0.0:
-        return "its area is zero; expected corners that are not on one line"
+        message = "its area is zero; expected corners that are not on one line"
+        raise EntryError(Fault(f"{path}.polygon", message))
     if not shape.is_valid:
-        return f"no simple polygon: {shapely.is_valid_reason(shape)}"
-    return None
-
-
-def _not_one_of(path: str, allowed: str, given: list[str]) -> Fault:
-    found = " and ".join(given) if given else "no shape"
-    return Fault(path, f"has {found}; expected exactly one of {allowed}")
+        message = f"no simple polygon: {shapely.is_valid_reason(shape)}"
+        raise EntryError(Fault(f"{path}.polygon", message))

@@ -162,6 +162,11 @@ def model_folder(reference: str, base: Path | None) -> Path | str:
     )
 
 
+def with_reference(wanted: Any, reference: str) -> Any:
+    """Return a robot's `model` with another name or folder of the model."""
+    return {**wanted, "like": reference} if isinstance(wanted, dict) else reference
+
+
 def load_model(
     folder: Path,
     *,

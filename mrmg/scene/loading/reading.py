@@ -64,7 +64,7 @@ def scene_from_document(
     _require_format(document, source)
     faults: list[Fault] = []
     try:
-        SceneDocument.model_validate(document)
+        checked = SceneDocument.model_validate(document)
     except ValidationError as error:
         faults = faults_of(error, SceneDocument)
     assembly = Assembly(document, base, trust_code=trust_code)
@@ -72,7 +72,7 @@ def scene_from_document(
     if faults:
         named = [replace(fault, id=id_at(document, fault.path)) for fault in faults]
         raise SceneError(source, sorted(named, key=_place_in(document)))
-    return assembly.scene()
+    return assembly.scene(checked)
 
 
 def dump_scene(scene: Scene) -> str:

@@ -104,11 +104,11 @@ from mrmg.scene.loading.shape_schema import (
     Length,
     NotNegative,
     Number,
+    OneOf,
     Positive,
     Ring,
     ShapedEntry,
     Strict,
-    exactly_one,
 )
 from mrmg.scene.region import HEADING_TOLERANCE_RAD
 
@@ -139,10 +139,10 @@ class TerrainEntry(ShapedEntry):
     """standard deviation of a run's energy from run to run, as a share"""
 
 
-class RegionEntry(Strict):
+class RegionEntry(OneOf):
     """A goal or station: exactly one of circle, polygon; convex."""
 
-    model_config = exactly_one("circle", "polygon")
+    one_of = ("circle", "polygon")
 
     id: Identifier
     """name, unique in the whole file"""
@@ -185,10 +185,11 @@ class BatteryEntry(Strict):
     """power in W with which stations fill it"""
 
 
-class StartEnergyEntry(Strict):
+class StartEnergyEntry(OneOf):
     """Exactly one of the four."""
 
-    model_config = exactly_one("fraction", "J", "Wh", "m")
+    one_of = ("fraction", "J", "Wh", "m")
+    none_of = "no amount"
 
     fraction: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] | None = None
     """share of the capacity, in [0, 1]"""
@@ -222,10 +223,10 @@ StartEnergy = Annotated[
 ]
 
 
-class FinishEntry(Strict):
+class FinishEntry(OneOf):
     """Exactly one of circle, polygon; convex; perhaps with a heading."""
 
-    model_config = exactly_one("circle", "polygon")
+    one_of = ("circle", "polygon")
 
     circle: CircleEntry | None = None
     """a disc: its center [x, y] and its radius in m"""

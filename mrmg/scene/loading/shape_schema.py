@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import re
-from typing import Annotated
+from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
+
+from mrmg.errors import Fault
+from mrmg.scene.loading.faults import EntryError
 
 # Limits within which sums, squares and quotients of doubles stay finite, and places
 # exact to well below a millimetre.
@@ -59,9 +62,32 @@ class NamedWithUnits(Strict):
     )
 
 
-def exactly_one(*keys: str) -> ConfigDict:
-    """Return what distinguishes editors that exactly one of some keys is given."""
-    return ConfigDict(json_schema_extra={"oneOf": [{"required": [k]} for k in keys]})
+def _require_one(schema: dict[str, Any], kind: type[OneOf]) -> None:
+    schema["oneOf"] = [{"required": [key]} for key in kind.one_of]
+
+
+class OneOf(Strict):
+    """An entry that has exactly one of some keys."""
+
+    model_config = ConfigDict(json_schema_extra=_require_one)
+
+    one_of: ClassVar[tuple[str, ...]]
+    """The keys."""
+    none_of: ClassVar[str] = "no shape"
+    """What an entry has that has none of them."""
+
+    def given(self, path: str) -> str:
+        """Return the key that the entry at `path` has.
+
+        Raises:
+            EntryError: if it has none of them, or several.
+        """
+        keys = [key for key in self.one_of if getattr(self, key) is not None]
+        if len(keys) != 1:
+            found, allowed = " and ".join(keys) or self.none_of, ", ".join(self.one_of)
+            message = f"has {found}; expected exactly one of {allowed}"
+            raise EntryError(Fault(path, message))
+        return keys[0]
 
 
 class BoxEntry(Strict):
@@ -82,10 +108,10 @@ class CircleEntry(Strict):
     """radius in m"""
 
 
-class ShapedEntry(Strict):
+class ShapedEntry(OneOf):
     """Exactly one of polygon, box, circle."""
 
-    model_config = exactly_one("polygon", "box", "circle")
+    one_of = ("polygon", "box", "circle")
 
     polygon: Ring | None = None
     """at least 3 corners [x, y] in m"""

@@ -130,8 +130,11 @@ def save(path: Path, name: str) -> None:
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
-        ({}, r"elevation: has none of file, grid, hills, packed; expected exactly"),
-        ({"grid": [[0, 0], [0, 0]], "file": "a.npy"}, r"has file and grid of"),
+        ({}, r"elevation: has no heights; expected exactly one of file, grid, hills"),
+        (
+            {"grid": [[0, 0], [0, 0]], "file": "a.npy"},
+            r"has file and grid; expected exactly one",
+        ),
         ({"file": "hils.npy"}, r"got 'hils.npy'; no such file"),
         ({"file": "grey.pgm"}, r"expected .npy \(heights in m\) or .png"),
         ({"file": "broken.npy"}, r"'broken.npy' is no readable .npy file"),
