@@ -11,7 +11,7 @@ import copy
 import math
 import zlib
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import shapely
@@ -20,20 +20,17 @@ from mrmg.errors import Fault, SceneError
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.margins import STATES_NONE
 from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
-from mrmg.scene.region import HEADING_TOLERANCE_RAD
-
-if TYPE_CHECKING:
-    from mrmg.scene.region import Region
-    from mrmg.scene.types import (
-        Battery,
-        Finish,
-        Goal,
-        Obstacle,
-        Robot,
-        Scene,
-        Station,
-        TerrainArea,
-    )
+from mrmg.scene.region import HEADING_TOLERANCE_RAD, Region
+from mrmg.scene.types import (
+    Battery,
+    Finish,
+    Goal,
+    Obstacle,
+    Robot,
+    Scene,
+    Station,
+    TerrainArea,
+)
 
 PACKED_M = 1e-4
 """Resolution of packed heights."""
@@ -61,46 +58,27 @@ def _document(scene: Scene) -> _Entry:
     document: _Entry = copy.deepcopy(dict(written.document)) if written else {}
     document |= {"format": 1, "name": scene.name}
     document["bounds"] = [float(value) for value in scene.bounds]
-    for section, write in _WRITERS.items():
-        document[section] = _entries(scene, document.get(section, []), section, write)
-    if not (is_as_loaded(scene, "elevation") and is_as_loaded(scene, "bounds")):
+    for section in ("obstacles", "terrain", "goals", "stations"):
+        document[section] = _entries(scene, document.get(section, []), section)
+    if not (scene.holds_loaded("elevation") and scene.holds_loaded("bounds")):
         document["elevation"] = _elevation(scene)
-    if not is_as_loaded(scene, "objective"):
-        document["objective"] = objective_entry(scene.objective)
-    if not is_as_loaded(scene, "time_limit_s"):
+    if not scene.holds_loaded("objective"):
+        document["objective"] = _objective_entry(scene.objective)
+    if not scene.holds_loaded("time_limit_s"):
         limit_s = float(scene.time_limit_s)
         document["time_limit"] = limit_s if math.isfinite(limit_s) else None
     document["battery"], document["robots"] = _robots(scene, document)
     return {key: value for key, value in document.items() if value is not None}
 
 
-def is_as_loaded(scene: Scene, name: str) -> bool:
-    """Return whether a field of a scene holds what it was loaded as."""
-    if scene.written is None:
-        return False
-    now, then = getattr(scene, name), getattr(scene.written.loaded, name)
-    if isinstance(now, tuple):
-        # Values are immutable: what is the same object has not changed.
-        pairs = zip(now, then, strict=False)
-        return len(now) == len(then) and all(a is b or _equal(a, b) for a, b in pairs)
-    return now is then or _equal(now, then)
-
-
-def _equal(now: Any, then: Any) -> bool:
-    simple = isinstance(now, float | int | str | Objective)
-    return simple and bool(now == then)
-
-
-def _entries(
-    scene: Scene, entries: list[_Entry], section: str, write: Callable[[Any], _Entry]
-) -> list[_Entry]:
+def _entries(scene: Scene, entries: list[_Entry], section: str) -> list[_Entry]:
     """Return the entries of a section: those of unchanged values as written."""
-    if is_as_loaded(scene, section):
+    if scene.holds_loaded(section):
         return entries
     before = getattr(scene.written.loaded, section) if scene.written else ()
     known = {id(value): entry for value, entry in zip(before, entries, strict=True)}
     return [
-        {"id": value.id, **known[id(value)]} if id(value) in known else write(value)
+        {"id": value.id, **known[id(value)]} if id(value) in known else entry_of(value)
         for value in getattr(scene, section)
     ]
 
@@ -113,12 +91,20 @@ def _robots(scene: Scene, document: _Entry) -> tuple[_Entry, list[_Entry]]:
     at_once = any(not robot.battery.takes_time_to_fill for robot in changed)
     if at_once and "charging_power" in fleet:
         # A robot's own battery cannot take a charging power of the fleet's back.
-        return {}, [robot_entry(robot) for robot in scene.robots]
-    return fleet, _entries(scene, document.get("robots", []), "robots", robot_entry)
+        return {}, [_robot_entry(robot) for robot in scene.robots]
+    return fleet, _entries(scene, document.get("robots", []), "robots")
 
 
-def obstacle_entry(obstacle: Obstacle) -> _Entry:
-    """Return the entry of an obstacle."""
+def entry_of(value: Any) -> Any:
+    """Return the entry of a value of `WRITTEN`, in plain terms.
+
+    Raises:
+        SceneError: if the format cannot say it.
+    """
+    return WRITTEN[type(value)](value)
+
+
+def _obstacle_entry(obstacle: Obstacle) -> _Entry:
     entry = {"id": obstacle.id, **_polygon(obstacle.shape)}
     entry["height"] = float(obstacle.height_m)
     if obstacle.blocks is not None:
@@ -126,8 +112,7 @@ def obstacle_entry(obstacle: Obstacle) -> _Entry:
     return entry
 
 
-def terrain_entry(area: TerrainArea) -> _Entry:
-    """Return the entry of a terrain area."""
+def _terrain_entry(area: TerrainArea) -> _Entry:
     entry = {"id": area.id, **_polygon(area.shape)}
     entry["multiplier"] = float(area.multiplier)
     if area.turning_multiplier != 1.0:
@@ -137,8 +122,7 @@ def terrain_entry(area: TerrainArea) -> _Entry:
     return entry
 
 
-def goal_entry(goal: Goal) -> _Entry:
-    """Return the entry of a goal."""
+def _goal_entry(goal: Goal) -> _Entry:
     entry = {"id": goal.id, **_region(goal.region)}
     if goal.dwell_s:
         entry["dwell"] = float(goal.dwell_s)
@@ -146,15 +130,14 @@ def goal_entry(goal: Goal) -> _Entry:
     return entry | (_heading(goal) if stated != (None, HEADING_TOLERANCE_RAD) else {})
 
 
-def station_entry(station: Station) -> _Entry:
-    """Return the entry of a station."""
+def _station_entry(station: Station) -> _Entry:
     entry = {"id": station.id, **_region(station.region)}
     if station.dwell_s:
         entry["dwell"] = float(station.dwell_s)
     return {**entry, "capacity": 1} if station.one_at_a_time else entry
 
 
-def robot_entry(robot: Robot) -> _Entry:
+def _robot_entry(robot: Robot) -> _Entry:
     """Return the entry of a robot, independent of the fleet's battery.
 
     Raises:
@@ -192,8 +175,7 @@ def packed_heights(steps: np.ndarray) -> _Entry:
     return {"packed": {"rows": rows, "columns": columns, "heights": text}}
 
 
-def objective_entry(objective: Objective) -> str | _Entry:
-    """Return the entry of an objective."""
+def _objective_entry(objective: Objective) -> str | _Entry:
     if objective in (ENERGY, MAKESPAN):
         return objective.name
     return {
@@ -304,9 +286,13 @@ def _differences(before: Mapping[str, Any], after: Mapping[str, Any]) -> _Entry:
     return found
 
 
-_WRITERS: dict[str, Callable[[Any], _Entry]] = {
-    "obstacles": obstacle_entry,
-    "terrain": terrain_entry,
-    "goals": goal_entry,
-    "stations": station_entry,
+WRITTEN: dict[type, Callable[[Any], Any]] = {
+    Elevation: elevation_entry,
+    Goal: _goal_entry,
+    Objective: _objective_entry,
+    Obstacle: _obstacle_entry,
+    Robot: _robot_entry,
+    Station: _station_entry,
+    TerrainArea: _terrain_entry,
 }
+"""What makes the entry of a value, by its type."""

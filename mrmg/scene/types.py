@@ -9,8 +9,7 @@ from typing import Any
 
 from shapely.geometry import Polygon
 
-from mrmg.scene.content import content_digest, contents
-from mrmg.scene.document import is_as_loaded, scene_document
+from mrmg.scene.content import content, content_digest, contents
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.margins import STATES_NONE, Margins
 from mrmg.scene.objective import ENERGY, Objective
@@ -225,6 +224,8 @@ class Scene:
         Raises:
             SceneError: if a scene file cannot say what was changed in memory.
         """
+        from mrmg.scene.document import scene_document
+
         return scene_document(self)
 
     def with_(self, *, trust_code: bool = False, **changes: Any) -> Scene:
@@ -285,7 +286,14 @@ class Scene:
     def is_as_loaded(self) -> bool:
         """Whether nothing was changed in memory since a file or document was loaded."""
         names = {item.name for item in fields(self)} - {"written"}
-        return all(is_as_loaded(self, name) for name in names)
+        return all(self.holds_loaded(name) for name in names)
+
+    def holds_loaded(self, name: str) -> bool:
+        """Return whether a field holds what it was loaded as."""
+        if self.written is None:
+            return False
+        now, then = getattr(self, name), getattr(self.written.loaded, name)
+        return now is then or bool(content(now) == content(then))
 
     @property
     def has_custom_motion(self) -> bool:

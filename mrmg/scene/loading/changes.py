@@ -3,40 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mrmg.errors import Fault, SceneError, nearest
-from mrmg.scene.document import (
-    elevation_entry,
-    goal_entry,
-    objective_entry,
-    obstacle_entry,
-    robot_entry,
-    station_entry,
-    terrain_entry,
-)
-from mrmg.scene.elevation import Elevation
+from mrmg.scene.document import WRITTEN, entry_of
 from mrmg.scene.loading.faults import unknown_key
 from mrmg.scene.loading.reading import scene_from_document
 from mrmg.scene.loading.schema import SECTIONS, RobotEntry, SceneDocument
-from mrmg.scene.objective import Objective
-from mrmg.scene.types import Goal, Obstacle, Robot, Scene, Station, TerrainArea
+from mrmg.scene.types import Scene
 
 _Entry = dict[str, Any]
-
-_WRITERS: dict[type, Callable[[Any], Any]] = {
-    Elevation: elevation_entry,
-    Goal: goal_entry,
-    Objective: objective_entry,
-    Obstacle: obstacle_entry,
-    Robot: robot_entry,
-    Station: station_entry,
-    TerrainArea: terrain_entry,
-}
 
 
 def changed_scene(
@@ -132,8 +112,8 @@ def _plain(value: Any, written: Mapping[int, _Entry]) -> Any:
     """Return a value as a scene file has it; `written` are the scene's own."""
     if id(value) in written:
         return written[id(value)]
-    if type(value) in _WRITERS:
-        return _WRITERS[type(value)](value)
+    if type(value) in WRITTEN:
+        return entry_of(value)
     if isinstance(value, Mapping):
         return {key: _plain(item, written) for key, item in value.items()}
     if isinstance(value, list | tuple):
