@@ -31,6 +31,13 @@ class Elevation:
         rows, columns = self.height_m.shape
         return (x_max - x_min) / (columns - 1), (y_max - y_min) / (rows - 1)
 
+    @cached_property
+    def nodes_m(self) -> tuple[np.ndarray, np.ndarray]:
+        """The x of the columns and the y of the rows of nodes [m]."""
+        x_min, y_min, x_max, y_max = self.bounds
+        rows, columns = self.height_m.shape
+        return np.linspace(x_min, x_max, columns), np.linspace(y_min, y_max, rows)
+
     def height_at(self, points: np.ndarray) -> np.ndarray:
         """Return the height [m] at each point, shape (n, 2) -> (n,).
 
@@ -71,10 +78,8 @@ class Elevation:
         Bilinear ground has its extremes at corners: of the box, and of the cells that
         it cuts.
         """
-        rows, columns = self.height_m.shape
-        x_min, y_min, x_max, y_max = self.bounds
-        x = _cuts(np.linspace(x_min, x_max, columns), box[0], box[2])
-        y = _cuts(np.linspace(y_min, y_max, rows), box[1], box[3])
+        x_lines, y_lines = self.nodes_m
+        x, y = _cuts(x_lines, box[0], box[2]), _cuts(y_lines, box[1], box[3])
         height = self.height_at(np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2))
         return float(height.min()), float(height.max())
 

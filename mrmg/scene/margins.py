@@ -11,7 +11,7 @@ tracking error without disturbances (`mrmg.planning.problem.openings`).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from mrmg.errors import UsageError
@@ -58,13 +58,13 @@ class Margins:
     def over(self, other: Margins) -> Margins:
         """Return these margins, with another's where these state none."""
         return Margins(
-            **{
-                each.name: getattr(other, each.name)
-                if getattr(self, each.name) is None
-                else getattr(self, each.name)
-                for each in fields(self)
-            }
+            obstacle_m=_first(self.obstacle_m, other.obstacle_m),
+            robot_m=_first(self.robot_m, other.robot_m),
         )
+
+
+def _first(own: float | None, other: float | None) -> float | None:
+    return other if own is None else own
 
 
 STATES_NONE = Margins()

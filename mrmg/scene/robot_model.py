@@ -7,7 +7,7 @@ file; `scene.loading` reads the YAML, `execution` compiles the MJCF.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -56,25 +56,13 @@ class Limits:
     u1_max_m_s2: float
     u2_max: float
 
-    def as_tuple(self) -> tuple[float, float, float, float, float]:
+    def as_tuple(self) -> tuple[float, ...]:
         """Return (v_min, v_max, w_max, u1_max, u2_max)."""
-        return (
-            self.v_min_m_s,
-            self.v_max_m_s,
-            self.w_max,
-            self.u1_max_m_s2,
-            self.u2_max,
-        )
+        return astuple(self)
 
     def scaled(self, share: float) -> Limits:
         """Return the limits times `share`; the planner leaves the rest to control."""
-        return Limits(
-            v_min_m_s=self.v_min_m_s * share,
-            v_max_m_s=self.v_max_m_s * share,
-            w_max=self.w_max * share,
-            u1_max_m_s2=self.u1_max_m_s2 * share,
-            u2_max=self.u2_max * share,
-        )
+        return Limits(**{name: share * most for name, most in asdict(self).items()})
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,12 +245,8 @@ class RobotModel(ByContent):
     @property
     def inscribed_radius_m(self) -> float:
         """Radius of the largest circle about the reference point in the footprint."""
-        start = self.footprint_m
-        edge = np.roll(start, -1, axis=0) - start
-        normal_distance = (
-            edge[:, 0] * -start[:, 1] - edge[:, 1] * -start[:, 0]
-        ) / np.hypot(edge[:, 0], edge[:, 1])
-        return float(normal_distance.min())
+        outline = shapely.Polygon(self.footprint_m).exterior
+        return float(outline.distance(shapely.Point(0.0, 0.0)))
 
     @property
     def half_width_m(self) -> float:

@@ -63,9 +63,7 @@ def bend_warnings(scene: Scene) -> list[Fault]:
     elevation = scene.elevation
     if elevation is None:
         return []
-    bends, (rows, columns) = elevation.bends(), elevation.height_m.shape
-    x_min, y_min, x_max, y_max = elevation.bounds
-    x, y = np.linspace(x_min, x_max, columns), np.linspace(y_min, y_max, rows)
+    bends, (x, y) = elevation.bends(), elevation.nodes_m
     walls = shapely.union_all([wall.shape for wall in scene.barriers])
     bends[shapely.intersects_xy(walls, *np.meshgrid(x, y))] = 0.0
     row, column = np.unravel_index(int(np.argmax(bends)), bends.shape)
@@ -122,10 +120,8 @@ def _multiplier(elevation: Elevation, terrain: Sequence[TerrainArea]) -> np.ndar
 def _outlines(elevation: Elevation, steep: np.ndarray) -> list[shapely.Polygon]:
     if not steep.any():
         return []
-    x_min, y_min, x_max, y_max = elevation.bounds
-    rows, columns = elevation.height_m.shape
-    x, y = np.linspace(x_min, x_max, columns), np.linspace(y_min, y_max, rows)
-    row, column = np.nonzero(steep.reshape(rows - 1, columns - 1))
+    x, y = elevation.nodes_m
+    row, column = np.nonzero(steep.reshape(len(y) - 1, len(x) - 1))
     cells = shapely.box(x[column], y[row], x[column + 1], y[row + 1])
     half_m = 0.5 * min(elevation.cell_m)
     grown = shapely.coverage_union_all(cells).buffer(half_m, join_style="mitre")
