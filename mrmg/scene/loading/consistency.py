@@ -186,7 +186,6 @@ def _hull(
     normals /= np.hypot(edge[:, 0], edge[:, 1])[:, None]
     wheels = [robot.place_m(name)[:2] for name in (*parts.spin, *parts.steer)]
     for normal, corner in zip(normals, start, strict=True):
-        side = _side(normal)
         outline_m = float(normal @ corner)
         hull_m = robot.reach_m(HULL, normal)
         wheels_m = max(float(normal @ place) for place in wheels)
@@ -194,27 +193,25 @@ def _hull(
             FOOTPRINT_BEYOND_M, FOOTPRINT_BEYOND_SHARE * float(np.ptp(start @ normal))
         )
         if hull_m - outline_m > HULL_BEYOND_M:
-            yield Fault(
-                "footprint",
-                f"{side} it ends {outline_m:.4g} m from the reference point, but the "
-                f"hull of {robot.file} reaches {hull_m:.4g} m: clearances would be "
+            found = (
+                f"the hull of {robot.file} reaches {hull_m:.4g} m: clearances would be "
                 f"worth nothing (allowed: {HULL_BEYOND_M:g} m); enlarge the footprint "
-                "or shrink the hull",
+                "or shrink the hull"
             )
         elif outline_m - hull_m > allowed_m:
-            yield Fault(
-                "footprint",
-                f"{side} it ends {outline_m:.4g} m from the reference point, but the "
-                f"hull of {robot.file} reaches only {hull_m:.4g} m (allowed: "
-                f"{allowed_m:.2g} m less); shrink the footprint or enlarge the hull",
+            found = (
+                f"the hull of {robot.file} reaches only {hull_m:.4g} m (allowed: "
+                f"{allowed_m:.2g} m less); shrink the footprint or enlarge the hull"
             )
         elif wheels_m - outline_m > PLACE_M:
-            yield Fault(
-                "footprint",
-                f"{side} it ends {outline_m:.4g} m from the reference point, but a "
-                f"wheel of {robot.file} stands at {wheels_m:.4g} m (allowed: "
-                f"{PLACE_M:g} m more); enlarge the footprint",
+            found = (
+                f"a wheel of {robot.file} stands at {wheels_m:.4g} m (allowed: "
+                f"{PLACE_M:g} m more); enlarge the footprint"
             )
+        else:
+            continue
+        ends = f"{_side(normal)} it ends {outline_m:.4g} m from the reference point"
+        yield Fault("footprint", f"{ends}, but {found}")
     top_m = robot.reach_m(HULL, (0.0, 0.0, 1.0)) + float(robot.origin_m[2])
     if apart(top_m, model.height_m, HEIGHT_SHARE * model.height_m):
         allowed = f"{HEIGHT_SHARE:.0%}"

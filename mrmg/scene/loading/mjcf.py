@@ -57,13 +57,14 @@ class CompiledRobot:
 
     def has(self, kind: str, name: str) -> bool:
         """Return whether there is a joint, body, geom, actuator, ... of that name."""
-        return self._id(kind, name) >= 0
+        code = getattr(self._mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+        return bool(self._mujoco.mj_name2id(self._model, code, name) >= 0)
 
     def has_free_root(self) -> bool:
         """Return whether the joint `root` is free, and that of the chassis."""
-        joint = self._id("joint", ROOT)
-        free = self._model.jnt_type[joint] == self._mujoco.mjtJoint.mjJNT_FREE
-        return bool(free and self._model.jnt_bodyid[joint] == self._chassis)
+        joint = self._model.joint(ROOT)
+        free = joint.type == self._mujoco.mjtJoint.mjJNT_FREE
+        return bool(free and joint.bodyid[0] == self._model.body(CHASSIS).id)
 
     @property
     def mass_kg(self) -> float:
@@ -78,54 +79,51 @@ class CompiledRobot:
     @property
     def origin_m(self) -> np.ndarray:
         """Where the chassis stands, shape (3,)."""
-        return np.asarray(self._data.xpos[self._chassis])
+        return np.asarray(self._data.body(CHASSIS).xpos)
 
     @property
     def heading(self) -> np.ndarray:
         """Forward axis of the chassis, shape (3,)."""
-        return np.asarray(self._data.xmat[self._chassis].reshape(3, 3)[:, 0])
+        return np.asarray(self._data.body(CHASSIS).xmat.reshape(3, 3)[:, 0])
 
-    def axis(self, joint: str) -> np.ndarray:
+    def axis(self, joint: str | int) -> np.ndarray:
         """Return the axis of a hinge, shape (3,); zeros for a joint that is none."""
-        at = self._id("joint", joint)
-        hinge = self._model.jnt_type[at] == self._mujoco.mjtJoint.mjJNT_HINGE
-        return np.asarray(self._data.xaxis[at]) if hinge else np.zeros(3)
+        hinge = self._model.joint(joint).type == self._mujoco.mjtJoint.mjJNT_HINGE
+        return np.asarray(self._data.joint(joint).xaxis) if hinge else np.zeros(3)
 
     def place_m(self, joint: str) -> np.ndarray:
         """Return where a joint is, seen from the chassis' origin, shape (3,)."""
-        at = self._id("joint", joint)
-        return np.asarray(self._data.xanchor[at] - self.origin_m)
+        return np.asarray(self._data.joint(joint).xanchor - self.origin_m)
 
     def joint_range_rad(self, joint: str) -> tuple[float, float]:
         """Return how far a joint turns."""
-        at = self._id("joint", joint)
-        return _range(self._model.jnt_limited[at], self._model.jnt_range[at])
+        found = self._model.joint(joint)
+        return _range(found.limited, found.range)
 
     @cached_property
-    def wheels(self) -> tuple[str, ...]:
-        """Names of the joints of all wheels: hinges across, with a tyre on the floor.
+    def wheels(self) -> tuple[str | int, ...]:
+        """Joints of all wheels: hinges across, with a tyre on the floor.
 
-        A joint without a name is called by its number.
+        They are given by their names, or by their numbers where they have none.
         """
         joints = range(self._model.njnt)
-        named = [self._model.joint(at).name or f"#{at}" for at in joints]
-        hinges = [name for name in named if self._across(name)]
+        named = [self._model.joint(at).name or at for at in joints]
+        hinges = [name for name in named if abs(self.axis(name)[1]) > 0.9]
         return tuple(name for name in hinges if self._tyres(name))
 
-    def radius_m(self, joint: str) -> float:
+    def radius_m(self, joint: str | int) -> float:
         """Return how far the tyres of a wheel reach below its joint."""
         down = np.array([0.0, 0.0, -1.0])
-        middle = down @ self._data.xanchor[self._id("joint", joint)]
+        middle = down @ self._data.joint(joint).xanchor
         lowest = max(
             support_m(self._model, self._data, geom, down)
             for geom in self._tyres(joint)
         )
         return float(lowest - middle)
 
-    def spin_inertia_kg_m2(self, joint: str) -> float:
+    def spin_inertia_kg_m2(self, joint: str | int) -> float:
         """Return the inertia about a wheel's joint, armature included."""
-        dof = self._model.jnt_dofadr[self._id("joint", joint)]
-        return float(self._model.dof_M0[dof])
+        return float(self._model.joint(joint).M0[0])
 
     def grip(self, joint: str) -> float:
         """Return the friction coefficient of a wheel on the simulated floor."""
@@ -146,7 +144,7 @@ class CompiledRobot:
 
     def touches(self, geom: str, bits: int) -> bool:
         """Return whether a geom touches everything that has one of some bits."""
-        affinity = int(self._model.geom_conaffinity[self._id("geom", geom)])
+        affinity = int(self._model.geom(geom).conaffinity[0])
         return affinity & bits == bits
 
     def reach_m(self, geom: str, direction: Sequence[float]) -> float:
@@ -155,7 +153,7 @@ class CompiledRobot:
         Infinity for planes and height fields.
         """
         vector = np.array([*direction, 0.0, 0.0, 0.0])[:3]
-        far_m = support_m(self._model, self._data, self._id("geom", geom), vector)
+        far_m = support_m(self._model, self._data, self._model.geom(geom).id, vector)
         return far_m - float(vector @ self.origin_m)
 
     def traction_N(self, motor: str, joints: Sequence[str], force_N: float) -> float:
@@ -163,7 +161,7 @@ class CompiledRobot:
 
         That is what `simulation.drives` commands at rest; its ranges may cut it.
         """
-        model, at = self._model, self._id("actuator", motor)
+        model, at = self._model, self._model.actuator(motor).id
         (moment,) = transmission(model)[[model.actuator_outadr[at]]]
         effort = force_N * self.radius_m(joints[0]) / moment.sum()
         control = (effort - model.actuator_biasprm[at, 0]) / model.actuator_gainprm[
@@ -176,69 +174,55 @@ class CompiledRobot:
         if model.actuator_actadr[at] >= 0:  # a filter, once it has settled
             self._data.act[model.actuator_actadr[at]] = control
         self._mujoco.mj_forward(model, self._data)
-        dofs = [model.jnt_dofadr[self._id("joint", joint)] for joint in joints]
-        radii_m = [self.radius_m(joint) for joint in joints]
-        return float((self._data.qfrc_actuator[dofs] / radii_m).sum())
+        forces_N = [
+            self._data.joint(joint).qfrc_actuator[0] / self.radius_m(joint)
+            for joint in joints
+        ]
+        return float(sum(forces_N))
 
     def yaw_inertia_kg_m2(self) -> float:
         """Return the inertia about the upright axis through the chassis' origin."""
-        first = self._model.jnt_dofadr[self._id("joint", ROOT)]
-        return float(self._model.dof_M0[first + 5])
+        return float(self._model.joint(ROOT).M0[5])
 
     def drive_fault(self, actuator: str) -> str:
         """Return why an actuator cannot be commanded as a force; "" if it can."""
-        at = self._id("actuator", actuator)
+        at = self._model.actuator(actuator).id
         moment = transmission(self._model)[self._model.actuator_outadr[at]]
         return drive_fault(self._model, at, moment)
 
     def servo_gain(self, servo: str) -> float:
         """Return the angle a position servo holds for a control of 1; else 0."""
-        at, model, types = self._id("actuator", servo), self._model, self._mujoco
-        stiffness = -float(model.actuator_biasprm[at, 1])
-        affine = model.actuator_biastype[at] == types.mjtBias.mjBIAS_AFFINE
-        at_once = model.actuator_dyntype[at] == types.mjtDyn.mjDYN_NONE
-        gear = float(model.actuator_gear[at, 0])
+        actuator = self._model.actuator(servo)
+        stiffness, gear = -float(actuator.biasprm[1]), float(actuator.gear[0])
+        affine = actuator.biastype == self._mujoco.mjtBias.mjBIAS_AFFINE
+        at_once = actuator.dyntype == self._mujoco.mjtDyn.mjDYN_NONE
         if not (affine and at_once and stiffness > 0.0 and gear):
             return 0.0
-        return float(model.actuator_gainprm[at, 0]) / stiffness / gear
+        return float(actuator.gainprm[0]) / stiffness / gear
 
     def servo_range_rad(self, servo: str) -> tuple[float, float]:
         """Return the angles a position servo can be given."""
-        at = self._id("actuator", servo)
-        limited = self._model.actuator_ctrllimited[at]
-        low, high = _range(limited, self._model.actuator_ctrlrange[at])
+        actuator = self._model.actuator(servo)
+        low, high = _range(actuator.ctrllimited, actuator.ctrlrange)
         return self.servo_gain(servo) * low, self.servo_gain(servo) * high
 
     def tendon_per_rad_m(self, tendon: str, joint: str) -> float:
         """Return by how much a tendon grows when a wheel turns by one radian."""
-        tendon_at = self._id("tendon", tendon)
-        place = self._model.jnt_qposadr[self._id("joint", joint)]
-        before = float(self._data.ten_length[tendon_at])
-        self._data.qpos[place] += _TURNED_RAD
-        self._mujoco.mj_fwdPosition(self._model, self._data)
-        grown_m = float(self._data.ten_length[tendon_at]) - before
-        self._data.qpos[place] -= _TURNED_RAD
-        self._mujoco.mj_fwdPosition(self._model, self._data)
+        length_m = self._data.tendon(tendon).length
+        before_m = float(length_m[0])
+        self._turn(joint, _TURNED_RAD)
+        grown_m = float(length_m[0]) - before_m
+        self._turn(joint, -_TURNED_RAD)
         return grown_m / _TURNED_RAD
 
-    @cached_property
-    def _chassis(self) -> int:
-        return self._id("body", CHASSIS)
+    def _turn(self, joint: str, angle_rad: float) -> None:
+        self._data.joint(joint).qpos[0] += angle_rad
+        self._mujoco.mj_fwdPosition(self._model, self._data)
 
-    def _id(self, kind: str, name: str) -> int:
-        if name.startswith("#"):
-            return int(name[1:])
-        kinds = self._mujoco.mjtObj
-        code = getattr(kinds, f"mjOBJ_{kind.upper()}")
-        return int(self._mujoco.mj_name2id(self._model, code, name))
-
-    def _across(self, joint: str) -> bool:
-        return bool(abs(self.axis(joint)[1]) > 0.9)
-
-    def _tyres(self, joint: str) -> list[int]:
+    def _tyres(self, joint: str | int) -> list[int]:
         """Return the geoms of a wheel that touch the floor."""
         model = self._model
-        body = model.body_weldid[model.jnt_bodyid[self._id("joint", joint)]]
+        body = model.body_weldid[model.joint(joint).bodyid[0]]
         return [
             int(geom)
             for geom in np.flatnonzero(model.geom_conaffinity & FLOOR_BIT)
