@@ -91,11 +91,23 @@ _CORE_SCALARS = (
         list("-+.0123456789"),
     ),
 )
-_CORE_SCALAR = re.compile("|".join(pattern for _, pattern, _ in _CORE_SCALARS))
-"""Anything but text."""
+
+
+class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
+    """Writes lists of plain values on one line, and never an alias.
+
+    It quotes what readers of YAML 1.1 or 1.2 take for something else than text: "no" in
+    the former, "1e3" in the latter.
+    """
+
+    def ignore_aliases(self, data: Any) -> bool:
+        return True
+
 
 for _tag, _pattern, _first in _CORE_SCALARS:
-    _CoreLoader.add_implicit_resolver(_tag, re.compile(f"^(?:{_pattern})$"), _first)
+    _scalar = re.compile(f"^(?:{_pattern})$")
+    _CoreLoader.add_implicit_resolver(_tag, _scalar, _first)
+    _Dumper.add_implicit_resolver(_tag, _scalar, _first)
 _CoreLoader.add_constructor("tag:yaml.org,2002:int", _construct_core_int)
 _CoreLoader.add_constructor("tag:yaml.org,2002:float", _construct_core_float)
 
@@ -207,13 +219,6 @@ def _repeated(value: Any, sizes: dict[int, float]) -> float:
     return repeated
 
 
-class _Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]
-    """Writes lists of plain values on one line, and never an alias."""
-
-    def ignore_aliases(self, data: Any) -> bool:
-        return True
-
-
 def _represent_list(dumper: _Dumper, data: list[Any]) -> yaml.SequenceNode:
     short = not any(isinstance(item, dict) for item in data)
     return dumper.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=short)
@@ -227,15 +232,7 @@ def _represent_float(dumper: _Dumper, data: float) -> yaml.ScalarNode:
     return dumper.represent_scalar("tag:yaml.org,2002:float", text)
 
 
-def _represent_text(dumper: _Dumper, data: str) -> yaml.ScalarNode:
-    # PyYAML quotes what YAML 1.1 takes for something else than text, as "no"; but "1e3"
-    # is a number in YAML 1.2 only.
-    style = "'" if _CORE_SCALAR.fullmatch(data) else None
-    return dumper.represent_scalar("tag:yaml.org,2002:str", data, style=style)
-
-
 _Dumper.add_representer(list, _represent_list)
-_Dumper.add_representer(str, _represent_text)
 _Dumper.add_representer(float, _represent_float)
 
 
