@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -15,34 +16,28 @@ _MOTIONS = {
     "unicycle": "unicycle: two driven wheels",
 }
 
+_AS_STATED = (
+    *("motion_model", "mass_kg", "height_m", "wheelbase_m", "track_m"),
+    *("wheel_radius_m", "planning_share", "battery_capacity_J"),
+)
+"""Figures that are values of the model."""
+
 
 def robot_figures(model: RobotModel) -> dict[str, Any]:
     """Return the figures of a model as JSON data, by names with units."""
     length_m, width_m = np.ptp(model.footprint_m, axis=0).tolist()
-    limits, share = model.limits, model.planning_share
     plain_J_per_m = model.energy_model.plain_ground_J_per_m()
     full_lock_m = None
     if model.motion_model == "car":
-        full_lock_m = model.wheelbase_m / math.tan(limits.w_max)
+        full_lock_m = model.wheelbase_m / math.tan(model.limits.w_max)
     return {
-        "motion_model": model.motion_model,
-        "mass_kg": model.mass_kg,
+        **{name: getattr(model, name) for name in _AS_STATED},
+        **asdict(model.limits),
         "length_m": round(length_m, 9),
         "width_m": round(width_m, 9),
-        "height_m": model.height_m,
-        "wheelbase_m": model.wheelbase_m,
-        "track_m": model.track_m,
-        "wheel_radius_m": model.wheel_radius_m,
-        "v_max_m_s": limits.v_max_m_s,
-        "v_min_m_s": limits.v_min_m_s,
-        "w_max": limits.w_max,
-        "u1_max_m_s2": limits.u1_max_m_s2,
-        "u2_max": limits.u2_max,
-        "planning_share": share,
         "turning_radius_m": model.turning_radius_m,
         "turning_radius_at_full_lock_m": full_lock_m,
         "plain_ground_J_per_m": plain_J_per_m,
-        "battery_capacity_J": model.battery_capacity_J,
         "battery_range_m": model.battery_capacity_J / plain_J_per_m,
         "mjcf": None if model.mjcf is None else model.mjcf.name,
         "only_planned_for": why_not_driven(model),

@@ -130,23 +130,22 @@ def _merged_battery(battery: _Entry, given: Any) -> Any:
     """Return a battery's entry with what is given in place of what it named."""
     if not isinstance(given, dict):
         return given  # and the loader reports what is wrong
-    kept = {key: item for key, item in battery.items() if not _named(key, given)}
-    return _without_none(kept | given)
+    return _without_none(_kept(battery, given) | given)
 
 
-def _named(key: str, given: _Entry) -> bool:
-    """Return whether a battery's entry names a key, in whatever unit."""
-    capacities = [name for name in given if name.startswith("capacity_")]
-    return key in given or (key.startswith("capacity_") and bool(capacities))
+def _kept(battery: _Entry, given: _Entry) -> _Entry:
+    """Return what of a battery's entry another one does not name, in whatever unit."""
+    replaced = set(given)
+    if any(key.startswith("capacity_") for key in given):
+        replaced |= {key for key in battery if key.startswith("capacity_")}
+    return {key: item for key, item in battery.items() if key not in replaced}
 
 
 def _without_own(robot: _Entry, given: Any) -> _Entry:
     """Return a robot's entry without what the fleet's battery is given now."""
     if not isinstance(given, dict) or "battery" not in robot:
         return robot
-    own = robot["battery"]
-    kept = {key: item for key, item in own.items() if not _named(key, given)}
-    return {**robot, "battery": kept}
+    return {**robot, "battery": _kept(robot["battery"], given)}
 
 
 def _without_none(entry: _Entry) -> _Entry:
