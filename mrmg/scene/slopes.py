@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -13,9 +12,7 @@ from mrmg.energy.model import GRAVITY_M_S2
 from mrmg.errors import Fault
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.robot_model import RobotModel
-
-if TYPE_CHECKING:
-    from mrmg.scene.types import Obstacle, Robot, Scene, TerrainArea
+from mrmg.scene.types import Obstacle, Robot, Scene, TerrainArea
 
 STEEP = "steep_ground"
 """What the names of steep ground begin with."""
@@ -77,24 +74,33 @@ def bend_warnings(scene: Scene) -> list[Fault]:
     return [Fault("elevation", message)]
 
 
-def steep_ground(
-    elevation: Elevation, robots: Sequence[Robot], terrain: Sequence[TerrainArea]
-) -> list[tuple[shapely.Polygon, tuple[str, ...]]]:
-    """Return ground too steep to climb, and the ids of the robots it is too steep for.
+def avoided_ground(
+    elevation: Elevation | None,
+    robots: Sequence[Robot],
+    terrain: Sequence[TerrainArea],
+) -> tuple[Obstacle, ...]:
+    """Return ground too steep to climb, as obstacles for the robots that cannot.
 
     It covers the cells of the elevation that are too steep, and up to half a cell
-    around them, which rounds the steps of its outline.
+    around them, which rounds the steps of its outline. There is none but with
+    `slope: avoid`.
     """
+    if elevation is None or not elevation.avoid_steep:
+        return ()
     slope, multiplier = elevation.steepest().ravel(), _multiplier(elevation, terrain)
     stopped: dict[bytes, list[str]] = {}
     for robot in robots:
         steep = slope > np.maximum(steepest_climb(robot.model, multiplier), 0.0)
         stopped.setdefault(steep.tobytes(), []).append(robot.id)
-    return [
+    ground = [
         (part, tuple(names))
         for mask, names in stopped.items()
         for part in _outlines(elevation, np.frombuffer(mask, dtype=bool))
     ]
+    return tuple(
+        Obstacle(id=f"{STEEP}_{number}", shape=shape, height_m=0.0, blocks=names)
+        for number, (shape, names) in enumerate(ground, start=1)
+    )
 
 
 def steepest_climb(model: RobotModel, multiplier: np.ndarray) -> np.ndarray:

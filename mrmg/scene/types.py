@@ -15,7 +15,6 @@ from mrmg.scene.margins import STATES_NONE, Margins
 from mrmg.scene.objective import ENERGY, Objective
 from mrmg.scene.region import HEADING_TOLERANCE_RAD, Region
 from mrmg.scene.robot_model import RobotModel
-from mrmg.scene.slopes import STEEP, steep_ground
 from mrmg.scene.written import WrittenScene
 
 
@@ -205,14 +204,10 @@ class Scene:
     @cached_property
     def barriers(self) -> tuple[Obstacle, ...]:
         """The obstacles, and with `slope: avoid` the ground too steep for robots."""
-        if self.elevation is None or not self.elevation.avoid_steep:
-            return self.obstacles
-        steep = steep_ground(self.elevation, self.robots, self.terrain)
-        ground = tuple(
-            Obstacle(id=f"{STEEP}_{number}", shape=shape, height_m=0.0, blocks=robots)
-            for number, (shape, robots) in enumerate(steep, start=1)
-        )
-        return self.obstacles + ground
+        from mrmg.scene.slopes import avoided_ground
+
+        steep = avoided_ground(self.elevation, self.robots, self.terrain)
+        return self.obstacles + steep
 
     @property
     def document(self) -> dict[str, Any]:

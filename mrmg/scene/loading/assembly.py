@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import shapely
-from shapely.geometry import Polygon
 
 from mrmg import storage
 from mrmg.errors import Fault, SceneError, nearest
@@ -45,7 +44,7 @@ from mrmg.scene.loading.starts import crowded_robots, misplaced_robots
 from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
 from mrmg.scene.region import HEADING_TOLERANCE_RAD, Region
 from mrmg.scene.robot_model import RobotModel
-from mrmg.scene.slopes import slope_faults, steep_ground
+from mrmg.scene.slopes import avoided_ground, slope_faults
 from mrmg.scene.types import Finish, Goal, Obstacle, Robot, Scene, Station, TerrainArea
 from mrmg.scene.written import WrittenScene
 
@@ -71,7 +70,6 @@ class Assembly:
         self._base = base
         self._models: dict[str, tuple[RobotModel, dict[str, Any]] | None] = {}
         self._parameters: dict[str, dict[str, Any]] = {}
-        self._steep: list[tuple[Polygon, tuple[str, ...]]] = []
         self.ids = self._unique_ids()
         self.bounds = self._bounds()
         self.robots = self._parts("robots", self._robot)
@@ -83,16 +81,11 @@ class Assembly:
         self.goals = self._parts("goals", self._goal)
         self.stations = self._parts("stations", self._station)
         self.objective = self._objective()
-        self.faults += self._faults_of_starts()
-
-    def _faults_of_starts(self) -> list[Fault]:
-        places = {robot: f"{path}.pose" for robot, path in self.ids.items()}
-        return [
-            *misplaced_robots(
-                self.robots, places, self.bounds, self.obstacles, self._steep
-            ),
-            *crowded_robots(self.robots, places, self.stations),
-        ]
+        starts = {robot: f"{path}.pose" for robot, path in self.ids.items()}
+        steep = avoided_ground(self.elevation, self.robots, self.terrain)
+        barriers = [*self.obstacles, *steep]
+        self.faults += misplaced_robots(self.robots, starts, self.bounds, barriers)
+        self.faults += crowded_robots(self.robots, starts, self.stations)
 
     def scene(self, checked: SceneDocument) -> Scene:
         """Return the scene; call it only when there are no faults.
@@ -271,9 +264,7 @@ class Assembly:
             return None
         with self._faults_noted():
             elevation = elevation_of(entry, self.bounds, self._base)
-            if elevation.avoid_steep:
-                self._steep = steep_ground(elevation, self.robots, self.terrain)
-            else:
+            if not elevation.avoid_steep:
                 ground = (self.obstacles, self.terrain)
                 self.faults += slope_faults(elevation, self.robots, *ground)
             return elevation

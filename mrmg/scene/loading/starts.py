@@ -17,8 +17,7 @@ def misplaced_robots(
     robots: Sequence[Robot],
     places: Mapping[str, str],
     bounds: tuple[float, float, float, float] | None,
-    obstacles: Sequence[Obstacle],
-    steep: Sequence[tuple[Polygon, tuple[str, ...]]],
+    barriers: Sequence[Obstacle],
 ) -> Iterator[Fault]:
     """Yield a fault for each robot that starts outside the bounds or on an obstacle.
 
@@ -26,19 +25,19 @@ def misplaced_robots(
         robots: of the scene.
         places: of their poses in its file, by id.
         bounds: of the scene; None where the file states none that hold.
-        obstacles: of the scene.
-        steep: ground too steep, and for which robots it is.
+        barriers: obstacles of the scene, and ground too steep.
     """
     for robot in robots:
         where, shape = places[robot.id], _footprint(robot)
         if bounds and not shapely.box(*bounds).covers(shape):
             message = f"{robot.id} starts outside the bounds {list(bounds)}"
             yield Fault(where, message)
-        for wall in obstacles:
-            if wall.stops(robot.id) and wall.shape.intersects(shape):
+        stopping = [wall for wall in barriers if wall.stops(robot.id)]
+        below = [wall for wall in stopping if wall.shape.intersects(shape)]
+        for wall in below:
+            if not wall.is_steep_ground:
                 yield Fault(where, f"{robot.id} starts on the obstacle '{wall.id}'")
-        ground = [shape for shape, names in steep if robot.id in names]
-        if shapely.intersects(ground, shape).any():
+        if any(wall.is_steep_ground for wall in below):
             yield Fault(where, f"{robot.id} starts on ground too steep for it")
 
 

@@ -20,7 +20,7 @@ from mrmg.scene.margins import default_margins
 from mrmg.scene.populating.ground import Ground
 from mrmg.scene.populating.placement import RESERVE, Placement, Sites, place_mission
 from mrmg.scene.robot_model import RobotModel
-from mrmg.scene.slopes import steep_ground
+from mrmg.scene.slopes import avoided_ground
 from mrmg.scene.types import Battery, Robot, Scene
 from mrmg.seeding import stream
 
@@ -163,11 +163,10 @@ def _size(model: RobotModel) -> float:
 
 def _too_steep(scene: Scene, model: RobotModel) -> list[Polygon]:
     """Return the ground that a robot of a model cannot climb."""
-    if scene.elevation is None or not scene.elevation.avoid_steep:
-        return []
     battery = Battery(capacity_J=1.0, start_J=1.0, reserve_fraction=0.0)
     robot = Robot(id="r", model=model, pose=(0.0, 0.0, 0.0), battery=battery)
-    return [shape for shape, _ in steep_ground(scene.elevation, [robot], scene.terrain)]
+    ground = avoided_ground(scene.elevation, [robot], scene.terrain)
+    return [part.shape for part in ground]
 
 
 def _climbs_m(scene: Scene, model: RobotModel, points_m: np.ndarray) -> np.ndarray:
