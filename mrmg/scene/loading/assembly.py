@@ -71,6 +71,12 @@ class Assembly:
         self._models: dict[str, tuple[RobotModel, dict[str, Any]] | None] = {}
         self._parameters: dict[str, dict[str, Any]] = {}
         self.ids = self._unique_ids()
+        items = self._items("robots")
+        self._robot_ids = [str(i.get("id")) for i in items if isinstance(i, dict)]
+        fleet = parsed(BatteryEntry, document.get("battery", {}))
+        self._fleet_battery = fleet or BatteryEntry()
+        margins = parsed(MarginsEntry, document.get("margins")) or MarginsEntry()
+        self._fleet_margins = margins.margins
         self.bounds = self._bounds()
         self.robots = self._parts("robots", self._robot)
         self.obstacles = self._parts("obstacles", self._obstacle)
@@ -192,15 +198,14 @@ class Assembly:
         model, self._parameters[entry.id] = self._model(entry.model, f"{path}.model")
         if entry.energy is not None:
             model = replace(model, energy_preset=entry.energy)
-        default = parsed(BatteryEntry, self._document.get("battery", {}))
-        battery = battery_of(entry, default or BatteryEntry(), model, path)
+        battery = battery_of(entry, self._fleet_battery, model, path)
         finish = None
         with self._faults_noted():
             finish = _finish(entry, f"{path}.finish")
         if entry.rolling_factor is not None:
             rolling = model.rolling_coefficient * entry.rolling_factor
             model = replace(model, rolling_coefficient=rolling)
-        stated = parsed(MarginsEntry, self._document.get("margins")) or MarginsEntry()
+        own = entry.margins or MarginsEntry()
         x, y, yaw = entry.pose
         return Robot(
             id=entry.id,
@@ -208,7 +213,7 @@ class Assembly:
             pose=(x, y, yaw),
             battery=battery,
             finish=finish,
-            margins=(entry.margins or MarginsEntry()).margins.over(stated.margins),
+            margins=own.margins.over(self._fleet_margins),
         )
 
     def _model(self, wanted: Any, path: str) -> tuple[RobotModel, dict[str, Any]]:
@@ -242,8 +247,7 @@ class Assembly:
         return loaded
 
     def _obstacle(self, entry: ObstacleEntry, path: str) -> Obstacle:
-        items = self._items("robots")
-        robots = [str(item.get("id")) for item in items if isinstance(item, dict)]
+        robots = self._robot_ids
         for place, name in enumerate(entry.blocks or []):
             if name not in robots:
                 known = ", ".join(robots) if robots else "none"
