@@ -12,7 +12,7 @@ from mrmg.plans import Plan
 from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.loading.mjcf import no_warning_file
 from mrmg.scene.types import Scene
-from mrmg.simulation.actuation import actuation_of
+from mrmg.simulation.actuation import Actuation
 from mrmg.simulation.chassis import chassis_maker
 from mrmg.simulation.contacts import ContactWatch
 from mrmg.simulation.controller import Controller, controller_maker
@@ -145,7 +145,8 @@ class _Run:
         self._slopes_underfoot = SlopesUnderfoot(world.scene)
         self._terrain = TerrainUnderfoot(world.scene)
         self._sensing = sensing_of(world.scene, disturbance, self._period_s)
-        self._actuation = actuation_of(disturbance, self._set_points.following[:, 1])
+        steer = self._set_points.following[:, 1]
+        self._actuation = Actuation(disturbance, steer, self._period_s)
         self._coming = self._reference.at_once(0.0)
         self._settle()
         self._observe()
@@ -171,8 +172,8 @@ class _Run:
             period_s,
             slope,
         )
-        force = self._actuation.force_N(wanted, period_s)
-        steer_from, steer_to = self._actuation.steer(now[:, 1], steer, period_s)
+        force = self._actuation.force_N(wanted)
+        steer_from, steer_to = self._actuation.steer(now[:, 1], steer)
         if self._disturbance is not None:
             ground = self._ground(true, steer_to)
             level, _ = self._slopes

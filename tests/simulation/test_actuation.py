@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrmg.simulation.actuation import Actuation, LaggingActuation, actuation_of
+from mrmg.simulation.actuation import Actuation
 from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
 
 T_S = 0.02
 
 
-def actuation(steer: float = 0.0, **changes: float) -> LaggingActuation:
+def actuation(steer: float = 0.0, **changes: float) -> Actuation:
     robot = RobotDisturbance(robot="r1", **changes)
-    return LaggingActuation(Disturbance(seed=0, robots=(robot,)), np.array([steer]))
+    return Actuation(Disturbance(seed=0, robots=(robot,)), np.array([steer]), T_S)
 
 
 def integrated(
@@ -32,8 +32,8 @@ def test_without_disturbance_commands_arrive_exactly() -> None:
     rng = np.random.default_rng(1)
     force, angle = rng.normal(size=50), np.append(0.3, rng.normal(size=50))
     for wanted, start, end in zip(force, angle, angle[1:], strict=False):
-        assert through.force_N(np.array([wanted]), T_S) == wanted
-        before, after = through.steer(np.array([start]), np.array([end]), T_S)
+        assert through.force_N(np.array([wanted])) == wanted
+        before, after = through.steer(np.array([start]), np.array([end]))
         assert (before, after) == (start, end)
 
 
@@ -44,7 +44,7 @@ def test_the_force_is_the_mean_of_the_lagging_one(lag_s: float) -> None:
     exact = integrated(np.repeat(commands, fine), lag_s, 0.0, fine)
     mean = exact[:-1].reshape(len(commands), fine).mean(axis=1)
     lagging = actuation(lag_s=lag_s)
-    got = [lagging.force_N(np.array([wanted]), T_S)[0] for wanted in commands]
+    got = [lagging.force_N(np.array([wanted]))[0] for wanted in commands]
     np.testing.assert_allclose(got, mean, atol=0.2)
 
 
@@ -59,37 +59,20 @@ def test_the_steering_lags_behind_ramps(lag_s: float) -> None:
     for start, end, before, after in zip(
         ends, ends[1:], exact, exact[1:], strict=False
     ):
-        got = lagging.steer(np.array([start]), np.array([end]), T_S)
+        got = lagging.steer(np.array([start]), np.array([end]))
         np.testing.assert_allclose(np.array(got)[:, 0], (before, after), atol=1e-4)
 
 
 def test_gains_scale_what_arrives() -> None:
     weak = actuation(steer=0.2, drive_gain=-0.1, steering_gain=0.05)
-    assert weak.force_N(np.array([200.0]), T_S) == pytest.approx(180.0)
-    before, after = weak.steer(np.array([0.2]), np.array([0.4]), T_S)
+    assert weak.force_N(np.array([200.0])) == pytest.approx(180.0)
+    before, after = weak.steer(np.array([0.2]), np.array([0.4]))
     assert (before, after) == (pytest.approx(0.21), pytest.approx(0.42))
 
 
 def test_robots_have_their_own_lags() -> None:
     robots = (RobotDisturbance(robot="r1", lag_s=0.1), RobotDisturbance(robot="r2"))
-    both = LaggingActuation(Disturbance(seed=0, robots=robots), np.zeros(2))
-    late, prompt = both.force_N(np.array([50.0, 50.0]), T_S)
+    both = Actuation(Disturbance(seed=0, robots=robots), np.zeros(2), T_S)
+    late, prompt = both.force_N(np.array([50.0, 50.0]))
     assert 0.0 < late < 6.0
     assert prompt == 50.0
-
-
-def test_without_lag_and_gain_everything_is_done_at_once() -> None:
-    """The perfect actuators do what lagging ones without lag do."""
-    undisturbed = Disturbance(seed=0, robots=(RobotDisturbance(robot="r1"),))
-    prompt = actuation_of(undisturbed, np.array([0.1]))
-    assert isinstance(prompt, Actuation)
-    general = LaggingActuation(undisturbed, np.array([0.1]))
-    angles = 0.1 + 0.05 * np.sin(np.arange(6))
-    angles[0] = 0.1
-    for force, start, end in zip(angles * 900, angles, angles[1:], strict=False):
-        asked = np.array([force])
-        assert prompt.force_N(asked, T_S) == general.force_N(asked, T_S)
-        ramp = np.array([start]), np.array([end])
-        np.testing.assert_allclose(
-            prompt.steer(*ramp, T_S), general.steer(*ramp, T_S), atol=1e-15
-        )
