@@ -14,13 +14,12 @@ import numpy as np
 from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import PARTS
 from mrmg.scene.types import Robot
-from mrmg.simulation.chassis import part_ids
-from mrmg.simulation.driven_wheels import DrivenWheels
+from mrmg.simulation.chassis import Chassis, part_ids
 from mrmg.simulation.drives import ForceDrives
 
 
-class AckermannChassis:
-    """All cars of a running simulation; a `Chassis`."""
+class AckermannChassis(Chassis):
+    """All cars of a running simulation."""
 
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[Robot]
@@ -28,19 +27,17 @@ class AckermannChassis:
         """Find the parts of `robots`.
 
         Raises:
-            FileError: if an MJCF lacks one.
+            FileError: if a drive cannot be commanded as a force.
         """
-        self._model, self._data, parts = model, data, PARTS["car"]
+        parts = PARTS["car"]
+        super().__init__(model, data, robots, parts)
         self._step_s = model.opt.timestep
         models = [robot.model for robot in robots]
         # What tan psi loses, by tan psi itself, to the left wheel's and to the right's.
         half_track = np.array([item.track_m / item.wheelbase_m / 2 for item in models])
         self._swing = half_track[:, None] * np.array([1.0, -1.0])
-        self._wheels = DrivenWheels(model, data, robots, parts.spin)
-        joint, actuator = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_ACTUATOR
-        steer = part_ids(model, joint, robots, parts.steer)
-        self._steer_q = model.jnt_qposadr[steer]
-        servos = part_ids(model, actuator, robots, parts.servos)
+        self._steer_q = model.jnt_qposadr[part_ids(model.joint, robots, parts.steer)]
+        servos = part_ids(model.actuator, robots, parts.servos)
         self._steer_ctrl = model.actuator_ctrladr[servos].ravel()
         self._control, self._share = data.ctrl, np.empty((0, 1))
         self._find_drives(robots)
@@ -58,26 +55,21 @@ class AckermannChassis:
 
     def axle_speed_m_s(self) -> np.ndarray:
         """Return the speed the rear axle rolls at, shape (K,)."""
-        return self._mean_over_axle(self._wheels.rate_rad_s())
+        left, right = self._wheel_rates_rad_s().T
+        return np.asarray(0.5 * self._radius_m * (left + right))
 
-    def set_resistance(
-        self,
-        resistance_N: np.ndarray,
-        swing_N: np.ndarray,
-        believed_swing_N: np.ndarray | None = None,
-    ) -> None:
-        """Set the dry friction of the rear axle, shape (K,); its differential is free.
-
-        Args:
-            resistance_N: against the way of its middle.
-            swing_N: zero.
-            believed_swing_N: zero.
-        """
-        torque = 0.5 * self._wheels.radius_m * resistance_N
-        self._model.dof_frictionloss[self._wheels.dof] = torque[:, None]
+    def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
+        """Set the dry friction of the rear axle; its differential is free of any."""
+        torque = 0.5 * self._radius_m * resistance_N
+        self._model.dof_frictionloss[self._wheels_v] = torque[:, None]
 
     def command(
-        self, force_N: np.ndarray, w_from: np.ndarray, w_to: np.ndarray, steps: int
+        self,
+        force_N: np.ndarray,
+        w_from: np.ndarray,
+        w_to: np.ndarray,
+        steps: int,
+        turning_multiplier: np.ndarray,
     ) -> None:
         """Hold the traction force; ramp psi so that the servos are on it in time."""
         lag = self._servo_lag_s / (steps * self._step_s)
@@ -95,28 +87,15 @@ class AckermannChassis:
 
     def _find_drives(self, robots: Sequence[Robot]) -> None:
         """Find `drive`, and what shares its work, of every robot."""
-        kind = mujoco.mjtObj.mjOBJ_ACTUATOR
-        (motor,) = PARTS["car"].motors
-        main = part_ids(self._model, kind, robots, (motor,))[:, 0]
-        names = [
-            self._model.actuator(index).name for index in range(self._model.nactuator)
-        ]
+        model, (motor,) = self._model, PARTS["car"].motors
+        names = [model.actuator(index).name for index in range(model.nactuator)]
         ids, owners = [], []
-        for place, (robot, own) in enumerate(zip(robots, main.tolist(), strict=True)):
-            start = f"{robot.id}/{motor}_"
-            others = [at for at, name in enumerate(names) if name.startswith(start)]
-            ids += [own, *others]
+        for place, robot in enumerate(robots):
+            own = f"{robot.id}/{motor}"
+            others = [name for name in names if name.startswith(f"{own}_")]
+            ids += [model.actuator(name).id for name in (own, *others)]
             owners += [place] * (1 + len(others))
         self._driven = np.array(owners)
         self._drive_count = np.bincount(self._driven)[self._driven]
-        self._drives = ForceDrives(
-            self._model,
-            self._data,
-            [robots[place] for place in owners],
-            np.array(ids),
-        )
-
-    def _mean_over_axle(self, wheels: np.ndarray) -> np.ndarray:
-        """Return the axle's motion from that of its wheels, shape (K, 2) -> (K,)."""
-        radius_m = self._wheels.radius_m
-        return np.asarray(0.5 * radius_m * (wheels[:, 0] + wheels[:, 1]))
+        driven = [robots[place] for place in owners]
+        self._drives = ForceDrives(model, self._data, driven, np.array(ids))

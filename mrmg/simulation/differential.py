@@ -17,9 +17,8 @@ from mrmg.energy.model import GRAVITY_M_S2
 from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import CHASSIS, PARTS, ROOT
 from mrmg.scene.types import Robot
-from mrmg.simulation.chassis import part_ids
+from mrmg.simulation.chassis import Chassis, part_ids
 from mrmg.simulation.drive import DriveParams, axle_grip_N
-from mrmg.simulation.driven_wheels import DrivenWheels
 from mrmg.simulation.drives import ForceDrives
 from mrmg.simulation.speed_loop import SpeedLoop
 
@@ -27,8 +26,8 @@ _LEVEL = 1e-3
 """Cross slope that dry friction holds."""
 
 
-class DifferentialChassis:
-    """All differential drives of a running simulation; a `Chassis`."""
+class DifferentialChassis(Chassis):
+    """All differential drives of a running simulation."""
 
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, robots: Sequence[Robot]
@@ -36,33 +35,31 @@ class DifferentialChassis:
         """Find the parts of `robots`.
 
         Raises:
-            FileError: if an MJCF lacks one.
+            FileError: if a drive cannot be commanded as a force.
         """
-        self._model, self._data, parts = model, data, PARTS["unicycle"]
+        parts = PARTS["unicycle"]
+        super().__init__(model, data, robots, parts)
         models = [robot.model for robot in robots]
         self._track_m = np.array([item.track_m for item in models])
-        self._wheels = DrivenWheels(model, data, robots, parts.spin)
-        joint, actuator = mujoco.mjtObj.mjOBJ_JOINT, mujoco.mjtObj.mjOBJ_ACTUATOR
-        root = part_ids(model, joint, robots, (ROOT,))[:, 0]
+        root = part_ids(model.joint, robots, (ROOT,))[:, 0]
         self._yaw_v = model.jnt_dofadr[root] + 5
-        motors = part_ids(model, actuator, robots, parts.motors)
+        motors = part_ids(model.actuator, robots, parts.motors)
         each = [robot for robot in robots for _ in range(2)]
         self._drives = ForceDrives(model, data, each, motors.ravel())
-        tendon = mujoco.mjtObj.mjOBJ_TENDON
-        self._tendon = part_ids(model, tendon, robots, parts.tendons)
-        turning_N = np.array([item.energy_model.turning_force_N for item in models])
-        self._turning_Nm = turning_N * self._track_m
+        self._tendon = part_ids(model.tendon, robots, parts.tendons)
+        self._turning_N = np.array(
+            [item.energy_model.turning_force_N for item in models]
+        )
         params = DriveParams()
         grip_N = params.grip_share * np.array([axle_grip_N(item) for item in models])
         spin = np.array([item.wheel_inertia_kg_m2 for item in models])
-        wheels_kg_m2 = 0.5 * spin * (self._track_m / self._wheels.radius_m) ** 2
-        body = part_ids(model, mujoco.mjtObj.mjOBJ_BODY, robots, (CHASSIS,))
-        self._body = body[:, 0]
+        wheels_kg_m2 = 0.5 * spin * (self._track_m / self._radius_m) ** 2
+        self._body = part_ids(model.body, robots, (CHASSIS,))[:, 0]
         yaw_kg_m2, self._lead_kg_m = self._inertia_about_axle()
         self._loop = SpeedLoop(
             inertia=yaw_kg_m2 + wheels_kg_m2,
             # Errors of the resistance to turning must be within reach, too.
-            limit=grip_N * self._track_m / 2 + self._turning_Nm,
+            limit=grip_N * self._track_m / 2 + self._turning_N * self._track_m,
             params=params.loop,
         )
 
@@ -74,20 +71,18 @@ class DifferentialChassis:
         """Return the speed the axle rolls at, shape (K,)."""
         return np.asarray(self._wheel_speed_m_s().mean(axis=1))
 
-    def set_resistance(
-        self,
-        resistance_N: np.ndarray,
-        swing_N: np.ndarray,
-        believed_swing_N: np.ndarray | None = None,
-    ) -> None:
-        """Set the dry friction of both tendons, each of shape (K,)."""
-        if believed_swing_N is not None:
-            self._turning_Nm = believed_swing_N * self._track_m
+    def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
+        """Set the dry friction of both tendons."""
         friction = np.stack([resistance_N, swing_N], axis=1)
         self._model.tendon_frictionloss[self._tendon] = friction
 
     def command(
-        self, force_N: np.ndarray, w_from: np.ndarray, w_to: np.ndarray, steps: int
+        self,
+        force_N: np.ndarray,
+        w_from: np.ndarray,
+        w_to: np.ndarray,
+        steps: int,
+        turning_multiplier: np.ndarray,
     ) -> None:
         """Hold the traction force, and the moment that follows the ramp of omega."""
         speed = self._wheel_speed_m_s()
@@ -97,7 +92,7 @@ class DifferentialChassis:
             (speed[:, 1] - speed[:, 0]) / self._track_m,
             w_from,
             w_to,
-            self._turning_Nm,
+            turning_multiplier * self._turning_N * self._track_m,
             steps * self._model.opt.timestep,
             brakes=np.abs(cross_slope) > _LEVEL,
         )
@@ -113,7 +108,7 @@ class DifferentialChassis:
 
     def _wheel_speed_m_s(self) -> np.ndarray:
         """Return the speed each wheel rolls at, left and right, shape (K, 2)."""
-        return np.asarray(self._wheels.rate_rad_s() * self._wheels.radius_m[:, None])
+        return np.asarray(self._wheel_rates_rad_s() * self._radius_m[:, None])
 
     def _inertia_about_axle(self) -> tuple[np.ndarray, np.ndarray]:
         """Return yaw inertias about the axles' middles, and masses times their leads.

@@ -15,9 +15,14 @@ import numpy as np
 from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import ROOT
 from mrmg.scene.types import Scene
-from mrmg.simulation.chassis import Chassis, chassis_maker, part_ids
+from mrmg.simulation.ackermann import AckermannChassis
+from mrmg.simulation.chassis import Chassis, part_ids
+from mrmg.simulation.differential import DifferentialChassis
 from mrmg.simulation.work import WorkMeter
 from mrmg.simulation.world_model import MujocoWorld
+
+_CHASSIS = {"car": AckermannChassis, "unicycle": DifferentialChassis}
+"""By motion model."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,14 +44,13 @@ class Fleet:
         """Find the parts of every robot of `world`.
 
         Raises:
-            UsageError: if a robot is of a kind that cannot be executed.
-            FileError: if a robot's MJCF lacks a part.
+            FileError: if a drive of a robot cannot be commanded as a force.
         """
         model, robots = world.model, world.scene.robots
         self._model, self._data = model, data
         self._groups = _grouped(model, data, world.scene)
         self.work = WorkMeter(model, data, robots)
-        root = part_ids(model, mujoco.mjtObj.mjOBJ_JOINT, robots, (ROOT,))
+        root = part_ids(model.joint, robots, (ROOT,))
         root_q, root_v = model.jnt_qposadr[root], model.jnt_dofadr[root]
         self._pose = root_q + np.arange(7)
         self._velocity = root_v + np.arange(2)
@@ -73,27 +77,25 @@ class Fleet:
         """Return the speed the driven axle rolls at, shape (R,)."""
         return self._gather([group.chassis.axle_speed_m_s() for group in self._groups])
 
-    def set_resistance(
-        self,
-        resistance_N: np.ndarray,
-        swing_N: np.ndarray,
-        believed_swing_N: np.ndarray | None = None,
-    ) -> None:
+    def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
         """Set the dry friction of the driven axles.
 
         Args:
             resistance_N: against the way of the axle's middle, shape (R,).
-            swing_N: against the way its wheels roll differently, shape (R,).
-            believed_swing_N: what the drive control believes of it; None leaves what it
-                believes.
+            swing_N: against the way its wheels roll differently, shape (R,); counts for
+                differential drives.
         """
         for group in self._groups:
             own = group.index
-            believed_N = None if believed_swing_N is None else believed_swing_N[own]
-            group.chassis.set_resistance(resistance_N[own], swing_N[own], believed_N)
+            group.chassis.set_resistance(resistance_N[own], swing_N[own])
 
     def drive(
-        self, force_N: np.ndarray, w_from: np.ndarray, w_to: np.ndarray, steps: int
+        self,
+        force_N: np.ndarray,
+        w_from: np.ndarray,
+        w_to: np.ndarray,
+        steps: int,
+        turning_multiplier: np.ndarray | float = 1.0,
     ) -> None:
         """Run a tick of `steps` physics steps under held force and a ramp of steering.
 
@@ -102,10 +104,15 @@ class Fleet:
             w_from: psi [rad] or omega [rad/s] at the start, shape (R,).
             w_to: psi or omega at the end, shape (R,).
             steps: number of physics steps.
+            turning_multiplier: of the terrain, as the drive control sees it, shape
+                (R,).
         """
+        multiplier = np.broadcast_to(turning_multiplier, len(force_N))
         for group in self._groups:
             own = group.index
-            group.chassis.command(force_N[own], w_from[own], w_to[own], steps)
+            group.chassis.command(
+                force_N[own], w_from[own], w_to[own], steps, multiplier[own]
+            )
         self.work.start(steps)
         for step in range(steps):
             for group in self._groups:
@@ -131,5 +138,5 @@ def _grouped(
     for kind in dict.fromkeys(kinds):
         index = np.array([place for place, own in enumerate(kinds) if own == kind])
         robots = [scene.robots[place] for place in index]
-        groups.append(_Group(index, chassis_maker(robots[0])(model, data, robots)))
+        groups.append(_Group(index, _CHASSIS[kind](model, data, robots)))
     return tuple(groups)

@@ -16,8 +16,7 @@ import numpy as np
 import shapely
 
 from mrmg.energy.model import GRAVITY_M_S2
-from mrmg.errors import Fault, FileError
-from mrmg.mujoco_import import mujoco
+from mrmg.scene.driven_parts import NUMERICS
 from mrmg.scene.types import Robot, Scene
 from mrmg.simulation.disturbance import Disturbance
 from mrmg.simulation.world_model import MujocoWorld
@@ -116,19 +115,12 @@ def believed_resistance(scene: Scene) -> GroundResistance:
 def true_resistance(
     world: MujocoWorld, disturbance: Disturbance | None = None
 ) -> GroundResistance:
-    """Return the resistance by the MJCF of the robots, and what disturbs it.
-
-    Raises:
-        FileError: if an MJCF does not state a coefficient.
-    """
-    robots = world.scene.robots
+    """Return the resistance by the MJCF of the robots, and what disturbs it."""
+    robots, numeric = world.scene.robots, world.model.numeric
     weight_N = world.model.body_subtreemass[world.chassis] * GRAVITY_M_S2
     coefficients = np.array(
         [
-            [
-                _numeric(world.model, robot, f"{kind}_coefficient")
-                for kind in ("rolling", "turning")
-            ]
+            [numeric(f"{robot.id}/{name}").data[0] for name in NUMERICS]
             for robot in robots
         ]
     )
@@ -137,14 +129,3 @@ def true_resistance(
         change = np.array([item.rolling for item in disturbance.robots])
         rolling_N = rolling_N * (1.0 + change)
     return GroundResistance.of(robots, rolling_N, turning_N)
-
-
-def _numeric(model: mujoco.MjModel, robot: Robot, name: str) -> float:
-    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, f"{robot.id}/{name}")
-    if index < 0:
-        message = (
-            f'states no {name}; add <custom><numeric name="{name}" data="..."/>'
-            "</custom>: the force over the weight that the simulated tyres lose"
-        )
-        raise FileError(str(robot.model.mjcf), [Fault("custom", message)])
-    return float(model.numeric_data[model.numeric_adr[index]])

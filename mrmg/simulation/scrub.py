@@ -40,7 +40,7 @@ import numpy as np
 from mrmg.energy.model import GRAVITY_M_S2
 from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import FLOOR_BIT, ROOT
-from mrmg.simulation.ground import TerrainUnderfoot
+from mrmg.simulation.ground import Ground, TerrainUnderfoot
 from mrmg.simulation.scenery import FLOOR
 from mrmg.simulation.world_model import MujocoWorld
 
@@ -72,7 +72,7 @@ _NO_SPIN = -1
 
 
 class ScrubbingTyres:
-    """The tyres of a fleet in a running simulation."""
+    """The tyres of a fleet in a running simulation; a `Plant`."""
 
     def __init__(
         self,
@@ -123,8 +123,12 @@ class ScrubbingTyres:
         for dofs in (self._spin[self._rolls], self._yaw):
             model.dof_solref[dofs, :2] = stiff
 
-    def resist(self) -> None:
-        """Set all frictions for the coming tick, from the loads of the last step."""
+    def resist(self, ground: Ground, level: np.ndarray) -> None:
+        """Set all frictions for the coming tick, from the loads of the last step.
+
+        Each tyre has ground of its own, and its load counts the slope: both arguments
+        count for nothing.
+        """
         model, params = self._model, self._params
         # A tyre gives way to a new load over some of its turn, not within a step.
         self._forces_N += _RELAXATION * (self._contact_forces() - self._forces_N)

@@ -13,7 +13,6 @@ from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.loading.mjcf import no_warning_file
 from mrmg.scene.types import Scene
 from mrmg.simulation.actuation import Actuation
-from mrmg.simulation.chassis import chassis_maker
 from mrmg.simulation.contacts import ContactWatch
 from mrmg.simulation.controller import Controller, controller_maker
 from mrmg.simulation.controller_calls import ControllerCalls
@@ -86,8 +85,6 @@ def simulate(
     require_plant(plant)
     require_same_mission(scene, plan)
     require_drivable(scene.robots)
-    for robot in scene.robots:
-        chassis_maker(robot)
     controllers = [maker(robot.model) for robot in scene.robots]
     world = build_world(scene, drawn=False)
     run = _Run(world, plan, controllers, disturbance, plant)
@@ -136,12 +133,12 @@ class _Run:
         self._set_points = SetPoints(world.scene, self._reference, controllers)
         self._drive = DriveControl(world.scene)
         self._believed = believed_resistance(world.scene)
-        self._plant = plant_of(plant, world, self.data, disturbance)
         self._contacts = ContactWatch(world)
         self._recording = Recording()
         self._calls = ControllerCalls(len(world.scene.robots))
         self._ending = Ending(self.data, self._is_speed)
         self._fleet = Fleet(world, self.data)
+        self._plant = plant_of(plant, world, self.data, self._fleet, disturbance)
         self._slopes_underfoot = SlopesUnderfoot(world.scene)
         self._terrain = TerrainUnderfoot(world.scene)
         self._sensing = sensing_of(world.scene, disturbance, self._period_s)
@@ -161,9 +158,8 @@ class _Run:
         level, slope = self._slopes
         if seen is not true:
             level, slope = self._slopes_underfoot.under(seen)
-        ground = self._ground(seen, steer)
+        ground = seen_ground = self._ground(seen, steer)
         believed = self._believed.force_N(*ground)
-        believed_swing_N = ground.turning_multiplier * self._believed.swing_N
         wanted = self._drive.force_N(
             self._sensing.axle_speed_m_s,
             now[:, 0],
@@ -177,10 +173,14 @@ class _Run:
         if self._disturbance is not None:
             ground = self._ground(true, steer_to)
             level, _ = self._slopes
-        resistance = self._plant.resistance(ground, level)
-        self._fleet.set_resistance(*resistance, believed_swing_N)
-        self._plant.resist()
-        self._fleet.drive(force, steer_from, steer_to, STEPS_PER_TICK)
+        self._plant.resist(ground, level)
+        self._fleet.drive(
+            force,
+            steer_from,
+            steer_to,
+            STEPS_PER_TICK,
+            seen_ground.turning_multiplier,
+        )
         self._clock.advance(self._period_s)
         self.ticks += 1
         self._observe()
@@ -267,8 +267,6 @@ class _Run:
         still = np.zeros(len(self._world.scene.robots))
         _, slope = self._slopes_underfoot.under(self._fleet.state())
         parked = self._drive.force_N(still, still, still, still, self._period_s, slope)
-        plain = Ground(still + 1.0, still, still + 1.0)
-        self._fleet.set_resistance(*self._plant.resistance(plain, still + 1.0))
         self._fleet.drive(parked, still, still, _SETTLING_STEPS)
         self.data.time = 0.0
         self._fleet.work.restart()

@@ -1,55 +1,15 @@
-"""Every chassis says what an MJCF lacks."""
+"""Every robot of a mixed fleet gets, and gives, what is its own."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import mujoco
 import numpy as np
-import pytest
 
-from mrmg import shipped
-from mrmg.errors import FileError, UsageError
 from mrmg.scene.types import Scene
-from mrmg.simulation.chassis import chassis_maker
 from mrmg.simulation.fleet import Fleet
 from mrmg.simulation.world_model import build_world
-
-
-@pytest.fixture(scope="module", params=shipped.model_names())
-def scene(request: pytest.FixtureRequest, driving: SimpleNamespace) -> Scene:
-    return driving.open_ground([(0.0, 0.0, 0.0)], models=[request.param])
-
-
-def test_a_kind_that_cannot_be_executed_is_named(scene: Scene) -> None:
-    robot = scene.robots[0]
-    boat = replace(robot, model=replace(robot.model, motion_model="boat"))
-    with pytest.raises(UsageError, match="'r1'.*'boat'.*allowed: car, unicycle"):
-        chassis_maker(boat)
-
-
-@pytest.mark.parametrize(
-    ("name", "part", "noun"),
-    [
-        ("car", "steer_fl", "joint"),
-        ("car", "drive", "actuator"),
-        ("diffdrive", "swing", "tendon"),
-    ],
-)
-def test_a_missing_part_is_named(
-    driving: SimpleNamespace, tmp_path: Path, name: str, part: str, noun: str
-) -> None:
-    scene = driving.open_ground([(0.0, 0.0, 0.0)], models=[name])
-    robot = scene.robots[0]
-    mjcf = tmp_path / "robot.xml"
-    text = robot.model.mjcf.read_text()
-    mjcf.write_text(text.replace(f'"{part}"', '"other"'))
-    changed = replace(robot, model=replace(robot.model, mjcf=mjcf))
-    world = build_world(replace(scene, robots=(changed,)))
-    with pytest.raises(FileError, match=f"robot.xml.*\n.*has no {noun} '{part}'"):
-        Fleet(world, mujoco.MjData(world.model))
 
 
 def test_a_mixed_fleet_is_read_in_the_scenes_order(driving: SimpleNamespace) -> None:

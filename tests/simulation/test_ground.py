@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from mrmg.errors import FileError
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
-from mrmg.simulation.ground import (
-    TerrainUnderfoot,
-    believed_resistance,
-    true_resistance,
-)
+from mrmg.simulation.ground import TerrainUnderfoot, believed_resistance
 from mrmg.simulation.simulation import simulate
-from mrmg.simulation.world_model import build_world
 from mrmg.world.terrain import multiplier_at, turning_multiplier_at
 
 
@@ -60,20 +52,6 @@ def test_a_wrong_belief_does_not_change_what_driving_takes(
         work_J.append(log.work_J[0].sum())
     assert work_J[1] == pytest.approx(work_J[0], rel=0.01)
     assert work_J[0] == pytest.approx(0.06 * 180 * 9.81 * 7.0, rel=0.01)
-
-
-@pytest.mark.parametrize("name", ["rolling_coefficient", "turning_coefficient"])
-def test_an_mjcf_that_does_not_state_its_losses_is_refused(
-    scene: Scene, tmp_path: Path, name: str
-) -> None:
-    model = scene.robots[0].model
-    mjcf = tmp_path / "car.xml"
-    shutil.copy(model.mjcf, mjcf)
-    mjcf.write_text(
-        mjcf.read_text().replace(f'numeric name="{name}"', 'numeric name="x"')
-    )
-    with pytest.raises(FileError, match=f"{mjcf}.*\n.*states no {name}; add"):
-        true_resistance(build_world(believing(scene, mjcf=mjcf)))
 
 
 @pytest.mark.parametrize("name", ["scene2", "hills", "quickstart"])
