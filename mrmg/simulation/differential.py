@@ -18,9 +18,8 @@ from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import CHASSIS, PARTS, ROOT
 from mrmg.scene.types import Robot
 from mrmg.simulation.chassis import Chassis, part_ids
-from mrmg.simulation.drive import DriveParams, axle_grip_N
+from mrmg.simulation.drive import SpeedLoop, usable_grip_N
 from mrmg.simulation.drives import ForceDrives
-from mrmg.simulation.speed_loop import SpeedLoop
 
 _LEVEL = 1e-3
 """Cross slope that dry friction holds."""
@@ -50,8 +49,7 @@ class DifferentialChassis(Chassis):
         self._turning_N = np.array(
             [item.energy_model.turning_force_N for item in models]
         )
-        params = DriveParams()
-        grip_N = params.grip_share * np.array([axle_grip_N(item) for item in models])
+        grip_N = np.array([usable_grip_N(item) for item in models])
         spin = np.array([item.wheel_inertia_kg_m2 for item in models])
         wheels_kg_m2 = 0.5 * spin * (self._track_m / self._radius_m) ** 2
         self._body = part_ids(model.body, robots, (CHASSIS,))[:, 0]
@@ -60,7 +58,6 @@ class DifferentialChassis(Chassis):
             inertia=yaw_kg_m2 + wheels_kg_m2,
             # Errors of the resistance to turning must be within reach, too.
             limit=grip_N * self._track_m / 2 + self._turning_N * self._track_m,
-            params=params.loop,
         )
 
     def fifth_state(self) -> np.ndarray:
@@ -93,8 +90,8 @@ class DifferentialChassis(Chassis):
             w_from,
             w_to,
             turning_multiplier * self._turning_N * self._track_m,
+            np.abs(cross_slope) > _LEVEL,
             steps * self._model.opt.timestep,
-            brakes=np.abs(cross_slope) > _LEVEL,
         )
         # A mass ahead of the axle wants to go straight on, and down a cross slope.
         moment_Nm += self._lead_kg_m * speed.mean(axis=1) * 0.5 * (w_from + w_to)

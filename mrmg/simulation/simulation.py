@@ -165,8 +165,8 @@ class _Run:
             now[:, 0],
             following[:, 0],
             level * believed,
-            period_s,
             slope,
+            period_s,
         )
         force = self._actuation.force_N(wanted)
         steer_from, steer_to = self._actuation.steer(now[:, 1], steer)
@@ -266,7 +266,7 @@ class _Run:
         """Let the tyres take the weight, then start the time."""
         still = np.zeros(len(self._world.scene.robots))
         _, slope = self._slopes_underfoot.under(self._fleet.state())
-        parked = self._drive.force_N(still, still, still, still, self._period_s, slope)
+        parked = self._drive.force_N(still, still, still, still, slope, self._period_s)
         self._fleet.drive(parked, still, still, _SETTLING_STEPS)
         self.data.time = 0.0
         self._fleet.work.restart()

@@ -7,8 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from mrmg.scene.robot_model import GRIP_SHARE
 from mrmg.scene.types import Scene
-from mrmg.simulation.drive import DriveControl, DriveParams
+from mrmg.simulation.drive import (
+    INTEGRAL_LIMIT_M_S2,
+    PROPORTIONAL_PER_S,
+    DriveControl,
+)
 
 TICK_S = 0.02
 
@@ -21,7 +26,7 @@ def scene(driving: SimpleNamespace) -> Scene:
 def force(scene: Scene, speed: float, now: float, following: float, ground: float = 0):
     control = DriveControl(scene)
     values = (np.array([value]) for value in (speed, now, following, ground))
-    return control.force_N(*values, TICK_S)[0]
+    return control.force_N(*values, np.zeros(1), TICK_S)[0]
 
 
 @pytest.mark.parametrize("direction", [1.0, -1.0])
@@ -41,25 +46,22 @@ def test_acceleration_is_limited_to_the_grip_resistance_is_not(scene: Scene) -> 
     model = scene.robots[0].model
     grip = 0.5 * model.friction_coefficient * model.mass_kg * 9.81
     hardest = force(scene, 0.0, 1.0, 2.0, ground=500.0)
-    assert hardest == pytest.approx(500.0 + DriveParams().grip_share * grip)
-    assert force(scene, 2.0, 1.0, 0.0) == pytest.approx(
-        -DriveParams().grip_share * grip
-    )
+    assert hardest == pytest.approx(500.0 + GRIP_SHARE * grip)
+    assert force(scene, 2.0, 1.0, 0.0) == pytest.approx(-GRIP_SHARE * grip)
 
 
 def test_integral_removes_a_steady_error_and_is_bounded(scene: Scene) -> None:
     """Against a force unknown to the model the loop settles on the asked speed."""
     mass, unknown = scene.robots[0].model.effective_mass_kg, 60.0
     control = DriveControl(scene)
-    asked, speed = np.ones(1), np.ones(1)
+    asked, speed, still = np.ones(1), np.ones(1), np.zeros(1)
     for _ in range(400):
-        held = control.force_N(speed, asked, asked, np.zeros(1), TICK_S)
+        held = control.force_N(speed, asked, asked, still, still, TICK_S)
         speed = speed + TICK_S * (held - unknown) / mass
     assert speed[0] == pytest.approx(1.0, abs=1e-3)
     for _ in range(2000):
-        held = control.force_N(np.zeros(1), asked, asked, np.zeros(1), TICK_S)
-    params = DriveParams()
-    bound = params.loop.proportional_per_s + params.loop.integral_limit_m_s2
-    assert held[0] == pytest.approx(
-        min(mass * bound, params.grip_share * 0.5 * 180 * 9.81)
-    )
+        held = control.force_N(
+            np.zeros(1), asked, asked, np.zeros(1), np.zeros(1), TICK_S
+        )
+    bound = PROPORTIONAL_PER_S + INTEGRAL_LIMIT_M_S2
+    assert held[0] == pytest.approx(min(mass * bound, GRIP_SHARE * 0.5 * 180 * 9.81))

@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from mrmg.simulation.fleet_clock import ClockParams, FleetClock, lag_s, turning_lag_s
+from mrmg.simulation.fleet_clock import (
+    RECOVERY_PER_S,
+    SLOWING_PER_S,
+    FleetClock,
+    lag_s,
+)
 
 TICK_S = 0.02
 
@@ -12,45 +17,42 @@ def moving(x: float, v: float, heading: float = 0.0) -> list[float]:
     return [x * np.cos(heading), x * np.sin(heading), heading, v, 0.0]
 
 
-@pytest.mark.parametrize("heading", [0.0, 1.0, -2.5])
 @pytest.mark.parametrize(
-    ("v", "behind_m", "late_s"),
+    ("rate", "behind", "late_s"),
     [
-        (2.0, 1.0, 0.5),  # forwards
+        (2.0, 1.0, 0.5),  # forwards, or to the left
         (-1.0, -0.4, 0.4),  # backwards, behind means ahead of the nose
         (2.0, -1.0, -0.5),  # early
-        (0.1, 0.1, 0.2),  # slow: as if at 0.5 m/s
+        (0.1, 0.1, 0.2),  # slow: as if at 0.5 m/s, or 0.5 rad/s
         (0.0, 0.3, 0.0),  # standing still is never late
     ],
 )
-def test_lag_is_measured_along_the_way(
-    heading: float, v: float, behind_m: float, late_s: float
+def test_lag_is_what_is_missing_over_the_rate(
+    rate: float, behind: float, late_s: float
 ) -> None:
+    assert lag_s(behind, rate) == pytest.approx(late_s)
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.0, -2.5])
+@pytest.mark.parametrize(
+    ("v", "behind_m", "waits"),
+    [(2.0, 1.0, True), (-1.0, -1.0, True), (2.0, -1.0, False), (-1.0, 1.0, False)],
+)
+def test_lag_is_measured_along_the_way(
+    heading: float, v: float, behind_m: float, waits: bool
+) -> None:
+    clock = FleetClock(np.array([False]))
     state = np.array([moving(0.0, v, heading)])
-    reference = np.array([moving(behind_m, v, heading)])
-    assert lag_s(state[0], reference[0], 0.5) == pytest.approx(late_s)
+    clock.pace(state, np.array([moving(behind_m, v, heading)]), TICK_S)
+    assert (clock.rate < 1.0) == waits
 
 
 def test_sideways_error_is_no_lag() -> None:
+    clock = FleetClock(np.array([False]))
     state, reference = np.array([moving(0.0, 1.0)]), np.array([moving(0.0, 1.0)])
     state[0, 1] = 0.5
-    assert lag_s(state[0], reference[0], 0.5) == pytest.approx(0.0)
-
-
-@pytest.mark.parametrize(
-    ("omega", "behind_rad", "late_s"),
-    [
-        (1.0, 0.3, 0.3),  # to the left
-        (-0.8, -0.4, 0.5),  # to the right, behind means to the left
-        (1.0, -0.2, -0.2),  # early
-        (0.1, 0.1, 0.2),  # slow: as if at 0.5 rad/s
-        (0.0, 0.3, 0.0),  # not turning is never late
-    ],
-)
-def test_lag_of_a_turn(omega: float, behind_rad: float, late_s: float) -> None:
-    state = np.array([[0.0, 0.0, 2.0, 0.0, omega]])
-    reference = state + [0.0, 0.0, behind_rad, 0.0, 0.0]
-    assert turning_lag_s(state[0], reference[0], 0.5) == pytest.approx(late_s)
+    clock.pace(state, reference, TICK_S)
+    assert clock.rate == 1.0
 
 
 def test_waits_for_robots_that_turn_and_not_for_wheels_that_are_turned() -> None:
@@ -67,7 +69,7 @@ def test_waits_for_robots_that_turn_and_not_for_wheels_that_are_turned() -> None
 
 
 def test_runs_at_full_rate_on_time() -> None:
-    clock = FleetClock()
+    clock = FleetClock(np.array([False, False]))
     on_time = np.array([moving(1.0, 1.0), moving(3.0, 2.0)])
     for _ in range(100):
         clock.pace(on_time, on_time, TICK_S)
@@ -77,8 +79,7 @@ def test_runs_at_full_rate_on_time() -> None:
 
 def test_waits_for_the_last_robot_and_recovers() -> None:
     """One late robot stops the clock of all; the rate changes within its slew."""
-    params = ClockParams()
-    clock = FleetClock(params=params)
+    clock = FleetClock(np.array([False, False]))
     on_time = np.array([moving(1.0, 1.0), moving(3.0, 1.0)])
     late = on_time.copy()
     late[1, 0] -= 2.0
@@ -92,12 +93,12 @@ def test_waits_for_the_last_robot_and_recovers() -> None:
         rates.append(clock.rate)
     assert rates[-1] == 1.0
     change = np.diff(rates)
-    assert change.min() >= -params.slowing_per_s * TICK_S - 1e-12
-    assert change.max() <= params.recovery_per_s * TICK_S + 1e-12
+    assert change.min() >= -SLOWING_PER_S * TICK_S - 1e-12
+    assert change.max() <= RECOVERY_PER_S * TICK_S + 1e-12
 
 
 def test_never_runs_ahead_of_an_early_fleet() -> None:
-    clock = FleetClock()
+    clock = FleetClock(np.array([False]))
     planned = np.array([moving(1.0, 1.0)])
     early = np.array([moving(2.0, 1.0)])
     for _ in range(20):
