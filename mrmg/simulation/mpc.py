@@ -14,35 +14,31 @@ Riccati recursion; only a solution that breaks a bound is found anew with them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 
 import casadi as ca
 import numpy as np
 
-from mrmg.motion.dynamics import DERIVATIVES, NU, NX, rk4_step
+from mrmg.motion.dynamics import NU, NX
 from mrmg.scene.robot_model import Limits, RobotModel
 from mrmg.simulation.controller import HORIZON, HORIZON_STEP_S
 from mrmg.simulation.native_code import compiled
-from mrmg.simulation.riccati import unbounded_solver
+from mrmg.simulation.riccati import SIZE, STAGE, linearised_step, unbounded_solver
 
-_STAGE = NX + NU
-_SIZE = HORIZON * _STAGE + NX
+STATE_WEIGHTS = (10.0, 10.0, 4.0, 0.5, 0.5)
+"""Per (x, y [1/m^2], theta [1/rad^2], v [s^2/m^2], psi [1/rad^2])."""
 
+CONTROL_WEIGHTS = (0.2, 0.2)
+"""Per (u1 [s^4/m^2], u2 [s^2/rad^2])."""
 
-@dataclass(frozen=True, slots=True)
-class MpcParams:
-    """Weights of the tracking cost.
+TERMINAL_FACTOR = 3.0
+"""Weight of the last state over the others."""
 
-    Attributes:
-        state: per (x, y [1/m^2], theta [1/rad^2], v [s^2/m^2], psi [1/rad^2]).
-        control: per (u1 [s^4/m^2], u2 [s^2/rad^2]).
-        terminal_factor: weight of the last state over the others.
-    """
-
-    state: tuple[float, ...] = (10.0, 10.0, 4.0, 0.5, 0.5)
-    control: tuple[float, ...] = (0.2, 0.2)
-    terminal_factor: float = 3.0
+WEIGHTS = np.array(
+    [*STATE_WEIGHTS, *CONTROL_WEIGHTS] * HORIZON
+    + [TERMINAL_FACTOR * value for value in STATE_WEIGHTS]
+)
+"""Of (x_0, u_0, x_1, ..., x_N) in the tracking cost."""
 
 
 class TrackingMpc:
@@ -53,16 +49,16 @@ class TrackingMpc:
             "qp".
     """
 
-    def __init__(self, model: RobotModel, params: MpcParams | None = None) -> None:
+    def __init__(self, model: RobotModel) -> None:
         """Set up the problem for a robot of `model`."""
-        kind = (model.motion_model, model.wheelbase_m, params or MpcParams())
+        kind = (model.motion_model, model.wheelbase_m)
         self._lower, self._upper = _bounds(model.limits)
         self._limits = model.limits
         self.branch = "riccati"
-        self._deviation = np.zeros(_SIZE)
-        self._guess = np.zeros(_SIZE)
-        self._target = np.zeros(_SIZE)
-        self._solution = np.zeros(_SIZE)
+        self._deviation = np.zeros(SIZE)
+        self._guess = np.zeros(SIZE)
+        self._target = np.zeros(SIZE)
+        self._solution = np.zeros(SIZE)
         question = (self._guess, self._target)
         bounds = (self._lower, self._upper)
         self._solve_unbounded = _BufferedCall(
@@ -74,7 +70,7 @@ class TrackingMpc:
 
     def correct(self, state: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """Return the first control of the optimum less the reference's."""
-        stages = self._target[:-NX].reshape(HORIZON, _STAGE)
+        stages = self._target[:-NX].reshape(HORIZON, STAGE)
         stages[:, :NX] = reference[:-1]
         stages[:, NX:] = (reference[1:, 3:] - reference[:-1, 3:]) / HORIZON_STEP_S
         self._target[-NX:] = reference[-1]
@@ -84,7 +80,7 @@ class TrackingMpc:
             self._deviation[:] = 0.0
             return np.zeros(NU)
         np.subtract(self._solution, self._target, out=self._deviation)
-        return self._deviation[NX:_STAGE].copy()
+        return self._deviation[NX:STAGE].copy()
 
     def _solve(self) -> bool:
         """Solve the QP; return whether question and answer are all numbers."""
@@ -144,21 +140,18 @@ def _bounds(limits: Limits) -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def _unbounded_solver(
-    motion_model: str, wheelbase_m: float, params: MpcParams
-) -> ca.Function:
+def _unbounded_solver(motion_model: str, wheelbase_m: float) -> ca.Function:
     """Return (guess, target) -> solution where no bound is active."""
-    return compiled(unbounded_solver(motion_model, wheelbase_m, _weights(params)))
+    return compiled(unbounded_solver(motion_model, wheelbase_m, WEIGHTS))
 
 
 @cache
-def _solver(motion_model: str, wheelbase_m: float, params: MpcParams) -> ca.Function:
+def _solver(motion_model: str, wheelbase_m: float) -> ca.Function:
     """Return (guess, target, lower, upper) -> solution of the linearised problem."""
-    guess = ca.MX.sym("guess", _SIZE)
-    target = ca.MX.sym("target", _SIZE)
-    lower = ca.MX.sym("lower", _SIZE)
-    upper = ca.MX.sym("upper", _SIZE)
-    weight = _weights(params)
+    guess = ca.MX.sym("guess", SIZE)
+    target = ca.MX.sym("target", SIZE)
+    lower = ca.MX.sym("lower", SIZE)
+    upper = ca.MX.sym("upper", SIZE)
     linearise = compiled(_linearised_gaps(motion_model, wheelbase_m))
     jacobian, gap = linearise(guess)
     # J z = J z_guess - gap(z_guess): the gaps close to first order.
@@ -166,12 +159,12 @@ def _solver(motion_model: str, wheelbase_m: float, params: MpcParams) -> ca.Func
     qp = ca.conic(
         "tracking",
         "piqp",
-        {"h": ca.Sparsity.diag(_SIZE), "a": linearise.sparsity_out(0)},
+        {"h": ca.Sparsity.diag(SIZE), "a": linearise.sparsity_out(0)},
         {"error_on_fail": False},
     )
     solution = qp(
-        h=ca.diag(ca.DM(weight)),
-        g=-weight * target,
+        h=ca.diag(ca.DM(WEIGHTS)),
+        g=-WEIGHTS * target,
         a=jacobian,
         lba=right_side,
         uba=right_side,
@@ -182,29 +175,17 @@ def _solver(motion_model: str, wheelbase_m: float, params: MpcParams) -> ca.Func
     return ca.Function("mpc_step", [guess, target, lower, upper], [solution])
 
 
-def _weights(params: MpcParams) -> np.ndarray:
-    stage = [*params.state, *params.control]
-    last = [params.terminal_factor * value for value in params.state]
-    return np.array(stage * HORIZON + last)
-
-
 def _linearised_gaps(motion_model: str, wheelbase_m: float) -> ca.Function:
     """Return z -> (Jacobian, value) of the gaps x_{k+1} - f(x_k, u_k)."""
-    step = rk4_step(DERIVATIVES[motion_model](ca.sin, ca.cos, ca.tan))
-    now = ca.SX.sym("now", _STAGE)
-    state, control = ca.vertsplit(now, [0, NX, _STAGE])
-    reached = ca.vertcat(
-        *step(ca.vertsplit(state), ca.vertsplit(control), wheelbase_m, HORIZON_STEP_S)
-    )
-    stage = ca.Function("stage", [now], [reached, ca.jacobian(reached, now)])
-    z = ca.MX.sym("z", _SIZE)
-    stages = ca.reshape(z[:-NX], _STAGE, HORIZON)
-    after, slopes = stage.map(HORIZON)(stages)
+    z = ca.MX.sym("z", SIZE)
+    stages = ca.reshape(z[:-NX], STAGE, HORIZON)
+    step = linearised_step(motion_model, wheelbase_m)
+    after, slopes = step.map(HORIZON)(stages)
     following = ca.horzcat(stages[:NX, 1:], z[-NX:])
     last = ca.MX(NX * HORIZON, NX)
-    slope = ca.horzcat(ca.diagcat(*ca.horzsplit(slopes, _STAGE)), last)
+    slope = ca.horzcat(ca.diagcat(*ca.horzsplit(slopes, STAGE)), last)
     selected = [ca.horzcat(ca.DM.eye(NX), ca.DM(NX, NU))] * (HORIZON - 1)
-    first = ca.DM(NX * HORIZON, _STAGE)
+    first = ca.DM(NX * HORIZON, STAGE)
     identity = ca.horzcat(first, ca.diagcat(*selected, ca.DM.eye(NX)))
     name = f"gaps_{motion_model}"
     return ca.Function(name, [z], [identity - slope, ca.vec(following - after)])

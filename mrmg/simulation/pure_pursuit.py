@@ -40,27 +40,29 @@ class PurePursuitParams:
     heading_per_s: float = 3.0
 
 
-TURNING_PARAMS = PurePursuitParams(
-    least_lookahead_m=0.15, lookahead_s=0.2, steering_s=0.1
-)
-"""Of robots that turn by themselves: their curvature changes sooner than a car's."""
+_PARAMS = {
+    "car": PurePursuitParams(),
+    "unicycle": PurePursuitParams(
+        least_lookahead_m=0.15, lookahead_s=0.2, steering_s=0.1
+    ),
+}
+"""By motion model: the curvature of robots that turn by themselves changes sooner than
+a car's."""
 
 
 class PurePursuit:
-    """Geometric tracking of one robot."""
+    """Geometric tracking of one robot.
 
-    def __init__(
-        self, model: RobotModel, params: PurePursuitParams | None = None
-    ) -> None:
+    A car's steering angle follows an arc of curvature kappa by psi = atan(L kappa), a
+    differential drive's yaw rate by omega = kappa v; on the spot that follows the
+    heading.
+    """
+
+    def __init__(self, model: RobotModel) -> None:
         """Follow with a robot of `model`."""
-        self._w_limit = model.limits.w_max
-        self._steering: _Wheels | _Turning
-        if model.motion_model == "car":
-            self._params = params or PurePursuitParams()
-            self._steering = _Wheels(model.wheelbase_m)
-        else:
-            self._params = params or TURNING_PARAMS
-            self._steering = _Turning(self._params.heading_per_s)
+        self._params = _PARAMS[model.motion_model]
+        self._turns = model.motion_model == "unicycle"
+        self._wheelbase_m, self._w_limit = model.wheelbase_m, model.limits.w_max
 
     def correct(self, state: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """Return the controls towards the point ahead, less the reference's."""
@@ -80,64 +82,26 @@ class PurePursuit:
         lookahead_m = params.least_lookahead_m + params.lookahead_s * abs(state[3])
         direction = np.sign(reference[:, 3].sum())
         far = (direction * ahead[:, 0] > 0.0) & (np.hypot(*ahead.T) >= lookahead_m)
-        turning_back = np.flatnonzero(
-            self._steering.ends_arc(reference, reference[:, 3] * direction)
-        )
-        if len(turning_back):
-            far[turning_back[0] :] = False
-        if not far.any():
-            w = self._steering.without_arc(state, reference)
-        else:
+        # The arc ends where the robot turns back, or turns on the spot.
+        along_m_s = reference[:, 3] * direction
+        ends = along_m_s < 0.0
+        if self._turns:
+            ends |= np.abs(reference[:, 4]) * _TIGHT_RADIUS_M > along_m_s
+        if ends.any():
+            far[np.argmax(ends) :] = False
+        if far.any():
             a, b = ahead[np.argmax(far)]
-            w = self._steering.on_arc(2.0 * b / (a * a + b * b), state[3])
+            curvature_per_m = 2.0 * b / (a * a + b * b)
+            if self._turns:
+                w = float(curvature_per_m * state[3])
+            else:
+                w = math.atan(self._wheelbase_m * curvature_per_m)
+        else:
+            w = float(reference[0, 4])
+            if self._turns:
+                error = math.remainder(reference[0, 2] - state[2], math.tau)
+                w += params.heading_per_s * error
         return min(max(w, -self._w_limit), self._w_limit)
-
-
-@dataclass(frozen=True, slots=True)
-class _Wheels:
-    """A car's: psi = atan(L kappa)."""
-
-    wheelbase_m: float
-
-    def ends_arc(self, reference: np.ndarray, along_m_s: np.ndarray) -> np.ndarray:
-        """Return from where on the reference is on another arc, shape (HORIZON + 1,).
-
-        It ends where the robot turns back.
-
-        Args:
-            reference: the states ahead, shape (HORIZON + 1, 5).
-            along_m_s: their speeds in the direction of driving.
-        """
-        return np.asarray(along_m_s < 0.0)
-
-    def on_arc(self, curvature_per_m: float, speed_m_s: float) -> float:
-        """Return the steering angle."""
-        return math.atan(self.wheelbase_m * curvature_per_m)
-
-    def without_arc(self, state: np.ndarray, reference: np.ndarray) -> float:
-        """Return the plan's steering angle."""
-        return float(reference[0, 4])
-
-
-@dataclass(frozen=True, slots=True)
-class _Turning:
-    """A differential drive's: omega = kappa v; on the spot it follows the heading."""
-
-    heading_per_s: float
-
-    def ends_arc(self, reference: np.ndarray, along_m_s: np.ndarray) -> np.ndarray:
-        """It ends where the robot turns back, or turns on the spot."""
-        spins = np.abs(reference[:, 4]) * _TIGHT_RADIUS_M > along_m_s
-        return np.asarray(spins | (along_m_s < 0.0))
-
-    def on_arc(self, curvature_per_m: float, speed_m_s: float) -> float:
-        """Return the yaw rate."""
-        return curvature_per_m * speed_m_s
-
-    def without_arc(self, state: np.ndarray, reference: np.ndarray) -> float:
-        """Return the plan's yaw rate, corrected by the heading."""
-        error = math.remainder(reference[0, 2] - state[2], math.tau)
-        return float(reference[0, 4]) + self.heading_per_s * error
 
 
 def _in_frame_of(state: np.ndarray, reference: np.ndarray) -> np.ndarray:

@@ -19,8 +19,11 @@ import numpy as np
 from mrmg.motion.dynamics import DERIVATIVES, NU, NX, rk4_step
 from mrmg.simulation.controller import HORIZON, HORIZON_STEP_S
 
-_STAGE = NX + NU
-_SIZE = HORIZON * _STAGE + NX
+STAGE = NX + NU
+"""Number of state and control components of one step of the horizon."""
+
+SIZE = HORIZON * STAGE + NX
+"""Number of components of a solution."""
 
 
 def unbounded_solver(
@@ -36,18 +39,18 @@ def unbounded_solver(
         weight: diagonals of Q and R stage by stage, and of the last state's, shape of
             the solution.
     """
-    guess, target = ca.MX.sym("guess", _SIZE), ca.MX.sym("target", _SIZE)
+    guess, target = ca.MX.sym("guess", SIZE), ca.MX.sym("target", SIZE)
     linearise = _stage_deviation(motion_model, wheelbase_m)
     backward, forward = _backward(linearise.sparsity_out(0)), _forward()
     stages = []
     for k in range(HORIZON):
-        now = slice(k * _STAGE, (k + 1) * _STAGE)
-        following = slice((k + 1) * _STAGE, (k + 1) * _STAGE + NX)
+        now = slice(k * STAGE, (k + 1) * STAGE)
+        following = slice((k + 1) * STAGE, (k + 1) * STAGE + NX)
         stages.append(linearise(guess[now], target[now], target[following]))
     value, value_slope = ca.MX(ca.diag(ca.DM(weight[-NX:]))), ca.MX(ca.DM.zeros(NX))
     gains = []
     for k in reversed(range(HORIZON)):
-        stage_weight = ca.DM(weight[k * _STAGE : (k + 1) * _STAGE])
+        stage_weight = ca.DM(weight[k * STAGE : (k + 1) * STAGE])
         value, value_slope, gain, offset = backward(
             value, value_slope, *stages[k], stage_weight
         )
@@ -62,16 +65,22 @@ def unbounded_solver(
     return ca.Function(name, [guess, target], [ca.vertcat(guess[:NX], later)])
 
 
-def _stage_deviation(motion_model: str, wheelbase_m: float) -> ca.Function:
-    """Return (guess, target, next target state) -> ([A B], g) of one stage."""
+def linearised_step(motion_model: str, wheelbase_m: float) -> ca.Function:
+    """Return (x, u) -> (x after a step of the horizon, its derivatives [A B])."""
     step = rk4_step(DERIVATIVES[motion_model](ca.sin, ca.cos, ca.tan))
-    guess, target = ca.SX.sym("guess", _STAGE), ca.SX.sym("target", _STAGE)
-    following = ca.SX.sym("following", NX)
-    state, control = ca.vertsplit(guess, [0, NX, _STAGE])
+    now = ca.SX.sym("now", STAGE)
+    state, control = ca.vertsplit(now, [0, NX, STAGE])
     reached = ca.vertcat(
         *step(ca.vertsplit(state), ca.vertsplit(control), wheelbase_m, HORIZON_STEP_S)
     )
-    slope = ca.jacobian(reached, guess)
+    return ca.Function("stage", [now], [reached, ca.jacobian(reached, now)])
+
+
+def _stage_deviation(motion_model: str, wheelbase_m: float) -> ca.Function:
+    """Return (guess, target, next target state) -> ([A B], g) of one stage."""
+    guess, target = ca.SX.sym("guess", STAGE), ca.SX.sym("target", STAGE)
+    following = ca.SX.sym("following", NX)
+    reached, slope = linearised_step(motion_model, wheelbase_m)(guess)
     gap = reached + slope @ (target - guess) - following
     return ca.Function("linearise", [guess, target, following], [slope, gap])
 
@@ -80,7 +89,7 @@ def _backward(slope_sparsity: ca.Sparsity) -> ca.Function:
     """Return (P, p, [A B], g, weights) -> (P, p, K, f), one stage earlier."""
     value, value_slope = ca.SX.sym("P", NX, NX), ca.SX.sym("p", NX)
     slope, gap = ca.SX.sym("slope", slope_sparsity), ca.SX.sym("gap", NX)
-    weight = ca.SX.sym("weight", _STAGE)
+    weight = ca.SX.sym("weight", STAGE)
     hessian = ca.diag(weight) + slope.T @ value @ slope
     gradient = slope.T @ (value @ gap + value_slope)
     inverse = _inverse(hessian[NX:, NX:])
@@ -98,7 +107,7 @@ def _backward(slope_sparsity: ca.Sparsity) -> ca.Function:
 def _forward() -> ca.Function:
     """Return (e, [A B], g, K, f) -> (d, next e)."""
     deviation, gap = ca.SX.sym("e", NX), ca.SX.sym("gap", NX)
-    slope = ca.SX.sym("slope", NX, _STAGE)
+    slope = ca.SX.sym("slope", NX, STAGE)
     gain, offset = ca.SX.sym("gain", NU, NX), ca.SX.sym("offset", NU)
     control = gain @ deviation + offset
     following = slope @ ca.vertcat(deviation, control) + gap

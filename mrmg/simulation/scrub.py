@@ -33,8 +33,6 @@ its `turning_coefficient` counts for nothing here.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from mrmg.energy.model import GRAVITY_M_S2
@@ -44,25 +42,19 @@ from mrmg.simulation.ground import Ground, TerrainUnderfoot
 from mrmg.simulation.scenery import FLOOR
 from mrmg.simulation.world_model import MujocoWorld
 
+LOAD_EXPONENT = 0.9
+"""beta; tyres of SAE J2452 have 0.8 to 1.0."""
 
-@dataclass(frozen=True, slots=True)
-class ScrubParams:
-    """What a tyre of this plant is like.
+SPEED_PER_M_S = 0.05
+"""c_v; walking pace is slow, but the model has no speed in it."""
 
-    Attributes:
-        load_exponent: beta; tyres of SAE J2452 have 0.8 to 1.0.
-        speed_per_m_s: c_v; walking pace is slow, but the model has no speed in it.
-        slip_stiffness: c, force over load per unit of slip; 8 to 12 for car tyres
-            (Pacejka 2012), less for soft ones.
-        patch_share: radius a of the patch over that of the wheel: a soft tyre pressed
-            in by 2 % of its radius touches the ground over 0.2 of it.
-    """
+SLIP_STIFFNESS = 8.0
+"""c, force over load per unit of slip; 8 to 12 for car tyres (Pacejka 2012), less for
+soft ones."""
 
-    load_exponent: float = 0.9
-    speed_per_m_s: float = 0.05
-    slip_stiffness: float = 8.0
-    patch_share: float = 0.2
-
+PATCH_SHARE = 0.2
+"""Radius a of the patch over that of the wheel: a soft tyre pressed in by 2 % of its
+radius touches the ground over 0.2 of it."""
 
 _RELAXATION = 0.2
 """Share of a change of load that a tyre takes up in a tick: most of it in 0.1 s."""
@@ -75,11 +67,7 @@ class ScrubbingTyres:
     """The tyres of a fleet in a running simulation; a `Plant`."""
 
     def __init__(
-        self,
-        world: MujocoWorld,
-        data: mujoco.MjData,
-        rolling_N: np.ndarray,
-        params: ScrubParams | None = None,
+        self, world: MujocoWorld, data: mujoco.MjData, rolling_N: np.ndarray
     ) -> None:
         """Find everything of the robots that touches the floor.
 
@@ -87,10 +75,8 @@ class ScrubbingTyres:
             world: the compiled world; its frictions are changed at every tick.
             data: of the simulation.
             rolling_N: C_rr times the weight of each robot, shape (R,).
-            params: what the tyres are like.
         """
         self._model, self._data = world.model, data
-        self._params = params or ScrubParams()
         model, robots = world.model, world.scene.robots
         self._terrain = TerrainUnderfoot(world.scene)
         self._floor = model.geom(FLOOR).id
@@ -129,7 +115,7 @@ class ScrubbingTyres:
         Each tyre has ground of its own, and its load counts the slope: both arguments
         count for nothing.
         """
-        model, params = self._model, self._params
+        model = self._model
         # A tyre gives way to a new load over some of its turn, not within a step.
         self._forces_N += _RELAXATION * (self._contact_forces() - self._forces_N)
         load_N, force_N = self._forces_N
@@ -138,11 +124,11 @@ class ScrubbingTyres:
         rolls, speed_m_s = self._rolls, self._speeds_m_s()
         grip = model.geom_friction[self._tyres, 0]
         used = np.clip(force_N / np.maximum(grip * load_N, 1.0), 0.0, 1.0)
-        slip = 3.0 * grip / params.slip_stiffness * (1.0 - np.cbrt(1.0 - used))
-        share = (np.maximum(load_N, 1.0) / self._usual_N) ** (params.load_exponent - 1)
+        slip = 3.0 * grip / SLIP_STIFFNESS * (1.0 - np.cbrt(1.0 - used))
+        share = (np.maximum(load_N, 1.0) / self._usual_N) ** (LOAD_EXPONENT - 1)
         drag_N = self._rolling * rolling * share * load_N
-        drag_N *= 1.0 + params.speed_per_m_s * speed_m_s
-        patch_m = params.patch_share * self._radius_m
+        drag_N *= 1.0 + SPEED_PER_M_S * speed_m_s
+        patch_m = PATCH_SHARE * self._radius_m
         spun_m_s = patch_m * yaw_rad_s + _STILL_M_S
         slid_m_s = 8.0 / (3.0 * np.pi) * slip * speed_m_s
         scrub_Nm = 2.0 / 3.0 * turning * grip * load_N * patch_m

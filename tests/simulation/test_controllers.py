@@ -19,7 +19,12 @@ from mrmg.simulation.controller import (
     controller_maker,
     controller_names,
 )
-from mrmg.simulation.mpc import MpcParams, TrackingMpc
+from mrmg.simulation.mpc import (
+    CONTROL_WEIGHTS,
+    STATE_WEIGHTS,
+    TERMINAL_FACTOR,
+    TrackingMpc,
+)
 from mrmg.testing import ControllerContract
 from mrmg.testing.controller_contract import TICKS_A_STEP, reference_of, straight
 
@@ -62,19 +67,19 @@ def converged(
     model: RobotModel, state: np.ndarray, reference: np.ndarray
 ) -> np.ndarray:
     """The first control of the nonlinear problem, by an interior point method."""
-    params, limits = MpcParams(), model.limits
+    limits = model.limits
     step = rk4_step(DERIVATIVES[model.motion_model](ca.sin, ca.cos, ca.tan))
     problem = ca.Opti()
     x, u = problem.variable(NX, HORIZON + 1), problem.variable(NU, HORIZON)
     planned = np.diff(reference[:, 3:], axis=0) / HORIZON_STEP_S
     cost = 0
     for k in range(HORIZON + 1):
-        factor = params.terminal_factor if k == HORIZON else 1.0
+        factor = TERMINAL_FACTOR if k == HORIZON else 1.0
         off = x[:, k] - reference[k]
-        cost += factor * ca.dot(ca.DM(params.state), off**2)
+        cost += factor * ca.dot(ca.DM(STATE_WEIGHTS), off**2)
         problem.set_initial(x[:, k], reference[k])
     for k in range(HORIZON):
-        cost += ca.dot(ca.DM(params.control), (u[:, k] - planned[k]) ** 2)
+        cost += ca.dot(ca.DM(CONTROL_WEIGHTS), (u[:, k] - planned[k]) ** 2)
         reached = step(
             ca.vertsplit(x[:, k]),
             ca.vertsplit(u[:, k]),

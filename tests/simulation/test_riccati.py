@@ -11,7 +11,7 @@ from mrmg.motion.dynamics import DERIVATIVES, NU, NX, rk4_step
 from mrmg.scene.loading.models import load_model
 from mrmg.scene.robot_model import RobotModel
 from mrmg.simulation.controller import HORIZON, HORIZON_STEP_S
-from mrmg.simulation.mpc import MpcParams, TrackingMpc
+from mrmg.simulation.mpc import WEIGHTS, TrackingMpc
 from mrmg.simulation.riccati import unbounded_solver
 
 STAGE = NX + NU
@@ -101,10 +101,8 @@ def test_the_controller_answers_as_with_bounds_at_once(
     reference = straight_reference(0.5 * model.limits.v_max_m_s)
     state = reference[0].copy()
     state[:2] += offset_m
-    limits, params = model.limits, MpcParams()
-    last = [params.terminal_factor * item for item in params.state]
-    weight = np.array([*params.state, *params.control] * HORIZON + last)
-    free = unbounded_solver(model.motion_model, model.wheelbase_m, weight)
+    limits = model.limits
+    free = unbounded_solver(model.motion_model, model.wheelbase_m, WEIGHTS)
     target = np.zeros(SIZE)
     stages = target[:-NX].reshape(HORIZON, STAGE)
     stages[:, :NX], target[-NX:] = reference[:-1], reference[-1]

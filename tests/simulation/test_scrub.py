@@ -12,10 +12,14 @@ import pytest
 from mrmg.errors import UsageError
 from mrmg.scene.types import Scene
 from mrmg.simulation import ExecutionLog, simulate
-from mrmg.simulation.scrub import ScrubParams
+from mrmg.simulation.scrub import (
+    LOAD_EXPONENT,
+    PATCH_SHARE,
+    SLIP_STIFFNESS,
+    SPEED_PER_M_S,
+)
 
 GRAVITY = 9.81
-PARAMS = ScrubParams()
 
 
 def driven(
@@ -42,13 +46,13 @@ def straight_W(scene: Scene, speed: float, left: float, right: float) -> float:
     for share in (front, 1.0 - front):
         for factor in (left, right):
             load_N = 0.5 * share * weight_N
-            coefficient = 0.06 * factor * (1.0 + PARAMS.speed_per_m_s * speed)
-            thin = (load_N / usual_N) ** (PARAMS.load_exponent - 1.0)
+            coefficient = 0.06 * factor * (1.0 + SPEED_PER_M_S * speed)
+            thin = (load_N / usual_N) ** (LOAD_EXPONENT - 1.0)
             drag.append(coefficient * thin * load_N)
     # The rear wheels push what holds the front ones back, and creep by that.
     load_N = 0.5 * (1.0 - front) * weight_N
     push_N = 0.5 * (drag[0] + drag[1])
-    slip = 3.0 / PARAMS.slip_stiffness * (1.0 - (1.0 - push_N / load_N) ** (1.0 / 3.0))
+    slip = 3.0 / SLIP_STIFFNESS * (1.0 - (1.0 - push_N / load_N) ** (1.0 / 3.0))
     return (sum(drag) + 2.0 * push_N * slip) * speed
 
 
@@ -83,12 +87,12 @@ def test_turning_on_the_spot_is_scrub_and_rolling(driving: SimpleNamespace) -> N
     weight_N, half_m = model.mass_kg * GRAVITY, model.track_m / 2
     wheels_N = weight_N * (1.0 - model.center_of_mass_m / 0.4)  # the caster leads 0.4 m
     caster_N = weight_N - wheels_N
-    patch_m = PARAMS.patch_share * model.wheel_radius_m
+    patch_m = PATCH_SHARE * model.wheel_radius_m
     usual_N = weight_N / 2
 
     def drag_N(load_N: float, number: int, speed: float) -> float:
-        thin = (load_N / number / usual_N) ** (PARAMS.load_exponent - 1.0)
-        return 0.05 * (1.0 + PARAMS.speed_per_m_s * speed) * thin * load_N
+        thin = (load_N / number / usual_N) ** (LOAD_EXPONENT - 1.0)
+        return 0.05 * (1.0 + SPEED_PER_M_S * speed) * thin * load_N
 
     scrub_Nm = 2.0 / 3.0 * wheels_N * patch_m
     rolling_Nm = drag_N(wheels_N, 2, 0.8 * half_m) * half_m
