@@ -19,7 +19,12 @@ import numpy as np
 
 from mrmg.energy.ledger import EnergyLedger, LedgerEntry
 from mrmg.energy.model import PARTS
-from mrmg.energy.visits import battery_contents, first_stay, recharging
+from mrmg.energy.visits import (
+    FROM_THE_START,
+    battery_contents,
+    first_stay,
+    recharging,
+)
 from mrmg.motion.dynamics import TURN_SPEEDS
 from mrmg.plans import Visit
 from mrmg.scene.types import Robot, Scene, Station
@@ -178,7 +183,11 @@ def find_visits(scene: Scene, motion: Motion, tour: Sequence[str]) -> tuple[Visi
 
 
 def visits_and_energy(
-    scene: Scene, motion: Motion, tour: Sequence[str]
+    scene: Scene,
+    motion: Motion,
+    tour: Sequence[str],
+    energy_J: np.ndarray | None = None,
+    reckoned_J: Mapping[int, float] = FROM_THE_START,
 ) -> tuple[tuple[Visit, ...], np.ndarray, list[LedgerEntry]]:
     """Return visits as `find_visits`, and what `battery_profile` and the ledger say.
 
@@ -186,6 +195,9 @@ def visits_and_energy(
         scene: names the targets.
         motion: planned or logged states of one robot.
         tour: ids of goals and stations.
+        energy_J: of each interval by part, shape (n, len(PARTS)); None for that of the
+            scene's energy model.
+        reckoned_J: contents from which the battery is reckoned on, by state.
     """
     visits: list[Visit] = []
     targets = {target.id: target for target in scene.targets()}
@@ -206,8 +218,10 @@ def visits_and_energy(
                 energy_J=0.0,
             )
         )
-    energy_J = step_energy_parts(scene, motion)
-    content_J, arrival_J = battery_content(scene, motion, energy_J.sum(axis=1), visits)
+    if energy_J is None:
+        energy_J = step_energy_parts(scene, motion)
+    draw_J = energy_J.sum(axis=1)
+    content_J, arrival_J = battery_content(scene, motion, draw_J, visits, reckoned_J)
     found = tuple(
         replace(visit, energy_J=arrived_J)
         for visit, arrived_J in zip(visits, arrival_J, strict=True)
@@ -234,7 +248,11 @@ def battery_profile(
 
 
 def battery_content(
-    scene: Scene, motion: Motion, draw_J: np.ndarray, visits: Sequence[Visit]
+    scene: Scene,
+    motion: Motion,
+    draw_J: np.ndarray,
+    visits: Sequence[Visit],
+    reckoned_J: Mapping[int, float] = FROM_THE_START,
 ) -> tuple[np.ndarray, list[float]]:
     """Return the battery content under any meter's draws, and that on each arrival.
 
@@ -243,6 +261,7 @@ def battery_content(
         motion: planned or logged states of one robot, shape (n + 1, 5).
         draw_J: energy drawn over each interval, shape (n,).
         visits: of this robot, in order of steps.
+        reckoned_J: contents from which the battery is reckoned on, by state.
 
     Returns:
         Content at each state [J], shape (n + 1,), and content on arrival at each of the
@@ -251,7 +270,7 @@ def battery_content(
     battery = scene.robot(motion.robot).battery
     points = motion.state[:, :2]
     given = recharging(scene, motion.robot, motion.time_s, points, visits)
-    before, after = battery_contents(battery, draw_J, given)
+    before, after = battery_contents(battery, draw_J, given, reckoned_J)
     return after, [float(before[visit.step]) for visit in visits]
 
 

@@ -26,7 +26,8 @@ from mrmg.scene.types import Battery, Goal, Scene, Station
 ROUNDING_S = 1e-6
 """Rounding of times that is forgiven in how long a robot stays."""
 
-_NOTHING: Mapping[int, float] = MappingProxyType({})
+FROM_THE_START: Mapping[int, float] = MappingProxyType({})
+"""No content but that at the start to reckon a battery from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +170,7 @@ def battery_contents(
     battery: Battery,
     draw_J: np.ndarray,
     given: Recharging,
-    reckoned_J: Mapping[int, float] = _NOTHING,
+    reckoned_J: Mapping[int, float] = FROM_THE_START,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the battery content on arrival at each state, and after a recharge there.
 

@@ -54,6 +54,11 @@ class Observation:
     work_J: Callable[[], np.ndarray]
     ended: bool
 
+    @property
+    def off_m(self) -> np.ndarray:
+        """Distance of each robot from where the plan has it, shape (R,)."""
+        return np.asarray(np.hypot(*(self.state - self.planned)[:, :2].T))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Orders:

@@ -6,13 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mrmg.energy.visits import (
-    Stay,
-    battery_contents,
-    first_stay,
-    is_at,
-    recharging,
-)
+from mrmg.energy.metering import LoggedMotion, battery_content
+from mrmg.energy.visits import Stay, first_stay, is_at
 from mrmg.plans import Visit
 from mrmg.scene.types import Robot, Scene, Station
 
@@ -29,10 +24,7 @@ class BatteryTracker:
         self.charge_J = robot.battery.start_J
         self._scene, self._robot = scene, robot
         self._targets = {target.id: target for target in scene.targets()}
-        self._tour: list[str] = []
-        self._begun_J = self.charge_J
-        self._time_s = np.zeros(0)
-        self._poses, self._draw_J = np.zeros((0, 3)), np.zeros(0)
+        self.follow(())
 
     def follow(self, tour: Sequence[str]) -> None:
         """Expect the visits of a tour from now on."""
@@ -59,25 +51,27 @@ class BatteryTracker:
             self._visit(name, stay.first)
             for name, stay in zip(self._tour, stays, strict=False)
         ]
-        given = recharging(
-            self._scene, self._robot.id, self._time_s, self._poses[:, :2], visits
+        motion = LoggedMotion(
+            robot=self._robot.id, time_s=self._time_s, state=self._poses
         )
-        before_J, after_J = battery_contents(
-            self._robot.battery, self._draw_J, given, {0: self._begun_J}
+        content_J, arrival_J = battery_content(
+            self._scene, motion, self._draw_J, visits, {0: self._begun_J}
         )
-        self.charge_J = float(after_J[-1])
-        if visits and visits[-1].kind == "station" and not given.full_at:
+        self.charge_J = float(content_J[-1])
+        takes_time = self._robot.battery.takes_time_to_fill
+        if visits and visits[-1].kind == "station" and takes_time:
             # It goes on giving: what comes next depends on when this began.
             self._tour = self._tour[len(stays) - 1 :]
-            self._keep(visits[-1].step, before_J)
+            self._keep(visits[-1].step, arrival_J[-1])
         else:
             self._tour = self._tour[len(stays) :]
             over = stays[-1].over if stays else 0
-            self._keep(max(over, self._since_when_at_target()), after_J)
+            first = max(over, self._since_when_at_target())
+            self._keep(first, float(content_J[first]))
 
-    def _keep(self, first: int, content_J: np.ndarray) -> None:
-        """Forget what was before a state."""
-        self._begun_J = float(content_J[first])
+    def _keep(self, first: int, content_J: float) -> None:
+        """Forget what was before a state, at which the battery had this content."""
+        self._begun_J = content_J
         self._time_s, self._poses = self._time_s[first:], self._poses[first:]
         self._draw_J = self._draw_J[first:]
 

@@ -48,11 +48,10 @@ class TrackingCorridor:
 
     def left(self, now: Observation) -> Departure | None:
         """Return how the corridor was left, if it was."""
-        off_m = np.hypot(*(now.state - now.planned)[:, :2].T)
-        worst = int(off_m.argmax())
-        robot = self._robots[worst]
-        if off_m[worst] > self._params.off_m:
-            text = f"{robot} is {off_m[worst]:.2f} m off its plan"
+        worst = int(now.off_m.argmax())
+        robot, off_m = self._robots[worst], now.off_m[worst]
+        if off_m > self._params.off_m:
+            text = f"{robot} is {off_m:.2f} m off its plan"
             return Departure("tracking", robot, text)
         if now.rate > _STANDING_RATE:
             self._got_on_s = now.time_s

@@ -14,12 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrmg.energy.ledger import EnergyLedger, LedgerEntry
-from mrmg.energy.metering import find_visits, leg_entries, step_energy_parts
-from mrmg.energy.model import PARTS
-from mrmg.energy.visits import battery_contents, recharging
+from mrmg.energy.metering import step_energy_parts, visits_and_energy
 from mrmg.plans import Plan, Visit
 from mrmg.scene.types import Scene
-from mrmg.supervision.stopping import Departing
+from mrmg.supervision.stopping import Motion, motions_to_rest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,14 +78,9 @@ class Course:
             broken: ids of robots that can but brake in full.
             pause_s: how long the fleet stands at least.
         """
-        departing = Departing(
-            scene=self.scene,
-            trajectories=self.plan.trajectories,
-            step=step,
-            states=states,
-            broken=broken,
+        motions = motions_to_rest(
+            self.scene, self.plan.trajectories, step, states, broken
         )
-        motions = departing.motions_to_rest()
         longest = max(len(control) for _, control in motions.values())
         length = longest + round(pause_s / self.plan.dt_s)
         motions = {name: _held(*motion, length) for name, motion in motions.items()}
@@ -128,14 +121,13 @@ class Course:
         entries: list[LedgerEntry] = []
         content_J = {}
         for item in self.plan.trajectories:
-            own = find_visits(self.scene, item, tours[item.robot])
-            before_J, content_J[item.robot] = self._content_J(item.robot, own)
-            arrival_J = [float(before_J[visit.step]) for visit in own]
-            visits += [
-                replace(visit, energy_J=energy_J)
-                for visit, energy_J in zip(own, arrival_J, strict=True)
-            ]
-            entries += leg_entries(item.robot, self.parts_J[item.robot], PARTS, own)
+            robot = item.robot
+            anew = {step: charge_J[robot] for step, charge_J in self.charge_J}
+            own, content_J[robot], legs = visits_and_energy(
+                self.scene, item, tours[robot], self.parts_J[robot], anew
+            )
+            visits += own
+            entries += legs
         visits.sort(key=lambda visit: (visit.step, visit.robot))
         plan = replace(
             self.plan,
@@ -147,27 +139,10 @@ class Course:
         )
         return replace(self, plan=plan)
 
-    def _content_J(
-        self, robot: str, visits: Sequence[Visit]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the planned battery content at each state, before and after recharges.
-
-        Args:
-            robot: id of the robot.
-            visits: of this robot.
-        """
-        battery = self.scene.robot(robot).battery
-        motion = self.plan.trajectory(robot)
-        points = motion.state[:, :2]
-        given = recharging(self.scene, robot, motion.time_s, points, visits)
-        anew = {step: charge_J[robot] for step, charge_J in self.charge_J}
-        draw_J = self.parts_J[robot].sum(axis=1)
-        return battery_contents(battery, draw_J, given, anew)
-
     def _continued(
         self,
         step: int,
-        motions: Mapping[str, tuple[np.ndarray, np.ndarray]],
+        motions: Mapping[str, Motion],
         believed: Scene,
     ) -> Course:
         """Return the course up to `step`, then the given states and controls.
@@ -211,9 +186,7 @@ def _rolling_factor(scene: Scene, believed: Scene, robot: str) -> float:
     return known / modelled
 
 
-def _held(
-    state: np.ndarray, control: np.ndarray, length: int
-) -> tuple[np.ndarray, np.ndarray]:
+def _held(state: np.ndarray, control: np.ndarray, length: int) -> Motion:
     """Return a motion lengthened to `length` steps by standing at its end."""
     rest = state[-1].copy()
     rest[3:] = 0.0

@@ -16,7 +16,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from enum import Enum
 
 import numpy as np
 
@@ -37,13 +36,6 @@ _NO_PROGRESS_M = 1.0
 
 _SLOW_RATE = 0.5
 """Rate of the fleet's clock below which the fleet waits for somebody."""
-
-
-class Phase(Enum):
-    """What the fleet is doing under its supervisor."""
-
-    FOLLOWING = "following the plan in force"
-    STOPPING = "coming to rest"
 
 
 class FleetSupervisor:
@@ -87,7 +79,7 @@ class FleetSupervisor:
         self._tracking = TrackingCorridor(self._robots, params)
         self._energy = EnergyCorridor(self.course, params)
         self._history = History(scene)
-        self._phase = Phase.FOLLOWING
+        self._stopping = False
 
     def watch(self, now: Observation) -> Orders | None:
         """Look at the run after a tick; see `Supervisor.watch`."""
@@ -95,7 +87,7 @@ class FleetSupervisor:
         if self._history.unmetered_s >= self._params.check_s - 1e-9:
             self._history.feed(self._meters)
         faulty = self._break_down(now)
-        if self._phase is Phase.STOPPING:
+        if self._stopping:
             return self._resume(now) if now.ended else None
         if faulty:
             return self._stop(now)
@@ -140,15 +132,14 @@ class FleetSupervisor:
 
     def _stop(self, now: Observation) -> Orders | None:
         """Bring the fleet to rest from the next step of the plan on."""
-        self._phase = Phase.STOPPING
+        self._stopping = True
         dt_s = self.course.plan.dt_s
         step = math.floor(now.clock_s / dt_s + 1e-9) + 1
         if step >= self.course.steps:
             return None
-        off_m = np.hypot(*(now.state - now.planned)[:, :2].T)
         states = {}
         for index, item in enumerate(self.course.plan.trajectories):
-            tracked = off_m[index] <= self._params.tracked_m
+            tracked = now.off_m[index] <= self._params.tracked_m
             on_plan = tracked and now.rate >= _SLOW_RATE
             states[item.robot] = item.state[step] if on_plan else now.state[index]
         self.course = self.course.stopped(
@@ -160,7 +151,7 @@ class FleetSupervisor:
     def _resume(self, now: Observation) -> Orders | None:
         """Plan the rest from where the fleet has come to rest."""
         self._history.feed(self._meters)
-        self._phase = Phase.FOLLOWING
+        self._stopping = False
         condition = self._condition(now)
         missing = [
             goal.id for goal in self._scene.goals if goal.id not in condition.visited
@@ -220,9 +211,8 @@ class FleetSupervisor:
         """Return the condition of the fleet, which is at rest."""
         poses = {}
         for index, item in enumerate(self.course.plan.trajectories):
-            off_m = float(np.hypot(*(now.state - now.planned)[index, :2]))
             gone = item.robot in self._out_of_service
-            true = off_m > self._params.tracked_m or gone
+            true = now.off_m[index] > self._params.tracked_m or gone
             x, y, yaw = (now.state[index] if true else item.state[-1])[:3]
             poses[item.robot] = (float(x), float(y), float(yaw))
         visited = self._history.visited()

@@ -11,7 +11,7 @@ from mrmg.planning.roadmap.fleet import fleet_array
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.margins import Margins
 from mrmg.scene.types import Scene
-from mrmg.supervision.braking import brake_to_rest
+from mrmg.supervision.stopping import brake_to_rest
 from mrmg.world.world import World
 
 DT_S = 0.1
@@ -41,9 +41,9 @@ def test_braking_is_what_planning_takes_it_for(model: str, speed: float) -> None
         before = expected.copy()
         u1, u2 = braking_control(own, 0, before, DT_S)
         step(own[0], before, u1, u2, DT_S, expected)
-        np.testing.assert_allclose(states[n], expected, atol=1e-12)
         n += 1
-    assert len(states) == len(controls)
+        np.testing.assert_allclose(states[n], expected, atol=1e-12)
+    assert len(states) == len(controls) + 1
 
 
 @pytest.mark.parametrize("model", ["car", "diffdrive"])
@@ -61,5 +61,5 @@ def test_a_standing_robot_brakes_in_no_time() -> None:
     states, controls = brake_to_rest(
         one_robot("car").robots[0].model, np.zeros(5), DT_S
     )
-    assert states.shape == (0, 5)
+    assert states.shape == (1, 5)
     assert controls.shape == (0, 2)

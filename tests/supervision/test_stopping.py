@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 
 from mrmg.plans import Trajectory
 from mrmg.scene.types import Scene
-from mrmg.supervision.stopping import ENOUGH_M, Departing
+from mrmg.supervision.stopping import (
+    ENOUGH_M,
+    Motion,
+    brake_to_rest,
+    clearance_m,
+    motions_to_rest,
+)
 
 DT_S = 0.1
 
@@ -29,20 +34,18 @@ def cruise(robot: str, at: tuple[float, float], yaw: float, psi: float) -> Traje
     )
 
 
-def departing(
-    scene: Scene, trajectories: list[Trajectory], **changes: Any
-) -> Departing:
-    step = 5
-    return Departing(
-        **{
-            "scene": scene,
-            "trajectories": tuple(trajectories),
-            "step": step,
-            "states": {item.robot: item.state[step] for item in trajectories},
-            "broken": frozenset(),
-            **changes,
-        }
-    )
+STEP = 5
+
+
+def to_rest(
+    scene: Scene, trajectories: list[Trajectory], broken: frozenset[str] = frozenset()
+) -> dict[str, Motion]:
+    states = {item.robot: item.state[STEP] for item in trajectories}
+    return motions_to_rest(scene, trajectories, STEP, states, broken)
+
+
+def braked(scene: Scene, item: Trajectory) -> Motion:
+    return brake_to_rest(scene.robot(item.robot).model, item.state[STEP], DT_S)
 
 
 @pytest.fixture
@@ -59,7 +62,7 @@ def test_full_braking_is_taken_where_it_is_clear(
     lonely: tuple[Scene, list[Trajectory]],
 ) -> None:
     scene, trajectories = lonely
-    (states, controls) = departing(scene, trajectories).motions_to_rest()["r1"]
+    (states, controls) = to_rest(scene, trajectories)["r1"]
     limits = scene.robots[0].model.limits
     share = scene.robots[0].model.planning_share
     assert controls[0, 0] == pytest.approx(-share * limits.u1_max_m_s2)
@@ -85,11 +88,10 @@ def crossing(make_yard: Callable[..., Scene]) -> tuple[Scene, list[Trajectory]]:
 
 def test_else_the_fleet_stops_along_its_plan(make_yard: Callable[..., Scene]) -> None:
     scene, trajectories = crossing(make_yard)
-    stop = departing(scene, trajectories)
-    committed = {item.robot: stop._braking(item) for item in trajectories}
-    assert stop._clearance_m(committed) < ENOUGH_M
-    motions = stop.motions_to_rest()
-    assert stop._clearance_m(motions) > stop._clearance_m(committed)
+    committed = {item.robot: braked(scene, item) for item in trajectories}
+    assert clearance_m(scene, committed) < ENOUGH_M
+    motions = to_rest(scene, trajectories)
+    assert clearance_m(scene, motions) > clearance_m(scene, committed)
     for item in trajectories:
         states, controls = motions[item.robot]
         assert len(states) == len(controls) + 1
@@ -101,7 +103,6 @@ def test_else_the_fleet_stops_along_its_plan(make_yard: Callable[..., Scene]) ->
 
 def test_who_is_broken_only_brakes(make_yard: Callable[..., Scene]) -> None:
     scene, trajectories = crossing(make_yard)
-    stop = departing(scene, trajectories, broken=frozenset({"r1"}))
-    states, _ = stop.motions_to_rest()["r1"]
-    expected, _ = stop._braking(trajectories[0])
+    states, _ = to_rest(scene, trajectories, broken=frozenset({"r1"}))["r1"]
+    expected, _ = braked(scene, trajectories[0])
     np.testing.assert_array_equal(states, expected)
