@@ -12,6 +12,7 @@ import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
@@ -89,8 +90,12 @@ def write_text(path: Path, text: str) -> None:
 
 
 def canonical_json(value: Any) -> str:
-    """Return `value` as JSON with sorted keys: equal values give equal bytes."""
-    return json.dumps(value, sort_keys=True, indent=1, allow_nan=False) + "\n"
+    """Return `value` as JSON with sorted keys: equal values give equal bytes.
+
+    Dataclasses are written by the names of their fields.
+    """
+    text = json.dumps(value, sort_keys=True, indent=1, allow_nan=False, default=asdict)
+    return text + "\n"
 
 
 def write_json(path: Path, value: Any) -> None:

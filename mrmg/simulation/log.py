@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
@@ -23,9 +23,6 @@ from mrmg.simulation.supervision import Event
 
 LOG_FORMAT = 1
 LOG_FILE = "log.json"
-
-_NOT_PLAIN = ("contacts", "disturbance", "events", "timing")
-
 
 _DECIDING = ("mujoco", "casadi", "numpy", "scipy", "shapely")
 
@@ -193,13 +190,10 @@ class ExecutionLog:
         header = {
             field.name: getattr(self, field.name)
             for field in fields(self)
-            if field.name not in {*self._arrays(), *_NOT_PLAIN}
+            if field.name not in {*self._arrays(), "timing"}
         }
-        header["versions"] = dict(self.versions)
-        header["contacts"] = [asdict(contact) for contact in self.contacts]
-        header["events"] = [asdict(event) for event in self.events]
-        if self.disturbance is not None:
-            header["disturbance"] = asdict(self.disturbance)
+        if self.disturbance is None:
+            del header["disturbance"]
         storage.write_json(folder / LOG_FILE, {"format": LOG_FORMAT, **header})
 
     def _arrays(self) -> dict[str, np.ndarray]:

@@ -7,6 +7,8 @@ each other. Groups: 1 drawn, 3 hidden solids.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import shapely
 from shapely.geometry import Polygon
@@ -44,29 +46,24 @@ def add_floor(spec: mujoco.MjSpec, scene: Scene, *, painted: bool) -> None:
     x_min, y_min, x_max, y_max = scene.bounds
     half = np.array([x_max - x_min, y_max - y_min]) / 2 + _FLOOR_MARGIN_M
     center = np.array([x_min + x_max, y_min + y_max]) / 2
-    options = {
-        "name": FLOOR,
-        "contype": FLOOR_BIT,
-        "conaffinity": 0,
-        "castshadow": False,
-    }
+    if scene.elevation is None:
+        ground = {
+            "type": mujoco.mjtGeom.mjGEOM_PLANE,
+            "pos": [*center, 0.0],
+            "size": [*half, 1.0],
+        }
+    else:
+        foot_m = add_height_field(spec, FLOOR, scene, center, half)
+        ground = {
+            "type": mujoco.mjtGeom.mjGEOM_HFIELD,
+            "hfieldname": FLOOR,
+            "pos": [*center, foot_m],
+        }
     if painted:
         _add_paint(spec, _floor_image(scene, center, half))
-        options["material"] = FLOOR
-    if scene.elevation is None:
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_PLANE,
-            pos=[*center, 0.0],
-            size=[*half, 1.0],
-            **options,
-        )
-        return
-    foot_m = add_height_field(spec, FLOOR, scene, center, half)
+        ground["material"] = FLOOR
     spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_HFIELD,
-        hfieldname=FLOOR,
-        pos=[*center, foot_m],
-        **options,
+        name=FLOOR, contype=FLOOR_BIT, conaffinity=0, castshadow=False, **ground
     )
 
 
@@ -135,26 +132,11 @@ def add_obstacle(
     for number, ring in enumerate(convex_pieces(shape)):
         name = f"solid:{obstacle.id}:{number}"
         spec.add_mesh(name=name, uservert=_prism(ring, height_m).ravel())
-        body.add_geom(
-            name=name,
-            type=mujoco.mjtGeom.mjGEOM_MESH,
-            meshname=name,
-            contype=OBSTACLE_BIT,
-            conaffinity=0,
-            group=_SOLID_GROUP,
-        )
+        _add_mesh_geom(body, name, contype=OBSTACLE_BIT, group=_SOLID_GROUP)
     colour = palette.OBSTACLE if obstacle.blocks is None else palette.PARTIAL_OBSTACLE
     name = f"obstacle:{obstacle.id}"
     _add_drawn_mesh(spec, name, shape, height_m)
-    body.add_geom(
-        name=name,
-        type=mujoco.mjtGeom.mjGEOM_MESH,
-        meshname=name,
-        contype=0,
-        conaffinity=0,
-        group=_DRAWN_GROUP,
-        rgba=[*colour, 1.0],
-    )
+    _add_mesh_geom(body, name, contype=0, group=_DRAWN_GROUP, rgba=[*colour, 1.0])
     return body
 
 
@@ -196,32 +178,38 @@ def add_targets(spec: mujoco.MjSpec, scene: Scene) -> None:
 def _add_mark(
     spec: mujoco.MjSpec, scene: Scene, name: str, region: Region, colour: palette.Rgb
 ) -> None:
-    options = {
-        "name": name,
+    look = {
         "contype": 0,
-        "conaffinity": 0,
         "group": _DRAWN_GROUP,
         "rgba": [*colour, 0.8],
         "castshadow": False,
     }
-    if scene.elevation is not None:
-        _add_mesh(spec, name, *draped_mark(scene, region))
+    if scene.elevation is None and not len(region.corners):
+        half = _TARGET_THICKNESS_M / 2
         spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **options
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+            pos=[*region.center, half],
+            size=[region.radius_m, half, 0.0],
+            conaffinity=0,
+            **look,
         )
         return
-    if len(region.corners):
+    if scene.elevation is None:
         _add_drawn_mesh(spec, name, region.shape, _TARGET_THICKNESS_M)
-        spec.worldbody.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, **options
-        )
-        return
-    half = _TARGET_THICKNESS_M / 2
-    spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
-        pos=[*region.center, half],
-        size=[region.radius_m, half, 0.0],
-        **options,
+    else:
+        _add_mesh(spec, name, *draped_mark(scene, region))
+    _add_mesh_geom(spec.worldbody, name, **look)
+
+
+def _add_mesh_geom(body: mujoco.MjsBody, name: str, **look: Any) -> None:
+    """Add the mesh of a name as a geom of that name, which tests for no contacts."""
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname=name,
+        conaffinity=0,
+        **look,
     )
 
 
