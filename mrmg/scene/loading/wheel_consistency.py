@@ -170,7 +170,7 @@ def traction_faults(
             f"{asked.format(needed_N)}the drive control holds what tyres of friction "
             f"{model.friction_coefficient:g} transmit, {most_N:.0f} N; lower the limit",
         )
-    # What scrub takes is fed forward without a limit; see `simulation.speed_loop`.
+    # What scrub takes is fed forward without a limit; see `simulation.drive`.
     swing_Nm = robot.yaw_inertia_kg_m2() * limits.u2_max
     most_Nm = most_N * model.track_m / 2
     if not parts.steer and swing_Nm > most_Nm * (1.0 + FORCE_SHARE):
