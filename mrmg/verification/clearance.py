@@ -53,6 +53,11 @@ class GapMinimum:
     contact_step: np.ndarray
     contact_time_s: np.ndarray
 
+    @property
+    def clearance_m(self) -> float:
+        """What is certainly kept clear, 0 on contact."""
+        return max(self.lower_bound_m, 0.0)
+
 
 def bounded_minimum(gap: Gap, steps: np.ndarray, dt_s: float) -> GapMinimum:
     """Return the certified minimum of `gap` over the given steps.

@@ -43,12 +43,10 @@ def check_obstacles(
 ) -> list[Contacts]:
     """Return the robot's contacts with obstacles, then with the bounds."""
     footprint = SweptFootprint.of(robot.model, trajectory)
-    outside = _least_gap(BoundsGap(footprint, scene.bounds), footprint)
-    contacts = [_bounds_contacts(robot.id, footprint, outside, scene.bounds)]
+    contacts = [_bounds_contacts(robot.id, footprint, scene.bounds)]
     obstacles = [item for item in scene.barriers if item.stops(robot.id)]
     if obstacles:
-        touched = _least_gap(ObstacleGap(footprint, obstacles), footprint)
-        contacts.append(_obstacle_contacts(robot.id, footprint, touched, obstacles))
+        contacts.append(_obstacle_contacts(robot.id, footprint, obstacles))
     return contacts
 
 
@@ -100,11 +98,9 @@ def check_robots(scene: Scene, trajectories: Sequence[Trajectory]) -> list[Conta
 
 
 def _obstacle_contacts(
-    robot: str,
-    footprint: SweptFootprint,
-    touched: GapMinimum,
-    obstacles: Sequence[Obstacle],
+    robot: str, footprint: SweptFootprint, obstacles: Sequence[Obstacle]
 ) -> Contacts:
+    touched = _least_gap(ObstacleGap(footprint, obstacles), footprint)
     shapes = _footprints_on_contact(footprint, touched)
     tree = shapely.STRtree([obstacle.shape for obstacle in obstacles])
     # Contacts that lie below the resolution do not intersect; their nearest counts.
@@ -115,39 +111,25 @@ def _obstacle_contacts(
     for index in np.unique(pairs[1]):
         obstacle = obstacles[index]
         contacts = pairs[0, pairs[1] == index]
-        overlap_m2 = shapely.area(
+        overlap_m2 = np.full(len(shapes), -np.inf)
+        overlap_m2[contacts] = shapely.area(
             shapely.intersection(shapes[contacts], obstacle.shape)
         )
-        violations += _violations(
-            robot,
-            footprint,
-            touched,
-            contacts,
-            ViolationKind.OBSTACLE,
-            obstacle.id,
-            overlap_m2,
-        )
-    return Contacts(clearance_m=max(touched.lower_bound_m, 0.0), violations=violations)
+        partner = (ViolationKind.OBSTACLE, obstacle.id)
+        violations += _violations(robot, footprint, touched, partner, overlap_m2)
+    return Contacts(clearance_m=touched.clearance_m, violations=violations)
 
 
 def _bounds_contacts(
-    robot: str,
-    footprint: SweptFootprint,
-    touched: GapMinimum,
-    bounds: tuple[float, float, float, float],
+    robot: str, footprint: SweptFootprint, bounds: tuple[float, float, float, float]
 ) -> Contacts:
     gap = BoundsGap(footprint, bounds)
-    protruding_m = -gap.at(touched.contact_step, touched.contact_time_s)
-    violations = _violations(
-        robot,
-        footprint,
-        touched,
-        np.arange(len(touched.contact_step)),
-        ViolationKind.BOUNDS,
-        "bounds",
-        np.maximum(protruding_m, 0.0),
-    )
-    return Contacts(clearance_m=max(touched.lower_bound_m, 0.0), violations=violations)
+    touched = _least_gap(gap, footprint)
+    inside_m = gap.at(touched.contact_step, touched.contact_time_s)
+    partner = (ViolationKind.BOUNDS, "bounds")
+    outside_m = np.maximum(-inside_m, 0.0)
+    violations = _violations(robot, footprint, touched, partner, outside_m)
+    return Contacts(clearance_m=touched.clearance_m, violations=violations)
 
 
 def _pair_contacts(
@@ -155,18 +137,11 @@ def _pair_contacts(
     footprints: tuple[SweptFootprint, SweptFootprint],
     touched: GapMinimum,
 ) -> Contacts:
-    one, other = (_footprints_on_contact(item, touched) for item in footprints)
-    overlap_m2 = shapely.area(shapely.intersection(one, other))
-    violations = _violations(
-        robots[0],
-        footprints[0],
-        touched,
-        np.arange(len(touched.contact_step)),
-        ViolationKind.ROBOT,
-        robots[1],
-        overlap_m2,
-    )
-    return Contacts(clearance_m=max(touched.lower_bound_m, 0.0), violations=violations)
+    shapes = [_footprints_on_contact(item, touched) for item in footprints]
+    overlap_m2 = shapely.area(shapely.intersection(*shapes))
+    partner = (ViolationKind.ROBOT, robots[1])
+    violations = _violations(robots[0], footprints[0], touched, partner, overlap_m2)
+    return Contacts(clearance_m=touched.clearance_m, violations=violations)
 
 
 def _message(robot: str, kind: ViolationKind, other: str, amount: float) -> str:
@@ -188,19 +163,26 @@ def _violations(
     robot: str,
     footprint: SweptFootprint,
     touched: GapMinimum,
-    contacts: np.ndarray,
-    kind: ViolationKind,
-    other: str,
+    partner: tuple[ViolationKind, str],
     amount: np.ndarray,
 ) -> list[Violation]:
-    """Return the worst contact of each run of consecutive steps."""
-    step = touched.contact_step[contacts]
+    """Return the worst contact of each run of consecutive steps.
+
+    Args:
+        robot: id of the robot.
+        footprint: of the robot.
+        touched: instants of contact.
+        partner: kind and id of what is touched.
+        amount: by how much at each of these instants; -inf where it is not touched.
+    """
+    kind, other = partner
+    step = touched.contact_step
     by_step = np.full(len(footprint.state), -np.inf)
     np.maximum.at(by_step, step, amount)
     violations = []
     for worst_step in worst_of_runs(by_step, by_step > -np.inf):
         worst = int(np.flatnonzero((step == worst_step) & (amount == by_step[step]))[0])
-        within_s = touched.contact_time_s[contacts[worst] : contacts[worst] + 1]
+        within_s = touched.contact_time_s[worst : worst + 1]
         state = footprint.states_at(step[worst : worst + 1], within_s)[0]
         violations.append(
             Violation(

@@ -6,7 +6,7 @@ than the certified minimum of the robot's model. How a plan begins is the scene'
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 from itertools import combinations
 
 import numpy as np
@@ -23,9 +23,9 @@ ROUNDING_M = 1e-6
 """Missing distance that is forgiven: rounding of coordinates and of sums [m]."""
 
 
-def check_margins(scene: Scene, plan: Plan) -> list[Violation]:
-    """Return where a plan keeps less than the margins it states."""
-    violations = _stated_too_small(scene, plan)
+def check_margins(scene: Scene, plan: Plan) -> Iterator[Violation]:
+    """Yield where a plan keeps less than the margins it states."""
+    yield from _stated_too_small(scene, plan)
     own = [item for item in plan.trajectories if item.robot in plan.margins]
     reach_m = [scene.robot(item.robot).model.circumscribed_radius_m for item in own]
     for trajectory in own:
@@ -39,7 +39,7 @@ def check_margins(scene: Scene, plan: Plan) -> list[Violation]:
                     for time_s in (narrow.start_s, narrow.end_s)
                 )
                 needed_m[first : last + 1] = narrow.margin_m
-        violations += _violations(trajectory, distance_m, needed_m, "an obstacle")
+        yield from _violations(trajectory, distance_m, needed_m, "an obstacle")
     boxes_m = boxes_apart_m(own) if own else np.zeros((0, 0))
     for (i, one), (j, other) in combinations(enumerate(own), 2):
         spacing_m = max(plan.margins[item.robot][1] for item in (one, other))
@@ -47,8 +47,7 @@ def check_margins(scene: Scene, plan: Plan) -> list[Violation]:
             continue
         distance_m = _distance_m(scene, one, other, spacing_m)
         needed_m = np.full(len(distance_m), spacing_m)
-        violations += _violations(one, distance_m, needed_m, other.robot)
-    return violations
+        yield from _violations(one, distance_m, needed_m, other.robot)
 
 
 def _distance_m(
@@ -70,32 +69,28 @@ def _distance_m(
     return np.asarray(distance_m)
 
 
-def _stated_too_small(scene: Scene, plan: Plan) -> list[Violation]:
-    """Return the stretches that keep less than the certified minimum."""
-    violations = []
+def _stated_too_small(scene: Scene, plan: Plan) -> Iterator[Violation]:
+    """Yield the stretches that keep less than the certified minimum."""
     for narrow in plan.narrow:
         model = scene.robot(narrow.robot).model
         wanted_m = plan.margins.get(narrow.robot, (np.inf, np.inf))[0]
         least_m = min(certified_minimum_m(model), wanted_m)
         if narrow.start_s > 0.0 and narrow.margin_m < least_m - ROUNDING_M:
-            violations.append(
-                Violation(
-                    kind=ViolationKind.MARGIN,
-                    robot=narrow.robot,
-                    time_s=narrow.start_s,
-                    x_m=narrow.x_m,
-                    y_m=narrow.y_m,
-                    amount=least_m - narrow.margin_m,
-                    message=f"{narrow.robot}: keeps {narrow.margin_m:.3f} m in a "
-                    f"passage, less than the certified minimum of {least_m:.3f} m",
-                )
+            yield Violation(
+                kind=ViolationKind.MARGIN,
+                robot=narrow.robot,
+                time_s=narrow.start_s,
+                x_m=narrow.x_m,
+                y_m=narrow.y_m,
+                amount=least_m - narrow.margin_m,
+                message=f"{narrow.robot}: keeps {narrow.margin_m:.3f} m in a "
+                f"passage, less than the certified minimum of {least_m:.3f} m",
             )
-    return violations
 
 
 def _violations(
     trajectory: Trajectory, distance_m: np.ndarray, needed_m: np.ndarray, other: str
-) -> Sequence[Violation]:
+) -> list[Violation]:
     missing_m = needed_m - distance_m
     broken = missing_m > ROUNDING_M
     broken[: int(np.argmin(broken)) if not broken.all() else len(broken)] = False

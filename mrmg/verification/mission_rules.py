@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import zip_longest
 
 import numpy as np
 
@@ -30,28 +31,25 @@ _Key = tuple[str, int, str, str]
 """Robot, leg, target and part of an entry of the ledger."""
 
 
-def check_mission(scene: Scene, plan: Plan) -> list[Violation]:
-    """Return every broken rule of the mission as a whole."""
-    violations = [
-        *_check_goals(scene, plan),
-        *_check_recharges(scene, plan),
-        *_check_stations(scene, plan),
-        *_check_time(scene, plan),
-    ]
+def check_mission(scene: Scene, plan: Plan) -> Iterator[Violation]:
+    """Yield every broken rule of the mission as a whole."""
+    yield from _check_goals(scene, plan)
+    yield from _check_recharges(scene, plan)
+    yield from _check_stations(scene, plan)
+    yield from _check_time(scene, plan)
     known = {target.id for target in scene.targets()}
     accounts: dict[str, MotionAccount] = {}
     for trajectory in plan.trajectories:
         tour = [name for name in plan.tours[trajectory.robot] if name in known]
         account = account_of(scene, trajectory, tour)
-        violations += _check_tour(scene, plan, trajectory, account.visits)
-        violations += _check_visits(plan, trajectory, account.visits)
-        violations += _check_energy(scene, trajectory, account)
+        yield from _check_tour(scene, plan, trajectory, account.visits)
+        yield from _check_visits(plan, trajectory, account.visits)
+        yield from _check_energy(scene, trajectory, account)
         accounts[trajectory.robot] = account
-    return violations + _check_ledger(plan, accounts)
+    yield from _check_ledger(plan, accounts)
 
 
-def _check_goals(scene: Scene, plan: Plan) -> list[Violation]:
-    violations = []
+def _check_goals(scene: Scene, plan: Plan) -> Iterator[Violation]:
     for goal in scene.goals:
         if goal.id in plan.skipped:
             continue  # the verdict names it
@@ -59,23 +57,19 @@ def _check_goals(scene: Scene, plan: Plan) -> list[Violation]:
         step = int(depth.argmax())
         missed_m = -float(depth[step])
         if missed_m > 0.0:
-            violations.append(
-                violation_at(
-                    trajectory,
-                    step,
-                    ViolationKind.GOAL_MISSED,
-                    f"goal {goal.id} is visited by no robot; this one comes nearest, "
-                    f"{missed_m:.3g} m off",
-                    amount=missed_m,
-                    other=goal.id,
-                )
+            message = (
+                f"goal {goal.id} is visited by no robot; this one comes nearest, "
+                f"{missed_m:.3g} m off"
+            )
+            kind = ViolationKind.GOAL_MISSED
+            yield violation_at(
+                trajectory, step, kind, message, amount=missed_m, other=goal.id
             )
             continue
         askew = [] if goal.heading_rad is None else _check_heading(plan, goal)
-        violations += askew
+        yield from askew
         if goal.dwell_s > 0.0 and not askew:
-            violations += _check_dwell(plan, goal)
-    return violations
+            yield from _check_dwell(plan, goal)
 
 
 def _deepest(plan: Plan, goal: Goal) -> tuple[np.ndarray, Trajectory]:
@@ -115,12 +109,12 @@ def _check_heading(plan: Plan, goal: Goal) -> list[Violation]:
     return [violation_at(trajectory, step, kind, message, amount=excess, other=goal.id)]
 
 
-def _check_dwell(plan: Plan, goal: Goal) -> list[Violation]:
+def _check_dwell(plan: Plan, goal: Goal) -> Iterator[Violation]:
     """Check that some robot stays at a goal for its dwell time."""
     stays_s = [(longest_stay_s(goal, item), item) for item in plan.trajectories]
     stay_s, trajectory = max(stays_s, key=lambda pair: pair[0])
     if stay_s >= goal.dwell_s - TIME_ROUNDING_S:
-        return []
+        return
     step = int(goal.region.depth(trajectory.state[:, :2]).argmax())
     stay, dwell = compared(stay_s, goal.dwell_s, 1)
     message = (
@@ -129,16 +123,15 @@ def _check_dwell(plan: Plan, goal: Goal) -> list[Violation]:
     )
     amount = goal.dwell_s - stay_s
     kind = ViolationKind.DWELL
-    return [violation_at(trajectory, step, kind, message, amount=amount, other=goal.id)]
+    yield violation_at(trajectory, step, kind, message, amount=amount, other=goal.id)
 
 
 def _check_tour(
     scene: Scene, plan: Plan, trajectory: Trajectory, visits: Sequence[Visit]
-) -> list[Violation]:
+) -> Iterator[Violation]:
     """Check that the trajectory enters all targets of its tour in their order."""
     regions = {target.id: target.region for target in scene.targets()}
     left = [visit.target for visit in visits]
-    violations = []
     for name in plan.tours[trajectory.robot]:
         if left and left[0] == name:
             left.pop(0)
@@ -150,45 +143,30 @@ def _check_tour(
         else:
             step, amount = 0, 0.0
             message = f"the tour names {name}, which the scene does not have"
-        violations.append(
-            violation_at(
-                trajectory,
-                step,
-                ViolationKind.TOUR,
-                message,
-                amount=amount,
-                other=name,
-            )
-        )
-    return violations
+        kind = ViolationKind.TOUR
+        yield violation_at(trajectory, step, kind, message, amount=amount, other=name)
 
 
 def _check_visits(
     plan: Plan, trajectory: Trajectory, visits: Sequence[Visit]
-) -> list[Violation]:
+) -> Iterator[Violation]:
     """Check that the plan states the visits that the motion makes, and no others."""
     stated = [visit for visit in plan.visits if visit.robot == trajectory.robot]
-    violations = []
-    for index in range(max(len(stated), len(visits))):
-        claim = stated[index] if index < len(stated) else None
-        truth = visits[index] if index < len(visits) else None
+    last = len(trajectory.state) - 1
+    for index, (claim, truth) in enumerate(zip_longest(stated, visits)):
         if _agree(claim, truth):
             continue
         visit = claim or truth
         assert visit is not None
-        last = len(trajectory.state) - 1
-        violations.append(
-            violation_at(
-                trajectory,
-                min(max(visit.step, 0), last),
-                ViolationKind.VISIT,
-                f"visit {index} is stated as {_described(claim)}, "
-                f"the motion makes it {_described(truth)}",
-                amount=abs(claim.time_s - truth.time_s) if claim and truth else 0.0,
-                other=visit.target,
-            )
+        yield violation_at(
+            trajectory,
+            min(max(visit.step, 0), last),
+            ViolationKind.VISIT,
+            f"visit {index} is stated as {_described(claim)}, "
+            f"the motion makes it {_described(truth)}",
+            amount=abs(claim.time_s - truth.time_s) if claim and truth else 0.0,
+            other=visit.target,
         )
-    return violations
 
 
 def _agree(claim: Visit | None, truth: Visit | None) -> bool:
@@ -211,10 +189,9 @@ def _described(visit: Visit | None) -> str:
     )
 
 
-def _check_recharges(scene: Scene, plan: Plan) -> list[Violation]:
+def _check_recharges(scene: Scene, plan: Plan) -> Iterator[Violation]:
     """Check that batteries are filled inside stations only."""
     stations = {station.id: station.region for station in scene.stations}
-    violations = []
     for visit in plan.visits:
         if visit.kind != "station":
             continue
@@ -228,22 +205,15 @@ def _check_recharges(scene: Scene, plan: Plan) -> list[Violation]:
             off_m = np.inf
             message = f"recharges at {visit.target}, which is no station"
         if off_m > 0.0:
-            violations.append(
-                violation_at(
-                    trajectory,
-                    step,
-                    ViolationKind.RECHARGE,
-                    message,
-                    amount=off_m if np.isfinite(off_m) else 0.0,
-                    other=visit.target,
-                )
+            amount = off_m if np.isfinite(off_m) else 0.0
+            kind = ViolationKind.RECHARGE
+            yield violation_at(
+                trajectory, step, kind, message, amount=amount, other=visit.target
             )
-    return violations
 
 
-def _check_stations(scene: Scene, plan: Plan) -> list[Violation]:
+def _check_stations(scene: Scene, plan: Plan) -> Iterator[Violation]:
     """Check that stations for one robot at a time hold one at any time."""
-    violations = []
     for station in scene.stations:
         if not station.one_at_a_time:
             continue
@@ -253,36 +223,23 @@ def _check_stations(scene: Scene, plan: Plan) -> list[Violation]:
                 f"is at {station.id} for {shared_s:.3g} s together with {other.robot}; "
                 "it is for one robot at a time"
             )
-            violations.append(
-                violation_at(
-                    one,
-                    first,
-                    ViolationKind.OCCUPIED,
-                    message,
-                    amount=shared_s,
-                    other=station.id,
-                )
+            kind = ViolationKind.OCCUPIED
+            yield violation_at(
+                one, first, kind, message, amount=shared_s, other=station.id
             )
-    return violations
 
 
-def _check_time(scene: Scene, plan: Plan) -> list[Violation]:
+def _check_time(scene: Scene, plan: Plan) -> Iterator[Violation]:
     """Check that all robots are at rest when the time limit is over."""
     late_s = overtime_s(scene.time_limit_s, plan.makespan_s)
     if not late_s:
-        return []
+        return
     taken, limit = compared(plan.makespan_s, scene.time_limit_s, 1)
     message = (
         f"the plan takes {taken} s, {late_s:.3g} s more than the limit of {limit} s"
     )
-    return [
-        Violation(
-            kind=ViolationKind.LATE,
-            time_s=plan.makespan_s,
-            amount=late_s,
-            message=message,
-        )
-    ]
+    kind = ViolationKind.LATE
+    yield Violation(kind=kind, time_s=plan.makespan_s, amount=late_s, message=message)
 
 
 def _check_energy(
@@ -308,7 +265,9 @@ def _check_energy(
     ]
 
 
-def _check_ledger(plan: Plan, accounts: Mapping[str, MotionAccount]) -> list[Violation]:
+def _check_ledger(
+    plan: Plan, accounts: Mapping[str, MotionAccount]
+) -> Iterator[Violation]:
     """Check the predicted ledger entry by entry."""
     stated: dict[_Key, float] = defaultdict(float)
     for entry in plan.ledger.entries:
@@ -321,7 +280,7 @@ def _check_ledger(plan: Plan, accounts: Mapping[str, MotionAccount]) -> list[Vio
     keys = sorted({*stated, *recomputed})
     off_J = np.array([abs(stated[key] - recomputed[key]) for key in keys])
     if not keys or off_J.max() <= ENERGY_TOLERANCE_J:
-        return []
+        return
     worst = int(off_J.argmax())
     robot, leg, target, part = keys[worst]
     claimed, takes = compared(stated[keys[worst]], recomputed[keys[worst]], 1)
@@ -329,12 +288,10 @@ def _check_ledger(plan: Plan, accounts: Mapping[str, MotionAccount]) -> list[Vio
         f"{robot or 'plan'}: the ledger states {claimed} J for {part} on leg {leg} to "
         f"{target or 'the end'}, the motion takes {takes} J"
     )
-    return [
-        Violation(
-            kind=ViolationKind.LEDGER,
-            robot=robot,
-            other=target,
-            amount=float(off_J[worst]),
-            message=message,
-        )
-    ]
+    yield Violation(
+        kind=ViolationKind.LEDGER,
+        robot=robot,
+        other=target,
+        amount=float(off_J[worst]),
+        message=message,
+    )

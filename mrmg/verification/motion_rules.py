@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
 from mrmg.compared import compared
-from mrmg.motion.dynamics import DERIVATIVES, Derivative, rk4_step
+from mrmg.motion.dynamics import DERIVATIVES, SPEED_STATES, Derivative, rk4_step
 from mrmg.motion.user_motion import motion_of
 from mrmg.plans import Trajectory
 from mrmg.scene.robot_model import RobotModel
@@ -72,64 +73,53 @@ def violation_at(
     )
 
 
-def _check_start(robot: Robot, trajectory: Trajectory) -> list[Violation]:
+def _check_start(robot: Robot, trajectory: Trajectory) -> Iterator[Violation]:
     expected = np.array([*robot.pose, 0.0, 0.0])
     error = np.abs(trajectory.state[0] - expected)
     worst = int(error.argmax())
     if error[worst] == 0.0:
-        return []
-    names = _COMPONENTS.get(robot.model.motion_model, _USER_COMPONENTS)
-    name = names[worst]
+        return
+    name = _components(robot.model)[worst]
     found, wanted = compared(trajectory.state[0, worst], expected[worst], 3)
     message = f"the plan starts with {name} = {found}, the scene with {wanted}"
     amount = float(error[worst])
-    return [violation_at(trajectory, 0, ViolationKind.START, message, amount=amount)]
+    yield violation_at(trajectory, 0, ViolationKind.START, message, amount=amount)
 
 
-def _check_final_rest(robot: Robot, trajectory: Trajectory) -> list[Violation]:
-    rates = {"v": 3}
-    if robot.model.motion_model != "car":
-        rates["omega" if _is_unicycle(robot.model) else "w"] = 4
+def _check_final_rest(robot: Robot, trajectory: Trajectory) -> Iterator[Violation]:
     last = len(trajectory.state) - 1
-    return [
-        violation_at(
-            trajectory,
-            last,
-            ViolationKind.FINAL_REST,
-            f"the plan ends in motion, {name} = {trajectory.state[last, column]:.3g}",
-            amount=abs(float(trajectory.state[last, column])),
-        )
-        for name, column in rates.items()
-        if abs(trajectory.state[last, column]) > REST_TOLERANCE
-    ]
+    for column in SPEED_STATES.get(robot.model.motion_model, (3, 4)):
+        value = float(trajectory.state[last, column])
+        if abs(value) > REST_TOLERANCE:
+            name = _components(robot.model)[column]
+            message = f"the plan ends in motion, {name} = {value:.3g}"
+            kind = ViolationKind.FINAL_REST
+            yield violation_at(trajectory, last, kind, message, amount=abs(value))
 
 
-def _check_finish(robot: Robot, trajectory: Trajectory) -> list[Violation]:
+def _check_finish(robot: Robot, trajectory: Trajectory) -> Iterator[Violation]:
     """Check that the robot ends in its finish, with the required heading."""
     if robot.finish is None:
-        return []
-    violations = []
+        return
     last = len(trajectory.state) - 1
+    kind = ViolationKind.FINISH
     x, y, yaw = trajectory.state[-1, :3]
     missed_m = -float(robot.finish.region.depth(np.array([[x, y]]))[0])
     if missed_m > 0.0:
         message = f"ends {missed_m:.3g} m outside its finish"
-        violations.append((ViolationKind.FINISH, message, missed_m))
+        yield violation_at(trajectory, last, kind, message, amount=missed_m)
     if robot.finish.heading_rad is not None:
         off = abs(math.remainder(yaw - robot.finish.heading_rad, math.tau))
         excess = off - robot.finish.heading_tolerance_rad
         if excess > 0.0:
             found, most = compared(off, robot.finish.heading_tolerance_rad, 2)
             message = f"ends {found} rad off its finish's heading, {most} are allowed"
-            violations.append((ViolationKind.FINISH, message, excess))
-    return [
-        violation_at(trajectory, last, kind, message, amount=amount)
-        for kind, message, amount in violations
-    ]
+            yield violation_at(trajectory, last, kind, message, amount=excess)
 
 
-def _is_unicycle(model: RobotModel) -> bool:
-    return model.motion_model == "unicycle"
+def _components(model: RobotModel) -> tuple[str, ...]:
+    """Return the names of the state's components."""
+    return _COMPONENTS.get(model.motion_model, _USER_COMPONENTS)
 
 
 def replay(model: RobotModel, trajectory: Trajectory) -> np.ndarray:
@@ -185,7 +175,7 @@ def _check_dynamics(model: RobotModel, trajectory: Trajectory) -> list[Violation
 def _check_state_limits(model: RobotModel, trajectory: Trajectory) -> list[Violation]:
     limits = model.limits
     v, w = trajectory.state[:, 3], trajectory.state[:, 4]
-    name = _COMPONENTS.get(model.motion_model, _USER_COMPONENTS)[4]
+    name = _components(model)[4]
     rules = (
         ("v", v, v - limits.v_max_m_s, limits.v_max_m_s),
         ("v", v, limits.v_min_m_s - v, limits.v_min_m_s),

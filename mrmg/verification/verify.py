@@ -7,6 +7,8 @@ recomputed.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from mrmg.motion.dynamics import NU, NX
@@ -35,7 +37,7 @@ def verify(scene: Scene, plan: Plan) -> Verdict:
             that are not finite) is judged by that alone.
     """
     mismatch = _check_digest(scene, plan)
-    malformed = _check_form(scene, plan) or _check_coarseness(scene, plan)
+    malformed = [*_check_form(scene, plan)] or _check_coarseness(scene, plan)
     if malformed:
         return Verdict(
             ok=False,
@@ -74,43 +76,35 @@ def _check_digest(scene: Scene, plan: Plan) -> list[Violation]:
     return [Violation(kind=ViolationKind.SCENE_MISMATCH, message=message)]
 
 
-def _check_form(scene: Scene, plan: Plan) -> list[Violation]:
+def _check_form(scene: Scene, plan: Plan) -> Iterator[Violation]:
     """Check what all other rules take for granted."""
-    faults = []
     expected = [robot.id for robot in scene.robots]
     planned = [trajectory.robot for trajectory in plan.trajectories]
     if planned != expected:
-        faults.append(
-            ("", f"the plan moves robots {planned}, the scene has {expected}")
+        yield _malformed(
+            "", f"the plan moves robots {planned}, the scene has {expected}"
         )
     if not np.isfinite(plan.dt_s) or plan.dt_s <= 0.0:
-        faults.append(("", f"the step length is {plan.dt_s} s, it must be positive"))
+        yield _malformed("", f"the step length is {plan.dt_s} s, it must be positive")
     steps = {len(trajectory.control) for trajectory in plan.trajectories}
     if len(steps) > 1 or 0 in steps:
         counts = sorted(steps)
-        faults.append(("", f"trajectories have {counts} steps, not one equal number"))
+        yield _malformed("", f"trajectories have {counts} steps, not one equal number")
     for trajectory in plan.trajectories:
-        n = len(trajectory.control)
+        robot, n = trajectory.robot, len(trajectory.control)
         shapes = (trajectory.state.shape, trajectory.control.shape)
         if shapes != ((n + 1, NX), (n, NU)):
-            faults.append(
-                (trajectory.robot, f"states and controls have shapes {shapes}")
-            )
+            yield _malformed(robot, f"states and controls have shapes {shapes}")
         elif not all(
             np.isfinite(a).all() for a in (trajectory.state, trajectory.control)
         ):
-            faults.append(
-                (trajectory.robot, "a state or control is not a finite number")
-            )
+            yield _malformed(robot, "a state or control is not a finite number")
         if trajectory.dt_s != plan.dt_s:
-            faults.append((trajectory.robot, f"its step is {trajectory.dt_s} s long"))
-        if trajectory.robot not in plan.tours:
-            faults.append((trajectory.robot, "the plan has no tour for it"))
-    strangers = {visit.robot for visit in plan.visits} - set(planned)
-    faults += [
-        (robot, "visits are stated but no motion") for robot in sorted(strangers)
-    ]
-    return [_malformed(robot, text) for robot, text in faults]
+            yield _malformed(robot, f"its step is {trajectory.dt_s} s long")
+        if robot not in plan.tours:
+            yield _malformed(robot, "the plan has no tour for it")
+    for robot in sorted({visit.robot for visit in plan.visits} - set(planned)):
+        yield _malformed(robot, "visits are stated but no motion")
 
 
 def _check_coarseness(scene: Scene, plan: Plan) -> list[Violation]:
