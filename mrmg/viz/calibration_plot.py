@@ -83,7 +83,7 @@ def _draw_residuals(axes: Axes, calibration: Calibration) -> None:
 
 
 def _rows_by_kind(calibration: Calibration) -> dict[str, np.ndarray]:
-    kinds = np.array([leg.kind for leg in calibration.legs])
+    kinds = np.array([leg.manoeuvre.kind for leg in calibration.legs])
     return {kind: np.flatnonzero(kinds == kind) for kind in _LOOKS if kind in kinds}
 
 

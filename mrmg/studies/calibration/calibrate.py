@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
@@ -38,8 +38,8 @@ class Estimate:
     value: float
     half_width: float
     unit: str
-    was: float | None
-    key: KeyPath | None
+    was: float | None = None
+    key: KeyPath | None = None
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -98,9 +98,9 @@ class Calibration:
         """Return everything as JSON data."""
         legs = [
             {
-                "manoeuvre": leg.manoeuvre,
+                "manoeuvre": leg.manoeuvre.name,
                 "piece": leg.piece,
-                "multiplier": leg.multiplier,
+                "multiplier": leg.manoeuvre.multiplier,
                 "duration_s": leg.duration_s,
                 "measured_W": leg.power_W,
                 "fitted_W": float(fitted),
@@ -157,10 +157,12 @@ def calibrate(
         if on_progress is not None:
             on_progress(index / len(manoeuvres), manoeuvre.name)
         legs += drive_legs(model, manoeuvre, plant)
-    return replace(fit_legs(model, legs), plant=plant)
+    return fit_legs(model, legs, plant)
 
 
-def fit_legs(model: RobotModel, legs: Sequence[Leg]) -> Calibration:
+def fit_legs(
+    model: RobotModel, legs: Sequence[Leg], plant: str = DEFAULT_PLANT
+) -> Calibration:
     """Fit the energy model of `model` to the power of legs that were driven.
 
     Raises:
@@ -169,7 +171,11 @@ def fit_legs(model: RobotModel, legs: Sequence[Leg]) -> Calibration:
     matrix = np.array([leg.features for leg in legs])
     fit = fit_linear(matrix, np.array([leg.power_W for leg in legs]))
     return Calibration(
-        model=model, legs=tuple(legs), fit=fit, estimates=_estimates(model, fit)
+        model=model,
+        legs=tuple(legs),
+        fit=fit,
+        estimates=_estimates(model, fit),
+        plant=plant,
     )
 
 

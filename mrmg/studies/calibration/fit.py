@@ -13,6 +13,11 @@ CONFIDENCE = 0.95
 """Probability that an interval holds the true value, if the residuals are noise."""
 
 
+def t_quantile(freedom: float, share: float = CONFIDENCE) -> float:
+    """Return the number that Student's t stays below in size with a probability."""
+    return float(stdtrit(freedom, 0.5 + 0.5 * share))
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LinearFit:
     """The x that brings A x closest to b.
@@ -60,10 +65,9 @@ def fit_linear(matrix: np.ndarray, measured: np.ndarray) -> LinearFit:
     freedom = rows - parameters
     normal = (matrix / scale).T @ (matrix / scale)
     variance = residual @ residual / freedom * np.diag(np.linalg.inv(normal))
-    quantile = stdtrit(freedom, 0.5 + 0.5 * CONFIDENCE)
     return LinearFit(
         value=value,
-        half_width=quantile * np.sqrt(variance) / scale,
+        half_width=t_quantile(freedom) * np.sqrt(variance) / scale,
         fitted=fitted,
         residual=residual,
     )

@@ -26,10 +26,8 @@ from mrmg.studies.calibration.log_fit import (
     LawFit,
     Pieces,
     fit_law,
-    interval_factors,
-    spreads,
 )
-from mrmg.studies.calibration.power_laws import PowerLaw, laws_of
+from mrmg.studies.calibration.power_laws import laws_of
 from mrmg.studies.calibration.robot_logs import LoggedRun
 from mrmg.studies.calibration.terrain_estimates import (
     TerrainEstimate,
@@ -123,13 +121,12 @@ class LogCalibration:
 
     def laws_json(self) -> list[dict[str, Any]]:
         """Return how well each law predicts runs it was not fitted to, best first."""
-        terrain = [item.run.terrain for item in self.runs if item.fitted]
         return [
             {
                 "name": fit.law.name,
                 "formula": fit.law.formula,
                 "parameters_per_terrain": len(fit.law.parameters),
-                **quality(fit.log_error, terrain),
+                **fit.quality(),
             }
             for fit in self.fits
         ]
@@ -188,100 +185,35 @@ def calibrate_from_logs(
         key=lambda fit: float(np.abs(fit.log_error).mean()),
     )
     best = fits[0]
+    left_out = [
+        _prediction(best, run, best.without[at], at) for at, run in enumerate(runs)
+    ]
+    tested = [_prediction(best, test, best.parameters[test.terrain]) for test in tests]
     return LogCalibration(
         model=model,
-        runs=(*_left_out(best, runs), *_tested(best, tests)),
+        runs=(*left_out, *tested),
         fits=tuple(fits),
         terrains=terrain_estimates(model, best, runs, stationary),
         stationary_W=stationary,
     )
 
 
-def quality(log_error: np.ndarray, terrain: Sequence[str]) -> dict[str, Any]:
-    """Return how well runs are predicted that were left out of the fit.
+def _prediction(
+    fit: LawFit, run: LoggedRun, parameters: np.ndarray, number: int | None = None
+) -> RunPrediction:
+    """Return a run as a fit predicts it.
 
     Args:
-        log_error: logarithms of measured over predicted energy, shape (n,).
-        terrain: of each run.
+        fit: of the best law.
+        run: to be predicted.
+        parameters: of the law, found without the run.
+        number: of the run in the fit; None for a test run.
     """
-    error_pct = 100.0 * np.abs(np.exp(-log_error) - 1.0)
-    ends = [_own_factors(log_error, terrain, at) for at in range(len(terrain))]
-    holds = [
-        low <= np.exp(error) <= high
-        for (low, high), error in zip(ends, log_error, strict=True)
-    ]
-    width_pct = [100.0 * (high - low) for low, high in ends]
-
-    def of(name: str, values: Sequence[float] | np.ndarray) -> list[float]:
-        return [float(v) for v, own in zip(values, terrain, strict=True) if own == name]
-
-    return {
-        "mean_log_error": float(np.abs(log_error).mean()),
-        "median_error_pct": float(np.median(error_pct)),
-        "worst_error_pct": float(error_pct.max()),
-        "intervals_hold_pct": 100.0 * float(np.mean(holds)),
-        "interval_width_pct": float(np.median(width_pct)),
-        "terrains": {
-            name: {
-                "runs": len(of(name, error_pct)),
-                "median_error_pct": float(np.median(of(name, error_pct))),
-                "intervals_hold_pct": 100.0 * float(np.mean(of(name, holds))),
-                "interval_width_pct": float(np.median(of(name, width_pct))),
-            }
-            for name in dict.fromkeys(terrain)
-        },
-    }
-
-
-def _own_factors(
-    log_error: np.ndarray, terrain: Sequence[str], at: int
-) -> tuple[float, float]:
-    """Return the ends of a run's interval by the errors of the other runs."""
-    spread, freedom = spreads(log_error, terrain, without=at)
-    return interval_factors(spread[terrain[at]], freedom[terrain[at]])
-
-
-def _left_out(fit: LawFit, runs: Sequence[LoggedRun]) -> list[RunPrediction]:
-    """Return each run as the others predict it."""
-    terrain = [run.terrain for run in runs]
-    return [
-        _prediction(
-            fit.law,
-            run,
-            fit.without[at],
-            _own_factors(fit.log_error, terrain, at),
-            fitted=True,
-        )
-        for at, run in enumerate(runs)
-    ]
-
-
-def _tested(fit: LawFit, tests: Sequence[LoggedRun]) -> list[RunPrediction]:
-    return [
-        _prediction(
-            fit.law,
-            run,
-            fit.parameters[run.terrain],
-            fit.factors(run.terrain),
-            fitted=False,
-        )
-        for run in tests
-    ]
-
-
-def _prediction(
-    law: PowerLaw,
-    run: LoggedRun,
-    parameters: np.ndarray,
-    factors: tuple[float, float],
-    *,
-    fitted: bool,
-) -> RunPrediction:
-    predicted_J = Pieces.of(run, law).predicted_J(law.coefficients(parameters))
-    low, high = factors
+    predicted_J = Pieces.of(run, fit.law).predicted_J(fit.law.coefficients(parameters))
+    low, high = fit.spread(run.terrain, without=number).factors()
     return RunPrediction(
         run=run,
-        fitted=fitted,
+        fitted=number is not None,
         predicted_J=predicted_J,
         interval_J=(low * predicted_J, high * predicted_J),
     )

@@ -15,11 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.special import stdtrit
 
+from mrmg.studies.calibration.fit import t_quantile
 from mrmg.studies.calibration.power_laws import PowerLaw
 from mrmg.studies.calibration.robot_logs import LoggedRun
 
@@ -81,6 +82,30 @@ class Pieces:
         """Return the energy by the law."""
         return float(self.features @ coefficients @ self.duration_s)
 
+    def log_error(self, coefficients: np.ndarray) -> float:
+        """Return the logarithm of measured over predicted energy."""
+        predicted_J = max(self.predicted_J(coefficients), 1e-3 * self.energy_J)
+        return float(np.log(self.energy_J / predicted_J))
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """How far runs of a terrain are off their prediction.
+
+    Attributes:
+        deviation: standard deviation of the logarithm of measured over predicted
+            energy.
+        freedom: its degrees of freedom.
+    """
+
+    deviation: float
+    freedom: float
+
+    def factors(self) -> tuple[float, float]:
+        """Return the ends of the interval of a run's energy, over the prediction."""
+        reach = t_quantile(self.freedom, PREDICTED_SHARE) * self.deviation
+        return float(np.exp(-reach)), float(np.exp(reach))
+
 
 @dataclass(frozen=True, slots=True)
 class LawFit:
@@ -88,35 +113,71 @@ class LawFit:
 
     Attributes:
         law: what was fitted.
+        terrain: of each run.
         parameters: of each terrain, shape (p,).
         without: parameters of the run's terrain fitted without the run, by run, shape
             (n, p).
         log_error: logarithm of measured over predicted energy of each run by the fit
             without it, shape (n,).
-        spread: standard deviation of that logarithm by terrain.
-        freedom: degrees of freedom of the spread by terrain.
     """
 
     law: PowerLaw
+    terrain: tuple[str, ...]
     parameters: Mapping[str, np.ndarray]
     without: np.ndarray
     log_error: np.ndarray
-    spread: Mapping[str, float]
-    freedom: Mapping[str, float]
 
-    def factors(
-        self, terrain: str, share: float = PREDICTED_SHARE
-    ) -> tuple[float, float]:
-        """Return the ends of the interval of a run's energy, over the prediction."""
-        return interval_factors(self.spread[terrain], self.freedom[terrain], share)
+    def spread(self, name: str, *, without: int | None = None) -> Spread:
+        """Return how far runs of a terrain are off.
 
+        Args:
+            name: of the terrain.
+            without: number of a run whose error does not count.
+        """
+        squares = {
+            each: self.log_error[[at for at in self.rows(each) if at != without]] ** 2
+            for each in self.parameters
+        }
+        means = [float(own.mean()) for own in squares.values() if len(own)]
+        pooled = float(np.mean(means)) if means else 0.0
+        own = squares[name]
+        total = float(own.sum()) + PRIOR_RUNS * pooled
+        return Spread(
+            deviation=float(np.sqrt(total / (len(own) + PRIOR_RUNS))),
+            freedom=max(len(own) + PRIOR_RUNS - 1.0, 1.0),
+        )
 
-def interval_factors(
-    spread: float, freedom: float, share: float = PREDICTED_SHARE
-) -> tuple[float, float]:
-    """Return the ends of an interval about 1 for a logarithm of that spread."""
-    reach = float(stdtrit(freedom, 0.5 + 0.5 * share)) * spread
-    return float(np.exp(-reach)), float(np.exp(reach))
+    def rows(self, name: str) -> list[int]:
+        """Return the numbers of the runs on a terrain."""
+        return [at for at, own in enumerate(self.terrain) if own == name]
+
+    def quality(self) -> dict[str, Any]:
+        """Return how well runs are predicted that were left out, as JSON data."""
+        ratio = np.exp(self.log_error)
+        error_pct = 100.0 * np.abs(np.exp(-self.log_error) - 1.0)
+        ends = [
+            self.spread(name, without=at).factors()
+            for at, name in enumerate(self.terrain)
+        ]
+        low, high = np.array(ends).T
+        holds, width_pct = (low <= ratio) & (ratio <= high), 100.0 * (high - low)
+
+        def of(rows: Sequence[int]) -> dict[str, float]:
+            return {
+                "median_error_pct": float(np.median(error_pct[rows])),
+                "intervals_hold_pct": 100.0 * float(np.mean(holds[rows])),
+                "interval_width_pct": float(np.median(width_pct[rows])),
+            }
+
+        return {
+            "mean_log_error": float(np.abs(self.log_error).mean()),
+            "worst_error_pct": float(error_pct.max()),
+            **of(range(len(self.terrain))),
+            "terrains": {
+                name: {"runs": len(self.rows(name)), **of(self.rows(name))}
+                for name in self.parameters
+            },
+        }
 
 
 def fit_law(law: PowerLaw, runs: Sequence[LoggedRun]) -> LawFit:
@@ -129,11 +190,12 @@ def fit_law(law: PowerLaw, runs: Sequence[LoggedRun]) -> LawFit:
         runs: at least two.
     """
     pieces = [Pieces.of(run, law) for run in runs]
-    terrain = [run.terrain for run in runs]
+    terrain = tuple(run.terrain for run in runs)
     scale = _scale(law, runs)
     whole = fit_pieces(law, pieces, scale, scale)
     groups = {
-        name: _of_terrain(pieces, terrain, name) for name in dict.fromkeys(terrain)
+        name: [item for item, own in zip(pieces, terrain, strict=True) if own == name]
+        for name in dict.fromkeys(terrain)
     }
     parameters = {
         name: fit_pieces(law, own, scale, whole) for name, own in groups.items()
@@ -146,14 +208,11 @@ def fit_law(law: PowerLaw, runs: Sequence[LoggedRun]) -> LawFit:
         else:
             rest = [item for item in pieces if item is not left_out]
             without.append(fit_pieces(law, rest, scale, scale))
-    log_error = np.array(
-        [
-            _log_error(item, law.coefficients(found))
-            for item, found in zip(pieces, without, strict=True)
-        ]
-    )
-    spread, freedom = spreads(log_error, terrain)
-    return LawFit(law, parameters, np.array(without), log_error, spread, freedom)
+    log_error = [
+        item.log_error(law.coefficients(found))
+        for item, found in zip(pieces, without, strict=True)
+    ]
+    return LawFit(law, terrain, parameters, np.array(without), np.array(log_error))
 
 
 def fit_pieces(
@@ -195,44 +254,8 @@ def fit_pieces(
     return np.asarray(best.x * scale)
 
 
-def spreads(
-    log_error: np.ndarray, terrain: Sequence[str], *, without: int | None = None
-) -> tuple[dict[str, float], dict[str, float]]:
-    """Return spread and degrees of freedom by terrain.
-
-    Args:
-        log_error: of each run, shape (n,).
-        terrain: of each run.
-        without: number of a run whose error does not count.
-    """
-    names = list(dict.fromkeys(terrain))
-    squares: dict[str, np.ndarray] = {}
-    for name in names:
-        rows = [at for at, own in enumerate(terrain) if own == name and at != without]
-        squares[name] = log_error[rows] ** 2
-    means = [float(own.mean()) for own in squares.values() if len(own)]
-    pooled = float(np.mean(means)) if means else 0.0
-    spread, freedom = {}, {}
-    for name, own in squares.items():
-        total = float(own.sum()) + PRIOR_RUNS * pooled
-        spread[name] = float(np.sqrt(total / (len(own) + PRIOR_RUNS)))
-        freedom[name] = max(len(own) + PRIOR_RUNS - 1.0, 1.0)
-    return spread, freedom
-
-
 def _scale(law: PowerLaw, runs: Sequence[LoggedRun]) -> np.ndarray:
     duration_s = sum(float(run.weight_s.sum()) for run in runs)
     power_W = sum(run.energy_J for run in runs) / duration_s
     way_m = sum(float(np.abs(run.speed_m_s) @ run.weight_s) for run in runs)
     return law.start(power_W, way_m / duration_s)
-
-
-def _of_terrain(
-    pieces: Sequence[Pieces], terrain: Sequence[str], name: str
-) -> list[Pieces]:
-    return [item for item, own in zip(pieces, terrain, strict=True) if own == name]
-
-
-def _log_error(pieces: Pieces, coefficients: np.ndarray) -> float:
-    predicted_J = max(pieces.predicted_J(coefficients), 1e-3 * pieces.energy_J)
-    return float(np.log(pieces.energy_J / predicted_J))

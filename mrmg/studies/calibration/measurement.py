@@ -37,20 +37,16 @@ class Leg:
     """One piece of a manoeuvre as it was driven.
 
     Attributes:
-        manoeuvre: its name.
-        kind: of the manoeuvre.
+        manoeuvre: which it is.
         piece: name of the piece.
-        multiplier: of the terrain.
         duration_s: how long it took.
         power_W: mean power of the drive, braking counted as negative.
         features: means that the parameters multiply, in the order of `PARAMETERS`,
             shape (4,).
     """
 
-    manoeuvre: str
-    kind: str
+    manoeuvre: Manoeuvre
     piece: str
-    multiplier: float
     duration_s: float
     power_W: float
     features: np.ndarray
@@ -74,10 +70,8 @@ def drive_legs(
             continue
         duration_s = float(log.time_s[last] - log.time_s[first])
         yield Leg(
-            manoeuvre=manoeuvre.name,
-            kind=manoeuvre.kind,
+            manoeuvre=manoeuvre,
             piece=piece.name,
-            multiplier=manoeuvre.multiplier,
             duration_s=duration_s,
             power_W=float(work_J[first:last].sum()) / duration_s,
             features=features[first:last].sum(axis=0) / duration_s,

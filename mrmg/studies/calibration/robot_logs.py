@@ -142,13 +142,14 @@ def _columns(path: Path, source: str) -> dict[str, np.ndarray]:
         message = f"has no column 'time'; it has {', '.join(rows[0])}"
         raise FileError(source, [Fault("columns", message)])
     return {
-        kind: np.array([_number(row, at, line, source) for line, row in _lines(rows)])
+        kind: np.array(
+            [
+                _number(row, at, line, source)
+                for line, row in enumerate(rows[1:], start=2)
+            ]
+        )
         for kind, at in known.items()
     }
-
-
-def _lines(rows: list[list[str]]) -> list[tuple[int, list[str]]]:
-    return list(enumerate(rows[1:], start=2))
 
 
 def _number(row: list[str], column: int, line: int, source: str) -> float:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import stdtrit
 
 from mrmg.scene.robot_model import RobotModel
 from mrmg.studies.calibration.calibrate import Estimate
-from mrmg.studies.calibration.fit import CONFIDENCE
+from mrmg.studies.calibration.fit import t_quantile
 from mrmg.studies.calibration.log_fit import LawFit
 from mrmg.studies.calibration.power_laws import PowerLaw
 from mrmg.studies.calibration.robot_logs import LoggedRun
@@ -78,11 +78,13 @@ def stationary_power(model: RobotModel, runs: Sequence[LoggedRun]) -> Estimate:
         if float(run.weight_s[run.at_rest].sum()) >= LEAST_REST_S
     ]
     medians = np.array([float(np.median(power)) for power in rests])
+    was_W = model.idle_power_W
     if not len(medians):
-        return _estimate(model.idle_power_W, np.nan, "W", model.idle_power_W)
+        return Estimate(value=was_W, half_width=np.nan, unit="W", was=was_W)
     spread_W = np.median(np.abs(medians - np.median(medians)))
-    half_W = 1.96 * 1.4826 * float(spread_W) / np.sqrt(len(medians))
-    return _estimate(float(np.median(medians)), half_W, "W", model.idle_power_W)
+    half_W = 1.96 * 1.4826 * float(spread_W) / math.sqrt(len(medians))
+    value_W = float(np.median(medians))
+    return Estimate(value=value_W, half_width=half_W, unit="W", was=was_W)
 
 
 def terrain_estimates(
@@ -97,10 +99,7 @@ def terrain_estimates(
             [_secants(model, fit.law, item) for item in fit.without[rows]]
         )
         rolling, turning = _secants(model, fit.law, fit.parameters[name])
-        half = _jackknife(values)
-        drives, turns = _excitation(own)
-        half[0] = half[0] if drives else np.nan
-        half[1] = half[1] if turns else np.nan
+        half = np.where(_excitation(own), _jackknife(values), np.nan).tolist()
         inertia = np.array([_inertia(model, fit, run) for run in own])
         weight = np.array([_jolt(run) for run in own])
         mass = float(inertia @ weight / max(float(weight.sum()), 1e-9))
@@ -110,15 +109,22 @@ def terrain_estimates(
             TerrainEstimate(
                 name=name,
                 runs=len(own),
-                rolling_W_s_m=_estimate(rolling, half[0], "W s/m", None),
-                turning_W_s_rad=_estimate(turning, half[1], "W s/rad", None),
+                rolling_W_s_m=Estimate(value=rolling, half_width=half[0], unit="W s/m"),
+                turning_W_s_rad=Estimate(
+                    value=turning, half_width=half[1], unit="W s/rad"
+                ),
                 stationary_W=stationary,
-                inertia_kg=_estimate(mass, mass_half, "kg", model.effective_mass_kg),
+                inertia_kg=Estimate(
+                    value=mass,
+                    half_width=mass_half,
+                    unit="kg",
+                    was=model.effective_mass_kg,
+                ),
                 multiplier=_ratio(rolling, first.rolling_W_s_m if first else None),
                 turning_multiplier=_ratio(
                     turning, first.turning_W_s_rad if first else None
                 ),
-                energy_spread=fit.spread[name],
+                energy_spread=fit.spread(name).deviation,
             )
         )
     return tuple(found)
@@ -163,8 +169,7 @@ def _jackknife(values: np.ndarray) -> np.ndarray:
     if runs < 2:
         return np.full(values.shape[1], np.nan)
     variance = (runs - 1) / runs * ((values - values.mean(axis=0)) ** 2).sum(axis=0)
-    quantile = float(stdtrit(runs - 1, 0.5 + 0.5 * CONFIDENCE))
-    return np.asarray(quantile * np.sqrt(variance))
+    return np.asarray(t_quantile(runs - 1) * np.sqrt(variance))
 
 
 def _excitation(runs: Sequence[LoggedRun]) -> tuple[bool, bool]:
@@ -203,20 +208,10 @@ def _spread_of_mean(values: np.ndarray, weight: np.ndarray) -> float:
         return float("nan")
     mean = float(values @ weight / weight.sum())
     variance = float(weight @ (values - mean) ** 2 / weight.sum()) / (effective - 1.0)
-    return float(stdtrit(effective - 1.0, 0.5 + 0.5 * CONFIDENCE)) * float(
-        np.sqrt(variance)
-    )
+    return t_quantile(effective - 1.0) * math.sqrt(variance)
 
 
 def _ratio(value: float, first: Estimate | None) -> float:
     if first is None:
         return 1.0
     return max(value / max(first.value, 1e-9), 1e-3)
-
-
-def _estimate(
-    value: float, half_width: float, unit: str, was: float | None
-) -> Estimate:
-    return Estimate(
-        value=value, half_width=float(half_width), unit=unit, was=was, key=None
-    )

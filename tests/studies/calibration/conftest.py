@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
+from mrmg.studies.calibration.manoeuvres import Manoeuvre
 from mrmg.studies.calibration.measurement import Leg
 
 KINDS = ("straight", "cycle", "circle", "spin")
@@ -22,10 +23,8 @@ def legs_of(coefficients: Sequence[float], noise_W: float = 0.0) -> list[Leg]:
         power = features @ coefficients + noise_W * rng.normal()
         legs.append(
             Leg(
-                manoeuvre=f"m{index}",
-                kind=KINDS[index // 10],
+                manoeuvre=Manoeuvre(f"m{index}", KINDS[index // 10], 1.0, ()),
                 piece="cruise",
-                multiplier=1.0,
                 duration_s=2.0,
                 power_W=float(power),
                 features=features,

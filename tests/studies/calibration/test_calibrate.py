@@ -71,7 +71,7 @@ def test_yaw_inertia_is_that_of_the_bodies(measured: Calibration) -> None:
 def test_the_fit_explains_what_was_measured(measured: Calibration) -> None:
     power_W = np.array([leg.power_W for leg in measured.legs])
     assert np.abs(measured.fit.residual).max() < 0.01 * np.abs(power_W).max()
-    assert {leg.multiplier for leg in measured.legs} == {1.0, 2.0, 4.0}
+    assert {leg.manoeuvre.multiplier for leg in measured.legs} == {1.0, 2.0, 4.0}
     assert (power_W < 0.0).any()
 
 
