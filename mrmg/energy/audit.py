@@ -91,9 +91,12 @@ def audit(
         for curve in measured
     )
     least_J = {curve.robot: curve.least_J for curve in measured}
+    mismatches = model_mismatches(scene, plan, log, robots, energy_tolerance_pct)
     failures = {
         **mission_failures(scene, log, goals_visited, least_J, plan.skipped),
-        **_energy_failures(scene, plan, log, robots, energy_tolerance_pct),
+        # What was measured is no evidence about a model where it cannot be trusted.
+        ENERGY_IMBALANCE: imbalances(robots),
+        MODEL_MISMATCH: mismatches,
     }
     reasons = tuple(reason for found in failures.values() for reason in found)
     return EnergyAudit(
@@ -129,19 +132,6 @@ def _simulated_visits(curves: Iterable[MeasuredCurve]) -> tuple[SimulatedVisit, 
         for visit in curve.visits
     ]
     return tuple(sorted(visits, key=lambda visit: visit.time_s))
-
-
-def _energy_failures(
-    scene: Scene,
-    plan: Plan,
-    log: ExecutionLog,
-    robots: tuple[RobotAudit, ...],
-    tolerance_pct: float,
-) -> dict[str, list[str]]:
-    """Return what speaks against the energies themselves, by its cause."""
-    mismatches = model_mismatches(scene, plan, log, robots, tolerance_pct)
-    # What was measured is no evidence about a model where it cannot be trusted.
-    return {ENERGY_IMBALANCE: imbalances(robots), MODEL_MISMATCH: mismatches}
 
 
 def believed_rolling(plan: Plan, log: ExecutionLog) -> dict[str, np.ndarray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -61,15 +62,14 @@ def energy_by_terrain(
     metered = _by_class(scene, driven, _model_energy(scene, driven, rolling))
     drawn_J = [curve.drawn_J.sum(axis=1) for curve in driven]
     measured = _by_class(scene, driven, drawn_J)
-    nothing = (0.0, 0.0)
     return tuple(
         TerrainEnergy(
             multiplier=key,
-            planned_m=planned.get(key, nothing)[0],
-            planned_J=planned.get(key, nothing)[1],
-            driven_m=metered.get(key, nothing)[0],
-            metered_J=metered.get(key, nothing)[1],
-            measured_J=measured.get(key, nothing)[1],
+            planned_m=planned[key][0],
+            planned_J=planned[key][1],
+            driven_m=metered[key][0],
+            metered_J=metered[key][1],
+            measured_J=measured[key][1],
         )
         for key in sorted({*planned, *metered})
     )
@@ -87,7 +87,7 @@ def planned_interval_J(
     Returns:
         Its ends [J]; None where the terrain states no spread, or nothing is taken.
     """
-    by_ground: dict[tuple[float, float, float], float] = {}
+    by_ground: dict[tuple[float, float, float], float] = defaultdict(float)
     for motion in plan.trajectories:
         if motion.robot not in robots:
             continue
@@ -102,8 +102,7 @@ def planned_interval_J(
                 if area
                 else (1.0, 1.0, 0.0)
             )
-            taken_J = float(energy_J[areas == number].sum())
-            by_ground[key] = by_ground.get(key, 0.0) + taken_J
+            by_ground[key] += float(energy_J[areas == number].sum())
     total_J = sum(by_ground.values())
     deviation_J = float(
         np.hypot.reduce([0.0, *(k[2] * e for k, e in by_ground.items())])
@@ -126,17 +125,17 @@ def _model_energy(
 def _by_class(
     scene: Scene, motions: Iterable[Motion], energies_J: Sequence[np.ndarray]
 ) -> dict[float, tuple[float, float]]:
-    """Return (way [m], energy [J]) of all motions by multiplier."""
-    sums: dict[float, tuple[float, float]] = {}
+    """Return (way [m], energy [J]) of all motions by multiplier; 0 of any other one."""
+    sums: dict[float, tuple[float, float]] = defaultdict(lambda: (0.0, 0.0))
     for motion, energy_J in zip(motions, energies_J, strict=True):
         points = motion.state[:, :2]
         ground = multiplier_at(scene, 0.5 * (points[:-1] + points[1:]))
         way_m = np.hypot(*np.diff(points, axis=0).T)
-        for key in np.unique(ground):
+        for key in np.unique(ground).tolist():
             on = ground == key
-            before = sums.get(float(key), (0.0, 0.0))
-            sums[float(key)] = (
-                before[0] + float(way_m[on].sum()),
-                before[1] + float(energy_J[on].sum()),
+            sum_m, sum_J = sums[key]
+            sums[key] = (
+                sum_m + float(way_m[on].sum()),
+                sum_J + float(energy_J[on].sum()),
             )
     return sums

@@ -40,10 +40,6 @@ class EnergyLedger:
             and (part is None or entry.part == part)
         )
 
-    def robots(self) -> tuple[str, ...]:
-        """Return the robots that have an entry, in order of appearance."""
-        return tuple(dict.fromkeys(entry.robot for entry in self.entries))
-
     def parts(self) -> tuple[str, ...]:
         """Return the parts that have an entry, in order of appearance."""
         return tuple(dict.fromkeys(entry.part for entry in self.entries))

@@ -77,10 +77,10 @@ moment would count, but not what it gained by the braking after that.
 """
 
 
-def step_power_parts(
+def step_energy_parts(
     scene: Scene, motion: Motion, rolling_factor: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return the battery power of each interval by part [W], shape (n, len(PARTS)).
+    """Return the battery energy of each interval by part [J], shape (n, len(PARTS)).
 
     Args:
         scene: gives energy models and terrain.
@@ -88,20 +88,20 @@ def step_power_parts(
         rolling_factor: by which the rolling resistance differs from the model's over
             each interval, shape (n,); None if it does not.
     """
-    factor = (
-        np.ones(len(motion.state) - 1) if rolling_factor is None else rolling_factor
-    )
+    time_s, state = motion.time_s, motion.state
+    factor = np.ones(len(state) - 1) if rolling_factor is None else rolling_factor
     if scene.elevation is None:
-        return _power_parts(scene, motion, factor)
-    time_s = motion.time_s
-    marks_s = np.arange(time_s[0], time_s[-1], SHORTEST_ON_SLOPES_S)
-    ends = np.append(np.searchsorted(time_s, marks_s - 1e-6), len(time_s) - 1)
-    ends = np.unique(ends)
-    coarse = LoggedMotion(
-        robot=motion.robot, time_s=time_s[ends], state=motion.state[ends]
-    )
-    parts_W = _power_parts(scene, coarse, factor[ends[:-1]])
-    return np.repeat(parts_W, np.diff(ends), axis=0)
+        parts_W = _power_parts(scene, motion, factor)
+    else:
+        marks_s = np.arange(time_s[0], time_s[-1], SHORTEST_ON_SLOPES_S)
+        ends = np.append(np.searchsorted(time_s, marks_s - 1e-6), len(time_s) - 1)
+        ends = np.unique(ends)
+        coarse = LoggedMotion(
+            robot=motion.robot, time_s=time_s[ends], state=state[ends]
+        )
+        spans_W = _power_parts(scene, coarse, factor[ends[:-1]])
+        parts_W = np.repeat(spans_W, np.diff(ends), axis=0)
+    return np.asarray(parts_W * np.diff(time_s)[:, None])
 
 
 def _power_parts(
@@ -127,17 +127,6 @@ def _power_parts(
         multiplier=rolling_factor * multiplier_at(scene, middle[:, :2]),
         climb_m_s=np.diff(height_m) / duration_s,
     )
-
-
-def step_energy_parts(
-    scene: Scene, motion: Motion, rolling_factor: np.ndarray | None = None
-) -> np.ndarray:
-    """Return the battery energy of each interval by part [J], shape (n, len(PARTS)).
-
-    The arguments are those of `step_power_parts`.
-    """
-    duration_s = np.diff(motion.time_s)
-    return step_power_parts(scene, motion, rolling_factor) * duration_s[:, None]
 
 
 def measured_energy_parts(

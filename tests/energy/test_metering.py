@@ -18,7 +18,6 @@ from mrmg.energy.metering import (
     leg_entries,
     plan_ledger,
     step_energy_parts,
-    step_power_parts,
 )
 from mrmg.energy.model import PARTS
 from mrmg.scene.loading import scene_from_document
@@ -219,12 +218,12 @@ def test_hard_braking_costs_nothing_without_regeneration(scene: Scene) -> None:
 
 
 def test_energy_is_power_times_duration_of_uneven_steps(scene: Scene) -> None:
+    """At a steady speed on one ground the power is the same throughout."""
     time_s = np.array([0.0, 0.1, 0.4, 0.41])
     motion = along(10 + time_s, np.ones(4), time_s)
-    power_W, energy_J = (
-        step_power_parts(scene, motion),
-        step_energy_parts(scene, motion),
-    )
+    energy_J = step_energy_parts(scene, motion)
+    power_W = energy_J.sum(axis=0) / 0.41
+    assert power_W.sum() > 0.0
     assert energy_J == pytest.approx(power_W * np.array([[0.1], [0.3], [0.01]]))
 
 
