@@ -64,7 +64,8 @@ class Pieces:
         starts = np.append(0, np.searchsorted(np.cumsum(weight_s), ends_s) + 1)
         starts = np.unique(np.minimum(starts, len(weight_s) - 1))
         duration_s = np.add.reduceat(weight_s, starts)
-        features = np.add.reduceat(law.features(run) * weight_s[:, None], starts)
+        features = law.features(run.speed_m_s, run.yaw_rate_rad_s)
+        features = np.add.reduceat(features * weight_s[:, None], starts)
         power_J = np.add.reduceat(run.power_W * weight_s, starts)
         return Pieces(features / duration_s[:, None], power_J / duration_s, duration_s)
 

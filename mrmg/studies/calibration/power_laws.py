@@ -25,7 +25,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrmg.scene.robot_model import RobotModel
-from mrmg.studies.calibration.robot_logs import LoggedRun
 
 SATURATION_RAD_S = 0.1
 """Yaw rate W at which the law `saturating` bends."""
@@ -63,9 +62,9 @@ class PolynomialLaw:
         first = ("a [W s/m]", "b [W s/rad]", "P0 [W]")
         return first + last.get(self.name, ())
 
-    def features(self, run: LoggedRun) -> np.ndarray:
-        """Return |v|, |w|, 1 and what is the law's own, shape (n, k)."""
-        speed, yaw_rate = np.abs(run.speed_m_s), np.abs(run.yaw_rate_rad_s)
+    def features(self, speed_m_s: np.ndarray, yaw_rate_rad_s: np.ndarray) -> np.ndarray:
+        """Return |v|, |w|, 1 and what is the law's own, shape (n,) -> (n, k)."""
+        speed, yaw_rate = np.abs(speed_m_s), np.abs(yaw_rate_rad_s)
         columns = [speed, yaw_rate, np.ones_like(speed)]
         if self.name == "saturating":
             columns.append(np.tanh(yaw_rate / SATURATION_RAD_S))
@@ -112,9 +111,9 @@ class MotorLaw:
         """Names of its parameters, with units."""
         return ("A [A]", "B [A]") + (("P0 [W]",) if self.fits_stationary else ())
 
-    def features(self, run: LoggedRun) -> np.ndarray:
-        """Return what A, B, A^2, B^2, A B and P0 multiply, shape (n, 6)."""
-        speed, half = run.speed_m_s, 0.5 * self.track_m * run.yaw_rate_rad_s
+    def features(self, speed_m_s: np.ndarray, yaw_rate_rad_s: np.ndarray) -> np.ndarray:
+        """Return what A, B, A^2, B^2, A B and P0 multiply, shape (n,) -> (n, 6)."""
+        speed, half = speed_m_s, 0.5 * self.track_m * yaw_rate_rad_s
         left, right = speed - half, speed + half
         moving = (np.abs(left) > CREEP_M_S) | (np.abs(right) > CREEP_M_S)
         rims = np.abs(left) + np.abs(right)

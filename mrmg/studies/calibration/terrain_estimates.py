@@ -152,15 +152,8 @@ def law_power_W(
     law: PowerLaw, parameters: np.ndarray, speed_m_s: float, yaw_rate_rad_s: float
 ) -> float:
     """Return the power of steady motion by a law."""
-    run = LoggedRun(
-        file="",
-        terrain="",
-        time_s=np.array([0.0]),
-        speed_m_s=np.array([speed_m_s]),
-        yaw_rate_rad_s=np.array([yaw_rate_rad_s]),
-        power_W=np.zeros(1),
-    )
-    return float(law.features(run)[0] @ law.coefficients(parameters))
+    features = law.features(np.array([speed_m_s]), np.array([yaw_rate_rad_s]))
+    return float(features[0] @ law.coefficients(parameters))
 
 
 def _jackknife(values: np.ndarray) -> np.ndarray:
@@ -193,10 +186,9 @@ def _jolt(run: LoggedRun) -> float:
 
 def _inertia(model: RobotModel, fit: LawFit, run: LoggedRun) -> float:
     """Return the mass that the law's error over accelerations shows in a run [kg]."""
-    law = fit.law
-    error_W = run.power_W - law.features(run) @ law.coefficients(
-        fit.parameters[run.terrain]
-    )
+    features = fit.law.features(run.speed_m_s, run.yaw_rate_rad_s)
+    coefficients = fit.law.coefficients(fit.parameters[run.terrain])
+    error_W = run.power_W - features @ coefficients
     felt = float((run.weight_s * error_W) @ _acceleration_power(run))
     return model.drive_efficiency * felt / max(_jolt(run), 1e-12)
 

@@ -69,7 +69,8 @@ def made_run(
         power_W=np.zeros_like(time_s),
     )
     law = law_of(model)
-    power_W = law.features(run) @ law.coefficients(np.array(TRUTH[terrain]))
+    features = law.features(speed, yaw_rate)
+    power_W = features @ law.coefficients(np.array(TRUTH[terrain]))
     noise = 1.0 + 0.1 * rng.standard_normal(len(power_W)) * (speed != 0.0)
     return replace(run, power_W=power_W * np.where(run.at_rest, 1.0, factor * noise))
 
