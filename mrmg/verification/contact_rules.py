@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
@@ -35,7 +35,7 @@ class Contacts:
     """
 
     clearance_m: float = np.inf
-    violations: list[Violation] = field(default_factory=list)
+    violations: Sequence[Violation] = ()
 
 
 def check_obstacles(
