@@ -92,3 +92,26 @@ def _insert(point, other, x, y, nearest, square, found):
         square[k], nearest[k] = square[k - 1], nearest[k - 1]
     square[at], nearest[at] = away, other
     return last + 1
+
+
+@kernel
+def nearest_vertices(buckets, vertex, count):
+    """Return each vertex's nearest others, in order; of equally near ones the first.
+
+    Args:
+        buckets: of the vertices.
+        vertex: positions, shape (V, 2).
+        count: number of neighbours, from 1 to V - 1.
+
+    Returns:
+        Shape (V, count).
+    """
+    nearest = np.empty((len(vertex), count), np.int64)
+    square = np.empty(count)
+    others = np.ones(len(vertex), np.bool_)
+    for v in range(len(vertex)):
+        others[v] = False
+        x, y = vertex[v, 0], vertex[v, 1]
+        nearest_points(buckets, vertex, others, x, y, nearest[v], square)
+        others[v] = True
+    return nearest

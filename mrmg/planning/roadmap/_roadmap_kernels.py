@@ -63,7 +63,3 @@ def edge_costs(space, terrain, vertex, first, second, passage, price, floor):
             cost[i, 0] = there * (1.0 + tight)
             cost[i, 1] = back * (1.0 + tight)
     return cost
-
-
-NEAR_M = 2.5
-"""Distance within which a waypoint is passed over for the next one in sight."""

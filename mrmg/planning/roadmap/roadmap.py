@@ -15,9 +15,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components, dijkstra
 
-from mrmg.planning.roadmap import _graph_kernels, _roadmap_kernels
-from mrmg.planning.roadmap._bucket_kernels import Buckets
+from mrmg.planning.roadmap import _roadmap_kernels
+from mrmg.planning.roadmap._bucket_kernels import Buckets, nearest_vertices
 from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
 from mrmg.planning.roadmap.fleet import TravelClass, travel_classes
 from mrmg.planning.roadmap.vertices import (
@@ -125,14 +127,13 @@ def build_roadmap(
     slopes = [one.slope for one in classes]
     n_targets = len(planned_regions(scene))
     starts = n_targets + np.arange(len(scene.robots))
-    x_min, y_min, x_max, y_max = scene.bounds
     return Roadmap(
         arrays=RoadmapArrays(
             vertex=vertex,
             cost_to_go=_stacked([one.cost for one in paths]),
             successor=_stacked([one.successor for one in paths]),
             slope_refund=np.array([slope.refund for slope in slopes]),
-            buckets=_buckets(vertex, (x_min, y_min), (x_max, y_max), BUCKET_M),
+            buckets=_buckets(vertex, scene.bounds[:2], scene.bounds[2:], BUCKET_M),
         ),
         distance=np.array([one.distance for one in paths]).reshape(
             len(classes), n_targets, n_targets
@@ -187,17 +188,16 @@ def _cheapest_paths(
     )
     usable = np.isfinite(weight[:, 0])
     low, high, weight = ends[0][usable], ends[1][usable], weight[usable]
-    entries = _entries(scene, vertex, _graph_kernels.parts(len(vertex), low, high))
-    start, end = _grouped(np.concatenate([low, high]), len(vertex))
-    cost, successor = _graph_kernels.cheapest_paths(
-        low,
-        high,
-        weight,
-        start,
-        end % max(len(low), 1),
-        np.concatenate([np.zeros(0, np.int64), *entries]),
-        np.cumsum([0, *map(len, entries)]),
-    )
+    ends = np.concatenate([high, low]), np.concatenate([low, high])
+    backwards = csr_array((weight.T.ravel(), ends), shape=(len(vertex), len(vertex)))
+    entries = _entries(scene, vertex, connected_components(backwards, False)[1])
+    cost = np.empty((len(entries), len(vertex)))
+    successor = np.empty(cost.shape, np.int32)
+    for t, own in enumerate(entries):
+        cost[t], before, _ = dijkstra(
+            backwards, indices=own, min_only=True, return_predecessors=True
+        )
+        successor[t] = np.maximum(before, -1)
     energy = _with_potential(cost, height_m, slope.refund)
     return _Paths(
         edges=(low, high, weight),
@@ -250,7 +250,7 @@ def _candidate_edges(
     second = first = np.zeros(0, np.int64)
     if count:
         buckets = _buckets(vertex, low, high, side_m)
-        second = _graph_kernels.nearest_vertices(buckets, vertex, count).reshape(-1)
+        second = nearest_vertices(buckets, vertex, count).reshape(-1)
         first = np.repeat(np.arange(len(vertex)), count)
     pair = np.minimum(first, second) * len(vertex) + np.maximum(first, second)
     return np.divmod(np.unique(pair), len(vertex))
@@ -264,13 +264,13 @@ def _buckets(
     columns, rows = 1 + ((high - low) / side_m).astype(int)
     at = np.clip(((points - low) / side_m).astype(int), 0, (columns - 1, rows - 1))
     key = at[:, 1] * columns + at[:, 0]
-    start, member = _grouped(key, int(rows * columns))
+    counts = np.bincount(key, minlength=int(rows * columns))
     return Buckets(
-        float(x_min), float(y_min), side_m, int(columns), int(rows), start, member
+        x_min=float(x_min),
+        y_min=float(y_min),
+        side=side_m,
+        columns=int(columns),
+        rows=int(rows),
+        start=np.concatenate([[0], np.cumsum(counts)]),
+        member=np.argsort(key, kind="stable"),
     )
-
-
-def _grouped(key: np.ndarray, groups: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return where each group begins and the last one ends, and the members of all."""
-    start = np.concatenate([[0], np.cumsum(np.bincount(key, minlength=groups))])
-    return start, np.argsort(key, kind="stable")
