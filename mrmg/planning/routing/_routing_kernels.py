@@ -21,7 +21,6 @@ from mrmg.planning.routing._refuel_kernels import Labels, new_labels
 from mrmg.planning.routing._routes_kernels import (
     COST,
     IMPOSSIBLE,
-    LABEL,
     Routes,
     copy_labels,
     copy_routes,
@@ -36,7 +35,6 @@ from mrmg.planning.routing._ruin_kernels import (
     order_absent,
     swap_tails,
 )
-from mrmg.planning.routing._tour_kernels import write_tour
 
 BLINK = 0.01
 """How often a place for a goal is overlooked, so that it goes elsewhere."""
@@ -162,30 +160,16 @@ def recreate(legs, state, random, blink, balance):
 
 
 @kernel
-def write_tours(legs, state, tour, tour_length):
-    """Write the tours of the best routes, or of better ones of all that were met.
+def settle(legs, state):
+    """Set the routes to the best ones, or to better ones of all that were met.
 
-    Returns their energy [J].
+    Returns their energy [J], with IMPOSSIBLE for each absent goal.
     """
-    routes, labels = state.routes, state.labels
+    routes = state.routes
     routes.changed[:] = 1
     copy_routes(state.best, routes, routes.changed)
     combine(state.pool, routes)
     routes.front[:] = routes.back[:] = 0
-    update(legs, routes, labels, state.pool, True)
+    update(legs, routes, state.labels, state.pool, True)
     robots = len(routes.length) - 1
-    total = IMPOSSIBLE * routes.length[robots]
-    for r in range(robots):
-        n = write_tour(
-            legs,
-            labels,
-            r,
-            routes.goal[r],
-            routes.length[r],
-            int(routes.known[r, LABEL]),
-            tour[r],
-        )
-        fits = n <= tour.shape[1]
-        tour_length[r] = n if fits else 0
-        total += routes.known[r, COST] if fits else IMPOSSIBLE
-    return min(total, IMPOSSIBLE * (1 + robots + legs.goals))
+    return routes.known[:robots, COST].sum() + IMPOSSIBLE * routes.length[robots]

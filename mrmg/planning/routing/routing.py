@@ -6,6 +6,7 @@ recreate with exact placing of the stations, or by nested rollout policy adaptat
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from time import thread_time
 
@@ -13,13 +14,18 @@ import numpy as np
 
 from mrmg.planning.routing._legs_kernels import Legs, new_legs
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays, nrpa, with_own_tables
-from mrmg.planning.routing._routes_kernels import IMPOSSIBLE, Routes
-from mrmg.planning.routing._routing_kernels import (
-    State,
-    new_state,
-    search,
-    write_tours,
+from mrmg.planning.routing._refuel_kernels import (
+    FIRST,
+    LAST,
+    ORIGIN,
+    PATH,
+    Labels,
+    place_at,
+    row_of,
+    slot_of,
 )
+from mrmg.planning.routing._routes_kernels import IMPOSSIBLE, LABEL, Routes
+from mrmg.planning.routing._routing_kernels import State, new_state, search, settle
 
 ROUNDS_PER_PAIR = 12
 """Rounds are at most so many for each pair of goals to visit, one with itself, too."""
@@ -182,14 +188,8 @@ def _filled(
     return np.ascontiguousarray(values, dtype=float)
 
 
-def tour_room(goals: int, targets: int) -> int:
-    """Return the most targets a tour may hold: three for a goal, every station once."""
-    return 2 * goals + targets + 3
-
-
 def solve_routing(problem: RoutingArrays, params: RouterParams, seed: int) -> Routing:
     """Solve a routing problem; the same seed gives the same tours."""
-    robots, goals = len(problem.energy), problem.goals
     random = np.array([seed], np.uint64)
     legs = new_legs(problem)
     state = new_state(problem, legs)
@@ -202,13 +202,47 @@ def solve_routing(problem: RoutingArrays, params: RouterParams, seed: int) -> Ro
         search(legs, state, rounds, span, random)
     else:
         _search_in_time(legs, state, span, random, params.limit_s)
-    tour = np.zeros((robots, tour_room(goals, problem.cost.shape[2])), np.int64)
-    length = np.zeros(robots, np.int64)
-    cost = write_tours(legs, state, tour, length)
+    cost_J = float(settle(legs, state))
     tours = tuple(
-        tuple(int(t) for t in row[:n]) for row, n in zip(tour, length, strict=True)
+        tour_of(legs, state.labels, r, routes.goal[r, :length], int(label))
+        for r, (length, label) in enumerate(
+            zip(routes.length[:-1], routes.known[:-1, LABEL], strict=True)
+        )
     )
-    return Routing(tours, float(cost) if cost < IMPOSSIBLE else float("inf"))
+    return Routing(tours, cost_J if cost_J < IMPOSSIBLE else math.inf)
+
+
+def tour_of(
+    legs: Legs, labels: Labels, r: int, route: np.ndarray, label: int
+) -> tuple[int, ...]:
+    """Return the targets of a labelled route in order, stations included.
+
+    Args:
+        legs: of the problem.
+        labels: of the route.
+        r: the robot.
+        route: the route's goals in order.
+        label: as `label_route` returned it; -1 where the robot stays, or cannot drive.
+    """
+    if label < 0:
+        return ()
+    own, length = legs.table[r], len(route)
+    targets: list[int] = []  # the last one first
+    for step in range(length + 1, 0, -1):
+        way = labels.way[row_of(legs, r, route, length, 0, step), label]
+        path, label = int(way[PATH]), int(way[ORIGIN])
+        if step <= length:
+            targets.append(int(route[step - 1]))
+        if path >= 0:
+            ends = (place_at(legs, r, route, length, 0, at) for at in (step - 1, step))
+            slot = slot_of(legs, labels, own, *ends)
+            stop, last = labels.path[slot, path, [FIRST, LAST]].astype(int).tolist()
+            stops = [stop]
+            while stop != last:
+                stop = int(legs.follower[own, stop, last])
+                stops.append(stop)
+            targets += [legs.goals + each for each in reversed(stops)]
+    return tuple(reversed(targets))
 
 
 def _search_in_time(

@@ -16,8 +16,7 @@ from mrmg.planning.routing._refuel_kernels import (
     new_labels,
     row_of,
 )
-from mrmg.planning.routing._tour_kernels import write_tour
-from mrmg.planning.routing.routing import routing_arrays
+from mrmg.planning.routing.routing import routing_arrays, tour_of
 
 SLACK_J = 1e-6
 
@@ -30,9 +29,7 @@ def refuelled(
     labels = new_labels(legs)
     goal = np.array(route, np.int64)
     cost, _, label = label_route(legs, labels, 0, goal, len(route), (0, 0), False)
-    out = np.full(10 * len(route) + 10, -1, np.int64)
-    n = write_tour(legs, labels, 0, goal, len(route), label, out)
-    return cost, out[:n].tolist()
+    return cost, list(tour_of(legs, labels, 0, goal, label))
 
 
 @pytest.mark.parametrize(
