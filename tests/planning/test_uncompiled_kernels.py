@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 HERE = Path(__file__).parent
-QUICK = ("band", "reeds_shepp", "pool", "random", "refuel", "roadmap")
+QUICK = ("band", "reeds_shepp", "random", "refuel", "roadmap")
 """Kernels whose tests take seconds uncompiled."""
 
 

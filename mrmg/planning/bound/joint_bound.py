@@ -17,11 +17,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mrmg.planning.bound._subset_kernels import join_robot
 from mrmg.planning.bound.bound import CELLS, ROUNDING_SHARE, Relaxation, most_descent_J
 from mrmg.planning.bound.exact_tours import MOST_GOALS, least_costs, of_robot
 from mrmg.planning.bound.makespan_bound import least_times_s
 from mrmg.planning.halting import NEVER
-from mrmg.planning.routing._subset_kernels import join_robot
 from mrmg.scene.objective import Objective
 from mrmg.scene.types import Scene
 
@@ -78,7 +78,7 @@ class Divisions:
         fleet[0] = 0.0
         for energy_J, time_s in zip(self.energy_J, self.time_s, strict=True):
             timely_J = np.where(time_s <= limit_s, energy_J, np.inf)
-            fleet, _ = join_robot(fleet, timely_J, False)
+            fleet = join_robot(fleet, timely_J, False)
         least_J = float(fleet[-1]) - self.descent_J
         return max(0.0, least_J) * (1.0 - ROUNDING_SHARE)
 

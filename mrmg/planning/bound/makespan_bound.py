@@ -16,6 +16,7 @@ from math import inf
 import numpy as np
 
 from mrmg.motion._kernels import MODEL_ID
+from mrmg.planning.bound._subset_kernels import join_robot
 from mrmg.planning.bound.bound import (
     CELLS,
     ROUNDING_SHARE,
@@ -25,7 +26,6 @@ from mrmg.planning.bound.bound import (
 from mrmg.planning.bound.exact_tours import MOST_GOALS, least_costs, of_robot
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing._subset_kernels import join_robot
 from mrmg.planning.routing.routing import routing_arrays
 from mrmg.scene.types import Robot, Scene
 
@@ -60,7 +60,7 @@ def makespan_bound_s(
         fleet = np.full(1 << len(scene.goals), inf)
         fleet[0] = 0.0
         for own_s in least_times_s(scene, step_s=step_s, cells=cells, halt=halt):
-            fleet, _ = join_robot(fleet, own_s, True)
+            fleet = join_robot(fleet, own_s, True)
         bound_s = float(fleet[-1])
     return max(0.0, bound_s) * (1.0 - ROUNDING_SHARE)
 

@@ -9,7 +9,6 @@ import numpy as np
 from mrmg.compilation import kernel
 from mrmg.planning.routing._insertion_kernels import value_with
 from mrmg.planning.routing._legs_kernels import MISSING, USABLE
-from mrmg.planning.routing._pool_kernels import pool_route
 from mrmg.planning.routing._random_kernels import random_unit
 from mrmg.planning.routing._refuel_kernels import (
     LEAST,
@@ -99,11 +98,11 @@ def copy_labels(legs, routes, changed, source, copy):
 
 
 @kernel
-def update(legs, routes, labels, pool, shorter):
-    """Bring labels and costs of changed routes up to date, and pool those routes.
+def update(legs, routes, labels, shorter):
+    """Bring labels and costs of changed routes up to date.
 
     Args:
-        legs, routes, labels, pool: the problem, and what is to be brought up to date.
+        legs, routes, labels: the problem, and what is to be brought up to date.
         shorter: whether goals were taken out.
     """
     for r in range(len(routes.length) - 1):
@@ -114,8 +113,6 @@ def update(legs, routes, labels, pool, shorter):
                 routes.plain[r] = suffices
                 routes.front[r] = routes.back[r] = 0
             label(legs, routes, labels, r)
-            cost = routes.known[r, COST]
-            pool_route(pool, r, routes.goal[r], routes.length[r], cost)
             routes.changed[r] = 1
 
 

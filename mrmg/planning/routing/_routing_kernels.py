@@ -15,7 +15,6 @@ import numpy as np
 from mrmg.compilation import kernel
 from mrmg.planning.routing._legs_kernels import Legs
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing._pool_kernels import Pool, combine, new_pool
 from mrmg.planning.routing._random_kernels import random_unit
 from mrmg.planning.routing._refuel_kernels import Labels, new_labels
 from mrmg.planning.routing._routes_kernels import (
@@ -56,7 +55,6 @@ class State(NamedTuple):
         routes, labels: those that are tried.
         present, kept: those that are left for others, and their labels.
         best: the best met.
-        pool: all met.
         gone, home, key: room for values of each goal, shape (G,).
     """
 
@@ -65,7 +63,6 @@ class State(NamedTuple):
     present: Routes
     kept: Labels
     best: Routes
-    pool: Pool
     gone: np.ndarray
     home: np.ndarray
     key: np.ndarray
@@ -87,7 +84,6 @@ def new_state(problem: RoutingArrays, legs: Legs) -> State:
         present,
         kept,
         best,
-        new_pool(problem),
         room,
         room.copy(),
         np.zeros(goals),
@@ -109,7 +105,7 @@ def search(legs, state, rounds, span, random):
     """
     routes, present, best = state.routes, state.present, state.best
     robots, gone = len(legs.robot), state.gone
-    update(legs, routes, state.labels, state.pool, True)
+    update(legs, routes, state.labels, True)
     gone[:] = 0
     for r in range(robots):
         for i in range(routes.length[r]):
@@ -146,14 +142,14 @@ def recreate(legs, state, random, blink, balance):
     """Take the flagged goals out of all routes, and put absent ones where they fit."""
     routes, labels, absent = state.routes, state.labels, len(legs.robot)
     remove_goals(routes, state.gone)
-    update(legs, routes, labels, state.pool, True)
+    update(legs, routes, labels, True)
     order_absent(legs, routes, random, state.key)
     n = routes.length[absent]
     routes.length[absent] = 0
     for i in range(n):
         goal = routes.goal[absent, i]
         if put_goal(legs, routes, labels, goal, random, blink, balance):
-            update(legs, routes, labels, state.pool, False)
+            update(legs, routes, labels, False)
         else:
             routes.goal[absent, routes.length[absent]] = goal
             routes.length[absent] += 1
@@ -161,15 +157,14 @@ def recreate(legs, state, random, blink, balance):
 
 @kernel
 def settle(legs, state):
-    """Set the routes to the best ones, or to better ones of all that were met.
+    """Set the routes to the best ones, and label them.
 
     Returns their energy [J], with IMPOSSIBLE for each absent goal.
     """
     routes = state.routes
     routes.changed[:] = 1
     copy_routes(state.best, routes, routes.changed)
-    combine(state.pool, routes)
     routes.front[:] = routes.back[:] = 0
-    update(legs, routes, state.labels, state.pool, True)
+    update(legs, routes, state.labels, True)
     robots = len(routes.length) - 1
     return routes.known[:robots, COST].sum() + IMPOSSIBLE * routes.length[robots]

@@ -37,8 +37,11 @@ PARTS, MOST_GROWTH = 20, 10.0
 """Parts of a search in limited time, and by how much their rounds may grow: the next
 part has as many rounds as the last one had in a part's time."""
 
-POOLED_SPAN = 5.0, 0.5
-"""The same where routes are pooled: to meet many of them is what counts there."""
+FEW_GOALS_SPAN = 2.0, 0.05
+"""The same for few goals, whose best tours a cold search may miss for good."""
+
+FEW_GOALS = 10
+"""Goals up to which they are few."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,8 +199,9 @@ def solve_routing(problem: RoutingArrays, params: RouterParams, seed: int) -> Ro
     routes = state.routes
     if params.rounds == 0:
         _play_out(problem, params, random, routes)
-    rounds = min(params.rounds, ROUNDS_PER_PAIR * int(problem.open_goal.sum()) ** 2)
-    span = POOLED_SPAN if state.pool.cost.shape[1] > 1 else SPAN
+    goals = int(problem.open_goal.sum())
+    rounds = min(params.rounds, ROUNDS_PER_PAIR * goals**2)
+    span = FEW_GOALS_SPAN if goals <= FEW_GOALS else SPAN
     if params.limit_s is None:
         search(legs, state, rounds, span, random)
     else:
