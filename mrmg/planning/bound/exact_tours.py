@@ -35,16 +35,10 @@ SHARES = (0.02, 0.08, math.inf)
 of that: they are sought within the first share, then within the next."""
 
 
-def exact_routing(
-    problem: RoutingArrays, rest: Completions | None = None
-) -> Routing | None:
+def exact_routing(problem: RoutingArrays) -> Routing | None:
     """Return the cheapest tours there are, stations in any number and order.
 
     Costs need not be a metric.
-
-    Args:
-        problem: the mission.
-        rest: its completions; worked out if None.
 
     Returns:
         The tours, with infinite cost if there are none; None if the mission is too
@@ -53,7 +47,7 @@ def exact_routing(
     timed = problem.makespan_weight > 0.0 or bool((problem.limit < np.inf).any())
     if timed or not are_few(int(problem.open_goal.sum()), len(problem.energy)):
         return None
-    rest = rest or completions(problem)
+    rest = completions(problem)
     least_J = float(rest.before[0])
     leg = np.ascontiguousarray(problem.cost[:, :, None, :, None])
     for share in SHARES if math.isfinite(least_J) else ():
@@ -165,6 +159,12 @@ def least_costs(
     search = search._replace(finish=finish)
     least, _, _, parent = _touring_kernels.cheapest_tours(search, MOST_LABELS)
     return np.asarray(least) if len(parent) else None
+
+
+def with_endless_batteries(problem: RoutingArrays) -> RoutingArrays:
+    """Return the mission of robots whose batteries never run out."""
+    endless = np.full_like(problem.energy, math.inf)
+    return problem._replace(energy=endless, capacity=endless)
 
 
 def of_robot(problem: RoutingArrays, r: int) -> RoutingArrays:

@@ -44,14 +44,13 @@ class Look(NamedTuple):
     """How values at points follow from those at nodes.
 
     Attributes:
-        point: which of them, as each is looked at from several cells, shape (n,).
-        nodes: flat indices of its cell's corners, row by row, shape (n, 4).
+        nodes: flat indices of the corners of a point's cell, row by row, shape (n, 4);
+            each point is looked at from several cells.
         across, along: where in the cell it is, from 0 to 1, shape (n,).
         slack: how much a certified field can differ within reach, shape (n,).
         arc: which of ARCS equal runs of points each belongs to, shape (n,).
     """
 
-    point: np.ndarray
     nodes: np.ndarray
     across: np.ndarray
     along: np.ndarray
@@ -169,7 +168,7 @@ class Ground:
         )
         arc = index * ARCS // max(ARCS, len(points))
         slack = self.price[row, column] * reach_m
-        return Look(index, nodes, fx, fy, slack, arc)
+        return Look(nodes, fx, fy, slack, arc)
 
     def field_from(self, region: Region) -> Field:
         """Return a certified field that grows away from a region."""
@@ -232,7 +231,6 @@ class Ways:
         ground: prices of driving.
         regions: T convex sets.
         fields: one from each region.
-        looks: at each region's border, `border` points of it.
         highest: bound of each region's own field on its border, shape (T,).
         lowest: bounds of each region's field on the arcs of borders, shape (T, T, K).
         overlap: which regions do, shape (T, T).
@@ -243,7 +241,6 @@ class Ways:
     ground: Ground
     regions: Sequence[Region]
     fields: list[Field]
-    looks: list[Look]
     highest: np.ndarray
     lowest: np.ndarray
     overlap: np.ndarray
@@ -296,7 +293,6 @@ class Ways:
             ground=ground,
             regions=regions,
             fields=fields,
-            looks=looks,
             highest=highest,
             lowest=lowest,
             overlap=apart_m <= 0.0,

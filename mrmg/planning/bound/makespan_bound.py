@@ -23,10 +23,14 @@ from mrmg.planning.bound.bound import (
     Relaxation,
     relaxed_routing_J,
 )
-from mrmg.planning.bound.exact_tours import MOST_GOALS, least_costs, of_robot
+from mrmg.planning.bound.exact_tours import (
+    MOST_GOALS,
+    least_costs,
+    of_robot,
+    with_endless_batteries,
+)
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing.routing import routing_arrays
 from mrmg.scene.types import Robot, Scene
 
 
@@ -86,27 +90,9 @@ def least_times_s(
 def _metres(scene: Scene, step_s: float, cells: int, halt: np.ndarray) -> RoutingArrays:
     """Return the problem whose costs are lengths, and whose batteries never run out."""
     flat = replace(scene, terrain=(), elevation=None)
-    ways = Relaxation.of(flat, step_s=step_s, cells=cells, halt=halt).problem
-    return _free_of_energy(ways, ways.cost / _plain_of(flat)[:, None, None])
-
-
-def _plain_of(scene: Scene) -> np.ndarray:
-    energy = [robot.model.energy_model for robot in scene.robots]
-    return np.array([model.plain_ground_J_per_m() for model in energy])
-
-
-def _free_of_energy(problem: RoutingArrays, cost: np.ndarray) -> RoutingArrays:
-    """Return a problem of other costs in which batteries never run out."""
-    robots = len(cost)
-    return routing_arrays(
-        goals=problem.goals,
-        distance=cost[:, :-1],
-        start_distance=cost[:, -1],
-        plain=np.ones(robots),
-        energy=np.full(robots, inf),
-        capacity=np.full(robots, inf),
-        reserve=np.zeros(robots),
-    )
+    relaxed = Relaxation.of(flat, step_s=step_s, cells=cells, halt=halt)
+    length_m = relaxed.problem.cost / relaxed.price[:, None, None]
+    return with_endless_batteries(relaxed.problem._replace(cost=length_m))
 
 
 def _stays_s(scene: Scene) -> np.ndarray:
@@ -144,7 +130,7 @@ def _relaxed_s(scene: Scene, metres: RoutingArrays) -> float:
     divided equally among all robots.
     """
     top_m_s = np.array([robot.model.top_speed_m_s for robot in scene.robots])
-    times = _free_of_energy(metres, metres.cost / top_m_s[:, None, None])
+    times = metres._replace(cost=metres.cost / top_m_s[:, None, None])
     stay_s = np.array([goal.dwell_s for goal in scene.goals])
     nearest_s = times.cost[:, -1, : len(scene.goals)].min(axis=0)
     shared_s = (relaxed_routing_J(times) + stay_s.sum()) / len(scene.robots)

@@ -22,7 +22,6 @@ goals are tried by their most remote ones together and by all others one by one.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -31,7 +30,12 @@ import shapely
 
 from mrmg.energy.metering import SHORTEST_ON_SLOPES_S
 from mrmg.planning.bound.bound import Relaxation
-from mrmg.planning.bound.exact_tours import MOST_GOALS, least_costs, of_robot
+from mrmg.planning.bound.exact_tours import (
+    MOST_GOALS,
+    least_costs,
+    of_robot,
+    with_endless_batteries,
+)
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.path_bounds import outer_polygon
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
@@ -151,8 +155,7 @@ class RelaxedFleet:
         """Return the proof that the fleet cannot visit all goals."""
         subsets = np.flatnonzero(self.visits())
         most = max((int(one) for one in subsets), key=int.bit_count, default=0)
-        without_end = np.full_like(self.problem.energy, math.inf)
-        endless = self.problem._replace(energy=without_end, capacity=without_end)
+        endless = with_endless_batteries(self.problem)
         goals = [int(goal) for goal in self.goals]
         return NoTours(
             goals=tuple(goals),

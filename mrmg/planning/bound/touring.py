@@ -113,7 +113,9 @@ def _tighten(
     """Tighten the ways that tours take; return whether any was new."""
     new: dict[tuple[int, Wave], ArcWays] = {}
     for r, tour in enumerate(tours):
-        arcs = _arcs_along(_legs_of(ways[r], r, price[r]), tour) if tour else []
+        if not tour:
+            continue
+        _, arcs = _cheapest_arcs(_legs_of(ways[r], r, price[r]), tour)
         for one in zip((-1 - r, *tour), (0, *arcs), tour, arcs, strict=False):
             new |= {(id(ways[r]), wave): ways[r] for wave in ways[r].waves(*one)}
     with ThreadPoolExecutor() as threads:
@@ -123,8 +125,8 @@ def _tighten(
     return bool(new)
 
 
-def _arcs_along(leg: np.ndarray, tour: Sequence[int]) -> list[int]:
-    """Return the arcs that a robot touches its targets at for the least cost.
+def _cheapest_arcs(leg: np.ndarray, tour: Sequence[int]) -> tuple[float, list[int]]:
+    """Return the least cost of a robot's tour, and the arcs it touches its targets at.
 
     Args:
         leg: what its legs cost, shape (T + 1, K, T, K).
@@ -139,7 +141,7 @@ def _arcs_along(leg: np.ndarray, tour: Sequence[int]) -> list[int]:
     arcs = [int(cost.argmin())]
     for origin in reversed(origins):
         arcs.append(int(origin[arcs[-1]]))
-    return arcs[-2::-1]  # the last one found is that of the start
+    return float(cost.min()), arcs[-2::-1]  # the last arc found is that of the start
 
 
 def _legs_of(ways: ArcWays, r: int, price: float) -> np.ndarray:
@@ -183,12 +185,7 @@ def _cost_along(
     """Return the least cost of given tours with prices, whatever arcs they touch."""
     total = -visits.surcharge
     for r, tour in enumerate(tours):
-        if not tour:
-            continue
-        leg = _legs_of(ways[r], r, price[r])
-        cost, place = np.where(np.arange(ARCS) == 0, 0.0, np.inf), len(leg) - 1
-        for target in tour:
-            cost = (cost[:, None] + leg[place, :, target]).min(axis=0)
-            place = target
-        total += float(cost.min() + visits.toll[r] + visits.price[list(tour)].sum())
+        if tour:
+            least, _ = _cheapest_arcs(_legs_of(ways[r], r, price[r]), tour)
+            total += float(least + visits.toll[r] + visits.price[list(tour)].sum())
     return total

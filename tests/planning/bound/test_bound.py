@@ -185,8 +185,8 @@ def test_a_field_is_never_steeper_than_the_price(seed: int) -> None:
         nodes = np.ravel_multi_index(
             ([i, i, i + 1, i + 1], [j, j + 1, j, j + 1]), u.shape
         )
-        here = np.zeros(len(x), int)
-        look = Look(here, np.tile(nodes, (len(x), 1)), x, y, 0.0 * x, here)
+        arc = np.zeros(len(x), int)
+        look = Look(np.tile(nodes, (len(x), 1)), x, y, 0.0 * x, arc)
         value = field.at(look)
         rise = np.abs(value[:, None] - value)
         assert (rise <= price[i, j] * way + 1e-9).all()
