@@ -37,7 +37,7 @@ PARTS, MOST_GROWTH = 20, 10.0
 """Parts of a search in limited time, and by how much their rounds may grow: the next
 part has as many rounds as the last one had in a part's time."""
 
-FEW_GOALS_SPAN = 2.0, 0.05
+FEW_GOALS_SPAN = 5.0, 0.5
 """The same for few goals, whose best tours a cold search may miss for good."""
 
 FEW_GOALS = 10
