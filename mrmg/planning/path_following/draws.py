@@ -28,7 +28,7 @@ tight take less than the roadmap's."""
 TIMED_SURCHARGES = (0.06, 0.0, 0.12)
 """The same where the makespan counts: who brakes hard and turns round needs more."""
 
-RECHARGE_DRAWS, RECHARGE_GOALS = 20, 320
+RECHARGE_DRAWS, RECHARGE_GOALS = 8, 320
 """Draws that follow where tours recharge, and the goals in all of them, at most ..."""
 
 FIRST_RECHARGE_DRAW = 1_000_000
