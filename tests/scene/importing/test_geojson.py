@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import permutations
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import shapely
 
 from mrmg.errors import SceneError
 from mrmg.scene.importing import import_files
+from mrmg.scene.importing.formats.lif import read_lif
 from mrmg.scene.importing.layers import ImportOptions
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
@@ -197,6 +199,19 @@ def test_lif_layout(tmp_path: Path) -> None:
     closed = shapely.union_all([wall.shape for wall in lanes.obstacles])
     assert not closed.covers(shapely.Point(6, 2))
     assert closed.covers(shapely.Point(1, 5))  # no edge goes there
+
+
+def test_lanes_of_lif_layouts_have_the_order_of_the_file(tmp_path: Path) -> None:
+    """What lies beside them has the same corners in every process."""
+    (ground,) = LIF["layouts"]
+    path = tmp_path / "hall.lif"
+    edges = [*ground["edges"], {"edgeId": "E5", "startNodeId": "N4", "endNodeId": "N1"}]
+    for order in permutations([edges[0], *edges[2:]]):
+        path.write_text(json.dumps({"layouts": [{**ground, "edges": order}]}))
+        lanes = read_lif(path, ImportOptions()).lanes
+        wanted = [{edge["startNodeId"], edge["endNodeId"]} for edge in order]
+        at = {(1.0, 2.0): "N1", (11.0, 2.0): "N2", (11.0, 9.0): "N3", (1.0, 9.0): "N4"}
+        assert [{at[point] for point in lane.coords} for lane in lanes] == wanted
 
 
 def test_lif_layouts_may_use_an_id_again(tmp_path: Path) -> None:
