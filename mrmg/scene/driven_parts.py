@@ -57,7 +57,7 @@ PARTS = {
 
 def why_not_driven(model: RobotModel) -> str | None:
     """Return what keeps a model from being driven; None if nothing does."""
-    if model.has_custom_motion:
+    if model.motion_model not in PARTS:
         return "a motion of its own"
     return "no MJCF file" if model.mjcf is None else None
 

@@ -10,6 +10,7 @@ import pytest
 from mrmg import shipped
 from mrmg.scene.loading.models import load_model
 from mrmg.studies.calibration import Calibration, fit_legs
+from mrmg.studies.calibration.manoeuvres import Manoeuvre
 from mrmg.studies.calibration.measurement import Leg
 from mrmg.viz.calibration_plot import draw_calibration
 
@@ -23,10 +24,13 @@ def calibration() -> Calibration:
         features = rng.uniform(-1.0, 1.0, 4) * [2e3, 1e3, 1.0, 0.3]
         legs.append(
             Leg(
-                manoeuvre=f"m{index}",
-                kind=("straight", "spin")[index % 2],
+                manoeuvre=Manoeuvre(
+                    name=f"m{index}",
+                    kind=("straight", "spin")[index % 2],
+                    multiplier=1.0,
+                    pieces=(),
+                ),
                 piece="cruise",
-                multiplier=1.0,
                 duration_s=1.0,
                 power_W=float(features @ [0.06, 0.015, 196.0, 80.0] + rng.normal()),
                 features=features,

@@ -89,7 +89,7 @@ def test_fast_drawing_from_above_equals_drawing_everything(mission) -> None:
     film = Film(scene, plan, log, OPTIONS)
     ground = paint_ground(scene, plan, film.frame)
     with open_view(film.world, ground, OPTIONS.size) as view:
-        stage = Stage(film, view, ground)
+        stage = Stage(film, view)
         tick = len(log.time_s) // 2
         pane = stage.draw(tick)[film.main_pane].astype(int)
         view.place(log.qpos[tick])
@@ -121,7 +121,7 @@ def test_visited_goals_and_driven_trails_take_the_robot_s_color(mission) -> None
         return pane[int(row), int(column)].astype(int)
 
     with open_view(film.world, ground, OPTIONS.size) as view:
-        stage = Stage(film, view, ground)
+        stage = Stage(film, view)
         first = stage.draw(0)
         last = stage.draw(len(log.time_s) - 1)
     blue = np.array(style.rgb(film.colors["r1"]))
