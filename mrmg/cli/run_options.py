@@ -24,15 +24,15 @@ def add_options(
             continue
         if option.group not in groups:
             groups[option.group] = parser.add_mutually_exclusive_group()
-        helps = {option.flag: _escaped(option)}
+        flags = {option.flag: _escaped(option)}
         for retired in option.formerly:
-            helps["--" + retired.replace("_", "-")] = argparse.SUPPRESS
-        for flag, help in helps.items():
+            flags["--" + retired.replace("_", "-")] = argparse.SUPPRESS
+        for flag, text in flags.items():
             argument = groups[option.group].add_argument(
                 flag,
                 dest=option.name,
                 default=argparse.SUPPRESS,
-                help=help,
+                help=text,
                 **_details(option),
             )
             if option.extended:
