@@ -19,8 +19,8 @@ HARD = {"two_swap"}
 INFEASIBLE = {"goal_enclosed", "goal_out_of_energy"}
 
 
-@pytest.mark.parametrize("scene", [f"scene{number}" for number in range(1, 7)])
-def test_table_one_needs_no_search(scene: str) -> None:
+@pytest.mark.parametrize("scene", [*(f"scene{n}" for n in range(1, 7)), "mixed"])
+def test_shipped_scenes_need_no_search(scene: str) -> None:
     for seed in range(5):
         result = mrmg.plan(mrmg.load_scene(scene), seed=seed, params=PARAMS)
         assert result.plan is not None

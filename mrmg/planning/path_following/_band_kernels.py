@@ -7,7 +7,7 @@ on footprints too near to obstacles and on targets that are missed.
 
 from __future__ import annotations
 
-from math import atan2, floor, hypot, sqrt
+from math import atan2, ceil, floor, hypot, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -42,6 +42,7 @@ class CostMap(NamedTuple):
         multiplier: of energy, smoothed, shape (ny, nx).
         disc: centres of the discs that cover the footprint, ahead of the reference
             point [m], shape (D,).
+        length: of the footprint [m].
         room: clearance their centres need [m].
         curvature: greatest [1/m].
         curvature_rate: greatest change of it per metre [1/m^2].
@@ -54,6 +55,7 @@ class CostMap(NamedTuple):
     distance: np.ndarray
     multiplier: np.ndarray
     disc: np.ndarray
+    length: float
     room: float
     curvature: float
     curvature_rate: float
@@ -141,54 +143,77 @@ def outside(stops, i, x, y):
 
 @kernel
 def add_terrain_and_clearance(cost_map, p, gear, gradient):
-    """Add the cost of the ground under each segment and of what it comes near to."""
+    """Add the cost of the ground under each segment and of what it comes near to.
+
+    A segment is looked at in pieces no longer than the footprint, which is laid on the
+    middle of each: so that no wall, however thin, lies between two of them.
+    """
     total = 0.0
     for i in range(len(p) - 1):
         bx, by = p[i + 1, 0] - p[i, 0], p[i + 1, 1] - p[i, 1]
         size = sqrt(bx * bx + by * by + 1e-12)
         tx, ty = bx / size, by / size
-        mx, my = 0.5 * (p[i, 0] + p[i + 1, 0]), 0.5 * (p[i, 1] + p[i + 1, 1])
-        k, kx, ky = value_and_slope(
-            cost_map.multiplier, cost_map.x_min, cost_map.y_min, cost_map.cell, mx, my
-        )
-        # A cost per metre times the length of the segment: density and its gradient.
-        density, gx, gy, across = k, kx, ky, 0.0
-        middle = 0.5 * (cost_map.disc[0] + cost_map.disc[-1]) * gear[i]
-        free, _, _ = value_and_slope(
+        pieces = int(ceil(size / cost_map.length))
+        for piece in range(pieces):
+            share = (piece + 0.5) / pieces
+            density, gx, gy, across = density_at(
+                cost_map, p[i, 0] + share * bx, p[i, 1] + share * by, tx, ty, gear[i]
+            )
+            part = size / pieces
+            total += density * part
+            # A cost per metre times the length of the segment, and its gradient.
+            away_x = (density * tx - ty * across) / pieces
+            away_y = (density * ty + tx * across) / pieces
+            gradient[i, 0] += (1.0 - share) * gx * part - away_x
+            gradient[i, 1] += (1.0 - share) * gy * part - away_y
+            gradient[i + 1, 0] += share * gx * part + away_x
+            gradient[i + 1, 1] += share * gy * part + away_y
+    return total
+
+
+@kernel
+def density_at(cost_map, x, y, tx, ty, gear):
+    """Return the cost per metre at a point, its gradient, and its slope by turning.
+
+    Args:
+        cost_map: what the path is priced on.
+        x, y: the point [m].
+        tx, ty: unit vector along the path there.
+        gear: 1 or -1.
+    """
+    density, gx, gy = value_and_slope(
+        cost_map.multiplier, cost_map.x_min, cost_map.y_min, cost_map.cell, x, y
+    )
+    across = 0.0
+    middle = 0.5 * (cost_map.disc[0] + cost_map.disc[-1]) * gear
+    free, _, _ = value_and_slope(
+        cost_map.distance,
+        cost_map.x_min,
+        cost_map.y_min,
+        cost_map.cell,
+        x + middle * tx,
+        y + middle * ty,
+    )
+    wide = free > cost_map.room + cost_map.disc[-1] - cost_map.disc[0]
+    for j in range(0 if wide else len(cost_map.disc)):
+        ahead = cost_map.disc[j] * gear
+        free, fx, fy = value_and_slope(
             cost_map.distance,
             cost_map.x_min,
             cost_map.y_min,
             cost_map.cell,
-            mx + middle * tx,
-            my + middle * ty,
+            x + ahead * tx,
+            y + ahead * ty,
         )
-        wide = free > cost_map.room + cost_map.disc[-1] - cost_map.disc[0]
-        for j in range(0 if wide else len(cost_map.disc)):
-            ahead = cost_map.disc[j] * gear[i]
-            free, fx, fy = value_and_slope(
-                cost_map.distance,
-                cost_map.x_min,
-                cost_map.y_min,
-                cost_map.cell,
-                mx + ahead * tx,
-                my + ahead * ty,
-            )
-            lack = cost_map.room - free
-            if lack > 0.0:
-                density += CLEARANCE_WEIGHT * lack * lack
-                push = -2.0 * CLEARANCE_WEIGHT * lack
-                gx += push * fx
-                gy += push * fy
-                # Turning the segment swings the disc sideways.
-                across += push * (fy * tx - fx * ty) * ahead
-        total += density * size
-        swing_x, swing_y = -ty * across, tx * across
-        along_x, along_y = density * tx, density * ty
-        gradient[i, 0] += 0.5 * gx * size - along_x - swing_x
-        gradient[i, 1] += 0.5 * gy * size - along_y - swing_y
-        gradient[i + 1, 0] += 0.5 * gx * size + along_x + swing_x
-        gradient[i + 1, 1] += 0.5 * gy * size + along_y + swing_y
-    return total
+        lack = cost_map.room - free
+        if lack > 0.0:
+            density += CLEARANCE_WEIGHT * lack * lack
+            push = -2.0 * CLEARANCE_WEIGHT * lack
+            gx += push * fx
+            gy += push * fy
+            # Turning the segment swings the disc sideways.
+            across += push * (fy * tx - fx * ty) * ahead
+    return density, gx, gy, across
 
 
 @kernel

@@ -50,6 +50,7 @@ def cost_map_of(problem: Problem, r: int, smooth: np.ndarray) -> CostMap:
         distance=spaces.distance[robot["space"]],
         multiplier=smooth,
         disc=low[0] + length * (np.arange(pieces) + 0.5),
+        length=float(high[0] - low[0]),
         room=float(np.hypot(0.5 * length, half) + robot["margin"] + TRACKING_ROOM_M),
         curvature=path_curvature(robot),
         curvature_rate=float(CURVATURE_SHARE * rate),

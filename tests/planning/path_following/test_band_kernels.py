@@ -21,6 +21,7 @@ def cost_map(**changes: Any) -> CostMap:
         "distance": np.full((80, 80), 9.0),
         "multiplier": np.ones((80, 80)),
         "disc": np.array([0.1, 0.6, 1.1]),
+        "length": 1.5,
         "room": 0.9,
         "curvature": 0.4,
         "curvature_rate": 0.4,
@@ -155,6 +156,26 @@ def test_a_band_round_a_disc_touches_it_and_no_more() -> None:
     tangent = (8.5**2 - 9.0) ** 0.5 + (7.9**2 - 9.0) ** 0.5
     arc = 3.0 * (pi - np.arccos(3 / 8.5) - np.arccos(3 / 7.9))
     assert value == pytest.approx(tangent + arc, rel=0.02)
+
+
+@pytest.mark.parametrize("spacing_m", [0.8, 2.4])
+def test_a_band_through_a_door_stays_in_it(spacing_m: float) -> None:
+    """A wall 0.5 m thick, thinner than a segment is long, and a door 4 m aside."""
+    x, y = np.meshgrid((np.arange(80) + 0.5) * 0.25, (np.arange(80) + 0.5) * 0.25)
+    wall = np.abs(x - 10.0) - 0.25
+    jamb = np.hypot(np.maximum(wall, 0.0), np.maximum(0.8 - np.abs(y - 14.0), 0.0))
+    distance = np.where(np.abs(y - 14.0) < 0.8, jamb, wall)
+    ground = cost_map(
+        distance=distance, disc=np.array([-0.15, 0.15]), length=0.6, room=0.6
+    )
+    x = np.concatenate([np.arange(4.0, 10.0, spacing_m), [10.0]])
+    half = np.stack([x, 14.0 - 4.0 * (10.0 - x) / 6.0], axis=1)
+    p = np.concatenate([half, half[-2::-1] * [-1.0, 1.0] + [20.0, 0.0]])
+    last = len(p) - 1
+    end = stops((last, *p[-1], 0.1))
+    _, node = relaxed(ground, end, p, np.ones(last, np.int64))
+    at_wall = np.interp(10.0, node[:, 0], node[:, 1])
+    assert abs(at_wall - 14.0) < 0.5
 
 
 @pytest.mark.parametrize("seed", range(4))
