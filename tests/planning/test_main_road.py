@@ -19,7 +19,9 @@ HARD = {"two_swap"}
 INFEASIBLE = {"goal_enclosed", "goal_out_of_energy"}
 
 
-@pytest.mark.parametrize("scene", [*(f"scene{n}" for n in range(1, 7)), "mixed"])
+@pytest.mark.parametrize(
+    "scene", [*(f"scene{n}" for n in range(1, 7)), "mixed", "boreal"]
+)
 def test_shipped_scenes_need_no_search(scene: str) -> None:
     for seed in range(5):
         result = mrmg.plan(mrmg.load_scene(scene), seed=seed, params=PARAMS)

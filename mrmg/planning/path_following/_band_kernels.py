@@ -344,12 +344,5 @@ def band_cost(cost_map, stops, p, gear, pivot, nose, shape, gradient):
 @kernel
 def new_shape(segments):
     """Return an empty `Shape`."""
-    return Shape(
-        np.zeros(segments),
-        np.zeros(segments),
-        np.zeros(segments),
-        np.zeros(segments),
-        np.zeros(segments),
-        np.zeros(segments),
-        np.zeros(segments),
-    )
+    zero = np.zeros((7, segments))
+    return Shape(zero[0], zero[1], zero[2], zero[3], zero[4], zero[5], zero[6])

@@ -8,8 +8,8 @@ search for motions starts from the paths (`coordination`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from math import cos, pi, radians, sin
 
@@ -21,6 +21,7 @@ from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import TRACKING_M, Path, smooth_path
 from mrmg.planning.path_following.coordination.rounds import rounds_of
+from mrmg.planning.path_following.driven_legs import Leg, legs_driven_J
 from mrmg.planning.path_following.gears import with_best_gears
 from mrmg.planning.path_following.refine import cost_maps_of, drive_paths
 from mrmg.planning.path_following.robot_task import RobotTask
@@ -74,12 +75,14 @@ class Followed:
         failure: why there is none, in words.
         driven: whether they could be driven, if not on the charge there is.
         meeting: whether robots met, each of which could drive alone.
+        leg_J: energies of the legs that were driven, if that gave no plan.
     """
 
     plan: Plan | None
     failure: str = ""
     driven: bool = True
     meeting: bool = False
+    leg_J: Mapping[Leg, float] = field(default_factory=dict)
 
 
 def follow_tours(
@@ -108,9 +111,8 @@ def follow_tours(
     cost_maps = cost_maps_of(problem)
     stops = [whole_tour(problem, routing, r) for r in range(len(cost_maps))]
     tours = problem.visits(routing.tours)
-    soon = number == 0
     timed = problem.minimum_time or problem.preference.objective.makespan_weight > 0.0
-    deeper_m = FIRST_PLAN_DEPTH_M if soon else TRACKING_M
+    deeper_m = FIRST_PLAN_DEPTH_M if number == 0 else TRACKING_M
     tried: list[list[Path]] = []
     failed = Followed(None, driven=False)
     sharps = _turns_to_change_gear_at(problem, timed)
@@ -124,7 +126,7 @@ def follow_tours(
         if any(_same_gears(paths, before) for before in tried):
             continue
         tried.append(paths)
-        if not soon and not timed:
+        if number > 0 and not timed:
             paths = [
                 _geared(problem, r, cost_maps[r], path) for r, path in enumerate(paths)
             ]
@@ -135,7 +137,9 @@ def follow_tours(
             plan = make_plan(problem, seed, params, drive.trajectories, tours)
             if plan is not None:
                 return Followed(plan)
-            failed = Followed(None, why_refused(problem, drive.trajectories, tours))
+            why = why_refused(problem, drive.trajectories, tours)
+            leg_J = legs_driven_J(problem, drive.trajectories, tours)
+            failed = Followed(None, why, leg_J=leg_J)
         else:
             failed = Followed(None, drive.failure, failed.driven, drive.meeting)
         if not drive.trajectories or halt[0]:

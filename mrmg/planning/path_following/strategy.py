@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
@@ -20,6 +20,7 @@ from mrmg.planning.path_following.coordination.coordination import coordinated
 from mrmg.planning.path_following.coordination.rounds import rounds_of
 from mrmg.planning.path_following.coordination.tasks import no_path
 from mrmg.planning.path_following.draws import Draw, Tours, drawn_tours, tours_of
+from mrmg.planning.path_following.driven_legs import Leg, with_driven_legs
 from mrmg.planning.path_following.following import (
     LEAST_SOC_MARGIN,
     can_follow,
@@ -79,8 +80,7 @@ class Schedule:
         numbers = range(first, first + (1 if alone else DRAWS_PER_ATTEMPT))
         draws = tuple(Draw.of(one, timed) for one in numbers)
         wanted = max(params.soc_margin, LEAST_SOC_MARGIN)
-        margins = sorted({wanted, LEAST_SOC_MARGIN}, reverse=True)
-        followed = [(margin, draws) for margin in margins]
+        followed = [(wanted, draws), (LEAST_SOC_MARGIN, draws)]
         if number == 0:
             further = [(Draw.of(one, timed),) for one in FURTHER_DRAWS]
             followed += [(LEAST_SOC_MARGIN, each) for each in further]
@@ -93,6 +93,19 @@ class Schedule:
             search_margin=margin,
             search_soc_margins=tuple(share * params.soc_margin for share in shares),
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Learnt:
+    """What an attempt learns by following tours.
+
+    Attributes:
+        useless: least state-of-charge margin at which tours are of no use.
+        leg_J: energies of legs as they were driven.
+    """
+
+    useless: dict[Tours, float] = field(default_factory=dict)
+    leg_J: dict[Leg, float] = field(default_factory=dict)
 
 
 def follows(problem: Problem, params: PlannerParams) -> bool:
@@ -135,12 +148,15 @@ def path_following(problem: Problem, request: Request) -> Attempt:
 
 
 def _tries(problem: Problem, request: Request, schedule: Schedule) -> Iterator[Attempt]:
-    """Yield what came of each entry of a schedule."""
-    tried: dict[Tours, float] = {}
-    met = False
+    """Yield what came of each entry of a schedule.
+
+    What driving along tours took corrects the energies that the next ones are found
+    for.
+    """
+    learnt, met = Learnt(), False
     for soc_margin, draws in schedule.followed:
-        kept = problem.with_soc_margin(soc_margin)
-        followed, meeting = follow_paths(kept, request, draws, soc_margin, tried)
+        kept = with_driven_legs(problem.with_soc_margin(soc_margin), learnt.leg_J)
+        followed, meeting = follow_paths(kept, request, draws, soc_margin, learnt)
         met |= meeting
         yield followed
     for soc_margin in schedule.search_soc_margins:
@@ -202,7 +218,7 @@ def follow_paths(
     request: Request,
     draws: tuple[Draw, ...],
     soc_margin: float,
-    tried: dict[Tours, float],
+    learnt: Learnt,
 ) -> tuple[Attempt, bool]:
     """Drive straight along tours; tell, too, whether robots met on them.
 
@@ -214,8 +230,7 @@ def follow_paths(
         request: the attempt.
         draws: of tours.
         soc_margin: state-of-charge margin that plans must leave.
-        tried: least margin at which tours that the attempt has followed are of no use;
-            receives those of these.
+        learnt: by following tours before; receives what is learnt by these.
     """
     began = time.perf_counter()
     choice, calls = drawn_tours(problem, request, draws)
@@ -229,7 +244,7 @@ def follow_paths(
     for tours, minimum_time in product(choice, (False, True)):
         if request.halted or (plans and not preference.late_s(plans[-1])):
             break
-        useless = soc_margin >= tried.get(tours.tours, np.inf)
+        useless = soc_margin >= learnt.useless.get(tours.tours, np.inf)
         if not plans and (minimum_time or useless):
             continue
         driven += 1
@@ -241,9 +256,10 @@ def follow_paths(
             request.halt,
             request.number,
         )
-        tried[tours.tours] = soc_margin if followed.driven else 0.0
+        learnt.useless[tours.tours] = soc_margin if followed.driven else 0.0
         plan, failure = followed.plan, followed.failure or failure
         met |= followed.meeting
+        learnt.leg_J.update(followed.leg_J)
         if plan is not None and (
             not plans or preference.rank(plan) < preference.rank(plans[-1])
         ):

@@ -21,6 +21,7 @@ from mrmg.planning import Attempt, PlannerParams, Problem, Request
 from mrmg.planning.path_following import strategy
 from mrmg.planning.path_following.following import Followed
 from mrmg.planning.path_following.strategy import (
+    Learnt,
     Schedule,
     follow_paths,
     path_following,
@@ -43,7 +44,7 @@ def request(number: int = 0, params: PlannerParams = PARAMS) -> Request:
 def along_paths(problem: Problem, asked: Request) -> Attempt:
     schedule = Schedule.of(problem, asked.params, asked.number)
     soc_margin, draws = schedule.followed[0]
-    found, _ = follow_paths(problem, asked, draws, soc_margin, {})
+    found, _ = follow_paths(problem, asked, draws, soc_margin, Learnt())
     return found
 
 
