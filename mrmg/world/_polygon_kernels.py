@@ -65,19 +65,15 @@ def point_convex_distance(px, py, corners):
 @kernel
 def convex_segment_distance(corners, ax, ay, bx, by):
     """Return the distance of a convex polygon from a segment; 0 where they meet."""
-    if point_in_convex(ax, ay, corners):
-        return 0.0
-    best = np.inf
+    best = point_convex_distance(ax, ay, corners)
+    best = min(best, point_convex_distance(bx, by, corners))
     n = len(corners)
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
         px, py = corners[i, 0], corners[i, 1]
-        qx, qy = corners[j, 0], corners[j, 1]
-        if segments_cross(px, py, qx, qy, ax, ay, bx, by):
+        if segments_cross(px, py, corners[j, 0], corners[j, 1], ax, ay, bx, by):
             return 0.0
         best = min(best, point_segment_distance(px, py, ax, ay, bx, by))
-        best = min(best, point_segment_distance(ax, ay, px, py, qx, qy))
-        best = min(best, point_segment_distance(bx, by, px, py, qx, qy))
     return best
 
 

@@ -1,7 +1,4 @@
-"""Compiled preparation of a free space: edges in buckets, distances in cells.
-
-What `_kernels` asks, this module lays out.
-"""
+"""Compiled preparation of a free space: cells in obstacles, distances of cells."""
 
 from __future__ import annotations
 
@@ -10,46 +7,6 @@ from math import ceil, floor, log2, sqrt
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.world._polygon_kernels import point_segment_distance
-
-
-@kernel
-def bucket_edges(edge, x_min, y_min, bucket, columns, rows, reach):
-    """Return (bucket_start, bucket_edge): for each bucket the edges within `reach`."""
-    count = np.zeros(columns * rows + 1, np.int64)
-    half = 0.5 * bucket * sqrt(2.0)
-    for sweep in range(2):
-        if sweep == 1:
-            start = np.zeros(columns * rows + 1, np.int64)
-            for b in range(columns * rows):
-                start[b + 1] = start[b] + count[b]
-            index = np.zeros(start[-1], np.int64)
-            fill = start.copy()
-        for e in range(len(edge)):
-            x0 = min(edge[e, 0], edge[e, 2]) - reach - x_min
-            x1 = max(edge[e, 0], edge[e, 2]) + reach - x_min
-            y0 = min(edge[e, 1], edge[e, 3]) - reach - y_min
-            y1 = max(edge[e, 1], edge[e, 3]) + reach - y_min
-            for row in range(
-                max(0, int(floor(y0 / bucket))), min(rows, int(floor(y1 / bucket)) + 1)
-            ):
-                for column in range(
-                    max(0, int(floor(x0 / bucket))),
-                    min(columns, int(floor(x1 / bucket)) + 1),
-                ):
-                    cx = x_min + (column + 0.5) * bucket
-                    cy = y_min + (row + 0.5) * bucket
-                    d = point_segment_distance(
-                        cx, cy, edge[e, 0], edge[e, 1], edge[e, 2], edge[e, 3]
-                    )
-                    if d <= reach + half:
-                        b = row * columns + column
-                        if sweep == 0:
-                            count[b] += 1
-                        else:
-                            index[fill[b]] = e
-                            fill[b] += 1
-    return start, index
 
 
 @kernel
@@ -69,25 +26,13 @@ def fill_rings(ring_start, point, x_min, y_min, cell, rows, columns):
                     t = (y - y0) / (y1 - y0)
                     crossing[n] = point[i, 0] + t * (point[j, 0] - point[i, 0])
                     n += 1
-        _sort(crossing[:n])
+        crossing[:n].sort()
         for pair in range(0, n - 1, 2):
             low = int(ceil((crossing[pair] - x_min) / cell - 0.5))
             high = int(floor((crossing[pair + 1] - x_min) / cell - 0.5))
             for column in range(max(low, 0), min(high, columns - 1) + 1):
                 inside[row, column] = True
     return inside
-
-
-@kernel
-def _sort(values):
-    """Put a few values in order."""
-    for i in range(1, len(values)):
-        value = values[i]
-        place = i
-        while place > 0 and values[place - 1] > value:
-            values[place] = values[place - 1]
-            place -= 1
-        values[place] = value
 
 
 @kernel

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.scene.types import Scene
@@ -135,8 +134,13 @@ def free_space(
     inside[:, x_min + (np.arange(columns) + 0.5) * cell_m > x_max] = True
     inside[y_min + (np.arange(rows) + 0.5) * cell_m > y_max] = True
     bucket_columns, bucket_rows = _cells(bounds, BUCKET_M)
-    bucket_start, bucket_edge = _raster_kernels.bucket_edges(
-        edge, x_min, y_min, BUCKET_M, bucket_columns, bucket_rows, reach
+    middle = np.mgrid[:bucket_rows, :bucket_columns].reshape(2, -1).T[:, ::-1] + 0.5
+    near, bucket = shapely.STRtree(
+        shapely.points((x_min, y_min) + BUCKET_M * middle)
+    ).query(
+        shapely.linestrings(edge.reshape(-1, 2, 2)),
+        predicate="dwithin",
+        distance=reach + BUCKET_M / np.sqrt(2.0),
     )
     return FreeSpace(
         x_min=float(x_min),
@@ -146,8 +150,8 @@ def free_space(
         bucket=BUCKET_M,
         bucket_columns=bucket_columns,
         bucket_rows=bucket_rows,
-        bucket_start=bucket_start,
-        bucket_edge=bucket_edge,
+        bucket_start=np.cumsum([0, *np.bincount(bucket, minlength=len(middle))]),
+        bucket_edge=near[np.lexsort((near, bucket))],
         reach=float(reach),
         edge=edge,
         allowance=NO_ALLOWANCE.copy(),
@@ -194,10 +198,8 @@ def _cells(bounds: tuple[float, float, float, float], side_m: float) -> tuple[in
 def _rings(geometry: shapely.Geometry) -> tuple[np.ndarray, np.ndarray]:
     """Return the first point of each ring of polygons and the end, and all points."""
     rings = [
-        np.asarray(ring.coords)[:-1]
-        for polygon in shapely.get_parts(geometry)
-        if isinstance(polygon, Polygon)
-        for ring in (polygon.exterior, *polygon.interiors)
+        shapely.get_coordinates(ring)[:-1]
+        for ring in shapely.get_rings(shapely.get_parts(geometry))
     ]
     points = np.concatenate([np.zeros((0, 2)), *rings])
     return np.cumsum([0, *(len(ring) for ring in rings)]), points
