@@ -10,9 +10,6 @@ from mrmg.compilation import kernel
 from mrmg.planning.bound._completion_kernels import Completions
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 
-ENDLESS_J = 1e300
-"""Stands for the energy of batteries that last for ever."""
-
 NOTHING = -1
 """Parent of the first label."""
 
@@ -98,23 +95,3 @@ def set_trace(labels, k, r, node, arc, parent):
     """Write where label k is, and the label that it continues."""
     labels.place[k, 0], labels.place[k, 1], labels.place[k, 2] = r, node, arc
     labels.parent[k] = parent
-
-
-@kernel
-def ahead_of(search, r, state, g):
-    """Return what bounds the rest of a mission with a robot at a goal (`bounded`)."""
-    rest, full_J = search.rest, search.rest.full_J + search.routing.reserve[r]
-    ending, penalty = rest.penalty[0], rest.penalty[-1]
-    ended = rest.after[0, state, g] + ending * full_J
-    charged = np.inf
-    if len(rest.after) > 1:
-        charged = rest.after[1, state, g] + penalty * full_J
-    return ended, ending, charged, penalty
-
-
-@kernel
-def bounded(ahead, left):
-    """Return the least cost of the rest of a mission with some energy left."""
-    ended, ending, charged, penalty = ahead
-    left = min(left, ENDLESS_J)
-    return min(ended - ending * left, charged - penalty * left)

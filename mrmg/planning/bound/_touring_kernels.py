@@ -27,8 +27,6 @@ from mrmg.planning.bound._completion_kernels import (
 from mrmg.planning.bound._label_kernels import (
     NOTHING,
     Labels,
-    ahead_of,
-    bounded,
     set_trace,
     set_value,
     value_of,
@@ -97,7 +95,7 @@ def _visit_goal(search, labels, r, state, g, count):
     Returns:
         The number of labels; more than there is room for if they do not fit.
     """
-    goal, ahead = search.goal_list[g], ahead_of(search, r, state, g)
+    goal, ahead = search.goal_list[g], search.rest.after[state, g]
     rest = before_visit(state, g, search.remembered)
     near = _near(search, labels, r, rest, g, ahead)
     for arc in range(search.leg.shape[4] if near else 0):
@@ -162,7 +160,7 @@ def _near(search, labels, r, rest, g, ahead):
         cost += price + search.nearest[r, node, from_arc, goal]
         if left < problem.reserve[r] or cost == np.inf:
             continue
-        if cost + bounded(ahead, left) <= search.most:
+        if cost + ahead <= search.most:
             labels.near[near] = k
             near += 1
     return near
@@ -192,7 +190,7 @@ def _offers(search, labels, r, near, goal, arc, ahead):
             left -= search.drain[r, node, from_arc, goal, arc]
         if left < problem.reserve[r] or cost == np.inf:
             continue
-        if cost + bounded(ahead, left) <= search.most:
+        if cost + ahead <= search.most:
             labels.offer[offers, 0] = cost
             labels.offer[offers, 1] = min(left, problem.capacity[r])
             labels.origin[offers] = k
@@ -279,8 +277,8 @@ def _after_station(search, r, state, s):
     least = rest.to_finish[r, search.routing.goals + s] + rest.before[state]
     for u in range(len(search.goal_list)):
         following = after_visit(state, u, search.remembered, states)
-        for mode in range(len(rest.after) if following >= 0 else 0):
-            on = rest.from_station[r, mode, s, u] + rest.after[mode, following, u]
+        if following >= 0:
+            on = rest.from_station[r, s, u] + rest.after[following, u]
             least = min(least, on)
     return least
 

@@ -72,10 +72,10 @@ def _walk(legs: Legs, found: Tables) -> tuple[np.ndarray, list[int]]:
     """Return how often the cheapest walk visits each goal, and where robots begin.
 
     Args:
-        legs: of one mode.
+        legs: of any robot.
         found: what `_completion_kernels.completions` returned for them.
     """
-    after, second, follower = found.after[0], found.second[0], found.follower[0]
+    after, second, follower = found.after, found.second, found.follower
     times, begun = np.zeros(len(legs.between)), list[int]()
     at = before = NONE
     for state in range(len(times)):
@@ -85,7 +85,7 @@ def _walk(legs: Legs, found: Tables) -> tuple[np.ndarray, list[int]]:
             go = np.where(back, second[state + 1] + legs.price, on) + legs.between[at]
             go[before if before >= 0 else at] = np.inf
         if at < 0 or legs.to_end[at] + found.before[state] <= go.min():
-            at, before = int(np.argmin(legs.from_start[0] + on)), NONE
+            at, before = int(np.argmin(legs.from_start + on)), NONE
             begun.append(at)
         else:
             at, before = int(np.argmin(go)), at
