@@ -91,7 +91,7 @@ class Proofs:
             divisions = Divisions.of(self.scene, step_s=self.step_s, halt=self.halt)
         if divisions is None or math.isfinite(divisions.energy_within_J(limit_s)):
             return None
-        return endings.NO_TIMELY_TOURS.reason(limit_s=limit_s)
+        return endings.NO_TIMELY_TOURS.format(limit_s=limit_s)
 
 
 def proof_of_lateness(
@@ -104,7 +104,7 @@ def proof_of_lateness(
     if math.isinf(least_s) or not overtime_s(scene.time_limit_s, least_s):
         return None
     least, _ = compared(least_s, scene.time_limit_s, 1)
-    return endings.TOO_LATE.reason(limit_s=scene.time_limit_s, least=least)
+    return endings.TOO_LATE.format(limit_s=scene.time_limit_s, least=least)
 
 
 def _sentence(scene: Scene, proof: NoTours) -> str:
@@ -113,18 +113,18 @@ def _sentence(scene: Scene, proof: NoTours) -> str:
     if proof.unreachable:
         goal = scene.goals[proof.unreachable[0]]
         gap = widest_gap(scene, scene.robots, goal.region)
-        return endings.GOAL_CUT_OFF.reason(goal=goal.id, gap=gap)
+        return endings.GOAL_CUT_OFF.format(goal=goal.id, gap=gap)
     if proof.cut_off:
         robot = scene.robots[proof.cut_off[0]]
         assert robot.finish is not None
         gap = widest_gap(scene, [robot], robot.finish.region)
-        return endings.FINISH_CUT_OFF.reason(robot=robot.id, gap=gap)
+        return endings.FINISH_CUT_OFF.format(robot=robot.id, gap=gap)
     if proof.homeless:
         robot = scene.robots[proof.homeless[0]]
         more = _more_energy(robot, proof.share)
-        return endings.FINISH_OUT_OF_ENERGY.reason(robot=robot.id, more=more)
+        return endings.FINISH_OUT_OF_ENERGY.format(robot=robot.id, more=more)
     robot = max(scene.robots, key=_usable_J)
-    return endings.NO_TOURS.reason(
+    return endings.NO_TOURS.format(
         served=len(proof.goals) - len(proof.left_out),
         goals=counted(len(proof.goals), "goal")
         if len(proof.goals) == len(names)
@@ -175,7 +175,7 @@ def why_no_roadmap(
     params: PlannerParams, statistics: Statistics
 ) -> tuple[PlanStatus, str]:
     """Return how planning ended whose budget was over with the roadmap, or before."""
-    return PlanStatus.TIMEOUT, endings.BUDGET_FOR_ROADMAP.reason(
+    return PlanStatus.TIMEOUT, endings.BUDGET_FOR_ROADMAP.format(
         budget_s=params.budget_s, init_s=statistics.time_s["init"]
     )
 
@@ -189,7 +189,7 @@ def _budget_over(
     params: PlannerParams, search: Search, so_far: str
 ) -> tuple[PlanStatus, str]:
     made = counted(search.attempts, "attempt")
-    return PlanStatus.TIMEOUT, endings.BUDGET_OVER.reason(
+    return PlanStatus.TIMEOUT, endings.BUDGET_OVER.format(
         budget_s=params.budget_s,
         attempts=made if search.attempts else "less than one attempt",
         so_far=so_far,
@@ -203,14 +203,14 @@ def _obstacle(problem: Problem, request: Request, search: Search) -> str:
     unjoined = unjoined_goals(scene, roadmap) + _unjoined_finishes(scene, roadmap)
     if unjoined:
         passages = passages_missing(scene, params.margins, unjoined_places(problem))
-        return endings.NO_PATH.reason(
+        return endings.NO_PATH.format(
             places=listed(unjoined), passages="; ".join(passages)
         )
     if not search.tours_found:
         return _missing_tours(problem, params, seed)
     if math.isfinite(search.earliest_s):
         latest_s = scene.time_limit_s - TIME_MARGIN_S
-        return endings.LATE.reason(
+        return endings.LATE.format(
             earliest=compared(search.earliest_s, latest_s, 1)[0],
             limit_s=scene.time_limit_s,
             margin_s=TIME_MARGIN_S,
@@ -221,7 +221,7 @@ def _obstacle(problem: Problem, request: Request, search: Search) -> str:
     in_time = search.statistics.left_s(params.budget_s) > 0.0
     headings = _headings_in_the_way(scene, request) if in_time else []
     if headings:
-        return endings.HEADINGS.reason(places=listed(headings), searched=searched)
+        return endings.HEADINGS.format(places=listed(headings), searched=searched)
     routing = solve_routing(
         easiest(problem, params).mission.routing,
         params.router,
@@ -230,7 +230,7 @@ def _obstacle(problem: Problem, request: Request, search: Search) -> str:
     blocked = [search.blocked] if search.blocked else []
     if any(routing.tours) or not blocked:
         blocked.append(narrowest_meeting(problem, routing.tours))
-    return endings.NO_PROGRESS.reason(blocked="; ".join(blocked), searched=searched)
+    return endings.NO_PROGRESS.format(blocked="; ".join(blocked), searched=searched)
 
 
 def _headings_in_the_way(scene: Scene, request: Request) -> list[str]:
@@ -280,8 +280,8 @@ def _missing_tours(problem: Problem, params: PlannerParams, seed: int) -> str:
             remedy = _no_battery_helps(scene)
     remedy = "; ".join([remedy, *_stations_missing(problem, params)])
     if math.isinf(scene.time_limit_s):
-        return endings.NO_TOURS_FOUND.reason(left_out=left_out, remedy=remedy)
-    return endings.NO_TOURS_IN_TIME.reason(
+        return endings.NO_TOURS_FOUND.format(left_out=left_out, remedy=remedy)
+    return endings.NO_TOURS_IN_TIME.format(
         limit_s=scene.time_limit_s, left_out=left_out, remedy=remedy
     )
 

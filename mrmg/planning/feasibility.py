@@ -138,7 +138,7 @@ def _reaches(scene: Scene, halt: np.ndarray = NEVER) -> list[_Reach]:
 def _cut_off(scene: Scene, reaches: Sequence[_Reach]) -> dict[str, str]:
     """Return the goals that no robot of a fleet gets into, as far as obstacles go."""
     return {
-        goal.id: GOAL_CUT_OFF.reason(
+        goal.id: GOAL_CUT_OFF.format(
             goal=goal.id, gap=widest_gap(scene, scene.robots, goal.region)
         )
         for goal in scene.goals
@@ -190,7 +190,7 @@ class _Missing:
         return energy_and_metres(self.energy_J, self.robot)
 
     def sentence(self, goal: str) -> str:
-        return GOAL_OUT_OF_ENERGY.reason(goal=goal, missing=self.words)
+        return GOAL_OUT_OF_ENERGY.format(goal=goal, missing=self.words)
 
 
 def _out_of_energy(
@@ -221,7 +221,7 @@ def _unreachable_finish(scene: Scene) -> str | None:
             robot.finish.region
         ):
             gap = widest_gap(scene, [robot], robot.finish.region)
-            return FINISH_CUT_OFF.reason(robot=robot.id, gap=gap)
+            return FINISH_CUT_OFF.format(robot=robot.id, gap=gap)
     return None
 
 
@@ -240,7 +240,7 @@ def _crowded_finish(scene: Scene) -> str | None:
         widest_m = _longest_distance_m(first_region, second_region)
         needed_m = first.model.inscribed_radius_m + second.model.inscribed_radius_m
         if widest_m < needed_m:
-            return FINISHES_CROWDED.reason(
+            return FINISHES_CROWDED.format(
                 first=first.id, second=second.id, needed_m=needed_m
             )
     return None
