@@ -69,8 +69,7 @@ def cheapest_tours(search, room):
                 cost[state] + search.rest.before[state] <= search.most
             ):
                 if count < room:
-                    begun = cost[state] + search.toll[r]
-                    set_value(labels, count, begun, problem.energy[r])
+                    set_value(labels, count, cost[state], problem.energy[r])
                     set_trace(labels, count, r, start, 0, last[state])
                 count += 1
             for g in range(n):

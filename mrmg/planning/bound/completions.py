@@ -19,32 +19,28 @@ from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 class Visits:
     """Which goals are visited, and which visits are remembered.
 
-    Tours that visit every goal once, from each start at most one, pay all prices once
-    and no more than all tolls; both together are taken off their cost.
+    Tours that visit every goal once pay all prices once, which is taken off their cost.
 
     Attributes:
         order: numbers of the goals, shape (G,); those that are remembered come first.
         remembered: how many are; visits of the others are only counted.
         price: what a visit of each target costs in addition [J], shape (T,).
-        toll: what a robot's first leg costs in addition [J], at least 0, shape (R,).
     """
 
     order: np.ndarray
     remembered: int
     price: np.ndarray
-    toll: np.ndarray
 
     @staticmethod
     def all_remembered(problem: RoutingArrays) -> Visits:
         """Return the visits of a mission of few goals."""
         order = np.flatnonzero(problem.open_goal)
-        robots, _, targets = problem.cost.shape
-        return Visits(order, len(order), np.zeros(targets), np.zeros(robots))
+        return Visits(order, len(order), np.zeros(problem.cost.shape[2]))
 
     @property
     def surcharge(self) -> float:
-        """What tours that visit every goal once pay too much at most [J]."""
-        return float(self.price[self.order].sum() + self.toll.sum())
+        """What tours that visit every goal once pay too much [J]."""
+        return float(self.price[self.order].sum())
 
 
 def no_completions(problem: RoutingArrays, visits: Visits) -> Completions:
@@ -104,7 +100,7 @@ def least_legs(
     legs = Legs(
         between=between,
         pair=pair,
-        from_start=(least[:, start, order] + visits.toll[:, None]).min(axis=0),
+        from_start=least[:, start, order].min(axis=0),
         to_end=least[:, order, start].min(axis=0),
         price=visits.price[order],
     )

@@ -31,11 +31,9 @@ remembered: a second or two of one processor."""
 def counted_visits(problem: RoutingArrays) -> Visits:
     """Return good prices for a mission of many goals, and which ones are remembered."""
     order = np.flatnonzero(problem.open_goal)
-    robots, nodes, targets = problem.cost.shape
-    visits = Visits(order, 0, np.zeros(targets), np.zeros(robots))
+    visits = Visits(order, 0, np.zeros(problem.cost.shape[2]))
     best, best_J, step = visits, -np.inf, 0.0
     wrong = np.zeros(len(order))
-    first = problem.cost[:, nodes - 1, order]
     for i in range(ROUNDS):
         legs = least_legs(problem, visits)
         found = _completion_kernels.completions(legs, 0)
@@ -44,14 +42,12 @@ def counted_visits(problem: RoutingArrays) -> Visits:
             break
         if walk_J - visits.surcharge > best_J:
             best, best_J = visits, walk_J - visits.surcharge
-        times, begun = _walk(legs, found)
-        used = np.zeros(robots)
-        np.add.at(used, (first + visits.toll[:, None])[:, begun].argmin(axis=0), 1.0)
+        off = _visits_of_walk(legs, found) - 1.0
         step = DECAY * step if i else FIRST_STEP * walk_J / len(order)
-        price, toll = visits.price.copy(), visits.toll + step * (used - 1.0)
-        price[order] += step * (times - 1.0)
-        visits = replace(visits, price=price, toll=np.maximum(0.0, toll))
-        wrong = 0.9 * wrong + np.abs(times - 1.0)
+        price = visits.price.copy()
+        price[order] += step * off
+        visits = replace(visits, price=price)
+        wrong = 0.9 * wrong + np.abs(off)
     own = best.price.copy()
     remembered = most_remembered(len(order))
     order = order[np.argsort(-wrong, kind="stable")]
@@ -68,15 +64,15 @@ def most_remembered(goals: int) -> int:
     return 0
 
 
-def _walk(legs: Legs, found: Tables) -> tuple[np.ndarray, list[int]]:
-    """Return how often the cheapest walk visits each goal, and where robots begin.
+def _visits_of_walk(legs: Legs, found: Tables) -> np.ndarray:
+    """Return how often the cheapest walk visits each goal, shape (G,).
 
     Args:
         legs: of any robot.
         found: what `_completion_kernels.completions` returned for them.
     """
     after, second, follower = found.after, found.second, found.follower
-    times, begun = np.zeros(len(legs.between)), list[int]()
+    times = np.zeros(len(legs.between))
     at = before = NONE
     for state in range(len(times)):
         on = after[state + 1] + legs.price
@@ -86,8 +82,7 @@ def _walk(legs: Legs, found: Tables) -> tuple[np.ndarray, list[int]]:
             go[before if before >= 0 else at] = np.inf
         if at < 0 or legs.to_end[at] + found.before[state] <= go.min():
             at, before = int(np.argmin(legs.from_start + on)), NONE
-            begun.append(at)
         else:
             at, before = int(np.argmin(go)), at
         times[at] += 1.0
-    return times, begun
+    return times

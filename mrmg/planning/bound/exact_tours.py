@@ -115,8 +115,6 @@ def _search(
     counted = np.zeros(leg.shape[1], np.bool_)
     counted[visits.order[visits.remembered :]] = True
     stations = slice(problem.goals, problem.cost.shape[2])
-    finish = problem.finish.copy()
-    finish[:, -1] -= visits.toll
     return TourSearch(
         routing=problem,
         goal_list=visits.order,
@@ -127,8 +125,7 @@ def _search(
         station_drain=drain[:, stations].min(axis=2),
         nearest=leg.min(axis=4),
         price=visits.price,
-        toll=visits.toll,
-        finish=finish,
+        finish=problem.finish,
         rest=rest,
         most=most + visits.surcharge,
     )
@@ -147,11 +144,10 @@ def least_costs(
     Returns:
         Shape (2^n,); None if that takes too many labels.
     """
-    robots, _, targets = problem.cost.shape
     cost, finish = problem.cost, problem.finish
     if free:
         cost, finish = (np.where(np.isfinite(one), 0.0, one) for one in (cost, finish))
-    visits = Visits(goals, len(goals), np.zeros(targets), np.zeros(robots))
+    visits = Visits(goals, len(goals), np.zeros(cost.shape[2]))
     leg = np.ascontiguousarray(cost[:, :, None, :, None])
     drain = np.ascontiguousarray(problem.cost[:, :, None, :, None])
     nothing = no_completions(problem, visits)

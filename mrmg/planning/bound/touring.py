@@ -187,5 +187,5 @@ def _cost_along(
     for r, tour in enumerate(tours):
         if tour:
             least, _ = _cheapest_arcs(_legs_of(ways[r], r, price[r]), tour)
-            total += float(least + visits.toll[r] + visits.price[list(tour)].sum())
+            total += float(least + visits.price[list(tour)].sum())
     return total

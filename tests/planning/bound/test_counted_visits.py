@@ -41,9 +41,7 @@ def test_prices_raise_what_walks_cost(
     for seed in range(4):
         problem = mission(seed, goals=9, stations=1, robots=2, range_m=(1e6, 2e6))
         visits = counted_visits.counted_visits(problem)
-        free = replace(
-            visits, price=np.zeros_like(visits.price), toll=np.zeros_like(visits.toll)
-        )
+        free = replace(visits, price=np.zeros_like(visits.price))
         priced_J, free_J = (
             float(completions(problem, None, each).before[0]) - each.surcharge
             for each in (visits, free)
@@ -51,7 +49,7 @@ def test_prices_raise_what_walks_cost(
         exact = exact_routing(problem)
         assert exact is not None
         assert free_J < priced_J <= exact.cost_J * (1.0 + 1e-9)
-        assert priced_J >= 0.8 * exact.cost_J
+        assert priced_J >= 0.7 * exact.cost_J
 
 
 def test_as_many_goals_are_remembered_as_the_work_allows() -> None:
