@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from mrmg.compilation import kernel
@@ -41,22 +39,9 @@ FLEET = np.dtype(
 """One robot as a record; a fleet is an array of them, shape (R,)."""
 
 
-class Spaces(NamedTuple):
-    """The free spaces of a world stacked: their number is not part of a type."""
-
-    x_min: float
-    y_min: float
-    cell: float
-    distance: np.ndarray
-    bucket: float
-    bucket_columns: int
-    bucket_rows: int
-    bucket_start: np.ndarray
-    bucket_edge: np.ndarray
-    reach: float
-    edge: np.ndarray
-    allowance: np.ndarray
-    guide: float
+Spaces = FreeSpace
+"""The free spaces of a world stacked, as their number is no part of a type: distances,
+bucket starts and allowances have one more axis, edges are numbered through."""
 
 
 @kernel

@@ -29,29 +29,20 @@ PASSAGE_SLACK_M = 0.05
 
 def stack_spaces(world: World) -> Spaces:
     """Stack the world's free spaces; bucket starts and edges are counted through."""
-    first = world.spaces[0]
-    start, index, edges = [], [], []
-    edge_offset = index_offset = 0
-    for space in world.spaces:
-        start.append(space.bucket_start + index_offset)
-        index.append(space.bucket_edge + edge_offset)
-        edges.append(space.edge)
-        index_offset += len(space.bucket_edge)
-        edge_offset += len(space.edge)
-    return Spaces(
-        x_min=first.x_min,
-        y_min=first.y_min,
-        cell=first.cell,
-        distance=np.stack([space.distance for space in world.spaces]),
-        bucket=first.bucket,
-        bucket_columns=first.bucket_columns,
-        bucket_rows=first.bucket_rows,
+    spaces = world.spaces
+    start, listed = [], []
+    edges = entries = 0
+    for space in spaces:
+        start.append(space.bucket_start + entries)
+        listed.append(space.bucket_edge + edges)
+        entries += len(space.bucket_edge)
+        edges += len(space.edge)
+    return spaces[0]._replace(
+        distance=np.stack([space.distance for space in spaces]),
         bucket_start=np.stack(start),
-        bucket_edge=np.concatenate(index),
-        reach=first.reach,
-        edge=np.concatenate(edges),
-        allowance=np.stack([space.allowance for space in world.spaces]),
-        guide=first.guide,
+        bucket_edge=np.concatenate(listed),
+        edge=np.concatenate([space.edge for space in spaces]),
+        allowance=np.stack([space.allowance for space in spaces]),
     )
 
 
