@@ -9,6 +9,7 @@ import numpy as np
 from mrmg.energy.model import CONSUMERS_W
 from mrmg.planning.path_following.band import Path
 from mrmg.planning.problem.problem import Problem
+from mrmg.world.terrain import multiplier_at
 
 MORE = 1.05
 """Multiple of what its path takes from which it follows how long a battery is filled:
@@ -44,13 +45,8 @@ def with_pauses(problem: Problem, r: int, path: Path) -> Path:
 
 def _used_J(problem: Problem, r: int, path: Path) -> np.ndarray:
     """Return the energy that rolling takes to each node, shape (n,)."""
-    spaces, terrain = problem.mission.spaces, problem.mission.terrain.multiplier
     middle = 0.5 * (path.node[1:] + path.node[:-1])
-    cell = ((middle - (spaces.x_min, spaces.y_min)) / spaces.cell).astype(int)
-    rows, columns = terrain.shape
-    ground = terrain[
-        np.clip(cell[:, 1], 0, rows - 1), np.clip(cell[:, 0], 0, columns - 1)
-    ]
+    ground = multiplier_at(problem.scene, middle)
     size = np.hypot(*np.diff(path.node, axis=0).T)
     plain = problem.mission.fleet[r]["plain"]
     return np.concatenate([[0.0], np.cumsum(plain * ground * size)])
