@@ -8,12 +8,12 @@ at all. What is impossible then is impossible.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 import shapely
-from shapely.geometry import Point, Polygon, box
+from shapely.geometry import Point, Polygon
 
 from mrmg.errors import Fault, SceneError
 from mrmg.planning.endings import (
@@ -276,27 +276,21 @@ class _Reach:
 
     @staticmethod
     def of(scene: Scene, robot: Robot) -> _Reach:
-        obstacles = shapely.union_all(
-            [obstacle.shape for obstacle in scene.barriers if obstacle.stops(robot.id)]
-        )
+        ground = FreeGround.of(scene, robot)
         # The largest disc inside the footprint; shrunk by the search's tolerance.
         spoke = shapely.maximum_inscribed_circle(Polygon(robot.model.footprint_m))
         centre = np.asarray(spoke.coords[0])
         radius = 0.98 * spoke.length
-        x_min, y_min, x_max, y_max = scene.bounds
-        free = box(
-            x_min + radius, y_min + radius, x_max - radius, y_max - radius
-        ).difference(obstacles.buffer(radius))
         x, y, yaw = robot.pose
         turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
         disc = Point(turn @ centre + (x, y))
-        parts = [part for part in shapely.get_parts(free) if part.distance(disc) < 0.05]
+        parts = [part for part in ground.pieces(radius) if part.distance(disc) < 0.05]
         reach = _Reach(
             scene=scene,
             robot=robot,
             free=shapely.union_all(parts),
             offset_m=float(np.hypot(*centre)),
-            walls=Walls.of(obstacles),
+            walls=Walls.of(ground.obstacles),
             left_J=(),
         )
         return reach._with_stations()
@@ -328,14 +322,7 @@ class _Reach:
                 if self._least_J(place, station.region) <= energy_J:
                     waiting.remove(station)
                     reached.append((station.region, full_J))
-        return _Reach(
-            scene=self.scene,
-            robot=self.robot,
-            free=self.free,
-            offset_m=self.offset_m,
-            walls=self.walls,
-            left_J=tuple(reached),
-        )
+        return replace(self, left_J=tuple(reached))
 
     def _least_J(self, place: Region | Point, region: Region) -> float:
         """Return a lower bound of the energy from a place to a region."""
