@@ -6,7 +6,7 @@ into arcs of equal length; between arcs holds
 - the straight distance at the least price there is,
 - the bound of all ways from one region to the other arc (`geodesic.Ways`),
 - for pairs of interest, what a wave from a start certifies, or a plane wave that leaves
-  a region in the direction that ways between given arcs take. It is computed on finer
+  a region in the direction that the way from a given arc takes. It is computed on finer
   cells, in a window that ways of interest do not leave: a way that does costs at least
   what it costs to the window's border and on from there.
 """
@@ -120,8 +120,8 @@ class ArcWays:
             found = [Wave(origin, target, 0)]
         else:
             found = [
-                Wave(origin, target, self._sector(origin, from_arc, target, to_arc)),
-                Wave(target, origin, self._sector(target, to_arc, origin, from_arc)),
+                Wave(origin, target, self._sector(origin, from_arc, target)),
+                Wave(target, origin, self._sector(target, to_arc, origin)),
             ]
         return [wave for wave in found if wave not in self.known]
 
@@ -168,28 +168,12 @@ class ArcWays:
             return float(ways.from_start[-1 - origin, target])
         return float(ways.between[origin, target])
 
-    def _sector(self, source: int, arc: int, sink: int, sink_arc: int) -> int:
-        """Return the sector in which the way from arc to arc sets out, or nearly so.
-
-        That is straight to the other arc, unless something is in the way, or else
-        where the way to the region leads.
-        """
-        here, there = self._middle(source, arc), self._middle(sink, sink_arc)
-        straight = there - here
-        down = -self._slope(sink, here)
-        swing = np.arctan2(
-            down[0] * straight[1] - down[1] * straight[0], down @ straight
-        )
-        reach_m = np.hypot(*(there - self.ways.regions[sink].center))
-        wide = np.arctan2(2.0 * reach_m, np.hypot(*straight))
-        heading = straight if abs(swing) <= wide else down
-        angle = np.arctan2(heading[1], heading[0])
-        return round(SECTORS * float(angle) / (2.0 * np.pi)) % SECTORS
-
-    def _middle(self, region: int, arc: int) -> np.ndarray:
-        """Return the middle of an arc, shape (2,)."""
-        points = border(self.ways.regions[region])
-        return np.asarray(points[(2 * arc + 1) * len(points) // (2 * ARCS)])
+    def _sector(self, source: int, arc: int, sink: int) -> int:
+        """Return the sector in which the way from an arc to a region sets out."""
+        points = border(self.ways.regions[source])
+        middle = points[(2 * arc + 1) * len(points) // (2 * ARCS)]
+        x, y = -self._slope(sink, middle)
+        return round(SECTORS * float(np.arctan2(y, x)) / (2.0 * np.pi)) % SECTORS
 
     def _slope(self, source: int, point: np.ndarray) -> np.ndarray:
         """Return the gradient of a region's field about a point, shape (2,)."""
