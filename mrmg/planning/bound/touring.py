@@ -23,9 +23,6 @@ from mrmg.planning.halting import NEVER
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import Routing
 
-SLACK = 1e-6
-"""Share by which tours may cost more than the best known; rounding loses none."""
-
 STEP, FINE_STEP = 0.02, 0.005
 """Shares of what is proven by which costlier tours are looked at in the next round,
 before and after the cheapest ones of some round are known."""
@@ -89,8 +86,6 @@ def touring_bound_J(
         rest = rest or completions(problem, leg, visits)
         best = max(best, float(rest.before[0]) - visits.surcharge)
         most = (1.0 + (FINE_STEP if settled else STEP)) * best
-        along_J = (1.0 + SLACK) * _cost_along(ways, price, tours, visits)
-        most = min(most, along_J) if best < along_J else most
         found, labels = cheapest_tours(problem, leg, rest, most, work, visits)
         work -= labels
         if found is None:
@@ -115,7 +110,7 @@ def _tighten(
     for r, tour in enumerate(tours):
         if not tour:
             continue
-        _, arcs = _cheapest_arcs(_legs_of(ways[r], r, price[r]), tour)
+        arcs = _cheapest_arcs(_legs_of(ways[r], r, price[r]), tour)
         for one in zip((-1 - r, *tour), (0, *arcs), tour, arcs, strict=False):
             new |= {(id(ways[r]), wave): ways[r] for wave in ways[r].waves(*one)}
     with ThreadPoolExecutor() as threads:
@@ -125,8 +120,8 @@ def _tighten(
     return bool(new)
 
 
-def _cheapest_arcs(leg: np.ndarray, tour: Sequence[int]) -> tuple[float, list[int]]:
-    """Return the least cost of a robot's tour, and the arcs it touches its targets at.
+def _cheapest_arcs(leg: np.ndarray, tour: Sequence[int]) -> list[int]:
+    """Return the arcs at which a robot's cheapest tour touches its targets.
 
     Args:
         leg: what its legs cost, shape (T + 1, K, T, K).
@@ -141,7 +136,7 @@ def _cheapest_arcs(leg: np.ndarray, tour: Sequence[int]) -> tuple[float, list[in
     arcs = [int(cost.argmin())]
     for origin in reversed(origins):
         arcs.append(int(origin[arcs[-1]]))
-    return float(cost.min()), arcs[-2::-1]  # the last arc found is that of the start
+    return arcs[-2::-1]  # the last arc found is that of the start
 
 
 def _legs_of(ways: ArcWays, r: int, price: float) -> np.ndarray:
@@ -174,18 +169,3 @@ def _write_legs(leg: np.ndarray, ways: Sequence[ArcWays], price: np.ndarray) -> 
         for i, j in product(each, each):
             part = own[:, i :: len(each), :, j :: len(each)]
             np.minimum(leg[r], part, out=leg[r])
-
-
-def _cost_along(
-    ways: Sequence[ArcWays],
-    price: np.ndarray,
-    tours: Sequence[Sequence[int]],
-    visits: Visits,
-) -> float:
-    """Return the least cost of given tours with prices, whatever arcs they touch."""
-    total = -visits.surcharge
-    for r, tour in enumerate(tours):
-        if tour:
-            least, _ = _cheapest_arcs(_legs_of(ways[r], r, price[r]), tour)
-            total += float(least + visits.price[list(tour)].sum())
-    return total
