@@ -2,7 +2,8 @@
 
 Slow are the tests marked so, and those that `slow_tests.txt` lists: all that took more
 than `QUICK_S` of processor time. `pytest --list-slow` brings the list up to date with
-the tests that it runs.
+the tests that it runs. Tests marked ci repeat at length what others show at one case
+(all shipped scenes, other maps, a compilation from nothing); they run where CI=true.
 """
 
 from __future__ import annotations
@@ -25,6 +26,10 @@ settings.load_profile("mrmg")
 SLOW_TESTS = Path(__file__).with_name("slow_tests.txt")
 QUICK_S = 0.4
 """Processor time that a test of the fast part may take."""
+
+NOT_HERE = pytest.mark.skipif(
+    os.environ.get("CI") != "true", reason="at length where CI=true"
+)
 
 WALLED = """\
 format: 1
@@ -69,6 +74,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         others = quick and called and called.id not in quick.args
         if others or item.nodeid in listed:
             item.add_marker(pytest.mark.slow)
+        if item.get_closest_marker("ci"):
+            item.add_marker(pytest.mark.slow)
+            item.add_marker(NOT_HERE)
     items.sort(key=lambda item: item.get_closest_marker("slow") is not None)
 
 

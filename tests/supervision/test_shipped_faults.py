@@ -39,7 +39,7 @@ def stopped_safely(drive: Drive, robot: str, time_s: float) -> None:
     assert np.hypot(*np.ptp(wreck, axis=0)) < 0.05
 
 
-@pytest.mark.parametrize("time_s", [20.0, 35.0])
+@pytest.mark.parametrize("time_s", [20.0, pytest.param(35.0, marks=pytest.mark.ci)])
 def test_on_slopes_the_other_finishes(time_s: float) -> None:
     scene = load_scene("hills")
     drive = drive_mission(scene, planned(scene), faults=[f"r1@{time_s}s"])

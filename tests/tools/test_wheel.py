@@ -77,7 +77,7 @@ def test_new_files_name_the_installed_schemas(command: Path) -> None:
         assert json.loads(Path(schema).read_text())["properties"]["format"]
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_the_installed_command_runs_a_whole_mission(command: Path) -> None:
     where = f"{command.parent}/python -c 'import mrmg; print(mrmg.__file__)'"
     home = subprocess.run(

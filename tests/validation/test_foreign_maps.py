@@ -20,10 +20,11 @@ MAPS = Path(__file__).parents[3] / "shared/maps"
     "name",
     [
         "potholes.txt",
-        "complex2.txt",
-        "geometry-reduced.txt",
-        "warehouse2.txt",
         "dense.tri",
+        *(
+            pytest.param(name, marks=pytest.mark.ci)
+            for name in ("complex2.txt", "geometry-reduced.txt", "warehouse2.txt")
+        ),
     ],
 )
 def test_a_mission_on_a_foreign_map_ends_well(name: str, tmp_path: Path) -> None:

@@ -6,8 +6,6 @@ integration (CI=true), where all of them are.
 
 from __future__ import annotations
 
-import os
-
 import pytest
 
 import mrmg
@@ -29,13 +27,10 @@ BALANCE_PCT = 0.5
 TRACKING_RMS_M = 0.05
 TRACKING_MAX_M = 0.25
 
-in_ci = pytest.mark.skipif(
-    os.environ.get("CI") != "true", reason="all scenes are driven where CI=true"
-)
 MISSIONS = [
     pytest.param(("quickstart", 0), id="quickstart"),
     *(
-        pytest.param((name, 0), id=name, marks=[pytest.mark.slow, in_ci])
+        pytest.param((name, 0), id=name, marks=pytest.mark.ci)
         for name in scene_names()
         if name != "quickstart"
     ),

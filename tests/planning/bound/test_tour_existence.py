@@ -171,7 +171,7 @@ def smallest_solved(name: str, sizes_m: list[float], **more: Any) -> float:
         ("diffdrive", lambda scene: scene, [30.0], 0.5),
         pytest.param("hills", lambda s: s, [60.0], 0.5, marks=pytest.mark.slow),
         pytest.param("mixed", lambda s: s, [44.0], 0.6, marks=pytest.mark.slow),
-        pytest.param("scene4", lambda s: s, [116.0], 0.8, marks=pytest.mark.slow),
+        pytest.param("scene4", lambda s: s, [116.0], 0.8, marks=pytest.mark.ci),
     ],
 )
 def test_what_is_solved_is_never_proven_impossible_and_little_less_is(

@@ -31,7 +31,15 @@ def test_a_robot_recharges_once_where_it_enters_a_station() -> None:
     assert result.plan.tours["r1"] == ("s1", "g1")
 
 
-@pytest.mark.parametrize("name", ["one_goal", "two_swap", "station_needed", "no_goals"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "one_goal",
+        pytest.param("two_swap", marks=pytest.mark.ci),
+        "station_needed",
+        "no_goals",
+    ],
+)
 def test_plans_are_valid_and_reproducible(name: str) -> None:
     scene = load_scene(SCENES / f"{name}.yaml")
     first, second = (

@@ -46,7 +46,13 @@ def test_occupancy_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", [0, 1], ids=["hall", "field"])
+@pytest.mark.parametrize(
+    "number",
+    [
+        pytest.param(0, id="hall"),
+        pytest.param(1, id="field", marks=pytest.mark.ci),
+    ],
+)
 def test_stories_of_the_readme(
     number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
