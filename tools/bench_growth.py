@@ -11,14 +11,17 @@ on the map of scene6, 100 x 100 m as well. In the series `fleets` all grows toge
 goals and a station for each robot, ground and boxes with them (50 boxes on 100 x 100 m
 for 16 robots); 64, 128 and 256 robots take long and are measured by `--sizes` alone.
 Times are wall-clock, of planning in process; a plan counts if the verifier finds
-nothing wrong with it. Memory is the process's peak so far. The last table has one line
-for the missions of one size. The exponent of growth is the slope of a line through the
-logarithms of the sizes and of the median times to the first plan.
+nothing wrong with it. With --drive it is driven in MuJoCo, too, and must end as
+planned: how many times faster than real time comes last in its line. Memory is the
+process's peak so far. The last table has one line for the missions of one size. The
+exponent of growth is the slope of a line through the logarithms of the sizes and of the
+median times to the first plan.
 
 Finished missions are kept in --output FILE: the same command goes on from there after
 an interruption. Rows of --json are those of the last table: `series`, `size`, `robots`,
 `goals`, `obstacles`, `ok` of `missions`, `first_plan_s_median`, `first_plan_s_worst`,
-`routing_s_median`, `populate_s_median`, `memory_MB`. `exponents`: `series`, `exponent`.
+`routing_s_median`, `populate_s_median`, `memory_MB`, with --drive `x_real_time_least`.
+`exponents`: `series`, `exponent`.
 """
 
 from __future__ import annotations
@@ -26,7 +29,7 @@ from __future__ import annotations
 import argparse
 import resource
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from math import sqrt
@@ -34,27 +37,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import shapely
 from bench import conditions
 from growth_figure import GrowthPoint, draw_growth, exponent
+from growth_map import SIDE_M, drawn_map
 from protocol import Row, Trials, add_file_options, run, write_document
-from shapely import affinity
 
 import mrmg
-from mrmg import seeding
 from mrmg.errors import UsageError
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.parameters import PATH_FOLLOWING
 from mrmg.planning.preparation import compile_kernels
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.populating import populate
-
-SIDE_M = 100.0
-COVERED = 0.12
-"""Share of a drawn map that its boxes cover."""
-
-APART_M = 3.6
-"""Least distance of boxes from each other and from the edge: a road's width."""
 
 GOALS_PER_STATION = 4
 """Where goals grow; the others' missions have 20 goals and 6 stations."""
@@ -116,7 +110,7 @@ def main() -> int:
     chosen = [case for case in chosen if is_chosen(case, options.sizes, options.most)]
     options.seeds = range(options.seeds)
     trials = Trials(options.output)
-    rows = measure(chosen, options.seeds, trials)
+    rows = measure(chosen, options.seeds, trials, options.drive)
     table = sizes_of(rows)
     powers = {name: exponent(points) for name, points in points_of(rows).items()}
     print(f"\n{summary(table)}\n")
@@ -137,6 +131,7 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument("--seeds", type=int, default=3, help="default 3: 0, 1 and 2")
     parser.add_argument("--most", type=int, help="leave out larger sizes")
     parser.add_argument("--sizes", type=int, nargs="+", help="only these sizes")
+    parser.add_argument("--drive", action="store_true", help="drive plans in MuJoCo")
     add_file_options(parser)
     parser.add_argument("--figure", type=Path, help="PDF, SVG or PNG")
     return parser.parse_args()
@@ -149,15 +144,18 @@ def is_chosen(case: Case, sizes: Sequence[int] | None, most: int | None) -> bool
     return case.size <= (most or USUAL_MOST.get(case.series, case.size))
 
 
-def measure(cases: Sequence[Case], seeds: range, trials: Trials) -> list[Row]:
+def measure(
+    cases: Sequence[Case], seeds: range, trials: Trials, drive: bool = False
+) -> list[Row]:
     """Plan what is not finished; print a table of all and return its rows."""
     print(f"{__doc__}\n{conditions()}\n")
     print("grows | size | seed | ok | init s | router s | first plan s | cost J | MB")
     rows = []
     for case in cases:
         for seed in seeds:
-            make = partial(planned, case, seed)
-            rows.append(trials.row(make, **asdict(case), seed=seed))
+            make = partial(planned, case, seed, drive)
+            driven = {"driven": True} if drive else {}
+            rows.append(trials.row(make, **asdict(case), seed=seed, **driven))
             print(table_row(rows[-1]), flush=True)
     return rows
 
@@ -169,8 +167,8 @@ def warm() -> None:
     plan_mission(mrmg.load_scene("quickstart"))
 
 
-def planned(case: Case, seed: int) -> Row:
-    """Generate, plan and verify one mission; return its row."""
+def planned(case: Case, seed: int, drive: bool = False) -> Row:
+    """Generate, plan, verify and perhaps drive one mission; return its row."""
     warm()
     populating = time.perf_counter()
     scene = scene_from_document(document_of(case, seed), source=f"{case}")
@@ -196,6 +194,11 @@ def planned(case: Case, seed: int) -> Row:
     if result.plan is not None:
         row["ok"] = mrmg.verify(scene, result.plan).ok
         row["cost_J"] = result.plan.cost_J
+    if drive and result.plan is not None:
+        began = time.perf_counter()
+        log = mrmg.execute(scene, result.plan)
+        row["x_real_time"] = float(log.time_s[-1]) / (time.perf_counter() - began)
+        row["ok"] &= mrmg.audit(scene, result.plan, log).mission_ok
     row["memory_MB"] = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
     return row
 
@@ -203,11 +206,12 @@ def planned(case: Case, seed: int) -> Row:
 def table_row(row: Row) -> str:
     """Return one line of the table."""
     first_s = row["time_s"].get("first_solution", np.nan)
+    driven = f" | {row['x_real_time']:.1f}" if "x_real_time" in row else ""
     return (
         f"{row['series']} | {row['size']} | {row['seed']} | "
         f"{'yes' if row['ok'] else row['status']} | {row['time_s']['init']:.3f} | "
         f"{row['time_s'].get('routing', np.nan):.3f} | {first_s:.3f} | "
-        f"{row.get('cost_J', np.nan):.0f} | {row['memory_MB']:.0f}"
+        f"{row.get('cost_J', np.nan):.0f} | {row['memory_MB']:.0f}{driven}"
     )
 
 
@@ -223,6 +227,8 @@ def sizes_of(rows: Sequence[Row]) -> list[Row]:
         routing_s = [each.get("routing", np.nan) for each in times]
         of_all = ("series", "size", "robots", "goals", "obstacles")
         line: Row = {key: same[0][key] for key in of_all}
+        speeds = [row["x_real_time"] for row in same if "x_real_time" in row]
+        line |= {"x_real_time_least": min(speeds)} if speeds else {}
         table.append(
             line
             | {
@@ -294,52 +300,6 @@ def document_of(case: Case, seed: int) -> dict[str, Any]:
         except UsageError as error:
             refused = error
     raise refused
-
-
-def drawn_map(boxes: int, seed: int, side_m: float = SIDE_M) -> dict[str, Any]:
-    """Return a square map with boxes at drawn places."""
-    rng = seeding.stream(seed, "growth", boxes)
-    found = list(_free_boxes(rng, boxes, side_m))
-    return {
-        "format": 1,
-        "name": f"{boxes} boxes, seed {seed}",
-        "bounds": [0, 0, side_m, side_m],
-        "obstacles": found,
-    }
-
-
-def _free_boxes(
-    rng: np.random.Generator, boxes: int, side_m: float
-) -> Iterator[dict[str, Any]]:
-    """Yield boxes that leave roads between each other, narrower if there is no room."""
-    box_m = side_m * sqrt(COVERED / boxes)
-    placed: list[Any] = []
-    apart_m, tries = APART_M, 0
-    while len(placed) < boxes:
-        ratio = float(rng.uniform(0.6, 1.6))
-        size = (box_m * sqrt(ratio), box_m / sqrt(ratio))
-        yaw = float(rng.uniform(0.0, np.pi / 2.0))
-        centre = rng.uniform(0.0, side_m, 2)
-        box = affinity.rotate(
-            shapely.box(-size[0] / 2.0, -size[1] / 2.0, size[0] / 2.0, size[1] / 2.0),
-            yaw,
-            use_radians=True,
-        )
-        box = affinity.translate(box, *centre)
-        inside = shapely.box(0.0, 0.0, side_m, side_m).buffer(-apart_m).contains(box)
-        tries += 1
-        if tries % 2000 == 0:
-            apart_m *= 0.8
-        if inside and (shapely.distance(box, placed) >= apart_m).all():
-            placed.append(box)
-            yield {
-                "id": f"box{len(placed)}",
-                "box": {
-                    "center": [round(float(x), 3) for x in centre],
-                    "size": [round(x, 3) for x in size],
-                    "yaw": round(yaw, 4),
-                },
-            }
 
 
 if __name__ == "__main__":

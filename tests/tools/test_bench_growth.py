@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import bench_growth
+import growth_map
 import numpy as np
 import pytest
 import shapely
@@ -20,13 +21,13 @@ TINY = [Case(series="robots", size=n, robots=n, goals=3, stations=3) for n in (1
 
 @pytest.mark.parametrize("boxes", [12, 200])
 def test_maps_cover_the_same_share(boxes: int) -> None:
-    scene = scene_from_document(bench_growth.drawn_map(boxes, 0), source="test")
+    scene = scene_from_document(growth_map.drawn_map(boxes, 0), source="test")
     shapes = [shapely.Polygon(wall.shape.exterior) for wall in scene.obstacles]
     assert len(shapes) == boxes
-    share = sum(shape.area for shape in shapes) / bench_growth.SIDE_M**2
-    assert share == pytest.approx(bench_growth.COVERED, rel=0.01)
+    share = sum(shape.area for shape in shapes) / growth_map.SIDE_M**2
+    assert share == pytest.approx(growth_map.COVERED, rel=0.01)
     assert shapely.unary_union(shapes).area == pytest.approx(share * 1e4)
-    assert bench_growth.drawn_map(boxes, 0) != bench_growth.drawn_map(boxes, 1)
+    assert growth_map.drawn_map(boxes, 0) != growth_map.drawn_map(boxes, 1)
 
 
 def test_ground_grows_with_a_fleet() -> None:
@@ -60,7 +61,7 @@ def test_rows_and_figure(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     output, figure = tmp_path / "rows.jsonl", tmp_path / "growth.svg"
-    arguments = ["bench_growth", "--series", "robots", "--seeds", "1"]
+    arguments = ["bench_growth", "--series", "robots", "--seeds", "1", "--drive"]
     arguments += ["--output", str(output), "--figure", str(figure)]
     document = tmp_path / "growth.json"
     arguments += ["--json", str(document)]
@@ -74,6 +75,7 @@ def test_rows_and_figure(
     assert "robots | 2 | 0 | yes" in capsys.readouterr().out
     written = json.loads(document.read_text())
     assert [(row["size"], row["ok"]) for row in written["rows"]] == [(1, 1), (2, 1)]
+    assert all(row["x_real_time_least"] > 0.0 for row in written["rows"])
     assert written["ok"] is True
     (power,) = written["exponents"]
     assert power["series"] == "robots"
