@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 import shapely
-import trimesh
 from shapely.geometry import Polygon
 
 from mrmg.export.ros_messages import MAP_FRAME, RosTypes
 from mrmg.scene.types import Goal, Obstacle, Scene, Station
 from mrmg.simulation import palette
-from mrmg.simulation.convex import triangles
+from mrmg.simulation.convex import numbered, triangles, upright_solid
 from mrmg.world.elevation import ground_mesh, height_at, lifted
 from mrmg.world.terrain import multiplier_at
 
@@ -153,7 +152,8 @@ def _flat(
     ros: RosTypes, scene: Scene, name: str, shape: Polygon, color: palette.Rgb
 ) -> Any:
     """Return an area that lies on the ground."""
-    corners = lifted(scene, _corners(shape), _LIFT_M)
+    points, faces = numbered(triangles(shape))
+    corners = lifted(scene, points[faces.ravel()], _LIFT_M)
     return _marker(ros, name, _TRIANGLES, corners, color)
 
 
@@ -181,21 +181,10 @@ def _ground(ros: RosTypes, scene: Scene) -> Any:
     return marker
 
 
-def _corners(shape: Polygon) -> np.ndarray:
-    """Return the corners of triangles that tile a polygon, shape (3 n, 2)."""
-    rings = shapely.get_rings(
-        [shapely.orient_polygons(part) for part in triangles(shape)]
-    )
-    corners = shapely.get_coordinates(rings).reshape(-1, 4, 2)[:, :3]
-    return np.asarray(corners).reshape(-1, 2)
-
-
 def _prism(shape: Polygon, height_m: float) -> np.ndarray:
     """Return the corners of the triangles round an upright solid, shape (3 n, 3)."""
-    vertices, faces = np.unique(_corners(shape), axis=0, return_inverse=True)
-    create: Any = trimesh.creation
-    solid = create.extrude_triangulation(vertices, faces.reshape(-1, 3), height_m)
-    return np.array(solid.triangles).reshape(-1, 3)
+    corners, faces = upright_solid(triangles(shape), height_m)
+    return np.asarray(corners[faces.ravel()])
 
 
 def _text(ros: RosTypes, name: str, where: np.ndarray, text: str) -> Any:

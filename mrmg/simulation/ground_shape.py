@@ -11,6 +11,7 @@ from shapely.geometry import MultiPolygon, Polygon
 from mrmg.mujoco_import import mujoco
 from mrmg.scene.region import Region
 from mrmg.scene.types import Scene
+from mrmg.simulation.convex import upright_solid
 from mrmg.world.elevation import height_at
 
 FACET_M = 1.0
@@ -22,6 +23,7 @@ FOUNDATION_M = 0.5
 
 _MARK_SPACING_M = 0.4
 _MARK_LIFT_M = 0.05
+_SLIVER_M2 = 1e-9
 _BASE_M = 1.0
 
 
@@ -98,34 +100,10 @@ def draped_mark(scene: Scene, region: Region) -> tuple[np.ndarray, np.ndarray]:
     reach = float(np.hypot(*(ring - middle).T).max())
     rings = max(1, math.ceil(reach / _MARK_SPACING_M))
     share = (np.arange(1, rings + 1) / rings)[:, None, None]
-    points = np.concatenate(
-        [
-            middle[None],
-            (middle + share * (ring - middle)).reshape(-1, 2),
-        ]
-    )
-    n = len(ring)
-    after = np.roll(np.arange(n), -1)
-    faces = [np.stack([np.zeros(n, int), 1 + np.arange(n), 1 + after], axis=1)]
-    for k in range(rings - 1):
-        inner, outer = 1 + k * n, 1 + (k + 1) * n
-        first, second = inner + np.arange(n), inner + after
-        third, fourth = outer + np.arange(n), outer + after
-        faces.append(np.stack([first, third, fourth], axis=1))
-        faces.append(np.stack([first, fourth, second], axis=1))
-    top = np.concatenate(faces)
-    height = height_at(scene, points) + _MARK_LIFT_M
-    upper = np.column_stack([points, height])
-    lower = np.column_stack([points, height - 2.0 * _MARK_LIFT_M])
-    count, rim = len(points), 1 + (rings - 1) * n
-    here, there = rim + np.arange(n), rim + after
-    sides = np.concatenate(
-        [
-            np.stack([here, here + count, there + count], axis=1),
-            np.stack([here, there + count, there], axis=1),
-        ]
-    )
-    return (
-        np.concatenate([upper, lower]),
-        np.concatenate([top, top[:, ::-1] + count, sides]),
-    )
+    points = np.vstack([middle, (middle + share * (ring - middle)).reshape(-1, 2)])
+    parts = shapely.get_parts(shapely.delaunay_triangles(shapely.multipoints(points)))
+    # Points of one side may be off its line by their rounding.
+    parts = parts[shapely.area(parts) > _SLIVER_M2]
+    corners, faces = upright_solid(parts, 2.0 * _MARK_LIFT_M)
+    corners[:, 2] += height_at(scene, corners[:, :2]) - _MARK_LIFT_M
+    return corners, faces

@@ -18,7 +18,12 @@ from mrmg.scene.driven_parts import FLOOR_BIT, OBSTACLE_BIT
 from mrmg.scene.region import Region
 from mrmg.scene.types import Obstacle, Scene
 from mrmg.simulation import palette
-from mrmg.simulation.convex import convex_pieces, triangles
+from mrmg.simulation.convex import (
+    convex_pieces,
+    prism_corners,
+    triangles,
+    upright_solid,
+)
 from mrmg.simulation.ground_shape import (
     FOUNDATION_M,
     add_height_field,
@@ -131,7 +136,7 @@ def add_obstacle(
     )
     for number, ring in enumerate(convex_pieces(shape)):
         name = f"solid:{obstacle.id}:{number}"
-        spec.add_mesh(name=name, uservert=_prism(ring, height_m).ravel())
+        spec.add_mesh(name=name, uservert=prism_corners(ring, height_m).ravel())
         _add_mesh_geom(body, name, contype=OBSTACLE_BIT, group=_SOLID_GROUP)
     colour = palette.OBSTACLE if obstacle.blocks is None else palette.PARTIAL_OBSTACLE
     name = f"obstacle:{obstacle.id}"
@@ -213,54 +218,13 @@ def _add_mesh_geom(body: mujoco.MjsBody, name: str, **look: Any) -> None:
     )
 
 
-def _prism(ring: np.ndarray, height_m: float) -> np.ndarray:
-    """Return the corners of the upright prism over a convex ring, shape (2 k, 3)."""
-    return np.concatenate(
-        [np.insert(ring, 2, level, axis=1) for level in (0.0, height_m)]
-    )
-
-
 def _add_drawn_mesh(
     spec: mujoco.MjSpec, name: str, polygon: Polygon, height_m: float
 ) -> None:
     """Add the polygon's extrusion as a mesh with flat faces."""
-    corners = np.concatenate(
-        [
-            shapely.get_coordinates(shapely.orient_polygons(part).exterior)[:3]
-            for part in triangles(polygon)
-        ]
-    )
-    vertices, faces = np.unique(corners, axis=0, return_inverse=True)
-    sides = _extruded(vertices, faces.reshape(-1, 3), height_m)
+    corners, faces = upright_solid(triangles(polygon), height_m)
     # Shared corners would make MuJoCo smooth the edges away.
-    _add_mesh(spec, name, sides.reshape(-1, 3), np.arange(3 * len(sides)))
-
-
-def _extruded(points: np.ndarray, faces: np.ndarray, height_m: float) -> np.ndarray:
-    """Return the corners of the outward triangles round an upright solid, (n, 3, 3).
-
-    Args:
-        points: on the ground [m], shape (k, 2).
-        faces: triangles of its base, counter-clockwise, whole side to whole side,
-            shape (m, 3).
-        height_m: of the solid.
-    """
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    _, place, uses = np.unique(
-        np.sort(edges, axis=1), axis=0, return_index=True, return_counts=True
-    )
-    # An edge of a single triangle is one of the outline.
-    start, end = edges[place[uses == 1]].T
-    low = np.insert(points, 2, 0.0, axis=1)
-    high = np.insert(points, 2, height_m, axis=1)
-    return np.concatenate(
-        [
-            low[faces[:, ::-1]],
-            high[faces],
-            np.stack([low[start], low[end], high[end]], axis=1),
-            np.stack([low[start], high[end], high[start]], axis=1),
-        ]
-    )
+    _add_mesh(spec, name, corners[faces.ravel()], np.arange(faces.size))
 
 
 def _add_mesh(
