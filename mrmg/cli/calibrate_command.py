@@ -147,12 +147,12 @@ def folder_of_model(reference: str) -> Path:
 
     # A folder in the working directory needs no slash here, as it does in a scene.
     here = Path(reference)
-    found = model_folder(reference, None)
-    if isinstance(found, str) and (here / "robot.yaml").is_file():
-        return here.resolve()
-    if isinstance(found, str):
-        raise UsageError(f"MODEL: {found}")
-    return found
+    try:
+        return model_folder(reference, None)
+    except UsageError as error:
+        if (here / "robot.yaml").is_file():
+            return here.resolve()
+        raise UsageError(f"MODEL: {error}") from error
 
 
 def _lines(calibration: Calibration) -> list[str]:

@@ -196,6 +196,22 @@ class Scene:
     time_limit_s: float = math.inf
     written: WrittenScene | None = field(default=None, repr=False)
 
+    @staticmethod
+    def around(model: RobotModel, half_m: float) -> Scene:
+        """Return plain ground that reaches so far from one robot, `r1`, at (0, 0)."""
+        full_J = model.battery_capacity_J
+        battery = Battery(capacity_J=full_J, start_J=full_J, reserve_fraction=0.0)
+        robot = Robot(id="r1", model=model, pose=(0.0, 0.0, 0.0), battery=battery)
+        return Scene(
+            name=model.name,
+            bounds=(-half_m, -half_m, half_m, half_m),
+            obstacles=(),
+            terrain=(),
+            goals=(),
+            stations=(),
+            robots=(robot,),
+        )
+
     @cached_property
     def digest(self) -> str:
         """Fingerprint of the content, models and their files included."""

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mrmg.motion.dynamics import DERIVATIVES, NX, rk4_step
-from mrmg.scene.loading import scene_from_document
+from mrmg.scene.loading.models import load_model, model_folder
 from mrmg.scene.robot_model import RobotModel
 from mrmg.simulation.controller import HORIZON, HORIZON_STEP_S, Controller
 
@@ -47,13 +47,7 @@ class ControllerContract:
     def robots(self) -> Iterator[RobotModel]:
         """Yield the models of the robots that it drives."""
         for name in self.models:
-            document = {
-                "format": 1,
-                "name": "ground",
-                "bounds": [0, 0, 20, 20],
-                "robots": [{"id": "r1", "model": name, "pose": [10, 10, 0]}],
-            }
-            yield scene_from_document(document, source=name).robots[0].model
+            yield load_model(model_folder(name, None))[0]
 
     def test_a_correction_is_two_finite_numbers(self) -> None:
         """Even far from the reference, and at the limits of the state."""

@@ -13,7 +13,7 @@ from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import why_not_driven
 from mrmg.scene.robot_figures import figure_lines
 from mrmg.scene.robot_model import RobotModel
-from mrmg.scene.types import Battery, Robot, Scene
+from mrmg.scene.types import Scene
 from mrmg.simulation.world_model import build_world
 from mrmg.viz import style
 from mrmg.viz.figures import new_figure, require_format, write_figure
@@ -82,7 +82,7 @@ def _draw_rendered(
 ) -> None:
     """Draw the simulated robot with its outline on both axes."""
     size_m = 2.0 * model.circumscribed_radius_m
-    world = build_world(_alone(model, size_m))
+    world = build_world(Scene.around(model, 20.0 * size_m))
     ground = np.broadcast_to(_GROUND, (16, 16, 3)).copy()
     middle = 0.5 * (model.footprint_m.min(axis=0) + model.footprint_m.max(axis=0))
     away_m = 0.7 * (size_m + model.height_m) / math.tan(math.radians(_FOVY_DEG))
@@ -107,19 +107,3 @@ def _draw_rendered(
                 )
             axes.set_xlim(0, width)
             axes.set_ylim(height, 0)
-
-
-def _alone(model: RobotModel, size_m: float) -> Scene:
-    """Return a scene with nothing but one robot."""
-    half_m = 20.0 * size_m
-    capacity_J = model.battery_capacity_J
-    battery = Battery(capacity_J=capacity_J, start_J=capacity_J, reserve_fraction=0.0)
-    return Scene(
-        name=model.name,
-        bounds=(-half_m, -half_m, half_m, half_m),
-        obstacles=(),
-        terrain=(),
-        goals=(),
-        stations=(),
-        robots=(Robot(id="r1", model=model, pose=(0.0, 0.0, 0.0), battery=battery),),
-    )

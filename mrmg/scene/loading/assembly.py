@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 import shapely
 
 from mrmg import storage
-from mrmg.errors import Fault, SceneError, nearest
+from mrmg.errors import Fault, SceneError, UsageError, nearest
 from mrmg.scene.document import elevation_entry
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.loading.batteries import battery_of
@@ -225,9 +225,10 @@ class Assembly:
         """
         changes = dict(wanted) if isinstance(wanted, dict) else {}
         reference: str = changes.pop("like", wanted)
-        folder = model_folder(reference, self._base)
-        if isinstance(folder, str):
-            raise EntryError(Fault(path, folder))
+        try:
+            folder = model_folder(reference, self._base)
+        except UsageError as error:
+            raise EntryError(Fault(path, str(error))) from error
         kind = f"{folder} {changes}"
         if kind not in self._models:
             self._models[kind] = None

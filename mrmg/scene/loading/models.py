@@ -20,7 +20,7 @@ from pydantic import Field, ValidationError
 
 from mrmg import shipped, storage
 from mrmg.energy.model import EnergyPreset
-from mrmg.errors import Fault, SceneError, nearest
+from mrmg.errors import Fault, SceneError, UsageError, nearest
 from mrmg.scene.loading.consistency import mjcf_faults
 from mrmg.scene.loading.faults import faults_of
 from mrmg.scene.loading.margins_schema import MarginsEntry, TrackingErrorEntry
@@ -144,19 +144,23 @@ class ModelDocument(NamedWithUnits):
     """MJCF file in the folder; without it, not driven"""
 
 
-def model_folder(reference: str, base: Path | None) -> Path | str:
-    """Return the folder a scene's `model` names, or why there is none."""
+def model_folder(reference: str, base: Path | None) -> Path:
+    """Return the folder a scene's `model` names.
+
+    Raises:
+        UsageError: if there is none.
+    """
     if "/" in reference:
         folder = Path(reference)
         if not folder.is_absolute():
             folder = (base or Path.cwd()) / folder
         if (folder / "robot.yaml").is_file():
             return folder.resolve()
-        return f"got '{reference}'; no such folder with a robot.yaml"
+        raise UsageError(f"got '{reference}'; no such folder with a robot.yaml")
     names = shipped.model_names()
     if reference in names:
         return shipped.models_folder() / reference
-    return (
+    raise UsageError(
         f"unknown model '{reference}'{nearest(reference, names)}; shipped models: "
         f"{', '.join(names)}; or give the path of a folder, with a '/' in it"
     )

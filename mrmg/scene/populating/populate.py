@@ -21,7 +21,7 @@ from mrmg.scene.populating.ground import Ground
 from mrmg.scene.populating.placement import RESERVE, Placement, Sites, place_mission
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.slopes import avoided_ground
-from mrmg.scene.types import Battery, Robot, Scene
+from mrmg.scene.types import Scene
 from mrmg.seeding import stream
 
 GOAL_RADIUS_M = 1.5
@@ -83,8 +83,6 @@ def populate(
         if count < 1:
             raise UsageError(f"cannot place {count} {name}; ask for at least 1")
     folder = model_folder(model, None)
-    if isinstance(folder, str):
-        raise UsageError(folder)
     bare = _map_of(document)
     scene = scene_from_document(bare, source=str(document.get("name", "the map")))
     robot_model, _ = load_model(folder, trust_code=trust_code)
@@ -163,9 +161,8 @@ def _size(model: RobotModel) -> float:
 
 def _too_steep(scene: Scene, model: RobotModel) -> list[Polygon]:
     """Return the ground that a robot of a model cannot climb."""
-    battery = Battery(capacity_J=1.0, start_J=1.0, reserve_fraction=0.0)
-    robot = Robot(id="r", model=model, pose=(0.0, 0.0, 0.0), battery=battery)
-    ground = avoided_ground(scene.elevation, [robot], scene.terrain)
+    robots = Scene.around(model, 1.0).robots
+    ground = avoided_ground(scene.elevation, robots, scene.terrain)
     return [part.shape for part in ground]
 
 

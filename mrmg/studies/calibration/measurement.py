@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -14,7 +14,7 @@ from mrmg.errors import UsageError
 from mrmg.motion.dynamics import DERIVATIVES, TURN_SPEEDS
 from mrmg.plans import Plan, Trajectory
 from mrmg.scene.robot_model import RobotModel
-from mrmg.scene.types import Battery, Robot, Scene, TerrainArea
+from mrmg.scene.types import Scene, TerrainArea
 from mrmg.simulation import ExecutionLog, simulate
 from mrmg.simulation.plants import DEFAULT_PLANT
 from mrmg.studies.calibration.manoeuvres import STEP_S, Manoeuvre
@@ -123,21 +123,10 @@ def yaw_rate(model: RobotModel, state: np.ndarray) -> np.ndarray:
 
 
 def _plain(model: RobotModel, multiplier: float, reach_m: float) -> Scene:
-    half_m = reach_m + _MARGIN_M
-    bounds = (-half_m, -half_m, half_m, half_m)
-    capacity_J = model.battery_capacity_J
-    battery = Battery(capacity_J=capacity_J, start_J=capacity_J, reserve_fraction=0.0)
-    return Scene(
-        name="plain",
-        bounds=bounds,
-        obstacles=(),
-        terrain=(
-            TerrainArea(id="plain", shape=shapely.box(*bounds), multiplier=multiplier),
-        ),
-        goals=(),
-        stations=(),
-        robots=(Robot(id=_ROBOT, model=model, pose=(0.0, 0.0, 0.0), battery=battery),),
-    )
+    scene = Scene.around(model, reach_m + _MARGIN_M)
+    ground = shapely.box(*scene.bounds)
+    area = TerrainArea(id="plain", shape=ground, multiplier=multiplier)
+    return replace(scene, terrain=(area,))
 
 
 def _plan(scene: Scene, manoeuvre: Manoeuvre, states: np.ndarray) -> Plan:
