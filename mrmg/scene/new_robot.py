@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
 
@@ -24,14 +25,7 @@ def new_robot(folder: Path, *, like: str = "car") -> list[Path]:
     names = shipped.model_names()
     if like not in names:
         raise UsageError(f"unknown model '{like}'; shipped models: {', '.join(names)}")
-    name = folder.name
-    if not _NAME.fullmatch(name) or name in names:
-        raise UsageError(
-            f"'{name}' cannot name a robot model; use letters, digits, '_', '.' and "
-            f"'-', and none of the shipped models' names ({', '.join(names)})"
-        )
-    if folder.exists() or folder.is_symlink():
-        raise UsageError(f"{folder} is there already; give another name")
+    name = require_new_model(folder, "give another name")
     source = shipped.models_folder() / like
     text = (source / "robot.yaml").read_text(encoding="utf-8")
     text = text.replace(f"mjcf: {like}.xml", f"mjcf: {name}.xml")
@@ -47,3 +41,20 @@ def new_robot(folder: Path, *, like: str = "car") -> list[Path]:
     for path, content in files.items():
         storage.write_text(path, content)
     return list(files)
+
+
+def require_new_model(folder: Path, remedy: str) -> str:
+    """Return the name of the model that a new folder shall hold, which is its own.
+
+    Raises:
+        UsageError: if there is something in that place, or it cannot name a model.
+    """
+    name, names = folder.name, shipped.model_names()
+    if not _NAME.fullmatch(name) or name in names:
+        raise UsageError(
+            f"'{name}' cannot name a robot model; use letters, digits, '_', '.' and "
+            f"'-', and none of the shipped models' names ({', '.join(names)})"
+        )
+    if os.path.lexists(folder):
+        raise UsageError(f"{folder} is there already; {remedy}")
+    return name

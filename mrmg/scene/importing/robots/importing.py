@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import re
 import shutil
 import tempfile
 from collections import defaultdict
@@ -15,18 +13,17 @@ from typing import Any
 import numpy as np
 
 from mrmg import shipped, storage
-from mrmg.errors import Fault, SceneError, UsageError
+from mrmg.errors import Fault, SceneError
 from mrmg.scene.importing.robots.description import Description, read_description
 from mrmg.scene.importing.robots.mjcf_text import DrawnGeom, mjcf_text
 from mrmg.scene.importing.robots.parameters import Parameter, parameters_of
 from mrmg.scene.importing.robots.survey import Survey, survey
 from mrmg.scene.loading.models import load_model
+from mrmg.scene.new_robot import require_new_model
 from mrmg.templates import rendered
 
 _BESIDE_AXLE_M = 1e-3
 """Distance from the driven axle up to which a support is below it."""
-
-_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 
 
 @dataclass(frozen=True)
@@ -68,14 +65,7 @@ def import_robot(
         SceneError: if the description cannot be used; nothing is written then.
         MachineError: if a package is missing.
     """
-    name = folder.name
-    if not _NAME.fullmatch(name) or name in shipped.model_names():
-        raise UsageError(
-            f"'{name}' cannot name a robot model; use letters, digits, '_', '.' and "
-            "'-', and no shipped model's name"
-        )
-    if os.path.lexists(folder):
-        raise UsageError(f"{folder} is there already; give another -o FOLDER")
+    name = require_new_model(folder, "give another -o FOLDER")
     description = read_description(path, arguments or {})
     found = survey(description, str(path), drive, steer)
     values = parameters_of(found, description)
