@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,21 +22,11 @@ from mrmg.motion.dynamics import DERIVATIVES, rk4_step
 from mrmg.scene.types import Scene
 from mrmg.simulation.disturbance import Disturbance
 
+POSITION_DRIFT_M, HEADING_DRIFT_RAD = 0.005, 0.002
+"""Standard deviations that odometry gathers in a second."""
 
-@dataclass(frozen=True, slots=True)
-class FilterParams:
-    """How far the estimate is trusted between measurements.
-
-    Attributes:
-        position_drift_m: standard deviation that odometry gathers in a second.
-        heading_drift_rad: likewise.
-        speed_drift_m_s: standard deviation of speed changes within a second that the
-            commands do not reveal.
-    """
-
-    position_drift_m: float = 0.005
-    heading_drift_rad: float = 0.002
-    speed_drift_m_s: float = 0.1
+SPEED_DRIFT_M_S = 0.1
+"""Standard deviation of speed changes within a second that commands do not reveal."""
 
 
 class Sensing:
@@ -67,18 +56,11 @@ class Sensing:
 class FilteredSensing(Sensing):
     """Sees noisy, late measurements through a filter."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        disturbance: Disturbance,
-        period_s: float,
-        params: FilterParams | None = None,
-    ) -> None:
+    def __init__(self, scene: Scene, disturbance: Disturbance, period_s: float) -> None:
         """Set up noise, delay and filter of the robots of `scene`, one look a period.
 
         The filter knows where its robots were meant to start.
         """
-        params = params or FilterParams()
         robots = disturbance.robots
         self._period_s = period_s
         self._wheelbase_m = np.array([item.model.wheelbase_m for item in scene.robots])
@@ -94,13 +76,9 @@ class FilteredSensing(Sensing):
             ]
         )
         self._speed_noise = np.array([item.speed_noise_m_s for item in robots])
-        drift = np.array(
-            [params.position_drift_m, params.position_drift_m, params.heading_drift_rad]
-        )
+        drift = np.array([POSITION_DRIFT_M, POSITION_DRIFT_M, HEADING_DRIFT_RAD])
         self._gain = _kalman_gain(drift, self._noise, period_s)
-        self._speed_gain = _kalman_gain(
-            np.array(params.speed_drift_m_s), self._speed_noise, period_s
-        )
+        self._speed_gain = _kalman_gain(SPEED_DRIFT_M_S, self._speed_noise, period_s)
         self._rng = [
             seeding.stream(disturbance.seed, "sensors", item.robot) for item in robots
         ]
@@ -182,7 +160,9 @@ def sensing_of(scene: Scene, disturbance: Disturbance, period_s: float) -> Sensi
 _LEAST_NOISE = 1e-3
 
 
-def _kalman_gain(drift: np.ndarray, noise: np.ndarray, period_s: float) -> np.ndarray:
+def _kalman_gain(
+    drift: np.ndarray | float, noise: np.ndarray, period_s: float
+) -> np.ndarray:
     """Return K for a drift a second and a noise a measurement."""
     q = drift**2 * period_s
     r = np.maximum(noise, _LEAST_NOISE) ** 2

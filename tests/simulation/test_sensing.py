@@ -139,14 +139,12 @@ def test_noise_is_that_of_the_seed(scene: Scene) -> None:
     assert not np.array_equal(one, other)
 
 
-def test_noise_is_white_before_the_filter(scene: Scene) -> None:
+def test_noise_is_white_before_the_filter(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """With a filter that trusts measurements alone, the noise comes through as is."""
-    from mrmg.simulation.sensing import FilterParams
-
-    credulous = FilterParams(position_drift_m=1e3)
-    sensing = FilteredSensing(
-        scene, disturbed(position_noise_m=0.05), PERIOD_S, credulous
-    )
+    monkeypatch.setattr("mrmg.simulation.sensing.POSITION_DRIFT_M", 1e3)
+    sensing = filtered(scene, disturbed(position_noise_m=0.05))
     truth = circle(60.0)
     noise = (seen(sensing, truth) - truth)[:, 0, 0]
     assert noise.std() == pytest.approx(0.05, rel=0.05)
