@@ -113,11 +113,7 @@ class Elevation:
 
     def cell_centres(self) -> np.ndarray:
         """Return the middle of each cell [m], shape (ny - 1, nx - 1, 2)."""
-        x_min, y_min, _, _ = self.bounds
-        rows, columns = self.height_m.shape
-        dx, dy = self.cell_m
-        x = x_min + (np.arange(columns - 1) + 0.5) * dx
-        y = y_min + (np.arange(rows - 1) + 0.5) * dy
+        x, y = (0.5 * (nodes[1:] + nodes[:-1]) for nodes in self.nodes_m)
         return np.stack(np.meshgrid(x, y), axis=-1)
 
     @cached_property

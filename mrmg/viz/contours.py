@@ -22,13 +22,7 @@ def contour_lines(scene: Scene) -> Iterator[tuple[float, np.ndarray]]:
     elevation = scene.elevation
     if elevation is None:
         return
-    x_min, y_min, x_max, y_max = scene.bounds
-    rows, columns = elevation.height_m.shape
-    lines = contour_generator(
-        np.linspace(x_min, x_max, columns),
-        np.linspace(y_min, y_max, rows),
-        elevation.height_m,
-    )
+    lines = contour_generator(*elevation.nodes_m, elevation.height_m)
     for level in levels_m(
         float(elevation.height_m.min()), float(elevation.height_m.max())
     ):

@@ -14,6 +14,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from unittest import mock
 
 from mrmg.errors import MachineError
 
@@ -79,27 +80,14 @@ def offscreen_context(width: int, height: int) -> Iterator[str]:
         MachineError: if no backend works on this machine.
     """
     backend = choose_backend()
-    with _platform(backend):
+    # PyOpenGL takes its platform from the environment at first import.
+    with mock.patch.dict(os.environ, {"PYOPENGL_PLATFORM": backend}):
         context = importlib.import_module(f"mujoco.{backend}").GLContext(width, height)
     context.make_current()
     try:
         yield backend
     finally:
         context.free()
-
-
-@contextmanager
-def _platform(backend: str) -> Iterator[None]:
-    # PyOpenGL takes its platform from the environment at first import.
-    before = os.environ.get("PYOPENGL_PLATFORM")
-    os.environ["PYOPENGL_PLATFORM"] = backend
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["PYOPENGL_PLATFORM"]
-        else:
-            os.environ["PYOPENGL_PLATFORM"] = before
 
 
 def _why_not(backend: str) -> str | None:
