@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from mrmg import storage
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
 
     from mrmg.planning import Improvement
     from mrmg.runs.arguments import RunArguments
-    from mrmg.runs.folder import Step
     from mrmg.runs.steps import StepProgress
 
 _DOING = {
@@ -33,17 +33,20 @@ _DOING = {
 
 
 @contextmanager
-def progress() -> Iterator[StepProgress | None]:
-    """Yield a callback that draws one bar per step; None away from a terminal."""
+def progress() -> Iterator[Callable[[str, float, str], None] | None]:
+    """Yield a callback that draws one bar per step; None away from a terminal.
+
+    Steps that are none of a run are called on the bar what they are called.
+    """
     with _bars() as bars:
         if bars is None:
             yield None
             return
-        tasks: dict[Step, Any] = {}
+        tasks: dict[str, Any] = {}
 
-        def report(step: Step, fraction: float, text: str) -> None:
+        def report(step: str, fraction: float, text: str) -> None:
             if step not in tasks:
-                tasks[step] = bars.add_task(_DOING[step], total=1.0, note="")
+                tasks[step] = bars.add_task(_DOING.get(step, step), total=1.0, note="")
             bars.update(tasks[step], completed=fraction, note=text)
 
         yield report
@@ -56,12 +59,8 @@ def progress_of(doing: str) -> Iterator[Callable[[float, str], None] | None]:
     Args:
         doing: what the bar calls the work.
     """
-    with _bars() as bars:
-        if bars is None:
-            yield None
-            return
-        task = bars.add_task(doing, total=1.0, note="")
-        yield lambda done, text: bars.update(task, completed=done, note=text)
+    with progress() as report:
+        yield report and partial(report, doing)
 
 
 @contextmanager
