@@ -107,6 +107,18 @@ class MachineError(MrmgError):
     exit_code = ExitCode.MACHINE
 
 
+def require_known(what: str, name: str, names: Iterable[str]) -> None:
+    """Refuse a name that is none of some.
+
+    Raises:
+        UsageError: naming those there are, and the most similar one.
+    """
+    known = list(names)
+    if name not in known:
+        text = f"{what} '{name}' is not known{nearest(name, known)}"
+        raise UsageError(f"{text}; allowed: {', '.join(known)}")
+
+
 def nearest(name: str, names: Iterable[str], *, cutoff: float = 0.5) -> str:
     """Return " (did you mean '...'?)" for the most similar of `names`, or nothing."""
     match = difflib.get_close_matches(name, list(names), n=1, cutoff=cutoff)

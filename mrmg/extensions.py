@@ -17,7 +17,7 @@ from functools import cache, wraps
 from importlib.metadata import PackageNotFoundError, entry_points, version
 from typing import Any
 
-from mrmg.errors import MachineError, MrmgError, UsageError, nearest
+from mrmg.errors import MachineError, MrmgError, UsageError, require_known
 
 PLANNERS, ROUTERS = "mrmg.planners", "mrmg.routers"
 """Groups of entry points."""
@@ -43,14 +43,8 @@ def require(group: str, name: str) -> str:
     Raises:
         UsageError: if there is none of that name; lists those there are.
     """
-    if name in BUILT_IN[group]:
-        return name  # what is installed need not be looked through
-    known = names(group)
-    if name not in known:
-        raise UsageError(
-            f"{_KIND[group]} {name!r} is not known{nearest(name, known)}; allowed: "
-            f"{', '.join(known)}"
-        )
+    if name not in BUILT_IN[group]:  # or what is installed need not be looked through
+        require_known(_KIND[group], name, names(group))
     return name
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from mrmg.errors import UsageError, nearest
+from mrmg.errors import require_known
 
 if TYPE_CHECKING:
     from mrmg.export.mission import Mission
@@ -47,12 +47,7 @@ def load_format(name: str) -> Format:
     Raises:
         UsageError: if there is none of that name.
     """
-    names = format_names()
-    if name not in names:
-        allowed = ", ".join(names)
-        raise UsageError(
-            f"format {name!r} is unknown{nearest(name, names)}; allowed: {allowed}"
-        )
+    require_known("format", name, format_names())
     module = importlib.import_module(f"{_FORMATS}.{name}")
     loaded: Format = module.FORMAT
     return loaded

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from mrmg import shipped, storage
-from mrmg.errors import UsageError
+from mrmg.errors import UsageError, require_known
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]*")
 
@@ -22,9 +22,7 @@ def new_robot(folder: Path, *, like: str = "car") -> list[Path]:
     Raises:
         UsageError: if there is something in that place, or a name cannot be used.
     """
-    names = shipped.model_names()
-    if like not in names:
-        raise UsageError(f"unknown model '{like}'; shipped models: {', '.join(names)}")
+    require_known("shipped model", like, shipped.model_names())
     name = require_new_model(folder, "give another name")
     source = shipped.models_folder() / like
     text = (source / "robot.yaml").read_text(encoding="utf-8")

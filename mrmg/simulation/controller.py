@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from mrmg.errors import UsageError
+from mrmg.errors import require_known
 from mrmg.scene.robot_model import RobotModel
 
 HORIZON = 20
@@ -49,9 +49,7 @@ def controller_maker(name: str) -> Callable[[RobotModel], Controller]:
     Raises:
         UsageError: if there is none of that name.
     """
-    if name not in _MAKERS:
-        allowed = ", ".join(controller_names())
-        raise UsageError(f"controller '{name}' is not known; allowed: {allowed}")
+    require_known("controller", name, controller_names())
     module, attribute = _MAKERS[name]
     maker: Callable[[RobotModel], Controller] = getattr(
         import_module(module), attribute

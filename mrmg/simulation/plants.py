@@ -7,7 +7,6 @@ from typing import Protocol
 
 import numpy as np
 
-from mrmg.errors import UsageError
 from mrmg.mujoco_import import mujoco
 from mrmg.simulation.disturbance import Disturbance
 from mrmg.simulation.fleet import Fleet
@@ -56,7 +55,7 @@ def plant_of(
 ) -> Plant:
     """Return the plant of that name, its robots on plain ground before the first tick.
 
-    The coefficients are those of the MJCF, and what disturbs them. `require_plant` has
+    The coefficients are those of the MJCF, and what disturbs them. `simulate` has
     allowed the name.
     """
     law = true_resistance(world, disturbance)
@@ -66,13 +65,3 @@ def plant_of(
     # Every wheel loses for itself, from the first tick on.
     fleet.set_resistance(0.0 * law.rolling_N, 0.0 * law.swing_N)
     return ScrubbingTyres(world, data, law.rolling_N)
-
-
-def require_plant(name: str) -> None:
-    """Refuse a plant that there is none of.
-
-    Raises:
-        UsageError: naming those that there are.
-    """
-    if name not in PLANTS:
-        raise UsageError(f"plant '{name}' is not known; allowed: {', '.join(PLANTS)}")

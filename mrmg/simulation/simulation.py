@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from mrmg.errors import require_known
 from mrmg.mujoco_import import mujoco
 from mrmg.plans import Plan
 from mrmg.scene.driven_parts import require_drivable
@@ -28,7 +29,7 @@ from mrmg.simulation.ground import (
     believed_resistance,
 )
 from mrmg.simulation.log import ExecutionLog, package_versions, require_same_mission
-from mrmg.simulation.plants import DEFAULT_PLANT, plant_of, require_plant
+from mrmg.simulation.plants import DEFAULT_PLANT, PLANTS, plant_of
 from mrmg.simulation.recording import Recording
 from mrmg.simulation.reference import FleetReference, speed_states
 from mrmg.simulation.sensing import sensing_of
@@ -82,7 +83,7 @@ def simulate(
         IdentityError: if the plan is of another scene.
     """
     maker = controller_maker(controller)
-    require_plant(plant)
+    require_known("plant", plant, PLANTS)
     require_same_mission(scene, plan)
     require_drivable(scene.robots)
     controllers = [maker(robot.model) for robot in scene.robots]

@@ -20,7 +20,7 @@ from itertools import islice
 from multiprocessing import get_context
 from typing import Any, TypeVar
 
-from mrmg.errors import MachineError, UsageError
+from mrmg.errors import MachineError, UsageError, require_known
 from mrmg.extras import import_extra
 from mrmg.interruption import end_with_parent, sheltered_children
 
@@ -52,8 +52,7 @@ class Engine:
     scheduler: str | None = None
 
     def __post_init__(self) -> None:
-        if self.kind not in ENGINES:
-            raise UsageError(f"engine {self.kind!r}; allowed: {', '.join(ENGINES)}")
+        require_known("engine", self.kind, ENGINES)
         if self.workers is not None and self.workers < 1:
             raise UsageError(f"workers = {self.workers}; at least 1 is needed")
         if self.scheduler is not None and self.kind != "dask":

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from matplotlib import rc_context
 
-from mrmg.errors import Fault, RunFolderError, UsageError
+from mrmg.errors import Fault, RunFolderError, require_known
 from mrmg.runs.record import read_record
 from mrmg.viz.energy_plot import draw_energy
 from mrmg.viz.figures import FOR_PRINT, require_format
@@ -38,8 +38,7 @@ def draw_figure(
         UsageError: if kind or suffix is unknown.
         RunFolderError: if the run has no plan, or cannot be read.
     """
-    if kind not in _DRAW:
-        raise UsageError(f"kind {kind!r} is unknown; use one of {', '.join(KINDS)}")
+    require_known("kind", kind, KINDS)
     require_format(path)
     record = read_record(run_folder, trust_code=trust_code)
     if record.plan is None:

@@ -79,7 +79,10 @@ def test_a_new_model_is_valid_as_it_is(
         (["car"], "'car' cannot name a robot model"),
         (["my robot"], "cannot name"),
         ([".."], "cannot name"),
-        (["other", "--like", "boat"], "unknown model 'boat'; shipped models: car"),
+        (
+            ["other", "--like", "boat"],
+            "shipped model 'boat' is not known",
+        ),
     ],
 )
 def test_new_refuses(

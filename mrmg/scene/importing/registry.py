@@ -14,7 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from mrmg.errors import Fault, SceneError, UsageError, nearest
+from mrmg.errors import Fault, SceneError, require_known
 from mrmg.scene.importing.layers import ImportOptions, Layer
 from mrmg.scene.loading.yaml_text import parse_yaml, read_text, read_yaml
 
@@ -109,9 +109,7 @@ def format_of(path: Path, kind: str | None = None) -> Format:
     """
     known = formats()
     if kind is not None:
-        if kind not in known:
-            names = ", ".join(known)
-            raise UsageError(f"unknown kind '{kind}'{nearest(kind, known)}; of {names}")
+        require_known("kind", kind, known)
         return known[kind]
     head = Head(path)
     for entry in known.values():
