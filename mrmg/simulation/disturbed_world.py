@@ -7,8 +7,8 @@ import numpy as np
 from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import ROOT
 from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
-from mrmg.simulation.slopes import standing_pose
 from mrmg.simulation.world_model import MujocoWorld
+from mrmg.world.elevation import ground_poses
 
 
 def disturb_world(world: MujocoWorld, disturbance: Disturbance) -> None:
@@ -36,12 +36,6 @@ def move_starts(
         if not (item.start_x_m or item.start_y_m or item.start_heading_rad):
             continue
         root = world.model.joint(f"{robot.id}/{ROOT}")
-        x, y, yaw = robot.pose
-        position, orientation = standing_pose(
-            world.scene,
-            x + item.start_x_m,
-            y + item.start_y_m,
-            yaw + item.start_heading_rad,
-        )
-        pose = data.qpos[int(root.qposadr[0]) :][:7]
-        pose[:3], pose[3:] = position, orientation
+        moved = (item.start_x_m, item.start_y_m, item.start_heading_rad)
+        pose = np.add(robot.pose, moved)[None]
+        data.qpos[int(root.qposadr[0]) :][:7] = ground_poses(world.scene, pose)[0]

@@ -6,9 +6,7 @@ import math
 
 import numpy as np
 
-from mrmg.mujoco_import import mujoco
 from mrmg.scene.types import Scene
-from mrmg.world.elevation import gradient_at, height_at
 
 
 class SlopesUnderfoot:
@@ -40,28 +38,3 @@ class SlopesUnderfoot:
             level.append(1.0 / math.hypot(1.0, rise))
             slope.append(rise * level[-1])
         return np.array(level), np.array(slope)
-
-
-def standing_pose(
-    scene: Scene, x: float, y: float, yaw: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return position [m] and orientation (w, x, y, z) of a robot on the ground.
-
-    Its up is the ground's normal, and its forward axis shows the yaw on the map.
-    """
-    if scene.elevation is None:
-        turn = np.array([np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
-        return np.array([x, y, 0.0]), turn
-    place = np.array([[x, y]])
-    slope_x, slope_y = gradient_at(scene, place)[0]
-    heading = np.array([np.cos(yaw), np.sin(yaw)])
-    forward = _unit(np.array([*heading, heading @ (slope_x, slope_y)]))
-    up = _unit(np.array([-slope_x, -slope_y, 1.0]))
-    axes = np.stack([forward, np.cross(up, forward), up], axis=1)
-    orientation = np.empty(4)
-    mujoco.mju_mat2Quat(orientation, axes.ravel())
-    return np.array([x, y, height_at(scene, place)[0]]), orientation
-
-
-def _unit(vector: np.ndarray) -> np.ndarray:
-    return np.asarray(vector / np.linalg.norm(vector))

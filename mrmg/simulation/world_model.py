@@ -13,7 +13,7 @@ from mrmg.scene.driven_parts import CHASSIS, HULL, require_drivable
 from mrmg.scene.loading.mjcf import no_warning_file
 from mrmg.scene.types import Robot, Scene
 from mrmg.simulation import palette, scenery
-from mrmg.simulation.slopes import standing_pose
+from mrmg.world.elevation import ground_poses
 
 PHYSICS_STEP_S = 0.004
 """Short enough for the stiff tyres; contact softness scales with it."""
@@ -163,8 +163,8 @@ def _attach(
     except (ValueError, OSError) as error:
         fault = Fault("", f"no usable MJCF for model '{robot.model.name}' ({error})")
         raise FileError(str(path), [fault]) from error
-    position, orientation = standing_pose(scene, *robot.pose)
-    frame = spec.worldbody.add_frame(pos=position, quat=orientation)
+    (pose,) = ground_poses(scene, np.array([robot.pose]))
+    frame = spec.worldbody.add_frame(pos=pose[:3], quat=pose[3:])
     spec.attach(car, prefix=f"{robot.id}/", frame=frame)
     paint = spec.material(f"{robot.id}/paint")
     if paint is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
@@ -71,3 +72,25 @@ def gradient_at(scene: Scene, points: np.ndarray) -> np.ndarray:
     if scene.elevation is None:
         return np.zeros((len(points), 2))
     return scene.elevation.gradient_at(points)
+
+
+def ground_poses(scene: Scene, poses: np.ndarray) -> np.ndarray:
+    """Return poses on the ground, shape (n, 3) -> (n, 7), of (x, y, yaw) on the map.
+
+    Each is a position (x, y, z) and an orientation (w, x, y, z): up is the ground's
+    normal, and the forward axis shows the yaw on the map.
+    """
+    points, yaw = poses[:, :2], poses[:, 2]
+    place = lifted(scene, points, 0.0)
+    if scene.elevation is None:
+        level = np.zeros(len(poses))
+        half = 0.5 * yaw
+        return np.column_stack([place, np.cos(half), level, level, np.sin(half)])
+    slope = gradient_at(scene, points)
+    heading = np.stack([np.cos(yaw), np.sin(yaw)], axis=1)
+    forward = np.column_stack([heading, (heading * slope).sum(axis=1)])
+    up = np.column_stack([-slope, np.ones(len(slope))])
+    axes = np.stack([forward, np.cross(up, forward), up], axis=2)
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    turn = Rotation.from_matrix(axes).as_quat(scalar_first=True)
+    return np.column_stack([place, turn])

@@ -16,9 +16,9 @@ from mrmg.simulation.ground_shape import FOUNDATION_M, draped_mark, height_span
 from mrmg.simulation.log import ExecutionLog
 from mrmg.simulation.scenery import FLOOR
 from mrmg.simulation.simulation import simulate
-from mrmg.simulation.slopes import SlopesUnderfoot, standing_pose
+from mrmg.simulation.slopes import SlopesUnderfoot
 from mrmg.simulation.world_model import build_world
-from mrmg.world.elevation import height_at
+from mrmg.world.elevation import ground_poses, height_at
 
 HILLS = {"hills": [{"center": [0, 0], "height": 2.0, "radius": 20}]}
 
@@ -154,7 +154,8 @@ def test_robots_start_upright_on_the_ground(driving: SimpleNamespace) -> None:
     for _ in range(50):
         x, y = rng.uniform(-18.0, 18.0, 2)
         yaw = rng.uniform(-3.0, 3.0)
-        position, orientation = standing_pose(scene, x, y, yaw)
+        (pose,) = ground_poses(scene, np.array([[x, y, yaw]]))
+        position, orientation = pose[:3], pose[3:]
         axes = np.empty(9)
         mujoco.mju_quat2Mat(axes, orientation)
         forward, left, up = axes.reshape(3, 3).T
@@ -165,7 +166,8 @@ def test_robots_start_upright_on_the_ground(driving: SimpleNamespace) -> None:
             assert rise == pytest.approx(axis[2], abs=2e-3)
         assert up[2] > 0.9
     flat = driving.open_ground([(0.0, 0.0, 0.0)])
-    position, orientation = standing_pose(flat, 1.0, 2.0, 0.6)
+    (pose,) = ground_poses(flat, np.array([[1.0, 2.0, 0.6]]))
+    position, orientation = pose[:3], pose[3:]
     assert position.tolist() == [1.0, 2.0, 0.0]
     assert orientation == pytest.approx([np.cos(0.3), 0.0, 0.0, np.sin(0.3)])
 

@@ -21,7 +21,6 @@ from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from mrmg import __version__
 from mrmg.energy.metering import Motion
@@ -37,7 +36,7 @@ from mrmg.export.table import Files, Format
 from mrmg.extras import import_extra
 from mrmg.scene.types import Scene
 from mrmg.simulation import palette
-from mrmg.world.elevation import gradient_at, lifted
+from mrmg.world.elevation import ground_poses
 
 TF_PERIOD_S = 0.05
 POSE_PERIOD_S = 0.1
@@ -157,7 +156,7 @@ def _path(ros: RosTypes, scene: Scene, motion: Motion) -> Any:
         pose_stamped(ros.header(time_s), ros.pose(pose[:3], pose[3:]))
         for time_s, pose in zip(
             motion.time_s[at].tolist(),
-            _poses_3d(scene, motion.state[at]).tolist(),
+            _ros_poses(scene, motion.state[at]).tolist(),
             strict=True,
         )
     ]
@@ -200,7 +199,7 @@ def _transforms(
         )
 
     at = every(mission.time_s, TF_PERIOD_S)
-    poses = [_poses_3d(mission.scene, course.state[at]) for course in mission.courses]
+    poses = [_ros_poses(mission.scene, course.state[at]) for course in mission.courses]
     time_s = mission.time_s[at]
     messages = ros.encoded_series(kind, message_of, time_s, np.hstack(poses))
     for at_s, cdr in zip(time_s.tolist(), messages, strict=True):
@@ -217,7 +216,7 @@ def _poses(
         return ros[kind](header, ros.pose(numbers[:3], numbers[3:]))
 
     at = every(course.time_s, POSE_PERIOD_S)
-    time_s, poses = course.time_s[at], _poses_3d(scene, course.state[at])
+    time_s, poses = course.time_s[at], _ros_poses(scene, course.state[at])
     messages = ros.encoded_series(kind, message_of, time_s, poses)
     for at_s, cdr in zip(time_s.tolist(), messages, strict=True):
         yield _Message(at_s, topic, kind, cdr)
@@ -254,20 +253,9 @@ def _battery(ros: RosTypes, course: Course, topic: str) -> Iterator[_Message]:
         yield _Message(time_s, topic, kind, ros.encoded(kind, state))
 
 
-def _poses_3d(scene: Scene, state: np.ndarray) -> np.ndarray:
-    """Return poses on the ground: x, y, z and a quaternion x, y, z, w, shape (n, 7).
-
-    The x axis points along the heading, the z axis along the normal of the ground.
-    """
-    points, heading = state[:, :2], state[:, 2]
-    slope = gradient_at(scene, points)
-    flat = np.stack([np.cos(heading), np.sin(heading)], axis=-1)
-    forward = np.column_stack([flat, np.sum(flat * slope, axis=1)])
-    normal = np.column_stack([-slope, np.ones(len(slope))])
-    axes = np.stack([forward, np.cross(normal, forward), normal], axis=-1)
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    turn = Rotation.from_matrix(axes).as_quat()
-    return np.column_stack([lifted(scene, points, 0.0), turn])
+def _ros_poses(scene: Scene, state: np.ndarray) -> np.ndarray:
+    """Return poses on the ground: x, y, z and a quaternion x, y, z, w, shape (n, 7)."""
+    return ground_poses(scene, state[:, :3])[:, [0, 1, 2, 4, 5, 6, 3]]
 
 
 FORMAT = Format(suffix=".mcap", files=files)
