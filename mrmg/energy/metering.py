@@ -24,10 +24,11 @@ from mrmg.energy.visits import (
     battery_contents,
     first_stay,
     recharging,
+    visit_of,
 )
 from mrmg.motion.dynamics import TURN_SPEEDS
 from mrmg.plans import Visit
-from mrmg.scene.types import Robot, Scene, Station
+from mrmg.scene.types import Robot, Scene
 from mrmg.world.elevation import height_at, load_points
 from mrmg.world.terrain import multiplier_at, turning_multiplier_at
 
@@ -197,16 +198,7 @@ def visits_and_energy(
         if stay is None:
             continue
         step = stay.over
-        visits.append(
-            Visit(
-                robot=motion.robot,
-                target=name,
-                kind="station" if isinstance(target, Station) else "goal",
-                step=stay.first,
-                time_s=float(motion.time_s[stay.first]),
-                energy_J=0.0,
-            )
-        )
+        visits.append(visit_of(motion.robot, target, motion.time_s, stay.first))
     if energy_J is None:
         energy_J = step_energy_parts(scene, motion)
     draw_J = energy_J.sum(axis=1)

@@ -61,6 +61,14 @@ def is_at(
     return at & (np.abs(off_rad) <= target.heading_tolerance_rad)
 
 
+def visit_of(
+    robot: str, target: Goal | Station, time_s: np.ndarray, step: int
+) -> Visit:
+    """Return a robot's visit from a step on, with its battery's content left at 0."""
+    kind = "station" if isinstance(target, Station) else "goal"
+    return Visit(robot, target.id, kind, step, float(time_s[step]), 0.0)
+
+
 def first_stay(
     target: Goal | Station, time_s: np.ndarray, poses: np.ndarray, start: int
 ) -> Stay | None:

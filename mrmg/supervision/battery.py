@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from mrmg.energy.metering import LoggedMotion, battery_content
-from mrmg.energy.visits import Stay, first_stay, is_at
-from mrmg.plans import Visit
-from mrmg.scene.types import Robot, Scene, Station
+from mrmg.energy.visits import Stay, first_stay, is_at, visit_of
+from mrmg.scene.types import Robot, Scene
 
 
 class BatteryTracker:
@@ -48,7 +47,7 @@ class BatteryTracker:
         self._draw_J = np.concatenate([self._draw_J, draw_J])
         stays = self._stays()
         visits = [
-            self._visit(name, stay.first)
+            visit_of(self._robot.id, self._targets[name], self._time_s, stay.first)
             for name, stay in zip(self._tour, stays, strict=False)
         ]
         motion = LoggedMotion(
@@ -85,17 +84,6 @@ class BatteryTracker:
                 break
             stays.append(stay)
         return stays
-
-    def _visit(self, name: str, step: int) -> Visit:
-        is_station = isinstance(self._targets[name], Station)
-        return Visit(
-            robot=self._robot.id,
-            target=name,
-            kind="station" if is_station else "goal",
-            step=step,
-            time_s=float(self._time_s[step]),
-            energy_J=0.0,
-        )
 
     def _since_when_at_target(self) -> int:
         """Return the state since which the robot is at its next target, else now."""
