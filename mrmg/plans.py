@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import lru_cache
 from pathlib import Path
@@ -21,6 +21,12 @@ PLAN_FORMAT = 1
 
 DRIVEN_PLAN = "driven_plan"
 """Name of the files of a plan that was joined on the way."""
+
+_DIGESTED = (
+    *("scene_name", "scene_digest", "seed", "profile", "parameters_digest"),
+    *("versions", "dt_s", "tours", "visits"),
+)
+"""Fields that the digest counts as they are."""
 
 _BY_ROBOT = {"content_J": ".content", "rolling_factor": ".rolling_factor"}
 """Fields with an array for each robot, and what follows its id in the array's name."""
@@ -219,8 +225,8 @@ class Plan:
                 robot: {"obstacle": obstacle_m, "robot": robot_m}
                 for robot, (obstacle_m, robot_m) in self.margins.items()
             },
-            "narrow": [asdict(each) for each in self.narrow],
-            "skipped": dict(self.skipped),
+            "narrow": self.narrow,
+            "skipped": self.skipped,
         }
         storage.write_json(folder / f"{name}.json", {**self._header(), **not_digested})
 
@@ -228,18 +234,10 @@ class Plan:
         makers = {"planner": self.planner, "router": self.router}
         return {
             "format": PLAN_FORMAT,
-            "scene_name": self.scene_name,
-            "scene_digest": self.scene_digest,
-            "seed": self.seed,
-            "profile": self.profile,
-            "parameters_digest": self.parameters_digest,
-            "versions": dict(self.versions),
+            **{name: getattr(self, name) for name in _DIGESTED},
             **{name: made for name, made in makers.items() if made},
-            "dt_s": self.dt_s,
             "robots": [trajectory.robot for trajectory in self.trajectories],
-            "tours": {robot: list(tour) for robot, tour in self.tours.items()},
-            "visits": [asdict(visit) for visit in self.visits],
-            "ledger": self.ledger.to_rows(),
+            "ledger": self.ledger.entries,
         }
 
     @staticmethod

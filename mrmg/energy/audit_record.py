@@ -133,7 +133,7 @@ class EnergyAudit:
 
     def save(self, folder: Path) -> None:
         """Write `audit.json`."""
-        ledgers = {name: getattr(self, name).to_rows() for name in _LEDGERS}
+        ledgers = {name: getattr(self, name).entries for name in _LEDGERS}
         content = {"format": AUDIT_FORMAT, **asdict(self), **ledgers}
         storage.write_json(folder / AUDIT_FILE, content)
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -43,7 +42,3 @@ class EnergyLedger:
     def parts(self) -> tuple[str, ...]:
         """Return the parts that have an entry, in order of appearance."""
         return tuple(dict.fromkeys(entry.part for entry in self.entries))
-
-    def to_rows(self) -> list[dict[str, Any]]:
-        """Return the entries as JSON rows."""
-        return [asdict(entry) for entry in self.entries]
