@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields, make_dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -97,24 +97,12 @@ class Disturbance:
         return replace(scene, robots=tuple(robots))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class DisturbanceRanges:
-    """How far each quantity of `RobotDisturbance` may stray, in its unit."""
+_SPANS = [(quantity.name, Span, Span()) for quantity in fields(RobotDisturbance)[1:]]
+_Spans: Any = make_dataclass("_Spans", _SPANS, frozen=True, kw_only=True)
 
-    mass: Span = Span()
-    friction: Span = Span()
-    rolling: Span = Span()
-    drive_gain: Span = Span()
-    steering_gain: Span = Span()
-    lag_s: Span = Span()
-    position_noise_m: Span = Span()
-    heading_noise_rad: Span = Span()
-    speed_noise_m_s: Span = Span()
-    delay_s: Span = Span()
-    start_x_m: Span = Span()
-    start_y_m: Span = Span()
-    start_heading_rad: Span = Span()
-    capacity: Span = Span()
+
+class DisturbanceRanges(_Spans):  # type: ignore[misc]
+    """How far each quantity of `RobotDisturbance` may stray, in its unit: a `Span`."""
 
     def draw(self, seed: int, robots: Iterable[str]) -> Disturbance:
         """Return the disturbance that `seed` picks for the robots of these ids.
