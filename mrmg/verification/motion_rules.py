@@ -38,8 +38,7 @@ def check_motion(robot: Robot, trajectory: Trajectory) -> list[Violation]:
         *_check_final_rest(robot, trajectory),
         *_check_finish(robot, trajectory),
         *_check_dynamics(robot.model, trajectory),
-        *_check_state_limits(robot.model, trajectory),
-        *_check_control_limits(robot.model, trajectory),
+        *_check_limits(robot.model, trajectory),
     ]
 
 
@@ -172,33 +171,24 @@ def _check_dynamics(model: RobotModel, trajectory: Trajectory) -> list[Violation
     ]
 
 
-def _check_state_limits(model: RobotModel, trajectory: Trajectory) -> list[Violation]:
+def _check_limits(model: RobotModel, trajectory: Trajectory) -> list[Violation]:
     limits = model.limits
     v, w = trajectory.state[:, 3], trajectory.state[:, 4]
+    u1, u2 = np.abs(trajectory.control).T
     name = _components(model)[4]
-    rules = (
+    of_states = (
         ("v", v, v - limits.v_max_m_s, limits.v_max_m_s),
         ("v", v, limits.v_min_m_s - v, limits.v_min_m_s),
         (f"|{name}|", np.abs(w), np.abs(w) - limits.w_max, limits.w_max),
     )
-    return _limit_violations(trajectory, ViolationKind.STATE_LIMIT, rules)
-
-
-def _check_control_limits(model: RobotModel, trajectory: Trajectory) -> list[Violation]:
-    limits = model.limits
-    u1, u2 = np.abs(trajectory.control).T
-    rules = (
+    of_controls = (
         ("|u1|", u1, u1 - limits.u1_max_m_s2, limits.u1_max_m_s2),
         ("|u2|", u2, u2 - limits.u2_max, limits.u2_max),
     )
-    return _limit_violations(trajectory, ViolationKind.CONTROL_LIMIT, rules)
-
-
-def _limit_violations(
-    trajectory: Trajectory,
-    kind: ViolationKind,
-    rules: tuple[tuple[str, np.ndarray, np.ndarray, float], ...],
-) -> list[Violation]:
+    rules = {
+        ViolationKind.STATE_LIMIT: of_states,
+        ViolationKind.CONTROL_LIMIT: of_controls,
+    }
     return [
         violation_at(
             trajectory,
@@ -207,6 +197,7 @@ def _limit_violations(
             "{} is {}, the limit is {}".format(name, *compared(value[step], limit, 3)),
             amount=float(excess[step]),
         )
-        for name, value, excess, limit in rules
+        for kind, own in rules.items()
+        for name, value, excess, limit in own
         for step in worst_of_runs(excess, excess > LIMIT_TOLERANCE)
     ]
