@@ -105,7 +105,7 @@ def entry_of(value: Any) -> Any:
 
 
 def _obstacle_entry(obstacle: Obstacle) -> _Entry:
-    entry = {"id": obstacle.id, **_polygon(obstacle.shape)}
+    entry = {"id": obstacle.id, **polygon_entry(obstacle.shape)}
     entry["height"] = float(obstacle.height_m)
     if obstacle.blocks is not None:
         entry["blocks"] = list(obstacle.blocks)
@@ -113,7 +113,7 @@ def _obstacle_entry(obstacle: Obstacle) -> _Entry:
 
 
 def _terrain_entry(area: TerrainArea) -> _Entry:
-    entry = {"id": area.id, **_polygon(area.shape)}
+    entry = {"id": area.id, **polygon_entry(area.shape)}
     entry["multiplier"] = float(area.multiplier)
     if area.turning_multiplier != 1.0:
         entry["turning_multiplier"] = float(area.turning_multiplier)
@@ -196,7 +196,12 @@ def _elevation(scene: Scene) -> _Entry | None:
     return elevation_entry(scene.elevation)
 
 
-def _polygon(shape: Any) -> _Entry:
+def polygon_entry(shape: Any) -> _Entry:
+    """Return the entry of a polygon's rings.
+
+    Raises:
+        SceneError: if it is none.
+    """
     if not isinstance(shape, shapely.Polygon) or shape.is_empty:
         message = f"got a {shape.geom_type}; expected one polygon, not empty, an entry"
         raise SceneError("scene", [Fault("polygon", message)])

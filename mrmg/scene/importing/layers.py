@@ -15,7 +15,7 @@ from shapely.geometry.base import BaseGeometry
 
 from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError
-from mrmg.scene.document import PACKED_M, packed_heights
+from mrmg.scene.document import PACKED_M, packed_heights, polygon_entry
 from mrmg.scene.importing.frames import Frame
 
 Entry = dict[str, Any]
@@ -220,21 +220,16 @@ def _entries(areas: Iterable[Area], box: Polygon) -> Iterable[Entry]:
         inside = area.shape if box.covers(area.shape) else area.shape & box
         for part in shapely.get_parts(inside):
             if isinstance(part, Polygon) and part.area > _SLIVER_M2:
-                entry = {**_polygon(shapely.orient_polygons(part)), **area.entry}
+                shape = shapely.transform(shapely.orient_polygons(part), _rounded)
+                entry = {**polygon_entry(shape), **area.entry}
                 if "id" in entry:
                     entry["id"] = _unused(_as_id(entry["id"]), used)
                     entry = {"id": entry.pop("id"), **entry}
                 yield entry
 
 
-def _polygon(shape: Polygon) -> Entry:
-    rings = [_corners(ring) for ring in (shape.exterior, *shape.interiors)]
-    return {"polygon": rings[0], **({"holes": rings[1:]} if rings[1:] else {})}
-
-
-def _corners(ring: Any) -> list[list[float]]:
-    corners = np.round(np.array(ring.coords[:-1])[:, :2], _DECIMALS) + 0.0
-    return list(corners.tolist())
+def _rounded(corners: np.ndarray) -> np.ndarray:
+    return np.round(corners, _DECIMALS) + 0.0
 
 
 def _point(entry: Entry) -> shapely.Point:
