@@ -31,23 +31,19 @@ from mrmg.simulation.ground_shape import (
     height_span,
     on_map,
 )
-from mrmg.world.terrain import multiplier_at
 
 _DRAWN_GROUP, _SOLID_GROUP = 1, 3
 
 FLOOR = "floor"
 BOUNDS = "bounds"
 _FLOOR_MARGIN_M = 4.0
-_TEXTURE_PIXELS = 1536
-_GRID_M = 10.0
-_GRID_SHADE = 0.94
 _WALL_HEIGHT_M = 0.5
 _WALL_THICKNESS_M = 0.4
 _TARGET_THICKNESS_M = 0.03
 
 
-def add_floor(spec: mujoco.MjSpec, scene: Scene, *, painted: bool) -> None:
-    """Add the ground, a plane or a field of heights, painted by its terrain or not."""
+def add_floor(spec: mujoco.MjSpec, scene: Scene) -> None:
+    """Add the ground, a plane or a field of heights."""
     x_min, y_min, x_max, y_max = scene.bounds
     half = np.array([x_max - x_min, y_max - y_min]) / 2 + _FLOOR_MARGIN_M
     center = np.array([x_min + x_max, y_min + y_max]) / 2
@@ -64,52 +60,9 @@ def add_floor(spec: mujoco.MjSpec, scene: Scene, *, painted: bool) -> None:
             "hfieldname": FLOOR,
             "pos": [*center, foot_m],
         }
-    if painted:
-        _add_paint(spec, _floor_image(scene, center, half))
-        ground["material"] = FLOOR
     spec.worldbody.add_geom(
         name=FLOOR, contype=FLOOR_BIT, conaffinity=0, castshadow=False, **ground
     )
-
-
-def _add_paint(spec: mujoco.MjSpec, image: np.ndarray) -> None:
-    """Add the material of the ground, with an image of shape (h, w, 3)."""
-    texture = spec.add_texture(
-        name=FLOOR,
-        type=mujoco.mjtTexture.mjTEXTURE_2D,
-        colorspace=mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR,
-        height=image.shape[0],
-        width=image.shape[1],
-        nchannel=3,
-    )
-    texture.data = image.tobytes()
-    material = spec.add_material(name=FLOOR, specular=0.0, shininess=0.0)
-    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = FLOOR
-
-
-def _floor_image(scene: Scene, center: np.ndarray, half: np.ndarray) -> np.ndarray:
-    """Return the ground seen from above, north up, shape (h, w, 3) of bytes."""
-    pixel_m = 2.0 * half.max() / _TEXTURE_PIXELS
-    columns, rows = np.maximum(np.round(2.0 * half / pixel_m), 1).astype(int)
-    x = center[0] - half[0] + (np.arange(columns) + 0.5) * 2.0 * half[0] / columns
-    y = center[1] + half[1] - (np.arange(rows) + 0.5) * 2.0 * half[1] / rows
-    grid_x, grid_y = np.meshgrid(x, y)
-    points = np.stack([grid_x.ravel(), grid_y.ravel()], axis=1)
-    classes = np.unique([1.0, *(area.multiplier for area in scene.terrain)])
-    colours = np.array([palette.terrain_colour(multiplier) for multiplier in classes])
-    of_pixel = np.searchsorted(classes, multiplier_at(scene, points))
-    on_grid = _on_grid(y, pixel_m)[:, None] | _on_grid(x, pixel_m)[None]
-    tints = _bytes(np.concatenate([colours, _GRID_SHADE * colours]))
-    tint = of_pixel.reshape(rows, columns) + len(classes) * on_grid
-    return np.asarray(tints[tint])
-
-
-def _on_grid(at_m: np.ndarray, width_m: float) -> np.ndarray:
-    return np.abs((at_m + _GRID_M / 2) % _GRID_M - _GRID_M / 2) < width_m
-
-
-def _bytes(colours: np.ndarray) -> np.ndarray:
-    return np.asarray(np.round(255.0 * colours), dtype=np.uint8)
 
 
 def add_obstacle(

@@ -47,13 +47,10 @@ class MujocoWorld:
     chassis: np.ndarray
 
 
-def build_world(scene: Scene, *, drawn: bool = True) -> MujocoWorld:
+def build_world(scene: Scene) -> MujocoWorld:
     """Build and compile the MuJoCo world of a scene.
 
-    Args:
-        scene: what to build.
-        drawn: whether it is to be looked at; painting the ground takes longer than
-            all else.
+    What is drawn of the ground is left to those who look at it.
 
     Raises:
         FileError: if a robot's MJCF cannot be used, or MuJoCo cannot hold the scene.
@@ -61,19 +58,19 @@ def build_world(scene: Scene, *, drawn: bool = True) -> MujocoWorld:
     """
     try:
         with no_warning_file():
-            return _built(scene, drawn)
+            return _built(scene)
     except ValueError as error:
         reason = " ".join(str(error).split())
         fault = Fault("", f"MuJoCo cannot build its world: {reason}")
         raise FileError(scene.name, [fault]) from error
 
 
-def _built(scene: Scene, drawn: bool) -> MujocoWorld:
+def _built(scene: Scene) -> MujocoWorld:
     spec = mujoco.MjSpec()
     spec.modelname = "mrmg"
     _set_options(spec, len(scene.robots))
     _set_appearance(spec, scene)
-    scenery.add_floor(spec, scene, painted=drawn)
+    scenery.add_floor(spec, scene)
     scenery.add_bounds(spec, scene)
     scenery.add_targets(spec, scene)
     for index, robot in enumerate(scene.robots):

@@ -226,9 +226,18 @@ def drawable_spec(
     """
     # Cost grows with the number of vertices, so round things get few.
     spec = world.spec.copy()
-    texture = spec.texture(FLOOR)
-    texture.height, texture.width = ground.shape[:2]
+    texture = spec.add_texture(
+        name=FLOOR,
+        type=mujoco.mjtTexture.mjTEXTURE_2D,
+        colorspace=mujoco.mjtColorSpace.mjCOLORSPACE_LINEAR,
+        height=ground.shape[0],
+        width=ground.shape[1],
+        nchannel=3,
+    )
     texture.data = ground.tobytes()
+    material = spec.add_material(name=FLOOR, specular=0.0, shininess=0.0)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = FLOOR
+    spec.geom(FLOOR).material = FLOOR
     quality = spec.visual.quality
     quality.numslices, quality.numstacks, quality.numquads = _SLICES, _STACKS, 1
     quality.shadowsize = _SHADOW_PIXELS

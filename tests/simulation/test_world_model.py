@@ -15,7 +15,6 @@ from shapely.geometry import Polygon, box
 
 from mrmg.errors import FileError
 from mrmg.scene.types import Scene
-from mrmg.simulation import palette
 from mrmg.simulation.contacts import ContactWatch
 from mrmg.simulation.world_model import MujocoWorld, build_world
 
@@ -190,21 +189,6 @@ def test_drawn_obstacles_have_the_volume_of_their_prisms(world: MujocoWorld) -> 
         volume = np.linalg.det(corner).sum() / 6
         expected_m3 = obstacle.shape.area * obstacle.height_m
         assert volume == pytest.approx(expected_m3, rel=1e-4)
-
-
-def test_floor_shows_the_terrain(world: MujocoWorld) -> None:
-    """The pixel under a point has the colour of its multiplier; north is up."""
-    model = world.model
-    texture = model.texture("floor")
-    height, width = int(texture.height[0]), int(texture.width[0])
-    data = model.tex_data[texture.adr[0] :][: 3 * height * width]
-    image = data.reshape(height, width, 3)
-    half = model.geom("floor").size[:2]
-    for point, multiplier in (((-7.0, 9.0), 3.0), ((7.0, 9.0), 1.0), ((-7, -9), 1.0)):
-        column = int((point[0] + half[0]) / (2 * half[0]) * width)
-        row = int((half[1] - point[1]) / (2 * half[1]) * height)
-        colour = np.array(palette.terrain_colour(multiplier)) * 255
-        np.testing.assert_allclose(image[row, column], colour, atol=1)
 
 
 def test_equal_scenes_give_equal_worlds(scene: Scene, world: MujocoWorld) -> None:
