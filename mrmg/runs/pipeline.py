@@ -158,7 +158,7 @@ def rehearse(scene: Scene) -> list[str]:
         return [str(error)]
     from mrmg.simulation import build_world
 
-    build_world(scene)
+    build_world(scene, drawn=False)
     return []
 
 

@@ -65,14 +65,14 @@ class SetPoints:
         """
         horizon = self._reference.paced(clock_s, rate, HORIZON_STEP_S, HORIZON + 1)
         start = np.concatenate([state[:, :3], self.following], axis=1)
+        waits = _stand(horizon) if rate > 0.0 else np.zeros(len(start), np.bool_)
+        self._correction[waits] = 0.0
         calls.begin()
-        for index, controller in enumerate(self._controllers):
+        for index in np.flatnonzero(~waits).tolist():
+            controller = self._controllers[index]
             own = horizon[:, index]
-            if rate > 0.0 and _stands(own):
-                self._correction[index] = 0.0
-            else:
-                self._correction[index] = controller.correct(start[index], own)
-                calls.note(index, controller)
+            self._correction[index] = controller.correct(start[index], own)
+            calls.note(index, controller)
 
     def advance(
         self,
@@ -123,13 +123,10 @@ class SetPoints:
         self.following = self.now - np.clip(self.now, -change, change)
 
 
-def _stands(horizon: np.ndarray) -> bool:
-    """Return whether a robot stands all along its horizon, shape (n, 5)."""
-    # Most robots move, and that is seen sooner.
-    if not _is_still(horizon[-1, 3]):
-        return False
-    slow = np.abs(horizon[:, 3]).max() < STANDSTILL_M_S
-    return bool(slow and np.ptp(horizon, axis=0).max() < _STILL)
+def _stand(horizon: np.ndarray) -> np.ndarray:
+    """Return which robots stand all along their horizons, (n, R, 5), shape (R,)."""
+    slow = np.abs(horizon[:, :, 3]).max(axis=0) < STANDSTILL_M_S
+    return np.asarray(slow & (np.ptp(horizon, axis=0).max(axis=1) < _STILL))
 
 
 def _is_still(rate: float) -> bool:

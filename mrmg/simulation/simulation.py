@@ -87,7 +87,7 @@ def simulate(
     require_same_mission(scene, plan)
     require_drivable(scene.robots)
     controllers = [maker(robot.model) for robot in scene.robots]
-    world = build_world(scene)
+    world = build_world(scene, drawn=False)
     run = _Run(world, plan, controllers, disturbance, plant)
     started, watched_s = time.perf_counter(), 0.0
     with no_warning_file():
