@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import zip_longest
 
 import numpy as np
 
 from mrmg import seeding
+from mrmg.background import in_background
 from mrmg.planning.attempt import Request
 from mrmg.planning.path_following.following import path_cost_J, whole_tour
 from mrmg.planning.problem.problem import Problem
@@ -91,33 +94,45 @@ def drawn_tours(
     cost_J: dict[Tours, float] = {}
     found: dict[Tours, Routing] = {}
 
-    def take(draw: Draw, share: float) -> None:
-        tours = _drawn(problem, request, draw)
-        if tours.feasible and tours.tours not in found:
-            found[tours.tours] = tours
-            cost_J[tours.tours] = share * path_cost_J(problem, tours)
+    def take(draws: Sequence[Draw], share: float) -> None:
+        for tours in _all_drawn(problem, request, draws):
+            if tours.feasible and tours.tours not in found:
+                found[tours.tours] = tours
+                cost_J[tours.tours] = share * path_cost_J(problem, tours)
 
-    for draw in draws:
-        take(draw, 1.0)
+    take(draws, 1.0)
     if not found:
         return [], len(draws)
     best = min(cost_J, key=cost_J.__getitem__)
-    recharge = any(t >= problem.mission.targets.goals for tour in best for t in tour)
-    further = range(recharge_draws(problem.mission.targets.goals) if recharge else 0)
-    roadmap_J = _roadmap_cost_J(problem, found[best])
-    for i in further:
-        draw = Draw.of(
-            FIRST_RECHARGE_DRAW + RECHARGE_DRAWS * draws[0].number + i, False
-        )
-        surcharge = DRIVEN_SHARE * cost_J[best] / roadmap_J - 1.0
-        take(replace(draw, surcharge=surcharge), CLEARLY_BETTER)
+    goals, more = problem.mission.targets.goals, 0
+    if any(target >= goals for tour in best for target in tour):
+        more = recharge_draws(goals)
+        first = FIRST_RECHARGE_DRAW + RECHARGE_DRAWS * draws[0].number
+        driven = cost_J[best] / _roadmap_cost_J(problem, found[best])
+        surcharge = DRIVEN_SHARE * driven - 1.0
+        further = (Draw.of(number, False) for number in range(first, first + more))
+        take([replace(one, surcharge=surcharge) for one in further], CLEARLY_BETTER)
     ranked = sorted(cost_J, key=cost_J.__getitem__)
-    return [found[tours] for tours in ranked], len(draws) + len(further)
+    return [found[tours] for tours in ranked], len(draws) + more
 
 
 def recharge_draws(goals: int) -> int:
     """Return how many draws follow where tours through so many goals recharge."""
     return min(RECHARGE_DRAWS, RECHARGE_GOALS // max(1, goals))
+
+
+def _all_drawn(
+    problem: Problem, request: Request, draws: Sequence[Draw]
+) -> list[Routing]:
+    """Return the tours of several draws, which are found two at a time."""
+
+    def drawn(some: Sequence[Draw]) -> list[Routing]:
+        return [_drawn(problem, request, draw) for draw in some]
+
+    beside = in_background(partial(drawn, draws[1::2]))
+    own = drawn(draws[::2])
+    turns = zip_longest(own, beside.result())
+    return [tours for pair in turns for tours in pair if tours is not None]
 
 
 def _drawn(problem: Problem, request: Request, draw: Draw) -> Routing:
