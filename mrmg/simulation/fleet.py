@@ -18,11 +18,15 @@ from mrmg.scene.types import Scene
 from mrmg.simulation.ackermann import AckermannChassis
 from mrmg.simulation.chassis import Chassis, part_ids
 from mrmg.simulation.differential import DifferentialChassis
+from mrmg.simulation.reference import speed_states
 from mrmg.simulation.work import WorkMeter
 from mrmg.simulation.world_model import MujocoWorld
 
 _CHASSIS = {"car": AckermannChassis, "unicycle": DifferentialChassis}
 """By motion model."""
+
+_NUDGE_M_S = 1e-9
+"""Speed that wakes a robot, and moves it by nothing that counts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +58,8 @@ class Fleet:
         root_q, root_v = model.jnt_qposadr[root], model.jnt_dofadr[root]
         self._pose = root_q + np.arange(7)
         self._velocity = root_v + np.arange(2)
+        self._tree = model.body_treeid[world.chassis]
+        self._turns = speed_states(world.scene)[:, 4]
         self._yaw = [robot.pose[2] for robot in robots]
 
     def state(self) -> np.ndarray:
@@ -107,6 +113,7 @@ class Fleet:
             turning_multiplier: of the terrain, as the drive control sees it, shape
                 (R,).
         """
+        self._wake((force_N != 0.0) | (w_from != w_to) | (self._turns & (w_to != 0.0)))
         multiplier = np.broadcast_to(turning_multiplier, len(force_N))
         for group in self._groups:
             own = group.index
@@ -119,6 +126,15 @@ class Fleet:
                 group.chassis.apply(step)
             mujoco.mj_step(self._model, self._data)
             self.work.look()
+
+    def _wake(self, commanded: np.ndarray) -> None:
+        """Wake those of the sleeping robots that are commanded to move, shape (R,).
+
+        MuJoCo wakes what is touched or moves, and looks at no actuator of a sleeper
+        (its manual: Sleeping actuators).
+        """
+        asleep = self._data.tree_asleep[self._tree] >= 0
+        self._data.qvel[self._velocity[asleep & commanded, 0]] = _NUDGE_M_S
 
     def _gather(self, parts: list[np.ndarray]) -> np.ndarray:
         """Return the groups' values in the scene's order, shape (R, ...)."""

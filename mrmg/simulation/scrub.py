@@ -88,6 +88,7 @@ class ScrubbingTyres:
         self._tyre_of = np.full(model.ngeom, -1)
         self._tyre_of[tyres] = np.arange(len(tyres))
         self._tyres, self._owner = tyres, owner[roots[tyres]]
+        self._tree = model.body_treeid[model.geom_bodyid[tyres]]
         self._spin = np.array([_spin_dof(model, int(geom)) for geom in tyres])
         self._rolls = self._spin != _NO_SPIN
         self._axles = _axles(model, tyres, self._owner)
@@ -117,7 +118,9 @@ class ScrubbingTyres:
         """
         model = self._model
         # A tyre gives way to a new load over some of its turn, not within a step.
-        self._forces_N += _RELAXATION * (self._contact_forces() - self._forces_N)
+        # MuJoCo finds no contacts of a robot that sleeps: its tyres keep their loads.
+        taken = _RELAXATION * (self._data.tree_asleep[self._tree] < 0)
+        self._forces_N += taken * (self._contact_forces() - self._forces_N)
         load_N, force_N = self._forces_N
         rolling, turning = self._terrain.under(*self._data.geom_xpos[self._tyres, :2].T)
         yaw_rad_s = np.abs(self._data.qvel[self._yaw])[self._owner]

@@ -75,7 +75,7 @@ def _built(scene: Scene, drawn: bool) -> MujocoWorld:
     spec.modelname = "mrmg"
     # What only the eye sees costs steps a quarter of their time in a large fleet.
     spec.compiler.discardvisual = not drawn
-    _set_options(spec, len(scene.robots))
+    _set_options(spec, len(scene.robots), drawn)
     _set_appearance(spec, scene)
     scenery.add_floor(spec, scene)
     scenery.add_bounds(spec, scene)
@@ -107,18 +107,17 @@ def _built(scene: Scene, drawn: bool) -> MujocoWorld:
     )
 
 
-def _set_options(spec: mujoco.MjSpec, robots: int) -> None:
+def _set_options(spec: mujoco.MjSpec, robots: int, drawn: bool) -> None:
     option = spec.option
     option.timestep = PHYSICS_STEP_S
     option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.impratio = 10.0
     option.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    # A diverged state must be seen by the caller, not silently set back; finding
-    # islands costs more than it saves for cars that touch nothing but the floor.
-    option.disableflags = (
-        mujoco.mjtDisableBit.mjDSBL_AUTORESET | mujoco.mjtDisableBit.mjDSBL_ISLAND
-    )
+    # A diverged state must be seen by the caller, not silently set back.
+    option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    if not drawn:  # robots that stand take no time, until `Fleet` wakes them
+        option.enableflags = mujoco.mjtEnableBit.mjENBL_SLEEP
     if robots >= _SPARSE_FROM_ROBOTS:
         option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
 
@@ -171,6 +170,8 @@ def _attach(
     (pose,) = ground_poses(scene, np.array([robot.pose]))
     frame = spec.worldbody.add_frame(pos=pose[:3], quat=pose[3:])
     spec.attach(car, prefix=f"{robot.id}/", frame=frame)
+    chassis = spec.body(f"{robot.id}/{CHASSIS}")
+    chassis.sleep = mujoco.mjtSleepPolicy.mjSLEEP_ALLOWED
     paint = spec.material(f"{robot.id}/paint")
     if paint is not None:
         paint.rgba = [*colour, 1.0]
