@@ -7,7 +7,9 @@ that is found can be driven exactly, and keeps clear at every step.
 What is promised: every plan found keeps all margins. A round of the search ends without
 a plan when no order of the robots has one, with cells as fine and searches as long as
 the round allows, or when it has looked at as many nodes as it may; each round is finer
-and longer than the one before, and begins with other motions.
+and longer than the one before, and begins with other motions. A round is in two halves:
+in the second one robots find their motions alone in the reverse order, as those that
+lead nowhere often come of who was first.
 """
 
 from __future__ import annotations
@@ -49,7 +51,10 @@ from mrmg.planning.path_following.coordination.tasks import (
     no_path,
     task_of,
 )
-from mrmg.planning.path_following.coordination.traffic import FleetTraffic
+from mrmg.planning.path_following.coordination.traffic import (
+    FleetTraffic,
+    trajectories_of,
+)
 from mrmg.planning.path_following.tracking import Drive, Motion, course_of, empty_path
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
@@ -124,7 +129,7 @@ class _Planning:
             curve=empty_course(MOST_CURVE_NODES),
         )
         self.round = ROUNDS[0]
-        self.nodes = 0
+        self.nodes, self.most = 0, np.inf
         self._blocked: set[int] = set()
         """Robots whose short search has failed: they are searched for at length."""
         self._answers: dict[tuple[object, ...], Motion | None] = {}
@@ -141,7 +146,12 @@ class _Planning:
         *,
         yielding: bool = False,
     ) -> Motion | None:
-        """Return a motion of robot r without conflicts with the robots marked."""
+        """Return a motion of robot r without conflicts with the robots marked.
+
+        None, too, once as many nodes have been looked at as may be.
+        """
+        if self.nodes >= self.most:
+            return None
         self.nodes += 1
         options = self.round, yielding, r in self._blocked
         asked = (r, *options, above.tobytes(), *map(id, motions))
@@ -248,15 +258,33 @@ class _Planning:
         return Motion(state, control)
 
     def find_alone(
-        self, r: int, motions: Sequence[Motion | None], first: Round, halt: np.ndarray
-    ) -> Motion | None:
-        """Return a motion of a robot that may meet the others."""
-        number = ROUNDS.index(first)
-        for self.round in ROUNDS[number : number + ROUNDS_ALONE]:
-            found = self.find(r, motions, np.zeros(len(motions), bool))
-            if found is not None or halt[0]:
-                return found
-        return None
+        self,
+        order: Sequence[int],
+        drives: Sequence[Drive | None],
+        first: Round,
+        halt: np.ndarray,
+    ) -> list[Motion] | None:
+        """Return motions of all robots that may meet, None where one has none.
+
+        Each makes what room it can for those that found theirs before it.
+
+        Args:
+            order: in which robots that have not been driven are looked at.
+            drives: of those that have.
+            first: round that is tried first.
+            halt: shape (1,); the search ends soon after it has turned true.
+        """
+        number, self.most = ROUNDS.index(first), np.inf
+        motions = [None if drive is None else drive.motion for drive in drives]
+        nobody = np.zeros(len(motions), bool)
+        for r in order:
+            for self.round in ROUNDS[number : number + ROUNDS_ALONE]:
+                if motions[r] is None and not halt[0]:
+                    motions[r] = self.find(r, motions, nobody)
+            if motions[r] is None:
+                return None
+        self.round = first
+        return [motion for motion in motions if motion is not None]
 
     def conflicts(self, r: int, motions: Sequence[Motion]) -> np.ndarray:
         """Return the step of r's first conflict with each robot, inf for never."""
@@ -291,21 +319,18 @@ def coordinated(
     planning = _Planning(problem, tours, paths, drives, horizon)
     rng = seeding.stream(seed, "coordination")
     for now in rounds:
-        motions = [None if drive is None else drive.motion for drive in drives]
-        for r in rng.permutation(robots).tolist():
-            if motions[r] is not None:
-                continue
-            motions[r] = planning.find_alone(r, motions, now, halt)
-            if motions[r] is None:
+        drawn = rng.permutation(robots).tolist()
+        orders = [drawn, drawn[::-1]] if any(one is None for one in drives) else [drawn]
+        for order in orders:
+            alone = planning.find_alone(order, drives, now, halt)
+            if alone is None:
                 return ()
-        alone = [motion for motion in motions if motion is not None]
-        planning.round = now
-        most = SEARCHES * now.most * robots
-        found = priorities.search_priorities(alone, planning, most, halt)
-        if found is not None:
-            planning.round = replace(now, most=max(now.most, SHORTENING_MOST))
-            found = priorities.shortened(found, alone, planning, halt)
-            return trajectories_of(problem, found)
+            most = SEARCHES * now.most * robots / len(orders)
+            found = priorities.search_priorities(alone, planning, most, halt)
+            if found is not None:
+                planning.round = replace(now, most=max(now.most, SHORTENING_MOST))
+                found = priorities.shortened(found, alone, planning, halt)
+                return trajectories_of(problem, found)
     return ()
 
 
@@ -318,19 +343,3 @@ def _course_with_rest(
         return course
     course.node["rest_s"][: len(path.node)] = drive.spent_s[-1] - drive.spent_s
     return course
-
-
-def trajectories_of(
-    problem: Problem, motions: Sequence[Motion]
-) -> tuple[Trajectory, ...]:
-    """Return motions as trajectories of one length: who is through stands."""
-    steps = max(1, *(len(motion.control) for motion in motions))
-    trajectories = []
-    for robot, motion in zip(problem.scene.robots, motions, strict=True):
-        rest = steps - len(motion.control)
-        control = np.pad(motion.control, ((0, rest), (0, 0)))
-        state = np.pad(motion.state, ((0, rest), (0, 0)), mode="edge")
-        trajectories.append(
-            Trajectory(robot=robot.id, dt_s=problem.dt_s, state=state, control=control)
-        )
-    return tuple(trajectories)

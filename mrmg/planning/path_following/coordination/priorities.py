@@ -30,9 +30,11 @@ class MotionPlanning(Protocol):
 
     Attributes:
         nodes: that have been looked at for all motions so far.
+        most: nodes after which no motion is found any more.
     """
 
     nodes: int
+    most: float
 
     def find(
         self,
@@ -96,8 +98,8 @@ def search_priorities(
     root = _Node(np.zeros((robots, robots), bool), tuple(motions), conflict)
     stack: list[Iterator[_Node]] = [iter([root])]
     seen: dict[tuple[object, ...], _Node] = {}  # two may make room for a third in turn
-    most += planning.nodes
-    while stack and planning.nodes < most and not halt[0]:
+    planning.most = planning.nodes + most
+    while stack and planning.nodes < planning.most and not halt[0]:
         node = next(stack[-1], None)
         if node is None:
             stack.pop()
@@ -209,12 +211,13 @@ def shortened(
         planning: finds motions.
         halt: shape (1,); the search ends soon after it has turned true.
     """
-    best, most = list(motions), (1.0 + SHORTENING_SHARE) * planning.nodes
+    best = list(motions)
+    planning.most = (1.0 + SHORTENING_SHARE) * planning.nodes
     lost = {
         r: len(motions[r].control) - len(one.control) for r, one in enumerate(alone)
     }
     for r in sorted(lost, key=lambda r: -lost[r]):
-        if lost[r] <= 0 or planning.nodes >= most or halt[0]:
+        if lost[r] <= 0 or planning.nodes >= planning.most or halt[0]:
             break
         found = planning.find(r, best, np.arange(len(best)) != r, yielding=True)
         if found is not None and len(found.control) < len(best[r].control):

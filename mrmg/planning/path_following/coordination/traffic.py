@@ -1,4 +1,4 @@
-"""The motions of a fleet, side by side, as the kernels see them."""
+"""The motions of a fleet, side by side, as the kernels see them, and in plans."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from mrmg.planning.path_following.coordination import _conflict_kernels
 from mrmg.planning.path_following.coordination._motion_kernels import OTHER, Traffic
 from mrmg.planning.path_following.tracking import Motion
 from mrmg.planning.problem.problem import Problem
+from mrmg.plans import Trajectory
 
 CLOSING_SHARE = 1.5
 """How much faster than the reference point at most the middle of a footprint moves."""
@@ -101,3 +102,19 @@ def starts_of(motion: Motion) -> np.ndarray:
     moves = np.append((np.diff(motion.state[:, :3], axis=0) != 0.0).any(axis=1), True)
     ways = np.flatnonzero(moves)
     return ways[np.diff(ways, prepend=-1) > STANDING_STEPS]
+
+
+def trajectories_of(
+    problem: Problem, motions: Sequence[Motion]
+) -> tuple[Trajectory, ...]:
+    """Return motions as trajectories of one length: who is through stands."""
+    steps = max(1, *(len(motion.control) for motion in motions))
+    trajectories = []
+    for robot, motion in zip(problem.scene.robots, motions, strict=True):
+        rest = steps - len(motion.control)
+        control = np.pad(motion.control, ((0, rest), (0, 0)))
+        state = np.pad(motion.state, ((0, rest), (0, 0)), mode="edge")
+        trajectories.append(
+            Trajectory(robot=robot.id, dt_s=problem.dt_s, state=state, control=control)
+        )
+    return tuple(trajectories)

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 import pytest
 
 import mrmg
+from mrmg.planning.path_following.band import Path
+from mrmg.planning.path_following.coordination import coordination
 from mrmg.planning.path_following.coordination.coordination import (
     coordinated,
     empty_nodes,
 )
-from mrmg.planning.path_following.coordination.rounds import ROUNDS
+from mrmg.planning.path_following.coordination.rounds import ROUNDS, SEARCHES
 from mrmg.planning.path_following.coordination.tasks import no_path, task_of
+from mrmg.planning.path_following.tracking import Motion
 from mrmg.planning.problem._target_kernels import at_target
 from mrmg.planning.problem.problem import Problem
 from mrmg.scene.types import Scene
@@ -76,3 +80,50 @@ def test_a_robot_sets_out_by_shorter_motions_where_there_is_no_room_for_longer_o
     plan = mrmg.plan(scene).plan
     assert plan is not None
     assert mrmg.verify(scene, plan).ok
+
+
+def test_both_halves_of_a_round_begin_with_other_robots(
+    yard: Callable[..., Scene],
+    state: Callable[..., Problem],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    orders: list[Sequence[int]] = []
+    find_alone = coordination._Planning.find_alone
+
+    def noted(planning: coordination._Planning, order: Sequence[int], *of: Any) -> Any:
+        orders.append(order)
+        return find_alone(planning, order, *of)
+
+    def nothing(
+        _motions: Sequence[Motion], _planning: Any, most: float, _: Any
+    ) -> None:
+        shares.append(most / (SEARCHES * ROUNDS[0].most * 2))
+
+    shares: list[float] = []
+    monkeypatch.setattr(coordination._Planning, "find_alone", noted)
+    monkeypatch.setattr(coordination.priorities, "search_priorities", nothing)
+    found = coordinated(*_two_robots(yard, state), np.zeros(1, bool), rounds=ROUNDS[:1])
+    assert found == ()
+    assert shares == [0.5, 0.5]
+    assert sorted(map(list, orders)) == [[0, 1], [1, 0]]
+
+
+def test_no_motion_is_found_once_a_search_has_taken_its_nodes(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    problem, tours, paths = _two_robots(yard, state)
+    planning = coordination._Planning(problem, tours, paths, [None, None], 2000)
+    none = [None, None], np.zeros(2, bool)
+    planning.most = planning.nodes
+    assert planning.find(0, *none, yielding=True) is None
+    planning.most += 1
+    assert planning.find(0, *none, yielding=True) is not None
+
+
+def _two_robots(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> tuple[Problem, list[list[int]], list[Path]]:
+    """Return a problem of two robots without targets, with their tours and paths."""
+    robots = [{"id": f"r{y}", "model": "diffdrive", "pose": [6, y, 0]} for y in (8, 12)]
+    problem = state(yard(robots=robots), samples=50)
+    return problem, [[], []], [no_path(problem, r) for r in range(2)]
