@@ -37,9 +37,9 @@ def _free_boxes(
 ) -> Iterator[dict[str, Any]]:
     """Yield boxes that leave roads between each other, narrower if there is no room."""
     box_m = side_m * sqrt(COVERED / boxes)
-    placed: list[Any] = []
-    apart_m, tries = APART_M, 0
-    while len(placed) < boxes:
+    placed = np.empty(boxes, dtype=object)
+    count, apart_m, tries = 0, APART_M, 0
+    while count < boxes:
         ratio = float(rng.uniform(0.6, 1.6))
         size = (box_m * sqrt(ratio), box_m / sqrt(ratio))
         yaw = float(rng.uniform(0.0, np.pi / 2.0))
@@ -50,14 +50,16 @@ def _free_boxes(
             use_radians=True,
         )
         box = affinity.translate(box, *centre)
-        inside = shapely.box(0.0, 0.0, side_m, side_m).buffer(-apart_m).contains(box)
+        far_m = side_m - apart_m
+        inside = shapely.box(apart_m, apart_m, far_m, far_m).contains(box)
         tries += 1
         if tries % 2000 == 0:
             apart_m *= 0.8
-        if inside and (shapely.distance(box, placed) >= apart_m).all():
-            placed.append(box)
+        if inside and (shapely.distance(box, placed[:count]) >= apart_m).all():
+            placed[count] = box
+            count += 1
             yield {
-                "id": f"box{len(placed)}",
+                "id": f"box{count}",
                 "box": {
                     "center": [round(float(x), 3) for x in centre],
                     "size": [round(x, 3) for x in size],

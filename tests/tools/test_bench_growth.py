@@ -16,18 +16,25 @@ from bench_growth import Case
 
 from mrmg.scene.loading import scene_from_document
 
-TINY = [Case(series="robots", size=n, robots=n, goals=3, stations=3) for n in (1, 2)]
+SMALL = {"goals": 3, "stations": 3, "boxes": 8, "side_m": 40.0}
+TINY = [Case(series="robots", size=n, robots=n, **SMALL) for n in (1, 2)]
 
 
 @pytest.mark.parametrize("boxes", [12, 200])
 def test_maps_cover_the_same_share(boxes: int) -> None:
-    scene = scene_from_document(growth_map.drawn_map(boxes, 0), source="test")
+    drawn = growth_map.drawn_map(boxes, 0)
+    scene = scene_from_document(drawn, source="test")
     shapes = [shapely.Polygon(wall.shape.exterior) for wall in scene.obstacles]
     assert len(shapes) == boxes
     share = sum(shape.area for shape in shapes) / growth_map.SIDE_M**2
     assert share == pytest.approx(growth_map.COVERED, rel=0.01)
     assert shapely.unary_union(shapes).area == pytest.approx(share * 1e4)
-    assert growth_map.drawn_map(boxes, 0) != growth_map.drawn_map(boxes, 1)
+
+
+def test_maps_are_those_of_their_seeds() -> None:
+    drawn = growth_map.drawn_map(12, 0)
+    assert drawn == growth_map.drawn_map(12, 0)
+    assert drawn != growth_map.drawn_map(12, 1)
 
 
 def test_ground_grows_with_a_fleet() -> None:
