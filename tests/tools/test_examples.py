@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import runpy
 import subprocess
 import sys
 from pathlib import Path
@@ -65,10 +66,34 @@ def test_every_example_is_tried_here() -> None:
     assert {path.stem for path in EXAMPLES} == set(LEAVES)
 
 
+def check_what_it_made(name: str, folder: Path, said: str) -> None:
+    assert SAYS[name] in said
+    assert {item.name for item in (folder / "made").iterdir()} == LEAVES[name]
+    assert [item.name for item in folder.iterdir()] == ["made"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
-def test_an_example_works_from_anywhere(path: Path, tmp_path: Path) -> None:
+def test_an_example_works_from_anywhere(
+    path: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """As a script, with a folder of its own to find modules in."""
     assert len(path.read_text().splitlines()) <= 60
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [str(path), "made"])
+    monkeypatch.setattr(sys, "path", [str(path.parent), *sys.path])
+    runpy.run_path(str(path), run_name="__main__")
+    said, complained = capsys.readouterr()
+    assert complained == ""
+    check_what_it_made(path.stem, tmp_path, said)
+
+
+@pytest.mark.slow
+def test_an_example_is_a_program(tmp_path: Path) -> None:
+    (path,) = (path for path in EXAMPLES if path.stem == "own_planner")
     ended = subprocess.run(
         [sys.executable, str(path), "made"],
         capture_output=True,
@@ -77,6 +102,4 @@ def test_an_example_works_from_anywhere(path: Path, tmp_path: Path) -> None:
         check=False,
     )
     assert (ended.returncode, ended.stderr) == (0, "")
-    assert SAYS[path.stem] in ended.stdout
-    assert {item.name for item in (tmp_path / "made").iterdir()} == LEAVES[path.stem]
-    assert [item.name for item in tmp_path.iterdir()] == ["made"]
+    check_what_it_made(path.stem, tmp_path, ended.stdout)
