@@ -102,7 +102,7 @@ def test_the_command_shows_a_part_from_a_robot_s_place(
     ]
     with Image.open(own_run / "mission.gif") as gif:
         assert gif.n_frames == 11
-    again = ["--robot", "r1", "--no-gif"]
+    again = [*small, *part, "--robot", "r1", "--no-gif"]
     assert main(["render", str(own_run), *again]) == ExitCode.OK
     assert not (own_run / "mission.gif").exists()
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,9 +23,20 @@ NEEDED = {"goal", "station", "robot", "stop", "breakdown"}
 
 
 def overlaps(
-    scene: Scene, labels: tuple[MapLabel, ...], em_m: float
+    scene: Scene,
+    labels: tuple[MapLabel, ...],
+    em_m: float,
+    asked: Sequence[int] | None = None,
 ) -> dict[int, list[str]]:
-    """Return what each label overlaps but that which it names, by its number."""
+    """Return what labels overlap but that which they name, by their numbers.
+
+    Args:
+        scene: where they are.
+        labels: all there are.
+        em_m: letter size.
+        asked: the numbers of those to look at; all by default.
+    """
+    looked_at = np.arange(len(labels)) if asked is None else np.array(asked)
     half = np.array([half_size_m(item.kind, item.text, em_m) for item in labels])
     middle = np.array([(item.x_m, item.y_m) for item in labels])
     boxes = shapely.box(*(middle - half).T, *(middle + half).T)
@@ -37,10 +48,11 @@ def overlaps(
     shapes = np.array([*things.values(), *boxes])
     names = [*things, *(item.text for item in labels)]
     owned = [*things, *(None for _ in labels)]
-    shared = shapely.area(shapely.intersection(boxes[:, None], shapes))
-    shared[np.arange(len(labels)), len(things) + np.arange(len(labels))] = 0.0
+    shared = shapely.area(shapely.intersection(boxes[looked_at, None], shapes))
+    shared[np.arange(len(looked_at)), len(things) + looked_at] = 0.0
     found: dict[int, list[str]] = {}
-    for at, other in np.argwhere(shared > 1e-9 * em_m**2).tolist():
+    for row, other in np.argwhere(shared > 1e-9 * em_m**2).tolist():
+        at = int(looked_at[row])
         if not (labels[at].kind == "obstacle" and labels[at].of == owned[other]):
             found.setdefault(at, []).append(
                 f"{labels[at].text} overlaps {names[other]}"
@@ -114,7 +126,7 @@ def could_be_free(
         for x_m, y_m in spots:
             moved = replace(label, x_m=float(x_m), y_m=float(y_m))
             elsewhere = (*labels[:at], moved, *labels[at + 1 :])
-            if at not in overlaps(scene, elsewhere, em_m):
+            if not overlaps(scene, elsewhere, em_m, [at]):
                 yield f"{faults}, and could be at {x_m:.2f}, {y_m:.2f}"
 
 
