@@ -67,7 +67,11 @@ def test_the_end_of_a_command_is_judged(outcome: dict[str, Any], fault: str) -> 
 
 
 @pytest.mark.slow
-def test_every_damage_of_a_plan_is_done_and_caught(tmp_path: Path) -> None:
+def test_every_damage_of_a_plan_is_done_and_caught(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Some need a robot that turns on the spot, others a car with a station."""
+    monkeypatch.setattr(plans, "SCENES", ("quickstart", "mixed"))
     options = Options(
         seed=1,
         files=0,

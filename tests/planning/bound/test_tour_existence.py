@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import mrmg
+from mrmg.planning import PlannerParams
 from mrmg.planning.bound.bound import lower_bound_J
 from mrmg.planning.bound.tour_existence import (
     NoTours,
@@ -156,7 +157,7 @@ def smallest_solved(name: str, sizes_m: list[float], **more: Any) -> float:
     least_m = np.inf
     for capacity_m in sizes_m:
         scene = more["edit"](with_capacity(name, capacity_m))
-        plan = mrmg.plan(scene).plan
+        plan = mrmg.plan(scene, params=PlannerParams(improvements=0)).plan
         if plan is not None and mrmg.verify(scene, plan).ok:
             least_m = min(least_m, capacity_m)
             assert proof_of_no_tours(scene, 0.1) is None
