@@ -449,7 +449,10 @@ def grid_way_m(
 
 
 @pytest.mark.quick("0", "1")
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize(
+    "seed",
+    [*range(4), *(pytest.param(seed, marks=pytest.mark.ci) for seed in range(4, 8))],
+)
 def test_it_is_never_longer_than_a_way_on_a_fine_grid(
     seed: int,
 ) -> None:

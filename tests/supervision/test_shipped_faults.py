@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mrmg.energy.audit import audit
-from mrmg.planning import plan_mission
+from mrmg.planning import PlannerParams, plan_mission
 from mrmg.plans import Plan
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
@@ -20,8 +20,12 @@ from mrmg.supervision import Drive, drive_mission
 pytestmark = pytest.mark.slow
 
 
+ONE_PLAN = PlannerParams(improvements=0)
+"""What matters here is how the fleet goes on, not how good its plans are."""
+
+
 def planned(scene: Scene) -> Plan:
-    plan = plan_mission(scene, seed=0).plan
+    plan = plan_mission(scene, seed=0, params=ONE_PLAN).plan
     assert plan is not None
     return plan
 
@@ -42,7 +46,9 @@ def stopped_safely(drive: Drive, robot: str, time_s: float) -> None:
 @pytest.mark.parametrize("time_s", [20.0, pytest.param(35.0, marks=pytest.mark.ci)])
 def test_on_slopes_the_other_finishes(time_s: float) -> None:
     scene = load_scene("hills")
-    drive = drive_mission(scene, planned(scene), faults=[f"r1@{time_s}s"])
+    drive = drive_mission(
+        scene, planned(scene), faults=[f"r1@{time_s}s"], planner=ONE_PLAN
+    )
     stopped_safely(drive, "r1", time_s)
     account = audit(scene, drive.plan, drive.log)
     assert account.mission_ok, account.reasons
@@ -53,12 +59,24 @@ def test_on_slopes_the_other_finishes(time_s: float) -> None:
         assert robot.metered_J == pytest.approx(robot.planned_J, rel=0.03)
 
 
-@pytest.mark.parametrize("robot", ["r1", "r3"])
-def test_in_a_mixed_fleet_the_others_do_what_they_can(robot: str) -> None:
+@pytest.mark.parametrize(
+    ("robot", "time_s"),
+    [
+        ("r1", 15.0),
+        ("r3", 10.0),
+        pytest.param("r3", 15.0, marks=pytest.mark.ci),  # hard to go on from
+        pytest.param("r1", 30.0, marks=pytest.mark.ci),  # goals are given up
+    ],
+)
+def test_in_a_mixed_fleet_the_others_do_what_they_can(
+    robot: str, time_s: float
+) -> None:
     """Goals that only the broken robot fits to are given up, and that is said."""
     scene = load_scene("mixed")
-    drive = drive_mission(scene, planned(scene), faults=[f"{robot}@15s"])
-    stopped_safely(drive, robot, 15.0)
+    drive = drive_mission(
+        scene, planned(scene), faults=[f"{robot}@{time_s}s"], planner=ONE_PLAN
+    )
+    stopped_safely(drive, robot, time_s)
     account = audit(scene, drive.plan, drive.log)
     missed = {goal.id for goal in scene.goals} - set(account.goals_visited)
     given_up = {name for replan in drive.replans for name in replan.given_up}
@@ -73,7 +91,7 @@ def test_robots_with_a_finish_still_end_there(make_yard: Callable[..., Scene]) -
         {"id": "r2", "model": "car", "pose": [5, 5, 0], "finish": "start"},
     ]
     scene = make_yard(robots=homes, battery={"capacity_m": 200, "reserve": 0.05})
-    drive = drive_mission(scene, planned(scene), faults=["r1@4s"])
+    drive = drive_mission(scene, planned(scene), faults=["r1@4s"], planner=ONE_PLAN)
     stopped_safely(drive, "r1", 4.0)
     account = audit(scene, drive.plan, drive.log)
     assert set(account.goals_visited) == {"g1", "g2", "g3"}

@@ -19,11 +19,15 @@ MAPS = Path(__file__).parents[3] / "shared/maps"
 @pytest.mark.parametrize(
     "name",
     [
-        "potholes.txt",
         "dense.tri",
         *(
             pytest.param(name, marks=pytest.mark.ci)
-            for name in ("complex2.txt", "geometry-reduced.txt", "warehouse2.txt")
+            for name in (
+                "complex2.txt",
+                "geometry-reduced.txt",
+                "potholes.txt",
+                "warehouse2.txt",
+            )
         ),
     ],
 )

@@ -359,8 +359,9 @@ def test_no_plan_of_the_quickstart_undercuts_the_bound(seed: int) -> None:
 @pytest.mark.parametrize(
     "name",
     [
-        *(f"scene{i}" for i in range(1, 6)),
-        pytest.param("scene6", marks=pytest.mark.ci),
+        "scene1",
+        "scene5",
+        *(pytest.param(f"scene{i}", marks=pytest.mark.ci) for i in (2, 3, 4, 6)),
     ],
 )
 def test_no_plan_of_a_shipped_scene_undercuts_the_bound(name: str) -> None:

@@ -322,7 +322,7 @@ def test_less_work_proves_less_and_never_less_than_was_known() -> None:
     assert found_J[0] < found_J[2]
 
 
-@pytest.mark.parametrize("step", [0.002, 0.005])
+@pytest.mark.parametrize("step", [pytest.param(0.002, marks=pytest.mark.ci), 0.005])
 def test_the_bound_is_as_good_however_small_the_steps_towards_it(
     step: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -28,7 +28,7 @@ def check(folder: Path, goals: int) -> None:
     assert (folder / "export").is_dir()
 
 
-@pytest.mark.slow
+@pytest.mark.ci
 def test_occupancy_map(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if not NAV2.exists():
         pytest.skip("no shared maps")

@@ -19,13 +19,19 @@ from mrmg.scene.populating.ground import Ground
 from mrmg.scene.types import Scene
 
 MAPS = Path(__file__).parents[4] / "shared" / "maps"
-FLEET_MAPS = ("complex3-big.txt", "warehouse.txt", "gaps.txt", "triangles.tri")
+FLEET_MAPS = (
+    "warehouse.txt",
+    "gaps.txt",
+    pytest.param("complex3-big.txt", marks=pytest.mark.ci),
+    pytest.param("triangles.tri", marks=pytest.mark.ci),
+)
 PAIR_MAPS = (
     "potholes.txt",
-    "complex2.txt",
-    "geometry-reduced.txt",
-    "warehouse2.txt",
     "dense.tri",
+    *(
+        pytest.param(name, marks=pytest.mark.ci)
+        for name in ("complex2.txt", "geometry-reduced.txt", "warehouse2.txt")
+    ),
 )
 
 FIELD: dict[str, Any] = {

@@ -24,7 +24,13 @@ def of(name: str) -> RobotModel:
 CAR = of("car")
 
 
-@pytest.fixture(scope="module", params=shipped.model_names())
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(name, marks=pytest.mark.ci) if name == "hauler" else name
+        for name in shipped.model_names()
+    ],
+)
 def measured(request: pytest.FixtureRequest) -> Calibration:
     """A shipped model, calibrated from beliefs that are far off."""
     output: list[float] = []
