@@ -73,11 +73,11 @@ def wall_with_gap(gap_m: float) -> list[dict[str, Any]]:
 
 
 SWAP = {
-    "bounds": [0, 0, 30, 2.4],
-    "goals": [circle("east", 27, 1.2, 1.0), circle("west", 3, 1.2, 1.0)],
+    "bounds": [0, 0, 24, 2.4],
+    "goals": [circle("east", 21, 1.2, 1.0), circle("west", 3, 1.2, 1.0)],
     "robots": [
-        car("r1", 8, 1.2, finish=ends_at(27, 1.2)),
-        car("r2", 22, 1.2, 3.1416, finish=ends_at(3, 1.2)),
+        car("r1", 8, 1.2, finish=ends_at(21, 1.2)),
+        car("r2", 16, 1.2, 3.1416, finish=ends_at(3, 1.2)),
     ],
 }
 """Two robots that must get past each other where there is no room for it."""

@@ -28,6 +28,6 @@ def test_rules_have_names_of_their_own() -> None:
 def test_a_rule_that_is_taken_out_is_noticed(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert main(["--only", "a robot ends in its finish"]) == 0
-    assert "FINISH" in capsys.readouterr().out
+    assert main(["--only", "preference then the energy"]) == 0
+    assert "the_cheaper_is_better" in capsys.readouterr().out
     assert main(["--only", "no such rule"]) == 0

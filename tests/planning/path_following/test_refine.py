@@ -110,11 +110,13 @@ def test_the_same_again(mission: Refined) -> None:
     assert again.digest == mission.after.digest
 
 
-def test_most_missions_gain() -> None:
+@pytest.mark.parametrize(
+    "name", ["quickstart", pytest.param("scene1", marks=pytest.mark.ci)]
+)
+def test_most_missions_gain(name: str) -> None:
     """What a search found without a path leaves something to gain."""
-    for name in ("quickstart", "scene1"):
-        one = refined(mrmg.load_scene(name), seed=1)
-        assert one.after.cost_J < one.before.cost_J, name
+    one = refined(mrmg.load_scene(name), seed=1)
+    assert one.after.cost_J < one.before.cost_J
 
 
 def test_halted_it_hands_back_what_it_was_given(mission: Refined) -> None:
