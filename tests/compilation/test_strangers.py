@@ -108,4 +108,4 @@ def test_strangers_kernels_do_the_same_before_and_after(tmp_path: Path) -> None:
     # numba itself words some errors another way the second time.
     alone = seen_in(tmp_path, "stranger", "stranger")
     assert seen_in(tmp_path, "stranger", "mrmg", "stranger") == alone
-    assert seen_in(tmp_path, "mrmg", "stranger", "stranger") == alone
+    assert seen_in(tmp_path, "mrmg", "stranger") == alone[:1]

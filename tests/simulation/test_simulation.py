@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -63,6 +62,13 @@ def wild_log(wild: tuple[Scene, Plan]) -> ExecutionLog:
     return simulate(*wild)
 
 
+@pytest.fixture(scope="module")
+def wild_again(wild: tuple[Scene, Plan]) -> tuple[ExecutionLog, list[float]]:
+    """The same once more, and the progress that it told."""
+    seen: list[float] = []
+    return simulate(*wild, on_progress=lambda share, _: seen.append(share)), seen
+
+
 def test_switching_controls_are_tracked(wild_log: ExecutionLog) -> None:
     assert wild_log.completed
     assert wild_log.contacts == ()
@@ -121,9 +127,9 @@ def test_logged_states_are_those_of_qpos(
 
 
 def test_equal_runs_give_equal_logs(
-    wild: tuple[Scene, Plan], wild_log: ExecutionLog
+    wild_log: ExecutionLog, wild_again: tuple[ExecutionLog, list[float]]
 ) -> None:
-    again = simulate(*wild)
+    again, _ = wild_again
     for field in fields(ExecutionLog):
         first, second = (getattr(log, field.name) for log in (wild_log, again))
         if isinstance(first, np.ndarray):
@@ -392,10 +398,10 @@ def test_a_plan_that_turns_to_no_number_ends_the_run(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_progress_rises_to_the_end(wild: tuple[Scene, Plan]) -> None:
-    seen: list[float] = []
-    record: Callable[[float, str], None] = lambda share, _: seen.append(share)  # noqa: E731
-    simulate(*wild, on_progress=record)
+def test_progress_rises_to_the_end(
+    wild_again: tuple[ExecutionLog, list[float]],
+) -> None:
+    _, seen = wild_again
     assert seen == sorted(seen)
     assert 0.0 < seen[0] < 0.1
     assert seen[-1] == 1.0

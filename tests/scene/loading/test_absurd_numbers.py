@@ -46,6 +46,7 @@ def with_number(path: tuple[Any, ...], value: float) -> dict[str, Any]:
 def test_absurd_numbers(
     section: str, value: float, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
+    drawn = set()
     for path in numbers(HILLS[section], (section,)):
         try:
             scene = scene_from_document(with_number(path, value), source="absurd")
@@ -53,6 +54,9 @@ def test_absurd_numbers(
         except FileError as error:
             assert all(fault.message for fault in error.faults), path
         else:
-            if value == 1e8:
+            # One number of each kind is drawn with, which takes longest.
+            kind = tuple(key for key in path if isinstance(key, str))
+            if value == 1e8 and kind not in drawn:
+                drawn.add(kind)
                 draw_scene(scene, tmp_path / "map.png")
     assert capfd.readouterr() == ("", "")
