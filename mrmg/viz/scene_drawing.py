@@ -19,7 +19,7 @@ from shapely.geometry.base import BaseGeometry
 
 from mrmg.counted import counted
 from mrmg.scene.region import Region
-from mrmg.scene.types import Robot, Scene
+from mrmg.scene.types import Goal, Robot, Scene, Station
 from mrmg.viz import style
 from mrmg.viz.contours import draw_contours
 from mrmg.viz.figures import new_figure, write_figure
@@ -85,17 +85,18 @@ def draw_scene(scene: Scene, path: Path) -> None:
     write_figure(figure, path)
 
 
-def letter_m(axes: Axes) -> float:
+def letter_m(axes: Axes, points: float = LETTER_POINTS) -> float:
     """Return the size of letters on the ground [m].
 
     Args:
         axes: in metres; all that decides their place in the figure is there.
+        points: size of the letters.
     """
     figure = axes.get_figure(root=True)
     assert figure is not None
     figure.draw_without_rendering()
     pixels_per_m = axes.transData.get_matrix()[0, 0]
-    return float(LETTER_POINTS / 72.0 * figure.dpi / pixels_per_m)
+    return float(points / 72.0 * figure.dpi / pixels_per_m)
 
 
 def draw_labels(
@@ -172,24 +173,40 @@ def draw_ground(axes: Axes, scene: Scene, *, hatched: bool = True) -> None:
     draw_contours(axes, scene)
 
 
+def draw_goal(
+    axes: Axes,
+    goal: Goal,
+    *,
+    color: str = style.GOAL_OPEN,
+    points: float = LETTER_POINTS,
+) -> None:
+    """Draw a goal region; a colour other than white means visited."""
+    draw_region(axes, goal.region, color, style.GOAL_EDGE, 0.13 * points)
+
+
+def draw_station(
+    axes: Axes, station: Station, *, points: float = LETTER_POINTS
+) -> None:
+    """Draw a recharging station: its region with a square."""
+    width = 0.13 * points
+    draw_region(axes, station.region, style.STATION, style.STATION_EDGE, width)
+    axes.plot(
+        *station.region.center,
+        marker="s",
+        markersize=0.6 * points,
+        markerfacecolor=style.STATION,
+        markeredgecolor=style.STATION_EDGE,
+        markeredgewidth=0.1 * points,
+        zorder=6,
+    )
+
+
 def draw_targets(axes: Axes, scene: Scene, colors: Mapping[str, str]) -> None:
     """Draw goals, stations and wanted poses; `colors` has those of visited goals."""
-    edge_points = 0.13 * LETTER_POINTS
     for goal in scene.goals:
-        color = colors.get(goal.id, style.GOAL_OPEN)
-        draw_region(axes, goal.region, color, style.GOAL_EDGE, edge_points)
+        draw_goal(axes, goal, color=colors.get(goal.id, style.GOAL_OPEN))
     for station in scene.stations:
-        face, edge = style.STATION, style.STATION_EDGE
-        draw_region(axes, station.region, face, edge, edge_points)
-        axes.plot(
-            *station.region.center,
-            marker="s",
-            markersize=0.6 * LETTER_POINTS,
-            markerfacecolor=face,
-            markeredgecolor=edge,
-            markeredgewidth=0.1 * LETTER_POINTS,
-            zorder=6,
-        )
+        draw_station(axes, station)
     draw_wanted_poses(axes, scene)
 
 

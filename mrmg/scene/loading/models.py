@@ -151,9 +151,7 @@ def model_folder(reference: str, base: Path | None) -> Path:
         UsageError: if there is none.
     """
     if "/" in reference:
-        folder = Path(reference)
-        if not folder.is_absolute():
-            folder = (base or Path.cwd()) / folder
+        folder = (base or Path.cwd()) / reference  # as it is where it is absolute
         if (folder / "robot.yaml").is_file():
             return folder.resolve()
         raise UsageError(f"got '{reference}'; no such folder with a robot.yaml")
