@@ -6,9 +6,9 @@ import math
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
-from scipy.special import ndtri
 
 from mrmg.energy.audit import believed_rolling
 from mrmg.energy.battery_curves import measured_curves
@@ -109,7 +109,8 @@ def planned_interval_J(
     )
     if deviation_J == 0.0 or total_J <= 0.0:
         return None
-    reach = float(ndtri(0.5 + 0.5 * INTERVAL_SHARE)) * deviation_J / total_J
+    quantile = NormalDist().inv_cdf(0.5 + 0.5 * INTERVAL_SHARE)
+    reach = quantile * deviation_J / total_J
     return total_J * math.exp(-reach), total_J * math.exp(reach)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
@@ -92,5 +91,7 @@ def ground_poses(scene: Scene, poses: np.ndarray) -> np.ndarray:
     up = np.column_stack([-slope, np.ones(len(slope))])
     axes = np.stack([forward, np.cross(up, forward), up], axis=2)
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    from scipy.spatial.transform import Rotation  # heavy, and planning needs it not
+
     turn = Rotation.from_matrix(axes).as_quat(scalar_first=True)
     return np.column_stack([place, turn])

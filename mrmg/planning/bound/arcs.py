@@ -179,7 +179,7 @@ class ArcWays:
         """Return the gradient of a region's field about a point, shape (2,)."""
         ground = self.ways.ground
         rows, columns = ground.price.shape
-        field = self.ways.fields[source].at_nodes().reshape(rows + 1, columns + 1)
+        field = self._cost_to(source)
         column, row = ((point - (ground.x_min, ground.y_min)) / ground.cell_m).astype(
             int
         )

@@ -17,9 +17,6 @@ SPACING_M = 0.04
 ARCS = 64
 """Arcs into which borders are cut."""
 
-CHORDS = 4
-"""Chords that stand for an arc of a circle in straight distances."""
-
 
 def border(region: Region) -> np.ndarray:
     """Return points on a region's border, SPACING_M apart at most.
@@ -59,19 +56,17 @@ def distances_m(regions: Sequence[Region]) -> np.ndarray:
 
 
 def arc_lines(region: Region) -> list[shapely.LineString]:
-    """Return the arcs of a region's border, those of circles as polygonal lines."""
+    """Return the arcs of a region's border, those of circles as their chords."""
     if len(region.corners):
         ring = region.shape.exterior
         cuts = np.linspace(0.0, ring.length, ARCS + 1)
         return [substring(ring, *ends) for ends in zip(cuts, cuts[1:], strict=False)]
-    angle = np.linspace(0.0, 2.0 * np.pi, ARCS * CHORDS + 1)
+    angle = np.linspace(0.0, 2.0 * np.pi, ARCS + 1)
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1) * region.radius_m
     ring = ring + region.center
-    return [
-        shapely.LineString(ring[CHORDS * k : CHORDS * (k + 1) + 1]) for k in range(ARCS)
-    ]
+    return [shapely.LineString(ends) for ends in zip(ring, ring[1:], strict=False)]
 
 
 def sagitta_m(region: Region) -> float:
     """Return how far an arc departs from its line [m]."""
-    return region.radius_m * (1.0 - float(np.cos(np.pi / (ARCS * CHORDS))))
+    return region.radius_m * (1.0 - float(np.cos(np.pi / ARCS)))

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 
@@ -78,7 +78,7 @@ def touring_bound_J(
     settled_J, rest, cheapest = -math.inf, None, False
     leg = _room_for_legs(ways, problem.goals)
     for _ in range(rounds):
-        tightened = _tighten(ways, price, tours)
+        tightened = _tighten(ways, tours)
         if halt[0] or (cheapest and not tightened):
             break
         settled = math.isfinite(settled_J)
@@ -102,15 +102,13 @@ def touring_bound_J(
     return best
 
 
-def _tighten(
-    ways: Sequence[ArcWays], price: np.ndarray, tours: Sequence[Sequence[int]]
-) -> bool:
+def _tighten(ways: Sequence[ArcWays], tours: Sequence[Sequence[int]]) -> bool:
     """Tighten the ways that tours take; return whether any was new."""
     new: dict[tuple[int, Wave], ArcWays] = {}
     for r, tour in enumerate(tours):
         if not tour:
             continue
-        arcs = _cheapest_arcs(_legs_of(ways[r], r, price[r]), tour)
+        arcs = _cheapest_arcs(ways[r], r, tour)
         for one in zip((-1 - r, *tour), (0, *arcs), tour, arcs, strict=False):
             new |= {(id(ways[r]), wave): ways[r] for wave in ways[r].waves(*one)}
     with ThreadPoolExecutor() as threads:
@@ -120,23 +118,18 @@ def _tighten(
     return bool(new)
 
 
-def _cheapest_arcs(leg: np.ndarray, tour: Sequence[int]) -> list[int]:
-    """Return the arcs at which a robot's cheapest tour touches its targets.
-
-    Args:
-        leg: what its legs cost, shape (T + 1, K, T, K).
-        tour: its targets.
-    """
-    cost, place = np.where(np.arange(ARCS) == 0, 0.0, np.inf), len(leg) - 1
+def _cheapest_arcs(ways: ArcWays, r: int, tour: Sequence[int]) -> list[int]:
+    """Return the arcs at which a robot touches its targets on its cheapest tour."""
+    cost = ways.from_start[r, tour[0]]
     origins: list[np.ndarray] = []
-    for target in tour:
-        over = cost[:, None] + leg[place, :, target]
+    for origin, target in pairwise(tour):
+        over = cost[:, None] + ways.between[origin, :, target]
         origins.append(over.argmin(axis=0))
-        cost, place = over.min(axis=0), target
+        cost = over.min(axis=0)
     arcs = [int(cost.argmin())]
-    for origin in reversed(origins):
-        arcs.append(int(origin[arcs[-1]]))
-    return arcs[-2::-1]  # the last arc found is that of the start
+    for before in reversed(origins):
+        arcs.append(int(before[arcs[-1]]))
+    return arcs[::-1]
 
 
 def _legs_of(ways: ArcWays, r: int, price: float) -> np.ndarray:

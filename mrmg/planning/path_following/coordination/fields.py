@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import ndimage
 
 from mrmg.planning.path_following.coordination import _field_kernels
 from mrmg.planning.path_following.coordination._field_kernels import Guide
@@ -220,7 +219,13 @@ def _add_near_misses(penalty: np.ndarray, layer_s: float) -> None:
     """
     taken = np.isinf(penalty)
     late = round(LATE_S / layer_s)
-    near = ndimage.maximum_filter1d(taken, 2 * late + 1, axis=0, mode="nearest")
+    before = np.zeros((len(taken) + 1, *taken.shape[1:]), np.int32)
+    np.cumsum(taken, axis=0, out=before[1:])
+    layer = np.arange(len(taken))
+    near = (
+        before[np.minimum(layer + late + 1, len(taken))]
+        > before[np.maximum(layer - late, 0)]
+    )
     penalty[near & ~taken] += NEAR_MISS_SHARE * layer_s
 
 
