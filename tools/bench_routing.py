@@ -38,7 +38,8 @@ from mrmg import storage
 from mrmg.planning.bound.exact_tours import exact_routing
 from mrmg.planning.routers import find_router
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing.routing import RouterParams, routing_arrays
+from mrmg.planning.routing.instance import RoutingInstance
+from mrmg.planning.routing.routing import RouterParams
 from mrmg.planning.routing.routing_problem import RoutingProblem
 
 PROVEN = {
@@ -241,7 +242,7 @@ def read_green_vrp(path: Path, *, vehicles: int = VEHICLES) -> RoutingArrays:
     stop = np.repeat([CUSTOMER_STOP, STATION_STOP], [len(customers), len(stations)])
     hours = way[:, :targets] / SPEED + stop
     fleet = np.ones(vehicles)
-    return routing_arrays(
+    return RoutingInstance(
         goals=len(customers),
         distance=np.tile(way[:targets, :targets], (vehicles, 1, 1)),
         start_distance=np.tile(way[targets, :targets], (vehicles, 1)),
@@ -253,7 +254,7 @@ def read_green_vrp(path: Path, *, vehicles: int = VEHICLES) -> RoutingArrays:
         time=np.tile(hours, (vehicles, 1, 1)),
         finish_time=np.tile(way[:, targets] / SPEED, (vehicles, 1)),
         limit=LONGEST_ROUTE * fleet,
-    )
+    ).arrays
 
 
 def haversine(point: np.ndarray) -> np.ndarray:

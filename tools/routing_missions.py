@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing.routing import routing_arrays
+from mrmg.planning.routing.instance import RoutingInstance
 
 BATTERIES = {"recharged": (100.0, 140.0), "sufficient": (500.0, 800.0)}
 """Between these lies the way that full batteries last for in large missions [m]: robots
@@ -58,7 +58,7 @@ def uneven_mission(
         way = np.minimum(way, way[:, k : k + 1] + way[k : k + 1])
     plain = rng.uniform(80.0, 120.0, robots)
     capacity = plain * rng.uniform(*range_m, robots)
-    problem = routing_arrays(
+    problem = RoutingInstance(
         goals=goals,
         distance=np.repeat(way[None, :targets, :targets], robots, axis=0),
         start_distance=way[targets:, :targets],
@@ -66,7 +66,7 @@ def uneven_mission(
         energy=capacity * rng.uniform(0.5, 1.0, robots),
         capacity=capacity,
         reserve=0.05 * capacity,
-    )
+    ).arrays
     if open_goal is None:
         return problem
     return problem._replace(open_goal=np.array(open_goal))

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from mrmg.planning.routers import Router
-from mrmg.planning.routing.routing import Routing, routing_arrays
+from mrmg.planning.routing.instance import RoutingInstance
+from mrmg.planning.routing.routing import Routing
 from mrmg.planning.routing.routing_problem import RoutingProblem, faults_of_tours
 
 SPEED_M_S = 2.0
@@ -42,7 +43,7 @@ def sample_routing_problem(
         robots: how many.
         range_m: between these lies the length of path that a full battery lasts for.
         closed: whether robots return to where they start.
-        options: further arguments of `routing_arrays`, such as `limit`.
+        options: further arguments of `RoutingInstance`, such as `limit`.
     """
     rng = np.random.default_rng(seed)
     targets = goals + stations
@@ -61,7 +62,7 @@ def sample_routing_problem(
         options["finish_time"] = np.stack(
             [time[node, targets + r] for r, node in enumerate(nodes)]
         )
-    arrays = routing_arrays(
+    arrays = RoutingInstance(
         goals=goals,
         distance=np.repeat(cost[None, :targets, :targets], robots, axis=0),
         start_distance=cost[targets:, :targets],
@@ -71,7 +72,7 @@ def sample_routing_problem(
         reserve=0.05 * capacity,
         time=np.stack([time[node, :targets] + dwell for node in nodes]),
         **options,
-    )
+    ).arrays
     return RoutingProblem.of(arrays)
 
 

@@ -17,7 +17,7 @@ from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.problem.problem import Problem, state_problem
 from mrmg.planning.roadmap.roadmap import build_roadmap
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing.routing import routing_arrays
+from mrmg.planning.routing.instance import RoutingInstance
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.world.world import World
@@ -205,7 +205,7 @@ def state() -> Callable[..., Problem]:
 def chain() -> RoutingArrays:
     """Five stations on a line, 10 m apart, with a battery for 11 m."""
     x = np.array([60.0, 10.0, 20.0, 30.0, 40.0, 50.0])
-    return routing_arrays(
+    return RoutingInstance(
         goals=1,
         distance=np.abs(x[:, None] - x)[None],
         start_distance=x[None],
@@ -213,4 +213,4 @@ def chain() -> RoutingArrays:
         energy=np.array([11.0]),
         capacity=np.array([11.0]),
         reserve=np.zeros(1),
-    )
+    ).arrays

@@ -22,7 +22,7 @@ from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.bound.bound import lower_bound_J
 from mrmg.planning.bound.exact_tours import exact_routing
 from mrmg.planning.bound.geodesic import Ground
-from mrmg.planning.routing.routing import routing_arrays
+from mrmg.planning.routing.instance import RoutingInstance
 from mrmg.plans import Plan
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
@@ -185,7 +185,7 @@ def test_costlier_legs_never_make_tours_cheaper(seed: int, costlier: list[int]) 
     raised = np.concatenate([distance.ravel(), start_distance.ravel()])
     raised[np.array(costlier, int)] *= rng.uniform(1.0, 1.5, len(costlier))
     problems = [
-        routing_arrays(
+        RoutingInstance(
             goals=4,
             distance=legs[:72].reshape(2, 6, 6),
             start_distance=legs[72:].reshape(2, 6),
@@ -193,7 +193,7 @@ def test_costlier_legs_never_make_tours_cheaper(seed: int, costlier: list[int]) 
             energy=np.array([20.0, 30.0]),
             capacity=np.array([25.0, 30.0]),
             reserve=np.ones(2),
-        )
+        ).arrays
         for legs in (np.append(distance, start_distance), raised)
     ]
     before, after = (exact_routing(problem) for problem in problems)

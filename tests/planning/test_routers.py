@@ -19,7 +19,8 @@ from mrmg.errors import UsageError
 from mrmg.planning import Router, RoutingProblem
 from mrmg.planning.routers import find_router
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing.routing import RouterParams, Routing, routing_arrays
+from mrmg.planning.routing.instance import RoutingInstance
+from mrmg.planning.routing.routing import RouterParams, Routing
 from mrmg.planning.routing.routing_problem import faults_of_tours, tour_ledger
 from mrmg.testing import RouterContract, sample_routing_problem
 
@@ -47,7 +48,7 @@ class TestExact(RouterContract):
 
 
 def made(**arguments: Any) -> RoutingProblem:
-    return RoutingProblem.of(routing_arrays(**arguments))
+    return RoutingProblem.of(RoutingInstance(**arguments).arrays)
 
 
 def driven(

@@ -11,7 +11,7 @@ from peer_legs import leg_of
 
 import mrmg
 from mrmg.planning import RoutingProblem, faults_of_tours
-from mrmg.planning.routing.routing import routing_arrays
+from mrmg.planning.routing.instance import RoutingInstance
 from mrmg.scene.loading import scene_from_document
 
 
@@ -60,7 +60,7 @@ def test_the_baseline_does_not_see_obstacles() -> None:
 def test_a_solvers_matrix_has_start_nodes_and_end() -> None:
     legs = np.array([[[0.0, 2.0], [2.0, 0.0]]])
     problem = RoutingProblem.of(
-        routing_arrays(
+        RoutingInstance(
             goals=1,
             distance=legs,
             start_distance=np.array([[3.0, 5.0]]),
@@ -69,7 +69,7 @@ def test_a_solvers_matrix_has_start_nodes_and_end() -> None:
             capacity=np.full(1, 9.0),
             reserve=np.zeros(1),
             finish_distance=np.array([[1.0, 4.0, 7.0]]),
-        )
+        ).arrays
     )
     found = peer_routing.matrix(problem, 0, [0, 1])
     assert found[0].tolist() == [0.0, 3.0, 5.0, 7.0]

@@ -46,11 +46,8 @@ from mrmg.planning.bound.touring import touring_bound_J
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing.routing import (
-    RouterParams,
-    routing_arrays,
-    solve_routing,
-)
+from mrmg.planning.routing.instance import RoutingInstance
+from mrmg.planning.routing.routing import RouterParams, solve_routing
 from mrmg.scene.region import Region
 from mrmg.scene.types import Robot, Scene
 
@@ -200,7 +197,7 @@ class Relaxation:
         last = np.zeros((len(keys), targets + 1))
         for place, r in enumerate(ends if with_finishes else (), start=targets):
             last[r] = [*ways[keys[r]].between[:targets, place], first[r, place]]
-        problem = routing_arrays(
+        problem = RoutingInstance(
             goals=len(scene.goals),
             distance=np.stack(
                 [ways[k].between[:targets, :targets] for k, *_ in distinct]
@@ -212,7 +209,7 @@ class Relaxation:
             energy=np.array([_relaxed_start_J(scene, one) for one in scene.robots]),
             capacity=np.array(full_J),
             reserve=np.array(reserve_J),
-        )
+        ).arrays
         return Relaxation(scene, step_s, problem, keys, ways, np.array(price))
 
     def arc_ways(self, finer: int = FINER) -> list[ArcWays]:

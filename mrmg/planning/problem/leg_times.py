@@ -11,7 +11,7 @@ from mrmg.planning.preference import Preference
 from mrmg.planning.problem.targets import finish_of
 from mrmg.planning.problem.time_weighting import way_lengths_m
 from mrmg.planning.roadmap.roadmap import Roadmap
-from mrmg.planning.routing.routing import homes
+from mrmg.planning.routing.instance import homes
 from mrmg.scene.types import Scene
 
 TIE_SHARE = 0.01
@@ -55,7 +55,7 @@ def routing_times(
         scene: the mission.
         roadmap: its roadmap.
         fleet: records of FLEET, shape (R,).
-        table: of each robot, as of `routing_arrays`.
+        table: of each robot, as of `RoutingInstance`.
         dwell: how long robots stay at each target [s].
         margin: surcharge on times, for what the roadmap does not see.
     """

@@ -32,7 +32,7 @@ from mrmg.planning.roadmap.fleet import fleet_array, stack_spaces
 from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
 from mrmg.planning.roadmap.vertices import planned_regions
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing.routing import routing_arrays
+from mrmg.planning.routing.instance import RoutingInstance
 from mrmg.plans import Trajectory
 from mrmg.scene.region import Region
 from mrmg.scene.types import Scene
@@ -221,7 +221,7 @@ def state_problem(
         roadmap=roadmap.arrays,
         targets=targets,
         zones=gate_arrays(scene),
-        routing=routing_arrays(
+        routing=RoutingInstance(
             goals=len(scene.goals),
             distance=roadmap.distance[fleet["field"][owner], :places, :places]
             + stay_m[owner, None],
@@ -233,7 +233,7 @@ def state_problem(
             reserve=fleet["reserve"],
             finish_distance=last_leg / fleet["plain"][:, None],
             **({} if times is None else times._asdict()),
-        ),
+        ).arrays,
     )
     return Problem(
         scene=scene,

@@ -17,12 +17,8 @@ from mrmg.planning.bound.bound import Relaxation, lower_bound_J, relaxed_routing
 from mrmg.planning.bound.exact_tours import PRUNED_GOALS, exact_routing
 from mrmg.planning.bound.geodesic import Field, Look
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing.routing import (
-    RouterParams,
-    Routing,
-    routing_arrays,
-    solve_routing,
-)
+from mrmg.planning.routing.instance import RoutingInstance
+from mrmg.planning.routing.routing import RouterParams, Routing, solve_routing
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.types import Scene
 
@@ -85,7 +81,7 @@ def test_costs_need_not_be_a_metric(oracle: Oracle) -> None:
     """Regions are crossed for nothing, so that a way over a third may be shorter."""
     rng = np.random.default_rng(4)
     for _ in range(20):
-        problem = routing_arrays(
+        problem = RoutingInstance(
             goals=5,
             distance=rng.uniform(1.0, 30.0, (2, 7, 7)),
             start_distance=rng.uniform(1.0, 30.0, (2, 7)),
@@ -93,7 +89,7 @@ def test_costs_need_not_be_a_metric(oracle: Oracle) -> None:
             energy=np.array([15.0, 25.0]),
             capacity=np.array([20.0, 25.0]),
             reserve=np.ones(2),
-        )
+        ).arrays
         routing = exact_routing(problem)
         assert routing is not None
         assert routing.cost_J == pytest.approx(oracle(problem))

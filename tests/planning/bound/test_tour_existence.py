@@ -18,7 +18,7 @@ from mrmg.planning.bound.tour_existence import (
     proof_of_no_tours,
 )
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing.routing import routing_arrays
+from mrmg.planning.routing.instance import RoutingInstance
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.types import Scene
 
@@ -48,7 +48,7 @@ def random_fleet(
     if metric and closed:
         back = [[*leg[r, :targets, targets + r], 0.0] for r in range(robots)]
         last = np.array(back)
-    return routing_arrays(
+    return RoutingInstance(
         goals=goals,
         distance=leg[:, :targets, :targets],
         start_distance=np.stack([leg[r, targets + r, :targets] for r in range(robots)]),
@@ -57,7 +57,7 @@ def random_fleet(
         capacity=capacity,
         reserve=0.1 * capacity,
         finish_distance=last,
-    )
+    ).arrays
 
 
 def drives(problem: RoutingArrays, r: int, order: tuple[int, ...], left: float) -> bool:

@@ -18,7 +18,7 @@ from mrmg.planning.bound.exact_tours import cheapest_tours, exact_routing
 from mrmg.planning.bound.geodesic import Ground, Ways
 from mrmg.planning.bound.touring import touring_bound_J
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.planning.routing.routing import routing_arrays
+from mrmg.planning.routing.instance import RoutingInstance
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 
@@ -90,7 +90,7 @@ def by_arcs(leg: np.ndarray, goals: int, range_m: float) -> RoutingArrays:
     least = leg.min(axis=(2, 4))
     least[:, -1] = leg[:, -1, 0].min(axis=-1)
     robots = len(leg)
-    return routing_arrays(
+    return RoutingInstance(
         goals=goals,
         distance=least[:, :-1],
         start_distance=least[:, -1],
@@ -98,7 +98,7 @@ def by_arcs(leg: np.ndarray, goals: int, range_m: float) -> RoutingArrays:
         energy=np.full(robots, range_m),
         capacity=np.full(robots, range_m),
         reserve=np.zeros(robots),
-    )
+    ).arrays
 
 
 @pytest.mark.parametrize(
@@ -176,7 +176,7 @@ def test_counted_visits_prove_no_more_than_the_cheapest_tours_cost(
 
 
 def test_a_goal_that_no_robot_reaches_makes_the_tours_infinite() -> None:
-    problem = routing_arrays(
+    problem = RoutingInstance(
         goals=1,
         distance=np.zeros((1, 1, 1)),
         start_distance=np.array([[np.inf]]),
@@ -184,7 +184,7 @@ def test_a_goal_that_no_robot_reaches_makes_the_tours_infinite() -> None:
         energy=np.ones(1),
         capacity=np.ones(1),
         reserve=np.zeros(1),
-    )
+    ).arrays
     routing = exact_routing(problem)
     assert routing is not None
     assert not routing.feasible

@@ -16,7 +16,8 @@ from mrmg.planning.routing._refuel_kernels import (
     new_labels,
     row_of,
 )
-from mrmg.planning.routing.routing import routing_arrays, tour_of
+from mrmg.planning.routing.instance import RoutingInstance
+from mrmg.planning.routing.routing import tour_of
 
 SLACK_J = 1e-6
 
@@ -90,7 +91,7 @@ def test_a_larger_battery_never_costs_more(mission: Callable) -> None:
 def test_without_stations_a_route_is_drivable_or_not() -> None:
     """Ten, then ten more joules: 25 suffice above a reserve of 5, 24 do not."""
     for energy, expected in ((25.0, 20.0), (24.0, None)):
-        problem = routing_arrays(
+        problem = RoutingInstance(
             goals=2,
             distance=np.array([[[0.0, 10.0], [10.0, 0.0]]]),
             start_distance=np.array([[10.0, 20.0]]),
@@ -98,7 +99,7 @@ def test_without_stations_a_route_is_drivable_or_not() -> None:
             energy=np.array([energy]),
             capacity=np.array([100.0]),
             reserve=np.array([5.0]),
-        )
+        ).arrays
         cost, tour = refuelled(problem, (0, 1))
         if expected is None:
             assert cost == np.inf
@@ -155,7 +156,7 @@ def test_recharging_takes_its_time_and_routes_keep_their_limit(
     expected_s = finish_m + charged_J / 2.0
     x = np.array([goal_m, station_m, 0.0])  # the start comes last
     apart = np.abs(x[:, None] - x)
-    problem = routing_arrays(
+    problem = RoutingInstance(
         goals=1,
         distance=apart[None, :2, :2],
         start_distance=apart[None, 2, :2],
@@ -169,7 +170,7 @@ def test_recharging_takes_its_time_and_routes_keep_their_limit(
         limit=np.array([expected_s + slack_s]),
         charge_power=np.array([2.0]),
         makespan_weight=1.0,
-    )
+    ).arrays
     legs = new_legs(problem)
     labels = new_labels(legs)
     goal, end = np.array([0]), int(legs.home[0])

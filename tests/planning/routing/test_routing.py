@@ -14,12 +14,8 @@ import numpy as np
 import pytest
 
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays, with_own_tables
-from mrmg.planning.routing.routing import (
-    RouterParams,
-    Routing,
-    routing_arrays,
-    solve_routing,
-)
+from mrmg.planning.routing.instance import RoutingInstance
+from mrmg.planning.routing.routing import RouterParams, Routing, solve_routing
 
 SLACK_J = 1e-6
 
@@ -141,8 +137,10 @@ def test_robots_alike_may_share_their_legs() -> None:
         "reserve": 0.1 * capacity,
     }
     legs = apart[None, :12, :12]
-    shared = routing_arrays(goals=9, distance=np.repeat(legs, 2, 0), table=table, **own)
-    alone = routing_arrays(goals=9, distance=np.repeat(legs, 3, 0), **own)
+    shared = RoutingInstance(
+        goals=9, distance=np.repeat(legs, 2, 0), table=table, **own
+    ).arrays
+    alone = RoutingInstance(goals=9, distance=np.repeat(legs, 3, 0), **own).arrays
     assert shared.cost.shape == (2, 14, 12)
     separated = with_own_tables(shared)
     assert all(
@@ -241,7 +239,7 @@ def test_nothing_left_to_visit_costs_nothing(mission: Mission) -> None:
 
 
 def test_a_goal_beyond_every_battery_makes_the_mission_infeasible() -> None:
-    problem = routing_arrays(
+    problem = RoutingInstance(
         goals=2,
         distance=np.array([[[0.0, 5.0, 5.0], [5.0, 0.0, 80.0], [5.0, 80.0, 0.0]]]),
         start_distance=np.array([[5.0, 80.0, 5.0]]),
@@ -249,7 +247,7 @@ def test_a_goal_beyond_every_battery_makes_the_mission_infeasible() -> None:
         energy=np.array([6.0]),
         capacity=np.array([7.0]),
         reserve=np.array([1.0]),
-    )
+    ).arrays
     routing = solve_routing(problem, RouterParams(), 0)
     assert not routing.feasible
     assert routing.cost_J == np.inf
@@ -263,7 +261,7 @@ def test_goals_cut_off_from_one_robot_go_to_the_other(
     inf = np.inf
     apart = np.array([[0.0, inf, 4.0], [inf, 0.0, inf], [4.0, inf, 0.0]])
     kept = slice(0, 2 + stations)
-    problem = routing_arrays(
+    problem = RoutingInstance(
         goals=2,
         distance=np.stack([apart[kept, kept]] * 2),
         start_distance=np.array([[3.0, inf, 2.0], [inf, 3.0, inf]])[:, kept],
@@ -271,7 +269,7 @@ def test_goals_cut_off_from_one_robot_go_to_the_other(
         energy=np.array([10.0, 10.0]),
         capacity=np.array([20.0, 20.0]),
         reserve=np.zeros(2),
-    )
+    ).arrays
     routing = solve_routing(problem, RouterParams(), 0)
     assert routing.tours == ((0,), (1,))
     assert routing.cost_J == 6.0
@@ -279,7 +277,7 @@ def test_goals_cut_off_from_one_robot_go_to_the_other(
 
 def test_a_goal_cut_off_from_all_ends_in_an_infinite_cost() -> None:
     inf = np.inf
-    problem = routing_arrays(
+    problem = RoutingInstance(
         goals=2,
         distance=np.array([[[0.0, inf], [inf, 0.0]]]),
         start_distance=np.array([[3.0, inf]]),
@@ -287,14 +285,14 @@ def test_a_goal_cut_off_from_all_ends_in_an_infinite_cost() -> None:
         energy=np.array([10.0]),
         capacity=np.array([20.0]),
         reserve=np.zeros(1),
-    )
+    ).arrays
     assert solve_routing(problem, RouterParams(), 0).cost_J == inf
 
 
 def test_ties_do_not_make_the_search_run_in_circles(oracle: Oracle) -> None:
     """Identical robots, goals in one place, and no energy: every move is a tie."""
     for energy in (1.0, 30.0):
-        problem = routing_arrays(
+        problem = RoutingInstance(
             goals=4,
             distance=np.full((3, 5, 5), 10.0) * (1.0 - np.eye(5)),
             start_distance=np.full((3, 5), 10.0),
@@ -302,6 +300,6 @@ def test_ties_do_not_make_the_search_run_in_circles(oracle: Oracle) -> None:
             energy=np.full(3, energy),
             capacity=np.full(3, 40.0),
             reserve=np.zeros(3),
-        )
+        ).arrays
         routing = solve_routing(problem, RouterParams(), 0)
         assert routing.cost_J == oracle(problem)
