@@ -23,7 +23,7 @@ from mrmg.plans import Plan, Trajectory
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.world._kernels import FreeSpace, footprint_is_clear
-from mrmg.world._polygon_kernels import convex_convex_distance, place_footprint
+from mrmg.world._polygon_kernels import convex_distance, place_footprint
 from mrmg.world.world import World
 
 LEGS = {
@@ -81,7 +81,7 @@ def states_clear(fleet, spaces, states, corners):  # type: ignore[no-untyped-def
         ):
             return False
         for other in range(r):
-            apart = convex_convex_distance(corners[r], corners[other])
+            apart = convex_distance(corners[r], corners[other], one.spacing)
             if apart < one.spacing:
                 return False
     return True

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.world._polygon_kernels import convex_segment_distance, point_segment_distance
+from mrmg.world._polygon_kernels import convex_distance, point_segment_distance
 
 
 class FreeSpace(NamedTuple):
@@ -164,11 +164,11 @@ def footprint_is_clear(space, placed, cx, cy, radius, margin):
             margin -= space.allowance[row, column]
     for i in range(space.bucket_start[b], space.bucket_start[b + 1]):
         e = space.bucket_edge[i]
-        ax, ay = space.edge[e, 0], space.edge[e, 1]
-        bx, by = space.edge[e, 2], space.edge[e, 3]
+        edge = space.edge[e]
         if (
-            point_segment_distance(cx, cy, ax, ay, bx, by) <= radius + margin
-            and convex_segment_distance(placed, ax, ay, bx, by) < margin
+            point_segment_distance(cx, cy, edge[0], edge[1], edge[2], edge[3])
+            <= radius + margin
+            and convex_distance(placed, edge.reshape(2, 2), margin) < margin
         ):
             return False
     # No edge is near, so the footprint lies wholly inside or wholly outside.

@@ -1,11 +1,12 @@
 """Distances of points, segments and convex polygons, and footprints at poses.
 
-Polygons are arrays of their corners, counter-clockwise, shape (m, 2), in m.
+Polygons are arrays of their corners, counter-clockwise, shape (m, 2), in m. A segment
+is a polygon of two corners.
 """
 
 from __future__ import annotations
 
-from math import cos, hypot, sin
+from math import cos, sin, sqrt
 
 import numpy as np
 
@@ -22,17 +23,8 @@ def point_segment_distance(px, py, ax, ay, bx, by):
     if length2 > 0.0:
         t = ((px - ax) * dx + (py - ay) * dy) / length2
         t = min(1.0, max(0.0, t))
-    return hypot(px - ax - t * dx, py - ay - t * dy)
-
-
-@kernel
-def segments_cross(ax, ay, bx, by, cx, cy, dx, dy):
-    """Return whether segments ab and cd properly cross."""
-    d1 = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-    d2 = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
-    d3 = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
-    d4 = (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
-    return (d1 > 0.0) != (d2 > 0.0) and (d3 > 0.0) != (d4 > 0.0)
+    ex, ey = px - ax - t * dx, py - ay - t * dy
+    return sqrt(ex * ex + ey * ey)
 
 
 @kernel
@@ -63,40 +55,53 @@ def point_convex_distance(px, py, corners):
 
 
 @kernel
-def convex_segment_distance(corners, ax, ay, bx, by):
-    """Return the distance of a convex polygon from a segment; 0 where they meet."""
-    best = point_convex_distance(ax, ay, corners)
-    best = min(best, point_convex_distance(bx, by, corners))
-    n = len(corners)
+def beyond_sides(first, second, enough):
+    """Return how far a polygon lies beyond the side of another one it is farthest from.
+
+    Negative where it lies wholly beyond none. The distance is at least that, and where
+    it is not positive either way round, the two meet (separating axes). Sides after one
+    that is `enough` are not looked at.
+    """
+    best, n = -np.inf, len(first)
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
-        px, py = corners[i, 0], corners[i, 1]
-        if segments_cross(px, py, corners[j, 0], corners[j, 1], ax, ay, bx, by):
-            return 0.0
-        best = min(best, point_segment_distance(px, py, ax, ay, bx, by))
+        ex, ey = first[j, 0] - first[i, 0], first[j, 1] - first[i, 1]
+        size = sqrt(ex * ex + ey * ey)
+        if size == 0.0 or best >= enough:
+            continue
+        least = np.inf
+        for k in range(len(second)):
+            dx, dy = second[k, 0] - first[i, 0], second[k, 1] - first[i, 1]
+            least = min(least, dx * ey - dy * ex)
+        best = max(best, least / size)
     return best
 
 
 @kernel
-def convex_convex_distance(first, second):
-    """Return the distance of two convex polygons; 0 where they meet."""
-    if point_in_convex(second[0, 0], second[0, 1], first):
-        return 0.0
-    if point_in_convex(first[0, 0], first[0, 1], second):
-        return 0.0
-    best = np.inf
-    n = len(second)
+def corners_from_sides(first, second):
+    """Return the least distance of a polygon's corners from sides of another one."""
+    best, n = np.inf, len(first)
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
-        best = min(
-            best,
-            convex_segment_distance(
-                first, second[i, 0], second[i, 1], second[j, 0], second[j, 1]
-            ),
-        )
-        if best == 0.0:
-            return 0.0
+        ax, ay, bx, by = first[i, 0], first[i, 1], first[j, 0], first[j, 1]
+        for k in range(len(second)):
+            apart = point_segment_distance(second[k, 0], second[k, 1], ax, ay, bx, by)
+            best = min(best, apart)
     return best
+
+
+@kernel
+def convex_distance(first, second, enough):
+    """Return the distance of two convex polygons; 0 where they meet.
+
+    Some number from `enough` on where they are at least that far apart.
+    """
+    beyond = beyond_sides(first, second, enough)
+    if beyond < enough:
+        beyond = max(beyond, beyond_sides(second, first, enough))
+    if beyond >= enough or beyond <= 0.0:
+        return max(beyond, 0.0)
+    return min(corners_from_sides(first, second), corners_from_sides(second, first))
 
 
 @kernel

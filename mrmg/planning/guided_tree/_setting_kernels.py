@@ -13,7 +13,7 @@ from mrmg.planning.roadmap._fleet_kernels import Spaces, space_of
 from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.world._kernels import TerrainGrid, footprint_is_clear
-from mrmg.world._polygon_kernels import convex_convex_distance, place_footprint
+from mrmg.world._polygon_kernels import convex_distance, place_footprint
 
 STATE_ROUNDING = 1e-9
 """Rounding of summed steps that is forgiven in the limits of speed and steering."""
@@ -106,6 +106,6 @@ def collision_free(setting, state, corner, middle):
             if apart >= fleet[r].radius + fleet[other].radius + gap:
                 continue
             others = corner[other, : fleet[other].corners]
-            if convex_convex_distance(corner[r, :n], others) < gap:
+            if convex_distance(corner[r, :n], others, gap) < gap:
                 return False
     return True

@@ -29,7 +29,7 @@ from mrmg.planning.problem._control_kernels import (
     stands,
 )
 from mrmg.planning.problem._region_kernels import in_region
-from mrmg.world._polygon_kernels import convex_convex_distance, place_footprint
+from mrmg.world._polygon_kernels import convex_distance, place_footprint
 
 BRAKE, HOME, VISIT, STAY, WAIT, TRACK, HOLD, MOVE = range(-5, 3)
 """Brake, or drive home, and be through; drive to a target's pose; stand in a target, or
@@ -119,7 +119,7 @@ def first_conflict(own, traffic, other, state, count, first, corner):
         place_footprint(
             traffic.fleet[other].corner[:m], pose[0], pose[1], pose[2], corner[1, :m]
         )
-        if convex_convex_distance(corner[0, :n], corner[1, :m]) < margin:
+        if convex_distance(corner[0, :n], corner[1, :m], margin) < margin:
             return k
         k += 1
     return -1

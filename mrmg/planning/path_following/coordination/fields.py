@@ -90,25 +90,22 @@ class Fields:
         standing, stood = hold_share * layer * dt_s, np.full(len(targets), -1)
         stood[: len(stay)] = -(-stay // layer)
         lasting = np.where(penalty[-1] < np.inf, price, np.inf)
-        legs: list[np.ndarray] = []
+        field = np.empty((len(targets), *penalty.shape))
         for i in range(len(targets) - 1, -1, -1):
             region = self._region(targets[i : i + 1])
             hold = np.full(price.shape, standing)
             seed = np.full(penalty.shape, np.inf)
             last = np.where(region, 0.0, np.inf)
             if stood[i] >= 0:
-                later = legs[-1] if legs else np.zeros(penalty.shape)
                 ahead = np.minimum(np.arange(layers) + stood[i], layers - 1)
-                seed[:, region] = later[ahead][:, region]
+                through = i + 1 == len(targets)
+                seed[:, region] = 0.0 if through else field[i + 1, ahead][:, region]
                 last = seed[-1]
             else:
                 hold[region] = 0.0
             last = np.where(lasting < np.inf, last, np.inf)
-            field = np.empty(penalty.shape)
-            field[-1] = _field_kernels.cost_to_go(lasting, last)
-            _field_kernels.timed_cost_to_go(price, seed, penalty, hold, field)
-            legs.append(field)
-        field = np.stack(legs[::-1])
+            field[i, -1] = _field_kernels.cost_to_go(lasting, last)
+            _field_kernels.timed_cost_to_go(price, seed, penalty, hold, field[i])
         way = self._way_down(r, targets, stood, (price, standing, field))
         return Guide(field, cell_m, layer), way
 
@@ -217,16 +214,14 @@ def _add_near_misses(penalty: np.ndarray, layer_s: float) -> None:
         penalty: of cells, inf where other robots are, shape (T, ny, nx).
         layer_s: time of a layer [s].
     """
-    taken = np.isinf(penalty)
-    late = round(LATE_S / layer_s)
-    before = np.zeros((len(taken) + 1, *taken.shape[1:]), np.int32)
+    ever = np.isinf(penalty).any(axis=0)
+    taken = np.isinf(penalty[:, ever])
+    late, layer = round(LATE_S / layer_s), np.arange(len(taken))
+    before = np.zeros((len(taken) + 1, taken.shape[1]), np.int32)
     np.cumsum(taken, axis=0, out=before[1:])
-    layer = np.arange(len(taken))
-    near = (
-        before[np.minimum(layer + late + 1, len(taken))]
-        > before[np.maximum(layer - late, 0)]
-    )
-    penalty[near & ~taken] += NEAR_MISS_SHARE * layer_s
+    last, first = np.minimum(layer + late + 1, len(taken)), np.maximum(layer - late, 0)
+    near = (before[last] > before[first]) & ~taken
+    penalty[:, ever] += np.where(near, NEAR_MISS_SHARE * layer_s, 0.0)
 
 
 def inner_m(robot: np.ndarray) -> float:
