@@ -5,7 +5,7 @@ Static ones know obstacles alone; timed ones also know where the other robots ar
 
 from __future__ import annotations
 
-from math import floor, hypot, sqrt
+from math import cos, floor, hypot, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +18,9 @@ from mrmg.world._polygon_kernels import place_footprint, point_convex_distance
 
 DIAGONAL = sqrt(2.0)
 
+BEARINGS = 8
+"""Headings that costs-to-go of turning know: those to the cells about one."""
+
 
 class Guide(NamedTuple):
     """Costs-to-go through all targets of a tour.
@@ -25,11 +28,15 @@ class Guide(NamedTuple):
     Attributes:
         field: from each cell on each leg in each layer of time to the end [s], shape
             (L, T, ny, nx); the last layer lasts.
+        turning: what turning costs beside that with each of BEARINGS, a full turn
+            divided by their number apart, [s], shape (L, BEARINGS, ny, nx); (0, ...) if
+            it is not known.
         cell: side of a cell [m].
         layer: steps that a layer of time lasts.
     """
 
     field: np.ndarray
+    turning: np.ndarray
     cell: float
     layer: int
 
@@ -68,6 +75,54 @@ def cost_to_go(price, seed):
                     cost[a, b] = there
                     size = push(key, entry, size, there, a * columns + b)
     return cost
+
+
+@kernel
+def turning_cost_to_go(price, turn_s, back, cost):
+    """Lower the costs of poses by way of each other (Dijkstra).
+
+    A robot drives ahead or back to the next cell in the line of its heading, or turns
+    from one of BEARINGS to the next one.
+
+    Args:
+        price: cost of a cell's side, inf where it may not be passed, shape (ny, nx).
+        turn_s: cost of turning by one heading, shape (ny, nx).
+        back: cost of driving back over that of driving ahead; inf if it cannot.
+        cost: where the way may end from each pose on, else inf; receives the least
+            costs, shape (BEARINGS, ny, nx).
+    """
+    rows, columns = price.shape
+    poses = BEARINGS * rows * columns
+    key, entry = np.empty(5 * poses + 8), np.empty(5 * poses + 8, np.int64)
+    size = 0
+    for pose in range(poses):
+        value = cost[pose // (rows * columns), pose // columns % rows, pose % columns]
+        if value < np.inf:
+            size = push(key, entry, size, value, pose)
+    while size > 0:
+        value, pose = key[0], entry[0]
+        size = pop(key, entry, size)
+        h, i, j = pose // (rows * columns), pose // columns % rows, pose % columns
+        if value > cost[h, i, j]:
+            continue
+        angle = 2.0 * pi * h / BEARINGS
+        di, dj = round(sin(angle)), round(cos(angle))
+        way = DIAGONAL if di != 0 and dj != 0 else 1.0
+        for move in range(4):
+            g, a, b, more = h, i, j, turn_s[i, j]
+            if move < 2:  # it comes from behind, or from ahead and drives back
+                side = -1 if move == 0 else 1
+                a, b = i + side * int(di), j + side * int(dj)
+                if not (0 <= a < rows and 0 <= b < columns):
+                    continue
+                more = 0.5 * way * (price[i, j] + price[a, b])
+                more *= 1.0 if move == 0 else back
+            else:
+                g = (h + (1 if move == 2 else BEARINGS - 1)) % BEARINGS
+            if value + more < cost[g, a, b]:
+                cost[g, a, b] = value + more
+                pose = (g * rows + a) * columns + b
+                size = push(key, entry, size, value + more, pose)
 
 
 @kernel
@@ -240,3 +295,18 @@ def guide_at(guide, leg, step, x_min, y_min, x, y):
     """Return the cost-to-go of a point on a leg at a step [s]."""
     layer = min(step // guide.layer, guide.field.shape[1] - 1)
     return field_at(guide.field[leg, layer], x_min, y_min, guide.cell, x, y)
+
+
+@kernel
+def turning_at(guide, leg, x_min, y_min, state):
+    """Return what turning costs from a state on beside the cost-to-go [s]."""
+    rows, columns = guide.turning.shape[2], guide.turning.shape[3]
+    column = min(max(int(floor((state[0] - x_min) / guide.cell)), 0), columns - 1)
+    row = min(max(int(floor((state[1] - y_min) / guide.cell)), 0), rows - 1)
+    place = state[2] / (2.0 * pi) * BEARINGS
+    low = int(floor(place))
+    share = place - low
+    one = guide.turning[leg, low % BEARINGS, row, column]
+    return (1.0 - share) * one + share * guide.turning[
+        leg, (low + 1) % BEARINGS, row, column
+    ]

@@ -10,7 +10,11 @@ import numpy as np
 from mrmg.compilation import kernel
 from mrmg.motion._kernels import CAR, copy_numbers
 from mrmg.planning.path_following._following_kernels import Course, advance
-from mrmg.planning.path_following.coordination._field_kernels import Guide, guide_at
+from mrmg.planning.path_following.coordination._field_kernels import (
+    Guide,
+    guide_at,
+    turning_at,
+)
 from mrmg.planning.path_following.coordination._motion_kernels import (
     TRACK,
     Traffic,
@@ -31,6 +35,10 @@ OFF_PATH = -1
 
 CURVE_SHARE = 1.05
 """Radius of the curves that costs-to-go are reckoned with, over the least one."""
+
+TURNING_SHARE = 0.4
+"""Share of the costs-to-go of turning that counts: robots turn as they drive, too, and
+other robots may be led round that way."""
 
 SIDEWAYS = 2.0
 """Metres of way that a metre off the path counts as."""
@@ -203,11 +211,16 @@ def cost_to_go_s(search, place, state):
         )
     if on_path and segment < search.course.size[0]:
         time_s = along_path_s(search, leg, left, state)
-    elif target >= 0 and search.targets.target[target].tolerance < pi:
-        posed_s = posing_time_s(own, search.targets, target, x, y, state[2])
+    elif target >= 0:
+        known, posed_s = len(task.guide.turning) > 0, 0.0
+        if known:
+            turn_s = turning_at(task.guide, leg, spaces.x_min, spaces.y_min, state)
+            time_s += TURNING_SHARE * turn_s
+        if search.targets.target[target].tolerance < pi:
+            posed_s = posing_time_s(own, search.targets, target, x, y, state[2])
         if own[0].model != CAR:
-            time_s += posed_s
-        else:
+            time_s += 0.0 if known else posed_s
+        elif posed_s > 0.0:
             if leg + 1 < legs or (leg < legs and task.finish >= 0):
                 center = search.targets.target[target].center
                 posed_s += guide_at(

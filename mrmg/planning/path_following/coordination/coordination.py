@@ -34,7 +34,7 @@ from mrmg.planning.path_following.coordination._node_kernels import (
     Setting,
     Task,
 )
-from mrmg.planning.path_following.coordination.fields import NO_GUIDE, Fields
+from mrmg.planning.path_following.coordination.fields import NO_GUIDE, UNKNOWN, Fields
 from mrmg.planning.path_following.coordination.leads import rounded_path
 from mrmg.planning.path_following.coordination.rounds import (
     FIRST_MOST,
@@ -200,9 +200,10 @@ class _Planning:
         led &= bool(
             (problem.mission.targets.target["tolerance"][task.leg] >= np.pi).all()
         )
+        turning = self._fields.turning(r, tour) if now.turning else UNKNOWN
         guide = NO_GUIDE
         if not (led and self.round is ROUNDS[0]):
-            guide = self._fields.static(r, tour)
+            guide = self._fields.static(r, tour)._replace(turning=turning)
         along = guided(problem, r, task, path, guide)
         yield along._replace(most=min(FIRST_MOST, now.most)), course
         costs = task.hold_share, task.soft_s / (task.steps * problem.dt_s)
@@ -216,7 +217,7 @@ class _Planning:
             free = task_of(problem, r, tour, nowhere, now)._replace(
                 stay=task.stay, later_s=task.later_s
             )
-            guide, way = timed
+            guide, way = timed[0]._replace(turning=turning), timed[1]
             steered = problem.mission.fleet[r]["model"] != CAR
             lead = rounded_path(problem, r, way) if steered else nowhere
             yield guided(problem, r, free, nowhere, guide), course_of(problem, r, lead)

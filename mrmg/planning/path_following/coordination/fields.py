@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mrmg.motion._kernels import CAR
 from mrmg.planning.path_following.coordination import _field_kernels
-from mrmg.planning.path_following.coordination._field_kernels import Guide
+from mrmg.planning.path_following.coordination._field_kernels import BEARINGS, Guide
 from mrmg.planning.path_following.coordination._motion_kernels import Traffic
 from mrmg.planning.problem.problem import Problem
 from mrmg.world._polygon_kernels import point_in_convex, point_segment_distance
@@ -22,6 +23,9 @@ MOST_TIMED_CELLS = 3_000_000
 """Cells of fields that know where the other robots are when, over all layers and legs,
 at most: it bounds their time and memory."""
 
+MOST_POSES = 200_000
+"""Poses of fields that know how long turning takes, over all legs, at most."""
+
 LATE_S = 1.5
 """How much later, or sooner, than costs-to-go tell a robot may be somewhere: they know
 neither how it turns nor how it gains speed [s]."""
@@ -30,7 +34,10 @@ NEAR_MISS_SHARE = 3.0
 """Cost of a second where another robot is so much later or sooner, over that of driving
 for it."""
 
-NO_GUIDE = Guide(np.zeros((1, 1, 1, 1)), 1e9, 1 << 30)
+UNKNOWN = np.zeros((0, 1, 1, 1))
+"""What turning costs where that is not known."""
+
+NO_GUIDE = Guide(np.zeros((1, 1, 1, 1)), UNKNOWN, 1e9, 1 << 30)
 """Costs-to-go of those who do without."""
 
 
@@ -41,6 +48,7 @@ class Fields:
         """Keep the problem; no field is made yet."""
         self._problem = problem
         self._known: dict[tuple[int, float, tuple[int, ...]], np.ndarray] = {}
+        self._turning: dict[tuple[int, ...], np.ndarray] = {}
         spaces = problem.mission.spaces
         cells = spaces.distance[0].size
         self._coarser = max(1, round((cells / MOST_CELLS) ** 0.5))
@@ -53,7 +61,7 @@ class Fields:
         legs = [self._way(r, tuple(targets[i:])) / top for i in range(len(targets))]
         if not legs:
             return NO_GUIDE
-        return Guide(np.stack(legs)[:, None], self._cell_m, 1 << 30)
+        return Guide(np.stack(legs)[:, None], UNKNOWN, self._cell_m, 1 << 30)
 
     def timed(
         self,
@@ -107,7 +115,7 @@ class Fields:
             field[i, -1] = _field_kernels.cost_to_go(lasting, last)
             _field_kernels.timed_cost_to_go(price, seed, penalty, hold, field[i])
         way = self._way_down(r, targets, stood, (price, standing, field))
-        return Guide(field, cell_m, layer), way
+        return Guide(field, UNKNOWN, cell_m, layer), way
 
     def _add_others(
         self,
@@ -172,6 +180,46 @@ class Fields:
             price = self._cell_m * self._price(r, targets)
             self._known[key] = _field_kernels.cost_to_go(price, seed)
         return self._known[key]
+
+    def turning(self, r: int, targets: Sequence[int]) -> np.ndarray:
+        """Return what turning costs robot r beside its costs-to-go [s] (`Guide`).
+
+        It is `UNKNOWN` for too many poses.
+        """
+        if (r, *targets) not in self._turning:
+            poses = len(targets) * BEARINGS * self._shape[0] * self._shape[1]
+            known = 0 < poses <= MOST_POSES
+            found = self._turns(r, targets) if known else UNKNOWN
+            self._turning[r, *targets] = found
+        return self._turning[r, *targets]
+
+    def _turns(self, r: int, targets: Sequence[int]) -> np.ndarray:
+        mission = self._problem.mission
+        robot, price = mission.fleet[r], self._price(r, targets)
+        back, top, rate = np.maximum(np.abs(robot["limit"][:3]), 1e-6)
+        if robot["model"] == CAR:
+            rate = top / robot["turning_radius"]
+        heading = 2.0 * np.pi / BEARINGS * np.arange(BEARINGS)
+        turn_s = heading[1] / rate * np.where(price < np.inf, price, 1.0)
+        turning = np.zeros((len(targets), BEARINGS, *self._shape))
+        cost = turning[0]
+        for i in range(len(targets) - 1, -1, -1):
+            aim = mission.targets.target[targets[i]]
+            off = np.abs((heading - aim["heading"] + np.pi) % (2.0 * np.pi) - np.pi)
+            after = slice(None)
+            if aim["tolerance"] < np.pi:
+                after = slice(int(off.argmin()), int(off.argmin()) + 1)
+            region = self._region(targets[i : i + 1])
+            off_s = np.maximum(0.0, off - aim["tolerance"]) / rate
+            later = cost[after, region] + off_s[:, None]
+            cost = np.full(turning.shape[1:], np.inf)
+            cost[:, region] = later
+            side_s = self._cell_m / top * price
+            _field_kernels.turning_cost_to_go(side_s, turn_s, top / back, cost)
+            way_s = self._way(r, tuple(targets[i:])) / top
+            known = np.isfinite(way_s) & np.isfinite(cost)
+            np.subtract(cost, way_s, out=turning[i], where=known)
+        return turning
 
     def _price(self, r: int, targets: Sequence[int]) -> np.ndarray:
         """Return what a metre costs robot r in each cell, inf where it has no room.

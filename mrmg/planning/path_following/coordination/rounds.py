@@ -15,16 +15,18 @@ class Round:
         weight: of costs-to-go: motions take at most so many times the least cost.
         fineness: how much shorter motions, and finer cells, are than usual.
         soft_s: cost of conflicts with robots of lower priority [s].
+        turning: whether costs-to-go know how long turning takes among obstacles.
     """
 
     most: int
     weight: float
     fineness: float
     soft_s: float
+    turning: bool = True
 
 
 ROUNDS = (
-    Round(most=1_000, weight=1.5, fineness=1.0, soft_s=2.0),
+    Round(most=1_000, weight=1.5, fineness=1.0, soft_s=2.0, turning=False),
     Round(most=4_000, weight=1.5, fineness=1.0, soft_s=4.0),
     Round(most=16_000, weight=2.0, fineness=2.0, soft_s=1.0),
     Round(most=64_000, weight=2.0, fineness=3.0, soft_s=4.0),

@@ -185,7 +185,8 @@ def poses_s(problem: Problem, r: int, task: Task, guide: Guide) -> np.ndarray:
     for leg, target in enumerate(task.leg):
         excess_s[: leg + 1] += stop_s * (targets.target["tolerance"][target] < pi)
     for leg, (one, other) in enumerate(pairwise(tour)):
-        if (targets.target["tolerance"][[one, other]] >= pi).any():
+        known = own[0]["model"] != CAR and len(guide.turning) > 0
+        if known or (targets.target["tolerance"][[one, other]] >= pi).any():
             continue
         x, y = targets.target["center"][one]
         time_s = posing_time_s(

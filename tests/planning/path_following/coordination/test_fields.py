@@ -1,0 +1,92 @@
+"""Costs-to-go over grids: what turning costs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from math import cos, hypot, inf, pi, sin
+
+import networkx as nx
+import numpy as np
+import pytest
+
+from mrmg.planning.path_following.coordination import _field_kernels
+from mrmg.planning.path_following.coordination._field_kernels import BEARINGS
+from mrmg.planning.path_following.coordination.fields import MOST_POSES, Fields
+from mrmg.planning.problem.problem import Problem
+from mrmg.scene.types import Scene
+
+Pose = tuple[int, int, int]
+
+
+def moves(
+    price: np.ndarray, turn_s: np.ndarray, back: float
+) -> Iterator[tuple[Pose, Pose, float]]:
+    """Yield (from, to, cost) of all moves from pose to pose, (heading, row, column)."""
+    rows, columns = price.shape
+    for h, i, j in np.ndindex(BEARINGS, rows, columns):
+        angle = 2.0 * pi * h / BEARINGS
+        for side, factor in ((1, 1.0), (-1, back)):
+            a, b = i + side * round(sin(angle)), j + side * round(cos(angle))
+            if 0 <= a < rows and 0 <= b < columns:
+                way = hypot(a - i, b - j) * 0.5 * (price[i, j] + price[a, b])
+                if way * factor < inf:
+                    yield (h, i, j), (h, a, b), way * factor
+        for g in ((h + 1) % BEARINGS, (h - 1) % BEARINGS):
+            yield (h, i, j), (g, i, j), turn_s[i, j]
+
+
+@pytest.mark.parametrize("back", [1.0, 2.5, inf])
+def test_costs_of_poses_are_those_of_the_shortest_ways(back: float) -> None:
+    """Against Dijkstra's algorithm of networkx, on priced ground with obstacles."""
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        price = rng.uniform(0.2, 2.0, (7, 9))
+        price[rng.random(price.shape) < 0.25] = inf
+        turn_s = rng.uniform(0.1, 3.0, price.shape)
+        cost = np.full((BEARINGS, *price.shape), inf)
+        cost[:, 3, 4] = rng.uniform(0.0, 5.0, BEARINGS)
+        graph: nx.DiGraph[object] = nx.DiGraph()
+        for one, other, way in moves(price, turn_s, back):
+            graph.add_edge(other, one, weight=way)
+        for h in range(BEARINGS):
+            graph.add_edge("end", (h, 3, 4), weight=cost[h, 3, 4])
+        expected = nx.single_source_dijkstra_path_length(graph, "end")
+        _field_kernels.turning_cost_to_go(price, turn_s, back, cost)
+        for pose in np.ndindex(cost.shape):
+            assert cost[pose] == pytest.approx(expected.get(pose, inf), abs=1e-9)
+
+
+def test_turning_is_counted_beside_the_way(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    robots = [{"id": "r", "model": "diffdrive", "pose": [4, 10, 0]}]
+    goals = [{"id": "g", "circle": {"center": [12, 10], "radius": 0.5}}]
+    small = yard(robots=robots, goals=goals, bounds=[0, 0, 16, 16])
+    problem = state(small, samples=50)
+    rate = float(problem.mission.fleet[0]["limit"][2])
+    fields = Fields(problem)
+    turning = fields.turning(0, [0])
+    assert turning.shape[:2] == (1, BEARINGS)
+    assert turning.min() >= -1e-9
+    guide = fields.static(0, [0])._replace(turning=turning)
+    corner = problem.mission.spaces.x_min, problem.mission.spaces.y_min
+
+    def turn_s(theta: float) -> float:
+        at = np.array([4.0, 10.0, theta, 0.0, 0.0])
+        return float(_field_kernels.turning_at(guide, 0, *corner, at))
+
+    assert turn_s(0.0) == pytest.approx(0.0, abs=1e-9)
+    assert turn_s(pi / 8) == pytest.approx(pi / 8 / rate)
+    assert turn_s(pi / 2) == pytest.approx(pi / 2 / rate)
+    assert turn_s(-pi / 2) == pytest.approx(pi / 2 / rate)
+
+
+def test_turning_is_not_known_on_wide_ground(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    robots = [{"id": "r", "model": "diffdrive", "pose": [4, 10, 0]}]
+    problem = state(yard(robots=robots, bounds=[0, 0, 200, 200]), samples=50)
+    cells = Fields(problem).static(0, [0]).field[0, 0].size
+    assert cells * BEARINGS > MOST_POSES
+    assert Fields(problem).turning(0, [0]).size == 0
+    assert Fields(problem).turning(0, []).size == 0
