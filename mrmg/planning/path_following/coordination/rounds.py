@@ -31,7 +31,11 @@ ROUNDS = (
     Round(most=16_000, weight=2.0, fineness=2.0, soft_s=1.0),
     Round(most=64_000, weight=2.0, fineness=3.0, soft_s=4.0),
 )
-"""Rounds one after the other."""
+"""Rounds one after the other.
+
+In the first one costs-to-go do not know turning: over cells and few headings it makes
+unicycles that meet on open ground (swap2) go the longer way round.
+"""
 
 SEARCHES = 2
 """How many searches of a round's length the search over priorities may take for each
