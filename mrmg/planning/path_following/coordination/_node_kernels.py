@@ -212,15 +212,13 @@ def cost_to_go_s(search, place, state):
     if on_path and segment < search.course.size[0]:
         time_s = along_path_s(search, leg, left, state)
     elif target >= 0:
-        known, posed_s = len(task.guide.turning) > 0, 0.0
+        known = len(task.guide.turning) > 0
+        posed = search.targets.target[target].tolerance < pi
         if known:
             turn_s = turning_at(task.guide, leg, spaces.x_min, spaces.y_min, state)
             time_s += TURNING_SHARE * turn_s
-        if search.targets.target[target].tolerance < pi:
+        if posed and own[0].model == CAR:
             posed_s = posing_time_s(own, search.targets, target, x, y, state[2])
-        if own[0].model != CAR:
-            time_s += 0.0 if known else posed_s
-        elif posed_s > 0.0:
             if leg + 1 < legs or (leg < legs and task.finish >= 0):
                 center = search.targets.target[target].center
                 posed_s += guide_at(
@@ -228,6 +226,8 @@ def cost_to_go_s(search, place, state):
                     center[0], center[1],
                 )  # fmt: skip
             time_s = max(time_s, posed_s)
+        elif posed and not known:
+            time_s += posing_time_s(own, search.targets, target, x, y, state[2])
     return time_s + task.later_s[leg]
 
 
