@@ -67,6 +67,14 @@ def arc_lines(region: Region) -> list[shapely.LineString]:
     return [shapely.LineString(ends) for ends in zip(ring, ring[1:], strict=False)]
 
 
+def half_arc_m(region: Region) -> float:
+    """Return half the length of an arc [m]."""
+    length_m = (
+        region.shape.length if len(region.corners) else 2.0 * np.pi * region.radius_m
+    )
+    return 0.5 * float(length_m) / ARCS
+
+
 def sagitta_m(region: Region) -> float:
     """Return how far an arc departs from its line [m]."""
     return region.radius_m * (1.0 - float(np.cos(np.pi / ARCS)))

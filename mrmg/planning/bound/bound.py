@@ -6,7 +6,8 @@ a robot that starts and ends at rest gets no inertia for nothing, and turning, i
 and other robots only cost more. The least over all orders is the bound.
 
 Orders are distinguished by where each region is touched first (`touring`), as the way
-through a region is no more for nothing than any other. Where goals are many, not all
+through a region is no more for nothing than any other. Legs of the cheapest orders are
+those of visibility graphs (`visibility`), all others those of fields. Where goals are many, not all
 visits are remembered (`counted_visits`); where there are more still, trees with prices
 span them (`relaxed_routing_J`).
 
@@ -38,11 +39,13 @@ from shapely.geometry import Point
 
 from mrmg.planning.bound import _bound_kernels
 from mrmg.planning.bound.arcs import ArcWays
+from mrmg.planning.bound.borders import half_arc_m
 from mrmg.planning.bound.completions import over_stations
 from mrmg.planning.bound.counted_visits import counted_visits
 from mrmg.planning.bound.exact_tours import are_few, exact_routing
 from mrmg.planning.bound.geodesic import Ground, Ways
 from mrmg.planning.bound.touring import touring_bound_J
+from mrmg.planning.bound.visibility import VisibilityGraph
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
@@ -57,7 +60,7 @@ CELLS = 30_000
 SPANNING_ROUNDS = 400
 """Changes of the prices in the bound of missions with more goals."""
 
-FINER = 3
+FINER = 5
 """Parts into which cells are cut where ways are tightened."""
 
 ROUNDS = 20
@@ -221,9 +224,14 @@ class Relaxation:
         for key, robot in zip(self.keys, self.scene.robots, strict=True):
             if key not in found:
                 ways = self.ways[key]
-                cell_m = ways.ground.cell_m / finer
-                fine = _ground(self.scene, robot, cell_m, self.step_s)
-                found[key] = ArcWays.of(ways, fine, _starts(self.scene))
+                graph = VisibilityGraph.of(
+                    self.scene,
+                    robot,
+                    cell_m=ways.ground.cell_m / finer,
+                    step_m=robot.model.top_speed_m_s * self.step_s,
+                    reach_m=max(map(half_arc_m, ways.regions)),
+                )
+                found[key] = ArcWays.of(ways, graph, _starts(self.scene))
         return [found[key] for key in self.keys]
 
 

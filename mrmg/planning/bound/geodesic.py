@@ -115,7 +115,15 @@ class Ground:
     price: np.ndarray
 
     @staticmethod
-    def of(scene: Scene, robot: Robot, *, cell_m: float, step_m: float) -> Ground:
+    def of(
+        scene: Scene,
+        robot: Robot,
+        *,
+        cell_m: float,
+        step_m: float,
+        reach_m: float = 0.0,
+        shrink_m: float = 0.0,
+    ) -> Ground:
         """Return the ground of a robot.
 
         Args:
@@ -124,24 +132,17 @@ class Ground:
             cell_m: side of a cell.
             step_m: longest way of one planning step. A step is charged at its middle,
                 which is at most half of it away from any point of it.
+            reach_m: how far from a cell prices count besides.
+            shrink_m: how much nearer to obstacles the robot is taken to come.
         """
-        radius = max(0.0, robot.model.inscribed_radius_m - CLEARANCE_TOLERANCE_M)
-        shapes = [o.shape for o in scene.barriers if o.stops(robot.id)]
-        blocked = shapely.union_all(shapes).buffer(radius)
-        price = least_prices(
-            scene, blocked, cell_m=cell_m, reach_m=ROUND_MARGIN * 0.5 * step_m
-        )
         x_min, y_min, _, _ = scene.bounds
-        return Ground(float(x_min), float(y_min), cell_m, price)
-
-    def part(self, rows: slice, columns: slice) -> Ground:
-        """Return the ground of a block of cells."""
-        return Ground(
-            x_min=self.x_min + columns.start * self.cell_m,
-            y_min=self.y_min + rows.start * self.cell_m,
-            cell_m=self.cell_m,
-            price=np.ascontiguousarray(self.price[rows, columns]),
+        price = least_prices(
+            scene,
+            blocked_ground(scene, robot, shrink_m),
+            cell_m=cell_m,
+            reach_m=charged_within_m(step_m) + reach_m,
         )
+        return Ground(float(x_min), float(y_min), cell_m, price)
 
     def look_at(self, points: np.ndarray, reach_m: float) -> Look:
         """Return how a field's values at points follow from its nodes.
@@ -179,27 +180,6 @@ class Ground:
         share = SEED_SHARE * self.least_price(near)
         return self.field(np.where(near, share * np.maximum(away, -band), UNREACHED))
 
-    def wave_from(self, region: Region, heading: np.ndarray) -> Field | None:
-        """Return a certified field that is a plane wave in a region and spreads on.
-
-        It is the better a bound the more nearly ways leave with that heading, and tells
-        apart what parts of the region's border they leave from.
-
-        Args:
-            region: the source.
-            heading: unit vector, shape (2,).
-
-        Returns:
-            The field; None if the region is too small for the cells.
-        """
-        points = self.nodes()
-        inside = region.depth(points.reshape(-1, 2)).reshape(points.shape[:2]) >= 0.0
-        if not inside.any():
-            return None
-        share = self.least_price(inside)
-        along = share * ((points - region.center) @ heading)
-        return self.field(np.where(inside, along, UNREACHED))
-
     def nodes(self) -> np.ndarray:
         """Return the corners of all cells, shape (Y + 1, X + 1, 2)."""
         rows, columns = self.price.shape
@@ -218,6 +198,24 @@ class Ground:
             self.price, self.cell_m, seed, ROUNDS, BAND_SHARE * self.cell_m
         )
         return Field(values.reshape(-1), level, certified)
+
+
+def blocked_ground(scene: Scene, robot: Robot, shrink_m: float) -> shapely.Geometry:
+    """Return where a robot's reference point cannot be.
+
+    Args:
+        scene: the scene.
+        robot: gives obstacles and disc.
+        shrink_m: how much nearer to obstacles it is taken to come.
+    """
+    radius_m = max(0.0, robot.model.inscribed_radius_m - CLEARANCE_TOLERANCE_M)
+    shapes = [o.shape for o in scene.barriers if o.stops(robot.id)]
+    return shapely.union_all(shapes).buffer(radius_m - shrink_m)
+
+
+def charged_within_m(step_m: float) -> float:
+    """Return how far from a point of a planning step it may be charged [m]."""
+    return ROUND_MARGIN * 0.5 * step_m
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,10 +32,7 @@ def least_prices(
     x_min, y_min, x_max, y_max = scene.bounds
     columns = len(np.arange(x_min, x_max, cell_m))
     rows = len(np.arange(y_min, y_max, cell_m))
-    areas = [
-        (area.shape.buffer(reach_m), area.shape.buffer(-reach_m), area.multiplier)
-        for area in scene.terrain
-    ]
+    areas = surroundings(scene, reach_m)
     lines = shapely.union_all(
         [blocked.boundary, *(one.boundary for area in areas for one in area[:2])]
     )
@@ -65,3 +62,13 @@ def least_prices(
         row = np.concatenate([row[mixed] + i * step for i in (0, 0, 1, 1)])
         column = np.concatenate([column[mixed] + j * step for j in (0, 1, 0, 1)])
     return price[:rows, :columns]
+
+
+def surroundings(
+    scene: Scene, reach_m: float
+) -> list[tuple[shapely.Geometry, shapely.Geometry, float]]:
+    """Return what lies within reach of each area, what does for sure, and its price."""
+    return [
+        (area.shape.buffer(reach_m), area.shape.buffer(-reach_m), area.multiplier)
+        for area in scene.terrain
+    ]

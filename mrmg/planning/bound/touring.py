@@ -15,7 +15,7 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from mrmg.planning.bound.arcs import ArcWays, Wave
+from mrmg.planning.bound.arcs import ArcWays, Pair
 from mrmg.planning.bound.borders import ARCS
 from mrmg.planning.bound.completions import Visits, completions
 from mrmg.planning.bound.exact_tours import cheapest_tours
@@ -104,17 +104,14 @@ def touring_bound_J(
 
 def _tighten(ways: Sequence[ArcWays], tours: Sequence[Sequence[int]]) -> bool:
     """Tighten the ways that tours take; return whether any was new."""
-    new: dict[tuple[int, Wave], ArcWays] = {}
+    new: dict[tuple[int, Pair], ArcWays] = {}
     for r, tour in enumerate(tours):
-        if not tour:
-            continue
-        arcs = _cheapest_arcs(ways[r], r, tour)
-        for one in zip((-1 - r, *tour), (0, *arcs), tour, arcs, strict=False):
-            new |= {(id(ways[r]), wave): ways[r] for wave in ways[r].waves(*one)}
+        pairs = pairwise((-1 - r, *tour))
+        new |= {(id(ways[r]), one): ways[r] for one in pairs if ways[r].is_loose(one)}
     with ThreadPoolExecutor() as threads:
         found = threads.map(lambda at: new[at].certificate(at[1]), new)
-        for (key, wave), apart in zip(new, found, strict=True):
-            new[key, wave].take(wave, apart)
+        for (key, pair), apart in zip(new, found, strict=True):
+            new[key, pair].take(pair, apart)
     return bool(new)
 
 

@@ -1,0 +1,165 @@
+"""Compiled part of visibility graphs: costs of straight pieces and of whole paths."""
+
+from __future__ import annotations
+
+from math import cos, hypot, pi
+from typing import NamedTuple
+
+import numpy as np
+
+from mrmg.compilation import kernel
+
+SAMPLING = 0.7
+"""Distance of the points at which prices along a piece are read, over a cell's side."""
+
+
+class Places(NamedTuple):
+    """Where straight pieces of paths end.
+
+    Attributes:
+        end: both ends of a line on which the piece's end lies [m], shape (n, 2, 2).
+        sagitta: how far it may be off that line, as arcs are off their chords [m],
+            shape (n,).
+        slack: half the length of the piece of a border that the place stands for, as
+            its middle [m], shape (n,); 0 for others.
+        border: number of that border, -1 of others, shape (n,).
+        along: how far along it the place is [m], shape (n,).
+        turned: by how much it has turned until there, and from there on [rad], which
+            differ at a corner, shape (n, 2).
+    """
+
+    end: np.ndarray
+    sagitta: np.ndarray
+    slack: np.ndarray
+    border: np.ndarray
+    along: np.ndarray
+    turned: np.ndarray
+
+
+@kernel
+def straight_costs(price, x_min, y_min, cell, first, second):
+    """Return the least cost of straight pieces between places, shape (n, m).
+
+    A piece lies in ground of one price. No price read here is above the true one, so
+    none along the piece is above that of its ground: the highest read is a bound.
+
+    A piece of a border stands for the point at which a path crosses it. In the shortest
+    path the derivatives by that point cancel out over what comes before and after it.
+    What is left of the error is at most s^2 / 2 times the curvature of the distance,
+    1 / r at a distance of r or more, and at most 2 s, with s the slack of both ends.
+
+    Between places on one border the distance is at least l cos(a / 2), with l the way
+    along the border and a the angle that all its directions lie in. That is linear in
+    both places, so that nothing is left of the error.
+
+    Args:
+        price: of square cells, shape (Y, X).
+        x_min, y_min, cell: of its grid [m].
+        first, second: the places.
+    """
+    cost = np.full((len(first.slack), len(second.slack)), np.inf)
+    for i in range(cost.shape[0]):
+        ax = 0.5 * (first.end[i, 0, 0] + first.end[i, 1, 0])
+        ay = 0.5 * (first.end[i, 0, 1] + first.end[i, 1, 1])
+        for j in range(cost.shape[1]):
+            bx = 0.5 * (second.end[j, 0, 0] + second.end[j, 1, 0])
+            by = 0.5 * (second.end[j, 0, 1] + second.end[j, 1, 1])
+            highest = _highest(price, x_min, y_min, cell, ax, ay, bx, by)
+            if highest == np.inf:
+                continue
+            length = _apart(first.end[i], second.end[j])
+            length -= first.sagitta[i] + second.sagitta[j]
+            slack = first.slack[i] + second.slack[j]
+            if slack > 0.0:
+                least = max(length - slack, 0.125 * slack)
+                length -= min(2.0 * slack, 0.5 * slack * slack / least)
+            if 0 <= first.border[i] == second.border[j]:
+                length = max(length, _along_border(first, i, second, j))
+            cost[i, j] = highest * max(0.0, length)
+    return cost
+
+
+@kernel
+def _along_border(first, i, second, j):
+    """Return a bound of the distance of two places on one border."""
+    length = second.along[j] - first.along[i]
+    angle = second.turned[j, 0] - first.turned[i, 1]
+    if length < 0.0:
+        length = -length
+        angle = first.turned[i, 0] - second.turned[j, 1]
+    return length * cos(0.5 * max(0.0, angle)) if angle < pi else 0.0
+
+
+@kernel
+def _highest(price, x_min, y_min, cell, ax, ay, bx, by):
+    """Return the highest price met at points between two; inf where it is blocked."""
+    rows, columns = price.shape
+    pieces = int(hypot(bx - ax, by - ay) / (SAMPLING * cell)) + 1
+    highest = 0.0
+    for k in range(pieces):
+        share = (k + 0.5) / pieces
+        column = int((ax + share * (bx - ax) - x_min) / cell)
+        row = int((ay + share * (by - ay) - y_min) / cell)
+        row = min(max(row, 0), rows - 1)
+        column = min(max(column, 0), columns - 1)
+        highest = max(highest, price[row, column])
+        if highest == np.inf:
+            break
+    return highest
+
+
+@kernel
+def _apart(one, other):
+    """Return the distance of two lines that do not cross, shape (2, 2) each."""
+    least = np.inf
+    for k in range(2):
+        least = min(least, _off(one, other[k, 0], other[k, 1]))
+        least = min(least, _off(other, one[k, 0], one[k, 1]))
+    return least
+
+
+@kernel
+def _off(line, x, y):
+    """Return the distance of a point from a line, shape (2, 2)."""
+    dx, dy = line[1, 0] - line[0, 0], line[1, 1] - line[0, 1]
+    size = dx * dx + dy * dy
+    share = 0.0
+    if size > 0.0:
+        share = ((x - line[0, 0]) * dx + (y - line[0, 1]) * dy) / size
+        share = min(1.0, max(0.0, share))
+    return hypot(x - line[0, 0] - share * dx, y - line[0, 1] - share * dy)
+
+
+@kernel
+def least_costs(between, first, last, direct):
+    """Return the costs of the shortest paths from k sources to m sinks, shape (k, m).
+
+    Dijkstra's algorithm from each source; a row of all costs is read for each node.
+
+    Args:
+        between: cost from node to node, shape (n, n).
+        first: from sources to nodes, shape (k, n).
+        last: from nodes to sinks, shape (n, m).
+        direct: from sources to sinks, shape (k, m).
+    """
+    found = direct.copy()
+    for source in range(len(first)):
+        cost = first[source].copy()
+        open_ = np.ones(len(cost), np.bool_)
+        while True:
+            node, least = -1, np.inf
+            for v in range(len(cost)):
+                if open_[v] and cost[v] < least:
+                    node, least = v, cost[v]
+            worst = 0.0
+            for sink in range(found.shape[1]):
+                worst = max(worst, found[source, sink])
+            if node < 0 or least >= worst:
+                break
+            open_[node] = False
+            for v in range(len(cost)):
+                cost[v] = min(cost[v], least + between[node, v])
+            for sink in range(found.shape[1]):
+                whole = least + last[node, sink]
+                found[source, sink] = min(found[source, sink], whole)
+    return found
