@@ -56,7 +56,7 @@ from mrmg.planning.statistics import UNKNOWN
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 
-BOUND_FINER = 7
+BOUND_FINER = 10
 """Parts into which the bound's cells are cut: more than planning has time for, which
 brings it up to half a percent nearer to the truth."""
 

@@ -7,9 +7,9 @@ and other robots only cost more. The least over all orders is the bound.
 
 Orders are distinguished by where each region is touched first (`touring`), as the way
 through a region is no more for nothing than any other. Legs of the cheapest orders are
-those of visibility graphs (`visibility`), all others those of fields. Where goals are many, not all
-visits are remembered (`counted_visits`); where there are more still, trees with prices
-span them (`relaxed_routing_J`).
+those of visibility graphs (`visibility`), all others those of fields. Where goals are
+many, not all visits are remembered (`counted_visits`); where there are more still,
+trees with prices span them (`relaxed_routing_J`).
 
 On slopes the battery also pays for climbing and is paid for rolling down, at most what
 that is worth without losses (`slopes.climb_J`). Along a way this adds up to the
@@ -61,7 +61,7 @@ SPANNING_ROUNDS = 400
 """Changes of the prices in the bound of missions with more goals."""
 
 FINER = 5
-"""Parts into which cells are cut where ways are tightened."""
+"""Parts into which cells are cut for visibility graphs."""
 
 ROUNDS = 20
 """Times that the ways of the cheapest tours are tightened at most."""

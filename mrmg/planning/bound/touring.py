@@ -28,7 +28,10 @@ STEP, FINE_STEP = 0.02, 0.005
 before and after the cheapest ones of some round are known."""
 
 LEAST_RISE = 0.001
-"""Share by which a round with the cheapest tours must raise the bound for another."""
+"""Share by which a round must raise the bound to be followed by another."""
+
+WORK_SHARE = 0.8
+"""Share of the work left that the next round may take, by what the last two took."""
 
 FINE_ARC_GOALS = 16
 """Goals up to which tours are told apart by all arcs; beyond, by pairs of them, as
@@ -76,16 +79,16 @@ def touring_bound_J(
     visits = visits or Visits.all_remembered(problem)
     best, tours = relaxed.cost_J, relaxed.tours
     settled_J, rest, cheapest = -math.inf, None, False
+    step, before = STEP, 0
     leg = _room_for_legs(ways, problem.goals)
     for _ in range(rounds):
         tightened = _tighten(ways, tours)
         if halt[0] or (cheapest and not tightened):
             break
-        settled = math.isfinite(settled_J)
         _write_legs(leg, ways, price)
         rest = rest or completions(problem, leg, visits)
         best = max(best, float(rest.before[0]) - visits.surcharge)
-        most = (1.0 + (FINE_STEP if settled else STEP)) * best
+        most = (1.0 + step) * best
         found, labels = cheapest_tours(problem, leg, rest, most, work, visits)
         work -= labels
         if found is None:
@@ -97,9 +100,32 @@ def touring_bound_J(
             settled_J = best
         else:
             best = max(best, most)
-        if enough or work < labels:  # the next round takes more
+        step = _next_step(step, before, labels, work)
+        if math.isfinite(settled_J):
+            step = min(step, FINE_STEP)
+        before = labels
+        if enough or step < LEAST_RISE:
             break
     return best
+
+
+def _next_step(step: float, before: int, labels: int, work: int) -> float:
+    """Return the share by which costlier tours are looked at in the next round.
+
+    Labels grow as exp(g x) with the share x; g is that of the last two rounds.
+
+    Args:
+        step: share of the last round.
+        before: labels of the round before it; 0 if there was none.
+        labels: labels of the last round.
+        work: labels that are left.
+    """
+    if labels >= work:
+        return 0.0
+    if not 0 < before < labels:
+        return STEP
+    growth = math.log(labels / before) / step
+    return min(STEP, max(0.0, math.log(WORK_SHARE * work / labels)) / growth)
 
 
 def _tighten(ways: Sequence[ArcWays], tours: Sequence[Sequence[int]]) -> bool:
