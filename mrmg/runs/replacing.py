@@ -14,7 +14,6 @@ from mrmg.runs.arguments import RunArguments, recorded
 from mrmg.runs.folder import Step, stale_after
 from mrmg.runs.options import options_of
 from mrmg.runs.steps import Run
-from mrmg.studies.outcomes import ROBUSTNESS_FILE
 
 _COSTLY = {Step.PLAN: "plan", Step.EXECUTE: "drive", Step.RENDER: "video"}
 
@@ -55,8 +54,11 @@ def would_be_lost(run: Run, first: Step, plan: Plan | None) -> list[str]:
     if not {Step.PLAN, Step.EXECUTE} & {*stale}:
         return []  # a video alone is replaced only by one that was asked for
     lost = [name for step, name in _COSTLY.items() if step in stale]
-    if Step.PLAN in stale and folder.file(ROBUSTNESS_FILE).exists():
-        lost.append("trials under disturbances")
+    if Step.PLAN in stale:
+        from mrmg.studies.outcomes import ROBUSTNESS_FILE
+
+        if folder.file(ROBUSTNESS_FILE).exists():
+            lost.append("trials under disturbances")
     return lost
 
 
