@@ -16,5 +16,5 @@ def code_digest() -> str:
     # The version alone would keep results of code that has been edited since.
     package = Path(mrmg.__file__).parent
     sources = sorted(package.rglob("*.py"))
-    code = [storage.digest(path.read_text()) for path in sources]
+    code = [storage.bytes_digest(path.read_bytes()) for path in sources]
     return storage.digest("".join([mrmg.__version__, version("mujoco"), *code]))

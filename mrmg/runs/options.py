@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import Field, dataclass, field, fields
 from functools import cache
@@ -121,9 +122,7 @@ def _docstrings(arguments: type) -> dict[str, str]:
     """Return the docstrings of a class's fields, which only its source has."""
     found: dict[str, str] = {}
     for kind in reversed(arguments.__mro__[:-1]):
-        (definition,) = ast.parse(inspect.getsource(kind)).body
-        assert isinstance(definition, ast.ClassDef)
-        for statement, below in pairwise(definition.body):
+        for statement, below in pairwise(_definitions(kind.__module__)[kind.__name__]):
             match statement, below:
                 case (
                     ast.AnnAssign(target=ast.Name(id=name)),
@@ -131,6 +130,13 @@ def _docstrings(arguments: type) -> dict[str, str]:
                 ):
                     found[name] = " ".join(text.split())
     return found
+
+
+@cache
+def _definitions(module: str) -> dict[str, list[ast.stmt]]:
+    """Return the bodies of a module's classes; to find one's source takes longer."""
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    return {one.name: one.body for one in tree.body if isinstance(one, ast.ClassDef)}
 
 
 def _option_of(each: Field[Any], help: str) -> Option:
