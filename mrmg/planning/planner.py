@@ -178,7 +178,7 @@ class _Planning:
         """Return the result of planning."""
         own = Frame.of(self.scene).scene(self.scene)
         bounding = self._bounding(own) if with_bound else None
-        load_kernels(self.params.planner)
+        load_kernels(self.params.planner, every=self.params.budget_s is not None)
         for robot in own.robots:
             motion_addresses(robot.model)
         self.statistics.begin()

@@ -61,16 +61,22 @@ def compile_kernels(
 
 
 @cache
-def load_kernels(planner: str) -> None:
+def load_kernels(planner: str, *, every: bool = True) -> None:
     """Load the kernels of a planner, so that no time limit or figure includes it.
 
     Planners of other packages load their own.
+
+    Args:
+        planner: name of it.
+        every: also those of the search for motions, which take a third of the time and
+            which many missions do not need.
     """
     if planner == GUIDED_TREE:
         guide_smallest()
     elif planner == PATH_FOLLOWING:
         follow_smallest()
-        coordinate_smallest()
+        if every:
+            coordinate_smallest()
 
 
 def coordinate_smallest() -> None:
