@@ -8,7 +8,6 @@ from typing import Protocol
 
 from mrmg import extensions
 from mrmg.planning.attempt import Attempt, Request
-from mrmg.planning.guided_tree.strategy import guided_tree
 from mrmg.planning.path_following.strategy import path_following
 from mrmg.planning.problem.problem import Problem
 
@@ -25,8 +24,14 @@ class Planner(Protocol):
         """Return what one attempt at a mission gave."""
 
 
+def _guided_tree(problem: Problem, request: Request) -> Attempt:
+    from mrmg.planning.guided_tree.strategy import guided_tree  # the default needs none
+
+    return guided_tree(problem, request)
+
+
 PLANNERS: Mapping[str, Planner] = MappingProxyType(
-    {"path_following": path_following, "guided_tree": guided_tree}
+    {"path_following": path_following, "guided_tree": _guided_tree}
 )
 """The planners of this package by name."""
 

@@ -20,7 +20,6 @@ from mrmg.planning.bound.exact_tours import exact_routing
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.bounding import bounds_of
 from mrmg.planning.frame import Frame, on_the_map
-from mrmg.planning.guided_tree.strategy import guided_tree
 from mrmg.planning.parameters import (
     GUIDED_TREE,
     PATH_FOLLOWING,
@@ -31,8 +30,7 @@ from mrmg.planning.parameters import (
 )
 from mrmg.planning.path_following.coordination.coordination import coordinated
 from mrmg.planning.path_following.coordination.tasks import no_path
-from mrmg.planning.path_following.strategy import path_following
-from mrmg.planning.planners import Planner
+from mrmg.planning.planners import find_planner
 from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.planning.routers import find_router
 from mrmg.scene.loading import scene_from_document
@@ -88,12 +86,12 @@ def coordinate_smallest() -> None:
 
 def follow_smallest() -> None:
     """Follow paths in the smallest mission."""
-    _plan_smallest(path_following, SMALL_PARAMS)
+    _plan_smallest(SMALL_PARAMS)
 
 
 def guide_smallest() -> None:
     """Plan the smallest mission by the paper's method."""
-    _plan_smallest(guided_tree, SMALL_PAPER_PARAMS)
+    _plan_smallest(SMALL_PAPER_PARAMS)
 
 
 @cache
@@ -126,10 +124,11 @@ SMALL_PAPER_PARAMS = replace(
 """The same for the paper's method."""
 
 
-def _plan_smallest(planner: Planner, params: PlannerParams) -> None:
+def _plan_smallest(params: PlannerParams) -> None:
     scene, problem = _smallest_mission()
     request = Request(params=params, router=find_router(params.router), seed=0)
-    found = on_the_map(planner(problem, request), problem, scene, params)
+    found = find_planner(params.planner)(problem, request)
+    found = on_the_map(found, problem, scene, params)
     assert found.plans, "the smallest mission has a plan, or not all is compiled"
 
 
