@@ -204,9 +204,9 @@ class _Planning:
                 )
             )
             return self._unsolved(proof, why or why_in_short(self.params, search))
+        best = with_margins(self.scene, best, self.params.margins)
         if bounding is not None:
             self._in_time(bounding.result)
-        best = with_margins(self.scene, best, self.params.margins)
         return PlanResult(
             status=PlanStatus.SOLVED,
             plan=best,
