@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.world._polygon_kernels import convex_distance, point_segment_distance
+from mrmg.world._polygon_kernels import convex_distance
 
 
 class FreeSpace(NamedTuple):
@@ -162,19 +162,46 @@ def footprint_is_clear(space, placed, cx, cy, radius, margin):
         if space.allowance[row, column] >= 0.0:
             raised = space.guide + space.allowance[row, column]
             margin -= space.allowance[row, column]
-    for i in range(space.bucket_start[b], space.bucket_start[b + 1]):
-        e = space.bucket_edge[i]
-        edge = space.edge[e]
-        if (
-            point_segment_distance(cx, cy, edge[0], edge[1], edge[2], edge[3])
-            <= radius + margin
-            and convex_distance(placed, edge.reshape(2, 2), margin) < margin
-        ):
-            return False
+    edges = space.bucket_edge[space.bucket_start[b] : space.bucket_start[b + 1]]
+    if not edges_are_clear(space.edge, edges, placed, margin):
+        return False
     # No edge is near, so the footprint lies wholly inside or wholly outside.
     if raised > 0.0:
         return space.distance[row, column] > raised
     return clearance_estimate(space, cx, cy) > 0.0
+
+
+@kernel
+def edges_are_clear(edge, near, placed, margin):
+    """Return whether a placed footprint keeps `margin` from some edges; exact.
+
+    Most edges lie beyond one of the footprint's sides, whose normals are made once.
+
+    Args:
+        edge: all edges, shape (n, 4).
+        near: numbers of those that are looked at.
+        placed: corners in the world, shape (m, 2).
+        margin: required distance.
+    """
+    normal = np.empty((len(placed), 3))
+    for k in range(len(placed)):
+        ax, ay, ex, ey = placed[k - 1, 0], placed[k - 1, 1], placed[k, 0], placed[k, 1]
+        ex, ey = ex - ax, ey - ay
+        size = max(sqrt(ex * ex + ey * ey), 1e-12)
+        normal[k, 0], normal[k, 1] = ey / size, -ex / size
+        normal[k, 2] = (ax * ey - ay * ex) / size
+    for e in near:
+        x0, y0, x1, y1 = edge[e, 0], edge[e, 1], edge[e, 2], edge[e, 3]
+        beyond = -np.inf
+        for k in range(len(placed)):
+            nx, ny = normal[k, 0], normal[k, 1]
+            side = min(nx * x0 + ny * y0, nx * x1 + ny * y1) - normal[k, 2]
+            beyond = max(beyond, side)
+        if beyond > margin:
+            continue
+        if convex_distance(placed, edge[e].reshape(2, 2), margin) < margin:
+            return False
+    return True
 
 
 @kernel
