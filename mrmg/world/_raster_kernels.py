@@ -7,6 +7,7 @@ from math import ceil, floor, log2, sqrt
 import numpy as np
 
 from mrmg.compilation import kernel
+from mrmg.world._polygon_kernels import point_segment_distance
 
 
 @kernel
@@ -88,3 +89,28 @@ def edge_distance_field(edge, x_min, y_min, cell, rows, columns):
             square[waiting, 2] = 2 * column + quarter % 2
             waiting += 1
     return distance
+
+
+@kernel
+def buckets_near(edge, x_min, y_min, side, rows, columns, reach):
+    """Return (edge, bucket) for all edges that are near to the centre of a bucket.
+
+    Args:
+        edge: shape (n, 4).
+        x_min, y_min, side: corner of the grid of buckets, and side of one.
+        rows, columns: number of buckets.
+        reach: distance from the centre within which edges are near.
+    """
+    found = [(0, 0)]
+    for e in range(len(edge)):
+        x0, y0, x1, y1 = edge[e, 0], edge[e, 1], edge[e, 2], edge[e, 3]
+        left = max(0, int((min(x0, x1) - reach - x_min) / side))
+        right = min(columns - 1, int((max(x0, x1) + reach - x_min) / side))
+        low = max(0, int((min(y0, y1) - reach - y_min) / side))
+        high = min(rows - 1, int((max(y0, y1) + reach - y_min) / side))
+        for row in range(low, high + 1):
+            for column in range(left, right + 1):
+                x, y = x_min + (column + 0.5) * side, y_min + (row + 0.5) * side
+                if point_segment_distance(x, y, x0, y0, x1, y1) <= reach:
+                    found.append((e, row * columns + column))
+    return np.array(found[1:])

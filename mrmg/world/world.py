@@ -134,14 +134,11 @@ def free_space(
     inside[:, x_min + (np.arange(columns) + 0.5) * cell_m > x_max] = True
     inside[y_min + (np.arange(rows) + 0.5) * cell_m > y_max] = True
     bucket_columns, bucket_rows = _cells(bounds, BUCKET_M)
-    middle = np.mgrid[:bucket_rows, :bucket_columns].reshape(2, -1).T[:, ::-1] + 0.5
-    near, bucket = shapely.STRtree(
-        shapely.points((x_min, y_min) + BUCKET_M * middle)
-    ).query(
-        shapely.linestrings(edge.reshape(-1, 2, 2)),
-        predicate="dwithin",
-        distance=reach + BUCKET_M / np.sqrt(2.0),
-    )
+    near, bucket = _raster_kernels.buckets_near(
+        edge, x_min, y_min, BUCKET_M, bucket_rows, bucket_columns,
+        reach + BUCKET_M / np.sqrt(2.0),
+    ).T  # fmt: skip
+    buckets = bucket_rows * bucket_columns
     return FreeSpace(
         x_min=float(x_min),
         y_min=float(y_min),
@@ -150,8 +147,8 @@ def free_space(
         bucket=BUCKET_M,
         bucket_columns=bucket_columns,
         bucket_rows=bucket_rows,
-        bucket_start=np.cumsum([0, *np.bincount(bucket, minlength=len(middle))]),
-        bucket_edge=near[np.lexsort((near, bucket))],
+        bucket_start=np.cumsum([0, *np.bincount(bucket, minlength=buckets)]),
+        bucket_edge=near[np.argsort(bucket, kind="stable")],
         reach=float(reach),
         edge=edge,
         allowance=NO_ALLOWANCE.copy(),
