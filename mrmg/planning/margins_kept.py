@@ -46,17 +46,15 @@ def _narrow(
     bounds = shapely.box(*scene.bounds).boundary
     near = [bounds, *(item.shape for item in scene.barriers if item.stops(robot.id))]
     tree = shapely.STRtree(near)
-    # Where the reference point is farther away than that, no corner is near enough.
-    reach_m = margin_m + float(np.hypot(*robot.model.footprint_m.T).max())
-    points = shapely.points(trajectory.state[:, :2])
-    close = np.unique(tree.query(points, predicate="dwithin", distance=reach_m)[0])
-    bodies = shapely.polygons(robot.model.footprint_at(trajectory.state[close]))
+    bodies = shapely.polygons(robot.model.footprint_at(trajectory.state))
+    least_m = margin_m - ROUNDING_M
+    less = np.unique(tree.query(bodies, predicate="dwithin", distance=least_m)[0])
     found, distance = tree.query_nearest(
-        bodies, return_distance=True, all_matches=False
+        bodies[less], return_distance=True, all_matches=False
     )
-    distance_m = np.full(len(points), np.inf)
-    distance_m[close[found[0]]] = distance
-    less = np.flatnonzero(distance_m < margin_m - ROUNDING_M)
+    distance_m = np.full(len(bodies), np.inf)
+    distance_m[less[found[0]]] = distance
+    less = np.flatnonzero(distance_m < least_m)
     for run in np.split(less, np.flatnonzero(np.diff(less) > 1) + 1):
         if len(run):
             tightest = int(run[distance_m[run].argmin()])
