@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import islice
 
 import numpy as np
 
@@ -170,10 +169,7 @@ class _Planning:
         yielding: bool,
     ) -> Motion | None:
         traffic = self._traffic.around(r, motions, above)
-        at_length = yielding or r in self._blocked
-        for task, course in islice(
-            self._tasks(r, traffic, yielding), int(at_length), None
-        ):
+        for task, course in self._tasks(r, traffic, yielding):
             found = self._search(r, task, traffic, course)
             if found is not None:
                 return found
@@ -185,8 +181,8 @@ class _Planning:
     ) -> Iterator[tuple[Task, Course]]:
         """Yield what to search for, and along which path.
 
-        First comes a short search that does not know when the others are where. The
-        next one does, if there is room for it, and then does without the path: robots
+        If there is room for costs-to-go that know when the others are where, a short
+        search without them comes first; the one with them does without the path: robots
         that turn on the spot have the way down the costs-to-go instead.
         """
         problem, path, tour = self._problem, self._paths[r], self._tours[r]
@@ -205,10 +201,10 @@ class _Planning:
         if not (led and self.round is ROUNDS[0]):
             guide = self._fields.static(r, tour)._replace(turning=turning)
         along = guided(problem, r, task, path, guide)
-        yield along._replace(most=min(FIRST_MOST, now.most)), course
-        costs = task.hold_share, task.soft_s / (task.steps * problem.dt_s)
-        timed = self._fields.timed(r, tour, task.stay, traffic, costs)
-        if timed is None:
+        known = self._fields.are_timed(r, tour, traffic)
+        if known and not (yielding or r in self._blocked):
+            yield along._replace(most=min(FIRST_MOST, now.most)), course
+        if not known:
             share = UNTIMED_SHARE if len(tour) > 1 and not yielding else 1
             most = min(share * along.most, ROUNDS[-1].most)
             yield along._replace(most=most), course
@@ -217,7 +213,9 @@ class _Planning:
             free = task_of(problem, r, tour, nowhere, now)._replace(
                 stay=task.stay, later_s=task.later_s
             )
-            guide, way = timed[0]._replace(turning=turning), timed[1]
+            costs = task.hold_share, task.soft_s / (task.steps * problem.dt_s)
+            guide, way = self._fields.timed(r, tour, task.stay, traffic, costs)
+            guide = guide._replace(turning=turning)
             steered = problem.mission.fleet[r]["model"] != CAR
             lead = rounded_path(problem, r, way) if steered else nowhere
             yield guided(problem, r, free, nowhere, guide), course_of(problem, r, lead)

@@ -63,6 +63,18 @@ class Fields:
             return NO_GUIDE
         return Guide(np.stack(legs)[:, None], UNKNOWN, self._cell_m, 1 << 30)
 
+    def _layers(self, r: int, traffic: Traffic) -> tuple[int, int]:
+        """Return how many steps a layer of time lasts for robot r, and the layers."""
+        step_m = float(self._problem.mission.fleet[r]["limit"][1]) * self._problem.dt_s
+        layer = max(1, int(self._cell_m / step_m))
+        return layer, -(-traffic.end // layer) + 1
+
+    def are_timed(self, r: int, targets: Sequence[int], traffic: Traffic) -> bool:
+        """Return whether there are few enough cells for costs-to-go in time."""
+        layers = len(targets) * self._layers(r, traffic)[1]
+        cells = layers * self._shape[0] * self._shape[1]
+        return bool(0 < cells <= MOST_TIMED_CELLS)
+
     def timed(
         self,
         r: int,
@@ -70,10 +82,10 @@ class Fields:
         stay: np.ndarray,
         traffic: Traffic,
         costs: tuple[float, float],
-    ) -> tuple[Guide, np.ndarray] | None:
+    ) -> tuple[Guide, np.ndarray]:
         """Return robot r's costs-to-go among the others, and the way down them.
 
-        The way is a chain of points, shape (n, 2). None for too many cells.
+        The way is a chain of points, shape (n, 2).
 
         Args:
             r: robot.
@@ -86,11 +98,7 @@ class Fields:
         mission, dt_s, cell_m = self._problem.mission, self._problem.dt_s, self._cell_m
         own = mission.fleet[r : r + 1]
         top = float(own[0]["limit"][1])
-        layer = max(1, int(cell_m / (top * dt_s)))
-        layers = -(-traffic.end // layer) + 1
-        cells = len(targets) * layers * self._shape[0] * self._shape[1]
-        if not 0 < cells <= MOST_TIMED_CELLS:
-            return None
+        layer, layers = self._layers(r, traffic)
         price = self._price(r, targets) * cell_m / top
         hold_share, soft_share = costs
         penalty = np.zeros((layers, *price.shape))
