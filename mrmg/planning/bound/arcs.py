@@ -1,7 +1,11 @@
 """Lower bounds of ways between arcs of regions' borders.
 
 Where a robot first touches a region decides how far it is to the next. Borders are cut
-into arcs of equal length; between arcs holds
+into arcs of equal length. A smooth arc of a goal stands for its middle: in the cheapest
+tour the derivatives of both legs by the place of touching cancel out, as along borders
+of terrain (`_visibility_kernels.straight_costs`). That needs all legs of a goal to be
+of this kind, or less by what half an arc may cost; and batteries that both legs drain,
+which is not so at stations. Any other arc stands for all its points. Between arcs holds
 
 - the straight distance at the least price there is,
 - the bound of all ways from one region to the other arc (`geodesic.Ways`),
@@ -18,13 +22,17 @@ import numpy as np
 import shapely
 
 from mrmg.planning.bound._eikonal_kernels import UNREACHED
-from mrmg.planning.bound.borders import ARCS, arc_lines, sagitta_m
+from mrmg.planning.bound.borders import ARCS, arc_lines, half_arc_m, sagitta_m
 from mrmg.planning.bound.geodesic import Ways
 from mrmg.planning.bound.visibility import VisibilityGraph, arcs_of, place_of
 
 NEAR_SHARE, NEAR_M = 0.1, 4.0
 """What paths may cost more than was known of any, as a share of it and besides, if the
 nodes that they bend at are to count."""
+
+APART_M = 1.0
+"""Least distance of a goal from all other regions and starts for its arcs to stand for
+their middles: where legs may cost nothing, their derivatives do not cancel out."""
 
 MOST_NODES = 2000
 """Nodes of a graph at most, by the memory for their distances (32 MB)."""
@@ -43,6 +51,7 @@ class ArcWays:
         between: from arc to arc, shape (T, K, T, K), symmetric.
         from_start: from start to arc, shape (R, T, K).
         starts: shape (R, 2).
+        smooth: which arcs stand for their middles, shape (T, K).
         known: pairs whose ways are tightened.
         cost: least cost from regions and starts to each bend, as far as asked for.
     """
@@ -52,12 +61,22 @@ class ArcWays:
     between: np.ndarray
     from_start: np.ndarray
     starts: np.ndarray
+    smooth: np.ndarray
     known: set[Pair] = field(default_factory=set)
     cost: dict[int, np.ndarray] = field(default_factory=dict)
 
     @staticmethod
-    def of(ways: Ways, graph: VisibilityGraph, starts: np.ndarray) -> ArcWays:
-        """Bound all ways between arcs, and from starts to arcs."""
+    def of(
+        ways: Ways, graph: VisibilityGraph, starts: np.ndarray, goals: int
+    ) -> ArcWays:
+        """Bound all ways between arcs, and from starts to arcs.
+
+        Args:
+            ways: between whole regions.
+            graph: of the ground.
+            starts: shape (R, 2).
+            goals: number of the regions that are goals, which come first.
+        """
         regions, count = ways.regions, len(ways.regions)
         reach = ways.lowest - ways.highest[:, None, None]
         lines = np.array([line for region in regions for line in arc_lines(region)])
@@ -85,7 +104,22 @@ class ArcWays:
         from_start[ways.from_start == 0.0] = 0.0
         for table in (between, from_start):
             table[table > 0.5 * UNREACHED] = np.inf
-        return ArcWays(ways, graph, between, from_start, starts)
+        away_m = np.append(between.min(axis=(1, 3)), from_start.min(axis=2), axis=0)
+        np.fill_diagonal(away_m, np.inf)
+        smooth = np.array([graph.smooth_arcs(region) for region in regions])
+        smooth &= ((away_m.min(axis=0) > APART_M) & (np.arange(count) < goals))[:, None]
+        found = ArcWays(ways, graph, between, from_start, starts, smooth)
+        between -= found.slack[:, :, None, None] + found.slack
+        from_start -= found.slack
+        for table in (between, from_start):
+            np.maximum(table, 0.0, out=table)
+        return found
+
+    @property
+    def slack(self) -> np.ndarray:
+        """What half of each smooth arc may cost, shape (T, K)."""
+        half_m = np.array([half_arc_m(region) for region in self.ways.regions])
+        return np.where(self.smooth, self.graph.highest * half_m[:, None], 0.0)
 
     def is_loose(self, pair: Pair) -> bool:
         """Return whether the ways of a pair can be tightened."""
@@ -105,9 +139,13 @@ class ArcWays:
         if origin < 0:
             first = place_of(self.starts[-1 - origin])
         else:
-            first = arcs_of(self.ways.regions[origin])
-        last = arcs_of(self.ways.regions[target])
-        return np.asarray(np.minimum(self.graph.least_costs(nodes, first, last), most))
+            first = arcs_of(self.ways.regions[origin], self.smooth[origin])
+        last = arcs_of(self.ways.regions[target], self.smooth[target])
+        slack = self.slack[target] + (
+            0.0 if origin < 0 else self.slack[origin][:, None]
+        )
+        found = self.graph.least_costs(nodes, first, last)
+        return np.asarray(np.minimum(found, most - slack))
 
     def take(self, pair: Pair, apart: np.ndarray) -> None:
         """Tighten the ways of a pair by a certificate."""

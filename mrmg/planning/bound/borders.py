@@ -67,6 +67,30 @@ def arc_lines(region: Region) -> list[shapely.LineString]:
     return [shapely.LineString(ends) for ends in zip(ring, ring[1:], strict=False)]
 
 
+def chords(region: Region) -> tuple[np.ndarray, np.ndarray]:
+    """Return the ends of arcs, shape (K, 2, 2), and how far arcs are off their chords.
+
+    The latter in m, shape (K,): a corner within an arc is off by half of it at most.
+    """
+    lines = [shapely.get_coordinates(line) for line in arc_lines(region)]
+    bent = np.array([len(line) > 2 for line in lines])
+    off_m = np.where(bent, half_arc_m(region), sagitta_m(region))
+    return np.array([line[[0, -1]] for line in lines]), off_m
+
+
+def arc_middles(region: Region) -> np.ndarray:
+    """Return the middles of arcs, on the border itself, shape (K, 2)."""
+    if len(region.corners):
+        share = (np.arange(ARCS) + 0.5) / ARCS
+        points = shapely.line_interpolate_point(
+            region.shape.exterior, share, normalized=True
+        )
+        return np.asarray(shapely.get_coordinates(points))
+    angle = 2.0 * np.pi * (np.arange(ARCS) + 0.5) / ARCS
+    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return np.asarray(region.center + region.radius_m * ring)
+
+
 def half_arc_m(region: Region) -> float:
     """Return half the length of an arc [m]."""
     length_m = (

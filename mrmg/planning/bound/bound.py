@@ -231,7 +231,8 @@ class Relaxation:
                     step_m=robot.model.top_speed_m_s * self.step_s,
                     reach_m=max(map(half_arc_m, ways.regions)),
                 )
-                found[key] = ArcWays.of(ways, graph, _starts(self.scene))
+                goals = len(self.scene.goals)
+                found[key] = ArcWays.of(ways, graph, _starts(self.scene), goals)
         return [found[key] for key in self.keys]
 
 

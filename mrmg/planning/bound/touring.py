@@ -65,7 +65,7 @@ def touring_bound_J(
     Args:
         problem: the relaxed routing problem, whose batteries limit tours.
         relaxed: good tours of that problem, whose ways are tightened first; their cost
-            is a bound that is known already.
+            is a bound that is known already, and returned if no better one is found.
         ways: of each robot.
         price: cost of a metre of plain ground of each robot, shape (R,).
         visits: of goals; all are remembered if None.
@@ -73,8 +73,6 @@ def touring_bound_J(
         work: labels that all rounds may set.
         halt: shape (1,); no round begins once it has turned true.
 
-    Returns:
-        The bound; that of `relaxed` if no better one was found.
     """
     visits = visits or Visits.all_remembered(problem)
     best, tours = relaxed.cost_J, relaxed.tours
@@ -101,11 +99,10 @@ def touring_bound_J(
         else:
             best = max(best, most)
         step = _next_step(step, before, labels, work)
-        if math.isfinite(settled_J):
-            step = min(step, FINE_STEP)
-        before = labels
         if enough or step < LEAST_RISE:
             break
+        step = min(step, FINE_STEP if math.isfinite(settled_J) else STEP)
+        before = labels
     return best
 
 

@@ -20,7 +20,12 @@ from shapely.geometry.polygon import orient
 
 from mrmg.planning.bound import _visibility_kernels
 from mrmg.planning.bound._visibility_kernels import Places
-from mrmg.planning.bound.borders import arc_lines, sagitta_m
+from mrmg.planning.bound.borders import (
+    arc_lines,
+    arc_middles,
+    chords,
+    half_arc_m,
+)
 from mrmg.planning.bound.geodesic import Ground, blocked_ground, charged_within_m
 from mrmg.planning.bound.prices import surroundings
 from mrmg.scene.region import Region
@@ -40,10 +45,14 @@ class VisibilityGraph:
     Attributes:
         ground: prices that are the least within reach of each cell.
         bends: the nodes.
+        edges: of obstacles, terrain and bounds, at which costs of paths have kinks.
+        highest: the highest price there is.
     """
 
     ground: Ground
     bends: Places
+    edges: shapely.Geometry
+    highest: float
 
     @staticmethod
     def of(
@@ -84,7 +93,21 @@ class VisibilityGraph:
         x_min, y_min, x_max, y_max = scene.bounds
         x, y = bends.end[:, 0].T
         inside = (x_min <= x) & (x <= x_max) & (y_min <= y) & (y <= y_max)
-        return VisibilityGraph(ground, Places(*(column[inside] for column in bends)))
+        return VisibilityGraph(
+            ground=ground,
+            bends=Places(*(column[inside] for column in bends)),
+            edges=shapely.union_all([solid, limits, borders]),
+            highest=max((area.multiplier for area in scene.terrain), default=1.0),
+        )
+
+    def smooth_arcs(self, region: Region) -> np.ndarray:
+        """Return which arcs are smooth and far from all edges, shape (K,)."""
+        lines = arc_lines(region)
+        corners = shapely.multipoints(region.corners) if len(region.corners) else None
+        far = ~shapely.dwithin(lines, self.edges, 2.0 * half_arc_m(region) + BORDER_M)
+        if corners is not None:
+            far &= ~shapely.dwithin(lines, corners, 1e-6)
+        return np.asarray(far)
 
     def least_costs(self, nodes: np.ndarray, first: Places, last: Places) -> np.ndarray:
         """Return the costs of the shortest paths between places, shape (k, m).
@@ -130,10 +153,17 @@ def _borders(scene: Scene, reach_m: float) -> list[shapely.Geometry]:
     return lines
 
 
-def arcs_of(region: Region) -> Places:
-    """Return the arcs of a region's border."""
-    end = np.stack([shapely.get_coordinates(line) for line in arc_lines(region)])
-    return _places(end, sagitta_m=sagitta_m(region))
+def arcs_of(region: Region, smooth: np.ndarray) -> Places:
+    """Return the arcs of a region's border; smooth ones are pieces of a border."""
+    ends, off_m = chords(region)
+    arcs = _places(ends)._replace(sagitta=off_m)
+    slack = half_arc_m(region)
+    arcs.end[smooth] = arc_middles(region)[smooth, None]
+    arcs.slack[smooth] = slack
+    # The border itself is bent: by s^2 / 2 times its curvature.
+    bent = 0.0 if len(region.corners) else 0.5 * slack**2 / region.radius_m
+    arcs.sagitta[smooth] = bent
+    return arcs
 
 
 def place_of(point: np.ndarray) -> Places:
@@ -141,12 +171,12 @@ def place_of(point: np.ndarray) -> Places:
     return _places(np.tile(point, (1, 2, 1)))
 
 
-def _places(end: np.ndarray, sagitta_m: float = 0.0) -> Places:
+def _places(end: np.ndarray) -> Places:
     """Return places that are on no border."""
     size = len(end)
     return Places(
         end=np.ascontiguousarray(end, dtype=float),
-        sagitta=np.full(size, sagitta_m),
+        sagitta=np.zeros(size),
         slack=np.zeros(size),
         border=np.full(size, -1),
         along=np.zeros(size),
