@@ -65,8 +65,7 @@ class Task(NamedTuple):
         hold_share: cost of a second of standing, of moving it is 1.
         soft_s: cost of a conflict with a robot of lower priority [s].
         most: nodes at most.
-        enough: nodes after which the best end that was found counts, or twice as many
-            as finding the first one took.
+        enough: nodes after which the best end that was found counts.
     """
 
     leg: np.ndarray

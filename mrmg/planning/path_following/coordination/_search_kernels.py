@@ -305,7 +305,7 @@ def find_motion(search, nodes, room, start, control):
         for motion in range(HOLD, MOVE + motions):
             expand(search, nodes, room, a, motion, nears)
         if nodes.size[2] >= 0:
-            most = min(most, max(task.enough, 2 * nodes.size[0]))
+            most = min(most, task.enough)
     if nodes.size[2] >= 0:  # the best there is, if not good enough to end sooner
         return write_controls(search, nodes, room, nodes.size[2], control)
     return -1
