@@ -20,7 +20,6 @@ from dataclasses import replace
 import numpy as np
 
 from mrmg import seeding
-from mrmg.motion._kernels import CAR
 from mrmg.planning.path_following import _tracking_kernels
 from mrmg.planning.path_following._following_kernels import Course
 from mrmg.planning.path_following.band import Path
@@ -216,8 +215,7 @@ class _Planning:
             costs = task.hold_share, task.soft_s / (task.steps * problem.dt_s)
             guide, way = self._fields.timed(r, tour, task.stay, traffic, costs)
             guide = guide._replace(turning=turning)
-            steered = problem.mission.fleet[r]["model"] != CAR
-            lead = rounded_path(problem, r, way) if steered else nowhere
+            lead = rounded_path(problem, r, way)
             yield guided(problem, r, free, nowhere, guide), course_of(problem, r, lead)
 
     def _search(

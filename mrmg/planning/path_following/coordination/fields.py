@@ -85,7 +85,8 @@ class Fields:
     ) -> tuple[Guide, np.ndarray]:
         """Return robot r's costs-to-go among the others, and the way down them.
 
-        The way is a chain of points, shape (n, 2).
+        The way is a chain of points, shape (n, 2); cars, which cannot follow it, have
+        none of more than one.
 
         Args:
             r: robot.
@@ -122,7 +123,9 @@ class Fields:
             last = np.where(lasting < np.inf, last, np.inf)
             field[i, -1] = _field_kernels.cost_to_go(lasting, last)
             _field_kernels.timed_cost_to_go(price, seed, penalty, hold, field[i])
-        way = self._way_down(r, targets, stood, (price, standing, field))
+        way = self._problem.start[r : r + 1, :2]
+        if own[0]["model"] != CAR:
+            way = self._way_down(r, targets, stood, (price, standing, field))
         return Guide(field, UNKNOWN, cell_m, layer), way
 
     def _add_others(
