@@ -65,7 +65,8 @@ class Task(NamedTuple):
         hold_share: cost of a second of standing, of moving it is 1.
         soft_s: cost of a conflict with a robot of lower priority [s].
         most: nodes at most.
-        enough: nodes after which the best end that was found counts.
+        enough: nodes after which the best end that was found counts, or AFTER_END times
+            as many as finding the first one took.
     """
 
     leg: np.ndarray
