@@ -139,7 +139,7 @@ class VisibilityGraph:
 def _borders(scene: Scene, reach_m: float) -> list[shapely.Geometry]:
     """Return the lines at which least prices may change.
 
-    An area alone is dearer than plain ground where it is for sure, or cheaper wherever
+    An area alone costs more than plain ground where it is for sure, or less wherever
     it is near; of areas that meet either may hold.
     """
     shapes = np.array([area.shape for area in scene.terrain], dtype=object)
