@@ -45,7 +45,7 @@ LEAST_SOC_MARGIN = 0.02
 """Share of a battery's capacity that plans always leave above its reserve: a robot may
 take a percent or two more than planned on slopes and in turns on the spot."""
 
-FIRST_PLAN_DEPTH_M = 0.05
+FIRST_PLAN_DEPTH_M = 0.08
 """How much deeper than needed first plans enter targets: they seldom miss one, which
 spares driving again."""
 

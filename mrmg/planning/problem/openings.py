@@ -14,7 +14,7 @@ from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.planning.free_ground import FreeGround, bottleneck
-from mrmg.planning.problem.targets import target_margin_m
+from mrmg.planning.problem.targets import TARGET_MARGIN_M
 from mrmg.planning.roadmap.fleet import PASSAGE_SLACK_M, margins_of
 from mrmg.scene.margins import Margins, certified_minimum_m
 from mrmg.scene.region import Region
@@ -38,9 +38,9 @@ MOST_CELLS = 4_000_000
 """Cells of a distance field at most."""
 
 
-def entered(scene: Scene, region: Region) -> BaseGeometry:
+def entered(region: Region) -> BaseGeometry:
     """Return where a region counts as entered for planning."""
-    inner = region.shape.buffer(-target_margin_m(scene), join_style="mitre")
+    inner = region.shape.buffer(-TARGET_MARGIN_M, join_style="mitre")
     return region.shape.centroid if inner.is_empty else inner
 
 
@@ -62,9 +62,7 @@ def openings_to(
         if key not in grounds:
             grounds[key] = FreeGround.of(scene, robot)
         margin_m = margins_of(robot, margins)[0]
-        found += _openings(
-            grounds[key], robot, number, margin_m, entered(scene, region)
-        )
+        found += _openings(grounds[key], robot, number, margin_m, entered(region))
     return tuple(found)
 
 
@@ -192,7 +190,7 @@ def passages_missing(
         start = Point(*robot.pose[:2])
         kept_m = least_margin_m(robot, margins_of(robot, margins)[0])
         needed_m = clearance_needed_m(robot, kept_m)
-        gap = bottleneck(ground, start, entered(scene, region), needed_m)
+        gap = bottleneck(ground, start, entered(region), needed_m)
         if gap is None:
             lacking_m, text = 2.0 * needed_m, f"there is no way at all for {robot.id}"
         elif gap.width_m >= 2.0 * needed_m:

@@ -9,13 +9,12 @@ import numpy as np
 from mrmg.planning.problem._region_kernels import REGION, Zones
 from mrmg.planning.problem._target_kernels import TARGET, Targets
 from mrmg.planning.roadmap.vertices import planned_regions
-from mrmg.scene.margins import tracking_error
 from mrmg.scene.region import Region
 from mrmg.scene.types import Finish, Goal, Scene, Station
 
-ERRORS_DEEP, LEAST_DEPTH_M = 1.3, 0.05
-"""How deep inside a region the planner drives, so that a tracked path enters it too: a
-multiple of the largest disturbed tracking error of the fleet, and the least depth."""
+TARGET_MARGIN_M = 0.12
+"""How deep inside a region the planner drives, so that a tracked path enters it too:
+robots stray by 0.02 m at most, and by 0.04 m under the default disturbances."""
 
 GATE_MARGIN_M = 0.3
 """How far from a station for one robot others stay, so that tracked paths do, too."""
@@ -33,24 +32,18 @@ def finish_of(scene: Scene) -> np.ndarray:
     return np.where(must, len(scene.targets()) + np.cumsum(must) - 1, -1)
 
 
-def target_margin_m(scene: Scene) -> float:
-    """Return how deep inside regions the planner drives."""
-    errors_m = (tracking_error(robot.model).disturbed_m for robot in scene.robots)
-    return max(LEAST_DEPTH_M, ERRORS_DEEP * max(errors_m, default=0.0))
-
-
 def target_arrays(scene: Scene) -> Targets:
     """Return goals, stations and finishes as the planner enters them."""
-    regions, margin_m = planned_regions(scene), target_margin_m(scene)
+    regions = planned_regions(scene)
     shrunk, radius_m = [], []
     for region in regions:
         corners = region.corners
         if len(corners):
-            smaller = region.shape.buffer(-margin_m, join_style="mitre")
+            smaller = region.shape.buffer(-TARGET_MARGIN_M, join_style="mitre")
             if not smaller.is_empty and smaller.geom_type == "Polygon":
                 corners = np.asarray(smaller.normalize().exterior.coords)[:-1][::-1]
         shrunk.append(corners)
-        radius_m.append(max(region.radius_m - margin_m, 0.5 * region.radius_m))
+        radius_m.append(max(region.radius_m - TARGET_MARGIN_M, 0.5 * region.radius_m))
     target = np.zeros(len(regions), TARGET)
     corner = _fill_in(target, regions, shrunk, radius_m)
     target["heading"], target["tolerance"] = _headings(scene)
