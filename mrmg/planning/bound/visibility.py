@@ -46,7 +46,7 @@ class VisibilityGraph:
         ground: prices that are the least within reach of each cell.
         bends: the nodes.
         edges: of obstacles, terrain and bounds, at which costs of paths have kinks.
-        highest: the highest price there is.
+        highest: the highest price there is, plain ground's included.
     """
 
     ground: Ground
@@ -97,7 +97,7 @@ class VisibilityGraph:
             ground=ground,
             bends=Places(*(column[inside] for column in bends)),
             edges=shapely.union_all([solid, limits, borders]),
-            highest=max((area.multiplier for area in scene.terrain), default=1.0),
+            highest=max([1.0, *(area.multiplier for area in scene.terrain)]),
         )
 
     def smooth_arcs(self, region: Region) -> np.ndarray:
