@@ -10,7 +10,8 @@ import numpy as np
 from mrmg.compilation import kernel
 
 SAMPLING = 0.7
-"""Distance of the points at which prices along a piece are read, over a cell's side."""
+"""Distance of the points at which prices along a piece are read, over a cell's side,
+where prices change."""
 
 
 class Places(NamedTuple):
@@ -36,8 +37,59 @@ class Places(NamedTuple):
     turned: np.ndarray
 
 
+class Cells(NamedTuple):
+    """Prices on square cells.
+
+    Attributes:
+        price: least within reach of each cell, shape (Y, X).
+        even: how many cells about each, to all sides, have its price, shape (Y, X).
+        x_min, y_min: corner of the first cell [m].
+        side: of a cell [m].
+    """
+
+    price: np.ndarray
+    even: np.ndarray
+    x_min: float
+    y_min: float
+    side: float
+
+
 @kernel
-def straight_costs(price, x_min, y_min, cell, first, second):
+def even_about(price):
+    """Return how many cells about each one, to all sides, have its price, shape (Y, X).
+
+    A distance transform by two sweeps (Rosenfeld and Pfaltz, Distance functions on
+    digital pictures, Pattern Recognition 1, 1968).
+    """
+    rows, columns = price.shape
+    even = np.full((rows, columns), rows + columns, np.int32)
+    for row in range(rows):
+        for column in range(columns):
+            for to in range(max(row - 1, 0), min(row + 2, rows)):
+                for side in range(max(column - 1, 0), min(column + 2, columns)):
+                    if price[to, side] != price[row, column]:
+                        even[row, column] = 0
+    for row in range(rows):
+        for column in range(columns):
+            _spread_from(even, row, column, row - 1, column - 1)
+    for row in range(rows - 1, -1, -1):
+        for column in range(columns - 1, -1, -1):
+            _spread_from(even, row, column, row + 1, column + 1)
+    return even
+
+
+@kernel
+def _spread_from(even, row, column, beside_row, beside_column):
+    """Lower a cell's distance by those of a row beside it and of a cell in its own."""
+    if 0 <= beside_row < even.shape[0]:
+        for side in range(max(column - 1, 0), min(column + 2, even.shape[1])):
+            even[row, column] = min(even[row, column], even[beside_row, side] + 1)
+    if 0 <= beside_column < even.shape[1]:
+        even[row, column] = min(even[row, column], even[row, beside_column] + 1)
+
+
+@kernel
+def straight_costs(cells, first, second):
     """Return the least cost of straight pieces between places, shape (n, m).
 
     A piece lies in ground of one price. No price read here is above the true one, so
@@ -53,30 +105,45 @@ def straight_costs(price, x_min, y_min, cell, first, second):
     both places, so that nothing is left of the error.
 
     Args:
-        price: of square cells, shape (Y, X).
-        x_min, y_min, cell: of its grid [m].
+        cells: prices.
         first, second: the places.
     """
     cost = np.full((len(first.slack), len(second.slack)), np.inf)
     for i in range(cost.shape[0]):
-        ax = 0.5 * (first.end[i, 0, 0] + first.end[i, 1, 0])
-        ay = 0.5 * (first.end[i, 0, 1] + first.end[i, 1, 1])
         for j in range(cost.shape[1]):
-            bx = 0.5 * (second.end[j, 0, 0] + second.end[j, 1, 0])
-            by = 0.5 * (second.end[j, 0, 1] + second.end[j, 1, 1])
-            highest = _highest(price, x_min, y_min, cell, ax, ay, bx, by)
-            if highest == np.inf:
-                continue
-            length = _apart(first.end[i], second.end[j])
-            length -= first.sagitta[i] + second.sagitta[j]
-            slack = first.slack[i] + second.slack[j]
-            if slack > 0.0:
-                least = max(length - slack, 0.125 * slack)
-                length -= min(2.0 * slack, 0.5 * slack * slack / least)
-            if 0 <= first.border[i] == second.border[j]:
-                length = max(length, _along_border(first, i, second, j))
-            cost[i, j] = highest * max(0.0, length)
+            cost[i, j] = _straight(cells, first, i, second, j)
     return cost
+
+
+@kernel
+def costs_between(cells, places):
+    """Return the least costs of straight pieces from place to place, shape (n, n)."""
+    cost = np.full((len(places.slack), len(places.slack)), np.inf)
+    for i in range(len(cost)):
+        for j in range(i):
+            cost[i, j] = cost[j, i] = _straight(cells, places, i, places, j)
+    return cost
+
+
+@kernel
+def _straight(cells, first, i, second, j):
+    """Return the least cost of a straight piece between two places."""
+    ax = 0.5 * (first.end[i, 0, 0] + first.end[i, 1, 0])
+    ay = 0.5 * (first.end[i, 0, 1] + first.end[i, 1, 1])
+    bx = 0.5 * (second.end[j, 0, 0] + second.end[j, 1, 0])
+    by = 0.5 * (second.end[j, 0, 1] + second.end[j, 1, 1])
+    highest = _highest(cells, ax, ay, bx, by)
+    if highest == np.inf:
+        return np.inf
+    length = _apart(first.end[i], second.end[j])
+    length -= first.sagitta[i] + second.sagitta[j]
+    slack = first.slack[i] + second.slack[j]
+    if slack > 0.0:
+        least = max(length - slack, 0.125 * slack)
+        length -= min(2.0 * slack, 0.5 * slack * slack / least)
+    if 0 <= first.border[i] == second.border[j]:
+        length = max(length, _along_border(first, i, second, j))
+    return highest * max(0.0, length)
 
 
 @kernel
@@ -91,20 +158,21 @@ def _along_border(first, i, second, j):
 
 
 @kernel
-def _highest(price, x_min, y_min, cell, ax, ay, bx, by):
+def _highest(cells, ax, ay, bx, by):
     """Return the highest price met at points between two; inf where it is blocked."""
-    rows, columns = price.shape
-    pieces = int(hypot(bx - ax, by - ay) / (SAMPLING * cell)) + 1
-    highest = 0.0
-    for k in range(pieces):
-        share = (k + 0.5) / pieces
-        column = int((ax + share * (bx - ax) - x_min) / cell)
-        row = int((ay + share * (by - ay) - y_min) / cell)
-        row = min(max(row, 0), rows - 1)
-        column = min(max(column, 0), columns - 1)
-        highest = max(highest, price[row, column])
-        if highest == np.inf:
-            break
+    rows, columns = cells.price.shape
+    size = hypot(bx - ax, by - ay) / cells.side
+    x, y = (ax - cells.x_min) / cells.side, (ay - cells.y_min) / cells.side
+    step_x, step_y = 0.0, 0.0
+    if size > 0.0:
+        step_x = (bx - ax) / cells.side / size
+        step_y = (by - ay) / cells.side / size
+    at, highest = 0.0, 0.0
+    while at <= size and highest < np.inf:
+        row = min(max(int(y + at * step_y), 0), rows - 1)
+        column = min(max(int(x + at * step_x), 0), columns - 1)
+        highest = max(highest, cells.price[row, column])
+        at += max(SAMPLING, cells.even[row, column])
     return highest
 
 

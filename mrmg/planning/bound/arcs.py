@@ -26,7 +26,7 @@ from mrmg.planning.bound.borders import ARCS, arc_lines, half_arc_m, sagitta_m
 from mrmg.planning.bound.geodesic import Ways
 from mrmg.planning.bound.visibility import VisibilityGraph, arcs_of, place_of
 
-NEAR_SHARE, NEAR_M = 0.1, 4.0
+NEAR_SHARE, NEAR_M = 0.1, 2.0
 """What paths may cost more than was known of any, as a share of it and besides, if the
 nodes that they bend at are to count."""
 

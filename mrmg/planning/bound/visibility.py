@@ -19,7 +19,7 @@ import shapely
 from shapely.geometry.polygon import orient
 
 from mrmg.planning.bound import _visibility_kernels
-from mrmg.planning.bound._visibility_kernels import Places
+from mrmg.planning.bound._visibility_kernels import Cells, Places
 from mrmg.planning.bound.borders import (
     arc_lines,
     arc_middles,
@@ -43,13 +43,13 @@ class VisibilityGraph:
     """Nodes at which shortest paths may bend, on the ground of one kind of robot.
 
     Attributes:
-        ground: prices that are the least within reach of each cell.
+        cells: prices, the least within reach of each cell.
         bends: the nodes.
         edges: of obstacles, terrain and bounds, at which costs of paths have kinks.
         highest: the highest price there is, plain ground's included.
     """
 
-    ground: Ground
+    cells: Cells
     bends: Places
     edges: shapely.Geometry
     highest: float
@@ -94,7 +94,13 @@ class VisibilityGraph:
         x, y = bends.end[:, 0].T
         inside = (x_min <= x) & (x <= x_max) & (y_min <= y) & (y <= y_max)
         return VisibilityGraph(
-            ground=ground,
+            cells=Cells(
+                ground.price,
+                _visibility_kernels.even_about(ground.price),
+                ground.x_min,
+                ground.y_min,
+                ground.cell_m,
+            ),
             bends=Places(*(column[inside] for column in bends)),
             edges=shapely.union_all([solid, limits, borders]),
             highest=max([1.0, *(area.multiplier for area in scene.terrain)]),
@@ -118,20 +124,13 @@ class VisibilityGraph:
             last: those that they end at, m of them.
         """
         bends = Places(*(column[nodes] for column in self.bends))
+        costs = _visibility_kernels.straight_costs
         return np.asarray(
             _visibility_kernels.least_costs(
-                self._straight(bends, bends),
-                self._straight(first, bends),
-                self._straight(bends, last),
-                self._straight(first, last),
-            )
-        )
-
-    def _straight(self, first: Places, second: Places) -> np.ndarray:
-        ground = self.ground
-        return np.asarray(
-            _visibility_kernels.straight_costs(
-                ground.price, ground.x_min, ground.y_min, ground.cell_m, first, second
+                _visibility_kernels.costs_between(self.cells, bends),
+                costs(self.cells, first, bends),
+                costs(self.cells, bends, last),
+                costs(self.cells, first, last),
             )
         )
 
