@@ -20,6 +20,7 @@ from shapely.geometry import Point, Polygon, box
 import mrmg
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.bound.bound import lower_bound_J
+from mrmg.planning.bound.clearance import blocked_ground
 from mrmg.planning.bound.exact_tours import exact_routing
 from mrmg.planning.bound.geodesic import Ground
 from mrmg.planning.routing.instance import RoutingInstance
@@ -166,7 +167,9 @@ def test_more_obstacles_never_lower_a_price(
 ) -> None:
     """Exactly: a cell is blocked if the obstacles together cover it."""
     fewer, both = (
-        Ground.of(scene, scene.robots[0], cell_m=0.5, step_m=0.2).price
+        Ground.of(
+            scene, blocked_ground(scene, scene.robots[0]), cell_m=0.5, step_m=0.2
+        ).price
         for scene in (
             scene_of({**YARD, "terrain": [MUD], "obstacles": entries})
             for entries in (before, [*before, *more])

@@ -40,6 +40,7 @@ from shapely.geometry import Point
 from mrmg.planning.bound import _bound_kernels
 from mrmg.planning.bound.arcs import ArcWays
 from mrmg.planning.bound.borders import half_arc_m
+from mrmg.planning.bound.clearance import avoided_ground, passing_radius_m
 from mrmg.planning.bound.completions import over_stations
 from mrmg.planning.bound.counted_visits import counted_visits
 from mrmg.planning.bound.exact_tours import are_few, exact_routing
@@ -47,6 +48,7 @@ from mrmg.planning.bound.geodesic import Ground, Ways
 from mrmg.planning.bound.touring import touring_bound_J
 from mrmg.planning.bound.visibility import VisibilityGraph
 from mrmg.planning.halting import NEVER, check
+from mrmg.planning.path_bounds import outer_polygon
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.instance import RoutingInstance
@@ -73,8 +75,8 @@ from arc to arc (134 MB) ..."""
 MOST_LEGS = 20_000
 """... and legs of all robots between them, by the time that their arcs take."""
 
-TravelKey = tuple[tuple[str, ...], float, float]
-"""What the ways of a robot depend on: obstacles, inscribed radius, top speed."""
+TravelKey = tuple[tuple[str, ...], float, float, float]
+"""What the ways of a robot depend on: obstacles, radii, top speed."""
 
 ROUNDING_SHARE = 1e-9
 """What rounding may add to a bound; taken off."""
@@ -223,16 +225,22 @@ class Relaxation:
         found = {}
         for key, robot in zip(self.keys, self.scene.robots, strict=True):
             if key not in found:
-                ways = self.ways[key]
-                graph = VisibilityGraph.of(
-                    self.scene,
-                    robot,
-                    cell_m=ways.ground.cell_m / finer,
-                    step_m=robot.model.top_speed_m_s * self.step_s,
-                    reach_m=max(map(half_arc_m, ways.regions)),
-                )
-                goals = len(self.scene.goals)
-                found[key] = ArcWays.of(ways, graph, _starts(self.scene), goals)
+                ways, goals = self.ways[key], len(self.scene.goals)
+                step_m = robot.model.top_speed_m_s * self.step_s
+                graphs = [
+                    VisibilityGraph.of(
+                        self.scene,
+                        blocked,
+                        cell_m=ways.ground.cell_m / finer,
+                        step_m=step_m,
+                        reach_m=max(map(half_arc_m, ways.regions)),
+                    )
+                    for blocked in (
+                        avoided_ground(self.scene, robot, step_m),
+                        ways.ground.blocked,
+                    )
+                ]
+                found[key] = ArcWays.of(ways, graphs, _starts(self.scene), goals)
         return [found[key] for key in self.keys]
 
 
@@ -246,23 +254,22 @@ def _ways_by_key(
     """Return the ways between regions of every kind of robot."""
     x_min, y_min, x_max, y_max = scene.bounds
     cell_m = math.sqrt((x_max - x_min) * (y_max - y_min) / cells)
+    keys = [_travel_key(scene, robot) for robot in scene.robots]
     ways: dict[TravelKey, Ways] = {}
-    for robot in scene.robots:
-        key = _travel_key(scene, robot)
+    for key, robot in zip(keys, scene.robots, strict=True):
         if key not in ways:
             check(halt)
-            ground = _ground(scene, robot, cell_m, step_s)
+            own = _starts(scene)[[other == key for other in keys]]
+            ends = [*map(outer_polygon, regions), shapely.multipoints(own)]
+            step_m = robot.model.top_speed_m_s * step_s
+            blocked = avoided_ground(scene, robot, step_m, ends)
+            ground = Ground.of(scene, blocked, cell_m=cell_m, step_m=step_m)
             ways[key] = Ways.of(ground, regions, _starts(scene), halt)
     return ways
 
 
 def _starts(scene: Scene) -> np.ndarray:
     return np.array([robot.pose[:2] for robot in scene.robots])
-
-
-def _ground(scene: Scene, robot: Robot, cell_m: float, step_s: float) -> Ground:
-    step_m = robot.model.top_speed_m_s * step_s
-    return Ground.of(scene, robot, cell_m=cell_m, step_m=step_m)
 
 
 def most_descent_J(scene: Scene, robot: Robot) -> float:
@@ -299,7 +306,9 @@ def _relaxed_full_J(scene: Scene, robot: Robot) -> float:
 def _travel_key(scene: Scene, robot: Robot) -> TravelKey:
     """Return what the ways of a robot depend on."""
     obstacles = tuple(o.id for o in scene.barriers if o.stops(robot.id))
-    return obstacles, robot.model.inscribed_radius_m, robot.model.top_speed_m_s
+    model = robot.model
+    radii = model.inscribed_radius_m, passing_radius_m(model)
+    return obstacles, *radii, model.top_speed_m_s
 
 
 def relaxed_routing_J(problem: RoutingArrays) -> float:

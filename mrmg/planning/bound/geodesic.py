@@ -1,9 +1,9 @@
 """Lower bounds of the cost of ways between regions, round obstacles and over terrain.
 
-A way is that of the reference point. It keeps as far from obstacles as the largest disc
-about that point inside the footprint reaches, and nothing else about the robot counts.
-The bounds come from certified fields (see `_eikonal_kernels`), so they hold whatever
-the cell is; a finer one brings them nearer to the truth.
+A way is that of the reference point. How far it keeps from obstacles (`clearance`) is
+all that counts of the robot. The bounds come from certified fields (see
+`_eikonal_kernels`), so they hold whatever the cell is; a finer one brings them nearer
+to the truth.
 """
 
 from __future__ import annotations
@@ -22,16 +22,13 @@ from mrmg.planning.bound.borders import ARCS, SPACING_M, border, distances_m
 from mrmg.planning.bound.prices import least_prices
 from mrmg.planning.halting import NEVER, check
 from mrmg.scene.region import Region
-from mrmg.scene.types import Robot, Scene
+from mrmg.scene.types import Scene
 
 ROUNDS = 3
 """Solutions of the eikonal equation at most per field."""
 
 BAND_SHARE = 0.25
 """Width of the levels of a field, as a share of a cell."""
-
-CLEARANCE_TOLERANCE_M = 0.02
-"""How much nearer to an obstacle than its disc allows a robot is taken to come."""
 
 ROUND_MARGIN = 1.02
 """Factor on radii of terrain's surroundings, whose arcs are drawn by chords."""
@@ -106,43 +103,43 @@ class Ground:
         x_min, y_min: corner of the first cell [m].
         cell_m: side of a cell.
         price: least multiplier within half a planning step of each cell, inf where the
-            reference point cannot be, shape (Y, X).
+            blocked, shape (Y, X).
+        blocked: where no way leads.
     """
 
     x_min: float
     y_min: float
     cell_m: float
     price: np.ndarray
+    blocked: shapely.Geometry
 
     @staticmethod
     def of(
         scene: Scene,
-        robot: Robot,
+        blocked: shapely.Geometry,
         *,
         cell_m: float,
         step_m: float,
         reach_m: float = 0.0,
-        shrink_m: float = 0.0,
     ) -> Ground:
-        """Return the ground of a robot.
+        """Return the ground of a scene.
 
         Args:
             scene: the scene.
-            robot: gives obstacles and disc.
+            blocked: where no way leads.
             cell_m: side of a cell.
             step_m: longest way of one planning step. A step is charged at its middle,
                 which is at most half of it away from any point of it.
             reach_m: how far from a cell prices count besides.
-            shrink_m: how much nearer to obstacles the robot is taken to come.
         """
         x_min, y_min, _, _ = scene.bounds
         price = least_prices(
             scene,
-            blocked_ground(scene, robot, shrink_m),
+            blocked,
             cell_m=cell_m,
             reach_m=charged_within_m(step_m) + reach_m,
         )
-        return Ground(float(x_min), float(y_min), cell_m, price)
+        return Ground(float(x_min), float(y_min), cell_m, price, blocked)
 
     def look_at(self, points: np.ndarray, reach_m: float) -> Look:
         """Return how a field's values at points follow from its nodes.
@@ -198,19 +195,6 @@ class Ground:
             self.price, self.cell_m, seed, ROUNDS, BAND_SHARE * self.cell_m
         )
         return Field(values.reshape(-1), level, certified)
-
-
-def blocked_ground(scene: Scene, robot: Robot, shrink_m: float) -> shapely.Geometry:
-    """Return where a robot's reference point cannot be.
-
-    Args:
-        scene: the scene.
-        robot: gives obstacles and disc.
-        shrink_m: how much nearer to obstacles it is taken to come.
-    """
-    radius_m = max(0.0, robot.model.inscribed_radius_m - CLEARANCE_TOLERANCE_M)
-    shapes = [o.shape for o in scene.barriers if o.stops(robot.id)]
-    return shapely.union_all(shapes).buffer(radius_m - shrink_m)
 
 
 def charged_within_m(step_m: float) -> float:

@@ -26,10 +26,10 @@ from mrmg.planning.bound.borders import (
     chords,
     half_arc_m,
 )
-from mrmg.planning.bound.geodesic import Ground, blocked_ground, charged_within_m
+from mrmg.planning.bound.geodesic import Ground, charged_within_m
 from mrmg.planning.bound.prices import surroundings
 from mrmg.scene.region import Region
-from mrmg.scene.types import Robot, Scene
+from mrmg.scene.types import Scene
 
 BORDER_M = 0.2
 """Longest piece of terrain's border that one node stands for."""
@@ -44,12 +44,14 @@ class VisibilityGraph:
 
     Attributes:
         cells: prices, the least within reach of each cell.
+        blocked: where no path leads.
         bends: the nodes.
         edges: of obstacles, terrain and bounds, at which costs of paths have kinks.
         highest: the highest price there is, plain ground's included.
     """
 
     cells: Cells
+    blocked: shapely.Geometry
     bends: Places
     edges: shapely.Geometry
     highest: float
@@ -57,17 +59,17 @@ class VisibilityGraph:
     @staticmethod
     def of(
         scene: Scene,
-        robot: Robot,
+        blocked: shapely.Geometry,
         *,
         cell_m: float,
         step_m: float,
         reach_m: float,
     ) -> VisibilityGraph:
-        """Return the graph of a robot.
+        """Return the graph of a scene.
 
         Args:
             scene: the scene.
-            robot: gives obstacles and disc.
+            blocked: where no path leads.
             cell_m: side of the cells that prices are read from.
             step_m: longest way of one planning step, as in `Ground.of`.
             reach_m: how far the true end of a piece may be from the place that stands
@@ -76,13 +78,12 @@ class VisibilityGraph:
         reach_m = max(reach_m, 0.5 * BORDER_M)
         ground = Ground.of(
             scene,
-            robot,
+            blocked.buffer(-reach_m - 2.0 * SIMPLER_M),
             cell_m=cell_m,
             step_m=step_m,
             reach_m=reach_m,
-            shrink_m=reach_m + 2.0 * SIMPLER_M,
         )
-        solid = blocked_ground(scene, robot, SIMPLER_M).simplify(SIMPLER_M)
+        solid = blocked.buffer(-SIMPLER_M).simplify(SIMPLER_M)
         limits = shapely.union_all(
             [solid.boundary, shapely.box(*scene.bounds).boundary]
         )
@@ -101,10 +102,15 @@ class VisibilityGraph:
                 ground.y_min,
                 ground.cell_m,
             ),
+            blocked=blocked,
             bends=Places(*(column[inside] for column in bends)),
             edges=shapely.union_all([solid, limits, borders]),
             highest=max([1.0, *(area.multiplier for area in scene.terrain)]),
         )
+
+    def holds(self, ends: np.ndarray, off_m: float) -> np.ndarray:
+        """Return which points or lines, with what is so near, are not blocked."""
+        return np.asarray(~shapely.dwithin(ends, self.blocked, off_m))
 
     def smooth_arcs(self, region: Region) -> np.ndarray:
         """Return which arcs are smooth and far from all edges, shape (K,)."""
@@ -124,15 +130,17 @@ class VisibilityGraph:
             last: those that they end at, m of them.
         """
         bends = Places(*(column[nodes] for column in self.bends))
-        costs = _visibility_kernels.straight_costs
         return np.asarray(
             _visibility_kernels.least_costs(
                 _visibility_kernels.costs_between(self.cells, bends),
-                costs(self.cells, first, bends),
-                costs(self.cells, bends, last),
-                costs(self.cells, first, last),
+                self._straight(first, bends),
+                self._straight(bends, last),
+                self._straight(first, last),
             )
         )
+
+    def _straight(self, first: Places, last: Places) -> np.ndarray:
+        return np.asarray(_visibility_kernels.straight_costs(self.cells, first, last))
 
 
 def _borders(scene: Scene, reach_m: float) -> list[shapely.Geometry]:
