@@ -84,7 +84,7 @@ def motions(scene: Scene, robot: Robot) -> tuple[np.ndarray, Callable[..., np.nd
     graph = graph.tocsr()
 
     def lengths(origins: np.ndarray) -> np.ndarray:
-        return dijkstra(graph, directed=False, indices=origins)
+        return np.asarray(dijkstra(graph, directed=False, indices=origins))
 
     return points, lengths
 
