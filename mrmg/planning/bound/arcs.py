@@ -11,13 +11,11 @@ which is not so at stations. Any other arc stands for all its points. Between ar
 - the bound of all ways from one region to the other arc (`geodesic.Ways`),
 - for pairs of interest, the shortest path of a visibility graph (`visibility`) whose
   nodes are those near the way: a path by any other node costs at least what the fields
-  of both regions say of that node. Paths keep off ground that they need not be on
-  (`clearance`), but for those from or to arcs and starts on it.
+  of both regions say of that node.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -49,34 +47,33 @@ class ArcWays:
 
     Attributes:
         ways: between whole regions.
-        graphs: of ground that paths can keep to; the last holds all arcs and starts.
+        graph: of the ground.
         between: from arc to arc, shape (T, K, T, K), symmetric.
         from_start: from start to arc, shape (R, T, K).
         starts: shape (R, 2).
         smooth: which arcs stand for their middles, shape (T, K).
         known: pairs whose ways are tightened.
-        cost: least cost to each bend of a graph from a region or start, as far as asked
-            for.
+        cost: least cost from regions and starts to each bend, as far as asked for.
     """
 
     ways: Ways
-    graphs: Sequence[VisibilityGraph]
+    graph: VisibilityGraph
     between: np.ndarray
     from_start: np.ndarray
     starts: np.ndarray
     smooth: np.ndarray
     known: set[Pair] = field(default_factory=set)
-    cost: dict[tuple[int, int], np.ndarray] = field(default_factory=dict)
+    cost: dict[int, np.ndarray] = field(default_factory=dict)
 
     @staticmethod
     def of(
-        ways: Ways, graphs: Sequence[VisibilityGraph], starts: np.ndarray, goals: int
+        ways: Ways, graph: VisibilityGraph, starts: np.ndarray, goals: int
     ) -> ArcWays:
         """Bound all ways between arcs, and from starts to arcs.
 
         Args:
             ways: between whole regions.
-            graphs: of ground that paths can keep to; the last holds all places.
+            graph: of the ground.
             starts: shape (R, 2).
             goals: number of the regions that are goals, which come first.
         """
@@ -109,9 +106,9 @@ class ArcWays:
             table[table > 0.5 * UNREACHED] = np.inf
         away_m = np.append(between.min(axis=(1, 3)), from_start.min(axis=2), axis=0)
         np.fill_diagonal(away_m, np.inf)
-        smooth = np.array([graphs[0].smooth_arcs(region) for region in regions])
+        smooth = np.array([graph.smooth_arcs(region) for region in regions])
         smooth &= ((away_m.min(axis=0) > APART_M) & (np.arange(count) < goals))[:, None]
-        found = ArcWays(ways, graphs, between, from_start, starts, smooth)
+        found = ArcWays(ways, graph, between, from_start, starts, smooth)
         between -= found.slack[:, :, None, None] + found.slack
         from_start -= found.slack
         for table in (between, from_start):
@@ -122,7 +119,7 @@ class ArcWays:
     def slack(self) -> np.ndarray:
         """What half of each smooth arc may cost, shape (T, K)."""
         half_m = np.array([half_arc_m(region) for region in self.ways.regions])
-        return np.where(self.smooth, self.graphs[0].highest * half_m[:, None], 0.0)
+        return np.where(self.smooth, self.graph.highest * half_m[:, None], 0.0)
 
     def is_loose(self, pair: Pair) -> bool:
         """Return whether the ways of a pair can be tightened."""
@@ -135,29 +132,20 @@ class ArcWays:
         origin, target = pair
         known = self._known(pair)
         most = (1.0 + NEAR_SHARE) * float(known[np.isfinite(known)].max()) + NEAR_M
-        found, left = np.zeros(known.shape), np.ones(known.shape, bool)
-        for k in range(len(self.graphs)):
-            held = left & self._held(k, origin)[:, None] & self._held(k, target)
-            if held.any():
-                found[held] = self._least_costs(k, pair, most)[held]
-                left &= ~held
-        slack = self._slack(origin)[:, None] + self._slack(target)
-        return np.asarray(np.minimum(found, most - slack))
-
-    def _least_costs(self, k: int, pair: Pair, most: float) -> np.ndarray:
-        """Return the costs of the shortest paths of a graph, as far as below `most`."""
-        origin, target = pair
-        over = self._cost_to(k, origin) + self._cost_to(k, target)
+        over = self._cost_to(origin) + self._cost_to(target)
         nodes = np.flatnonzero(over <= most)
         if len(nodes) > MOST_NODES:
-            return np.zeros(self._known(pair).shape)
-        ends = [
-            place_of(self.starts[-1 - place])
-            if place < 0
-            else arcs_of(self.ways.regions[place], self.smooth[place])
-            for place in pair
-        ]
-        return self.graphs[k].least_costs(nodes, *ends)
+            return np.zeros((1, 1))
+        if origin < 0:
+            first = place_of(self.starts[-1 - origin])
+        else:
+            first = arcs_of(self.ways.regions[origin], self.smooth[origin])
+        last = arcs_of(self.ways.regions[target], self.smooth[target])
+        slack = self.slack[target] + (
+            0.0 if origin < 0 else self.slack[origin][:, None]
+        )
+        found = self.graph.least_costs(nodes, first, last)
+        return np.asarray(np.minimum(found, most - slack))
 
     def take(self, pair: Pair, apart: np.ndarray) -> None:
         """Tighten the ways of a pair by a certificate."""
@@ -182,34 +170,18 @@ class ArcWays:
             return float(self.ways.from_start[-1 - origin, target])
         return float(self.ways.between[origin, target])
 
-    def _slack(self, place: int) -> np.ndarray:
-        """Return what half of each smooth arc may cost, 0 at a start, (K or 1,)."""
-        return np.zeros(1) if place < 0 else self.slack[place]
+    def _cost_to(self, place: int) -> np.ndarray:
+        """Return the least cost from a region or start to each bend."""
+        if place not in self.cost:
+            self.cost[place] = self._spread(place)
+        return self.cost[place]
 
-    def _held(self, k: int, place: int) -> np.ndarray:
-        """Return which arcs, or whether a start, a graph holds, shape (K or 1,)."""
-        if place < 0:
-            ends, off_m = shapely.points(self.starts[-1 - place, None]), 0.0
-        else:
-            region = self.ways.regions[place]
-            ends, off_m = np.array(arc_lines(region)), sagitta_m(region)
-        if k == len(self.graphs) - 1:
-            return np.ones(len(ends), bool)
-        return self.graphs[k].holds(ends, off_m)
-
-    def _cost_to(self, k: int, place: int) -> np.ndarray:
-        """Return the least cost from a region or start to each bend of a graph."""
-        if (k, place) not in self.cost:
-            bends = self.graphs[k].bends.end[:, 0]
-            self.cost[k, place] = self._spread(place, bends)
-        return self.cost[k, place]
-
-    def _spread(self, place: int, bend: np.ndarray) -> np.ndarray:
-        """Work out the least cost from a region or start to bends, (n, 2) -> (n,).
+    def _spread(self, place: int) -> np.ndarray:
+        """Work out the least cost from a region or start to each bend.
 
         It is the least of the nodes of the fields about the bend.
         """
-        ground = self.ways.ground
+        ground, bend = self.ways.ground, self.graph.bends.end[:, 0]
         if place < 0:
             floor = float(np.min(ground.price, initial=1.0))
             offset = bend - self.starts[-1 - place]

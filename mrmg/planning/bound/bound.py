@@ -225,22 +225,16 @@ class Relaxation:
         found = {}
         for key, robot in zip(self.keys, self.scene.robots, strict=True):
             if key not in found:
-                ways, goals = self.ways[key], len(self.scene.goals)
-                step_m = robot.model.top_speed_m_s * self.step_s
-                graphs = [
-                    VisibilityGraph.of(
-                        self.scene,
-                        blocked,
-                        cell_m=ways.ground.cell_m / finer,
-                        step_m=step_m,
-                        reach_m=max(map(half_arc_m, ways.regions)),
-                    )
-                    for blocked in (
-                        avoided_ground(self.scene, robot, step_m),
-                        ways.ground.blocked,
-                    )
-                ]
-                found[key] = ArcWays.of(ways, graphs, _starts(self.scene), goals)
+                ways = self.ways[key]
+                graph = VisibilityGraph.of(
+                    self.scene,
+                    ways.ground.blocked,
+                    cell_m=ways.ground.cell_m / finer,
+                    step_m=robot.model.top_speed_m_s * self.step_s,
+                    reach_m=max(map(half_arc_m, ways.regions)),
+                )
+                goals = len(self.scene.goals)
+                found[key] = ArcWays.of(ways, graph, _starts(self.scene), goals)
         return [found[key] for key in self.keys]
 
 
@@ -262,7 +256,7 @@ def _ways_by_key(
             own = _starts(scene)[[other == key for other in keys]]
             ends = [*map(outer_polygon, regions), shapely.multipoints(own)]
             step_m = robot.model.top_speed_m_s * step_s
-            blocked = avoided_ground(scene, robot, step_m, ends)
+            blocked = avoided_ground(scene, robot, shapely.union_all(ends), step_m)
             ground = Ground.of(scene, blocked, cell_m=cell_m, step_m=step_m)
             ways[key] = Ways.of(ground, regions, _starts(scene), halt)
     return ways

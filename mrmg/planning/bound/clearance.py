@@ -1,39 +1,43 @@
 """Where the reference point of a robot cannot be, and where it need not be.
 
 It cannot be nearer to an obstacle than the largest disc about it inside the footprint
-reaches, r. A robot that only moves along its heading need not be nearer than h on its
-way from one place to another, where h is up to half its width: some way that keeps h
-costs no more. What follows is why.
+reaches, r. A robot that only moves along its heading need not be nearer than h, up to
+half its width, on its way from one place to another: some way that keeps h costs no
+more. Only next to those places, and where prices change, it may have to. What follows
+is why.
 
 Let the footprint hold the box from -r to 2 h - r along the heading (or against it) and
-from -h to h across, with r <= h <= 2 r. Let d < h be the distance from the nearest
-obstacle at some time, n the direction away from it. The obstacle is outside the box, so
-the heading is so near to n, or -n, that |cos| >= r / d. So the robot moves across n by
-at most sqrt(1 - r^2 / d^2) of its speed. Move each point of the way along the gradient
-of the distance from obstacles until that is h:
+from -h to h across, with r <= h <= 2 r. Each point q of an obstacle has a distance
+h(q) to be kept, which is h, or r within h of the ends of the way. Let p be a point of
+the way nearer to obstacles than that, q the point for which |p - q| - h(q) is least,
+d = |p - q| < h the distance and n the direction from q to p. As q is outside the box,
+the heading is so near to n, or to -n, that |cos| >= r / d. So the robot moves across n
+by at most sqrt(1 - r^2 / d^2) of its speed. Move each such point along the gradient of
+that least difference until it is 0:
 
-- Beside an edge or a corner, that leads along n. What moves across n is stretched by at
-  most h / d, and (h / d) sqrt(1 - r^2 / d^2) <= 1, as h <= 2 r.
-- Where obstacles are equally near, it leads on along the medial axis. All points that
-  get to it at one side end at the same point, whose speed is 0.
-- The flow is continuous (Lieutier, Any open bounded subset of R^n has the same homotopy
-  type as its medial axis, Computer-Aided Design 36, 2004), so the way stays in one
-  piece, but for points that never get to h: those between obstacles less than 2 h
-  apart, and pockets that such gaps enclose. All lines through the reference point are
-  at least 2 h long within the box, as r >= h / 2, so it never passes such a gap.
+- At first that leads along n. What moves across n is stretched by at most h / d, as
+  about a corner, and (h / d) sqrt(1 - r^2 / d^2) <= 1, as h <= 2 r.
+- Where the least is that of several points, it leads on along a ridge. All points that
+  get to a ridge at the same side of its lowest point end at one point, which stands
+  still.
+- The least difference is semiconcave, so its gradient flow is continuous (Petrunin,
+  Semiconcave functions in Alexandrov's geometry, Surveys in Differential Geometry 11,
+  2007), and the way stays in one piece, but for points from which 0 is not reached:
+  those straight between two points of obstacles less than 2 h apart, and pockets that
+  such lines enclose. All lines through the reference point are at least 2 h long
+  within the box, as r >= h / 2, so it never crosses one of them.
 
-So the moved way is no longer. It costs no more if the price is the same all over the
-piece of ground, nearer to obstacles than h, that a point is moved within.
+So the moved way is no longer, and its ends, which are h(q) away, are where they were.
+It costs no more if the price is the same all over the connected piece of ground nearer
+than h(q) that a point is moved within.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import shapely
 
-from mrmg.planning.bound.geodesic import charged_within_m
+from mrmg.planning.bound.geodesic import ROUND_MARGIN, charged_within_m
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Robot, Scene
 
@@ -43,28 +47,27 @@ TOLERANCE_M = 0.02
 
 def blocked_ground(scene: Scene, robot: Robot) -> shapely.Geometry:
     """Return where the reference point cannot be."""
-    return _nearer_than(scene, robot, _inscribed_m(robot.model))
+    return _obstacles(scene, robot).buffer(_inscribed_m(robot.model))
 
 
 def avoided_ground(
-    scene: Scene,
-    robot: Robot,
-    step_m: float,
-    ends: Sequence[shapely.Geometry] = (),
+    scene: Scene, robot: Robot, ends: shapely.Geometry, step_m: float
 ) -> shapely.Geometry:
-    """Return where the reference point need not be on its way between other places.
+    """Return where the reference point need not be on its way between some places.
 
     Args:
         scene: the scene.
         robot: gives obstacles and footprint.
+        ends: the places.
         step_m: longest way of one planning step.
-        ends: places outside of which it must lie.
     """
-    parts = shapely.get_parts(_nearer_than(scene, robot, passing_radius_m(robot.model)))
-    free = ~shapely.intersects(parts, shapely.union_all(ends))
+    passing_m = passing_radius_m(robot.model)
+    far = _obstacles(scene, robot).difference(ends.buffer(ROUND_MARGIN * passing_m))
+    blocked = blocked_ground(scene, robot)
+    parts = shapely.get_parts(blocked.union(far.buffer(passing_m)))
     changes = shapely.union_all([area.shape.boundary for area in scene.terrain])
-    free &= ~shapely.dwithin(parts, changes, 2.0 * charged_within_m(step_m))
-    return shapely.union_all([blocked_ground(scene, robot), *parts[free]])
+    same = ~shapely.dwithin(parts, changes, 2.0 * charged_within_m(step_m))
+    return shapely.union_all([blocked, *parts[same]])
 
 
 def passing_radius_m(model: RobotModel) -> float:
@@ -84,7 +87,5 @@ def _inscribed_m(model: RobotModel) -> float:
     return max(0.0, model.inscribed_radius_m - TOLERANCE_M)
 
 
-def _nearer_than(scene: Scene, robot: Robot, distance_m: float) -> shapely.Geometry:
-    """Return the ground nearer to a robot's obstacles."""
-    shapes = [o.shape for o in scene.barriers if o.stops(robot.id)]
-    return shapely.union_all(shapes).buffer(distance_m)
+def _obstacles(scene: Scene, robot: Robot) -> shapely.Geometry:
+    return shapely.union_all([o.shape for o in scene.barriers if o.stops(robot.id)])

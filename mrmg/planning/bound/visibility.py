@@ -44,14 +44,12 @@ class VisibilityGraph:
 
     Attributes:
         cells: prices, the least within reach of each cell.
-        blocked: where no path leads.
         bends: the nodes.
         edges: of obstacles, terrain and bounds, at which costs of paths have kinks.
         highest: the highest price there is, plain ground's included.
     """
 
     cells: Cells
-    blocked: shapely.Geometry
     bends: Places
     edges: shapely.Geometry
     highest: float
@@ -102,15 +100,10 @@ class VisibilityGraph:
                 ground.y_min,
                 ground.cell_m,
             ),
-            blocked=blocked,
             bends=Places(*(column[inside] for column in bends)),
             edges=shapely.union_all([solid, limits, borders]),
             highest=max([1.0, *(area.multiplier for area in scene.terrain)]),
         )
-
-    def holds(self, ends: np.ndarray, off_m: float) -> np.ndarray:
-        """Return which points or lines, with what is so near, are not blocked."""
-        return np.asarray(~shapely.dwithin(ends, self.blocked, off_m))
 
     def smooth_arcs(self, region: Region) -> np.ndarray:
         """Return which arcs are smooth and far from all edges, shape (K,)."""
