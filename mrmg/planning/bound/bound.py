@@ -20,11 +20,13 @@ batteries that hold as much more.
 Charges are taken at the middle of each planning step. In a step in which the robot
 turns round, the way back is not charged; that is worth less than 0.01 mm.
 
-With more obstacles no cell is cheaper, and no tours are cheaper where no leg is. What a
-field certifies of a leg in between may be less nevertheless: fields are solved and then
-divided by how much too steep they are, which depends on where fronts meet. The
-greatest field would take a conic programme for each leg. So an obstacle may lower the
-bound, by less than half a percent in all that was tried; the greater of both holds.
+With more obstacles no cell that none can enter is cheaper, and no tours are cheaper
+where no leg is. Yet an obstacle or a goal more may lower the bound; the greater of both
+holds. What a field certifies of a leg may be less, by less than half a percent in all
+that was tried: fields are solved and then divided by how much too steep they are, which
+depends on where fronts meet. And where obstacles are joined to terrain by another one,
+or a goal is next to them, less is known of how far ways keep from them (`clearance`),
+which is worth 0.1 to 3 %.
 """
 
 from __future__ import annotations

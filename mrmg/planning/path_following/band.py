@@ -44,7 +44,7 @@ STAYING_M = 0.005
 LEAST_PIVOT = 0.5
 """Angle of a turn on the spot that counts as one [rad]."""
 
-TRACKING_M = 0.03
+TRACKING_M = 0.01
 """How much deeper than needed a path enters its targets, to begin with."""
 
 SERIES = 200

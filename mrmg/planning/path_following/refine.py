@@ -40,7 +40,7 @@ from mrmg.plans import Plan, Trajectory
 TRIES = 14
 """Times that driving is repeated with what went wrong put right."""
 
-DEEPER_M = 0.02
+DEEPER_M = 0.005
 """How much deeper than it was missed by a target is entered the next time."""
 
 SWERVES = 3
