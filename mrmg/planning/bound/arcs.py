@@ -121,6 +121,19 @@ class ArcWays:
         half_m = np.array([half_arc_m(region) for region in self.ways.regions])
         return np.where(self.smooth, self.graph.highest * half_m[:, None], 0.0)
 
+    def near_pairs(self, r: int, count: int) -> set[Pair]:
+        """Return pairs of one of the `count` nearest regions of any, or of start r."""
+        apart = self.ways.between.copy()
+        np.fill_diagonal(apart, np.inf)
+        nearest = np.argsort(apart, axis=1, kind="stable")[:, :count]
+        first = np.argsort(self.ways.from_start[r], kind="stable")[:count]
+        pairs = {
+            (max(i, j), min(i, j))
+            for i, others in enumerate(nearest.tolist())
+            for j in others
+        }
+        return pairs | {(-1 - r, j) for j in first.tolist()}
+
     def is_loose(self, pair: Pair) -> bool:
         """Return whether the ways of a pair can be tightened."""
         origin, target = pair

@@ -40,9 +40,16 @@ otherwise labels would be too many ..."""
 FINE_ARC_LEGS = 20_000_000
 """... and legs from arc to arc up to which they are, by their memory (160 MB)."""
 
+LONG_ROUND, NEAREST = 100_000, 5
+"""Labels of a round (some 0.3 s) after which all ways to the nearest places are
+tightened: better completions then save more than that takes. How many they are."""
+
 WORK_LABELS = 8_000_000
 """Labels that all rounds may set: some 6 s of one processor. The limit counts work, not
 time, so that the same mission has the same bound on every machine."""
+
+Pairs = dict[tuple[int, Pair], ArcWays]
+"""Ways by their identities and pairs of places."""
 
 
 def touring_bound_J(
@@ -76,11 +83,12 @@ def touring_bound_J(
     """
     visits = visits or Visits.all_remembered(problem)
     best, tours = relaxed.cost_J, relaxed.tours
-    settled_J, rest, cheapest = -math.inf, None, False
+    settled_J, rest, cheapest, all_near = -math.inf, None, False, False
     step, before = STEP, 0
     leg = _room_for_legs(ways, problem.goals)
+    pairs = _pairs_of(ways, tours)
     for _ in range(rounds):
-        tightened = _tighten(ways, tours)
+        tightened = _tighten(pairs)
         if halt[0] or (cheapest and not tightened):
             break
         _write_legs(leg, ways, price)
@@ -93,7 +101,7 @@ def touring_bound_J(
             break
         enough, cheapest = False, found.feasible
         if cheapest:
-            best, tours = max(best, found.cost_J), found.tours
+            best, pairs = max(best, found.cost_J), _pairs_of(ways, found.tours)
             enough = best < (1.0 + LEAST_RISE) * settled_J
             settled_J = best
         else:
@@ -103,6 +111,8 @@ def touring_bound_J(
             break
         step = min(step, FINE_STEP if math.isfinite(settled_J) else STEP)
         before = labels
+        if labels > LONG_ROUND and not all_near:
+            pairs, rest, all_near = pairs | _near_pairs(ways), None, True
     return best
 
 
@@ -125,31 +135,32 @@ def _next_step(step: float, before: int, labels: int, work: int) -> float:
     return min(STEP, max(0.0, math.log(WORK_SHARE * work / labels)) / growth)
 
 
-def _tighten(ways: Sequence[ArcWays], tours: Sequence[Sequence[int]]) -> bool:
-    """Tighten the ways that tours take; return whether any was new."""
-    new: dict[tuple[int, Pair], ArcWays] = {}
-    for r, tour in enumerate(tours):
-        pairs = pairwise((-1 - r, *tour))
-        new |= {(id(ways[r]), one): ways[r] for one in pairs if ways[r].is_loose(one)}
+def _pairs_of(ways: Sequence[ArcWays], tours: Sequence[Sequence[int]]) -> Pairs:
+    """Return the pairs that follow each other in tours."""
+    return {
+        (id(ways[r]), pair): ways[r]
+        for r, tour in enumerate(tours)
+        for pair in pairwise((-1 - r, *tour))
+    }
+
+
+def _near_pairs(ways: Sequence[ArcWays]) -> Pairs:
+    """Return the pairs of which one is among the nearest from the other one."""
+    return {
+        (id(one), pair): one
+        for r, one in enumerate(ways)
+        for pair in one.near_pairs(r, NEAREST)
+    }
+
+
+def _tighten(pairs: Pairs) -> bool:
+    """Tighten the ways of pairs; return whether any was new."""
+    new = {at: ways for at, ways in pairs.items() if ways.is_loose(at[1])}
     with ThreadPoolExecutor() as threads:
         found = threads.map(lambda at: new[at].certificate(at[1]), new)
         for (key, pair), apart in zip(new, found, strict=True):
             new[key, pair].take(pair, apart)
     return bool(new)
-
-
-def _cheapest_arcs(ways: ArcWays, r: int, tour: Sequence[int]) -> list[int]:
-    """Return the arcs at which a robot touches its targets on its cheapest tour."""
-    cost = ways.from_start[r, tour[0]]
-    origins: list[np.ndarray] = []
-    for origin, target in pairwise(tour):
-        over = cost[:, None] + ways.between[origin, :, target]
-        origins.append(over.argmin(axis=0))
-        cost = over.min(axis=0)
-    arcs = [int(cost.argmin())]
-    for before in reversed(origins):
-        arcs.append(int(before[arcs[-1]]))
-    return arcs[::-1]
 
 
 def _legs_of(ways: ArcWays, r: int, price: float) -> np.ndarray:
