@@ -67,7 +67,7 @@ def touring_bound_J(
 
     Each round looks for the cheapest tours by arcs among those that cost little more
     than what is proven, which proves as much if there are none, and tightens the ways
-    that the cheapest ones take.
+    that the cheapest ones take; those to all near places, too, once a round gets long.
 
     Args:
         problem: the relaxed routing problem, whose batteries limit tours.
@@ -79,14 +79,12 @@ def touring_bound_J(
         rounds: how often at most.
         work: labels that all rounds may set.
         halt: shape (1,); no round begins once it has turned true.
-
     """
     visits = visits or Visits.all_remembered(problem)
-    best, tours = relaxed.cost_J, relaxed.tours
+    best, pairs = relaxed.cost_J, _pairs_of(ways, relaxed.tours)
     settled_J, rest, cheapest, all_near = -math.inf, None, False, False
     step, before = STEP, 0
     leg = _room_for_legs(ways, problem.goals)
-    pairs = _pairs_of(ways, tours)
     for _ in range(rounds):
         tightened = _tighten(pairs)
         if halt[0] or (cheapest and not tightened):
