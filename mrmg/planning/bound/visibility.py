@@ -31,7 +31,7 @@ from mrmg.planning.bound.prices import surroundings
 from mrmg.scene.region import Region
 from mrmg.scene.types import Scene
 
-BORDER_M = 0.2
+BORDER_M = 0.15
 """Longest piece of terrain's border that one node stands for."""
 
 SIMPLER_M = 0.02
