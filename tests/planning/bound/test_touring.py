@@ -324,8 +324,15 @@ def test_certificates_are_below_paths_among_random_polygons_and_near_them(
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_no_tour_that_touches_all_goals_costs_less_than_the_bound(seed: int) -> None:
-    """Among goals of two kinds, round a wall; against tours by way of dense points."""
+def test_no_tour_that_touches_all_goals_costs_less_than_the_bound(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Among goals of two kinds, round a wall; against tours by way of dense points.
+
+    Half of the times all ways to near places are tightened after the first round.
+    """
+    if seed % 2:
+        monkeypatch.setattr(touring, "LONG_ROUND", 0)
     rng = np.random.default_rng(seed)
     square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     spots = [(8.0, 5.0), (8.0, 14.0), (25.0, 15.0), (25.0, 5.0)]
