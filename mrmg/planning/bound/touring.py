@@ -40,9 +40,12 @@ otherwise labels would be too many ..."""
 FINE_ARC_LEGS = 20_000_000
 """... and legs from arc to arc up to which they are, by their memory (160 MB)."""
 
-LONG_ROUND, NEAREST = 100_000, 5
-"""Labels of a round (some 0.3 s) after which all ways to the nearest places are
-tightened: better completions then save more than that takes. How many they are."""
+LONG_ROUND = 100_000
+"""Labels of a round, some 0.3 s of work, after which the ways between near places are
+tightened, too: later rounds then set fewer labels, or prove more."""
+
+NEAREST = 5
+"""How many places are near to each place."""
 
 WORK_LABELS = 8_000_000
 """Labels that all rounds may set: some 6 s of one processor. The limit counts work, not
