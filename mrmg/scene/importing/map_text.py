@@ -8,6 +8,8 @@ Two text formats are read:
   data. Polygons are closed implicitly and may run either way.
 - rows: 6 numbers are an obstacle triangle, 4 a segment, 2 a point. The border, if there
   is one, is drawn with thin triangles.
+
+What follows a `#` in a line is a comment.
 """
 
 from __future__ import annotations
@@ -63,8 +65,8 @@ def read_map(path: Path) -> RawMap:
         SceneError: naming every line that cannot be used.
     """
     text = read_text(path, source=str(path))
-    lines = [(n, line.strip()) for n, line in enumerate(text.splitlines(), start=1)]
-    lines = [(number, line) for number, line in lines if line]
+    uncommented = [line.partition("#")[0].strip() for line in text.splitlines()]
+    lines = [(number, line) for number, line in enumerate(uncommented, start=1) if line]
     if not lines:
         message = "empty; expected a sectioned map or rows of 6, 4 or 2 numbers"
         raise SceneError(str(path), [Fault("", message)])

@@ -175,6 +175,15 @@ def test_mixed_rows(tmp_path: Path) -> None:
     assert len(scene.obstacles) == 5
 
 
+def test_comments_say_nothing(tmp_path: Path) -> None:
+    text = (
+        f"# drawn by hand, in metres\n\n{SQUARE}[OBSTACLE] # a pillar\n2 2\n4 2 #x\n4 4"
+    )
+    assert blocked_m2(imported(written(tmp_path, text), 10.0)) == pytest.approx(2.0)
+    rows = "#Map 2D\n0 0 10 0 10 10\n0 0 0 4 4 4\n"
+    assert blocked_m2(imported(written(tmp_path, rows), 10.0)) == pytest.approx(58.0)
+
+
 def test_frame_of_triangles_becomes_the_bounds(tmp_path: Path) -> None:
     sides = [(0, 0, 10, 1), (0, 9, 10, 10), (0, 0, 1, 10), (9, 0, 10, 10)]
     rows = [

@@ -96,8 +96,9 @@ def _polygons(shape: BaseGeometry) -> list[Polygon]:
 
 
 def _recognises(head: Head) -> bool:
-    first = head.start.split(maxsplit=1)[:1]
-    return head.kind == "text" and bool(first) and first[0][:1] in b"[-+.0123456789"
+    lines = (line.strip() for line in head.start.splitlines())
+    first = next((line for line in lines if line[:1] not in (b"", b"#")), b"x")
+    return head.kind == "text" and first[:1] in b"[-+.0123456789"
 
 
 FORMAT = Format(
