@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from mrmg import storage
 from mrmg.counted import counted
+from mrmg.energy.text import energy_text
 from mrmg.errors import Fault
 
 if TYPE_CHECKING:
@@ -98,13 +99,13 @@ def quality(found: Mapping[str, Any]) -> str:
 
     def shown(value: float) -> str:
         if objective["unit"] == "J":
-            return f"{value / 1000:.2f} kJ"
+            return energy_text(value)
         return f"{value:.1f} s" if objective["unit"] == "s" else f"{value:.1f}"
 
     name = "cost" if objective["name"] == "energy" else objective["name"]
     text = f"{name} {shown(objective['value'])}"
     if objective["name"] != "energy":
-        text += f" ({found['cost_J'] / 1000:.2f} kJ, {found['makespan_s']:.1f} s)"
+        text += f" ({energy_text(found['cost_J'])}, {found['makespan_s']:.1f} s)"
     if objective["bound"] is not None:
         text += f", proven bound {shown(objective['bound'])}"
     if found["gap"] is not None:
@@ -212,8 +213,8 @@ def _figure_lines(summary: dict[str, Any]) -> Iterator[str]:
     execution, energy = summary["execution"], summary["energy"]
     if plan:
         yield (
-            f"plan       {plan['cost_J'] / 1000:.1f} kJ in {plan['makespan_s']:.0f} s, "
-            f"planned in {plan['time_s']['total']:.2f} s"
+            f"plan       {energy_text(plan['cost_J'], 1)} in "
+            f"{plan['makespan_s']:.0f} s, planned in {plan['time_s']['total']:.2f} s"
         )
         yield f"quality    {quality(plan)}"
         for sentence in plan.get("margins_kept", ()):

@@ -17,6 +17,7 @@ from mrmg.energy.battery_curves import (
     with_recharge_jumps,
 )
 from mrmg.energy.metering import Motion
+from mrmg.energy.text import energy_text
 from mrmg.plans import Plan
 from mrmg.report.chart_spec import chart, line, rounded
 from mrmg.scene.types import Battery, Scene
@@ -98,7 +99,7 @@ def _charge_charts(
         ]
         lines.append(line("reserve", "limit", owner, reserve))
         limits = _percent_limits(line["values"] for line in lines)
-        title = f"{planned.robot}, battery of {battery.capacity_J / 1000:.1f} kJ"
+        title = f"{planned.robot}, battery of {energy_text(battery.capacity_J, 1)}"
         name = f"charge-{planned.robot}"
         charts.append(
             chart(name, title, "%", lines, group="charge", digits=1, limits=limits)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-_KJ_DIGITS = 2
+from mrmg.energy.text import energy_text
+
+LEAST_BASE_J = 0.1
+"""Differences of what is less are not written in percent."""
 
 
 def fixed(value: float, digits: int) -> str:
@@ -12,9 +15,7 @@ def fixed(value: float, digits: int) -> str:
 
 def kJ(energy_J: float | None) -> str:
     """Return an energy, as the page writes every energy; none is empty."""
-    if energy_J is None:
-        return ""
-    return f"{energy_J / 1000.0 + 0.0:.{_KJ_DIGITS}f} kJ"
+    return "" if energy_J is None else energy_text(energy_J)
 
 
 def quantity(value: float, unit: str) -> str:
@@ -34,11 +35,12 @@ def distance(distance_m: float | None) -> str:
 
 
 def percent(value: float | None, base: float) -> str:
-    """Return by how much an energy is off another one; not of what shows as 0."""
+    """Return by how much an energy is off another one [J]; not of next to nothing."""
     if value is None:
         return ""
-    shown = round(base / 1000.0, _KJ_DIGITS)
-    return f"{signed(100.0 * (value - base) / base, 2)} %" if shown else "–"
+    if abs(base) < LEAST_BASE_J:
+        return "–"
+    return f"{signed(100.0 * (value - base) / base, 2)} %"
 
 
 def signed(value: float, digits: int) -> str:

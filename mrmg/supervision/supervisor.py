@@ -19,6 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from mrmg.energy.text import energy_text
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.supervision import Event, Observation, Orders
@@ -244,7 +245,7 @@ def _said(outcome: Replan, missing: int, condition: FleetCondition) -> str:
     count = f"{wanted} of {missing}" if outcome.given_up else str(wanted)
     words = [
         f"new plan for {count} {'goal' if count == '1' else 'goals'}: "
-        f"{outcome.plan.cost_J / 1000:.1f} kJ in {outcome.plan.makespan_s:.0f} s"
+        f"{energy_text(outcome.plan.cost_J, 1)} in {outcome.plan.makespan_s:.0f} s"
     ]
     factors = [
         f"{name} {factor:.2f}"

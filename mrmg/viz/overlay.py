@@ -8,6 +8,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from mrmg.counted import counted
+from mrmg.energy.text import energy_text
 from mrmg.scene.types import Robot, Scene
 from mrmg.viz import style
 from mrmg.viz.tags import draw_bar, font, text_width_em
@@ -81,7 +82,7 @@ class Reading:
     @property
     def used(self) -> str:
         """The energy drawn, with its unit."""
-        return f"{self.used_J / 1000.0:.1f} kJ"
+        return energy_text(self.used_J, 1)
 
     def goals_of(self, scene: Scene) -> str:
         """Return how many of a scene's goals are visited."""

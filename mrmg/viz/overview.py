@@ -12,6 +12,7 @@ from matplotlib.patches import Circle, Patch
 from matplotlib.patheffects import withStroke
 
 from mrmg.counted import counted
+from mrmg.energy.text import energy_text
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
@@ -247,5 +248,5 @@ def _title(scene: Scene, plan: Plan | None) -> str:
         return scene.name
     return (
         f"{scene.name}: {counted(len(scene.goals), 'goal')}, "
-        f"{plan.cost_J / 1000:.1f} kJ, {plan.makespan_s:.0f} s"
+        f"{energy_text(plan.cost_J, 1)}, {plan.makespan_s:.0f} s"
     )

@@ -176,7 +176,7 @@ def test_marks_of_ends_go_around_the_parked_robots(mission) -> None:
 
 
 def test_of_nothing_against_nothing_there_is_no_percentage() -> None:
-    assert percent(3.0, 2.0) == percent(0.0, 0.0) == percent(-1.0, 4.9) == "–"
+    assert percent(3.0, 0.09) == percent(0.0, 0.0) == percent(-1.0, 0.05) == "–"
     assert percent(5050.0, 5000.0) == "+1.00 %"
     assert percent(4999.9, 5000.0) == "+0.00 %"
 
