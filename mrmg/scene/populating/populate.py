@@ -137,7 +137,7 @@ def _drivable(scene: Scene, model: RobotModel) -> Ground:
         cell_m=max(_CELL_M * size, math.sqrt(extent_m2 / _MOST_POINTS)),
     )
     kept_m = model.margins.over(default_margins(model)).obstacle_m or 0.0
-    least_m = kept_m + _PLANNING_SLACK_M
+    least_m = kept_m + min(1.0, size) * _PLANNING_SLACK_M
     margins_m = [max(least_m, size * margin_m) for margin_m in _MARGINS_M]
     grounds = [
         replace(bare, margin_m=model.half_width_m + margin_m) for margin_m in margins_m
@@ -147,7 +147,7 @@ def _drivable(scene: Scene, model: RobotModel) -> Ground:
     if share < _LEAST_SHARE:
         message = (
             f"roads wide enough for this robot join only {100 * share:.0f} % of the "
-            "map's free ground; scale the map up"
+            "map's free ground; scale the map up, or take a smaller robot (--model)"
         )
         raise UsageError(message)
     # Wide margins lose a seam along every wall; lost rooms lose much more.

@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
+import yaml
 
 from mrmg.errors import UsageError
 from mrmg.scene.importing import import_map
 from mrmg.scene.loading import load_scene, scene_from_document
+from mrmg.scene.loading.models import model_folder
 from mrmg.scene.populating import populate
 from mrmg.scene.populating.ground import Ground
 from mrmg.scene.types import Scene
@@ -170,6 +172,30 @@ def test_robot_bound_obstacles_are_refused() -> None:
     wall = {"box": {"center": [10, 10], "size": [2, 2]}, "blocks": ["r1"]}
     with pytest.raises(UsageError, match="remove 'blocks'"):
         populate({**FIELD, "obstacles": [wall]})
+
+
+def test_roads_of_small_robots_are_narrow(tmp_path: Path) -> None:
+    """A robot of 0.3 m among posts 0.8 m apart."""
+    shipped = model_folder("diffdrive", None) / "robot.yaml"
+    entry = yaml.safe_load(shipped.read_text())
+    for key in ("mjcf", "tracking_error"):
+        del entry[key]
+    entry["footprint"] = [[0.4 * x, 0.4 * y] for x, y in entry["footprint"]]
+    for key in ("height", "wheelbase", "track", "center_of_mass"):
+        entry[key] *= 0.4
+    entry["wheel"]["radius"] *= 0.4
+    for key in ("v_min", "v_max", "u1_max"):
+        entry["limits"][key] *= 0.2
+    (tmp_path / "robot.yaml").write_text(yaml.safe_dump(entry))
+    posts = [
+        {"box": {"center": [x, y], "size": [0.2, 0.2]}}
+        for x in np.arange(0.5, 6.0, 1.0).tolist()
+        for y in np.arange(0.5, 6.0, 1.0).tolist()
+    ]
+    hall = {"format": 1, "name": "hall", "bounds": [0, 0, 6, 6], "obstacles": posts}
+    document = populate(hall, model=str(tmp_path), robots=1, goals=5, stations=2)
+    scene = scene_from_document(document, source="test")
+    assert len(scene.goals) == 5
 
 
 def test_no_room_at_all() -> None:
