@@ -8,8 +8,8 @@ from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.problem.problem import Problem
 
-DISCS_M = 0.4
-"""Distance of the discs that cover a footprint."""
+DISCS_SHARE = 0.4
+"""Distance of the discs that cover a footprint, at most, as a share of its width."""
 
 INFLATION_REACH_M = 4.0
 """How far around a place a path is led farther from obstacles ..."""
@@ -17,9 +17,9 @@ INFLATION_REACH_M = 4.0
 INFLATION_M = 0.06
 """... and how much farther, at the place."""
 
-TRACKING_ROOM_M = 0.06
-"""Room beyond the margin that a path leaves for what tracking may be off: it costs next
-to nothing, and robots seldom get stuck."""
+ROOM_SHARE = 0.24
+"""Room beyond the margin that a path leaves, as a share of the margin, for what driving
+it may be off: it costs next to nothing, and robots seldom get stuck."""
 
 CURVATURE_SHARE = 0.92
 """Share of the steering that a path uses."""
@@ -33,7 +33,7 @@ def cost_map_of(problem: Problem, r: int, smooth: np.ndarray) -> CostMap:
     outline = robot["corner"][: robot["corners"]]
     low, high = outline.min(axis=0), outline.max(axis=0)
     half = max(-low[1], high[1])
-    pieces = max(1, int(np.ceil((high[0] - low[0]) / DISCS_M)))
+    pieces = max(1, int(np.ceil((high[0] - low[0]) / (DISCS_SHARE * 2.0 * half))))
     length = (high[0] - low[0]) / pieces
     limit = robot["limit"]
     if robot["model"] == UNICYCLE:
@@ -51,7 +51,7 @@ def cost_map_of(problem: Problem, r: int, smooth: np.ndarray) -> CostMap:
         multiplier=smooth,
         disc=low[0] + length * (np.arange(pieces) + 0.5),
         length=float(high[0] - low[0]),
-        room=float(np.hypot(0.5 * length, half) + robot["margin"] + TRACKING_ROOM_M),
+        room=float(np.hypot(0.5 * length, half) + (1.0 + ROOM_SHARE) * robot["margin"]),
         curvature=path_curvature(robot),
         curvature_rate=float(CURVATURE_SHARE * rate),
         scrub=arm * energy.turning_force_N / max(energy.rolling_force_N, 1e-9),

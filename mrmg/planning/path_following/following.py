@@ -26,6 +26,7 @@ from mrmg.planning.path_following.gears import with_best_gears
 from mrmg.planning.path_following.refine import cost_maps_of, drive_paths
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.targets import target_depth_m
 from mrmg.planning.routing.routing import Routing
 from mrmg.plans import Plan
 
@@ -45,9 +46,9 @@ LEAST_SOC_MARGIN = 0.02
 """Share of a battery's capacity that plans always leave above its reserve: a robot may
 take a percent or two more than planned on slopes and in turns on the spot."""
 
-FIRST_PLAN_DEPTH_M = 0.08
-"""How much deeper than needed first plans enter targets: they seldom miss one, which
-spares driving again."""
+FIRST_PLAN_SHARE = 2.0 / 3.0
+"""How much deeper than needed first plans enter targets, as a share of what is needed:
+they seldom miss one, which spares driving again."""
 
 JUDGED_M = 4.0
 """Distance of the nodes of paths that only tours are judged by."""
@@ -112,7 +113,8 @@ def follow_tours(
     stops = [whole_tour(problem, routing, r) for r in range(len(cost_maps))]
     tours = problem.visits(routing.tours)
     timed = problem.minimum_time or problem.preference.objective.makespan_weight > 0.0
-    deeper_m = FIRST_PLAN_DEPTH_M if number == 0 else TRACKING_M
+    first_m = FIRST_PLAN_SHARE * target_depth_m(problem.scene)
+    deeper_m = first_m if number == 0 else TRACKING_M
     tried: list[list[Path]] = []
     failed = Followed(None, driven=False)
     sharps = _turns_to_change_gear_at(problem, timed)

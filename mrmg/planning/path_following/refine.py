@@ -32,7 +32,7 @@ from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.path_following.tracking import Drive, Motion, drive_alone
 from mrmg.planning.problem._target_kernels import Targets, at_target
 from mrmg.planning.problem.problem import Problem
-from mrmg.planning.problem.targets import TARGET_MARGIN_M
+from mrmg.planning.problem.targets import target_depth_m
 from mrmg.planning.problem.time_weighting import energy_share
 from mrmg.planning.roadmap.vertices import planned_regions
 from mrmg.plans import Plan, Trajectory
@@ -247,7 +247,7 @@ def tour_numbers(problem: Problem, plan: Plan) -> list[list[int]]:
 
 def _enter_deeper(problem: Problem, task: RobotTask, state: np.ndarray) -> None:
     """Lead a path deeper into the targets that were missed."""
-    path = task.path
+    path, depth_m = task.path, target_depth_m(problem.scene)
     regions = planned_regions(problem.scene)
     deeper = path.deeper.copy()
     passed = 0
@@ -255,8 +255,8 @@ def _enter_deeper(problem: Problem, task: RobotTask, state: np.ndarray) -> None:
         gap = state[passed:, :2] - path.node[node]
         passed += int(np.hypot(*gap.T).argmin())
         reached = float(regions[t].depth(state[passed : passed + 1, :2])[0])
-        if reached < TARGET_MARGIN_M:
-            deeper[i] += TARGET_MARGIN_M - reached + DEEPER_M
+        if reached < depth_m:
+            deeper[i] += depth_m - reached + DEEPER_M
     task.path = replace(path, deeper=deeper)
     task.smooth(problem, SPACINGS_M[-1:])
 

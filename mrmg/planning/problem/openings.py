@@ -14,7 +14,7 @@ from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.planning.free_ground import FreeGround, bottleneck
-from mrmg.planning.problem.targets import TARGET_MARGIN_M
+from mrmg.planning.problem.targets import target_depth_m
 from mrmg.planning.roadmap.fleet import PASSAGE_SLACK_M, margins_of
 from mrmg.scene.margins import Margins, certified_minimum_m
 from mrmg.scene.region import Region
@@ -34,13 +34,18 @@ RASTER_SHARE = 0.6
 LEAST_CELL_M = 0.05
 """Side of the cells of the distance field of a map with openings [m]."""
 
+FINE_SHARE, FINE_CELLS = 1.0 / 12.0, 60_000
+"""Side of the cells where there are few, as a share of half a robot's width with its
+margin, and how many few are: wider cells cannot tell whether a gap is wide enough, and
+searches that are led into one that is not look at all there is before it."""
+
 MOST_CELLS = 4_000_000
 """Cells of a distance field at most."""
 
 
-def entered(region: Region) -> BaseGeometry:
+def entered(scene: Scene, region: Region) -> BaseGeometry:
     """Return where a region counts as entered for planning."""
-    inner = region.shape.buffer(-TARGET_MARGIN_M, join_style="mitre")
+    inner = region.shape.buffer(-target_depth_m(scene), join_style="mitre")
     return region.shape.centroid if inner.is_empty else inner
 
 
@@ -62,7 +67,9 @@ def openings_to(
         if key not in grounds:
             grounds[key] = FreeGround.of(scene, robot)
         margin_m = margins_of(robot, margins)[0]
-        found += _openings(grounds[key], robot, number, margin_m, entered(region))
+        found += _openings(
+            grounds[key], robot, number, margin_m, entered(scene, region)
+        )
     return tuple(found)
 
 
@@ -111,15 +118,20 @@ def _robots_alike(
 def cell_m(scene: Scene, margins: Margins, wanted_m: float = CELL_M) -> float:
     """Return the side of the cells of a scene's distance field.
 
-    Half a robot's width with its margin exceeds a cell, as far as memory allows.
+    Half a robot's width with its margin exceeds a cell, as far as memory allows; on
+    small maps with obstacles, between which there may be gaps, cells are much finer.
     """
     reaches_m = [
         robot.model.half_width_m + margins_of(robot, margins)[0]
         for robot in scene.robots
     ]
     x_min, y_min, x_max, y_max = scene.bounds
-    least_m = ((x_max - x_min) * (y_max - y_min) / MOST_CELLS) ** 0.5
-    return max(min(wanted_m, *reaches_m, CELL_M), least_m if wanted_m < CELL_M else 0.0)
+    area_m2 = (x_max - x_min) * (y_max - y_min)
+    least_m = (area_m2 / MOST_CELLS) ** 0.5 if wanted_m < CELL_M else 0.0
+    fine_m = max(FINE_SHARE * min(reaches_m), (area_m2 / FINE_CELLS) ** 0.5)
+    usual_m = min(wanted_m, *reaches_m, CELL_M)
+    parts = max(1, int(usual_m / fine_m)) if scene.barriers else 1
+    return max(usual_m / parts, least_m)
 
 
 def guide_m(cell_m: float) -> float:
@@ -190,7 +202,7 @@ def passages_missing(
         start = Point(*robot.pose[:2])
         kept_m = least_margin_m(robot, margins_of(robot, margins)[0])
         needed_m = clearance_needed_m(robot, kept_m)
-        gap = bottleneck(ground, start, entered(region), needed_m)
+        gap = bottleneck(ground, start, entered(scene, region), needed_m)
         if gap is None:
             lacking_m, text = 2.0 * needed_m, f"there is no way at all for {robot.id}"
         elif gap.width_m >= 2.0 * needed_m:

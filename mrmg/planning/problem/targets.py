@@ -9,12 +9,16 @@ import numpy as np
 from mrmg.planning.problem._region_kernels import REGION, Zones
 from mrmg.planning.problem._target_kernels import TARGET, Targets
 from mrmg.planning.roadmap.vertices import planned_regions
+from mrmg.scene.margins import LEAST_DEFAULT_M, tracking_error
 from mrmg.scene.region import Region
 from mrmg.scene.types import Finish, Goal, Scene, Station
 
-TARGET_MARGIN_M = 0.12
-"""How deep inside a region the planner drives, so that a tracked path enters it too:
-robots stray by 0.02 m at most, and by 0.04 m under the default disturbances."""
+ERRORS_DEEP = 3.0
+"""How deep inside a region the planner drives, so that a tracked path enters it too, as
+a multiple of the disturbed tracking error of the robot that strays most ..."""
+
+LEAST_DEPTH_M, MOST_DEPTH_M = LEAST_DEFAULT_M, 0.12
+"""... within these bounds [m]; cars have always driven 0.12 m deep."""
 
 GATE_MARGIN_M = 0.3
 """How far from a station for one robot others stay, so that tracked paths do, too."""
@@ -32,18 +36,26 @@ def finish_of(scene: Scene) -> np.ndarray:
     return np.where(must, len(scene.targets()) + np.cumsum(must) - 1, -1)
 
 
+def target_depth_m(scene: Scene) -> float:
+    """Return how deep inside its targets a fleet drives, at least [m]."""
+    errors_m = [tracking_error(robot.model).disturbed_m for robot in scene.robots]
+    wanted_m = round(ERRORS_DEEP * max(errors_m), 3)
+    return min(max(wanted_m, LEAST_DEPTH_M), MOST_DEPTH_M)
+
+
 def target_arrays(scene: Scene) -> Targets:
     """Return goals, stations and finishes as the planner enters them."""
+    depth_m = target_depth_m(scene)
     regions = planned_regions(scene)
     shrunk, radius_m = [], []
     for region in regions:
         corners = region.corners
         if len(corners):
-            smaller = region.shape.buffer(-TARGET_MARGIN_M, join_style="mitre")
+            smaller = region.shape.buffer(-depth_m, join_style="mitre")
             if not smaller.is_empty and smaller.geom_type == "Polygon":
                 corners = np.asarray(smaller.normalize().exterior.coords)[:-1][::-1]
         shrunk.append(corners)
-        radius_m.append(max(region.radius_m - TARGET_MARGIN_M, 0.5 * region.radius_m))
+        radius_m.append(max(region.radius_m - depth_m, 0.5 * region.radius_m))
     target = np.zeros(len(regions), TARGET)
     corner = _fill_in(target, regions, shrunk, radius_m)
     target["heading"], target["tolerance"] = _headings(scene)

@@ -14,7 +14,7 @@ from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.path_following.band import visit_steps
 from mrmg.planning.path_following.refine import refine, tour_numbers
 from mrmg.planning.problem.problem import Problem, state_mission
-from mrmg.planning.problem.targets import TARGET_MARGIN_M
+from mrmg.planning.problem.targets import target_depth_m
 from mrmg.plans import Plan
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
@@ -88,7 +88,7 @@ def test_the_same_targets_in_the_same_order_as_deep(mission: Refined) -> None:
         assert steps == sorted(steps)
         for t, step in zip(tour, steps, strict=True):
             depth = targets[t].region.depth(trajectory.state[step, :2])
-            assert depth[0] >= TARGET_MARGIN_M - 1e-9
+            assert depth[0] >= target_depth_m(mission.scene) - 1e-9
 
 
 def test_the_planners_limits_are_kept(mission: Refined) -> None:

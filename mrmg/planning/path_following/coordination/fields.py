@@ -12,6 +12,7 @@ from mrmg.planning.path_following.coordination._field_kernels import BEARINGS, G
 from mrmg.planning.path_following.coordination._motion_kernels import Traffic
 from mrmg.planning.problem.problem import Problem
 from mrmg.world._polygon_kernels import point_in_convex, point_segment_distance
+from mrmg.world.world import CELL_M
 
 TIGHT_PRICE = 2.0
 """Factor on the cost of a metre where a robot cannot turn round."""
@@ -50,8 +51,9 @@ class Fields:
         self._known: dict[tuple[int, float, tuple[int, ...]], np.ndarray] = {}
         self._turning: dict[tuple[int, ...], np.ndarray] = {}
         spaces = problem.mission.spaces
-        cells = spaces.distance[0].size
-        self._coarser = max(1, round((cells / MOST_CELLS) ** 0.5))
+        wanted_m = min(CELL_M, problem.mission.fleet["passage"].min())
+        fewest = (spaces.distance[0].size / MOST_CELLS) ** 0.5
+        self._coarser = max(1, round(wanted_m / spaces.cell), round(fewest))
         self._cell_m = float(spaces.cell * self._coarser)
         self._shape = [-(-n // self._coarser) for n in spaces.distance[0].shape]
 
@@ -242,11 +244,12 @@ class Fields:
         rows, columns = self._shape
         padded = np.full((rows * n, columns * n), -np.inf)
         padded[: distance.shape[0], : distance.shape[1]] = distance
-        nearest = padded.reshape(rows, n, columns, n).max(axis=(1, 3))
+        cell = padded.reshape(rows, n, columns, n)
+        nearest, usual = cell.max(axis=(1, 3)), cell[:, n // 2, :, n // 2]
         needed_m = float(robot["passage"])
         roomy_m = float(robot["radius"] + robot["margin"])
-        lacking = (roomy_m - nearest) / max(roomy_m - needed_m, self._cell_m)
-        free = nearest > needed_m - 0.5 * self._cell_m
+        lacking = (roomy_m - usual) / max(roomy_m - needed_m, self._cell_m)
+        free = nearest > needed_m - 0.5 * self._problem.mission.spaces.cell
         passable = free | self._region(targets)
         return np.where(
             passable, 1.0 + TIGHT_PRICE * np.clip(lacking, 0.0, 1.0), np.inf

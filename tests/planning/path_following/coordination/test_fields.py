@@ -1,4 +1,4 @@
-"""Costs-to-go over grids: what turning costs."""
+"""Costs-to-go over grids: what turning costs, and which gaps are wide enough."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import networkx as nx
 import numpy as np
 import pytest
 
+from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following.coordination import _field_kernels
 from mrmg.planning.path_following.coordination._field_kernels import BEARINGS
 from mrmg.planning.path_following.coordination.fields import MOST_POSES, Fields
-from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.scene.types import Scene
 
 Pose = tuple[int, int, int]
@@ -90,3 +91,29 @@ def test_turning_is_not_known_on_wide_ground(
     assert cells * BEARINGS > MOST_POSES
     assert Fields(problem).turning(0, [0]).size == 0
     assert Fields(problem).turning(0, []).size == 0
+
+
+@pytest.mark.parametrize(("gap_m", "through"), [(1.55, False), (1.9, True)])
+def test_costs_to_go_lead_through_gaps_that_are_wide_enough_alone(
+    gap_m: float, through: bool, yard: Callable[..., Scene]
+) -> None:
+    """A car needs 1.7 m, with its margin and what driving may be off; else round it."""
+    low, high = 5.125 - 0.5 * gap_m, 5.125 + 0.5 * gap_m
+    wall = [
+        {"polygon": [[7, 0], [8, 0], [8, low], [7, low]]},
+        {"polygon": [[7, high], [8, high], [8, 12], [7, 12]]},
+    ]
+    scene = yard(
+        bounds=[0, 0, 15, 16],
+        obstacles=wall,
+        goals=[{"id": "g", "circle": {"center": [12, 5], "radius": 1.0}}],
+        robots=[{"id": "r", "model": "car", "pose": [3, 5, 0]}],
+    )
+    problem = state_mission(scene, 0, PlannerParams(samples=400))
+    assert not problem.openings
+    spaces, guide = problem.mission.spaces, Fields(problem).static(0, [0])
+    top = float(problem.mission.fleet[0]["limit"][1])
+    corner = float(spaces.x_min), float(spaces.y_min)
+    way_m = top * float(_field_kernels.guide_at(guide, 0, 0, *corner, 3.0, 5.0))
+    assert (way_m < 2.0 * 9.0) == through
+    assert way_m < inf
