@@ -113,8 +113,7 @@ def follow_tours(
     stops = [whole_tour(problem, routing, r) for r in range(len(cost_maps))]
     tours = problem.visits(routing.tours)
     timed = problem.minimum_time or problem.preference.objective.makespan_weight > 0.0
-    first_m = FIRST_PLAN_SHARE * target_depth_m(problem.scene)
-    deeper_m = first_m if number == 0 else TRACKING_M
+    deeper_m = _deeper_m(problem, number)
     tried: list[list[Path]] = []
     failed = Followed(None, driven=False)
     sharps = _turns_to_change_gear_at(problem, timed)
@@ -147,6 +146,13 @@ def follow_tours(
         if not drive.trajectories or halt[0]:
             break
     return failed
+
+
+def _deeper_m(problem: Problem, number: int) -> float:
+    """Return how much deeper than needed paths of attempt `number` enter targets."""
+    if number == 0:
+        return FIRST_PLAN_SHARE * target_depth_m(problem.scene)
+    return TRACKING_M
 
 
 def _turns_to_change_gear_at(problem: Problem, timed: bool) -> tuple[float, ...]:

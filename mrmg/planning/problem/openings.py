@@ -34,11 +34,6 @@ RASTER_SHARE = 0.6
 LEAST_CELL_M = 0.05
 """Side of the cells of the distance field of a map with openings [m]."""
 
-FINE_SHARE, FINE_CELLS = 1.0 / 12.0, 60_000
-"""Side of the cells where there are few, as a share of half a robot's width with its
-margin, and how many few are: wider cells cannot tell whether a gap is wide enough, and
-searches that are led into one that is not look at all there is before it."""
-
 MOST_CELLS = 4_000_000
 """Cells of a distance field at most."""
 
@@ -118,20 +113,15 @@ def _robots_alike(
 def cell_m(scene: Scene, margins: Margins, wanted_m: float = CELL_M) -> float:
     """Return the side of the cells of a scene's distance field.
 
-    Half a robot's width with its margin exceeds a cell, as far as memory allows; on
-    small maps with obstacles, between which there may be gaps, cells are much finer.
+    Half a robot's width with its margin exceeds a cell, as far as memory allows.
     """
     reaches_m = [
         robot.model.half_width_m + margins_of(robot, margins)[0]
         for robot in scene.robots
     ]
     x_min, y_min, x_max, y_max = scene.bounds
-    area_m2 = (x_max - x_min) * (y_max - y_min)
-    least_m = (area_m2 / MOST_CELLS) ** 0.5 if wanted_m < CELL_M else 0.0
-    fine_m = max(FINE_SHARE * min(reaches_m), (area_m2 / FINE_CELLS) ** 0.5)
-    usual_m = min(wanted_m, *reaches_m, CELL_M)
-    parts = max(1, int(usual_m / fine_m)) if scene.barriers else 1
-    return max(usual_m / parts, least_m)
+    least_m = ((x_max - x_min) * (y_max - y_min) / MOST_CELLS) ** 0.5
+    return max(min(wanted_m, *reaches_m, CELL_M), least_m if wanted_m < CELL_M else 0.0)
 
 
 def guide_m(cell_m: float) -> float:

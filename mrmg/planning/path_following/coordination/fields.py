@@ -11,14 +11,23 @@ from mrmg.planning.path_following.coordination import _field_kernels
 from mrmg.planning.path_following.coordination._field_kernels import BEARINGS, Guide
 from mrmg.planning.path_following.coordination._motion_kernels import Traffic
 from mrmg.planning.problem.problem import Problem
+from mrmg.world import _raster_kernels
 from mrmg.world._polygon_kernels import point_in_convex, point_segment_distance
-from mrmg.world.world import CELL_M
 
 TIGHT_PRICE = 2.0
 """Factor on the cost of a metre where a robot cannot turn round."""
 
 MOST_CELLS = 60_000
 """Cells of a field, about."""
+
+FINE_SHARE = 1.0 / 15.0
+"""Spacing of the points of a cell at which it is looked at whether a robot has room, as
+a share of the clearance that it needs. Looked at more coarsely, gaps count as wide
+enough that are not, and a search that is led into one looks at all there is before
+it."""
+
+MOST_POINTS = 60_000
+"""Such points of all cells, at most: cells of wide maps have one."""
 
 MOST_TIMED_CELLS = 3_000_000
 """Cells of fields that know where the other robots are when, over all layers and legs,
@@ -50,10 +59,10 @@ class Fields:
         self._problem = problem
         self._known: dict[tuple[int, float, tuple[int, ...]], np.ndarray] = {}
         self._turning: dict[tuple[int, ...], np.ndarray] = {}
+        self._room: dict[tuple[int, float], np.ndarray] = {}
         spaces = problem.mission.spaces
-        wanted_m = min(CELL_M, problem.mission.fleet["passage"].min())
-        fewest = (spaces.distance[0].size / MOST_CELLS) ** 0.5
-        self._coarser = max(1, round(wanted_m / spaces.cell), round(fewest))
+        cells = spaces.distance[0].size
+        self._coarser = max(1, round((cells / MOST_CELLS) ** 0.5))
         self._cell_m = float(spaces.cell * self._coarser)
         self._shape = [-(-n // self._coarser) for n in spaces.distance[0].shape]
 
@@ -244,16 +253,41 @@ class Fields:
         rows, columns = self._shape
         padded = np.full((rows * n, columns * n), -np.inf)
         padded[: distance.shape[0], : distance.shape[1]] = distance
-        cell = padded.reshape(rows, n, columns, n)
-        nearest, usual = cell.max(axis=(1, 3)), cell[:, n // 2, :, n // 2]
+        nearest = padded.reshape(rows, n, columns, n).max(axis=(1, 3))
         needed_m = float(robot["passage"])
         roomy_m = float(robot["radius"] + robot["margin"])
-        lacking = (roomy_m - usual) / max(roomy_m - needed_m, self._cell_m)
-        free = nearest > needed_m - 0.5 * self._problem.mission.spaces.cell
-        passable = free | self._region(targets)
+        lacking = (roomy_m - nearest) / max(roomy_m - needed_m, self._cell_m)
+        free = nearest > needed_m - 0.5 * self._cell_m
+        passable = free & self._has_room(r) | self._region(targets)
         return np.where(
             passable, 1.0 + TIGHT_PRICE * np.clip(lacking, 0.0, 1.0), np.inf
         )
+
+    def _has_room(self, r: int) -> np.ndarray:
+        """Return which cells have a point with the clearance that robot r needs.
+
+        All have on maps that are wide, have no obstacles or have openings, whose cells
+        are fine already; within obstacles it is not known.
+        """
+        robot, spaces = self._problem.mission.fleet[r], self._problem.mission.spaces
+        space, needed_m = int(robot["space"]), float(robot["passage"])
+        rows, columns = self._shape
+        parts = min(
+            int(self._cell_m / (FINE_SHARE * needed_m)),
+            int((MOST_POINTS / (rows * columns)) ** 0.5),
+        )
+        if parts < 2 or self._problem.openings or not self._problem.scene.barriers:
+            return np.ones(self._shape, bool)
+        if (space, needed_m) not in self._room:
+            near = slice(spaces.bucket_start[space, 0], spaces.bucket_start[space, -1])
+            fine_m = self._cell_m / parts
+            away_m = _raster_kernels.edge_distance_field(
+                spaces.edge[np.unique(spaces.bucket_edge[near])],
+                spaces.x_min, spaces.y_min, fine_m, rows * parts, columns * parts,
+            )  # fmt: skip
+            most_m = away_m.reshape(rows, parts, columns, parts).max(axis=(1, 3))
+            self._room[space, needed_m] = most_m > needed_m - 0.5 * fine_m
+        return self._room[space, needed_m]
 
     def _region(self, targets: Sequence[int]) -> np.ndarray:
         """Return which cells lie in one of some targets, shape (ny, nx)."""
