@@ -11,7 +11,7 @@ small as a hand must not all read 0.0."""
 
 def energy_text(energy_J: float, digits: int = 2) -> str:
     """Return an energy in kJ, with so many decimals or, where it is small, more."""
-    energy_kJ = energy_J / 1000.0 + 0.0
+    energy_kJ = energy_J / 1000.0
     if LEAST_KJ <= abs(energy_kJ) < SMALL_KJ:
         digits = 2 - floor(log10(abs(energy_kJ)))
-    return f"{energy_kJ:.{digits}f} kJ"
+    return f"{round(energy_kJ, digits) + 0.0:.{digits}f} kJ"  # never "-0.00"

@@ -13,9 +13,9 @@ def fixed(value: float, digits: int) -> str:
     return f"{value:.{digits}f}"
 
 
-def kJ(energy_J: float | None) -> str:
+def kJ(energy_J: float | None, digits: int = 2) -> str:
     """Return an energy, as the page writes every energy; none is empty."""
-    return "" if energy_J is None else energy_text(energy_J)
+    return "" if energy_J is None else energy_text(energy_J, digits)
 
 
 def quantity(value: float, unit: str) -> str:
