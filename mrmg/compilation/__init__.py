@@ -1,5 +1,6 @@
 """The one way this package compiles kernels with numba."""
 
+from mrmg.compilation.borrowing import borrowed
 from mrmg.compilation.cache import (
     cache_folder,
     compiled_kernels,
@@ -12,6 +13,7 @@ from mrmg.compilation.decorators import kernel
 from mrmg.compilation.parallel import compile_in_processes
 
 __all__ = [
+    "borrowed",
     "cache_folder",
     "compile_in_processes",
     "compiled_kernels",

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import borrowed, kernel
 from mrmg.planning.routing._legs_kernels import Legs
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing._random_kernels import random_unit
@@ -103,6 +103,7 @@ def search(legs, state, rounds, span, random):
         span: first and last temperature, as shares of a goal's mean cost.
         random: state of the generator.
     """
+    legs, state, random = borrowed(legs), borrowed(state), borrowed(random)
     routes, present, best = state.routes, state.present, state.best
     robots, gone = len(legs.robot), state.gone
     update(legs, routes, state.labels, True)

@@ -162,7 +162,7 @@ def clear(own, spaces, zones, traffic, state, count, first, corner):
         first: step of state 0.
         corner: room for a footprint, shape (2, M, 2).
     """
-    for k in range(1, count + 1):
+    for k in range(count, 0, -1):  # where a motion ends most is in the way
         if not clear_of_obstacles(own, spaces, state[k], corner[0]):
             return False
         for zone in range(len(zones.zone)):

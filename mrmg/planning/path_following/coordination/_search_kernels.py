@@ -13,8 +13,8 @@ from math import atan2, hypot, pi
 
 import numpy as np
 
-from mrmg.compilation import kernel
-from mrmg.motion._kernels import copy_numbers
+from mrmg.compilation import borrowed, kernel
+from mrmg.motion._kernels import USER, copy_numbers
 from mrmg.planning.path_following._following_kernels import advance
 from mrmg.planning.path_following.coordination._end_kernels import (
     MOST_BRAKING_STEPS,
@@ -44,6 +44,10 @@ from mrmg.planning.path_following.coordination._node_kernels import (
     cell_of,
     is_new,
     place_of,
+)
+from mrmg.planning.path_following.coordination._rollout_kernels import (
+    carry,
+    rolled_out,
 )
 from mrmg.planning.problem._control_kernels import wrap
 from mrmg.planning.problem._target_kernels import at_target
@@ -100,13 +104,23 @@ def rejoined(course, left, state):
 
 
 @kernel
-def expand(search, nodes, room, a, motion, nears):
-    """Add what a motion leads to from node a if it is free and new; return it or -1."""
+def expand(search, nodes, room, a, motion, nears, row):
+    """Add what a motion leads to from node a if it is free and new; return it or -1.
+
+    Args:
+        search, nodes, room: the search.
+        a, motion: where it begins and what it does.
+        nears: robots that may be met.
+        row: of the rollouts that begin like it, or -1.
+    """
     task, course, state = search.task, search.course, room.state
     own, dt, steps = search.own, search.dt, task.steps
     node = nodes.node[a]
     segment, left, first = node.segment, node.left, node.step
-    segment = move(search, motion, segment, steps, state, room.control)
+    if row >= 0:
+        carry(nodes.rollouts.state[row, motion - HOLD], steps, state)
+    else:
+        segment = move(search, motion, segment, steps, state, room.control)
     after = state[steps]
     leg = legs_done(search.targets, task, node.leg, state, 1, steps)
     stamp = first + steps if first < search.traffic.end else 0
@@ -264,7 +278,7 @@ def follow_path(search, nodes, room, a, tries):
             return tries
         copy_numbers(nodes.state[a], room.state[0])
         nears = list_near(search, room, first)
-        a = expand(search, nodes, room, a, TRACK, nears)
+        a = expand(search, nodes, room, a, TRACK, nears, -1)
     return tries
 
 
@@ -279,6 +293,8 @@ def find_motion(search, nodes, room, start, control):
         start: its state, shape (5,).
         control: receives the controls, shape (n, 2).
     """
+    search, nodes, room = borrowed(search), borrowed(nodes), borrowed(room)
+    start, control = borrowed(start), borrowed(control)
     task = search.task
     copy_numbers(start, room.state[0])
     leg = legs_done(search.targets, task, 0, room.state, 0, 0)
@@ -306,8 +322,11 @@ def find_motion(search, nodes, room, start, control):
         copy_numbers(nodes.state[a], room.state[0])
         wait(search, nodes, room, a)  # lists robots of its own
         nears = list_near(search, room, node.step)
+        row = -1
+        if search.own[0].model != USER:
+            row = rolled_out(search, nodes.rollouts, room.state[0], room.control)
         for motion in range(HOLD, MOVE + motions):
-            expand(search, nodes, room, a, motion, nears)
+            expand(search, nodes, room, a, motion, nears, row)
         if nodes.size[2] >= 0:
             most = min(most, max(task.enough, int(AFTER_END * nodes.size[0])))
     if nodes.size[2] >= 0:  # the best there is, if not good enough to end sooner

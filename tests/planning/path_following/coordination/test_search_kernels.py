@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 
+from mrmg.planning.path_following.coordination._motion_kernels import Traffic
 from mrmg.planning.path_following.coordination._node_kernels import Scratch, Setting
 from mrmg.planning.path_following.coordination._search_kernels import find_motion
 from mrmg.planning.path_following.coordination.coordination import (
@@ -24,6 +26,52 @@ from mrmg.scene.types import Scene
 HORIZON = 2000
 
 
+def found_control(problem: Problem, r: int, around: Traffic) -> np.ndarray:
+    """Return controls of robot r to the first target among the others."""
+    nowhere, guide = no_path(problem, r), Fields(problem).static(r, [0])
+    task = task_of(problem, r, [0], nowhere, ROUNDS[1])
+    search = Setting(
+        own=problem.mission.fleet[r : r + 1],
+        spaces=problem.mission.spaces,
+        terrain=problem.mission.terrain,
+        targets=problem.mission.targets,
+        zones=problem.mission.zones,
+        course=course_of(problem, r, nowhere),
+        traffic=around,
+        task=guided(problem, r, task, nowhere, guide),
+        dt=problem.dt_s,
+    )
+    room = Scratch(
+        state=np.zeros((HORIZON + 1, 5)),
+        control=np.zeros((HORIZON, 2)),
+        corner=np.empty((2, MOST_CORNERS, 2)),
+        near=np.empty(len(problem.start), np.int64),
+        curve=empty_course(100),
+    )
+    control = np.zeros((HORIZON, 2))
+    nodes = empty_nodes(search.task)
+    count = find_motion(search, nodes, room, problem.start[r], control)
+    assert count > 0
+    return control[:count]
+
+
+@pytest.mark.parametrize("model", ["car", "diffdrive"])
+@pytest.mark.parametrize("heading", [-2.6, -0.4, 0.7, 1.9])
+def test_what_is_found_leads_to_the_target_when_it_is_driven(
+    yard: Callable[..., Scene],
+    state: Callable[..., Problem],
+    model: str,
+    heading: float,
+) -> None:
+    """Motions are worked out once and carried to where they are needed."""
+    robots = [{"id": "own", "model": model, "pose": [6, 10, heading]}]
+    goals = [{"id": "g", "circle": {"center": [12, 5], "radius": 1}}]
+    problem = state(yard(robots=robots, goals=goals), samples=50)
+    nobody = FleetTraffic(problem, HORIZON).around(0, [None], np.zeros(1, bool))
+    driven = problem.trajectory(0, found_control(problem, 0, nobody))
+    assert np.hypot(*(driven.state[:, :2] - (12.0, 5.0)).T).min() < 1.0
+
+
 def test_near_robots_are_minded_where_a_wait_is_open(
     yard: Callable[..., Scene], state: Callable[..., Problem]
 ) -> None:
@@ -37,31 +85,9 @@ def test_near_robots_are_minded_where_a_wait_is_open(
     ]
     motions[1].state[190:, 1] += 0.05 * np.arange(10)  # it sets out
     traffic = FleetTraffic(problem, HORIZON)
-    nowhere, above = no_path(problem, 2), np.array([False, True, False])
-    guide = Fields(problem).static(2, [0])
-    task = task_of(problem, 2, [0], nowhere, ROUNDS[0])
-    search = Setting(
-        own=problem.mission.fleet[2:],
-        spaces=problem.mission.spaces,
-        terrain=problem.mission.terrain,
-        targets=problem.mission.targets,
-        zones=problem.mission.zones,
-        course=course_of(problem, 2, nowhere),
-        traffic=traffic.around(2, [*motions[:2], None], above),
-        task=guided(problem, 2, task, nowhere, guide),
-        dt=problem.dt_s,
-    )
-    room = Scratch(
-        state=np.zeros((HORIZON + 1, 5)),
-        control=np.zeros((HORIZON, 2)),
-        corner=np.empty((2, MOST_CORNERS, 2)),
-        near=np.empty(3, np.int64),
-        curve=empty_course(100),
-    )
-    control = np.zeros((HORIZON, 2))
-    start = problem.start[2]
-    count = find_motion(search, empty_nodes(search.task), room, start, control)
-    assert count > 0
-    own = problem.trajectory(2, control[:count])
+    above = np.array([False, True, False])
+    around = traffic.around(2, [*motions[:2], None], above)
+    control = found_control(problem, 2, around)
+    own = problem.trajectory(2, control)
     found = [*motions[:2], Motion(own.state, own.control)]
     assert traffic.conflicts(2, found)[1] == np.inf

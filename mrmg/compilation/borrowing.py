@@ -1,0 +1,49 @@
+"""Arrays that a kernel uses without owning them.
+
+numba counts who uses an array, in memory that all threads share: for every array of a
+tuple that is handed on, and twice for each call. Where kernels hand on whole missions
+that takes a third of their time. A kernel whose caller holds its arguments anyway,
+which Python does, need not count them.
+"""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic, overload
+
+T = TypeVar("T")
+
+
+def borrowed(value: T) -> T:
+    """Return arrays, or tuples with arrays in them, whose uses kernels do not count.
+
+    Whoever calls the kernel must hold them, and it must not return them.
+    """
+    return value
+
+
+@overload(borrowed)
+def _borrowed(_value):
+    return lambda _value: _without_owner(_value)
+
+
+@intrinsic
+def _without_owner(_typing, value):
+    def generate(_context, builder, _signature, arguments):
+        return _uncounted(builder, value, arguments[0])
+
+    return value(value), generate
+
+
+def _uncounted(builder, kind, value):
+    """Return a value with no owner of its memory, the first thing of an array."""
+    if isinstance(kind, types.Array):
+        return builder.insert_value(value, ir.Constant(value.type.elements[0], None), 0)
+    if isinstance(kind, types.BaseTuple):
+        for i, part in enumerate(kind):
+            own = builder.extract_value(value, i)
+            value = builder.insert_value(value, _uncounted(builder, part, own), i)
+    return value
