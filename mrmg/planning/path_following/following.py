@@ -20,7 +20,6 @@ from mrmg.planning.assembly import make_plan, why_refused
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import TRACKING_M, Path, smooth_path
-from mrmg.planning.path_following.coordination.rounds import rounds_of
 from mrmg.planning.path_following.driven_legs import Leg, legs_driven_J
 from mrmg.planning.path_following.gears import with_best_gears
 from mrmg.planning.path_following.refine import cost_maps_of, drive_paths
@@ -75,14 +74,12 @@ class Followed:
         plan: along them, None if there is none.
         failure: why there is none, in words.
         driven: whether they could be driven, if not on the charge there is.
-        meeting: whether robots met, each of which could drive alone.
         leg_J: energies of the legs that were driven, if that gave no plan.
     """
 
     plan: Plan | None
     failure: str = ""
     driven: bool = True
-    meeting: bool = False
     leg_J: Mapping[Leg, float] = field(default_factory=dict)
 
 
@@ -106,8 +103,7 @@ def follow_tours(
         routing: the tours.
         seed: of the search that the plan belongs to.
         halt: shape (1,); following ends soon after it has turned true.
-        number: of the attempt; the first one finds a plan soon rather than a cheap one,
-            and later ones try harder where robots meet.
+        number: of the attempt; the first one finds a plan soon rather than a cheap one.
     """
     cost_maps = cost_maps_of(problem)
     stops = [whole_tour(problem, routing, r) for r in range(len(cost_maps))]
@@ -133,7 +129,7 @@ def follow_tours(
             ]
         tasks = [RobotTask(*one) for one in zip(stops, paths, cost_maps, strict=True)]
         others = partial(_otherwise, problem, tasks, paths, sharps, deeper_m)
-        drive = drive_paths(problem, tasks, halt, rounds_of(number), others)
+        drive = drive_paths(problem, tasks, halt, others)
         if drive.trajectories:
             plan = make_plan(problem, seed, params, drive.trajectories, tours)
             if plan is not None:
@@ -142,7 +138,7 @@ def follow_tours(
             leg_J = legs_driven_J(problem, drive.trajectories, tours)
             failed = Followed(None, why, leg_J=leg_J)
         else:
-            failed = Followed(None, drive.failure, failed.driven, drive.meeting)
+            failed = Followed(None, drive.failure, failed.driven)
         if not drive.trajectories or halt[0]:
             break
     return failed

@@ -24,7 +24,7 @@ from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import SPACINGS_M, path_of, visit_steps
 from mrmg.planning.path_following.coordination.coordination import coordinated
-from mrmg.planning.path_following.coordination.rounds import ROUNDS, Round
+from mrmg.planning.path_following.coordination.rounds import ROUNDS
 from mrmg.planning.path_following.coordination.tasks import no_path
 from mrmg.planning.path_following.cost_map import cost_map_of, inflated, smooth_terrain
 from mrmg.planning.path_following.pauses import with_pauses
@@ -57,12 +57,10 @@ class FleetDrive:
     Attributes:
         trajectories: of all robots; empty if it failed.
         failure: why it did, in words.
-        meeting: whether robots met, each of which could drive alone.
     """
 
     trajectories: tuple[Trajectory, ...]
     failure: str = ""
-    meeting: bool = False
 
 
 def refine(
@@ -125,7 +123,6 @@ def drive_paths(
     problem: Problem,
     tasks: Sequence[RobotTask],
     halt: np.ndarray,
-    rounds: Sequence[Round] = ROUNDS[:1],
     others: Callable[[int], Iterable[RobotTask]] = lambda r: (),
 ) -> FleetDrive:
     """Smooth paths and drive the fleet along them.
@@ -137,7 +134,6 @@ def drive_paths(
         problem: the mission.
         tasks: what each robot drives; changed as its path is.
         halt: shape (1,); driving ends soon after it has turned true.
-        rounds: of the search where robots meet.
         others: what a robot that does not get through may drive instead.
     """
     tasks, drives = list(tasks), []
@@ -161,12 +157,12 @@ def drive_paths(
         [task.tour for task in tasks],
         [with_pauses(problem, r, task.path) for r, task in enumerate(tasks)],
         halt,
-        rounds=rounds,
+        rounds=ROUNDS[:1],
         drives=drives,
     )
     if trajectories:
         return FleetDrive(trajectories)
-    return FleetDrive((), "no motions were found that keep the robots apart", True)
+    return FleetDrive((), "no motions were found that keep the robots apart")
 
 
 def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, str]:

@@ -153,28 +153,20 @@ def _tries(problem: Problem, request: Request, schedule: Schedule) -> Iterator[A
     What driving along tours took corrects the energies that the next ones are found
     for.
     """
-    learnt, met = Learnt(), False
+    learnt = Learnt()
     for soc_margin, draws in schedule.followed:
         kept = with_driven_legs(problem.with_soc_margin(soc_margin), learnt.leg_J)
-        followed, meeting = follow_paths(kept, request, draws, soc_margin, learnt)
-        met |= meeting
-        yield followed
+        yield follow_paths(kept, request, draws, soc_margin, learnt)
     for soc_margin in schedule.search_soc_margins:
         kept = problem.with_soc_margin(soc_margin).with_margin(schedule.search_margin)
-        searched = search_motions(kept, request, met)
+        searched = search_motions(kept, request)
         yield searched
         if searched.tours_found:
             return
 
 
-def search_motions(problem: Problem, request: Request, met: bool = False) -> Attempt:
-    """Search for motions along tours, and refine their plan.
-
-    Args:
-        problem: the mission.
-        request: the attempt.
-        met: whether such a search has failed to keep robots apart on their paths.
-    """
+def search_motions(problem: Problem, request: Request) -> Attempt:
+    """Search for motions along tours, and refine their plan."""
     began = time.perf_counter()
     routing = tours_of(problem, request)
     routing_s = time.perf_counter() - began
@@ -188,7 +180,7 @@ def search_motions(problem: Problem, request: Request, met: bool = False) -> Att
         [no_path(problem, r) for r in robots],
         request.halt,
         seed=request.stream_seed("coordination"),
-        rounds=rounds_of(request.number + met),
+        rounds=rounds_of(request.number),
     )
     tours = problem.visits(routing.tours)
     plans: list[Plan] = []
@@ -219,8 +211,8 @@ def follow_paths(
     draws: tuple[Draw, ...],
     soc_margin: float,
     learnt: Learnt,
-) -> tuple[Attempt, bool]:
-    """Drive straight along tours; tell, too, whether robots met on them.
+) -> Attempt:
+    """Drive straight along tours.
 
     The first attempt takes the router's tours as they are; others the best of several
     draws.
@@ -239,8 +231,7 @@ def follow_paths(
     preference = problem.preference
     plans: list[Plan] = []
     found_at: list[float] = []
-    failure, met = "", False
-    driven = 0
+    failure, driven = "", 0
     for tours, minimum_time in product(choice, (False, True)):
         if request.halted or (plans and not preference.late_s(plans[-1])):
             break
@@ -258,7 +249,6 @@ def follow_paths(
         )
         learnt.useless[tours.tours] = soc_margin if followed.driven else 0.0
         plan, failure = followed.plan, followed.failure or failure
-        met |= followed.meeting
         learnt.leg_J.update(followed.leg_J)
         if plan is not None and (
             not plans or preference.rank(plan) < preference.rank(plans[-1])
@@ -266,5 +256,4 @@ def follow_paths(
             plans.append(plan)
             found_at.append(time.perf_counter())
     counts = {"path_following_plans": driven, "router_calls": calls}
-    found = Attempt(plans, found_at, routing_s, counts, bool(choice), failure)
-    return found, met
+    return Attempt(plans, found_at, routing_s, counts, bool(choice), failure)

@@ -44,8 +44,7 @@ def request(number: int = 0, params: PlannerParams = PARAMS) -> Request:
 def along_paths(problem: Problem, asked: Request) -> Attempt:
     schedule = Schedule.of(problem, asked.params, asked.number)
     soc_margin, draws = schedule.followed[0]
-    found, _ = follow_paths(problem, asked, draws, soc_margin, Learnt())
-    return found
+    return follow_paths(problem, asked, draws, soc_margin, Learnt())
 
 
 Way = Callable[[Problem, Request], Attempt]

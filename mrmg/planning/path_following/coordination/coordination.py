@@ -6,10 +6,10 @@ that is found can be driven exactly, and keeps clear at every step.
 
 What is promised: every plan found keeps all margins. A round of the search ends without
 a plan when no order of the robots has one, with cells as fine and searches as long as
-the round allows, or when it has looked at as many nodes as it may; each round is finer
-and longer than the one before, and begins with other motions. A round is in two halves:
-in the second one robots find their motions alone in the reverse order, as those that
-lead nowhere often come of who was first.
+the round allows, or when it has looked at as many nodes as it may. Rounds are finer and
+longer, one after the other, then they begin anew; each begins with other motions. A
+round is in two halves: in the second one robots find their motions alone in the reverse
+order, as those that lead nowhere often come of who was first.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ from mrmg.planning.path_following.coordination.fields import NO_GUIDE, UNKNOWN, 
 from mrmg.planning.path_following.coordination.leads import rounded_path
 from mrmg.planning.path_following.coordination.rounds import (
     FIRST_MOST,
+    LONGEST,
     ROUNDS,
     ROUNDS_ALONE,
     SEARCHES,
@@ -213,7 +214,7 @@ class _Planning:
             yield along._replace(most=min(FIRST_MOST, now.most)), course
         if not known:
             share = UNTIMED_SHARE if len(tour) > 1 and not yielding else 1
-            most = min(share * along.most, ROUNDS[-1].most)
+            most = min(share * along.most, LONGEST)
             yield along._replace(most=most), course
         else:
             nowhere = no_path(problem, r)

@@ -29,9 +29,9 @@ ROUNDS = (
     Round(most=1_000, weight=1.5, fineness=1.0, soft_s=2.0, turning=False),
     Round(most=4_000, weight=1.5, fineness=1.0, soft_s=4.0),
     Round(most=16_000, weight=2.0, fineness=2.0, soft_s=1.0),
-    Round(most=64_000, weight=2.0, fineness=3.0, soft_s=4.0),
 )
-"""Rounds one after the other.
+"""Rounds one after the other, and over again with other orders of the robots: orders
+that lead nowhere do not by looking longer.
 
 In the first one costs-to-go do not know turning: over cells and few headings it makes
 unicycles that meet on open ground (swap2) go the longer way round.
@@ -53,11 +53,14 @@ SHORTENING_MOST = 2_000
 """Nodes of a search that is to shorten a motion, at least: where two unicycles change
 places (swap2), the shorter motion takes 1,800."""
 
+LONGEST = 64_000
+"""Nodes of any search at most."""
+
 UNTIMED_SHARE = 10
 """How many times as many nodes a search along several targets may have, where its
 costs-to-go do not know when the other robots are where."""
 
 
 def rounds_of(number: int) -> Sequence[Round]:
-    """Return the round of an attempt: later ones try harder."""
-    return ROUNDS[min(number, len(ROUNDS) - 1) :][:1]
+    """Return the round of an attempt: later ones try harder, then they begin anew."""
+    return ROUNDS[number % len(ROUNDS) :][:1]
