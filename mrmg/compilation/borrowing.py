@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload
 
@@ -32,18 +31,22 @@ def _borrowed(_value):
 
 @intrinsic
 def _without_owner(_typing, value):
-    def generate(_context, builder, _signature, arguments):
-        return _uncounted(builder, value, arguments[0])
+    def generate(context, builder, _signature, arguments):
+        return _uncounted(context, builder, value, arguments[0])
 
     return value(value), generate
 
 
-def _uncounted(builder, kind, value):
-    """Return a value with no owner of its memory, the first thing of an array."""
+def _uncounted(context, builder, kind, value):
+    """Return a value whose arrays have no owner of their memory."""
     if isinstance(kind, types.Array):
-        return builder.insert_value(value, ir.Constant(value.type.elements[0], None), 0)
+        array = context.make_helper(builder, kind, value)
+        array.meminfo = array.meminfo.type(None)
+        return array._getvalue()
     if isinstance(kind, types.BaseTuple):
         for i, part in enumerate(kind):
             own = builder.extract_value(value, i)
-            value = builder.insert_value(value, _uncounted(builder, part, own), i)
+            value = builder.insert_value(
+                value, _uncounted(context, builder, part, own), i
+            )
     return value

@@ -19,7 +19,8 @@ ROLLED = 509
 """Pairs of speed and steering that are remembered; a prime, so that they spread."""
 
 FINEST = 2.0**54
-"""Speeds that differ are this often apart or more, as is known of numbers near 1."""
+"""Factor that makes different integers of different speeds from 1/4 m/s up, so that
+sums which differ in the last bit alone do not take each other's place."""
 
 
 class Rollouts(NamedTuple):
