@@ -21,6 +21,10 @@ import numpy as np
 
 from mrmg.errors import Fault, SceneError
 from mrmg.extras import import_extra
+from mrmg.scene.importing.robots.expressions import (
+    ExpressionError,
+    guarded_expressions,
+)
 from mrmg.scene.loading.mjcf import no_warning_file
 from mrmg.scene.loading.yaml_text import read_text
 
@@ -114,15 +118,28 @@ def _expanded(path: Path, arguments: Mapping[str, str]) -> str:
     xacro = import_extra("xacro", extra="ros", purpose="expands macros of descriptions")
     said = io.StringIO()
     try:
-        with contextlib.redirect_stderr(said), _packages_beside(path.parent):
+        with (
+            contextlib.redirect_stderr(said),
+            _packages_beside(path.parent),
+            guarded_expressions(xacro),
+        ):
             document = xacro.process_file(str(path), mappings=dict(arguments))
     except Exception as error:  # xacro raises what the expressions in a file raise
-        cause = getattr(error, "exc", None)  # of a file; xacro's own words repeat it
+        cause = _cause(error)
+        if isinstance(cause, ExpressionError):
+            raise SceneError(str(path), [Fault("", str(cause))]) from error
+        # Of a file; xacro's own words repeat it.
         words = str(cause if isinstance(cause, OSError) else error).split()
         reason = " ".join(words) or type(error).__name__
         message = f"xacro cannot expand it: {reason}; --arg NAME=VALUE sets arguments"
         raise SceneError(str(path), [Fault("", message)]) from error
     return str(document.toxml())
+
+
+def _cause(error: Exception) -> Exception:
+    """Return what an error of xacro, which wraps others in its own, is about."""
+    inner = getattr(error, "exc", None)
+    return _cause(inner) if isinstance(inner, Exception) else error
 
 
 def _without_lost_meshes(root: ET.Element, folder: Path) -> list[str]:
