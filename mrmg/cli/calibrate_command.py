@@ -193,4 +193,5 @@ def _log_lines(calibration: LogCalibration) -> list[str]:
             f"  {item.run.file}: {item.predicted_J:.0f} J ({low:.0f} .. {high:.0f}) "
             f"predicted, {item.run.energy_J:.0f} J measured, {item.error_pct:+.1f} %"
         )
+    lines += [f"  note: {note}" for note in calibration.notes]
     return lines

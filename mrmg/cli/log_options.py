@@ -11,14 +11,17 @@ from typing import Any
 from mrmg.errors import UsageError
 
 EPILOG = """\
-columns of a log (CSV with a line of names, time increasing):
+columns of a log (CSV with a line of names; commas, semicolons or tabs between values,
+points in numbers; time increasing):
   time                      s
   velL, velR                m/s, at the wheels of each side
   or v, yaw_rate            m/s, rad/s
   power                     W, drawn from the battery
   or current, voltage       A, V; or curL, curR, voltL, voltR of each side
   or curL, curR             A, with the motor constants of robot.yaml; or current
-Case, underscores and a unit (curL_A, "v [m/s]") do not count, nor do other columns.
+Case and underscores do not count, nor do other columns. A name may state another unit,
+as time_ms or "v [km/h]" do: ms, us, ns; km/h, mph, cm/s, mm/s; deg/s; kW; mA; mV.
+Gaps of a log (ten times as long as it usually takes to the next row) are left out.
 
 Each --terrain is of the --log or --test files before it; the first one is the plain
 ground of robot.yaml. Test files without --terrain are of the terrain whose logs, or

@@ -94,6 +94,11 @@ class LogCalibration:
     terrains: tuple[TerrainEstimate, ...]
     stationary_W: Estimate
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the logs is left out."""
+        return tuple(note for item in self.runs for note in item.run.notes)
+
     def changes(self) -> dict[KeyPath, NewValue]:
         """Return what `robot.yaml` should say instead: of the first terrain."""
         plain = self.terrains[0]
@@ -146,6 +151,7 @@ class LogCalibration:
             "stationary_W": self.stationary_W.to_json(),
             "terrains": [item.to_json() for item in self.terrains],
             "runs": [item.to_json() for item in self.runs],
+            "notes": list(self.notes),
             "tested": [item.run.file for item in self.runs if not item.fitted],
         }
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,35 +9,20 @@ from pathlib import Path
 
 import numpy as np
 
-from mrmg.errors import Fault, FileError
+from mrmg.counted import counted
+from mrmg.errors import Fault, FileError, UsageError
+from mrmg.scene.loading.shape_schema import ID_PATTERN
 from mrmg.scene.robot_model import RobotModel
-
-MAX_BYTES = 200_000_000
-"""Largest log that is read: a day at 50 rows a second has a tenth of it."""
+from mrmg.studies.calibration.log_columns import read_columns
 
 STILL = 0.005
 """Speed [m/s] and yaw rate [rad/s] below which a robot stands."""
 
-LEAST_ROWS = 10
-"""Fewest rows of which a power can be found."""
+GAP_PERIODS = 10.0
+"""Steps of time this many times a log's own period are gaps of the log ..."""
 
-COLUMNS = {
-    "time": ("time", "t", "timestamp"),
-    "speed_left": ("vell", "vleft", "velleft", "speedleft", "velocityleft"),
-    "speed_right": ("velr", "vright", "velright", "speedright", "velocityright"),
-    "speed": ("v", "speed", "vel", "velocity"),
-    "yaw_rate": ("yawrate", "omega", "w", "angularvelocity"),
-    "power": ("power", "p"),
-    "current_left": ("curl", "ileft", "curleft", "currentleft"),
-    "current_right": ("curr", "iright", "curright", "currentright"),
-    "current": ("current", "i", "cur"),
-    "voltage_left": ("voltl", "uleft", "voltleft", "voltageleft"),
-    "voltage_right": ("voltr", "uright", "voltright", "voltageright"),
-    "voltage": ("voltage", "u", "volt", "volts"),
-}
-"""Names of columns by what they hold; case, underscores and units do not count."""
-
-_UNITS = ("ms", "rads", "s", "a", "w", "v", "mps", "radps")
+GAP_S = 2.0
+"""... if they are longer than this, too [s]: than what laws are fitted to."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,9 +48,35 @@ class LoggedRun:
     of_motors: bool = False
 
     @property
+    def period_s(self) -> float:
+        """Usual time from row to row."""
+        return float(np.median(np.diff(self.time_s)))
+
+    @property
+    def gaps(self) -> np.ndarray:
+        """Which steps of time are gaps of the log, shape (n - 1,)."""
+        longest_s = max(GAP_S, GAP_PERIODS * self.period_s)
+        return np.asarray(np.diff(self.time_s) > longest_s)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of the log is left out."""
+        if not self.gaps.any():
+            return ()
+        gap_s = float(np.diff(self.time_s)[self.gaps].sum())
+        count = counted(int(self.gaps.sum()), "gap")
+        return (
+            f"{self.file}: {count} of {gap_s:.0f} s in all left out, as the log has a "
+            f"row every {self.period_s:.3g} s otherwise",
+        )
+
+    @property
     def weight_s(self) -> np.ndarray:
-        """Time that each row stands for (trapezoidal rule), shape (n,)."""
-        steps_s = np.diff(self.time_s)
+        """Time that each row stands for (trapezoidal rule), shape (n,).
+
+        What happened in gaps is not known: they count as one period.
+        """
+        steps_s = np.where(self.gaps, self.period_s, np.diff(self.time_s))
         halves_s = 0.5 * (np.append(steps_s, 0.0) + np.append(0.0, steps_s))
         return np.asarray(halves_s)
 
@@ -93,12 +103,19 @@ def read_run(file: str, terrain: str, model: RobotModel) -> LoggedRun:
 
     Raises:
         FileError: if the file cannot be read, lacks columns, or holds what no run is.
+        UsageError: if the terrain cannot be an id of a scene.
     """
-    columns = _columns(Path(file), file)
+    if not re.match(ID_PATTERN, terrain):
+        raise UsageError(
+            f"'{terrain}' cannot name a terrain; use letters, digits, '_', '.' and "
+            "'-', as ids in scenes do"
+        )
+    log = read_columns(Path(file), file)
+    columns = log.values
     time_s = columns["time"]
     late = np.flatnonzero(np.diff(time_s) <= 0.0)
     if len(late):
-        line = int(late[0]) + 3
+        line = log.lines[int(late[0]) + 1]
         raise FileError(file, [Fault("time", "must increase", line=line)])
     speed_m_s, yaw_rate_rad_s, sides = _motion(columns, model, file)
     run = LoggedRun(
@@ -114,63 +131,6 @@ def read_run(file: str, terrain: str, model: RobotModel) -> LoggedRun:
         message = f"takes {run.energy_J:.4g} J in all; expected more than none"
         raise FileError(file, [Fault("power", message)])
     return run
-
-
-def _columns(path: Path, source: str) -> dict[str, np.ndarray]:
-    """Return the known columns of a file by what they hold."""
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise FileError(source, [Fault("", f"larger than {MAX_BYTES} bytes")])
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "is no text in UTF-8"
-        raise FileError(source, [Fault("", f"cannot be read: {reason}")]) from error
-    try:
-        rows = [row for row in csv.reader(text.splitlines()) if any(row)]
-    except csv.Error as error:
-        raise FileError(source, [Fault("", f"is no CSV: {error}")]) from error
-    names = [_kind(name) for name in rows[0]] if rows else []
-    twice = {kind for kind in names if kind and names.count(kind) > 1}
-    if twice:
-        message = f"{' and '.join(sorted(twice))} named by more than one column"
-        raise FileError(source, [Fault("columns", message)])
-    if len(rows) <= LEAST_ROWS:
-        message = f"has {max(len(rows) - 1, 0)} rows; at least {LEAST_ROWS} are needed"
-        raise FileError(source, [Fault("", message)])
-    known = {kind: at for at, kind in enumerate(names) if kind}
-    if "time" not in known:
-        message = f"has no column 'time'; it has {', '.join(rows[0])}"
-        raise FileError(source, [Fault("columns", message)])
-    return {
-        kind: np.array(
-            [
-                _number(row, at, line, source)
-                for line, row in enumerate(rows[1:], start=2)
-            ]
-        )
-        for kind, at in known.items()
-    }
-
-
-def _number(row: list[str], column: int, line: int, source: str) -> float:
-    text = row[column] if column < len(row) else ""
-    try:
-        value = float(text)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        message = f"got '{text[:40]}'; expected a finite number"
-        raise FileError(source, [Fault(f"column {column + 1}", message, line=line)])
-    return value
-
-
-def _kind(name: str) -> str:
-    """Return what a column of that name holds; "" for nothing that is known."""
-    plain = re.sub(r"[^a-z]", "", re.sub(r"[\[(].*", "", name.lower()))
-    for kind, names in COLUMNS.items():
-        if plain in names or any(plain == known + u for known in names for u in _UNITS):
-            return kind
-    return ""
 
 
 def _motion(

@@ -197,6 +197,14 @@ def with_cell(row: int, column: int, text: str) -> list[list[str]]:
         (with_cell(7, 3, "fifty"), r"line 8: got 'fifty'; expected a finite"),
         (with_cell(7, 3, "nan"), r"line 8: got 'nan'; expected a finite"),
         (with_cell(5, 0, "0.2"), r"line 6: must increase"),
+        ([*GOOD[:5], [], *with_cell(5, 0, "0.2")[5:]], r"line 7: must increase"),
+        ([*GOOD[:5], [], *with_cell(7, 3, "x")[5:]], r"line 9: got 'x'"),
+        (with_cell(0, 1, "v [knots]"), r"'v \[knots\]': .*allowed: m/s, km/h"),
+        (with_cell(0, 2, "yaw_rate (rpm)"), r"rpm\)': .*allowed: rad/s, deg/s"),
+        (with_cell(0, 3, "power [MW]"), r"allowed: W, kW"),
+        (with_cell(0, 1, "v [m/s^2]"), r"allowed: m/s"),
+        (with_cell(7, 3, "5e201"), r"column 4, line 8: got '5e201'; .* at most 1e\+10"),
+        (with_cell(7, 0, "1e300"), r"column 1, line 8: got '1e300'; .* at most 1e\+10"),
         ([GOOD[0], *([*row[:3], "0"] for row in GOOD[1:])], "takes 0 J in all"),
     ],
 )
@@ -213,6 +221,68 @@ def test_a_file_that_is_no_log_is_refused_with_one_message(
     with pytest.raises(FileError, match=message):
         read_run(str(log), "x", load_model(models_folder() / "husky")[0])
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["time [ms]", "v [km/h]", "yaw_rate [deg/s]", "power [kW]"],
+        ["time_ms", "speed_kmh", "yaw_rate_deg_s", "P_kW"],
+        ["t (ms)", "V (km/h)", "omega (°/s)", "power_kw"],
+        ["timestamp_ms", "vel_kph", "w [deg s^-1]", "Power [kw]"],
+    ],
+)
+def test_units_in_names_are_converted(
+    names: list[str], husky: RobotModel, tmp_path: Path
+) -> None:
+    time, speed = np.arange(20) * 0.25, np.linspace(0.2, 0.6, 20)
+    yaw_rate, power = np.linspace(0.1, 0.3, 20), np.linspace(20.0, 80.0, 20)
+    others = [1e3 * time, 3.6 * speed, np.degrees(yaw_rate), power / 1e3]
+    columns = dict(zip(names, others, strict=True))
+    run = read_run(write_csv(tmp_path / "a.csv", **columns), "x", husky)
+    np.testing.assert_allclose(run.time_s, time)
+    np.testing.assert_allclose(run.speed_m_s, speed)
+    np.testing.assert_allclose(run.yaw_rate_rad_s, yaw_rate)
+    np.testing.assert_allclose(run.power_W, power)
+    columns = {names[0]: 1e3 * time, "v_mm_s": 1e3 * speed, "omega": yaw_rate}
+    columns |= {"I [mA]": 1e3 * power, "voltage_mV": np.full(20, 24e3)}
+    run = read_run(write_csv(tmp_path / "b.csv", **columns), "x", husky)
+    np.testing.assert_allclose(run.speed_m_s, speed)
+    np.testing.assert_allclose(run.power_W, 24.0 * power)
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_logs_with_other_separators(
+    separator: str, husky: RobotModel, tmp_path: Path
+) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("\n".join(separator.join(row) for row in GOOD))
+    run = read_run(str(log), "x", husky)
+    assert run.energy_J == pytest.approx(1.9 * 50.0)
+    log.write_text(log.read_text().replace(".", ","))
+    with pytest.raises(FileError, match="got '0,0'; expected .*such as 0.25"):
+        read_run(str(log), "x", husky)
+
+
+def test_gaps_count_as_no_driving(
+    husky: RobotModel, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Ten hours without a row are neither energy nor distance, and noted."""
+    files = []
+    for number in range(2):
+        run = made_run(husky, "firm", number)
+        late = run.time_s + np.where(run.time_s >= 20.0, 36_000.0, 0.0)
+        assert replace(run, time_s=late).energy_J == pytest.approx(run.energy_J)
+        columns = {"time": late, "v": run.speed_m_s, "yaw_rate": run.yaw_rate_rad_s}
+        path = tmp_path / f"{number}.csv"
+        files.append(write_csv(path, power=run.power_W, **columns))
+    arguments = ["calibrate", "husky", "-o", str(tmp_path / "out")]
+    assert main([*arguments, "--log", *files, "--terrain", "firm"]) == ExitCode.OK
+    note = f"{files[0]}: 1 gap of 36000 s in all left out, as the log has a row every"
+    assert note in " ".join(capsys.readouterr().out.split())
+    assert note in (tmp_path / "out" / "calibration.html").read_text()
+    steps = replace(run, time_s=run.time_s + (run.time_s >= 20.0) * 1.5)
+    assert not steps.notes  # a second or two is no gap
 
 
 def test_currents_need_motor_constants(tmp_path: Path) -> None:
@@ -299,6 +369,7 @@ def test_the_verb_leaves_a_robot_terrain_and_a_page(
         (["--terrain", "x"], "name the files with --log"),
         (["--log", "a.csv"], "on what terrain"),
         (["--test", "a.csv", "--terrain", "x"], "name logs to fit"),
+        (["--log", "a.csv", "--terrain", "wet sand"], "'wet sand' cannot name a terr"),
         (["--log", "a.csv", "a.csv", "--terrain", "x"], "named twice"),
         (
             ["--log", "a/a.csv", "--terrain", "x", "--log", "b/b.csv", "--terrain", "y"]
