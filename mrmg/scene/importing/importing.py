@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from mrmg.errors import UsageError
+from mrmg.errors import Fault, SceneError, UsageError
 from mrmg.scene.importing.formats import nav2_map
 from mrmg.scene.importing.layers import ImportOptions, Layer, scene_of_layers
 from mrmg.scene.importing.registry import Reader, format_of
@@ -53,6 +53,7 @@ def import_files(
 
     def add(path: Path, read: Reader, options: ImportOptions = plain) -> None:
         layer = read(path, replace(options, before=tuple(layers)))
+        _require_fit(layer, layers, str(path))
         layers.append(layer)
         notes.extend(f"{path.name}: {note}" for note in layer.notes)
 
@@ -67,6 +68,28 @@ def import_files(
         add(land_cover, format_of(land_cover, "land-cover").read, asked)
     document, left = scene_of_layers(files[0], layers, asked)
     return Imported(document, (layers[0].frame.note(), *notes, *left))
+
+
+def _require_fit(layer: Layer, before: Sequence[Layer], source: str) -> None:
+    """Refuse a layer that cannot be of the scene of those before.
+
+    Raises:
+        SceneError: saying why.
+    """
+    frame = before[0].frame if before else layer.frame
+    if layer.crs is None and frame.crs is not None:
+        message = (
+            "is in metres of its own, and the map it goes with has coordinates of "
+            f"{frame.crs}; import it alone, or state --crs local if both are in the "
+            "same metres"
+        )
+        raise SceneError(source, [Fault("", message)])
+    if layer.heights is not None and any(one.heights is not None for one in before):
+        message = (
+            "is a second elevation model, and scenes have one; merge them first "
+            "(gdal_merge.py -o ALL.tif FILE FILE), and import that"
+        )
+        raise SceneError(source, [Fault("", message)])
 
 
 def import_map(

@@ -54,7 +54,7 @@ def read_classes(path: Path | None, source: str) -> dict[str, Any]:
         try:
             return ClassTable.model_validate(document).root
         except ValidationError as error:
-            raise SceneError(str(path), faults_of(error, ClassEntry)) from error
+            raise SceneError(str(path), faults_of(error, ClassTable)) from error
 
 
 def land_cover_layer(

@@ -30,9 +30,10 @@ MAX_SIDE_M = 100_000.0
 _DECIMALS = 6
 """Coordinates are rounded to micrometres: obstacles lose nothing that counts."""
 
-CHARGING = re.compile("(?<!dis)charg", re.IGNORECASE)
+_CHARGING = re.compile("(?<!dis)charg", re.IGNORECASE)
 """What names of charging actions and places have in them, as startCharging."""
 
+_NO = ("", "false", "no", "none", "off", "0", "0.0")
 _SLIVER_M2 = 1e-6
 _NOT_IN_IDS = re.compile(r"[^A-Za-z0-9_.\-]+")
 
@@ -90,6 +91,7 @@ class Layer:
         goals, stations, robots: entries of a scene file.
         lanes: lines that robots may drive along.
         cells: placement and mask of the raster cells that obstacles cover.
+        closes_unknown: whether obstacles are ground that was never seen, too.
         notes: what was dropped, changed or assumed.
     """
 
@@ -104,6 +106,7 @@ class Layer:
     robots: Sequence[Entry] = ()
     lanes: Sequence[BaseGeometry] = ()
     cells: tuple[Any, np.ndarray] | None = None
+    closes_unknown: bool = False
     notes: Sequence[str] = ()
 
 
@@ -149,8 +152,7 @@ def scene_of_layers(
         [area.shape for area in obstacles if "blocks" not in area.entry]
     )
     if box.difference(solid).area <= _SLIVER_M2:
-        message = "no free ground is left; --unknown free opens what was never seen"
-        raise SceneError(source, [Fault("obstacles", message)])
+        raise SceneError(source, [Fault("obstacles", _nothing_free(layers, bounds))])
     for section in ("goals", "stations", "robots"):
         entries = _all(layers, section)
         fitting = [
@@ -166,6 +168,23 @@ def scene_of_layers(
             )
         document[section] = [_with_own_id(entry, used, notes) for entry in fitting]
     return {key: value for key, value in document.items() if value != []}, notes
+
+
+def _nothing_free(layers: Sequence[Layer], bounds: Box) -> str:
+    """Return why no free ground is left, and what to do."""
+    width_m, depth_m = bounds[2] - bounds[0], bounds[3] - bounds[1]
+    if width_m * depth_m <= _SLIVER_M2:
+        reason = "check its unit, resolution, --crs and --longest-side"
+        return f"the ground is only {width_m:.3g} x {depth_m:.3g} m; {reason}"
+    if any(layer.closes_unknown for layer in layers):
+        return "no free ground is left; --unknown free opens what was never seen"
+    message = f"they cover all of the ground, {width_m:.6g} x {depth_m:.6g} m"
+    if any(layer.bounds for layer in layers):
+        return f"{message}; check what the files take as occupied, and --crop"
+    return (
+        f"{message}, which reaches as far as the features do; add goals, stations or "
+        "robots beside them, or state more ground by --crop X_MIN Y_MIN X_MAX Y_MAX"
+    )
 
 
 def _all(layers: Sequence[Layer], section: str) -> list[Any]:
@@ -267,12 +286,47 @@ def _unused(wanted: str, used: dict[str, int]) -> str:
     return name
 
 
+def charges(stated: Any) -> bool:
+    """Return whether keys or words of a part of a file name charging.
+
+    A key whose value is false, no or 0 does not.
+    """
+    if isinstance(stated, dict):
+        # Pairs of a list are spelt as {key: ..., value: ...}.
+        return not _is_no(stated.get("value", True)) and any(
+            (bool(_CHARGING.search(str(key))) and not _is_no(value)) or charges(value)
+            for key, value in stated.items()
+        )
+    if isinstance(stated, list):
+        return any(map(charges, stated))
+    return isinstance(stated, str) and bool(_CHARGING.search(stated))
+
+
+def _is_no(value: Any) -> bool:
+    return value is None or str(value).strip().lower() in _NO
+
+
 def lanes_note(count: int) -> str:
     """Return what becomes of the edges of a graph or layout."""
     return (
         f"lanes of {counted(count, 'edge')}: robots keep to them with --lanes WIDTH, "
         "in either direction; otherwise they were left out"
     )
+
+
+def solid(shape: BaseGeometry, half_width_m: float, **style: Any) -> BaseGeometry:
+    """Return a valid shape with area: points, lines and what has none get a width.
+
+    Empty for polygons of which their holes leave nothing.
+
+    Args:
+        shape: of any kind.
+        half_width_m: half the width that thin things get.
+        style: of their ends and corners, as of `shapely.buffer`.
+    """
+    # A polygon that crosses itself may count zero until it is repaired.
+    valid = shapely.make_valid(shape, method="structure", keep_collapsed=True)
+    return valid.buffer(half_width_m, **style) if valid.area == 0.0 else valid
 
 
 def polygons(shape: BaseGeometry) -> MultiPolygon:

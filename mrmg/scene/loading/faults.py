@@ -7,7 +7,7 @@ import typing
 from collections.abc import Iterable
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, RootModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from mrmg.counted import counted
@@ -88,6 +88,8 @@ def _fault(detail: dict[str, Any], model: type[BaseModel]) -> Fault:
         return Fault(path, f"got {shown(value)}; expected {detail['msg']}")
     rule = _KINDS.get(kind) or f"must be {_allowed(detail)}"
     about = f" ({wanted})" if wanted else ""
+    if not wanted and _is_word(end) and (keys := ", ".join(_known_keys(model, loc))):
+        about += f", or a mapping with keys {keys}"
     return Fault(path, f"got {shown(value)}; {rule}{about}")
 
 
@@ -146,6 +148,10 @@ def _walk(
     for part in loc:
         if isinstance(part, int):
             field = None
+            continue
+        if inner is not None and issubclass(inner, RootModel):  # a mapping of any keys
+            root = inner.model_fields["root"].annotation
+            inner, field = _model_in(typing.get_args(root)[-1]), None
             continue
         if inner is None or part not in keys_of(inner):
             return None, None

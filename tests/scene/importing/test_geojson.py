@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import json
 from itertools import permutations
 from pathlib import Path
@@ -126,6 +127,102 @@ def test_land_based_features_need_no_extra(
 ) -> None:
     monkeypatch.setitem(__import__("sys").modules, "pyproj", None)
     assert scene_of(written(tmp_path / "a.geojson", MISSION, None), crs="local").goals
+
+
+@pytest.mark.parametrize("kind", ["obstacle", "terrain"])
+def test_areas_that_cross_themselves_count_whole(kind: str, tmp_path: Path) -> None:
+    """A bow tie's halves have opposite signs: their sum says nothing of its area."""
+    keys = {"kind": kind, "multiplier": 2.0}
+    goal = feature(shapely.Point(20, 20), kind="goal")
+    bow = shapely.Polygon([(5, 5), (9, 9), (9, 5), (5, 9)])
+    path = written(tmp_path / "a.geojson", [feature(bow, **keys), goal], "local")
+    found = import_files([path])
+    scene = scene_from_document(found.document, source="test")
+    areas = scene.obstacles if kind == "obstacle" else scene.terrain
+    assert sum(area.shape.area for area in areas) == pytest.approx(8.0)
+    assert any("features.0 crossed itself: repaired" in note for note in found.notes)
+    ring = [(5, 5), (9, 5), (9, 9), (5, 9)]
+    hole = feature(
+        shapely.Polygon(ring, [[(7, 7), (11, 7), (11, 11), (7, 11)]]), **keys
+    )
+    scene = scene_of(written(path, [hole, goal], "local"))
+    areas = scene.obstacles if kind == "obstacle" else scene.terrain
+    assert sum(area.shape.area for area in areas) == pytest.approx(12.0)
+    nothing = feature(shapely.Polygon(ring, [ring]), **keys)
+    with pytest.raises(SceneError, match="features.0.geometry: has no area: its holes"):
+        scene_of(written(path, [nothing, goal], "local"))
+
+
+def test_obstacles_alone_leave_no_ground(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.geojson", [feature(BOX, kind="obstacle")], "local")
+    with pytest.raises(SceneError, match=r"40 x 30 m, which reaches .* --crop") as it:
+        scene_of(path)
+    assert "--unknown" not in str(it.value)
+    assert scene_of(path, crop=(0.0, 0.0, 50.0, 30.0)).obstacles
+    small = shapely.affinity.scale(BOX, 1e-6, 1e-6)
+    path = written(tmp_path / "a.geojson", [feature(small, kind="obstacle")], "local")
+    with pytest.raises(SceneError, match=r"the ground is only 4e-05 x 3e-05 m; check"):
+        scene_of(path)
+
+
+def test_features_without_a_kind(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.geojson", [feature(BOX, name="x")], "local")
+    with pytest.raises(SceneError, match=r"none has a property 'kind' \(obstacle, ter"):
+        scene_of(path)
+    found = import_files([written(path, [feature(BOX), *MISSION], "local")])
+    assert any("without a property 'kind' (obs" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("stated", [False, "false", "no", 0, "0", "None"])
+def test_what_does_not_charge_is_no_station(stated: Any, tmp_path: Path) -> None:
+    points = [
+        feature(shapely.Point(9 * n, 5), id=n, charging=value)
+        for n, value in enumerate((stated, True))
+    ]
+    points += [
+        feature(shapely.Point(9, 9), id=2, operations={"charge": {"type": "dock"}}),
+        feature(shapely.Point(0, 9), id=3, operations=[{"type": "startCharging"}]),
+        feature(shapely.Point(5, 15), id=4, tags=[{"key": "charger", "value": stated}]),
+    ]
+    scene = scene_of(written(tmp_path / "a.geojson", points, "local"))
+    assert [goal.id for goal in scene.goals] == ["node_0", "node_4"]
+    assert len(scene.stations) == 3
+    document = copy.deepcopy(LIF)
+    document["layouts"][0]["stations"][0] |= {"stationName": "S", "charging": stated}
+    path = tmp_path / "hall.lif"
+    path.write_text(json.dumps(document))
+    assert [station.id for station in scene_of(path).stations] == ["N3"]
+
+
+def test_lif_nodes_given_twice(tmp_path: Path) -> None:
+    document = copy.deepcopy(LIF)
+    nodes = document["layouts"][0]["nodes"]
+    nodes.append({**nodes[0], "nodePosition": {"x": 5.0, "y": 5.0}})
+    path = tmp_path / "hall.lif"
+    path.write_text(json.dumps(document))
+    message = "nodes.N1: is given more than once in layout 'ground'"
+    with pytest.raises(SceneError, match=message):
+        scene_of(path)
+    (layout,) = LIF["layouts"]
+    path.write_text(json.dumps({"layouts": [layout] * 3}))
+    with pytest.raises(SceneError, match=message):
+        scene_of(path)
+
+
+def test_local_maps_do_not_fit_geographic_features(
+    tmp_path: Path, write_map: Any, write_tiff: Any
+) -> None:
+    place = feature(shapely.Point(8.3, 47.8), kind="goal")
+    path = written(tmp_path / "a.geojson", [place], "EPSG:4326")
+    local = write_map(tmp_path, np.full((20, 20), 254))
+    heights = write_tiff(tmp_path / "a.tif", np.full((20, 20), 3.0))
+    for other in (local, heights):
+        with pytest.raises(SceneError, match="metres of its own.*of EPSG:32632.*--crs"):
+            scene_of(path, other)
+    graph = written(tmp_path / "b.geojson", MISSION, "local")
+    with pytest.raises(SceneError, match="b.geojson.*\n.*metres of its own"):
+        scene_of(path, graph)
+    assert scene_of(path, local, crs="local").bounds == (0.0, 0.0, 2.0, 2.0)
 
 
 def test_geographic_features_do_not_fit_a_local_map(

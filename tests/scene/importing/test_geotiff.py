@@ -260,17 +260,36 @@ def test_land_cover_polygons(tmp_path: Path, write_tiff: Any) -> None:
     assert scene.obstacles[0].shape.area == pytest.approx(18.0)
 
 
-def test_classes_table_faults(tmp_path: Path, write_tiff: Any) -> None:
+def test_classes_table_faults(
+    tmp_path: Path, write_tiff: Any, capsys: pytest.CaptureFixture[str]
+) -> None:
     cover = write_tiff(tmp_path / "cover.tif", np.full((4, 4), 1, dtype="uint8"))
     dem = write_tiff(tmp_path / "dem.tif", heights(4, 4))
     command = ["scene", "import", str(dem), "--land-cover", str(cover)]
     out = tmp_path / "scene.yaml"
     assert main([*command, "-o", str(out)]) == 2
     table = tmp_path / "classes.yaml"
-    for text in ("", "- 1\n", "1: {multiplier: -2}\n", "1: water\n", "1: {speed: 2}\n"):
+    for text, message in (
+        ("", "expected lines 'class: {multiplier: 1.5}' or 'class: obstacle'"),
+        ("- 1\n", "expected lines"),
+        ("1: {multiplier: -2}\n", "1.multiplier, line 1: got -2; must be > 0"),
+        (
+            "1: water\n",
+            "must be 'obstacle', or a mapping with keys multiplier, turning",
+        ),
+        ("1: {speed: 2}\n", "unknown key; known keys: multiplier, turning"),
+        ("1: {multiplyer: 2}\n", "did you mean 'multiplier'?"),
+    ):
         table.write_text(text)
         assert main([*command, "--classes", str(table), "-o", str(out)]) == 3
+        assert message in " ".join(capsys.readouterr().err.split())
     assert not out.exists()
+
+
+def test_a_second_elevation_model_is_refused(tmp_path: Path, write_tiff: Any) -> None:
+    files = [write_tiff(tmp_path / f"{n}.tif", heights(20, 30)) for n in range(2)]
+    with pytest.raises(SceneError, match=r"1.tif.*\n.*second elevation model.*merge"):
+        import_files(files)
 
 
 def test_large_model_is_thinned_in_place(

@@ -129,6 +129,10 @@ def test_nothing_free_is_refused(tmp_path: Path, write_map: Any) -> None:
     with pytest.raises(SceneError, match="no free ground.*--unknown free"):
         imported(path)
     assert not imported(path, unknown="free").obstacles
+    black = write_map(tmp_path, np.zeros((8, 9)), name="black")
+    with pytest.raises(SceneError, match="cover all of the ground, 0.9 x 0.8 m") as it:
+        imported(black)
+    assert "--unknown" not in str(it.value)
     with pytest.raises(SceneError, match="lies beside the map, which covers 0, 0, 0.9"):
         imported(path, crop=(5.0, 5.0, 6.0, 6.0))
 
@@ -157,6 +161,13 @@ def test_pictures_of_other_kinds(tmp_path: Path, write_map: Any) -> None:
     for other in (picture.convert("RGB"), picture.convert("P"), wide):
         other.save(tmp_path / "map.png")
         assert imported(path) == plain
+    for alpha in (255, 0):  # trinary: its mean is that of all channels, as in RGBA
+        channel = np.full_like(grey, 255)
+        channel[6:9, 6:9] = alpha
+        Image.fromarray(np.dstack([grey] * 3 + [channel])).save(tmp_path / "map.png")
+        colours = imported(path, unknown="free")
+        Image.fromarray(np.dstack([grey, channel]), "LA").save(tmp_path / "map.png")
+        assert imported(path, unknown="free") == colours
     clear = np.dstack([grey] * 3 + [np.full_like(grey, 255)])
     clear[8, 8, 3] = 0  # never seen, in a map of scale
     Image.fromarray(clear).save(tmp_path / "map.png")

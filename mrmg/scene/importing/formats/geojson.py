@@ -22,17 +22,20 @@ from mrmg.scene.importing.features import Feature, Findings, crs_of, features_of
 from mrmg.scene.importing.frames import Frame, frame_of
 from mrmg.scene.importing.land_cover import land_cover_layer, read_classes
 from mrmg.scene.importing.layers import (
-    CHARGING,
     Area,
     ImportOptions,
     Layer,
+    charges,
     lanes_note,
     polygons,
+    solid,
 )
 from mrmg.scene.importing.registry import Format, Head, read_json
 from mrmg.scene.loading.faults import shown
 
 KINDS = ("obstacle", "terrain", "goal", "station", "robot")
+
+_KIND = f"a property 'kind' ({', '.join(KINDS)})"
 
 PLACE_RADIUS_M = 0.5
 """Radius of goals and stations that state none."""
@@ -69,6 +72,9 @@ def read_geojson(path: Path, options: ImportOptions) -> Layer:
         _add(feature, found)
     if findings.faults:
         raise SceneError(str(path), findings.faults)
+    if not any(found.values()):
+        message = f"none has {_KIND}"
+        raise SceneError(str(path), [Fault("features", message)])
     counts = [f"{len(found[kind])} {kind}" for kind in KINDS if found[kind]]
     lanes = [lanes_note(len(found["lane"]))] if found["lane"] else []
     return Layer(
@@ -111,7 +117,7 @@ def _add(feature: Feature, found: dict[str, list[Any]]) -> None:
         found["lane"].append(feature.shape)
         return
     if kind is None and feature.shape.geom_type == "Point" and "id" in keys:
-        kind = "station" if CHARGING.search(str(keys)) else "goal"
+        kind = "station" if charges(keys) else "goal"
     if kind in ("obstacle", "terrain"):
         found[kind].append(_area(kind, feature))
     elif kind in KINDS:
@@ -119,7 +125,7 @@ def _add(feature: Feature, found: dict[str, list[Any]]) -> None:
         entry = _robot(feature, own_id) if kind == "robot" else _region(feature)
         found[kind].append({"id": own_id, **entry})
     elif kind is None:
-        note = "features without 'kind' were left out"
+        note = f"features without {_KIND} were left out"
         if note not in notes:
             notes.append(note)
     else:
@@ -129,10 +135,13 @@ def _add(feature: Feature, found: dict[str, list[Any]]) -> None:
 
 def _area(kind: str, feature: Feature) -> Area:
     keys, shape = feature.keys, feature.shape
-    if shape.area == 0.0:
-        shape = shape.buffer(feature.number("radius", WALL_WIDTH_M / 2))
-    valid = polygons(shape)
-    if not valid.equals(shape):
+    # A radius is that of points and lines; areas may state one that means nothing.
+    thin = shape.geom_type != "Polygon"
+    half_m = feature.number("radius", WALL_WIDTH_M / 2) if thin else WALL_WIDTH_M / 2
+    valid = polygons(solid(shape, half_m))
+    if valid.is_empty:
+        feature.fault("geometry", "has no area: its holes leave nothing of it")
+    elif not shape.is_valid:
         feature.findings.notes.append(f"{feature.place} crossed itself: repaired")
     entry = {"id": keys["id"]} if "id" in keys else {}
     if kind == "terrain":

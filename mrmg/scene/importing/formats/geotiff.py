@@ -6,6 +6,7 @@ resampled to metres; a coordinate system that is metric already keeps its cells.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -57,7 +58,8 @@ def read_elevation(path: Path, options: ImportOptions) -> Layer:
     if min(heights.shape) < 2:
         message = f"{heights.shape[0]} x {heights.shape[1]} heights; expected 2 x 2"
         raise SceneError(str(path), [Fault("", message)])
-    return _layer(frame, _box(bounds), heights, options, notes, str(path))
+    layer = _layer(frame, _box(bounds), heights, options, notes, str(path))
+    return replace(layer, crs=crs)
 
 
 def _layer(
@@ -96,6 +98,7 @@ def _layer(
         bounds=bounds,
         heights=heights,
         obstacles=obstacles,
+        closes_unknown=bool(obstacles),
         notes=notes,
     )
 

@@ -6,7 +6,8 @@ serve, become stations; edges become lanes.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections import Counter
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -15,7 +16,7 @@ from pydantic import Field, ValidationError
 
 from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError
-from mrmg.scene.importing.layers import CHARGING, ImportOptions, Layer, lanes_note
+from mrmg.scene.importing.layers import ImportOptions, Layer, charges, lanes_note
 from mrmg.scene.importing.registry import Format, Head, read_json
 from mrmg.scene.loading.faults import faults_of
 from mrmg.scene.loading.shape_schema import Number, Strict
@@ -98,6 +99,7 @@ def read_lif(path: Path, options: ImportOptions) -> Layer:
     keys = []  # of nodes, by their ids, which another layout may use again
     for layout in layouts:
         keys.append({node.nodeId: _key(node, layout, nodes) for node in layout.nodes})
+        faults += _given_twice(layout, keys[-1], nodes)
         nodes |= {keys[-1][node.nodeId]: node for node in layout.nodes}
     everywhere = {node.nodeId: key for key, node in reversed(nodes.items())}
     for layout, own in zip(layouts, keys, strict=True):
@@ -115,12 +117,13 @@ def read_lif(path: Path, options: ImportOptions) -> Layer:
             continue
         for edge in layout.edges:
             pairs[tuple(sorted(key_of[name] for name in edge.ends))] = None
-        for station in filter(_charges, layout.stations):
-            charging |= {key_of[name] for name in station.interactionNodeIds}
+        for station in layout.stations:
+            if charges(station.model_dump()):
+                charging |= {key_of[name] for name in station.interactionNodeIds}
     if faults:
         raise SceneError(str(path), faults)
     charging |= {
-        key for key, node in nodes.items() if _charges(node.vehicleTypeNodeProperties)
+        key for key, node in nodes.items() if charges(node.vehicleTypeNodeProperties)
     }
     places = {name: _place(name, node) for name, node in nodes.items()}
     notes = [
@@ -152,8 +155,20 @@ def _key(node: NodeEntry, layout: LayoutEntry, known: Collection[str]) -> str:
     return f"{layout.layoutId}_{own}" if own in known else own
 
 
-def _charges(part: Any) -> bool:
-    return bool(CHARGING.search(str(part)))
+def _given_twice(
+    layout: LayoutEntry, keys: Mapping[str, str], known: Collection[str]
+) -> list[Fault]:
+    """Return a fault for each node whose id another node of the layout has."""
+    count = Counter(node.nodeId for node in layout.nodes)
+    return [
+        Fault(
+            f"nodes.{name}",
+            f"is given more than once in layout '{layout.layoutId}'; the ids of its "
+            "nodes must differ",
+        )
+        for name, key in keys.items()
+        if count[name] > 1 or key in known
+    ]
 
 
 def _recognises(head: Head) -> bool:

@@ -126,6 +126,7 @@ def read_map(path: Path, options: ImportOptions) -> Layer:
         bounds=bounds,
         obstacles=obstacles,
         cells=(grid.place, solid),
+        closes_unknown=bool(unknown.any()) and options.unknown == "obstacle",
         notes=notes,
     )
 
@@ -220,8 +221,9 @@ def _picture(path: Path, document: MapDocument) -> tuple[np.ndarray, np.ndarray]
             with Image.open(file) as picture:
                 if picture.width * picture.height > _MOST_PIXELS:
                     raise ValueError(f"more than {_MOST_PIXELS} pixels")
-                if picture.mode in ("P", "PA", "1"):
-                    clear = "transparency" in picture.info
+                # Grey with alpha as colours with alpha: its mean counts alpha, too.
+                if picture.mode in ("P", "PA", "1", "LA", "La"):
+                    clear = "A" in picture.getbands() or "transparency" in picture.info
                     data = np.asarray(picture.convert("RGBA" if clear else "RGB"))
                 else:
                     data = np.asarray(picture)

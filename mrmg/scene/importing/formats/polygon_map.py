@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError, UsageError
-from mrmg.scene.importing.layers import Area, ImportOptions, Layer
+from mrmg.scene.importing.layers import Area, ImportOptions, Layer, solid
 from mrmg.scene.importing.map_text import RawMap, read_map
 from mrmg.scene.importing.registry import Format, Head
 
@@ -37,8 +37,8 @@ def read_polygon_map(path: Path, options: ImportOptions) -> Layer:
         message = f"the longest side is {longest_m} m; it must be positive"
         raise UsageError(message)
     raw = read_map(path)
-    border, solid = _in_metres(raw, longest_m, str(path))
-    shapes = _polygons(solid)
+    border, blocked = _in_metres(raw, longest_m, str(path))
+    shapes = _polygons(blocked)
     x_min, y_min, x_max, y_max = (round(value, 3) for value in border.bounds)
     became = counted(len(shapes), "polygon")
     notes = [f"{counted(len(raw.obstacles), 'shape')} became {became}"]
@@ -72,17 +72,12 @@ def _in_metres(
     blocked = [_solid(placed(shape)) for shape in raw.obstacles]
     if raw.border is not None:
         blocked.append(box.difference(_solid(placed(raw.border))))
-    solid = shapely.set_precision(shapely.union_all(blocked), GRID_M)
-    return box, solid.intersection(shapely.set_precision(box, GRID_M))
+    whole = shapely.set_precision(shapely.union_all(blocked), GRID_M)
+    return box, whole.intersection(shapely.set_precision(box, GRID_M))
 
 
 def _solid(shape: BaseGeometry) -> BaseGeometry:
-    """Return a valid shape with area: thin things get a thickness."""
-    # A polygon that crosses itself may count zero until it is repaired.
-    valid = shapely.make_valid(shape, method="structure", keep_collapsed=True)
-    if valid.area == 0.0:
-        return valid.buffer(THIN_M, cap_style="square", join_style="mitre")
-    return valid
+    return solid(shape, THIN_M, cap_style="square", join_style="mitre")
 
 
 def _polygons(shape: BaseGeometry) -> list[Polygon]:
