@@ -236,6 +236,24 @@ def test_packages_and_masses_that_are_missing(tmp_path: Path) -> None:
         imported(path, tmp_path / "other")
 
 
+@pytest.mark.parametrize("mass", ["-40", "0", "nan", "inf"])
+def test_masses_that_none_can_be(mass: str, tmp_path: Path) -> None:
+    """Zero is allowed of frames alone, which have no shape."""
+    inertia = " ".join(f'{key}="0"' for key in ("ixx", "iyy", "izz", "ixy", "ixz"))
+    tip = f'<mass value="0"/><inertia {inertia} iyz="0"/>'
+    extra = (
+        f'<link name="tip"><inertial>{tip}</inertial></link><joint name="tipped" '
+        'type="fixed"><parent link="base"/><child link="tip"/></joint>'
+    )
+    path = written(tmp_path, "rl rr", extra=extra)
+    assert imported(path, tmp_path / "good")[0].mass_kg == pytest.approx(45.0)
+    path.write_text(path.read_text().replace('value="40"', f'value="{mass}"'))
+    message = f"link 'base': has a mass of {float(mass):g} kg; expected more than 0 kg"
+    with pytest.raises(SceneError, match=message) as caught:
+        import_robot(path, tmp_path / "bad")
+    assert len(caught.value.faults) == 1
+
+
 def test_nothing_is_replaced(tmp_path: Path) -> None:
     path = written(tmp_path, "rl rr")
     (tmp_path / "there").mkdir()

@@ -103,6 +103,8 @@ def read_description(path: Path, arguments: Mapping[str, str]) -> Description:
         raise SceneError(source, [Fault("", message)])
     notes = []
     if root.tag == "robot":
+        if faults := list(_mass_faults(root)):
+            raise SceneError(source, faults)
         notes = [*_without_lost_meshes(root, path.parent), *_assumed_masses(root)]
     try:
         with no_warning_file():
@@ -163,6 +165,26 @@ def _without_lost_meshes(root: ET.Element, folder: Path) -> list[str]:
         for tag, names in lost.items()
         if names
     ]
+
+
+def _mass_faults(root: ET.Element) -> Iterator[Fault]:
+    """Yield a fault for each link whose mass none can be."""
+    for link in root.iter("link"):
+        mass = link.find("inertial/mass")
+        try:
+            mass_kg = math.inf if mass is None else float(mass.get("value", ""))
+        except ValueError:
+            continue  # MuJoCo names its line
+        # Frames without a shape are often given a mass of zero.
+        has_shape = link.find("collision") is not None
+        if mass is None or (mass_kg == 0.0 and not has_shape):
+            continue
+        if not 0.0 < mass_kg < math.inf:
+            yield Fault(
+                f"link '{link.get('name')}'",
+                f"has a mass of {mass_kg:g} kg; expected more than 0 kg, or no "
+                "<inertial>, for that of its shape as of water",
+            )
 
 
 def _assumed_masses(root: ET.Element) -> list[str]:
