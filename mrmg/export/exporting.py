@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 
 from mrmg import storage
@@ -29,7 +30,8 @@ def export_run(
         out: folder to write to, or the file where it has the format's suffix; None for
             the folder `export` of the run.
         version: of the format's standard; None for all that can be written.
-        overwrite: whether to replace files that are there.
+        overwrite: whether to replace files that are there, and to remove those that
+            an export of another mission has left beside them.
         trust_code: whether robot models may bring Python code (`loading.trust`).
 
     Returns:
@@ -49,8 +51,14 @@ def export_run(
         _path(place, name, chosen.suffix): content
         for name, content in chosen.files(mission, versions).items()
     }
-    for path in files:
+    # Robots of another mission would seem to be of this one.
+    left = set(chosen.written_before(place, versions)) - set(files)
+    for path in [*files, *sorted(left)]:
         require_absent(path, overwrite=overwrite)
+    for path in left:
+        path.unlink()
+        with contextlib.suppress(OSError):  # holds files of others
+            path.parent.rmdir()
     for path, content in files.items():
         storage.write_bytes(path, content)
     return list(files)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mrmg.errors import require_known
@@ -19,6 +20,10 @@ Files = Mapping[str, bytes]
 """Content of the files of an export by their path, relative to its folder."""
 
 
+def _none(folder: Path, versions: tuple[str, ...]) -> Iterable[Path]:
+    return ()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format:
     """A format that a run can be exported to; a module calls its own `FORMAT`.
@@ -28,11 +33,14 @@ class Format:
         versions: of its standard that can be written; all of them are by default.
         files: returns the files of a mission in the versions asked for. A single file
             is called "mission" with its suffix.
+        written_before: returns the files in a folder that an export in the versions
+            asked for has left there, of any mission; none of a single file.
     """
 
     suffix: str = ""
     versions: tuple[str, ...] = ()
     files: Callable[[Mission, tuple[str, ...]], Files]
+    written_before: Callable[[Path, tuple[str, ...]], Iterable[Path]] = _none
 
 
 def format_names() -> list[str]:

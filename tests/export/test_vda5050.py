@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,12 +12,14 @@ import jsonschema
 import numpy as np
 import pytest
 
+from mrmg.errors import UsageError
 from mrmg.export.exporting import export_run
 from mrmg.plans import Plan
 from mrmg.scene.loading import load_scene
 from mrmg.simulation.log import ExecutionLog
 
 SCHEMAS = Path(__file__).parents[3] / "shared/vda5050"
+FILES = ("order.json", "states.jsonl")
 VERSIONS = ("2.1.0", "3.0.0")
 
 
@@ -123,3 +126,26 @@ def test_states_follow_the_drive(exported: Path, quickstart_run: Path) -> None:
 def test_one_version_can_be_asked_for(quickstart_run: Path, tmp_path: Path) -> None:
     files = export_run(quickstart_run, "vda5050", out=tmp_path, version="2.1.0")
     assert {path.relative_to(tmp_path).parts[1] for path in files} == {"2.1.0"}
+
+
+def test_robots_of_another_mission_do_not_stay(
+    quickstart_run: Path, tmp_path: Path
+) -> None:
+    """Nothing but files of an export is removed, and only if asked."""
+    export_run(quickstart_run, "vda5050", out=tmp_path)
+    folder = tmp_path / "vda5050" / "2.1.0"
+    for name in ("r8", "r9"):
+        shutil.copytree(folder / "r1", folder / name)
+    (folder / "r9" / "notes.txt").write_text("mine")
+    (folder / "r7").mkdir()
+    (folder / "r7" / "order.json").write_text('{"manufacturer": "another"}')
+    for name in ("r1", "r2"):
+        shutil.rmtree(folder / name)
+    with pytest.raises(UsageError, match=r"r8/order.json exists; --overwrite"):
+        export_run(quickstart_run, "vda5050", out=tmp_path, version="2.1.0")
+    export_run(quickstart_run, "vda5050", out=tmp_path, version="2.1.0", overwrite=True)
+    found = {str(path.relative_to(folder)) for path in folder.rglob("*.*")}
+    written = {f"{name}/{file}" for name in ("r1", "r2") for file in FILES}
+    assert found == {*written, "r7/order.json", "r9/notes.txt"}
+    assert not (folder / "r8").exists()
+    assert (tmp_path / "vda5050" / "3.0.0" / "r1").exists()

@@ -15,6 +15,7 @@ import json
 import math
 from collections.abc import Collection, Iterator
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,9 @@ from mrmg.viz.activities import lengths_along
 
 MANUFACTURER = "mrmg"
 STATE_PERIOD_S = 1.0
+
+_NAMES = ("order.json", "states.jsonl")
+"""Files of a robot."""
 
 _PATH_TOLERANCE_M = 0.02
 _FORWARDS, _BACKWARDS = 0.0, math.pi
@@ -63,9 +67,20 @@ def files(mission: Mission, versions: tuple[str, ...]) -> Files:
             folder = f"vda5050/{version}/{course.robot.id}"
             text = json.dumps(_in_version(order, version), indent=1) + "\n"
             lines = [f"{json.dumps(_in_version(state, version))}\n" for state in states]
-            written[f"{folder}/order.json"] = text.encode()
-            written[f"{folder}/states.jsonl"] = "".join(lines).encode()
+            contents = (text, "".join(lines))
+            for name, content in zip(_NAMES, contents, strict=True):
+                written[f"{folder}/{name}"] = content.encode()
     return written
+
+
+def written_before(folder: Path, versions: tuple[str, ...]) -> Iterator[Path]:
+    """Yield the orders and states in a folder that this module has written there."""
+    mark = f'"manufacturer": "{MANUFACTURER}"'
+    for version in versions:
+        for path in folder.glob(f"vda5050/{version}/*/*"):
+            own = path.name in _NAMES and path.is_file()
+            if own and mark in path.read_text(errors="replace"):
+                yield path
 
 
 def _in_version(message: _Json, version: str) -> _Json:
@@ -295,4 +310,4 @@ def _rounded(value: float) -> float:
     return round(float(value), _DECIMALS) + 0.0
 
 
-FORMAT = Format(versions=("2.1.0", "3.0.0"), files=files)
+FORMAT = Format(versions=("2.1.0", "3.0.0"), files=files, written_before=written_before)
