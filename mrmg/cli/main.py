@@ -48,8 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             # The reader of our output has gone; nothing is left to be written.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return int(ExitCode.OK)
-        about = f"{error.filename}: {error.strerror}" if error.filename else error
-        return _refused(f"cannot read or write {about}", ExitCode.MACHINE)
+        return _unusable(error)
     except Exception as error:
         altered = [*_altered_files(vars(options).values())]
         if not altered:
@@ -59,6 +58,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         remedy = "'mrmg run SCENE --out RUN --overwrite' makes all anew"
         text = f"{altered[0]}: {message} ({reason}); {remedy}"
         return _refused(text, ExitCode.INVALID_FILE)
+
+
+def _unusable(error: OSError) -> int:
+    """Print why a file or folder cannot be used, and what to do if it was named."""
+    if isinstance(error, IsADirectoryError):
+        message = f"{error.filename} is a folder; name a file instead"
+        return _refused(message, ExitCode.USAGE)
+    if isinstance(error, FileExistsError | NotADirectoryError):
+        message = f"{error.filename} is a file, and a folder is needed there"
+        return _refused(f"{message}; name another place", ExitCode.USAGE)
+    about = f"{error.filename}: {error.strerror}" if error.filename else error
+    return _refused(f"cannot read or write {about}", ExitCode.MACHINE)
 
 
 def _refused(text: str, code: ExitCode) -> int:

@@ -34,7 +34,7 @@ def files(folder: Path) -> dict[str, str]:
     }
 
 
-INVALID, USAGE, MACHINE = ExitCode.INVALID_FILE, ExitCode.USAGE, ExitCode.MACHINE
+INVALID, USAGE = ExitCode.INVALID_FILE, ExitCode.USAGE
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ INVALID, USAGE, MACHINE = ExitCode.INVALID_FILE, ExitCode.USAGE, ExitCode.MACHIN
         ("figure runs/frm-s0", INVALID, "did you mean 'runs/farm-s0'?"),
         ("scene draw farm.yaml -o farm.xyz", USAGE, "must end in one of .pdf, .svg"),
         ("scene draw farm.yaml -o farm.yaml", USAGE, "must end in one of .pdf, .svg"),
-        ("scene draw farm.yaml -o farm.yaml/a.png", MACHINE, "farm.yaml: "),
+        ("scene draw farm.yaml -o farm.yaml/a.png", USAGE, "farm.yaml is a file"),
         ("scene import farm.yaml -o empty", INVALID, "farm.yaml: 1 fault"),
         ("scene new .", USAGE, "expected a name such as farm"),
         ("scene new farm", USAGE, "farm.yaml is there already"),
@@ -84,9 +84,13 @@ def test_errors_of_writing_name_the_file_that_is_wanted(
     before = files(place)
     square = "[SCALE]\n1\n[BORDER]\n0 0\n9 0\n9 9\n0 9\n"
     (place / "square.txt").write_text(square)
-    assert main(["scene", "import", "square.txt", "-o", "empty"]) == MACHINE
+    assert main(["scene", "import", "square.txt", "-o", "empty"]) == USAGE
     output = capsys.readouterr().err
-    assert output.endswith("mrmg: cannot read or write empty: Is a directory\n")
+    assert output.endswith("mrmg: empty is a folder; name a file instead\n")
+    assert main(["scene", "import", "square.txt", "-o", "square.txt/a.yaml"]) == USAGE
+    output = capsys.readouterr().err
+    wanted = "square.txt is a file, and a folder is needed there; name another place\n"
+    assert output.endswith(wanted)
     assert files(place) == {**before, "square.txt": square}
 
 
