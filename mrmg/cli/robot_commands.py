@@ -48,7 +48,8 @@ def _add_import(acts: Any) -> None:
         "import",
         help="make a model of a robot description: URDF, xacro or MJCF",
         description="Write a model's folder with every parameter that the description "
-        "states, and report those that it does not.",
+        "states, and report those that it does not. No code of the file is run: "
+        "expressions of xacro that could run some are refused.",
         command=import_robot,
     )
     imported.add_argument("file", type=Path, metavar="FILE.urdf|FILE.xacro|FILE.xml")

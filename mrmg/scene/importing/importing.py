@@ -55,6 +55,9 @@ def import_files(
         layer = read(path, replace(options, before=tuple(layers)))
         _require_fit(layer, layers, str(path))
         layers.append(layer)
+        if layer.crs is not None and layers[0].frame.crs is None:
+            text = f"coordinates of {layer.crs} taken as metres of the map before it"
+            notes.append(f"{path.name}: {text}")
         notes.extend(f"{path.name}: {note}" for note in layer.notes)
 
     for path in files:

@@ -222,6 +222,14 @@ def test_local_maps_do_not_fit_geographic_features(
     graph = written(tmp_path / "b.geojson", MISSION, "local")
     with pytest.raises(SceneError, match="b.geojson.*\n.*metres of its own"):
         scene_of(path, graph)
+    free, origin = np.full((20, 20), 254), [450_000.0, 5_300_000.0, 0.0]
+    surveyed = write_map(tmp_path, free, name="surveyed", origin=origin)
+    place = feature(shapely.Point(450_001, 5_300_001), kind="goal")
+    metric = written(tmp_path / "c.geojson", [place], "EPSG:32632")
+    found = import_files([surveyed, metric])
+    assert len(found.document["goals"]) == 1
+    wanted = "c.geojson: coordinates of EPSG:32632 taken as metres of the map before it"
+    assert wanted in found.notes
     assert scene_of(path, local, crs="local").bounds == (0.0, 0.0, 2.0, 2.0)
 
 
