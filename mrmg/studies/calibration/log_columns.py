@@ -173,7 +173,10 @@ def _unit(name: str, kind: str, source: str) -> float:
         return 1.0
     if unit not in factors:
         allowed = ", ".join(_units(kind))
-        message = f"column '{name}': the unit is not known; allowed: {allowed}"
+        message = (
+            f"column '{name}': the unit '{stated}' is not known; allowed: {allowed}; "
+            "convert the column, or rename it if that is no unit"
+        )
         raise FileError(source, [Fault("columns", message)])
     return factors[unit]
 

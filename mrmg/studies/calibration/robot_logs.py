@@ -18,6 +18,9 @@ from mrmg.studies.calibration.log_columns import read_columns
 STILL = 0.005
 """Speed [m/s] and yaw rate [rad/s] below which a robot stands."""
 
+LEAST_STEP_S = 1e-6
+"""Least step of time: powers of accelerations are worked out over steps."""
+
 GAP_PERIODS = 10.0
 """Steps of time this many times a log's own period are gaps of the log ..."""
 
@@ -113,10 +116,11 @@ def read_run(file: str, terrain: str, model: RobotModel) -> LoggedRun:
     log = read_columns(Path(file), file)
     columns = log.values
     time_s = columns["time"]
-    late = np.flatnonzero(np.diff(time_s) <= 0.0)
+    late = np.flatnonzero(np.diff(time_s) < LEAST_STEP_S)
     if len(late):
         line = log.lines[int(late[0]) + 1]
-        raise FileError(file, [Fault("time", "must increase", line=line)])
+        message = f"must increase, by {LEAST_STEP_S:g} s at least"
+        raise FileError(file, [Fault("time", message, line=line)])
     speed_m_s, yaw_rate_rad_s, sides = _motion(columns, model, file)
     run = LoggedRun(
         file=file,

@@ -199,6 +199,7 @@ def with_cell(row: int, column: int, text: str) -> list[list[str]]:
         (with_cell(5, 0, "0.2"), r"line 6: must increase"),
         ([*GOOD[:5], [], *with_cell(5, 0, "0.2")[5:]], r"line 7: must increase"),
         ([*GOOD[:5], [], *with_cell(7, 3, "x")[5:]], r"line 9: got 'x'"),
+        (with_cell(7, 0, "0.50000001"), r"line 8: must increase, by 1e-06 s at least"),
         (with_cell(0, 1, "v [knots]"), r"'v \[knots\]': .*allowed: m/s, km/h"),
         (with_cell(0, 2, "yaw_rate (rpm)"), r"rpm\)': .*allowed: rad/s, deg/s"),
         (with_cell(0, 3, "power [MW]"), r"allowed: W, kW"),
