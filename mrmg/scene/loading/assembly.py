@@ -78,12 +78,12 @@ class Assembly:
         margins = parsed(MarginsEntry, document.get("margins")) or MarginsEntry()
         self._fleet_margins = margins.margins
         self.bounds = self._bounds()
-        self.robots = self._parts("robots", self._robot)
         self.obstacles = self._parts("obstacles", self._obstacle)
         self.terrain = self._parts("terrain", _terrain_area)
-        self.elevation = self._elevation()
         walls = [wall.shape for wall in self.obstacles if wall.blocks is None]
         self._blocked = shapely.disjoint_subset_union_all(walls)
+        self.robots = self._parts("robots", self._robot)
+        self.elevation = self._elevation()
         self.goals = self._parts("goals", self._goal)
         self.stations = self._parts("stations", self._station)
         self.objective = self._objective()
@@ -201,7 +201,7 @@ class Assembly:
         battery = battery_of(entry, self._fleet_battery, model, path)
         finish = None
         with self._faults_noted():
-            finish = _finish(entry, f"{path}.finish")
+            finish = self._finish(entry, f"{path}.finish")
         if entry.rolling_factor is not None:
             rolling = model.rolling_coefficient * entry.rolling_factor
             model = replace(model, rolling_coefficient=rolling)
@@ -214,6 +214,22 @@ class Assembly:
             battery=battery,
             finish=finish,
             margins=own.margins.over(self._fleet_margins),
+        )
+
+    def _finish(self, entry: RobotEntry, path: str) -> Finish | None:
+        wanted = entry.finish
+        if wanted is None:
+            return None
+        if wanted == "start":
+            circle = CircleEntry(center=entry.pose[:2], radius=HOME_RADIUS_M)
+            wanted = FinishEntry(circle=circle)
+            region = region_of(wanted, path)
+        else:
+            region = self._region(wanted, path)
+        return Finish(
+            region=region,
+            heading_rad=wanted.heading,
+            heading_tolerance_rad=wanted.heading_tolerance,
         )
 
     def _model(self, wanted: Any, path: str) -> tuple[RobotModel, dict[str, Any]]:
@@ -302,7 +318,7 @@ class Assembly:
             one_at_a_time=entry.capacity == 1,
         )
 
-    def _region(self, entry: RegionEntry, path: str) -> Region:
+    def _region(self, entry: RegionEntry | FinishEntry, path: str) -> Region:
         region = region_of(entry, path)
         if self.bounds and not region.shape.intersects(shapely.box(*self.bounds)):
             self._fault(path, f"lies outside the bounds {list(self.bounds)}")
@@ -323,20 +339,6 @@ def _terrain_area(entry: TerrainEntry, path: str) -> TerrainArea:
         multiplier=entry.multiplier,
         turning_multiplier=entry.turning_multiplier,
         energy_spread=entry.energy_spread,
-    )
-
-
-def _finish(entry: RobotEntry, path: str) -> Finish | None:
-    if entry.finish is None:
-        return None
-    wanted = entry.finish
-    if wanted == "start":
-        circle = CircleEntry(center=entry.pose[:2], radius=HOME_RADIUS_M)
-        wanted = FinishEntry(circle=circle)
-    return Finish(
-        region=region_of(wanted, path),
-        heading_rad=wanted.heading,
-        heading_tolerance_rad=wanted.heading_tolerance,
     )
 
 
