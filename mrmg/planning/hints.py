@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from mrmg.planning.bound.exact_tours import are_few
 from mrmg.planning.endings import listed
@@ -16,12 +16,15 @@ LARGE_GAP = 0.15
 INTERRUPTED = "planning was stopped by Ctrl-C; this is the best plan found until then"
 
 
-def hints_on(scene: Scene, plan: Plan, gap: float | None) -> Iterator[str]:
+def hints_on(
+    scene: Scene, plan: Plan, wanted: Mapping[str, float], gap: float | None
+) -> Iterator[str]:
     """Yield hints on a plan.
 
     Args:
         scene: the mission.
         plan: the answer.
+        wanted: distances from other robots that were asked for, by robot [m].
         gap: of the plan's objective to its bound; None if it is not known.
     """
     objective = scene.objective
@@ -34,6 +37,7 @@ def hints_on(scene: Scene, plan: Plan, gap: float | None) -> Iterator[str]:
         visit = "visits" if len(unused) == 1 else "visit"
         yield f"{listed(unused)} {visit} no goal, as that takes less energy; {wish}"
     yield from _on_narrow_passages(plan)
+    yield from _on_spacing(wanted, plan)
     if gap is None or gap <= LARGE_GAP:
         return
     if not are_few(len(goals), len(scene.robots)):
@@ -71,3 +75,15 @@ def _on_narrow_passages(plan: Plan) -> Iterator[str]:
                 f"{robot} keeps less than its margin of {plan.margins[robot][0]:g} m "
                 f"from obstacles where no wider way leads on: {places}"
             )
+
+
+def _on_spacing(wanted: Mapping[str, float], plan: Plan) -> Iterator[str]:
+    """Yield which robots keep less from each other than was asked for."""
+    kept = {robot: robot_m for robot, (_, robot_m) in plan.margins.items()}
+    less = [robot for robot, robot_m in kept.items() if robot_m < wanted[robot]]
+    if less:
+        wanted_m, kept_m = (max(known[r] for r in less) for known in (wanted, kept))
+        yield (
+            f"{listed(less)} may come as near to other robots as {kept_m:.3f} m "
+            f"instead of {wanted_m:g} m: no motions were found otherwise"
+        )

@@ -10,11 +10,27 @@ import shapely
 
 from mrmg.planning.roadmap.fleet import margins_of
 from mrmg.plans import Plan, Trajectory
-from mrmg.scene.margins import Margins, NarrowPassage
+from mrmg.scene.margins import Margins, NarrowPassage, certified_minimum_m
 from mrmg.scene.types import Robot, Scene
 
 ROUNDING_M = 1e-7
 """Distance that a margin may be missed by for rounding alone [m]."""
+
+
+def with_least_spacing(scene: Scene, margins: Margins) -> Scene:
+    """Return a scene whose robots keep no more from each other than both may stray.
+
+    Args:
+        scene: the mission.
+        margins: stated for all robots; those of the scene's robots hold them.
+    """
+    robots = []
+    for robot in scene.robots:
+        obstacle_m, robot_m = margins_of(robot, margins)
+        robot_m = min(robot_m, 2.0 * certified_minimum_m(robot.model))
+        own = Margins(obstacle_m=obstacle_m, robot_m=robot_m)
+        robots.append(replace(robot, margins=own))
+    return replace(scene, robots=tuple(robots))
 
 
 def with_margins(scene: Scene, plan: Plan, margins: Margins) -> Plan:

@@ -22,13 +22,13 @@ from mrmg.planning.diagnosis import Proofs, why_in_short, why_no_plan, why_no_ro
 from mrmg.planning.feasibility import require_robots
 from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.hints import INTERRUPTED, hints_on
-from mrmg.planning.margins_kept import with_margins
+from mrmg.planning.margins_kept import with_least_spacing, with_margins
 from mrmg.planning.parameters import GUIDED_TREE, PlannerParams, profile_params
 from mrmg.planning.planners import Planner
 from mrmg.planning.preference import Preference
 from mrmg.planning.preparation import compile_kernels, load_bounds, load_kernels
 from mrmg.planning.problem.problem import Problem, state_mission, tightened
-from mrmg.planning.roadmap.fleet import motion_addresses
+from mrmg.planning.roadmap.fleet import margins_of, motion_addresses
 from mrmg.planning.routers import Router
 from mrmg.planning.search import GRACE_S, OnImprovement, Progress, Search
 from mrmg.planning.skipping import plan_reachable
@@ -182,7 +182,7 @@ class _Planning:
         for robot in own.robots:
             motion_addresses(robot.model)
         self.statistics.begin()
-        proofs = Proofs(own, self.params.dt_s, self.request.halt)
+        proofs = Proofs(self.scene, self.params.dt_s, self.request.halt)
         problem = self._in_time(
             partial(state_mission, own, self.request.seed, self.params)
         )
@@ -204,7 +204,6 @@ class _Planning:
                 )
             )
             return self._unsolved(proof, why or why_in_short(self.params, search))
-        best = with_margins(self.scene, best, self.params.margins)
         if bounding is not None:
             self._in_time(bounding.result)
         return PlanResult(
@@ -214,7 +213,15 @@ class _Planning:
             statistics=self.statistics.as_dict(),
             hints=(
                 *([INTERRUPTED] if search.interrupted else []),
-                *hints_on(self.scene, best, self.statistics.gap),
+                *hints_on(
+                    self.scene,
+                    best,
+                    {
+                        r.id: margins_of(r, self.params.margins)[1]
+                        for r in self.scene.robots
+                    },
+                    self.statistics.gap,
+                ),
             ),
         )
 
@@ -239,17 +246,31 @@ class _Planning:
             # and keeps the margins that are wanted.
             meeting = found.tours_found and len(self.scene.robots) > 1
             longer = meeting and number == 0 and self.params.trees > 1
+            kept = self.scene
             if not (
-                found.plans or longer or halt[0] or proof(not found.tours_found, True)
+                found.plans
+                or longer
+                or halt[0]
+                or self.params.planner == GUIDED_TREE  # it has one search of some work
+                or proof(not found.tours_found, True)
             ):
                 found = self._tried_tightly(found, tight(), request)
-            return on_the_map(found, problem, self.scene, self.params)
+                kept = nearer()
+            found = on_the_map(found, problem, self.scene, self.params)
+            margins = STATES_NONE if kept is not self.scene else self.params.margins
+            plans = [with_margins(kept, plan, margins) for plan in found.plans]
+            return replace(found, plans=plans)
 
         @cache
-        def tight() -> Problem | None:
-            if self.params.planner == GUIDED_TREE:  # it has one search, of so much work
-                return None
-            return tightened(proofs.scene, self.request.seed, self.params)
+        def nearer() -> Scene:
+            return with_least_spacing(self.scene, self.params.margins)
+
+        @cache
+        def tight() -> Problem:
+            near = with_least_spacing(problem.scene, self.params.margins)
+            bare = replace(self.params, obstacle_margin_m=None, robot_margin_m=None)
+            problem_near = tightened(near, self.request.seed, bare)
+            return replace(problem_near, scene=problem.scene)  # plans are of this one
 
         def proof(tours_missing: bool, goes_on: bool) -> str | None:
             missing = tours_missing or math.isinf(self.statistics.bounds.energy_J or 0)
@@ -271,14 +292,12 @@ class _Planning:
         )
 
     def _tried_tightly(
-        self, failed: Attempt, problem: Problem | None, request: Request
+        self, failed: Attempt, problem: Problem, request: Request
     ) -> Attempt:
-        """Return an attempt that keeps the least margins in narrow ground, if any is.
+        """Return an attempt that keeps the least margins, where ground is narrow.
 
         It follows one that has found no plan with the margins that are wanted.
         """
-        if problem is None:
-            return failed
         found = self.planner(problem, request)
         return replace(
             found,

@@ -214,3 +214,65 @@ def test_passages_are_named_with_place_and_width() -> None:
     assert "at least 0.030 m" in reason
     proof = plan_mission(gap(1.05, turn=0.4)).reason
     assert "1.05 m wide near (12.0, 7.0), r1 is 1.10 m wide" in proof
+
+
+@pytest.mark.parametrize("apart_m", [0.1, 0.45])
+def test_robots_that_start_near_each_other_get_away(apart_m: float) -> None:
+    model = gap(12.0).robots[0].model
+    beside_m = 2.0 * model.half_width_m + apart_m
+    document = {
+        "format": 1,
+        "name": "near",
+        "bounds": [0, 0, *SIZE_M],
+        "goals": [{"id": "g", "circle": {"center": [15, 4], "radius": 1}}],
+        "robots": [
+            {"id": "r1", "model": "car", "pose": [4, 4, 0]},
+            {"id": "r2", "model": "car", "pose": [4, 4 + beside_m, 0]},
+        ],
+    }
+    scene = scene_from_document(document, source="near")
+    result = plan_mission(scene)
+    assert result.plan is not None, result.reason
+    assert verify(scene, result.plan).ok
+    least_m = 2.0 * certified_minimum_m(model)
+    kept = default_margins(model)
+    assert result.plan.margins["r1"] == (kept.obstacle_m, least_m)
+    (hint,) = [hint for hint in result.hints if "no motions were found" in hint]
+    assert f"{least_m:.3f} m instead of {kept.robot_m:g} m" in hint
+
+
+@pytest.mark.parametrize("corner", [(0.0, 0.0), (100.0, 200.0)])
+def test_proofs_name_places_where_they_lie(corner: tuple[float, float]) -> None:
+    x, y = corner
+    document = {
+        "format": 1,
+        "name": "turned",
+        "bounds": [x, y, x + 30.0, y + 15.0],
+        "obstacles": [
+            {
+                "id": name,
+                "polygon": [
+                    [x + 15.0, y + low],
+                    [x + 15.5, y + low],
+                    [x + 15.5, y + high],
+                    [x + 15.0, y + high],
+                ],
+            }
+            for name, low, high in (("south", 0.0, 4.0), ("north", 5.0, 15.0))
+        ],
+        "goals": [{"id": "g", "circle": {"center": [x + 5.0, y + 7.0], "radius": 1}}],
+        "robots": [{"id": "r1", "model": "car", "pose": [x + 25.0, y + 12.0, 3.1]}],
+    }
+    result = plan_mission(scene_from_document(document, source="turned"))
+    assert result.status is PlanStatus.INFEASIBLE
+    assert f"1.00 m wide near ({x + 15.2:.1f}, {y + 4.5:.1f})" in result.reason
+
+
+def test_a_region_that_is_narrow_itself_is_named() -> None:
+    scene = gap(12.0)
+    edge = replace(scene.goals[0].region, center=(24.5, 9.0))
+    goal = replace(scene.goals[0], region=edge)
+    result = plan_mission(replace(scene, goals=(goal,)))
+    assert result.plan is None
+    place = result.reason.split("near (")[1].split(",")[0]
+    assert float(place) > 22.0, result.reason

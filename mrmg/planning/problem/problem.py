@@ -282,13 +282,12 @@ def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
     return _opened(scene, seed, params, openings) if openings else problem
 
 
-def tightened(scene: Scene, seed: int, params: PlannerParams) -> Problem | None:
-    """Return the problem with the certified minimum in all narrow ground, if any is.
+def tightened(scene: Scene, seed: int, params: PlannerParams) -> Problem:
+    """Return the problem with the certified minimum in all narrow ground.
 
     Where robots have to turn they may need it though they get through without.
     """
-    openings = tightest_openings(scene, params.margins)
-    return _opened(scene, seed, params, openings) if openings else None
+    return _opened(scene, seed, params, tightest_openings(scene, params.margins))
 
 
 def _opened(
