@@ -228,7 +228,7 @@ def _obstacle(problem: Problem, request: Request, search: Search) -> str:
         seeding.stream_seed(seed, "meeting"),
     )
     blocked = [search.blocked] if search.blocked else []
-    if any(routing.tours) or not blocked:
+    if any(routing.tours) or any(r.finish for r in scene.robots) or not blocked:
         blocked.append(narrowest_meeting(problem, routing.tours))
     return endings.NO_PROGRESS.format(blocked="; ".join(blocked), searched=searched)
 

@@ -17,7 +17,7 @@ MAX_LISTED = 8
 
 GOAL_CUT_OFF = (
     "goal {goal} is unreachable: for every robot it is cut off from the start by "
-    "obstacles with no gap as wide as the robot{gap}"
+    "obstacles, or ground too steep, with no gap as wide as the robot{gap}"
 )
 GOAL_OUT_OF_ENERGY = (
     "goal {goal} is out of energy's reach: even on the shortest path, over every "
@@ -25,8 +25,8 @@ GOAL_OUT_OF_ENERGY = (
     "{missing} above its reserve"
 )
 FINISH_CUT_OFF = (
-    "the finish of {robot} is unreachable: it is cut off from the start by obstacles "
-    "with no gap as wide as the robot{gap}"
+    "the finish of {robot} is unreachable: it is cut off from the start by "
+    "obstacles, or ground too steep, with no gap as wide as the robot{gap}"
 )
 FINISH_OUT_OF_ENERGY = (
     "the finish of {robot} is out of energy's reach: even on the shortest path, over "

@@ -148,7 +148,10 @@ def bottleneck(
         return None
     wider_m = widest_m + 4.0 * WIDTH_ACCURACY_M
     places = ground.narrows(start, wanted, widest_m, wider_m)
-    place = places[0].representative_point() if places else start
+    if places:
+        place = places[0].representative_point()
+    else:  # what is narrow is the region itself
+        place = shapely.Point(shapely.shortest_line(wanted, start).coords[0])
     return Bottleneck(2.0 * widest_m, place.x, place.y)
 
 
