@@ -278,7 +278,7 @@ def test_classes_table_faults(
             "must be 'obstacle', or a mapping with keys multiplier, turning",
         ),
         ("1: {speed: 2}\n", "unknown key; known keys: multiplier, turning"),
-        ("1: {multiplyer: 2}\n", "did you mean 'multiplier'?"),
+        ("1: {multipliers: 2}\n", "did you mean 'multiplier'?"),
     ):
         table.write_text(text)
         assert main([*command, "--classes", str(table), "-o", str(out)]) == 3

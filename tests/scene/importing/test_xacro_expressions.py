@@ -69,6 +69,13 @@ def tried(path: Path, folder: Path) -> str:
     return str(caught.value)
 
 
+def test_the_module_stays_as_it_is_for_everybody_else(tmp_path: Path) -> None:
+    xacro = pytest.importorskip("xacro")
+    before = dict(vars(xacro))
+    tried(written(tmp_path, '<x y="${().__class__}"/>'), tmp_path)
+    assert vars(xacro) == before
+
+
 @pytest.mark.parametrize("expression", HARMFUL)
 def test_harmful_expressions(expression: str, tmp_path: Path) -> None:
     text = expression.replace("{ran}", str(tmp_path / "ran")).replace("<", "&lt;")

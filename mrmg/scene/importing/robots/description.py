@@ -21,10 +21,7 @@ import numpy as np
 
 from mrmg.errors import Fault, SceneError
 from mrmg.extras import import_extra
-from mrmg.scene.importing.robots.expressions import (
-    ExpressionError,
-    guarded_expressions,
-)
+from mrmg.scene.importing.robots.expressions import ExpressionError, guarded
 from mrmg.scene.loading.mjcf import no_warning_file
 from mrmg.scene.loading.yaml_text import read_text
 
@@ -120,12 +117,9 @@ def _expanded(path: Path, arguments: Mapping[str, str]) -> str:
     xacro = import_extra("xacro", extra="ros", purpose="expands macros of descriptions")
     said = io.StringIO()
     try:
-        with (
-            contextlib.redirect_stderr(said),
-            _packages_beside(path.parent),
-            guarded_expressions(xacro),
-        ):
-            document = xacro.process_file(str(path), mappings=dict(arguments))
+        with contextlib.redirect_stderr(said), _packages_beside(path.parent):
+            own = guarded(xacro)
+            document = own.process_file(str(path), mappings=dict(arguments))
     except Exception as error:  # xacro raises what the expressions in a file raise
         cause = _cause(error)
         if isinstance(cause, ExpressionError):

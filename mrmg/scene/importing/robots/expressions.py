@@ -8,11 +8,11 @@ evaluates it, after xacro has put it together from properties and arguments.
 from __future__ import annotations
 
 import ast
-import contextlib
+import importlib.util
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from types import ModuleType
 from typing import Any
-from unittest import mock
 
 ALLOWED = (
     "allowed are numbers, text, names, lists, arithmetic, comparisons, conditions and "
@@ -49,19 +49,23 @@ class ExpressionError(ValueError):
         )
 
 
-@contextlib.contextmanager
-def guarded_expressions(xacro: Any) -> Iterator[None]:
-    """Refuse expressions that could run code, while xacro expands a file.
+def guarded(xacro: ModuleType) -> Any:
+    """Return a copy of the module xacro that refuses expressions that could run code.
 
-    `safe_eval` and `eval_extension` are the two functions through which all of xacro's
-    evaluations pass; a version without them is an AttributeError, not unguarded.
+    All evaluations pass through two of its functions, which the copy replaces; the
+    module itself stays as it is for everybody else.
 
-    Args:
-        xacro: the module.
+    Raises:
+        AttributeError: if a version of xacro does not have these functions.
     """
-    evaluate, extend = xacro.safe_eval, xacro.eval_extension
+    spec = xacro.__spec__
+    assert spec is not None
+    assert spec.loader is not None
+    own = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(own)
+    evaluate, extend = own.safe_eval, own.eval_extension
 
-    def guarded(expression: str, *names: Any) -> Any:
+    def guarded_evaluation(expression: str, *names: Any) -> Any:
         require_harmless(expression)
         value = evaluate(expression, *names)
         # A property that held a function could be called by an allowed name.
@@ -75,11 +79,8 @@ def guarded_expressions(xacro: Any) -> Iterator[None]:
             require_harmless(command.removeprefix("eval"))
         return extend(text)
 
-    with (
-        mock.patch.object(xacro, "safe_eval", guarded),
-        mock.patch.object(xacro, "eval_extension", guarded_extension),
-    ):
-        yield
+    vars(own).update(safe_eval=guarded_evaluation, eval_extension=guarded_extension)
+    return own
 
 
 def require_harmless(expression: str) -> None:
