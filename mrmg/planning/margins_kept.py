@@ -27,7 +27,8 @@ def with_least_spacing(scene: Scene, margins: Margins) -> Scene:
     robots = []
     for robot in scene.robots:
         obstacle_m, robot_m = margins_of(robot, margins)
-        robot_m = min(robot_m, 2.0 * certified_minimum_m(robot.model))
+        if len(scene.robots) > 1:
+            robot_m = min(robot_m, 2.0 * certified_minimum_m(robot.model))
         own = Margins(obstacle_m=obstacle_m, robot_m=robot_m)
         robots.append(replace(robot, margins=own))
     return replace(scene, robots=tuple(robots))

@@ -266,11 +266,12 @@ class _Planning:
             return with_least_spacing(self.scene, self.params.margins)
 
         @cache
-        def tight() -> Problem:
+        def tight() -> Problem | None:
             near = with_least_spacing(problem.scene, self.params.margins)
             bare = replace(self.params, obstacle_margin_m=None, robot_margin_m=None)
-            problem_near = tightened(near, self.request.seed, bare)
-            return replace(problem_near, scene=problem.scene)  # plans are of this one
+            tighter = tightened(near, self.request.seed, bare)
+            # Plans are of the scene as it is.
+            return tighter and replace(tighter, scene=problem.scene)
 
         def proof(tours_missing: bool, goes_on: bool) -> str | None:
             missing = tours_missing or math.isinf(self.statistics.bounds.energy_J or 0)
@@ -292,12 +293,14 @@ class _Planning:
         )
 
     def _tried_tightly(
-        self, failed: Attempt, problem: Problem, request: Request
+        self, failed: Attempt, problem: Problem | None, request: Request
     ) -> Attempt:
-        """Return an attempt that keeps the least margins, where ground is narrow.
+        """Return an attempt that keeps the least margins, if there are any.
 
         It follows one that has found no plan with the margins that are wanted.
         """
+        if problem is None:
+            return failed
         found = self.planner(problem, request)
         return replace(
             found,

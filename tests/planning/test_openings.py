@@ -205,6 +205,8 @@ def test_narrow_corners_are_turned_in_with_the_certified_minimum() -> None:
     plan = planned(scene, params=PlannerParams(trees=1))
     assert verify(scene, plan).ok
     assert min(passage.margin_m for passage in plan.narrow) < 0.1
+    kept = kept_margins(scene.robots[0])
+    assert plan.margins == {"r1": (kept.obstacle_m, kept.robot_m)}
 
 
 def test_passages_are_named_with_place_and_width() -> None:

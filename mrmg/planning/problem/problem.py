@@ -282,12 +282,15 @@ def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
     return _opened(scene, seed, params, openings) if openings else problem
 
 
-def tightened(scene: Scene, seed: int, params: PlannerParams) -> Problem:
+def tightened(scene: Scene, seed: int, params: PlannerParams) -> Problem | None:
     """Return the problem with the certified minimum in all narrow ground.
 
-    Where robots have to turn they may need it though they get through without.
+    Where robots have to turn they may need it though they get through without. A robot
+    alone on wide ground has nothing to gain: None.
     """
-    return _opened(scene, seed, params, tightest_openings(scene, params.margins))
+    openings = tightest_openings(scene, params.margins)
+    alone = len(scene.robots) == 1 and not openings
+    return None if alone else _opened(scene, seed, params, openings)
 
 
 def _opened(
