@@ -130,6 +130,17 @@ def course_of(problem: Problem, r: int, path: Path) -> Course:
     )
 
 
+def course_with_rest(
+    problem: Problem, r: int, path: Path, drive: Drive | None
+) -> Course:
+    """Return robot r's path with what is left of it as its drive alone tells."""
+    course = course_of(problem, r, path)
+    if drive is None or len(drive.spent_s) == 0:
+        return course
+    course.node["rest_s"][: len(path.node)] = drive.spent_s[-1] - drive.spent_s
+    return course
+
+
 def empty_path(most: int) -> np.ndarray:
     """Return room for the nodes of a path: `COURSE_NODE`, shape (most,)."""
     node = np.zeros(most, COURSE_NODE)

@@ -1,8 +1,10 @@
 """Motions of a whole fleet along its tours, found robot by robot.
 
 Each robot's motion is found by a search over its own motions (`_search_kernels`), and
-who has priority over whom by a search over the orders of robots (`priorities`). All
-that is found can be driven exactly, and keeps clear at every step.
+who has priority over whom by a search over the orders of robots (`priorities`). Where
+the first round has found none, an order in which robots drive one after the other is
+looked for first (`sequencing`): in dense traffic that is soon there, or soon known to
+be missing. All that is found can be driven exactly, and keeps clear at every step.
 
 What is promised: every plan found keeps all margins. A round of the search ends without
 a plan when no order of the robots has one, with cells as fine and searches as long as
@@ -45,6 +47,7 @@ from mrmg.planning.path_following.coordination.rounds import (
     UNTIMED_SHARE,
     Round,
 )
+from mrmg.planning.path_following.coordination.sequencing import in_sequence
 from mrmg.planning.path_following.coordination.tasks import (
     guided,
     horizon_steps,
@@ -55,7 +58,13 @@ from mrmg.planning.path_following.coordination.traffic import (
     FleetTraffic,
     trajectories_of,
 )
-from mrmg.planning.path_following.tracking import Drive, Motion, course_of, empty_path
+from mrmg.planning.path_following.tracking import (
+    Drive,
+    Motion,
+    course_of,
+    course_with_rest,
+    empty_path,
+)
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.plans import Trajectory
@@ -116,7 +125,7 @@ class _Planning:
         self._problem = problem
         self._tours, self._paths = tours, paths
         self._courses = [
-            _course_with_rest(problem, r, path, drive)
+            course_with_rest(problem, r, path, drive)
             for r, (path, drive) in enumerate(zip(paths, drives, strict=True))
         ]
         self._fields = Fields(problem)
@@ -130,13 +139,13 @@ class _Planning:
             curve=empty_course(MOST_CURVE_NODES),
         )
         self.round = ROUNDS[0]
-        self.nodes, self.most = 0, np.inf
+        self.nodes, self.most, self.horizon = 0, np.inf, horizon
         self._blocked: set[int] = set()
         """Robots whose short search has failed: they are searched for at length."""
         self._answers: dict[tuple[object, ...], Motion | None] = {}
         """Motions found, and None where there was none, by what was asked for."""
         self._known: dict[tuple[int, bytes], Motion] = {}
-        """Motions found, by robot and controls: equal ones are one object, so that
+        """Motions kept, by robot and states: equal ones are one object, so that
         the same question is told by the identities of the motions in it."""
 
     def find(
@@ -158,10 +167,12 @@ class _Planning:
         asked = (r, *options, above.tobytes(), *map(id, motions))
         if asked not in self._answers:
             found = self._found(r, motions, above, yielding)
-            if found is not None:
-                found = self._known.setdefault((r, found.control.tobytes()), found)
-            self._answers[asked] = found
+            self._answers[asked] = None if found is None else self.kept(r, found)
         return self._answers[asked]
+
+    def kept(self, r: int, motion: Motion) -> Motion:
+        """Return a motion of robot r that is kept; equal ones are one object."""
+        return self._known.setdefault((r, motion.state.tobytes()), motion)
 
     def _found(
         self,
@@ -326,20 +337,13 @@ def coordinated(
             if alone is None:
                 return ()
             most = SEARCHES * now.most * robots / len(orders)
-            found = priorities.search_priorities(alone, planning, most, halt)
+            found = None
+            if now is not ROUNDS[0] and order is drawn:
+                found = in_sequence(alone, planning, most, halt)
+            if found is None:
+                found = priorities.search_priorities(alone, planning, most, halt)
             if found is not None:
                 planning.round = replace(now, most=max(now.most, SHORTENING_MOST))
                 found = priorities.shortened(found, alone, planning, halt)
                 return trajectories_of(problem, found)
     return ()
-
-
-def _course_with_rest(
-    problem: Problem, r: int, path: Path, drive: Drive | None
-) -> Course:
-    """Return robot r's path with what is left of it as its drive alone tells."""
-    course = course_of(problem, r, path)
-    if drive is None or len(drive.spent_s) == 0:
-        return course
-    course.node["rest_s"][: len(path.node)] = drive.spent_s[-1] - drive.spent_s
-    return course

@@ -31,10 +31,15 @@ class MotionPlanning(Protocol):
     Attributes:
         nodes: that have been looked at for all motions so far.
         most: nodes after which no motion is found any more.
+        horizon: steps that motions last at most.
     """
 
     nodes: int
     most: float
+    horizon: int
+
+    def kept(self, r: int, motion: Motion) -> Motion:
+        """Return a motion of robot r that is kept; equal ones are one object."""
 
     def find(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import bench_kinodynamic
@@ -12,6 +13,7 @@ import yaml
 
 import mrmg
 from mrmg.planning import plan_mission
+from mrmg.scene.types import Scene
 
 
 @pytest.mark.parametrize(
@@ -22,10 +24,24 @@ def test_robots_change_places(tmp_path: Path, name: str, seed: int) -> None:
 
     In window 1002 one has to turn round before it can set out.
     """
-    rng = np.random.default_rng((list(generate_traffic.CLASSES).index(name), seed))
-    path = tmp_path / f"{name}.yaml"
-    path.write_text(yaml.safe_dump(generate_traffic.CLASSES[name](rng)))
-    scene = bench_kinodynamic.benchmark_scene(path, tmp_path)
+    scene = _generated(tmp_path, name, seed)
     result = plan_mission(scene, params=bench_kinodynamic.PARAMS)
     assert result.plan is not None, result.reason
     assert mrmg.verify(scene, result.plan).ok
+
+
+def test_cars_of_a_dense_yard_get_through_in_the_second_attempt(tmp_path: Path) -> None:
+    """Over priorities this yard is searched for a minute, and more."""
+    scene = _generated(tmp_path, "yard7", 7009)
+    params = replace(bench_kinodynamic.PARAMS, trees=2)
+    result = plan_mission(scene, params=params)
+    assert result.plan is not None, result.reason
+    assert mrmg.verify(scene, result.plan).ok
+
+
+def _generated(folder: Path, name: str, seed: int) -> Scene:
+    """Return the scene that `tools/generate_traffic` makes of a class and a seed."""
+    rng = np.random.default_rng((list(generate_traffic.CLASSES).index(name), seed))
+    path = folder / f"{name}.yaml"
+    path.write_text(yaml.safe_dump(generate_traffic.CLASSES[name](rng)))
+    return bench_kinodynamic.benchmark_scene(path, folder)
