@@ -3,11 +3,13 @@
 An order in which each robot drives once, from where it starts to its end, is a monotone
 plan: M. Stilman, J.-U. Schamburek, J. Kuffner, T. Asfour: Manipulation planning among
 movable obstacles, ICRA 2007. It needs no search in time, so that what leads nowhere
-fails soon. Robots then find motions among those before them in the order as these move,
-and among those after them as they stand. There always is one, to wait until the others
-are through, as in the revised prioritized planning of M. Cap, P. Novak, A. Kleiner,
-M. Selecky: Prioritized planning algorithms for trajectory coordination of multiple
-mobile robots, T-ASE 2015.
+fails soon. Robots then set out as soon as they keep apart from those before them in the
+order as these move, and from those after them as they stand; or they move otherwise
+among these, where that is sooner. Setting out once the others are through is left to
+them all the while, as in the revised prioritized planning of M. Cap, P. Novak,
+A. Kleiner, M. Selecky: Prioritized planning algorithms for trajectory coordination of
+multiple mobile robots, T-ASE 2015; unless another one ends elsewhere than in the order,
+or the steps that motions may last are over. Then there are no motions.
 """
 
 from __future__ import annotations
@@ -42,7 +44,7 @@ def in_sequence(
     planning.most = planning.nodes + most
     drives = _drives(starts, tuple(order), planning, halt, set())
     planning.most = np.inf
-    return None if drives is None else _overlapping(starts, drives, planning)
+    return None if drives is None else _overlapping(starts, drives, planning, halt)
 
 
 def _drives(
@@ -88,7 +90,10 @@ def _standing(r: int, state: np.ndarray, planning: MotionPlanning) -> Motion:
 
 
 def _overlapping(
-    starts: Sequence[Motion], drives: dict[int, Motion], planning: MotionPlanning
+    starts: Sequence[Motion],
+    drives: dict[int, Motion],
+    planning: MotionPlanning,
+    halt: np.ndarray,
 ) -> tuple[Motion, ...] | None:
     """Return motions of robots that set out as soon as they keep apart.
 
@@ -96,11 +101,12 @@ def _overlapping(
         starts: motions that lead nowhere, from where robots start.
         drives: of each robot, in the order in which they get through.
         planning: finds motions.
+        halt: shape (1,); it ends soon after it has turned true.
     """
     motions = list(starts)
     for r, drive in drives.items():
         through = max(len(motion.control) for motion in motions)
-        if through + len(drive.control) > planning.horizon:
+        if halt[0] or through + len(drive.control) > planning.horizon:
             return None
         for delay in np.linspace(0, through, DELAYS).astype(int):
             motions[r] = planning.kept(r, _delayed(drive, delay))

@@ -52,12 +52,7 @@ class Grid:
         return way[::-1]
 
     def find(
-        self,
-        r: int,
-        motions: Sequence[Motion],
-        above: np.ndarray,
-        *,
-        yielding: bool = False,
+        self, r: int, motions: Sequence[Motion], above: np.ndarray, **_: bool
     ) -> Motion | None:
         """Return a motion where those above never are."""
         self.nodes += 1
@@ -165,3 +160,18 @@ def test_a_horizon_is_kept() -> None:
     grid.start, grid.end = [(5, 0), (0, 0)], [(19, 0), (14, 0)]
     grid.horizon = 25
     assert in_sequence(from_starts(grid), grid, np.inf, np.zeros(1, bool)) is None
+
+
+def test_halted_after_the_order_is_found_it_finds_nothing() -> None:
+    """A large fleet takes long to set out."""
+    grid = Grid(0)
+    grid.free = {(x, 0) for x in range(20)}
+    grid.start, grid.end = [(5, 0), (0, 0)], [(19, 0), (14, 0)]
+    halt = np.zeros(1, bool)
+
+    def conflicts(r: int, motions: Sequence[Motion]) -> np.ndarray:
+        halt[0] = True
+        return np.full(len(motions), np.inf)
+
+    grid.conflicts = conflicts  # type: ignore[method-assign]
+    assert in_sequence(from_starts(grid), grid, np.inf, halt) is None
