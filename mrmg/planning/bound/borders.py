@@ -23,23 +23,33 @@ def border(region: Region) -> np.ndarray:
 
     They lie in the middles of equal parts, whose number is a multiple of ARCS.
     """
+    parts = max(1, int(np.ceil(_length_m(region) / SPACING_M / ARCS)))
+    return _middles(region, ARCS * parts)
+
+
+def arc_middles(region: Region) -> np.ndarray:
+    """Return the middles of arcs, on the border itself, shape (K, 2)."""
+    return _middles(region, ARCS)
+
+
+def _middles(region: Region, count: int) -> np.ndarray:
+    """Return the middles of equal parts of a border, shape (count, 2)."""
+    share = (np.arange(count) + 0.5) / count
     if len(region.corners):
-        ring = region.shape.exterior
-        share = _middles(ring.length)
-        return np.asarray(
-            shapely.get_coordinates(
-                shapely.line_interpolate_point(ring, share, normalized=True)
-            )
+        points = shapely.line_interpolate_point(
+            region.shape.exterior, share, normalized=True
         )
-    angle = 2.0 * np.pi * _middles(2.0 * np.pi * region.radius_m)
+        return np.asarray(shapely.get_coordinates(points))
+    angle = 2.0 * np.pi * share
     ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     return np.asarray(region.center + region.radius_m * ring)
 
 
-def _middles(length_m: float) -> np.ndarray:
-    """Return the middles of equal parts of a border, as shares of its length."""
-    count = ARCS * max(1, int(np.ceil(length_m / SPACING_M / ARCS)))
-    return (np.arange(count) + 0.5) / count
+def _length_m(region: Region) -> float:
+    """Return the length of a region's border [m]."""
+    if len(region.corners):
+        return float(region.shape.length)
+    return 2.0 * np.pi * region.radius_m
 
 
 def distances_m(regions: Sequence[Region]) -> np.ndarray:
@@ -78,25 +88,9 @@ def chords(region: Region) -> tuple[np.ndarray, np.ndarray]:
     return np.array([line[[0, -1]] for line in lines]), off_m
 
 
-def arc_middles(region: Region) -> np.ndarray:
-    """Return the middles of arcs, on the border itself, shape (K, 2)."""
-    if len(region.corners):
-        share = (np.arange(ARCS) + 0.5) / ARCS
-        points = shapely.line_interpolate_point(
-            region.shape.exterior, share, normalized=True
-        )
-        return np.asarray(shapely.get_coordinates(points))
-    angle = 2.0 * np.pi * (np.arange(ARCS) + 0.5) / ARCS
-    ring = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return np.asarray(region.center + region.radius_m * ring)
-
-
 def half_arc_m(region: Region) -> float:
     """Return half the length of an arc [m]."""
-    length_m = (
-        region.shape.length if len(region.corners) else 2.0 * np.pi * region.radius_m
-    )
-    return 0.5 * float(length_m) / ARCS
+    return 0.5 * _length_m(region) / ARCS
 
 
 def sagitta_m(region: Region) -> float:
