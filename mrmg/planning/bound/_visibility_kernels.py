@@ -55,40 +55,6 @@ class Cells(NamedTuple):
 
 
 @kernel
-def even_about(price):
-    """Return how many cells about each one, to all sides, have its price, shape (Y, X).
-
-    A distance transform by two sweeps (Rosenfeld and Pfaltz, Distance functions on
-    digital pictures, Pattern Recognition 1, 1968).
-    """
-    rows, columns = price.shape
-    even = np.full((rows, columns), rows + columns, np.int32)
-    for row in range(rows):
-        for column in range(columns):
-            for to in range(max(row - 1, 0), min(row + 2, rows)):
-                for side in range(max(column - 1, 0), min(column + 2, columns)):
-                    if price[to, side] != price[row, column]:
-                        even[row, column] = 0
-    for row in range(rows):
-        for column in range(columns):
-            _spread_from(even, row, column, row - 1, column - 1)
-    for row in range(rows - 1, -1, -1):
-        for column in range(columns - 1, -1, -1):
-            _spread_from(even, row, column, row + 1, column + 1)
-    return even
-
-
-@kernel
-def _spread_from(even, row, column, beside_row, beside_column):
-    """Lower a cell's distance by those of a row beside it and of a cell in its own."""
-    if 0 <= beside_row < even.shape[0]:
-        for side in range(max(column - 1, 0), min(column + 2, even.shape[1])):
-            even[row, column] = min(even[row, column], even[beside_row, side] + 1)
-    if 0 <= beside_column < even.shape[1]:
-        even[row, column] = min(even[row, column], even[row, beside_column] + 1)
-
-
-@kernel
 def straight_costs(cells, first, second):
     """Return the least cost of straight pieces between places, shape (n, m).
 
