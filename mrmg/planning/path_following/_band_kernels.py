@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
+from mrmg.planning.problem._target_kernels import Targets
 
 SOFT_TURN = 0.05
 """Angle below which the scrub of turning is rounded off [rad]."""
@@ -66,18 +67,15 @@ class Stops(NamedTuple):
     """The targets at a path's nodes.
 
     Attributes:
+        targets: all targets.
         node: number of the node, increasing, shape (S,).
-        center, reach: circle about each region, shapes (S, 2) and (S,).
-        corner: padded corners of polygons, counter-clockwise, shape (S, M, 2).
-        corners: number of corners; 0 for a circle, shape (S,).
+        target: number of the target there, shape (S,).
         deeper: how deep the node is to lie inside [m], shape (S,).
     """
 
+    targets: Targets
     node: np.ndarray
-    center: np.ndarray
-    reach: np.ndarray
-    corner: np.ndarray
-    corners: np.ndarray
+    target: np.ndarray
     deeper: np.ndarray
 
 
@@ -102,11 +100,12 @@ class Shape(NamedTuple):
 
 
 @kernel
-def value_and_slope(grid, x_min, y_min, cell, x, y):
-    """Return (value, d/dx, d/dy) of a grid of cell values, bilinear."""
+def value_and_slope(cost_map, grid, x, y):
+    """Return (value, d/dx, d/dy) of one of a cost map's grids, bilinear."""
     rows, columns = grid.shape
-    fx = (x - x_min) / cell - 0.5
-    fy = (y - y_min) / cell - 0.5
+    cell = cost_map.cell
+    fx = (x - cost_map.x_min) / cell - 0.5
+    fy = (y - cost_map.y_min) / cell - 0.5
     column = min(max(int(floor(fx)), 0), columns - 2)
     row = min(max(int(floor(fy)), 0), rows - 2)
     fx = min(1.0, max(0.0, fx - column))
@@ -122,19 +121,20 @@ def value_and_slope(grid, x_min, y_min, cell, x, y):
 @kernel
 def outside(stops, i, x, y):
     """Return (distance outside a stop's region, drawn in, d/dx, d/dy); 0 inside."""
-    if stops.corners[i] == 0:
-        dx, dy = x - stops.center[i, 0], y - stops.center[i, 1]
+    t = stops.target[i]
+    region, corner = stops.targets.target[t], stops.targets.corner[t]
+    if region.corners == 0:
+        dx, dy = x - region.center[0], y - region.center[1]
         far = hypot(dx, dy)
-        off = far - stops.reach[i] + stops.deeper[i]
+        off = far - region.reach + stops.deeper[i]
         return (off, dx / far, dy / far) if off > 0.0 else (0.0, 0.0, 0.0)
     worst, nx, ny = 0.0, 0.0, 0.0
-    n = stops.corners[i]
+    n = region.corners
     for k in range(n):
         j = k + 1 if k + 1 < n else 0
-        ex = stops.corner[i, j, 0] - stops.corner[i, k, 0]
-        ey = stops.corner[i, j, 1] - stops.corner[i, k, 1]
+        ex, ey = corner[j, 0] - corner[k, 0], corner[j, 1] - corner[k, 1]
         size = hypot(ex, ey)
-        ox, oy = x - stops.corner[i, k, 0], y - stops.corner[i, k, 1]
+        ox, oy = x - corner[k, 0], y - corner[k, 1]
         off = (ey * ox - ex * oy) / size + stops.deeper[i]
         if off > worst:
             worst, nx, ny = off, ey / size, -ex / size
@@ -181,29 +181,15 @@ def density_at(cost_map, x, y, tx, ty, gear):
         tx, ty: unit vector along the path there.
         gear: 1 or -1.
     """
-    density, gx, gy = value_and_slope(
-        cost_map.multiplier, cost_map.x_min, cost_map.y_min, cost_map.cell, x, y
-    )
-    across = 0.0
+    density, gx, gy = value_and_slope(cost_map, cost_map.multiplier, x, y)
+    across, distance = 0.0, cost_map.distance
     middle = 0.5 * (cost_map.disc[0] + cost_map.disc[-1]) * gear
-    free, _, _ = value_and_slope(
-        cost_map.distance,
-        cost_map.x_min,
-        cost_map.y_min,
-        cost_map.cell,
-        x + middle * tx,
-        y + middle * ty,
-    )
+    free, _, _ = value_and_slope(cost_map, distance, x + middle * tx, y + middle * ty)
     wide = free > cost_map.room + cost_map.disc[-1] - cost_map.disc[0]
     for j in range(0 if wide else len(cost_map.disc)):
         ahead = cost_map.disc[j] * gear
         free, fx, fy = value_and_slope(
-            cost_map.distance,
-            cost_map.x_min,
-            cost_map.y_min,
-            cost_map.cell,
-            x + ahead * tx,
-            y + ahead * ty,
+            cost_map, distance, x + ahead * tx, y + ahead * ty
         )
         lack = cost_map.room - free
         if lack > 0.0:

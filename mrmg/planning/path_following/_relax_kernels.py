@@ -77,7 +77,7 @@ def relax(cost_map, stops, p, gear, pivot, nose, rounds):
     """Let a path slip into the nearest minimum of its cost; return the cost.
 
     Args:
-        surface, stops: what it is priced on and must pass.
+        cost_map, stops: what it is priced on and must pass.
         p: nodes, the first one fixed; changed in place, shape (n, 2).
         gear: of each segment, 1 or -1, shape (n - 1,).
         pivot: whether the robot turns on the spot before it, shape (n - 1,).

@@ -241,7 +241,7 @@ def _relaxed(
         pivot[path.pivot[path.pivot < len(pivot)]] = True
         cost = _relax_kernels.relax(
             cost_map,
-            stops_of(targets, path),
+            Stops(targets, path.stop, path.target, path.deeper),
             node,
             path.gear,
             pivot,
@@ -252,15 +252,3 @@ def _relaxed(
         if cost > (1.0 - LEAST_GAIN) * before:
             break
     return respaced(path, spacing_m), float(cost)
-
-
-def stops_of(targets: Targets, path: Path) -> Stops:
-    """Return a path's targets, drawn in by what tracking may be off."""
-    return Stops(
-        node=path.stop,
-        center=targets.target["center"][path.target],
-        reach=targets.target["reach"][path.target],
-        corner=targets.corner[path.target],
-        corners=targets.target["corners"][path.target],
-        deeper=path.deeper,
-    )

@@ -72,7 +72,7 @@ def path_curvature(robot: np.ndarray) -> float:
 
 
 def inflated(cost_map: CostMap, place: np.ndarray) -> CostMap:
-    """Return the surface with obstacles counted as nearer around a place."""
+    """Return the cost map with obstacles counted as nearer around a place."""
     distance = cost_map.distance.copy()
     x, y = (
         least + (np.arange(count) + 0.5) * cost_map.cell - at

@@ -10,6 +10,7 @@ import pytest
 
 from mrmg.planning.path_following import _band_kernels, _relax_kernels
 from mrmg.planning.path_following._band_kernels import CostMap, Stops
+from mrmg.planning.problem._target_kernels import TARGET, Targets
 
 
 def cost_map(**changes: Any) -> CostMap:
@@ -33,12 +34,13 @@ def cost_map(**changes: Any) -> CostMap:
 def stops(*circles: tuple[int, float, float, float], deeper: float = 0.0) -> Stops:
     """Return circular targets, each (node, x, y, radius)."""
     n = len(circles)
+    target = np.zeros(n, TARGET).view(np.recarray)
+    for i, (_, x, y, radius) in enumerate(circles):
+        target[i]["center"], target[i]["reach"] = (x, y), radius
     return Stops(
+        targets=Targets(n, n, np.zeros(0, np.int64), target, np.zeros((n, 3, 2))),
         node=np.array([c[0] for c in circles], np.int64),
-        center=np.array([c[1:3] for c in circles], float).reshape(-1, 2),
-        reach=np.array([c[3] for c in circles], float),
-        corner=np.zeros((n, 3, 2)),
-        corners=np.zeros(n, np.int64),
+        target=np.arange(n),
         deeper=np.full(n, deeper),
     )
 
@@ -66,8 +68,8 @@ def test_gradient_is_that_of_the_cost(seed: int) -> None:
         distance=5.0 * rng.random((80, 80)), multiplier=1.0 + rng.random((80, 80))
     )
     marks = stops((4, 5.0, 5.0, 0.5), (9, 9.0, 9.0, 0.4), deeper=0.1)
-    marks.corner[1] = [[8, 8], [9, 8], [8.5, 9]]
-    marks.corners[1] = 3
+    marks.targets.corner[1] = [[8, 8], [9, 8], [8.5, 9]]
+    marks.targets.target[1]["corners"] = 3
     p = 3.0 + np.cumsum(0.4 + 0.8 * rng.random((n, 2)), axis=0)
     gear = np.where(np.arange(n - 1) < 6, 1, -1)
     _, gradient = cost(ground, marks, p, gear)
