@@ -145,15 +145,9 @@ def footprint_is_clear(space, placed, cx, cy, radius, margin):
         return True
     if bound + 1.5 * space.cell < 0.0:
         return False
-    column = int(floor((cx - space.x_min) / space.bucket))
-    row = int(floor((cy - space.y_min) / space.bucket))
-    if (
-        column < 0
-        or row < 0
-        or column >= space.bucket_columns
-        or row >= space.bucket_rows
-    ):
-        return False
+    # The grid of cells may reach beyond that of buckets.
+    column = min(int((cx - space.x_min) / space.bucket), space.bucket_columns - 1)
+    row = min(int((cy - space.y_min) / space.bucket), space.bucket_rows - 1)
     b = row * space.bucket_columns + column
     raised = 0.0
     if space.allowance.shape[0] > 0:

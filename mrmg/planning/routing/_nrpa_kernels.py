@@ -108,15 +108,6 @@ def new_fleet(problem):
 
 
 @kernel
-def goals_to_visit(problem):
-    """Return the number of open goals."""
-    left = 0
-    for g in range(problem.goals):
-        left += problem.open_goal[g]
-    return left
-
-
-@kernel
 def legal_moves(problem, fleet, left, moves):
     """Write the legal moves (robot * T + target) into `moves`; return their number.
 
@@ -192,29 +183,22 @@ def ending_cost(problem, fleet, spent):
 
 
 @kernel
-def move_bias(problem, scale, r, place, t, energy):
-    """Return the logit of a move before any learning: near targets first.
-
-    Stations are unattractive while the battery is full and attractive when it is low.
-    """
-    bias = -problem.cost[r, place, t] / scale
-    if t >= problem.goals:
-        bias += 2.0 - 5.0 * energy / problem.capacity[r]
-    return bias
-
-
-@kernel
 def move_weights(problem, policy, scale, fleet, moves, n, weight):
-    """Write the moves' unnormalised probabilities into `weight`; return their sum."""
+    """Write the moves' unnormalised probabilities into `weight`; return their sum.
+
+    Before any learning near targets come first. Stations are unattractive while the
+    battery is full and attractive when it is low.
+    """
     targets = problem.cost.shape[2]
     top = -np.inf
     for i in range(n):
         r = moves[i] // targets
         t = moves[i] % targets
         place = fleet.place[r]
-        weight[i] = policy[r, place, t] + move_bias(
-            problem, scale, r, place, t, fleet.energy[r]
-        )
+        bias = -problem.cost[r, place, t] / scale
+        if t >= problem.goals:
+            bias += 2.0 - 5.0 * fleet.energy[r] / problem.capacity[r]
+        weight[i] = policy[r, place, t] + bias
         top = max(top, weight[i])
     mass = 0.0
     for i in range(n):
@@ -230,7 +214,7 @@ def playout(problem, policy, scale, random, sequence):
     fleet = new_fleet(problem)
     moves = np.empty(robots * targets, np.int64)
     weight = np.empty(robots * targets, np.float64)
-    left = goals_to_visit(problem)
+    left = problem.open_goal.sum()
     total = 0.0
     length = 0
     while left > 0 and length < len(sequence):
@@ -259,7 +243,7 @@ def adapt(problem, policy, scale, alpha, sequence, length):
     fleet = new_fleet(problem)
     moves = np.empty(robots * targets, np.int64)
     weight = np.empty(robots * targets, np.float64)
-    left = goals_to_visit(problem)
+    left = problem.open_goal.sum()
     for k in range(length):
         n = legal_moves(problem, fleet, left, moves)
         mass = move_weights(problem, before, scale, fleet, moves, n, weight)

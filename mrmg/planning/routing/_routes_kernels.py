@@ -153,20 +153,6 @@ def objective(legs, routes):
 
 
 @kernel
-def two_longest(routes):
-    """Return the longest time of a route [s], whose it is, and the second longest."""
-    longest = second = 0.0
-    robot = -1
-    for r in range(len(routes.length) - 1):
-        time = routes.known[r, TIME]
-        if robot < 0 or time > longest:
-            longest, second, robot = time, longest, r
-        else:
-            second = max(second, time)
-    return longest, robot, second
-
-
-@kernel
 def bound_places(legs, routes, labels, goal, random, blink, balance):
     """Return what a goal adds at least where no more stations are needed, and where.
 
@@ -294,10 +280,10 @@ def surcharge(legs, routes, labels, where, goal, ceiling):
         ceiling: what it adds counts as inf unless it is below.
     """
     r, i = where
-    own, n = routes.goal[r], routes.length[r]
-    longest, last_robot, second = two_longest(routes)
-    if r == last_robot:
-        longest = second
+    own, n, longest = routes.goal[r], routes.length[r], 0.0
+    for other in range(len(legs.robot)):
+        if other != r:
+            longest = max(longest, routes.known[other, TIME])
     before = route_value(legs, routes.known[r, COST], routes.known[r, TIME], longest)
     front = row_of(legs, r, own, n, 0, i), place_at(legs, r, own, n, 0, i)
     k = n - i
