@@ -31,12 +31,15 @@ class Guide(NamedTuple):
         turning: what turning costs beside that with each of BEARINGS, a full turn
             divided by their number apart, [s], shape (L, BEARINGS, ny, nx); (0, ...) if
             it is not known.
+        x_min, y_min: corner of the grid [m].
         cell: side of a cell [m].
         layer: steps that a layer of time lasts.
     """
 
     field: np.ndarray
     turning: np.ndarray
+    x_min: float
+    y_min: float
     cell: float
     layer: int
 
@@ -272,10 +275,15 @@ def add_region(targets, t, x_min, y_min, cell, region):
 
 
 @kernel
-def field_at(field, x_min, y_min, cell, x, y):
-    """Return a field at a point: bilinear, of the cells around it that have a value."""
+def guide_at(guide, leg, step, x, y):
+    """Return the cost-to-go of a point on a leg at a step [s].
+
+    It is bilinear, of the cells around the point that have a value.
+    """
+    field = guide.field[leg, min(step // guide.layer, guide.field.shape[1] - 1)]
     rows, columns = field.shape
-    fx, fy = (x - x_min) / cell - 0.5, (y - y_min) / cell - 0.5
+    fx = (x - guide.x_min) / guide.cell - 0.5
+    fy = (y - guide.y_min) / guide.cell - 0.5
     column = min(max(int(floor(fx)), 0), columns - 1)
     row = min(max(int(floor(fy)), 0), rows - 1)
     u, v = min(1.0, max(0.0, fx - column)), min(1.0, max(0.0, fy - row))
@@ -291,18 +299,12 @@ def field_at(field, x_min, y_min, cell, x, y):
 
 
 @kernel
-def guide_at(guide, leg, step, x_min, y_min, x, y):
-    """Return the cost-to-go of a point on a leg at a step [s]."""
-    layer = min(step // guide.layer, guide.field.shape[1] - 1)
-    return field_at(guide.field[leg, layer], x_min, y_min, guide.cell, x, y)
-
-
-@kernel
-def turning_at(guide, leg, x_min, y_min, state):
+def turning_at(guide, leg, state):
     """Return what turning costs from a state on beside the cost-to-go [s]."""
     rows, columns = guide.turning.shape[2], guide.turning.shape[3]
-    column = min(max(int(floor((state[0] - x_min) / guide.cell)), 0), columns - 1)
-    row = min(max(int(floor((state[1] - y_min) / guide.cell)), 0), rows - 1)
+    column = int(floor((state[0] - guide.x_min) / guide.cell))
+    row = int(floor((state[1] - guide.y_min) / guide.cell))
+    column, row = min(max(column, 0), columns - 1), min(max(row, 0), rows - 1)
     place = state[2] / (2.0 * pi) * BEARINGS
     low = int(floor(place))
     share = place - low

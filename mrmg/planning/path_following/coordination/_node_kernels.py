@@ -206,28 +206,24 @@ def cost_to_go_s(search, place, state):
     legs = len(task.leg)
     on_path = task.home_along if leg == legs else task.along[leg] < np.inf
     x, y = state[0], state[1]
-    spaces, time_s = search.spaces, 0.0
+    time_s = 0.0
     target = task.leg[leg] if leg < legs else task.finish
     if target >= 0:
-        time_s = guide_at(
-            task.guide, leg, step_number, spaces.x_min, spaces.y_min, x, y
-        )
+        time_s = guide_at(task.guide, leg, step_number, x, y)
     if on_path and segment < search.course.size[0]:
         time_s = along_path_s(search, leg, left, state)
     elif target >= 0:
         known = len(task.guide.turning) > 0
         posed = search.targets.target[target].tolerance < pi
         if known:
-            turn_s = turning_at(task.guide, leg, spaces.x_min, spaces.y_min, state)
-            time_s += TURNING_SHARE * turn_s
+            time_s += TURNING_SHARE * turning_at(task.guide, leg, state)
         if posed and own[0].model == CAR:
             posed_s = posing_time_s(own, search.targets, target, x, y, state[2])
             if leg + 1 < legs or (leg < legs and task.finish >= 0):
                 center = search.targets.target[target].center
                 posed_s += guide_at(
-                    task.guide, leg + 1, step_number, spaces.x_min, spaces.y_min,
-                    center[0], center[1],
-                )  # fmt: skip
+                    task.guide, leg + 1, step_number, center[0], center[1]
+                )
             time_s = max(time_s, posed_s)
         elif posed and not known:
             time_s += posing_time_s(own, search.targets, target, x, y, state[2])

@@ -12,7 +12,6 @@ from mrmg.planning.path_following.coordination._field_kernels import BEARINGS, G
 from mrmg.planning.path_following.coordination._motion_kernels import Traffic
 from mrmg.planning.problem.problem import Problem
 from mrmg.world import _raster_kernels
-from mrmg.world._polygon_kernels import point_in_convex, point_segment_distance
 
 TIGHT_PRICE = 2.0
 """Factor on the cost of a metre where a robot cannot turn round."""
@@ -47,7 +46,7 @@ for it."""
 UNKNOWN = np.zeros((0, 1, 1, 1))
 """What turning costs where that is not known."""
 
-NO_GUIDE = Guide(np.zeros((1, 1, 1, 1)), UNKNOWN, 1e9, 1 << 30)
+NO_GUIDE = Guide(np.zeros((1, 1, 1, 1)), UNKNOWN, 0.0, 0.0, 1e9, 1 << 30)
 """Costs-to-go of those who do without."""
 
 
@@ -64,6 +63,7 @@ class Fields:
         cells = spaces.distance[0].size
         self._coarser = max(1, round((cells / MOST_CELLS) ** 0.5))
         self._cell_m = float(spaces.cell * self._coarser)
+        self._grid = float(spaces.x_min), float(spaces.y_min), self._cell_m
         self._shape = [-(-n // self._coarser) for n in spaces.distance[0].shape]
 
     def static(self, r: int, targets: Sequence[int]) -> Guide:
@@ -72,7 +72,7 @@ class Fields:
         legs = [self._way(r, tuple(targets[i:])) / top for i in range(len(targets))]
         if not legs:
             return NO_GUIDE
-        return Guide(np.stack(legs)[:, None], UNKNOWN, self._cell_m, 1 << 30)
+        return Guide(np.stack(legs)[:, None], UNKNOWN, *self._grid, 1 << 30)
 
     def _layers(self, r: int, traffic: Traffic) -> tuple[int, int]:
         """Return how many steps a layer of time lasts for robot r, and the layers."""
@@ -137,7 +137,7 @@ class Fields:
         way = self._problem.start[r : r + 1, :2]
         if own[0]["model"] != CAR:
             way = self._way_down(r, targets, stood, (price, standing, field))
-        return Guide(field, UNKNOWN, cell_m, layer), way
+        return Guide(field, UNKNOWN, *self._grid, layer), way
 
     def _add_others(
         self,
@@ -156,11 +156,13 @@ class Fields:
             soft_share: cost of a second in conflict with a robot of lower priority.
             penalty: of cells, shape (T, ny, nx).
         """
-        mission, layer_s = self._problem.mission, layer * self._problem.dt_s
-        own, spaces = mission.fleet[r : r + 1], mission.spaces
-        grid = float(spaces.x_min), float(spaces.y_min), self._cell_m
+        own, layer_s = (
+            self._problem.mission.fleet[r : r + 1],
+            layer * self._problem.dt_s,
+        )
+        inner_m = self._problem.scene.robots[r].model.inscribed_radius_m
         _field_kernels.add_others(
-            own, traffic, inner_m(own[0]), grid, layer, soft_share * layer_s, penalty
+            own, traffic, inner_m, self._grid, layer, soft_share * layer_s, penalty
         )
         _add_near_misses(penalty, layer_s)
 
@@ -179,9 +181,7 @@ class Fields:
             stood: layers to stand in each of them, -1 for good.
             costs: of a cell's side, of holding for a layer, and to go.
         """
-        spaces = self._problem.mission.spaces
-        corner = np.array([spaces.x_min, spaces.y_min])
-        here = self._problem.start[r, :2]
+        corner, here = np.array(self._grid[:2]), self._problem.start[r, :2]
         rows, columns = self._shape
         way = np.zeros((len(costs[2][0]) + 2 * len(targets) * (rows + columns), 2), int)
         cell = ((here - corner) // self._cell_m).astype(int)
@@ -291,12 +291,9 @@ class Fields:
 
     def _region(self, targets: Sequence[int]) -> np.ndarray:
         """Return which cells lie in one of some targets, shape (ny, nx)."""
-        mission, region = self._problem.mission, np.zeros(self._shape, bool)
+        places, region = self._problem.mission.targets, np.zeros(self._shape, bool)
         for t in targets:
-            _field_kernels.add_region(
-                mission.targets, t, mission.spaces.x_min, mission.spaces.y_min,
-                self._cell_m, region,
-            )  # fmt: skip
+            _field_kernels.add_region(places, t, *self._grid, region)
         return region
 
 
@@ -318,12 +315,3 @@ def _add_near_misses(penalty: np.ndarray, layer_s: float) -> None:
     last, first = np.minimum(layer + late + 1, len(taken)), np.maximum(layer - late, 0)
     near = (before[last] > before[first]) & ~taken
     penalty[:, ever] += np.where(near, NEAR_MISS_SHARE * layer_s, 0.0)
-
-
-def inner_m(robot: np.ndarray) -> float:
-    """Return how far a robot reaches from its reference point whatever its heading."""
-    corner = robot["corner"][: robot["corners"]]
-    if not point_in_convex(0.0, 0.0, corner):
-        return 0.0
-    sides = zip(corner, np.roll(corner, -1, axis=0), strict=True)
-    return min(float(point_segment_distance(0.0, 0.0, *a, *b)) for a, b in sides)

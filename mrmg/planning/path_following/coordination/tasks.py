@@ -159,9 +159,7 @@ def guided(problem: Problem, r: int, task: Task, path: Path, guide: Guide) -> Ta
     """Return robot r's task with costs-to-go through its targets."""
     rest_s, legs = 0.0, len(task.leg)
     if task.finish >= 0 and not task.home_along:
-        x, y = path.node[-1]
-        spaces = problem.mission.spaces
-        rest_s = guide_at(guide, legs, 0, spaces.x_min, spaces.y_min, x, y)
+        rest_s = guide_at(guide, legs, 0, *path.node[-1])
     later_s = task.later_s + poses_s(problem, r, task, guide)
     return task._replace(guide=guide, rest_s=float(rest_s), later_s=later_s)
 
@@ -172,14 +170,13 @@ def poses_s(problem: Problem, r: int, task: Task, guide: Guide) -> np.ndarray:
     That is the time from pose to pose of targets that follow each other, and that to
     brake and set off at each.
     """
-    targets, spaces = problem.mission.targets, problem.mission.spaces
+    targets = problem.mission.targets
     own = problem.mission.fleet[r : r + 1]
     tour = [*task.leg.tolist(), *([task.finish] if task.finish >= 0 else [])]
     excess_s = np.zeros(len(task.leg) + 1)
 
     def rest_s(leg: int, target: int) -> float:
-        x, y = targets.target["center"][target]
-        return float(guide_at(guide, leg, 0, spaces.x_min, spaces.y_min, x, y))
+        return float(guide_at(guide, leg, 0, *targets.target["center"][target]))
 
     stop_s = float(own[0]["limit"][1] / own[0]["limit"][3])
     for leg, target in enumerate(task.leg):

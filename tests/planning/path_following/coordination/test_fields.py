@@ -70,11 +70,10 @@ def test_turning_is_counted_beside_the_way(
     assert turning.shape[:2] == (1, BEARINGS)
     assert turning.min() >= -1e-9
     guide = fields.static(0, [0])._replace(turning=turning)
-    corner = problem.mission.spaces.x_min, problem.mission.spaces.y_min
 
     def turn_s(theta: float) -> float:
         at = np.array([4.0, 10.0, theta, 0.0, 0.0])
-        return float(_field_kernels.turning_at(guide, 0, *corner, at))
+        return float(_field_kernels.turning_at(guide, 0, at))
 
     assert turn_s(0.0) == pytest.approx(0.0, abs=1e-9)
     assert turn_s(pi / 8) == pytest.approx(pi / 8 / rate)
@@ -111,9 +110,8 @@ def test_costs_to_go_lead_through_gaps_that_are_wide_enough_alone(
     )
     problem = state_mission(scene, 0, PlannerParams(samples=400))
     assert not problem.openings
-    spaces, guide = problem.mission.spaces, Fields(problem).static(0, [0])
+    guide = Fields(problem).static(0, [0])
     top = float(problem.mission.fleet[0]["limit"][1])
-    corner = float(spaces.x_min), float(spaces.y_min)
-    way_m = top * float(_field_kernels.guide_at(guide, 0, 0, *corner, 3.0, 5.0))
+    way_m = top * float(_field_kernels.guide_at(guide, 0, 0, 3.0, 5.0))
     assert (way_m < 2.0 * 9.0) == through
     assert way_m < inf
