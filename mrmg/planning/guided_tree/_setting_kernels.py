@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, sin
+from math import hypot
 from typing import NamedTuple
 
 import numpy as np
 
 from mrmg.compilation import kernel
 from mrmg.planning.problem._target_kernels import Targets
-from mrmg.planning.roadmap._fleet_kernels import Spaces, space_of
+from mrmg.planning.roadmap._fleet_kernels import Spaces, middle_at, space_of
 from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.world._kernels import TerrainGrid, footprint_is_clear
@@ -86,12 +86,8 @@ def collision_free(setting, state, corner, middle):
     for r in range(len(fleet)):
         if not within_limits(fleet[r], state[r]):
             return False
-        x, y, theta = state[r, 0], state[r, 1], state[r, 2]
-        c, s = cos(theta), sin(theta)
-        mx, my = fleet[r].middle[0], fleet[r].middle[1]
-        middle[r, 0] = x + c * mx - s * my
-        middle[r, 1] = y + s * mx + c * my
-        n = fleet[r].corners
+        x, y, theta, n = state[r, 0], state[r, 1], state[r, 2], fleet[r].corners
+        middle[r, 0], middle[r, 1] = middle_at(fleet[r], state[r])
         place_footprint(fleet[r].corner[:n], x, y, theta, corner[r])
         if not footprint_is_clear(
             space_of(setting.spaces, fleet[r].space), corner[r, :n],

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from math import cos, sin
-
 from mrmg.compilation import kernel
-from mrmg.planning.roadmap._fleet_kernels import space_of
+from mrmg.planning.roadmap._fleet_kernels import middle_at, space_of
 from mrmg.world._kernels import clearance_at_least, footprint_is_clear
 from mrmg.world._polygon_kernels import place_footprint
 
@@ -29,11 +27,8 @@ def keeps_clear(own, spaces, state, margin, corner):
     """
     space = space_of(spaces, own[0].space)
     n, radius = own[0].corners, own[0].radius
-    x, y, theta = state[0], state[1], state[2]
-    c, s = cos(theta), sin(theta)
-    cx = x + c * own[0].middle[0] - s * own[0].middle[1]
-    cy = y + s * own[0].middle[0] + c * own[0].middle[1]
+    cx, cy = middle_at(own[0], state)
     if clearance_at_least(space, cx, cy) > radius + margin:
         return True
-    place_footprint(own[0].corner[:n], x, y, theta, corner[:n])
+    place_footprint(own[0].corner[:n], state[0], state[1], state[2], corner[:n])
     return footprint_is_clear(space, corner[:n], cx, cy, radius, margin)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import cos, sin
+
 import numpy as np
 
 from mrmg.compilation import kernel
@@ -42,6 +44,14 @@ FLEET = np.dtype(
 Spaces = FreeSpace
 """The free spaces of a world stacked, as their number is no part of a type: distances,
 bucket starts and allowances have one more axis, edges are numbered through."""
+
+
+@kernel
+def middle_at(robot, state):
+    """Return the middle (x, y) of a robot's footprint in a state [m]."""
+    c, s = cos(state[2]), sin(state[2])
+    mx, my = robot.middle[0], robot.middle[1]
+    return state[0] + c * mx - s * my, state[1] + s * mx + c * my
 
 
 @kernel

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from math import cos, sin
-
 import numpy as np
 
 from mrmg.compilation import kernel
@@ -11,7 +9,7 @@ from mrmg.planning.path_following.coordination._motion_kernels import (
     first_conflict,
 )
 from mrmg.planning.problem._region_kernels import in_region
-from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
+from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS, middle_at
 
 
 @kernel
@@ -25,21 +23,15 @@ def note_motion(fleet, zones, traffic, inside, r, count):
         r: robot.
         count: number of its states.
     """
-    mx, my = fleet[r].middle[0], fleet[r].middle[1]
     traffic.robot[r].last = count - 1
     for k in range(inside.shape[2]):
-        i = min(k, count - 1)
-        x, y, theta = (
-            traffic.pose[r, i, 0],
-            traffic.pose[r, i, 1],
-            traffic.pose[r, i, 2],
-        )
+        pose = traffic.pose[r, min(k, count - 1)]
         if k < count:
-            c, s = cos(theta), sin(theta)
-            traffic.middle[r, k, 0] = x + c * mx - s * my
-            traffic.middle[r, k, 1] = y + s * mx + c * my
+            traffic.middle[r, k, 0], traffic.middle[r, k, 1] = middle_at(fleet[r], pose)
         for zone in range(len(zones.zone)):
-            inside[r, zone, k] = in_region(zones.zone[zone], zones.corner[zone], x, y)
+            inside[r, zone, k] = in_region(
+                zones.zone[zone], zones.corner[zone], pose[0], pose[1]
+            )
 
 
 @kernel

@@ -47,12 +47,6 @@ LEAST_NEARNESS = 0.2
 
 
 @kernel
-def may_end(targets, task, state):
-    """Return whether a robot at rest in a state is where and as it must end."""
-    return task.finish < 0 or at_target(targets, task.finish, state)
-
-
-@kernel
 def brake(own, dt, state, control):
     """Write the braking from state[0] until the robot stands; return the steps."""
     k = 0
@@ -159,19 +153,15 @@ def drive_to(search, target, room, control):
 
 
 @kernel
-def list_all(search, room):
-    """Write which robots are minded at all; return their number."""
-    count = 0
-    for other in range(len(search.traffic.robot)):
-        if search.traffic.robot[other].hard or search.traffic.robot[other].soft:
-            room.near[count] = other
-            count += 1
-    return count
+def list_near(search, room, first, steps):
+    """Write which robots may be met within some steps; return their number.
 
-
-@kernel
-def list_near(search, room, first):
-    """Write which robots may be met within the next motion; return their number."""
+    Args:
+        search: gives the robot and the others.
+        room: its first state is where the robot is; receives the numbers.
+        first: step that it is at.
+        steps: number of the steps.
+    """
     own, traffic, state = search.own, search.traffic, room.state[0]
     count = 0
     for other in range(len(traffic.robot)):
@@ -184,7 +174,7 @@ def list_near(search, room, first):
         )
         reach = 2.0 * own[0].radius + traffic.fleet[other].radius
         reach += max(own[0].spacing, traffic.fleet[other].spacing)
-        if apart < reach + (search.task.steps + 1) * traffic.robot[other].closing:
+        if apart < reach + (steps + 1) * traffic.robot[other].closing:
             room.near[count] = other
             count += 1
     return count
@@ -225,12 +215,10 @@ def passing_cost(search, room, count, first):
 
     That is the cost of conflicts, beside the time it takes.
     """
-    if not clear(
-        search.own, search.spaces, search.zones, search.traffic, room.state, count,
-        first, room.corner,
-    ):  # fmt: skip
+    if not clear(search, room.state, count, first, room.corner):
         return np.inf
-    return conflict_cost(search, room, list_all(search, room), first, count)
+    nears = list_near(search, room, first, count)
+    return conflict_cost(search, room, nears, first, count)
 
 
 @kernel
@@ -239,9 +227,9 @@ def add_end(search, nodes, room, a, motion, count):
 
     Returns whether it may be.
     """
-    first = nodes.node[a].step
+    first, finish = nodes.node[a].step, search.task.finish
     last = room.state[count]
-    if count < 0 or not may_end(search.targets, search.task, last):
+    if count < 0 or (finish >= 0 and not at_target(search.targets, finish, last)):
         return False
     conflict_s = passing_cost(search, room, count, first)
     if not conflict_s < np.inf or blocked_for_good(

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.motion._kernels import USER, copy_numbers, steer_user, step
+from mrmg.motion._kernels import USER, steer_user, step
 from mrmg.planning.path_following._following_kernels import (
     advance,
     track_control,
@@ -29,6 +29,7 @@ from mrmg.planning.problem._control_kernels import (
     stands,
 )
 from mrmg.planning.problem._region_kernels import in_region
+from mrmg.planning.roadmap._fleet_kernels import middle_at
 from mrmg.world._polygon_kernels import convex_distance, place_footprint
 
 BRAKE, HOME, VISIT, STAY, WAIT, TRACK, HOLD, MOVE = range(-5, 3)
@@ -101,23 +102,18 @@ def first_conflict(own, traffic, other, state, count, first, corner):
     n, m = own[0].corners, traffic.fleet[other].corners
     margin = max(own[0].spacing, traffic.fleet[other].spacing)
     reach = own[0].radius + traffic.fleet[other].radius + margin
-    mx, my = own[0].middle[0], own[0].middle[1]
     k = 1
     while k <= count:
         i, j = min(k, len(state) - 1), min(first + k, traffic.robot[other].last)
-        x, y, theta = state[i, 0], state[i, 1], state[i, 2]
-        c, s = cos(theta), sin(theta)
-        apart = hypot(
-            x + c * mx - s * my - traffic.middle[other, j, 0],
-            y + s * mx + c * my - traffic.middle[other, j, 1],
-        )
+        pose, its = state[i], traffic.pose[other, j]
+        x, y = middle_at(own[0], pose)
+        apart = hypot(x - traffic.middle[other, j, 0], y - traffic.middle[other, j, 1])
         if apart >= reach:  # until they may have come near to each other
             k += max(1, int((apart - reach) / traffic.robot[other].closing))
             continue
-        place_footprint(own[0].corner[:n], x, y, theta, corner[0, :n])
-        pose = traffic.pose[other, j]
+        place_footprint(own[0].corner[:n], pose[0], pose[1], pose[2], corner[0, :n])
         place_footprint(
-            traffic.fleet[other].corner[:m], pose[0], pose[1], pose[2], corner[1, :m]
+            traffic.fleet[other].corner[:m], its[0], its[1], its[2], corner[1, :m]
         )
         if convex_distance(corner[0, :n], corner[1, :m], margin) < margin:
             return k
@@ -128,46 +124,34 @@ def first_conflict(own, traffic, other, state, count, first, corner):
 @kernel
 def blocked_for_good(own, traffic, state, first, corner):
     """Return whether a robot that stands from step `first` on is ever run into."""
-    still = np.empty((2, 5))
-    copy_numbers(state, still[0])
-    copy_numbers(state, still[1])
+    still = state.reshape(1, 5)
     for other in range(len(traffic.robot)):
-        if not traffic.robot[other].hard:
-            continue
-        k = first
-        while k <= max(first, traffic.robot[other].last):
-            if first_conflict(own, traffic, other, still, 1, k - 1, corner) >= 0:
-                return True
-            j = min(k, traffic.robot[other].last)
-            apart = hypot(
-                state[0] - traffic.middle[other, j, 0],
-                state[1] - traffic.middle[other, j, 1],
-            )
-            reach = traffic.fleet[other].radius + own[0].radius + own[0].spacing
-            reach += traffic.fleet[other].spacing + own[0].radius
-            k += max(1, int((apart - reach) / traffic.robot[other].closing))
+        count = max(1, traffic.robot[other].last - first + 1)
+        if traffic.robot[other].hard and (
+            first_conflict(own, traffic, other, still, count, first - 1, corner) >= 0
+        ):
+            return True
     return False
 
 
 @kernel
-def clear(own, spaces, zones, traffic, state, count, first, corner):
+def clear(search, state, count, first, corner):
     """Return whether states 1 to `count` keep clear of obstacles and occupied zones.
 
     Args:
-        own: the robot, shape (1,).
-        spaces, zones: its surroundings.
-        traffic: gives when zones are occupied.
+        search: gives robot, surroundings, and when zones are occupied.
         state: shape (n, 5).
         count: number of the last one that is looked at.
         first: step of state 0.
         corner: room for a footprint, shape (2, M, 2).
     """
+    zones, busy = search.zones, search.traffic.busy
     for k in range(count, 0, -1):  # where a motion ends most is in the way
-        if not clear_of_obstacles(own, spaces, state[k], corner[0]):
+        if not clear_of_obstacles(search.own, search.spaces, state[k], corner[0]):
             return False
         for zone in range(len(zones.zone)):
-            j = min(first + k, traffic.busy.shape[1] - 1)
-            if traffic.busy[zone, j] and in_region(
+            j = min(first + k, busy.shape[1] - 1)
+            if busy[zone, j] and in_region(
                 zones.zone[zone], zones.corner[zone], state[k, 0], state[k, 1]
             ):
                 return False

@@ -114,7 +114,7 @@ def expand(search, nodes, room, a, motion, nears, row):
         row: of the rollouts that begin like it, or -1.
     """
     task, course, state = search.task, search.course, room.state
-    own, dt, steps = search.own, search.dt, task.steps
+    steps = task.steps
     node = nodes.node[a]
     segment, left, first = node.segment, node.left, node.step
     if row >= 0:
@@ -128,10 +128,7 @@ def expand(search, nodes, room, a, motion, nears, row):
     at = place_of(nodes.table, key)
     if nodes.table[at] == key and motion != TRACK:
         return -1
-    if not clear(
-        own, search.spaces, search.zones, search.traffic, state, steps, first,
-        room.corner,
-    ):  # fmt: skip
+    if not clear(search, state, steps, first, room.corner):
         return -1
     conflict_s = conflict_cost(search, room, nears, first, steps)
     if not conflict_s < np.inf:
@@ -144,7 +141,7 @@ def expand(search, nodes, room, a, motion, nears, row):
     share = task.hold_share
     if motion != HOLD:
         share = multiplier_in(search.terrain, after[0], after[1])
-    cost = node.cost + share * steps * dt + conflict_s
+    cost = node.cost + share * steps * search.dt + conflict_s
     place = (first + steps, leg, segment, left)
     return add(search, nodes, a, motion, after, place, cost)
 
@@ -277,7 +274,7 @@ def follow_path(search, nodes, room, a, tries):
         if not on_path or first + 2 * MOST_BRAKING_STEPS >= len(room.control):
             return tries
         copy_numbers(nodes.state[a], room.state[0])
-        nears = list_near(search, room, first)
+        nears = list_near(search, room, first, search.task.steps)
         a = expand(search, nodes, room, a, TRACK, nears, -1)
     return tries
 
@@ -321,7 +318,7 @@ def find_motion(search, nodes, room, start, control):
                 continue
         copy_numbers(nodes.state[a], room.state[0])
         wait(search, nodes, room, a)  # lists robots of its own
-        nears = list_near(search, room, node.step)
+        nears = list_near(search, room, node.step, task.steps)
         row = -1
         if search.own[0].model != USER:
             row = rolled_out(search, nodes.rollouts, room.state[0], room.control)
