@@ -46,6 +46,13 @@ def step(robot, state, u1, u2, dt, out):
 
 
 @kernel
+def write_states(robot, dt, control, state):
+    """Write the states that controls, shape (n, 2), lead to from state[0]."""
+    for k in range(len(control)):
+        step(robot, state[k], control[k, 0], control[k, 1], dt, state[k + 1])
+
+
+@kernel
 def turn_speed(model, v, w, track):
     """Return L |theta'| for the energy model's turning part [m/s]."""
     if model == CAR:

@@ -22,7 +22,6 @@ from mrmg.motion._kernels import MODEL_ID
 from mrmg.planning.assembly import make_plan
 from mrmg.planning.attempt import Attempt
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.path_following import _tracking_kernels
 from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Plan
 from mrmg.scene.elevation import Elevation
@@ -194,14 +193,10 @@ def _moved(
 
     None if accounting refuses what it accepted a nanometre away.
     """
-    trajectories = []
-    fleet = problem.mission.fleet
-    for r, (robot, given) in enumerate(
-        zip(scene.robots, plan.trajectories, strict=True)
-    ):
-        control, state = given.control.copy(), np.zeros(given.state.shape)
-        state[0, :3] = robot.pose
-        _tracking_kernels.write_states(fleet, r, given.dt_s, control, state)
-        trajectories.append(replace(given, control=control, state=state))
-    problem = replace(problem, scene=scene)
+    start = np.zeros_like(problem.start)
+    start[:, :3] = [robot.pose for robot in scene.robots]
+    problem = replace(problem, scene=scene, start=start)
+    trajectories = [
+        problem.trajectory(r, one.control) for r, one in enumerate(plan.trajectories)
+    ]
     return make_plan(problem, plan.seed, params, trajectories, plan.tours)

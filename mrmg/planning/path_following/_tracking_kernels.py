@@ -73,10 +73,3 @@ def first_inside(targets, t, state, first):
         ):
             return k
     return len(state)
-
-
-@kernel
-def write_states(fleet, r, dt, control, state):
-    """Write the states that controls, shape (n, 2), lead robot r to from state[0]."""
-    for k in range(len(control)):
-        step(fleet[r], state[k], control[k, 0], control[k, 1], dt, state[k + 1])

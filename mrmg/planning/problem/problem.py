@@ -10,8 +10,7 @@ import numpy as np
 
 from mrmg import seeding
 from mrmg.energy.model import CONSUMERS_W
-from mrmg.motion._kernels import CAR
-from mrmg.motion._kernels import step as motion_step
+from mrmg.motion._kernels import CAR, write_states
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
 from mrmg.planning.problem._region_kernels import Zones
@@ -27,7 +26,6 @@ from mrmg.planning.problem.openings import (
 from mrmg.planning.problem.targets import finish_of, gate_arrays, target_arrays
 from mrmg.planning.problem.time_weighting import priced_world, with_energies
 from mrmg.planning.roadmap._fleet_kernels import Spaces
-from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
 from mrmg.planning.roadmap.fleet import fleet_array, stack_spaces
 from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
 from mrmg.planning.roadmap.vertices import planned_regions
@@ -44,7 +42,7 @@ class Mission(NamedTuple):
     """A planning problem as arrays.
 
     Attributes:
-        fleet, spaces, terrain, roadmap, targets: robots, world and where to go.
+        fleet, spaces, terrain, targets: robots, world and where to go.
         zones: stations that one robot at a time may be at.
         routing: the routing problem at the start; costs include the route margin.
     """
@@ -52,7 +50,6 @@ class Mission(NamedTuple):
     fleet: np.ndarray
     spaces: Spaces
     terrain: TerrainGrid
-    roadmap: RoadmapArrays
     targets: Targets
     zones: Zones
     routing: RoutingArrays
@@ -112,15 +109,10 @@ class Problem:
         """
         state = np.zeros((len(control) + 1, 5))
         state[0] = self.start[robot]
-        one = self.mission.fleet[robot]
-        for k, (u1, u2) in enumerate(control):
-            motion_step(one, state[k], u1, u2, self.dt_s, state[k + 1])
-        return Trajectory(
-            robot=self.scene.robots[robot].id,
-            dt_s=self.dt_s,
-            state=state,
-            control=np.ascontiguousarray(control),
-        )
+        control = np.array(control, order="C")
+        write_states(self.mission.fleet[robot], self.dt_s, control, state)
+        name = self.scene.robots[robot].id
+        return Trajectory(robot=name, dt_s=self.dt_s, state=state, control=control)
 
     def path(self, robot: int, tour: Sequence[int]) -> np.ndarray:
         """Return the points of the roadmap along a robot's tour [m], shape (n, 2).
@@ -218,7 +210,6 @@ def state_problem(
         fleet=fleet,
         spaces=stack_spaces(world),
         terrain=world.terrain,
-        roadmap=roadmap.arrays,
         targets=targets,
         zones=gate_arrays(scene),
         routing=RoutingInstance(

@@ -22,7 +22,6 @@ from dataclasses import replace
 import numpy as np
 
 from mrmg import seeding
-from mrmg.planning.path_following import _tracking_kernels
 from mrmg.planning.path_following._following_kernels import Course
 from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.coordination import _search_kernels, priorities
@@ -235,9 +234,9 @@ class _Planning:
     def _search(
         self, r: int, task: Task, traffic: Traffic, course: Course
     ) -> Motion | None:
-        mission, dt_s, own = self._problem.mission, self._problem.dt_s, slice(r, r + 1)
+        mission = self._problem.mission
         search = Setting(
-            own=mission.fleet[own],
+            own=mission.fleet[r : r + 1],
             spaces=mission.spaces,
             terrain=mission.terrain,
             targets=mission.targets,
@@ -245,7 +244,7 @@ class _Planning:
             course=course,
             traffic=traffic,
             task=task,
-            dt=dt_s,
+            dt=self._problem.dt_s,
         )
         curve = self._room.curve._replace(
             ease=float(BRAKING_SHARE * mission.fleet["limit"][r, 3]),
@@ -262,11 +261,8 @@ class _Planning:
         self.nodes += int(nodes.size[0])
         if count < 0:
             return None
-        control = self._control[:count].copy()
-        state = np.zeros((count + 1, 5))
-        state[0] = self._problem.start[r]
-        _tracking_kernels.write_states(mission.fleet, r, dt_s, control, state)
-        return Motion(state, control)
+        found = self._problem.trajectory(r, self._control[:count])
+        return Motion(found.state, found.control)
 
     def find_alone(
         self,
