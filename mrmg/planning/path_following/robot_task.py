@@ -23,7 +23,7 @@ class RobotTask:
         cost_map: what the way is priced on.
         before: how the robot drove before; None if it did not.
         inflations: places that it was led round.
-        cost_m: what the way takes, in metres of plain ground.
+
     """
 
     tour: list[int]
@@ -31,13 +31,10 @@ class RobotTask:
     cost_map: CostMap
     before: Drive | None = None
     inflations: list[np.ndarray] = field(default_factory=list)
-    cost_m: float = 0.0
 
     def smooth(self, problem: Problem, spacings_m: Sequence[float]) -> None:
         """Smooth the path; one without targets only leads out of the way."""
         if not self.tour:
             return
         targets = problem.mission.targets
-        self.path, self.cost_m = smooth_path(
-            targets, self.cost_map, self.path, spacings_m
-        )
+        self.path, _ = smooth_path(targets, self.cost_map, self.path, spacings_m)
