@@ -9,7 +9,7 @@ from importlib.metadata import version
 
 from mrmg import extensions
 from mrmg.energy.ledger import EnergyLedger, LedgerEntry
-from mrmg.energy.metering import battery_profile, find_visits, visits_and_energy
+from mrmg.energy.metering import visits_and_energy
 from mrmg.energy.visits import crowded_stations
 from mrmg.planning.endings import listed
 from mrmg.planning.feasibility import energy_and_metres
@@ -25,7 +25,19 @@ def make_plan(
     trajectories: Sequence[Trajectory],
     tours: Mapping[str, tuple[str, ...]],
 ) -> Plan | None:
-    """Return the plan of trajectories, or None if exact accounting refuses it.
+    """Return the plan of trajectories, or None if exact accounting refuses it."""
+    made = plan_or_refusal(problem, seed, params, trajectories, tours)
+    return made if isinstance(made, Plan) else None
+
+
+def plan_or_refusal(
+    problem: Problem,
+    seed: int,
+    params: PlannerParams,
+    trajectories: Sequence[Trajectory],
+    tours: Mapping[str, tuple[str, ...]],
+) -> Plan | str:
+    """Return the plan of trajectories, or in words why exact accounting refuses it.
 
     Kernels meter terrain on a grid; the ledger uses the exact areas.
 
@@ -40,22 +52,25 @@ def make_plan(
     visits: list[Visit] = []
     entries: list[LedgerEntry] = []
     for trajectory in trajectories:
-        battery = scene.robot(trajectory.robot).battery
-        own, content_J, drawn = visits_and_energy(
-            scene, trajectory, tours[trajectory.robot]
-        )
-        if len(own) < len(tours[trajectory.robot]):
-            return None
+        robot, tour = scene.robot(trajectory.robot), tours[trajectory.robot]
+        own, content_J, drawn = visits_and_energy(scene, trajectory, tour)
+        if len(own) < len(tour):
+            return f"{robot.id} misses {tour[len(own)]}"
+        battery = robot.battery
         least_J = battery.reserve_J + problem.soc_margin * battery.capacity_J
-        if content_J.min() < least_J:
-            return None
+        missing_J = least_J - content_J.min()
+        if missing_J > 0.0:
+            missing = energy_and_metres(missing_J, robot)
+            return f"{robot.id} ends {missing} short of what its battery must keep"
         visits += own
         entries += drawn
     ways = {item.robot: item.state[:, :2] for item in trajectories}
     if any(crowded_stations(scene, ways)):
-        return None
-    if {goal.id for goal in scene.goals} - {visit.target for visit in visits}:
-        return None
+        return "two robots are at a station for one at a time"
+    visited = {visit.target for visit in visits}
+    left_out = [goal.id for goal in scene.goals if goal.id not in visited]
+    if left_out:
+        return f"nobody visits {listed(left_out)}"
     visits.sort(key=lambda visit: (visit.step, visit.robot))
     return Plan(
         scene_name=scene.name,
@@ -91,28 +106,3 @@ def _versions(params: PlannerParams) -> dict[str, str]:
         extensions.origin(extensions.ROUTERS, params.router.method),
     )
     return own | dict(package.rsplit(" ", 1) for package in added if package)
-
-
-def why_refused(
-    problem: Problem,
-    trajectories: Sequence[Trajectory],
-    tours: Mapping[str, tuple[str, ...]],
-) -> str:
-    """Return in words why `make_plan` refuses trajectories."""
-    visited = {target for tour in tours.values() for target in tour}
-    left_out = [goal.id for goal in problem.scene.goals if goal.id not in visited]
-    if left_out:
-        return f"nobody visits {listed(left_out)}"
-    for trajectory in trajectories:
-        robot = problem.scene.robot(trajectory.robot)
-        tour = tours[robot.id]
-        own = find_visits(problem.scene, trajectory, tour)
-        if len(own) < len(tour):
-            return f"{robot.id} misses {tour[len(own)]}"
-        battery = robot.battery
-        least_J = battery.reserve_J + problem.soc_margin * battery.capacity_J
-        missing_J = least_J - battery_profile(problem.scene, trajectory, own).min()
-        if missing_J > 0.0:
-            missing = energy_and_metres(missing_J, robot)
-            return f"{robot.id} ends {missing} short of what its battery must keep"
-    return "two robots are at a station for one at a time"

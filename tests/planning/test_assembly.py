@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from mrmg.planning.assembly import make_plan, why_refused
+from mrmg.planning.assembly import plan_or_refusal
 from mrmg.planning.parameters import PlannerParams
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
@@ -23,8 +23,7 @@ TWO_ROBOTS = [
 def assembled(scene: Scene, plan: Plan, soc_margin: float = 0.0) -> Plan | str:
     """The plan of a plan's trajectories and tours, or why there is none."""
     problem: Any = SimpleNamespace(scene=scene, soc_margin=soc_margin)
-    made = make_plan(problem, 3, PlannerParams(), plan.trajectories, plan.tours)
-    return made or why_refused(problem, plan.trajectories, plan.tours)
+    return plan_or_refusal(problem, 3, PlannerParams(), plan.trajectories, plan.tours)
 
 
 def test_trajectories_that_keep_every_rule_are_a_plan(case: Any) -> None:

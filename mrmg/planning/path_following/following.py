@@ -15,8 +15,8 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 
-from mrmg.motion._kernels import CAR, UNICYCLE
-from mrmg.planning.assembly import make_plan, why_refused
+from mrmg.motion._kernels import UNICYCLE, USER
+from mrmg.planning.assembly import plan_or_refusal
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import TRACKING_M, Path, smooth_path
@@ -57,13 +57,8 @@ DIRECTION_M = 4.0
 
 
 def can_follow(problem: Problem) -> bool:
-    """Return whether path following knows all that a mission requires.
-
-    They do not know how a user's models drive.
-    """
-    models = problem.mission.fleet["model"]
-    known = (models == CAR) | (models == UNICYCLE)
-    return bool(known.all())
+    """Return whether path following knows how all robots drive, not so a user's."""
+    return bool((problem.mission.fleet["model"] != USER).all())
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,12 +126,11 @@ def follow_tours(
         others = partial(_otherwise, problem, tasks, paths, sharps, deeper_m)
         drive = drive_paths(problem, tasks, halt, others)
         if drive.trajectories:
-            plan = make_plan(problem, seed, params, drive.trajectories, tours)
-            if plan is not None:
+            plan = plan_or_refusal(problem, seed, params, drive.trajectories, tours)
+            if isinstance(plan, Plan):
                 return Followed(plan)
-            why = why_refused(problem, drive.trajectories, tours)
             leg_J = legs_driven_J(problem, drive.trajectories, tours)
-            failed = Followed(None, why, leg_J=leg_J)
+            failed = Followed(None, plan, leg_J=leg_J)
         else:
             failed = Followed(None, drive.failure, failed.driven)
         if not drive.trajectories or halt[0]:
