@@ -54,11 +54,9 @@ def proof_of_infeasibility(scene: Scene, halt: np.ndarray = NEVER) -> str | None
         return _with_others(proofs, dict.fromkeys(proofs, ""))
     short = _out_of_energy(scene, reaches, halt)
     if short:
-        return _with_others(
-            {goal: one.sentence(goal) for goal, one in short.items()},
-            {goal: f" by {one.words}" for goal, one in short.items()},
-        )
-    return _unreachable_finish(scene) or _crowded_finish(scene)
+        amounts = {goal: f" by {missing}" for goal, missing in short.items()}
+        return _with_others(_out_of_reach(short), amounts)
+    return _unreachable_finish(scene, reaches) or _crowded_finish(scene)
 
 
 def _with_others(proofs: Mapping[str, str], amounts: Mapping[str, str]) -> str:
@@ -78,9 +76,7 @@ def impossible_goals(scene: Scene, halt: np.ndarray = NEVER) -> dict[str, str]:
     """
     reaches = _reaches(scene, halt)
     short = _out_of_energy(scene, reaches, halt)
-    return _cut_off(scene, reaches) | {
-        goal: one.sentence(goal) for goal, one in short.items()
-    }
+    return _cut_off(scene, reaches) | _out_of_reach(short)
 
 
 def energy_warnings(scene: Scene) -> list[str]:
@@ -92,7 +88,7 @@ def energy_warnings(scene: Scene) -> list[str]:
     """
     reaches = _reaches(scene)
     nobodys = _out_of_energy(scene, reaches)
-    warnings = [one.sentence(goal) for goal, one in nobodys.items()]
+    warnings = [*_out_of_reach(nobodys).values()]
     for reach in reaches:
         missing = {
             goal.id: reach.missing_energy_J(goal.region)
@@ -116,8 +112,9 @@ def mission_warnings(scene: Scene) -> list[str]:
     That is which goals and finishes are cut off, which finishes crowd each other, and
     the warnings of `energy_warnings`.
     """
-    cut_off = _cut_off(scene, _reaches(scene)).values()
-    finishes = [_unreachable_finish(scene), _crowded_finish(scene)]
+    reaches = _reaches(scene)
+    finishes = [_unreachable_finish(scene, reaches), _crowded_finish(scene)]
+    cut_off = _cut_off(scene, reaches).values()
     return [*cut_off, *filter(None, finishes), *energy_warnings(scene)]
 
 
@@ -173,53 +170,44 @@ MOST_LOOKED_AT = 4
 """Robots for which gaps are measured at most."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Missing:
-    """What the robot that comes nearest to a goal is short of at least.
-
-    Attributes:
-        energy_J: above its reserve.
-        robot: that robot.
-    """
-
-    energy_J: float
-    robot: Robot
-
-    @property
-    def words(self) -> str:
-        return energy_and_metres(self.energy_J, self.robot)
-
-    def sentence(self, goal: str) -> str:
-        return GOAL_OUT_OF_ENERGY.format(goal=goal, missing=self.words)
-
-
 def _out_of_energy(
     scene: Scene, reaches: Sequence[_Reach], halt: np.ndarray = NEVER
-) -> dict[str, _Missing]:
-    """Return the goals that are not cut off, but out of every battery's reach."""
+) -> dict[str, str]:
+    """Return the goals that are not cut off, but out of every battery's reach.
+
+    With each, in words, what the robot that comes nearest is short of above its
+    reserve, at least.
+    """
     found = {}
     for goal in scene.goals:
-        least: _Missing | None = None
+        least: tuple[float, Robot] | None = None
         for reach in reaches:
             check(halt)
             if not reach.is_connected(goal.region):
                 continue
             missing_J = reach.missing_energy_J(goal.region)
-            if least is None or missing_J < least.energy_J:
-                least = _Missing(missing_J, reach.robot)
+            if least is None or missing_J < least[0]:
+                least = missing_J, reach.robot
             if missing_J <= 0.0:
                 break
-        if least is not None and least.energy_J > 0.0:
-            found[goal.id] = least
+        if least is not None and least[0] > 0.0:
+            found[goal.id] = energy_and_metres(*least)
     return found
 
 
-def _unreachable_finish(scene: Scene) -> str | None:
+def _out_of_reach(short: Mapping[str, str]) -> dict[str, str]:
+    """Return the sentences on goals for which every robot is short of energy."""
+    return {
+        goal: GOAL_OUT_OF_ENERGY.format(goal=goal, missing=missing)
+        for goal, missing in short.items()
+    }
+
+
+def _unreachable_finish(scene: Scene, reaches: Sequence[_Reach]) -> str | None:
     """Return which robot's finish it cannot get to."""
-    for robot in scene.robots:
-        if robot.finish and not _Reach.of(scene, robot).is_connected(
-            robot.finish.region
-        ):
+    for reach in reaches:
+        robot = reach.robot
+        if robot.finish and not reach.is_connected(robot.finish.region):
             gap = widest_gap(scene, [robot], robot.finish.region)
             return FINISH_CUT_OFF.format(robot=robot.id, gap=gap)
     return None

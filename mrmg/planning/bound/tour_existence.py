@@ -89,9 +89,8 @@ def proof_of_no_tours(
     problem = _with_climbs(relaxed)
     for goals in _goals_to_try(problem):
         check(halt)
-        fleet = RelaxedFleet(problem, goals)
-        if not fleet.visits()[-1]:
-            return fleet.proof()
+        if not visits(problem, goals)[-1]:
+            return proof_of(problem, goals)
     return None
 
 
@@ -128,51 +127,37 @@ def _goals_to_try(problem: RoutingArrays) -> Iterator[np.ndarray]:
     yield from remote[MOST_GOALS:, None]
 
 
-@dataclass(frozen=True)
-class RelaxedFleet:
-    """Which goals a fleet can visit together, for batteries of any size.
+def visits(problem: RoutingArrays, goals: np.ndarray, share: float = 0.0) -> np.ndarray:
+    """Return which subsets of n goals a fleet can visit and then end, shape (2^n,).
 
-    Attributes:
+    Args:
         problem: the mission, with legs that cost at most what they must.
-        goals: numbers of n goals, the only ones to be visited.
+        goals: their numbers; no others are to be visited.
+        share: by which the usable energy of all batteries is larger than it is.
     """
-
-    problem: RoutingArrays
-    goals: np.ndarray
-
-    def visits(self, share: float = 0.0) -> np.ndarray:
-        """Return which subsets the fleet can visit and then end, shape (2^n,).
-
-        Args:
-            share: by which the usable energy of all batteries is larger than it is.
-        """
-        larger = with_batteries(self.problem, share)
-        least = least_costs(larger, self.goals, free=True)
-        assert least is not None, "without costs a state has one label"
-        return np.asarray(np.isfinite(least))
-
-    def proof(self) -> NoTours:
-        """Return the proof that the fleet cannot visit all goals."""
-        subsets = np.flatnonzero(self.visits())
-        most = max((int(one) for one in subsets), key=int.bit_count, default=0)
-        endless = with_endless_batteries(self.problem)
-        goals = [int(goal) for goal in self.goals]
-        return NoTours(
-            goals=tuple(goals),
-            left_out=tuple(g for i, g in enumerate(goals) if not most >> i & 1),
-            unreachable=tuple(g for g in goals if not any(_each_visits(endless, g))),
-            cut_off=_impossible(_each_visits(endless)),
-            homeless=_impossible(_each_visits(self.problem)),
-            share=least_share(lambda share: bool(self.visits(share)[-1]))[0],
-        )
+    least = least_costs(with_batteries(problem, share), goals, free=True)
+    assert least is not None, "without costs a state has one label"
+    return np.asarray(np.isfinite(least))
 
 
-def _each_visits(problem: RoutingArrays, *goals: int) -> list[bool]:
-    """Return which robots of a fleet can each visit goals and then end."""
-    wanted = np.array(goals, np.int64)
-    alone = [of_robot(problem, r) for r in range(len(problem.energy))]
-    return [bool(RelaxedFleet(own, wanted).visits()[-1]) for own in alone]
+def proof_of(problem: RoutingArrays, goals: np.ndarray) -> NoTours:
+    """Return the proof that a fleet cannot visit all of some goals, as `visits`."""
+    subsets = np.flatnonzero(visits(problem, goals))
+    most = max((int(one) for one in subsets), key=int.bit_count, default=0)
+    endless = with_endless_batteries(problem)
+    robots, numbers = range(len(problem.energy)), [int(goal) for goal in goals]
+    return NoTours(
+        goals=tuple(numbers),
+        left_out=tuple(g for i, g in enumerate(numbers) if not most >> i & 1),
+        unreachable=tuple(
+            g for g in numbers if not any(_can_visit(endless, r, g) for r in robots)
+        ),
+        cut_off=tuple(r for r in robots if not _can_visit(endless, r)),
+        homeless=tuple(r for r in robots if not _can_visit(problem, r)),
+        share=least_share(lambda share: bool(visits(problem, goals, share)[-1]))[0],
+    )
 
 
-def _impossible(possible: list[bool]) -> tuple[int, ...]:
-    return tuple(r for r, can in enumerate(possible) if not can)
+def _can_visit(problem: RoutingArrays, r: int, *goals: int) -> bool:
+    """Return whether one robot of a fleet can visit goals and then end."""
+    return bool(visits(of_robot(problem, r), np.array(goals, np.int64))[-1])

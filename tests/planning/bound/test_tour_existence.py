@@ -14,8 +14,9 @@ from mrmg.planning import PlannerParams
 from mrmg.planning.bound.bound import lower_bound_J
 from mrmg.planning.bound.tour_existence import (
     NoTours,
-    RelaxedFleet,
+    proof_of,
     proof_of_no_tours,
+    visits,
 )
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.instance import RoutingInstance
@@ -101,7 +102,7 @@ def test_tours_exist_where_one_of_all_can_be_driven(closed: bool, metric: bool) 
     verdicts = []
     for seed in range(60):
         problem = random_fleet(seed, closed=closed, metric=metric)
-        visited = RelaxedFleet(problem, np.arange(4)).visits()
+        visited = visits(problem, np.arange(4))
         some = any(
             all(
                 drives(problem, r, order, float(problem.energy[r]))
@@ -117,14 +118,14 @@ def test_tours_exist_where_one_of_all_can_be_driven(closed: bool, metric: bool) 
 def test_larger_batteries_only_help_and_the_share_is_what_is_missing() -> None:
     checked = 0
     for seed in range(40):
-        fleet = RelaxedFleet(random_fleet(seed), np.arange(4))
-        if fleet.visits()[-1]:
+        fleet, goals = random_fleet(seed), np.arange(4)
+        if visits(fleet, goals)[-1]:
             continue
-        proof = fleet.proof()
+        proof = proof_of(fleet, goals)
         assert set(proof.left_out) <= set(proof.goals)
         if np.isfinite(proof.share):
-            assert not fleet.visits(0.999 * proof.share)[-1]
-            assert fleet.visits(1.06 * proof.share + 0.011)[-1]
+            assert not visits(fleet, goals, 0.999 * proof.share)[-1]
+            assert visits(fleet, goals, 1.06 * proof.share + 0.011)[-1]
             checked += 1
     assert checked > 5
 
