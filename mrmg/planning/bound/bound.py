@@ -192,7 +192,7 @@ class Relaxation:
         ends = {r: one.finish for r, one in enumerate(scene.robots) if one.finish}
         regions += [finish.region for finish in ends.values() if with_finishes]
         keys = [_travel_key(scene, robot) for robot in scene.robots]
-        ways = _ways_by_key(scene, step_s, cells, regions, halt)
+        ways = _ways_by_key(scene, keys, step_s, cells, regions, halt)
         batteries = [robot.battery for robot in scene.robots]
         price = [r.model.energy_model.plain_ground_J_per_m() for r in scene.robots]
         full_J = [_relaxed_full_J(scene, one) for one in scene.robots]
@@ -242,6 +242,7 @@ class Relaxation:
 
 def _ways_by_key(
     scene: Scene,
+    keys: Sequence[TravelKey],
     step_s: float,
     cells: int,
     regions: Sequence[Region],
@@ -250,7 +251,6 @@ def _ways_by_key(
     """Return the ways between regions of every kind of robot."""
     x_min, y_min, x_max, y_max = scene.bounds
     cell_m = math.sqrt((x_max - x_min) * (y_max - y_min) / cells)
-    keys = [_travel_key(scene, robot) for robot in scene.robots]
     ways: dict[TravelKey, Ways] = {}
     for key, robot in zip(keys, scene.robots, strict=True):
         if key not in ways:

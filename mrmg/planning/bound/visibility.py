@@ -108,10 +108,9 @@ class VisibilityGraph:
     def smooth_arcs(self, region: Region) -> np.ndarray:
         """Return which arcs are smooth and far from all edges, shape (K,)."""
         lines = arc_lines(region)
-        corners = shapely.multipoints(region.corners) if len(region.corners) else None
         far = ~shapely.dwithin(lines, self.edges, 2.0 * half_arc_m(region) + BORDER_M)
-        if corners is not None:
-            far &= ~shapely.dwithin(lines, corners, 1e-6)
+        if len(region.corners):
+            far &= ~shapely.dwithin(lines, shapely.multipoints(region.corners), 1e-6)
         return np.asarray(far)
 
     def least_costs(self, nodes: np.ndarray, first: Places, last: Places) -> np.ndarray:

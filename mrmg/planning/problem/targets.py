@@ -47,15 +47,8 @@ def target_arrays(scene: Scene) -> Targets:
     """Return goals, stations and finishes as the planner enters them."""
     depth_m = target_depth_m(scene)
     regions = planned_regions(scene)
-    shrunk, radius_m = [], []
-    for region in regions:
-        corners = region.corners
-        if len(corners):
-            smaller = region.shape.buffer(-depth_m, join_style="mitre")
-            if not smaller.is_empty and smaller.geom_type == "Polygon":
-                corners = np.asarray(smaller.normalize().exterior.coords)[:-1][::-1]
-        shrunk.append(corners)
-        radius_m.append(max(region.radius_m - depth_m, 0.5 * region.radius_m))
+    shrunk = [_moved_corners(one, -depth_m) for one in regions]
+    radius_m = [max(one.radius_m - depth_m, 0.5 * one.radius_m) for one in regions]
     target = np.zeros(len(regions), TARGET)
     corner = _fill_in(target, regions, shrunk, radius_m)
     target["heading"], target["tolerance"] = _headings(scene)
@@ -67,6 +60,15 @@ def target_arrays(scene: Scene) -> Targets:
         target=target,
         corner=corner,
     )
+
+
+def _moved_corners(region: Region, by_m: float) -> np.ndarray:
+    """Return a polygon's corners with its sides moved out, if that leaves a polygon."""
+    if len(region.corners):
+        moved = region.shape.buffer(by_m, join_style="mitre")
+        if not moved.is_empty and moved.geom_type == "Polygon":
+            return np.asarray(moved.normalize().exterior.coords)[:-1][::-1]
+    return region.corners
 
 
 def _fill_in(
@@ -131,13 +133,7 @@ def _gates_of(scene: Scene) -> np.ndarray:
 def gate_arrays(scene: Scene) -> Zones:
     """Return the stations for one robot at a time, a margin wider than they are."""
     regions = [station.region for station in _exclusive(scene)]
-    outlines = []
-    for region in regions:
-        corners = region.corners
-        if len(corners):
-            wider = region.shape.buffer(GATE_MARGIN_M, join_style="mitre")
-            corners = np.asarray(wider.normalize().exterior.coords)[:-1][::-1]
-        outlines.append(corners)
+    outlines = [_moved_corners(region, GATE_MARGIN_M) for region in regions]
     zone = np.zeros(len(regions), REGION)
     radius_m = [region.radius_m + GATE_MARGIN_M for region in regions]
     return Zones(zone, _fill_in(zone, regions, outlines, radius_m))

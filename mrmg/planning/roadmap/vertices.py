@@ -56,13 +56,12 @@ def roadmap_vertices(
         samples: number of free samples tried.
         rng: source of the samples.
     """
-    x_min, y_min, x_max, y_max = scene.bounds
-    fixed = [
-        _anchor(scene, world, classes, region) for region in planned_regions(scene)
-    ]
+    low, high = np.array(scene.bounds).reshape(2, 2)
+    first, regions = classes[0], planned_regions(scene)
+    fixed = [_anchor(world.spaces[first.space], first.passage, one) for one in regions]
     fixed += [np.array(robot.pose[:2]) for robot in scene.robots]
     unit = (rng.random(2) + np.arange(samples)[:, None] * SPREAD) % 1.0
-    spread = unit * (x_max - x_min, y_max - y_min) + (x_min, y_min)
+    spread = unit * (high - low) + low
     passage = min(item.passage for item in classes)
     rings = [
         *(
@@ -76,15 +75,9 @@ def roadmap_vertices(
         [shapely.segmentize(ring, 8.0) for ring in rings if not ring.is_empty]
     )
     ridges = [_ridge(world.spaces[item.space]) for item in classes]
-    inner = [_inner_points(region) for region in planned_regions(scene)]
+    inner = [_inner_points(region) for region in regions]
     loose = np.concatenate([spread, corners.reshape(-1, 2), *ridges, *inner])
-    inside = (
-        (loose[:, 0] > x_min)
-        & (loose[:, 1] > y_min)
-        & (loose[:, 0] < x_max)
-        & (loose[:, 1] < y_max)
-    )
-    loose = loose[inside]
+    loose = loose[((loose > low) & (loose < high)).all(axis=1)]
     widest = np.max(
         [_field_at(world.spaces[item.space], loose) for item in classes], axis=0
     )
@@ -120,23 +113,17 @@ def _ridge(space: FreeSpace) -> np.ndarray:
     return np.asarray(points[np.sort(first)] + (space.x_min, space.y_min))
 
 
-def _anchor(
-    scene: Scene,
-    world: World,
-    classes: Sequence[TravelClass],
-    region: Region,
-) -> np.ndarray:
+def _anchor(space: FreeSpace, passage: float, region: Region) -> np.ndarray:
     """Return a region's centre, or its clearest point where the centre is tight."""
-    space, passage, _ = classes[0]
     centre = np.asarray(region.center, dtype=float)
-    if _field_at(world.spaces[space], centre[None])[0] >= passage:
+    if _field_at(space, centre[None])[0] >= passage:
         return centre
     x0, y0, x1, y1 = region.shape.bounds
     grid = np.stack(
         np.meshgrid(np.linspace(x0, x1, 21), np.linspace(y0, y1, 21)), axis=-1
     ).reshape(-1, 2)
     grid = grid[region.depth(grid) >= 0.0]
-    return np.asarray(grid[np.argmax(_field_at(world.spaces[space], grid))])
+    return np.asarray(grid[np.argmax(_field_at(space, grid))])
 
 
 def _field_at(space: FreeSpace, points: np.ndarray) -> np.ndarray:
