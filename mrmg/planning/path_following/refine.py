@@ -30,7 +30,7 @@ from mrmg.planning.path_following.cost_map import cost_map_of, inflated, smooth_
 from mrmg.planning.path_following.pauses import with_pauses
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.path_following.tracking import Drive, Motion, drive_alone
-from mrmg.planning.problem._target_kernels import Targets, at_target
+from mrmg.planning.problem._target_kernels import at_target
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.problem.targets import target_depth_m
 from mrmg.planning.problem.time_weighting import energy_share
@@ -176,7 +176,7 @@ def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, st
     if problem.steered_home[r]:
         return None, ""
     targets, robot = problem.mission.targets, problem.scene.robots[r].id
-    reason = ""
+    finish, reason = targets.finish[r], ""
     for _ in range(TRIES):
         drive = drive_alone(problem, r, with_pauses(problem, r, task.path))
         end = drive.motion.state[-1]
@@ -195,7 +195,7 @@ def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, st
             if (targets.target["tolerance"][goals] < np.pi).any():
                 return task.before, ""  # its motions are searched for
             _enter_deeper(problem, task, drive.motion.state)
-        elif not ends_well(targets, r, end):
+        elif finish >= 0 and not at_target(targets, finish, end):
             reason = f"{robot} does not end where its finish requires"
             break
         else:
@@ -255,9 +255,3 @@ def _enter_deeper(problem: Problem, task: RobotTask, state: np.ndarray) -> None:
             deeper[i] += depth_m - reached + DEEPER_M
     task.path = replace(path, deeper=deeper)
     task.smooth(problem, SPACINGS_M[-1:])
-
-
-def ends_well(targets: Targets, r: int, state: np.ndarray) -> bool:
-    """Return whether robot r stands where, and as, it must end."""
-    finish = targets.finish[r]
-    return bool(finish < 0 or at_target(targets, finish, state))

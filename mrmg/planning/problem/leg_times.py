@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,26 +19,6 @@ TIE_SHARE = 0.01
 soon, those of less energy are better."""
 
 
-class Times(NamedTuple):
-    """The part of a routing problem that is about time; see `RoutingArrays`.
-
-    Attributes:
-        time: from place to target, with the dwell there [s], shape (C, T + H, T).
-        finish_time: from place to finish [s], shape (R, T + 1).
-        limit: longest time of a route [s], shape (R,).
-        charge_power: at which batteries are filled [W], shape (R,).
-        energy_weight: of the summed energy in the objective.
-        makespan_weight: of the longest time of a route in the objective [J/s].
-    """
-
-    time: np.ndarray
-    finish_time: np.ndarray
-    limit: np.ndarray
-    charge_power: np.ndarray
-    energy_weight: float
-    makespan_weight: float
-
-
 def routing_times(
     scene: Scene,
     roadmap: Roadmap,
@@ -46,8 +26,8 @@ def routing_times(
     table: np.ndarray,
     dwell: np.ndarray,
     margin: float,
-) -> Times | None:
-    """Return the times of a mission's legs, or None if time does not matter.
+) -> dict[str, Any]:
+    """Return what of a `RoutingInstance` is about time; nothing if it does not matter.
 
     Robots drive the ways of the roadmap at the top speed that they are planned with.
 
@@ -61,7 +41,7 @@ def routing_times(
     """
     preference = Preference.of(scene)
     if not preference.timed:
-        return None
+        return {}
     places, robots = len(scene.targets()), len(fleet)
     length = way_lengths_m(roadmap)
     pace = (1.0 + margin) / fleet["limit"][:, 1]
@@ -87,11 +67,11 @@ def routing_times(
     )
     # Of the size that the weights have where energy alone counts.
     size = energy_weight + objective.makespan_weight
-    return Times(
-        time=time,
-        finish_time=finish_time,
-        limit=np.full(robots, preference.limit_s),
-        charge_power=fleet["charge"] - fleet["energy"][:, CONSUMERS_W],
-        energy_weight=energy_weight / size,
-        makespan_weight=objective.makespan_weight / size,
-    )
+    return {
+        "time": time,
+        "finish_time": finish_time,
+        "limit": np.full(robots, preference.limit_s),
+        "charge_power": fleet["charge"] - fleet["energy"][:, CONSUMERS_W],
+        "energy_weight": energy_weight / size,
+        "makespan_weight": objective.makespan_weight / size,
+    }

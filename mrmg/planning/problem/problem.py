@@ -194,16 +194,15 @@ def state_problem(
     fleet = fleet_array(scene, world, params.margins)
     places = len(scene.targets())
     targets = target_arrays(scene)
+    dwell_s = targets.target["dwell"]
     # What robots draw while they stay counts as way.
     idle_m = fleet["energy"][:, CONSUMERS_W] / fleet["plain"]
-    stay_m = idle_m[:, None] * targets.target["dwell"][:places]
+    stay_m = idle_m[:, None] * dwell_s[:places]
     last_leg = _last_legs(scene, roadmap, fleet)
     energy = np.array([robot.battery.start_J for robot in scene.robots])
     table = tables_of(fleet)
     owner = np.unique(table, return_index=True)[1]
-    times = routing_times(
-        scene, roadmap, fleet, table, targets.target["dwell"], params.route_margin
-    )
+
     start = np.zeros((len(scene.robots), 5))
     start[:, :3] = [robot.pose for robot in scene.robots]
     mission = Mission(
@@ -223,7 +222,7 @@ def state_problem(
             capacity=fleet["capacity"],
             reserve=fleet["reserve"],
             finish_distance=last_leg / fleet["plain"][:, None],
-            **({} if times is None else times._asdict()),
+            **routing_times(scene, roadmap, fleet, table, dwell_s, params.route_margin),
         ).arrays,
     )
     return Problem(
@@ -268,7 +267,7 @@ def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
     their margins on these ways.
     """
     world = World.from_scene(scene, cell_m=cell_m(scene, params.margins))
-    problem = _joined(scene, seed, params, world, ROADMAPS)
+    problem = _joined(scene, seed, params, world)
     openings = openings_to(scene, params.margins, unjoined_places(problem))
     return _opened(scene, seed, params, openings) if openings else problem
 
@@ -292,17 +291,15 @@ def _opened(
     world = World.from_scene(
         scene, cell_m=fine_m, openings=openings, guide_m=guide_m(fine_m)
     )
-    opened = _joined(scene, seed, params, world, ROADMAPS)
+    opened = _joined(scene, seed, params, world)
     return replace(opened, openings=openings)
 
 
-def _joined(
-    scene: Scene, seed: int, params: PlannerParams, world: World, most: int
-) -> Problem:
+def _joined(scene: Scene, seed: int, params: PlannerParams, world: World) -> Problem:
     """Return the problem with the first roadmap of several that joins all goals."""
     priced = priced_world(scene, world)
     samples = params.samples
-    for attempt in range(most):
+    for attempt in range(ROADMAPS):
         roadmap = build_roadmap(
             scene,
             priced,

@@ -123,11 +123,8 @@ def task_of(
     # A path may well pass through a target with another heading than it wants.
     along[targets.target["tolerance"][legs] < pi] = np.inf
     stay_s[:led] = path.pause_s[:led]
-    standing = (
-        LONG_HOLD_SHARE
-        if problem.mission.targets.target["zone"].max() >= 0
-        else HOLD_SHARE
-    )
+    queues = targets.target["zone"].max() >= 0
+    standing = LONG_HOLD_SHARE if queues else HOLD_SHARE
     # Stays yet to come cost what they cost, whatever the weight of the rest.
     ahead_s = np.append(np.cumsum(stay_s[::-1])[::-1], 0.0)
     steps = motion_steps(robot, dt_s, effort.fineness)
