@@ -108,7 +108,9 @@ def _visit_goal(search, labels, r, state, g, count):
         most_left, source, other_left = -np.inf, NOTHING, -np.inf
         for k in np.argsort(labels.offer[:offers, 0], kind="mergesort"):
             cost, left = labels.offer[k, 0], labels.offer[k, 1]
-            origin = _repeatable(search, labels, labels.origin[k])
+            # The goal it comes from, if its visits are counted.
+            origin = labels.place[labels.origin[k], 1]
+            origin = origin if search.is_counted[origin] else NOTHING
             if left <= other_left:
                 continue
             if left <= most_left and source in (NOTHING, origin):
@@ -125,13 +127,6 @@ def _visit_goal(search, labels, r, state, g, count):
             set_trace(labels, count, r, goal, arc, labels.origin[k])
             count += 1
     return count
-
-
-@kernel
-def _repeatable(search, labels, k):
-    """Return the goal that label k is at if its visits are counted, else NOTHING."""
-    node = labels.place[k, 1]
-    return node if search.is_counted[node] else NOTHING
 
 
 @kernel
