@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
+from mrmg.motion._kernels import copy_numbers
 
 
 class Vertices(NamedTuple):
@@ -199,12 +200,9 @@ def find_group(tree, region, visited):
     groups.slot[at] = g + 1
     groups.visits[g] = 0
     groups.first[g] = -1
-    groups.unvisited[g] = 0
-    for r in range(len(region)):
-        groups.region[g, r] = region[r]
-    for goal in range(len(visited)):
-        groups.visited[g, goal] = visited[goal]
-        groups.unvisited[g] += not visited[goal]
+    groups.unvisited[g] = len(visited) - visited.sum()
+    copy_numbers(region, groups.region[g])
+    copy_numbers(visited, groups.visited[g])
     return g
 
 

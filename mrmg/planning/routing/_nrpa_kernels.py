@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
+from mrmg.motion._kernels import copy_numbers
 from mrmg.planning.routing._random_kernels import random_unit
 
 UNVISITED = 1e13
@@ -265,12 +266,11 @@ def nrpa(problem, levels, iterations, alpha, random, sequence):
     recursion is unrolled over a counter per level, so that it compiles.
     """
     robots, places, targets = problem.cost.shape
-    size = len(sequence)
     scale = mean_cost(problem)
     policy = np.zeros((levels + 1, robots, places, targets))
     best = np.full(levels + 1, np.inf)
     best_length = np.zeros(levels + 1, np.int64)
-    best_sequence = np.zeros((levels + 1, size), np.int64)
+    best_sequence = np.zeros((levels + 1, len(sequence)), np.int64)
     done = np.zeros(levels + 1, np.int64)
     level = levels
     while True:
@@ -280,25 +280,21 @@ def nrpa(problem, levels, iterations, alpha, random, sequence):
             level = 1
         elif done[level] < iterations:
             if level > 1:
-                lower, upper = policy[level - 1].ravel(), policy[level].ravel()
-                for i in range(len(upper)):
-                    lower[i] = upper[i]
+                copy_numbers(policy[level].ravel(), policy[level - 1].ravel())
                 best[level - 1] = np.inf
                 done[level - 1] = 0
             level -= 1
             continue
         else:
             result, result_length = best[level], best_length[level]
-            for i in range(size):
-                sequence[i] = best_sequence[level, i]
+            copy_numbers(best_sequence[level], sequence)
             if level == levels:
                 return result, result_length
             level += 1
         if result <= best[level]:
             best[level] = result
             best_length[level] = result_length
-            for i in range(result_length):
-                best_sequence[level, i] = sequence[i]
+            copy_numbers(sequence[:result_length], best_sequence[level])
         done[level] += 1
         adapt(
             problem,

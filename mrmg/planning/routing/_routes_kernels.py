@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
+from mrmg.motion._kernels import copy_numbers
 from mrmg.planning.routing._insertion_kernels import value_with
 from mrmg.planning.routing._legs_kernels import MISSING, USABLE
 from mrmg.planning.routing._random_kernels import random_unit
@@ -71,10 +72,8 @@ def copy_routes(source, copy, changed):
     for r in range(robots + 1):
         if changed[r] or r == robots:
             copy.length[r] = source.length[r]
-            for i in range(source.length[r]):
-                copy.goal[r, i] = source.goal[r, i]
-            for column in range(3):
-                copy.known[r, column] = source.known[r, column]
+            copy_numbers(source.goal[r, : source.length[r]], copy.goal[r])
+            copy_numbers(source.known[r], copy.known[r])
             copy.front[r] = source.front[r]
             copy.back[r] = source.back[r]
             copy.plain[r] = source.plain[r]
@@ -91,10 +90,8 @@ def copy_labels(legs, routes, changed, source, copy):
             if i < 2 * n:
                 row = routes.goal[r, i // 2] + i % 2 * ends
             for k in range(int(source.head[row, WAYS])):
-                for column in range(source.way.shape[2]):
-                    copy.way[row, k, column] = source.way[row, k, column]
-            for column in range(source.head.shape[1]):
-                copy.head[row, column] = source.head[row, column]
+                copy_numbers(source.way[row, k], copy.way[row, k])
+            copy_numbers(source.head[row], copy.head[row])
 
 
 @kernel
