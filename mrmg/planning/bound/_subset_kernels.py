@@ -8,21 +8,25 @@ from mrmg.compilation import kernel
 
 
 @kernel
-def join_robot(fleet, own, longest):
-    """Return the least cost of each set of goals with one more robot.
+def least_division(own, longest):
+    """Return the least cost of all goals if robots divide them among each other.
 
     Args:
-        fleet, own: of each set, for the robots so far and the one more, shape (2^G,).
-        longest: whether the larger of both counts, not their sum.
+        own: of each set of goals, for each robot alone, shape (R, 2^G).
+        longest: whether the largest of the robots' costs counts, not their sum.
     """
-    joined = np.full(len(fleet), np.inf)
-    for goals in range(len(fleet)):
-        part = goals
-        while True:
-            rest = fleet[goals ^ part]
-            value = max(rest, own[part]) if longest else rest + own[part]
-            joined[goals] = min(joined[goals], value)
-            if part == 0:
-                break
-            part = (part - 1) & goals
-    return joined
+    fleet = np.full(own.shape[1], np.inf)
+    fleet[0] = 0.0
+    for r in range(len(own)):
+        joined = np.full(len(fleet), np.inf)
+        for goals in range(len(fleet)):
+            part = goals
+            while True:
+                rest = fleet[goals ^ part]
+                value = max(rest, own[r, part]) if longest else rest + own[r, part]
+                joined[goals] = min(joined[goals], value)
+                if part == 0:
+                    break
+                part = (part - 1) & goals
+        fleet = joined
+    return fleet[-1]

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mrmg.planning.bound._subset_kernels import join_robot
+from mrmg.planning.bound._subset_kernels import least_division
 from mrmg.planning.bound.bound import CELLS, ROUNDING_SHARE, Relaxation, most_descent_J
 from mrmg.planning.bound.exact_tours import MOST_GOALS, least_costs, of_robot
 from mrmg.planning.bound.makespan_bound import least_times_s
@@ -74,12 +74,8 @@ class Divisions:
 
     def energy_within_J(self, limit_s: float) -> float:
         """Return an energy that no plan undercuts which is over by `limit_s`."""
-        fleet = np.full(self.energy_J.shape[1], np.inf)
-        fleet[0] = 0.0
-        for energy_J, time_s in zip(self.energy_J, self.time_s, strict=True):
-            timely_J = np.where(time_s <= limit_s, energy_J, np.inf)
-            fleet = join_robot(fleet, timely_J, False)
-        least_J = float(fleet[-1]) - self.descent_J
+        timely_J = np.where(self.time_s <= limit_s, self.energy_J, np.inf)
+        least_J = float(least_division(timely_J, False)) - self.descent_J
         return max(0.0, least_J) * (1.0 - ROUNDING_SHARE)
 
     def value(self, objective: Objective, limit_s: float = math.inf) -> float:

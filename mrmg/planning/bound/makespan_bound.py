@@ -11,12 +11,11 @@ the bound.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import inf
 
 import numpy as np
 
 from mrmg.motion._kernels import MODEL_ID
-from mrmg.planning.bound._subset_kernels import join_robot
+from mrmg.planning.bound._subset_kernels import least_division
 from mrmg.planning.bound.bound import (
     CELLS,
     ROUNDING_SHARE,
@@ -61,11 +60,8 @@ def makespan_bound_s(
     if len(scene.goals) > MOST_GOALS:
         bound_s = _relaxed_s(scene, _metres(scene, step_s, cells, halt))
     else:
-        fleet = np.full(1 << len(scene.goals), inf)
-        fleet[0] = 0.0
-        for own_s in least_times_s(scene, step_s=step_s, cells=cells, halt=halt):
-            fleet = join_robot(fleet, own_s, True)
-        bound_s = float(fleet[-1])
+        times_s = least_times_s(scene, step_s=step_s, cells=cells, halt=halt)
+        bound_s = float(least_division(times_s, True))
     return max(0.0, bound_s) * (1.0 - ROUNDING_SHARE)
 
 
