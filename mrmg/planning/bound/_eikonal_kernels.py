@@ -53,12 +53,10 @@ def certified_field(price, cell, seed, rounds, band):
         _lower_where_steep(field, price, cell, step)
         field = seed.copy()
         _march(step.ravel(), field)
-    low, high = np.inf, -np.inf
+    low = high = field.min()
     for value in field.ravel():
-        low = min(low, value)
         if value < UNREACHED:
             high = max(high, value)
-    high = max(high, low)
     excess = np.ones(int((high - low) / band) + 2)
     for row in range(price.shape[0]):
         for column in range(price.shape[1]):

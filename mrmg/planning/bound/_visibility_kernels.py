@@ -185,10 +185,7 @@ def least_costs(between, first, last, direct):
             for v in range(len(cost)):
                 if open_[v] and cost[v] < least:
                     node, least = v, cost[v]
-            worst = 0.0
-            for sink in range(found.shape[1]):
-                worst = max(worst, found[source, sink])
-            if node < 0 or least >= worst:
+            if node < 0 or least >= found[source].max():
                 break
             open_[node] = False
             for v in range(len(cost)):
