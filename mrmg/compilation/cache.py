@@ -33,7 +33,6 @@ _SOURCES = (
     "compilation/*.py",
     "energy/model.py",
     "motion/dynamics.py",
-    "planning/problem/problem.py",  # named tuples that kernels take
     "**/*_kernels.py",
 )
 
