@@ -149,10 +149,8 @@ def _more_energy(robot: Robot, share: float) -> str:
 def _unjoined_finishes(scene: Scene, roadmap: Roadmap) -> list[str]:
     """Return the finishes to which the roadmap knows no path for their robots."""
     return [
-        f"the finish of {robot.id}"
-        for r, (robot, place) in enumerate(
-            zip(scene.robots, finish_of(scene), strict=True)
-        )
+        f"the {roadmap.targets[place]}"
+        for r, place in enumerate(finish_of(scene))
         if place >= 0 and not np.isfinite(roadmap.start_distance[r, place])
     ]
 

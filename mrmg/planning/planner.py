@@ -206,6 +206,8 @@ class _Planning:
             return self._unsolved(proof, why or why_in_short(self.params, search))
         if bounding is not None:
             self._in_time(bounding.result)
+        margins = self.params.margins
+        wanted = {one.id: margins_of(one, margins)[1] for one in self.scene.robots}
         return PlanResult(
             status=PlanStatus.SOLVED,
             plan=best,
@@ -213,15 +215,7 @@ class _Planning:
             statistics=self.statistics.as_dict(),
             hints=(
                 *([INTERRUPTED] if search.interrupted else []),
-                *hints_on(
-                    self.scene,
-                    best,
-                    {
-                        r.id: margins_of(r, self.params.margins)[1]
-                        for r in self.scene.robots
-                    },
-                    self.statistics.gap,
-                ),
+                *hints_on(self.scene, best, wanted, self.statistics.gap),
             ),
         )
 

@@ -108,19 +108,15 @@ def course_of(problem: Problem, r: int, path: Path) -> Course:
             node["bend"][a : b + 1] = _bends(chord[a:b], size[a:b])
         pause = np.ceil(path.pause_s / problem.dt_s).astype(int)
         np.add.at(node["pause"], path.stop, pause)
-        tight = steerable_speeds(
-            problem, r, node["bend"], node["way"], node["end"][:-1]
-        )
+        tight = steerable_speeds(problem, r, node)
         node["fastest"] = _speed_limits(path, tight, ease)
         node["rest_s"] = (path.way[-1] - path.way) / robot["limit"][1]
     targets = problem.mission.targets
     finish = targets.finish[r]
     final = np.array([0.0, np.inf])
     if finish >= 0 and targets.target["tolerance"][finish] < np.pi:
-        final[:] = (
-            targets.target["heading"][finish],
-            targets.target["tolerance"][finish],
-        )
+        aim = targets.target[finish]
+        final[:] = aim["heading"], aim["tolerance"]
     return Course(
         node=node,
         size=np.array([n]),
@@ -148,24 +144,20 @@ def empty_path(most: int) -> np.ndarray:
     return node
 
 
-def steerable_speeds(
-    problem: Problem, r: int, bend: np.ndarray, way: np.ndarray, end: np.ndarray
-) -> np.ndarray:
+def steerable_speeds(problem: Problem, r: int, node: np.ndarray) -> np.ndarray:
     """Return the speed up to which a robot can steer along its path, shape (n,).
 
     Args:
         problem: the mission.
         r: robot.
-        bend: curvature at the nodes [1/m], shape (n,).
-        way: way to the nodes [m], shape (n,).
-        end: number of the node at which each segment's stretch ends, shape (n - 1,).
+        node: `COURSE_NODE`, shape (n,), with bends, ways and ends of stretches.
     """
-    robot = problem.mission.fleet[r]
+    robot, bend = problem.mission.fleet[r], node["bend"]
     limit = robot["limit"]
     if robot["model"] == USER:  # only its own steering knows
         return np.full(len(bend), np.inf)
-    change = np.abs(np.diff(bend)) / np.maximum(np.diff(way), 1e-6)
-    change[1:][np.diff(end) != 0] = 0.0  # the robot stands there
+    change = np.abs(np.diff(bend)) / np.maximum(np.diff(node["way"]), 1e-6)
+    change[1:][np.diff(node["end"][:-1]) != 0] = 0.0  # the robot stands there
     change = np.maximum(change, 1e-9)
     if robot["model"] == UNICYCLE:
         speed = np.sqrt(limit[4] / change)

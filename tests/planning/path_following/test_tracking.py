@@ -15,6 +15,7 @@ from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.tracking import (
     deceleration,
     drive_alone,
+    empty_path,
     steerable_speeds,
 )
 from mrmg.planning.problem.problem import Problem, state_mission
@@ -47,8 +48,9 @@ def test_robots_can_steer_along_an_arc_as_fast_as_is_said(name: str) -> None:
     robot = problem.mission.fleet[0]
     way = np.linspace(0.0, 6.0, 601)
     bend = 0.4 * way  # a clothoid
-    end = np.full(600, 600)
-    speed = steerable_speeds(problem, 0, bend, way, end)
+    node = empty_path(601)
+    node["bend"], node["way"], node["end"] = bend, way, 600
+    speed = steerable_speeds(problem, 0, node)
     v = speed[1:-1]
     if name == "diffdrive":
         rate = v * np.diff(bend[1:]) / np.diff(way[1:]) * v
