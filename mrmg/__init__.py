@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from mrmg.runs.pipeline import run
     from mrmg.scene.loading import load_scene
     from mrmg.scene.types import Scene
-    from mrmg.simulation import simulate as execute
     from mrmg.simulation.log import ExecutionLog
-    from mrmg.supervision import drive_mission as drive
+    from mrmg.simulation.simulation import simulate as execute
+    from mrmg.supervision.driving import drive_mission as drive
     from mrmg.verification.verdict import Verdict
     from mrmg.verification.verify import verify
     from mrmg.viz.video import render_video as render
@@ -66,8 +66,8 @@ _HOME = {
     "Scene": ("mrmg.scene.types", "Scene"),
     "Verdict": ("mrmg.verification.verdict", "Verdict"),
     "audit": ("mrmg.energy.audit", "audit"),
-    "drive": ("mrmg.supervision", "drive_mission"),
-    "execute": ("mrmg.simulation", "simulate"),
+    "drive": ("mrmg.supervision.driving", "drive_mission"),
+    "execute": ("mrmg.simulation.simulation", "simulate"),
     "load_scene": ("mrmg.scene.loading", "load_scene"),
     "plan": ("mrmg.planning", "plan_mission"),
     "render": ("mrmg.viz.video", "render_video"),

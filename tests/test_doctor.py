@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mrmg import doctor
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 
 

@@ -10,7 +10,7 @@ import pytest
 from mrmg.energy.audit import audit
 from mrmg.planning import plan_mission
 from mrmg.scene.loading import load_scene
-from mrmg.simulation import simulate
+from mrmg.simulation.simulation import simulate
 from mrmg.verification.verify import verify
 
 SCENES = Path(__file__).parent / "scenes"

@@ -13,7 +13,7 @@ from mrmg.energy.audit import audit
 from mrmg.planning import plan_mission
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
-from mrmg.simulation import simulate
+from mrmg.simulation.simulation import simulate
 from mrmg.verification.verify import verify
 
 HILL = {"center": [16, 12], "height": 5, "radius": 7}

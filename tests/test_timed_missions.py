@@ -15,7 +15,7 @@ from mrmg.planning import PlannerParams, plan_mission
 from mrmg.plans import Plan, PlanResult, PlanStatus
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.types import Scene
-from mrmg.simulation import simulate
+from mrmg.simulation.simulation import simulate
 from mrmg.verification.verify import verify
 
 ONE_SIDED = Path(__file__).parent / "scenes" / "one_sided.yaml"

@@ -33,7 +33,8 @@ from physics.figures import Figure, print_figures
 from protocol import Row, add_file_options, run, state, versions, write_document
 
 from mrmg import storage
-from mrmg.studies.campaigns import read_campaign, run_campaign
+from mrmg.studies.campaigns.campaign import run_campaign
+from mrmg.studies.campaigns.reading import read_campaign
 from mrmg.studies.engine import Engine
 
 LIMIT_MS = 50.0

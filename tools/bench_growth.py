@@ -48,7 +48,7 @@ from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.parameters import PATH_FOLLOWING
 from mrmg.planning.preparation import compile_kernels
 from mrmg.scene.loading import scene_from_document
-from mrmg.scene.populating import populate
+from mrmg.scene.populating.populate import populate
 
 GOALS_PER_STATION = 4
 """Where goals grow; the others' missions have 20 goals and 6 stations."""

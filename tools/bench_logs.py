@@ -25,7 +25,8 @@ from protocol import write_document
 from mrmg import shipped
 from mrmg.errors import MrmgError
 from mrmg.scene.loading.models import load_model
-from mrmg.studies.calibration import calibrate_from_logs, read_run
+from mrmg.studies.calibration.log_calibration import calibrate_from_logs
+from mrmg.studies.calibration.robot_logs import read_run
 
 FOLDER = Path(__file__).resolve().parents[2] / "shared" / "energy" / "borealtc"
 

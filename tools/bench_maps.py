@@ -19,9 +19,9 @@ import bench
 from mission_tables import header, print_scene
 from protocol import Row, Trials, add_file_options, run, seed_range, write_document
 
-from mrmg.scene.importing import import_map
+from mrmg.scene.importing.importing import import_map
 from mrmg.scene.loading import scene_from_document
-from mrmg.scene.populating import populate
+from mrmg.scene.populating.populate import populate
 from mrmg.scene.types import Scene
 
 FOLDER = Path(__file__).resolve().parents[2] / "shared" / "maps"

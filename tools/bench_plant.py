@@ -40,7 +40,7 @@ from mrmg.energy.audit_record import MODEL_MISMATCH
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
 from mrmg.simulation.plants import PLANTS
-from mrmg.studies.calibration import calibrate
+from mrmg.studies.calibration.calibrate import calibrate
 
 SCENES = ("scene1", "scene2", "scene3", "scene4", "scene5", "scene6", "hills")
 PARAMETERS = ("rolling_coefficient", "turning_coefficient", "wheel_inertia_kg_m2")

@@ -17,7 +17,8 @@ from physics.figures import Figure
 
 from mrmg.compilation import cache_folder
 from mrmg.errors import ExitCode
-from mrmg.studies.campaigns import read_campaign, run_campaign
+from mrmg.studies.campaigns.campaign import run_campaign
+from mrmg.studies.campaigns.reading import read_campaign
 
 CAMPAIGN = """\
 scenes:

@@ -15,7 +15,8 @@ from mrmg.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
     from mrmg.scene.robot_model import RobotModel
-    from mrmg.studies.calibration import Calibration, LogCalibration
+    from mrmg.studies.calibration.calibrate import Calibration
+    from mrmg.studies.calibration.log_calibration import LogCalibration
 
 
 _DESCRIPTION = """\
@@ -53,7 +54,8 @@ def calibrate(options: argparse.Namespace) -> int:
     """Calibrate a robot model, and leave a calibrated copy with the plot of the fit."""
     if options.groups:
         return _calibrate_from_logs(options)
-    from mrmg.studies.calibration import calibrate, write_calibration
+    from mrmg.studies.calibration.calibrate import calibrate
+    from mrmg.studies.calibration.files import write_calibration
     from mrmg.viz.calibration_plot import draw_calibration
     from mrmg.viz.figures import require_format
 
@@ -74,13 +76,14 @@ def _calibrate_from_logs(options: argparse.Namespace) -> int:
     """Fit a robot model to logs, and leave a calibrated copy with page and terrain."""
     from mrmg.report.log_page import calibration_html
     from mrmg.storage import write_text
-    from mrmg.studies.calibration import (
-        calibrate_from_logs,
-        read_run,
+    from mrmg.studies.calibration.files import (
+        PAGE_FILE,
+        TERRAIN_FILE,
         write_calibration,
         write_terrain,
     )
-    from mrmg.studies.calibration.files import PAGE_FILE, TERRAIN_FILE
+    from mrmg.studies.calibration.log_calibration import calibrate_from_logs
+    from mrmg.studies.calibration.robot_logs import read_run
 
     if options.plot is not None:
         raise UsageError(
@@ -112,7 +115,7 @@ def _model_and_places(options: argparse.Namespace) -> tuple[RobotModel, Path, Pa
     """
     from mrmg.runs.replacing import require_absent
     from mrmg.scene.loading.models import load_model
-    from mrmg.studies.calibration import require_other_folder
+    from mrmg.studies.calibration.files import require_other_folder
 
     folder = folder_of_model(options.model)
     out = options.out or Path(f"calibrated-{folder.name}")

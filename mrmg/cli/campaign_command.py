@@ -62,7 +62,8 @@ def add_campaign(verbs: Any) -> None:
 
 def campaign(options: argparse.Namespace) -> int:
     """Make the trials of a campaign."""
-    from mrmg.studies.campaigns import read_campaign, run_campaign
+    from mrmg.studies.campaigns.campaign import run_campaign
+    from mrmg.studies.campaigns.reading import read_campaign
     from mrmg.studies.engine import Engine
 
     engine = Engine(

@@ -46,7 +46,8 @@ def run(options: argparse.Namespace) -> int:
 
 def _scene(options: argparse.Namespace) -> Scene:
     """Return the scene of the command line, and warn of what it may not mean."""
-    from mrmg.scene.loading import heading_hints, load_scene
+    from mrmg.scene.loading import load_scene
+    from mrmg.scene.loading.hints import heading_hints
     from mrmg.scene.slopes import bend_warnings
 
     scene = load_scene(options.scene, trust_code=options.trust_code)

@@ -126,7 +126,7 @@ def new_robot(options: argparse.Namespace) -> int:
 
 def import_robot(options: argparse.Namespace) -> int:
     """Make a robot model of a description of another tool."""
-    from mrmg.scene.importing.robots import import_robot as imported
+    from mrmg.scene.importing.robots.importing import import_robot as imported
 
     given = [item.replace(":=", "=").partition("=") for item in options.arg]
     if not all(name and sign for name, sign, _ in given):

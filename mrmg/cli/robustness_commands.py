@@ -49,7 +49,7 @@ def robustness(options: argparse.Namespace) -> int:
 
     from mrmg.runs.folder import Step, existing
     from mrmg.runs.steps import taken_up
-    from mrmg.studies.robustness import study_robustness
+    from mrmg.studies.robustness.study import study_robustness
 
     given_drive = {
         name: value

@@ -59,7 +59,8 @@ def check(options: argparse.Namespace) -> int:
     from mrmg.planning.feasibility import mission_warnings
     from mrmg.planning.roadmap.fleet import margins_of
     from mrmg.runs.pipeline import rehearse
-    from mrmg.scene.loading import heading_hints, load_scene
+    from mrmg.scene.loading import load_scene
+    from mrmg.scene.loading.hints import heading_hints
     from mrmg.scene.margins import STATES_NONE, sentences_on_margins
     from mrmg.scene.slopes import bend_warnings
 
@@ -150,7 +151,7 @@ def roadmap(options: argparse.Namespace) -> int:
 def schema(options: argparse.Namespace) -> int:
     """Print the JSON Schema of scenes, robot models, campaigns or summaries."""
     from mrmg.runs.summary_model import summary_schema
-    from mrmg.scene.loading import robot_schema, scene_schema
+    from mrmg.scene.loading.json_schema import robot_schema, scene_schema
     from mrmg.studies.campaigns.schema import campaign_schema
 
     made = {
@@ -165,7 +166,7 @@ def schema(options: argparse.Namespace) -> int:
 
 def import_(options: argparse.Namespace) -> int:
     """Read maps, layouts and features of other tools as a scene."""
-    from mrmg.scene.importing import import_files
+    from mrmg.scene.importing.importing import import_files
     from mrmg.scene.importing.layers import ImportOptions
 
     _require_absent(options)
@@ -205,7 +206,7 @@ def _box(words: Sequence[str]) -> tuple[float, float, float, float]:
 def populate(options: argparse.Namespace) -> int:
     """Place robots, goals and stations in a scene."""
     from mrmg.scene.loading import load_scene
-    from mrmg.scene.populating import populate as populated
+    from mrmg.scene.populating.populate import populate as populated
 
     _require_absent(options)
     document = populated(

@@ -12,7 +12,7 @@ from mrmg.scene.margins import STATES_NONE, margins_from
 from mrmg.scene.types import Scene
 
 if TYPE_CHECKING:
-    from mrmg.supervision import Drive
+    from mrmg.supervision.driving import Drive
 
 
 def checked_drive(scene: Scene, arguments: RunArguments) -> RunArguments:
@@ -40,7 +40,7 @@ def drive(
     """Drive a plan in MuJoCo as the arguments of its run want it."""
     from mrmg.planning import profile_params
     from mrmg.simulation.disturbance_spec import parse_disturbance
-    from mrmg.supervision import drive_mission
+    from mrmg.supervision.driving import drive_mission
 
     disturbance = None
     if arguments.disturb is not None:

@@ -156,7 +156,7 @@ def rehearse(scene: Scene) -> list[str]:
         require_drivable(scene.robots)
     except UsageError as error:
         return [str(error)]
-    from mrmg.simulation import build_world
+    from mrmg.simulation.world_model import build_world
 
     build_world(scene, drawn=False)
     return []

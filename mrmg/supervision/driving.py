@@ -12,8 +12,8 @@ from mrmg.planning import PlannerParams
 from mrmg.plans import DRIVEN_PLAN, Plan
 from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.types import Scene
-from mrmg.simulation import ExecutionLog, simulate
-from mrmg.simulation.log import require_same_mission
+from mrmg.simulation.log import ExecutionLog, require_same_mission
+from mrmg.simulation.simulation import simulate
 from mrmg.supervision.faults import checked_faults
 from mrmg.supervision.parameters import ControlParams
 from mrmg.supervision.replanning import Replan, Replanner

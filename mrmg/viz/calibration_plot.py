@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 
-from mrmg.studies.calibration import Calibration, Estimate
+from mrmg.studies.calibration.calibrate import Calibration, Estimate
 from mrmg.viz import style
 from mrmg.viz.figures import FOR_PRINT, new_figure, tidy, write_figure
 

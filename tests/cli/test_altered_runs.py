@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mrmg import storage
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 
 SCENE = Path(__file__).parents[1] / "scenes" / "one_goal.yaml"

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from mrmg import shipped
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 from mrmg.scene.loading.models import load_model
 

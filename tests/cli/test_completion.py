@@ -16,8 +16,8 @@ from pathlib import Path
 import pytest
 
 from mrmg import shipped
-from mrmg.cli import main
 from mrmg.cli.completion import SHELLS
+from mrmg.cli.main import main
 from mrmg.cli.parser import make_parser
 from mrmg.cli.usage import Parser
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 from mrmg.simulation.disturbance import DEFAULT_RANGES
 from mrmg.simulation.log import ExecutionLog

@@ -22,7 +22,7 @@ import pytest
 from PIL import Image
 
 from mrmg import storage
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 
 pytestmark = pytest.mark.slow

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 
 SCENE = "format: 1\nbounds: [0, 0, 20, 10]\n"

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 from mrmg.report.compare import compare_runs
 from mrmg.shipped import models_folder

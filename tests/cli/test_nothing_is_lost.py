@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 from mrmg.plans import Plan
 from mrmg.runs.folder import OUTPUTS, Step

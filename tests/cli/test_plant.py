@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 
 SCENE = Path(__file__).parents[1] / "scenes" / "one_goal.yaml"

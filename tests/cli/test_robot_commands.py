@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from mrmg import shipped
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 from mrmg.scene.loading import load_scene
 from mrmg.scene.loading.models import load_model

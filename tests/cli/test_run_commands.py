@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from mrmg import storage
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 from mrmg.runs.summary_model import summary_schema
 from mrmg.scene.loading import load_scene

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from mrmg import shipped
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.scene.robot_model import MAX_CORNERS

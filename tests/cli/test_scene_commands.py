@@ -13,9 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mrmg import shipped
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode
-from mrmg.scene.loading import heading_hints, load_scene, scene_from_document
+from mrmg.scene.loading import load_scene, scene_from_document
+from mrmg.scene.loading.hints import heading_hints
 from mrmg.scene.loading.schema import SECTIONS, BatteryEntry, SceneDocument
 from mrmg.scene.loading.yaml_text import dump_yaml, parse_yaml
 from mrmg.scene.new_scene import new_scene

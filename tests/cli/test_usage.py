@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.cli.parser import make_parser
 from mrmg.errors import ExitCode
 

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 import mrmg
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 from mrmg.export.exporting import export_run
 from mrmg.export.table import format_names
 from mrmg.plans import Plan
 from mrmg.runs.folder import RunFolder, Step
-from mrmg.scene.importing import import_files
+from mrmg.scene.importing.importing import import_files
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.simulation.log import ExecutionLog
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import shapely
 
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 from mrmg.export.exporting import export_run
 from mrmg.export.ros_messages import ros_names

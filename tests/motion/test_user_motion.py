@@ -200,7 +200,7 @@ def test_bad_names(tmp_path: Path, motion: str, message: str) -> None:
 
 
 def test_it_cannot_be_driven_in_mujoco_and_says_so(tmp_path: Path) -> None:
-    from mrmg.simulation import build_world
+    from mrmg.simulation.world_model import build_world
 
     scene = slider_scene(model_folder(tmp_path, SLIDER))
     with pytest.raises(MrmgError, match="planned for and verified, but not driven"):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.energy.ledger import EnergyLedger
 from mrmg.errors import ExitCode, RunFolderError, UsageError
 from mrmg.plans import DRIVEN_PLAN, Plan

@@ -12,9 +12,11 @@ import pytest
 
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
-from mrmg.simulation import ExecutionLog, build_world, simulate
 from mrmg.simulation.disturbance import DEFAULT_RANGES, Disturbance, RobotDisturbance
 from mrmg.simulation.disturbed_world import disturb_world
+from mrmg.simulation.log import ExecutionLog
+from mrmg.simulation.simulation import simulate
+from mrmg.simulation.world_model import build_world
 
 
 def disturbed(seed: int = 0, **changes: float) -> Disturbance:

@@ -15,8 +15,8 @@ from mrmg.energy.metering import measured_energy_parts
 from mrmg.errors import FileError
 from mrmg.scene.types import Scene
 from mrmg.simulation import fleet as fleet_module
-from mrmg.simulation import simulate
 from mrmg.simulation.fleet import Fleet
+from mrmg.simulation.simulation import simulate
 from mrmg.simulation.world_model import build_world
 
 CAR = '<motor name="drive" tendon="axle" gear="1"/>'

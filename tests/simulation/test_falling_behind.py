@@ -14,10 +14,10 @@ from mrmg.plans import Plan
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
 from mrmg.shipped import model_names
-from mrmg.simulation import simulate
 from mrmg.simulation.controller import controller_names
 from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
 from mrmg.simulation.log import ExecutionLog
+from mrmg.simulation.simulation import simulate
 
 pytestmark = pytest.mark.quick("car-mpc", "diffdrive-tvlqr", "hauler-pure_pursuit")
 

@@ -11,13 +11,14 @@ import pytest
 
 from mrmg.errors import UsageError
 from mrmg.scene.types import Scene
-from mrmg.simulation import ExecutionLog, simulate
+from mrmg.simulation.log import ExecutionLog
 from mrmg.simulation.scrub import (
     LOAD_EXPONENT,
     PATCH_SHARE,
     SLIP_STIFFNESS,
     SPEED_PER_M_S,
 )
+from mrmg.simulation.simulation import simulate
 
 GRAVITY = 9.81
 

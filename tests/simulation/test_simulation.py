@@ -17,10 +17,10 @@ from mrmg.errors import RunFolderError, UsageError
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene, TerrainArea
 from mrmg.shipped import model_names
-from mrmg.simulation import simulate
 from mrmg.simulation.controller import controller_names
 from mrmg.simulation.disturbance import DisturbanceRanges
 from mrmg.simulation.log import ExecutionLog
+from mrmg.simulation.simulation import simulate
 
 STRIPES = [
     {"id": "two", "polygon": [[8, -9], [18, -9], [18, 9], [8, 9]], "multiplier": 2},

@@ -10,7 +10,7 @@ import pytest
 
 from mrmg.plans import Plan, Trajectory
 from mrmg.scene.types import Scene
-from mrmg.simulation import simulate
+from mrmg.simulation.simulation import simulate
 from mrmg.simulation.supervision import Event, Observation, Orders
 
 

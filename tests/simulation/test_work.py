@@ -13,7 +13,8 @@ import pytest
 from mrmg.energy.audit import audit
 from mrmg.energy.audit_record import ENERGY_IMBALANCE, EnergyAudit
 from mrmg.scene.types import Scene
-from mrmg.simulation import ExecutionLog, simulate
+from mrmg.simulation.log import ExecutionLog
+from mrmg.simulation.simulation import simulate
 from mrmg.simulation.work import BALANCE_TERMS
 
 DRIVE = '<motor name="drive" tendon="axle" gear="1"/>'

@@ -16,11 +16,11 @@ from mrmg.errors import UsageError
 from mrmg.planning import plan_mission
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
-from mrmg.simulation import simulate
 from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
 from mrmg.simulation.disturbance_spec import parse_disturbance
 from mrmg.simulation.log import ExecutionLog
-from mrmg.supervision import Drive, drive_mission
+from mrmg.simulation.simulation import simulate
+from mrmg.supervision.driving import Drive, drive_mission
 from mrmg.verification.verify import verify
 
 

@@ -11,9 +11,9 @@ from mrmg.energy.metering import LoggedMotion, battery_profile, find_visits
 from mrmg.planning import plan_mission
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
-from mrmg.simulation import simulate
 from mrmg.simulation.disturbance_spec import parse_disturbance
 from mrmg.simulation.log import ExecutionLog
+from mrmg.simulation.simulation import simulate
 from mrmg.supervision.metering import RobotMeter, RollingEstimate
 
 

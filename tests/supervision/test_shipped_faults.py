@@ -15,7 +15,7 @@ from mrmg.planning import PlannerParams, plan_mission
 from mrmg.plans import Plan
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
-from mrmg.supervision import Drive, drive_mission
+from mrmg.supervision.driving import Drive, drive_mission
 
 pytestmark = pytest.mark.slow
 

@@ -14,8 +14,8 @@ from mrmg.planning import plan_mission
 from mrmg.plans import Visit
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.types import Scene
-from mrmg.supervision import drive_mission, remaining_scene
-from mrmg.supervision.remaining import FleetCondition
+from mrmg.supervision.driving import drive_mission
+from mrmg.supervision.remaining import FleetCondition, remaining_scene
 from mrmg.supervision.stays import OngoingStay, keeps_stays, stays_under_way
 
 DWELL = Path(__file__).parents[1] / "scenes" / "dwell.yaml"

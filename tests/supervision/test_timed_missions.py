@@ -11,7 +11,7 @@ from mrmg.energy.audit import audit
 from mrmg.energy.mission_failures import over_s
 from mrmg.planning import plan_mission
 from mrmg.scene.types import Scene
-from mrmg.supervision import drive_mission
+from mrmg.supervision.driving import drive_mission
 
 
 @pytest.mark.slow

@@ -8,9 +8,9 @@ import pytest
 
 from mrmg.errors import ExitCode
 from mrmg.runs import pipeline
-from mrmg.scene.importing import import_map
+from mrmg.scene.importing.importing import import_map
 from mrmg.scene.loading import scene_from_document
-from mrmg.scene.populating import populate
+from mrmg.scene.populating.populate import populate
 
 MAPS = Path(__file__).parents[3] / "shared/maps"
 

@@ -9,7 +9,7 @@ import pytest
 
 from mrmg import shipped
 from mrmg.scene.loading.models import load_model
-from mrmg.studies.calibration import Calibration, fit_legs
+from mrmg.studies.calibration.calibrate import Calibration, fit_legs
 from mrmg.studies.calibration.manoeuvres import Manoeuvre
 from mrmg.studies.calibration.measurement import Leg
 from mrmg.viz.calibration_plot import draw_calibration

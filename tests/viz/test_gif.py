@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode, UsageError
 from mrmg.plans import Plan
 from mrmg.scene.loading import load_scene

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode, MachineError, RunFolderError
 from mrmg.scene.loading import load_scene
 from mrmg.simulation.world_model import build_world

@@ -11,7 +11,7 @@ import pytest
 
 from mrmg.errors import UsageError
 from mrmg.runs.arguments import VideoArguments
-from mrmg.simulation import simulate
+from mrmg.simulation.simulation import simulate
 from mrmg.viz import style
 from mrmg.viz.film import Film, Stage
 from mrmg.viz.ground_image import paint_ground

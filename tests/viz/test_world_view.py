@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mrmg.simulation import build_world
+from mrmg.simulation.world_model import build_world
 from mrmg.viz.world_view import (
     CHASE_FOVY_DEG,
     chase_camera,

@@ -17,7 +17,7 @@ from mrmg.runs.drive import drive as drive_as
 from mrmg.runs.folder import RunFolder, Step
 from mrmg.runs.steps import Run, RunArguments
 from mrmg.studies.outcomes import Study, Trial, wilson_interval
-from mrmg.studies.robustness import study_robustness
+from mrmg.studies.robustness.study import study_robustness
 from physics.figures import Figure, verdict
 
 SCENES = ("scene1", "scene4")

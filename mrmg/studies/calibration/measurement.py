@@ -15,8 +15,9 @@ from mrmg.motion.dynamics import DERIVATIVES, TURN_SPEEDS
 from mrmg.plans import Plan, Trajectory
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene, TerrainArea
-from mrmg.simulation import ExecutionLog, simulate
+from mrmg.simulation.log import ExecutionLog
 from mrmg.simulation.plants import DEFAULT_PLANT
+from mrmg.simulation.simulation import simulate
 from mrmg.studies.calibration.manoeuvres import STEP_S, Manoeuvre
 
 UNITS = {

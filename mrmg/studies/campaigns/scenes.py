@@ -16,7 +16,7 @@ from mrmg.errors import SceneError
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.loading.carrying import SCENE_FILE, carried_files
 from mrmg.scene.loading.yaml_text import parse_yaml
-from mrmg.scene.populating import populate
+from mrmg.scene.populating.populate import populate
 from mrmg.scene.types import Scene
 from mrmg.seeding import stream
 

@@ -24,7 +24,7 @@ from mrmg.runs.steps import planner_params
 from mrmg.scene.types import Scene
 from mrmg.studies.campaigns.scenes import SceneSource
 from mrmg.studies.outcomes import assess_trial
-from mrmg.supervision import Drive
+from mrmg.supervision.driving import Drive
 
 if TYPE_CHECKING:
     from mrmg.energy.audit_record import EnergyAudit

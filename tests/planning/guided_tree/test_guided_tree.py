@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 import mrmg
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import UsageError
 from mrmg.planning import guided_tree, plan_mission, profile_params
 from mrmg.planning.parameters import GuidedTreeParams

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mrmg.cli import main
+from mrmg.cli.main import main
 
 BAD = Path(__file__).parent / "bad"
 FILES = sorted(

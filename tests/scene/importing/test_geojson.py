@@ -14,8 +14,8 @@ import pytest
 import shapely
 
 from mrmg.errors import SceneError
-from mrmg.scene.importing import import_files
 from mrmg.scene.importing.formats.lif import read_lif
+from mrmg.scene.importing.importing import import_files
 from mrmg.scene.importing.layers import ImportOptions
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene

@@ -12,10 +12,10 @@ import pyproj
 import pytest
 import shapely
 
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import SceneError
 from mrmg.scene.elevation import Elevation
-from mrmg.scene.importing import import_files
+from mrmg.scene.importing.importing import import_files
 from mrmg.scene.importing.layers import ImportOptions
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.types import Scene

@@ -13,7 +13,7 @@ from PIL import Image
 from shapely import affinity
 
 from mrmg.errors import SceneError
-from mrmg.scene.importing import import_files
+from mrmg.scene.importing.importing import import_files
 from mrmg.scene.importing.layers import ImportOptions
 from mrmg.scene.importing.raster_shapes import enclosing_polygons, polygons_of_cells
 from mrmg.scene.loading import dump_scene, scene_from_document

@@ -11,9 +11,9 @@ import trimesh
 
 import mrmg
 from mrmg import shipped
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import SceneError, UsageError
-from mrmg.scene.importing.robots import ImportedRobot, import_robot
+from mrmg.scene.importing.robots.importing import ImportedRobot, import_robot
 from mrmg.scene.loading.models import load_model
 from mrmg.scene.robot_model import RobotModel
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from pictures.stories import stories, write_field, write_hall
 
-from mrmg.cli import main
+from mrmg.cli.main import main
 
 NAV2 = Path(__file__).parents[4] / "shared" / "nav2"
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import SceneError
-from mrmg.scene.importing.robots import import_robot
+from mrmg.scene.importing.robots.importing import import_robot
 from mrmg.scene.loading.models import load_model
 
 SPACE = 'xmlns:xacro="http://www.ros.org/wiki/xacro"'

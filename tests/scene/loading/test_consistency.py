@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from mrmg import shipped
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode, SceneError
 from mrmg.scene.loading import load_scene
 from mrmg.scene.loading.consistency import mjcf_faults

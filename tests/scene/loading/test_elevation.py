@@ -15,12 +15,8 @@ import yaml
 from PIL import Image
 
 from mrmg.errors import SceneError
-from mrmg.scene.loading import (
-    dump_scene,
-    load_scene,
-    scene_from_document,
-    scene_schema,
-)
+from mrmg.scene.loading import dump_scene, load_scene, scene_from_document
+from mrmg.scene.loading.json_schema import scene_schema
 from mrmg.scene.slopes import steepest_climb
 from mrmg.scene.types import Scene
 

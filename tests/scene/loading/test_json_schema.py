@@ -15,11 +15,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mrmg import shipped
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import SceneError
 from mrmg.runs import summary_model
-from mrmg.scene.loading import robot_schema, scene_from_document, scene_schema
+from mrmg.scene.loading import scene_from_document
 from mrmg.scene.loading.faults import keys_of
+from mrmg.scene.loading.json_schema import robot_schema, scene_schema
 from mrmg.scene.loading.models import ModelDocument
 from mrmg.scene.loading.schema import SceneDocument
 from mrmg.scene.loading.yaml_text import read_yaml

@@ -15,12 +15,8 @@ from hypothesis import strategies as st
 
 from mrmg import shipped
 from mrmg.errors import SceneError
-from mrmg.scene.loading import (
-    dump_scene,
-    load_scene,
-    scene_from_document,
-    scene_schema,
-)
+from mrmg.scene.loading import dump_scene, load_scene, scene_from_document
+from mrmg.scene.loading.json_schema import scene_schema
 from mrmg.scene.loading.yaml_text import read_yaml
 
 EDGE_SCENES = Path(__file__).parents[2] / "scenes"

@@ -14,7 +14,7 @@ import yaml
 
 import mrmg
 from mrmg import shipped
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.cli.parser import make_parser
 from mrmg.errors import ExitCode, SceneError
 from mrmg.motion.user_motion import user_motion

@@ -13,11 +13,11 @@ import shapely
 import yaml
 
 from mrmg.errors import UsageError
-from mrmg.scene.importing import import_map
+from mrmg.scene.importing.importing import import_map
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.loading.models import model_folder
-from mrmg.scene.populating import populate
 from mrmg.scene.populating.ground import Ground
+from mrmg.scene.populating.populate import populate
 from mrmg.scene.types import Scene
 
 MAPS = Path(__file__).parents[4] / "shared" / "maps"

@@ -13,8 +13,12 @@ from mrmg import shipped
 from mrmg.errors import UsageError
 from mrmg.scene.loading.models import load_model
 from mrmg.scene.robot_model import RobotModel
-from mrmg.studies.calibration import Calibration, calibrate, fit_legs
-from mrmg.studies.calibration.calibrate import Estimate
+from mrmg.studies.calibration.calibrate import (
+    Calibration,
+    Estimate,
+    calibrate,
+    fit_legs,
+)
 
 
 def of(name: str) -> RobotModel:

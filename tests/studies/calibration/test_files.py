@@ -14,11 +14,8 @@ from mrmg.cli.calibrate_command import writing_to
 from mrmg.errors import RunFolderError, SceneError, UsageError
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.loading.models import load_model
-from mrmg.studies.calibration import (
-    Calibration,
-    fit_legs,
-    write_calibration,
-)
+from mrmg.studies.calibration.calibrate import Calibration, fit_legs
+from mrmg.studies.calibration.files import write_calibration
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mrmg.cli import main
+from mrmg.cli.main import main
 from mrmg.errors import ExitCode, FileError, UsageError
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.loading.models import load_model
@@ -19,8 +19,9 @@ from mrmg.scene.loading.yaml_text import read_yaml
 from mrmg.scene.robot_model import RobotModel
 from mrmg.shipped import models_folder
 from mrmg.simulation.disturbance import FIELD_SPREADS
-from mrmg.studies.calibration import LoggedRun, calibrate_from_logs, read_run
+from mrmg.studies.calibration.log_calibration import calibrate_from_logs
 from mrmg.studies.calibration.power_laws import MotorLaw
+from mrmg.studies.calibration.robot_logs import LoggedRun, read_run
 from mrmg.studies.calibration.terrain_estimates import law_power_W
 
 BOREALTC = Path(__file__).resolve().parents[4] / "shared/energy/borealtc"

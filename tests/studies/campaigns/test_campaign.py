@@ -10,8 +10,8 @@ import pytest
 
 from mrmg.errors import RunFolderError, UsageError
 from mrmg.runs.locking import locked
-from mrmg.studies.campaigns import read_campaign, run_campaign
-from mrmg.studies.campaigns.reading import Campaign
+from mrmg.studies.campaigns.campaign import run_campaign
+from mrmg.studies.campaigns.reading import Campaign, read_campaign
 from mrmg.studies.engine import Engine
 
 SCENES = Path(__file__).parents[2] / "scenes"

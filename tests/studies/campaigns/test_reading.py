@@ -8,7 +8,7 @@ import jsonschema
 import pytest
 
 from mrmg.errors import ExitCode, FileError
-from mrmg.studies.campaigns import read_campaign
+from mrmg.studies.campaigns.reading import read_campaign
 from mrmg.studies.campaigns.schema import CampaignDocument, campaign_schema
 
 ZOO = Path(__file__).parent / "bad"

@@ -13,7 +13,7 @@ from shapely.affinity import translate
 from mrmg import shipped
 from mrmg.errors import FileError
 from mrmg.scene.loading import load_scene
-from mrmg.studies.campaigns import read_campaign
+from mrmg.studies.campaigns.reading import read_campaign
 from mrmg.studies.campaigns.scenes import perturbed
 
 REACH = {"goals": 1.5, "stations": 1.0, "starts": 0.8, "headings": 20.0}

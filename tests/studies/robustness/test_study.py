@@ -15,7 +15,7 @@ from mrmg.runs.drive import drive
 from mrmg.runs.folder import RunFolder
 from mrmg.runs.steps import Run, taken_up
 from mrmg.studies.outcomes import Study, assess_trial
-from mrmg.studies.robustness import study_robustness
+from mrmg.studies.robustness.study import study_robustness
 
 SCENE = Path(__file__).parents[2] / "scenes" / "one_goal.yaml"
 
