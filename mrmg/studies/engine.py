@@ -18,15 +18,20 @@ from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import get_context
-from typing import Any, TypeVar
+from typing import Any
 
 from mrmg.errors import MachineError, UsageError, require_known
 from mrmg.extras import import_extra
 from mrmg.interruption import end_with_parent, sheltered_children
 
-Shared = TypeVar("Shared")
-Item = TypeVar("Item")
-Result = TypeVar("Result")
+Call = Callable[[Any, Any], Any]
+"""A function of a module that makes a trial."""
+
+Jobs = Sequence[tuple[Any, Any]]
+"""Arguments of calls; what several of them share comes first."""
+
+Results = Iterator[tuple[int, Any]]
+"""The place of each job and what came of it, as they come."""
 
 ENGINES = ("local", "dask")
 
@@ -60,11 +65,7 @@ class Engine:
                 "a scheduler is one of Dask; use --engine dask with --scheduler"
             )
 
-    def results(
-        self,
-        call: Callable[[Shared, Item], Result],
-        jobs: Sequence[tuple[Shared, Item]],
-    ) -> Iterator[tuple[int, Result]]:
+    def results(self, call: Call, jobs: Jobs) -> Results:
         """Yield the place of each job and what `call` returns for it, as they come.
 
         Args:
@@ -85,11 +86,7 @@ class Engine:
         else:
             yield from self._by_processes(call, jobs)
 
-    def _by_processes(
-        self,
-        call: Callable[[Shared, Item], Result],
-        jobs: Sequence[tuple[Shared, Item]],
-    ) -> Iterator[tuple[int, Result]]:
+    def _by_processes(self, call: Call, jobs: Jobs) -> Results:
         from joblib.externals.loky import ProcessPoolExecutor
 
         # loky warns where it replaces a process that has come to hold much memory.
@@ -101,7 +98,7 @@ class Engine:
         )
         waiting = enumerate(jobs)
 
-        def submitted(count: int) -> set[Future[tuple[int, Result]]]:
+        def submitted(count: int) -> set[Future[tuple[int, Any]]]:
             return {
                 pool.submit(_numbered, call, number, job)
                 for number, job in islice(waiting, count)
@@ -125,11 +122,7 @@ class Engine:
         finally:
             pool.shutdown(kill_workers=True)
 
-    def _by_dask(
-        self,
-        call: Callable[[Shared, Item], Result],
-        jobs: Sequence[tuple[Shared, Item]],
-    ) -> Iterator[tuple[int, Result]]:
+    def _by_dask(self, call: Call, jobs: Jobs) -> Results:
         purpose = "has workers on other machines make trials"
         dask = import_extra("distributed", extra="cluster", purpose=purpose)
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
@@ -185,11 +178,9 @@ class Engine:
             ) from error
 
 
-def _numbered(
-    call: Callable[[Any, Any], Result], number: int, job: tuple[Any, Any]
-) -> tuple[int, Result]:
+def _numbered(call: Call, number: int, job: tuple[Any, Any]) -> tuple[int, Any]:
     return number, call(*job)
 
 
-def _itself(value: Shared) -> Shared:
+def _itself(value: Any) -> Any:
     return value

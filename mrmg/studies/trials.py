@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from mrmg import storage
-from mrmg.studies.engine import Engine
+from mrmg.studies.engine import Call, Engine
 
 OnTrial = Callable[[int, int, int], None]
 """Called with (trials done, trials in all, feasible ones) after each trial."""
@@ -36,7 +36,7 @@ class Job:
 
 def completed_trials(
     jobs: Sequence[Job],
-    call: Callable[[Any, Any], Any],
+    call: Call,
     engine: Engine,
     *,
     check: Callable[[Job, Any], object],
