@@ -1,13 +1,13 @@
-"""What a chassis is: how robots of one motion model turn set-points into motion.
+"""What all chassis have: how robots of one motion model turn set-points into motion.
 
-A chassis handles all robots of its kind as arrays of shape (K,), in the scene's order.
-It finds its parts in the compiled MJCF by name; a robot's names are `<id>/<part>`. That
-the parts are there is checked as a robot's model is loaded.
+A chassis handles all robots of its kind as arrays of shape (K,), in the scene's order;
+`Fleet` says what its methods take. It finds its parts in the compiled MJCF by name; a
+robot's names are `<id>/<part>`. That the parts are there is checked as a robot's model
+is loaded.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -18,7 +18,7 @@ from mrmg.scene.driven_parts import DrivenParts
 from mrmg.scene.types import Robot
 
 
-class Chassis(ABC):
+class Chassis:
     """The robots of one motion model inside a running simulation, each on two wheels.
 
     Further wheels roll along; these two, left and right, are driven.
@@ -36,46 +36,8 @@ class Chassis(ABC):
         self._wheels_v = model.jnt_dofadr[part_ids(model.joint, robots, parts.spin)]
         self._radius_m = np.array([robot.model.wheel_radius_m for robot in robots])
 
-    @abstractmethod
-    def fifth_state(self) -> np.ndarray:
-        """Return the true psi [rad] or omega [rad/s], shape (K,)."""
-
-    @abstractmethod
-    def axle_speed_m_s(self) -> np.ndarray:
-        """Return the speed the driven axle rolls at, shape (K,)."""
-
-    @abstractmethod
-    def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
-        """Set the dry friction of the driven axle.
-
-        Args:
-            resistance_N: against the way of its middle, shape (K,).
-            swing_N: against the way its wheels roll differently, shape (K,).
-        """
-
-    @abstractmethod
-    def command(
-        self,
-        force_N: np.ndarray,
-        w_from: np.ndarray,
-        w_to: np.ndarray,
-        steps: int,
-        turning_multiplier: np.ndarray,
-    ) -> None:
-        """Prepare the controls of the coming `steps` physics steps.
-
-        Args:
-            force_N: traction force to hold at the driven axle, shape (K,).
-            w_from: psi or omega asked for at the start, shape (K,).
-            w_to: psi or omega asked for at the end, shape (K,).
-            steps: number of physics steps.
-            turning_multiplier: of the terrain, as the drive control sees it, shape
-                (K,).
-        """
-
-    @abstractmethod
     def apply(self, step: int) -> None:
-        """Give the actuators the controls of physics step `step`."""
+        """Give the actuators the controls of a physics step; held ones need nothing."""
 
     def _wheel_rates_rad_s(self) -> np.ndarray:
         """Return how fast each driven wheel turns, left and right, shape (K, 2)."""

@@ -100,9 +100,6 @@ class DifferentialChassis(Chassis):
         wheels_N = 0.5 * force_N[:, None] + np.stack([-swing_N, swing_N], axis=1)
         self._drives.command(wheels_N.ravel())
 
-    def apply(self, step: int) -> None:
-        """Do nothing: the motors hold their forces."""
-
     def _wheel_speed_m_s(self) -> np.ndarray:
         """Return the speed each wheel rolls at, left and right, shape (K, 2)."""
         return np.asarray(self._wheel_rates_rad_s() * self._radius_m[:, None])

@@ -16,13 +16,19 @@ from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import ROOT
 from mrmg.scene.types import Scene
 from mrmg.simulation.ackermann import AckermannChassis
-from mrmg.simulation.chassis import Chassis, part_ids
+from mrmg.simulation.chassis import part_ids
 from mrmg.simulation.differential import DifferentialChassis
 from mrmg.simulation.reference import speed_states
 from mrmg.simulation.work import WorkMeter
 from mrmg.simulation.world_model import MujocoWorld
 
-_CHASSIS = {"car": AckermannChassis, "unicycle": DifferentialChassis}
+Chassis = AckermannChassis | DifferentialChassis
+"""The robots of one motion model."""
+
+_CHASSIS: dict[str, type[Chassis]] = {
+    "car": AckermannChassis,
+    "unicycle": DifferentialChassis,
+}
 """By motion model."""
 
 _NUDGE_M_S = 1e-9
