@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import shapely
@@ -25,18 +24,6 @@ RESOLUTION_M = 1e-4
 
 SHORTEST_S = 1e-9
 """Intervals are not halved below this, so that absurd speeds end the search too."""
-
-
-class Gap(Protocol):
-    """A distance that changes along a motion; zero or negative means contact."""
-
-    def at(self, step: np.ndarray, time_s: np.ndarray) -> np.ndarray:
-        """Return the exact distance at instants of steps [m], shape (k,)."""
-
-    def over(
-        self, step: np.ndarray, start_s: np.ndarray, end_s: np.ndarray
-    ) -> np.ndarray:
-        """Return a lower bound over intervals of steps [m], shape (k,)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -223,6 +210,10 @@ class PairGap:
         reach = sum(model.circumscribed_radius_m for model in models)
         travel = self._one.travel_m + self._other.travel_m
         return np.asarray(np.hypot(separation[:, 0], separation[:, 1]) - reach - travel)
+
+
+Gap = ObstacleGap | BoundsGap | PairGap
+"""A distance that changes along a motion; zero or negative means contact."""
 
 
 def _hulls(start: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -8,7 +8,6 @@ the hull of the footprint at both ends, grown by that sagitta, holds all of the 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -113,9 +112,11 @@ def _acceleration_bound(model: RobotModel, trajectory: Trajectory) -> np.ndarray
     size = np.abs(trajectory.state[:, 3:])
     speed, w = np.maximum(size[:-1], size[1:]).T
     u1, u2 = np.abs(trajectory.control).T
-    yaw_rate, yaw_acceleration = _YAW_BOUNDS[model.motion_model](
-        speed, w, u1, u2, model.wheelbase_m
-    )
+    yaw_rate, yaw_acceleration = w, u2
+    if model.motion_model == "car":
+        tan = np.tan(w)
+        yaw_rate = speed * tan / model.wheelbase_m
+        yaw_acceleration = (u1 * tan + speed * u2 * (1.0 + tan**2)) / model.wheelbase_m
     reach = model.circumscribed_radius_m
     turning = reach * (yaw_acceleration + yaw_rate**2)
     return np.asarray(u1 + speed * yaw_rate + turning)
@@ -140,30 +141,3 @@ def _sampled_acceleration(model: RobotModel, trajectory: Trajectory) -> np.ndarr
     )
     second = np.diff(corners, 2, axis=0) / interval_s**2
     return np.asarray(1.5 * np.hypot(*np.moveaxis(second, -1, 0)).max(axis=(0, 2)))
-
-
-def _car_yaw_bounds(
-    speed: np.ndarray, psi: np.ndarray, u1: np.ndarray, u2: np.ndarray, wheelbase: float
-) -> tuple[np.ndarray, np.ndarray]:
-    tan = np.tan(psi)
-    return (
-        speed * tan / wheelbase,
-        (u1 * tan + speed * u2 * (1.0 + tan**2)) / wheelbase,
-    )
-
-
-def _unicycle_yaw_bounds(
-    speed: np.ndarray,
-    omega: np.ndarray,
-    u1: np.ndarray,
-    u2: np.ndarray,
-    wheelbase: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    return omega, u2
-
-
-_YAW_BOUNDS: dict[str, Callable[..., tuple[np.ndarray, np.ndarray]]] = {
-    "car": _car_yaw_bounds,
-    "unicycle": _unicycle_yaw_bounds,
-}
-"""Bounds of |theta'| and |theta''| from those of |v|, |w|, |u1|, |u2|."""
