@@ -21,7 +21,7 @@ from types import MappingProxyType
 import numpy as np
 
 from mrmg.plans import Visit
-from mrmg.scene.types import Battery, Goal, Scene, Station
+from mrmg.scene.types import Battery, Finish, Goal, Scene, Station
 
 ROUNDING_S = 1e-6
 """Rounding of times that is forgiven in how long a robot stays."""
@@ -44,12 +44,12 @@ class Stay:
 
 
 def is_at(
-    target: Goal | Station, poses: np.ndarray, depth_m: float = 0.0
+    target: Goal | Station | Finish, poses: np.ndarray, depth_m: float = 0.0
 ) -> np.ndarray:
     """Return whether a robot is at a target, shape (n,).
 
     Args:
-        target: a goal or station.
+        target: a goal, station or finish.
         poses: of its reference point, x, y [m], yaw [rad] and what else there is,
             shape (n, 3 or more).
         depth_m: how deep in the region it must be.

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from mrmg.energy.visits import is_at
 from mrmg.scene.loading import scene_from_document
-from mrmg.scene.types import Battery, Finish, Robot, Scene
+from mrmg.scene.types import Battery, Robot, Scene
 from mrmg.supervision.stays import OngoingStay
 
 _LEAST_J = 1e-9
@@ -167,15 +168,6 @@ def _home(entry: dict[str, Any], robot: Robot) -> dict[str, Any]:
 def is_over(rest: Scene) -> bool:
     """Return whether nothing is left to do: no goal, and all robots where they end."""
     return not rest.goals and all(
-        robot.finish is None or _at_finish(robot.pose, robot.finish)
+        robot.finish is None or is_at(robot.finish, np.array([robot.pose]))[0]
         for robot in rest.robots
     )
-
-
-def _at_finish(pose: tuple[float, float, float], finish: Finish) -> bool:
-    if float(finish.region.depth(np.array(pose[:2]))[0]) < 0.0:
-        return False
-    if finish.heading_rad is None:
-        return True
-    off_rad = (pose[2] - finish.heading_rad + np.pi) % (2.0 * np.pi) - np.pi
-    return bool(abs(off_rad) <= finish.heading_tolerance_rad)
