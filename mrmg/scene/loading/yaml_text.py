@@ -224,16 +224,7 @@ def _represent_list(dumper: _Dumper, data: list[Any]) -> yaml.SequenceNode:
     return dumper.represent_sequence("tag:yaml.org,2002:seq", data, flow_style=short)
 
 
-def _represent_float(dumper: _Dumper, data: float) -> yaml.ScalarNode:
-    # A point in the mantissa, since readers of YAML 1.1 take "1e+16" for text.
-    text = repr(data)
-    if "e" in text and "." not in text:
-        text = text.replace("e", ".0e")
-    return dumper.represent_scalar("tag:yaml.org,2002:float", text)
-
-
 _Dumper.add_representer(list, _represent_list)
-_Dumper.add_representer(float, _represent_float)
 
 
 def dump_yaml(document: Any) -> str:
