@@ -64,14 +64,9 @@ def run_campaign(
         document = {"format": TRIAL_FORMAT, **campaign.document}
         storage.write_json(folder / CAMPAIGN_FILE, document)
         made = _all_made(campaign, folder, engine or Engine(), on_trial)
-        rows = [
-            table_row(trial, one)
-            for trial, one in zip(campaign.trials, made, strict=True)
-        ]
-        times = [
-            times_row(trial, one)
-            for trial, one in zip(campaign.trials, made, strict=True)
-        ]
+        pairs = list(zip(campaign.trials, made, strict=True))
+        rows = [table_row(*pair) for pair in pairs]
+        times = [times_row(*pair) for pair in pairs]
         storage.write_text(folder / TABLE, _csv(rows))
         storage.write_text(folder / TIMES, _csv(times))
         if parquet:
