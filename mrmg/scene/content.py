@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Mapping
 from dataclasses import Field, fields, is_dataclass
@@ -44,11 +43,11 @@ def content(value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         return contents(value)
     if isinstance(value, BaseGeometry):
-        return _fingerprint(shapely.normalize(shapely.force_2d(value)).wkb)
+        return storage.bytes_digest(shapely.normalize(shapely.force_2d(value)).wkb)
     if isinstance(value, np.ndarray):
         # Adding 0.0 makes zeros of both signs equal.
         numbers = np.ascontiguousarray(value, dtype=float) + 0.0
-        return [list(value.shape), _fingerprint(numbers.tobytes())]
+        return [list(value.shape), storage.bytes_digest(numbers.tobytes())]
     if isinstance(value, Mapping):
         return {str(key): content(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -77,7 +76,3 @@ def contents(value: Any, *, without: tuple[str, ...] = ()) -> dict[str, Any]:
 
 def _is_default(value: Any, field: Field[Any]) -> bool:
     return type(value) is type(field.default) and bool(value == field.default)
-
-
-def _fingerprint(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()[:16]

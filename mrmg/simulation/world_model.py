@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import dataclass
 
 import numpy as np
 
+from mrmg import storage
 from mrmg.errors import Fault, FileError
 from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import CHASSIS, HULL, require_drivable
@@ -180,7 +180,7 @@ def _attach(
 def _digest(model: mujoco.MjModel) -> str:
     buffer = np.empty(mujoco.mj_sizeModel(model), dtype=np.uint8)
     mujoco.mj_saveModel(model, None, buffer)
-    return hashlib.sha256(buffer.tobytes()).hexdigest()[:16]
+    return storage.bytes_digest(buffer.tobytes())
 
 
 def _hull_owner(scene: Scene, model: mujoco.MjModel) -> np.ndarray:
