@@ -59,6 +59,7 @@ the height of the ground counts."""
 _AXIS_COSINE = 0.999
 
 
+@no_warning_file()
 def mjcf_faults(
     model: RobotModel, path: Path, *, center_stated: bool = True
 ) -> list[Fault]:
@@ -69,11 +70,6 @@ def mjcf_faults(
         path: of the MJCF file.
         center_stated: whether `robot.yaml` states the centre of mass.
     """
-    with no_warning_file():
-        return _faults(model, path, center_stated)
-
-
-def _faults(model: RobotModel, path: Path, center_stated: bool) -> list[Fault]:
     try:
         robot = CompiledRobot(path)
     except (ValueError, OSError) as error:
