@@ -9,6 +9,7 @@ import numpy as np
 import trimesh
 
 from mrmg.mujoco_import import mujoco
+from mrmg.scene.loading.mjcf import mesh_of
 
 _LAST_DRAWN_GROUP = 2
 _SIDES = 24
@@ -70,7 +71,7 @@ def _shape(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh:
     create: Any = trimesh.creation
     shape: Any
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
-        shape = _mesh(model, model.geom_dataid[geom])
+        shape = mesh_of(model, model.geom_dataid[geom])
     elif kind == mujoco.mjtGeom.mjGEOM_BOX:
         shape = create.box(extents=2.0 * size)
     elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
@@ -85,13 +86,3 @@ def _shape(model: mujoco.MjModel, geom: int) -> trimesh.Trimesh:
         is_ball = kind == mujoco.mjtGeom.mjGEOM_SPHERE
         shape.apply_scale(size[0] if is_ball else size)
     return trimesh.Trimesh(vertices=shape.vertices, faces=shape.faces)
-
-
-def _mesh(model: mujoco.MjModel, mesh: int) -> trimesh.Trimesh:
-    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-    start, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
-    return trimesh.Trimesh(
-        vertices=model.mesh_vert[first : first + count].copy(),
-        faces=model.mesh_face[start : start + faces].copy(),
-        process=False,
-    )

@@ -259,6 +259,19 @@ def support_m(model: Any, data: Any, geom: int, direction: np.ndarray) -> float:
     return float(reach + data.geom_xpos[geom] @ direction)
 
 
+def mesh_of(model: Any, mesh: int) -> Any:
+    """Return a mesh of a compiled model as a trimesh."""
+    import trimesh
+
+    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    start, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
+    return trimesh.Trimesh(
+        model.mesh_vert[first : first + count],
+        model.mesh_face[start : start + faces],
+        process=False,
+    )
+
+
 def _range(limited: bool, ends: np.ndarray) -> tuple[float, float]:
     low, high = map(float, ends)
     return (low, high) if limited else (-float("inf"), float("inf"))

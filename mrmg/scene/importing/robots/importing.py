@@ -8,7 +8,6 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -18,9 +17,13 @@ from mrmg.scene.importing.robots.description import Description, read_descriptio
 from mrmg.scene.importing.robots.mjcf_text import DrawnGeom, mjcf_text
 from mrmg.scene.importing.robots.parameters import Parameter, parameters_of
 from mrmg.scene.importing.robots.survey import Survey, survey
+from mrmg.scene.loading.mjcf import mesh_of
 from mrmg.scene.loading.models import load_model
 from mrmg.scene.new_robot import require_new_model
 from mrmg.templates import rendered
+
+_DRAWN = ("sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh")
+"""Shapes that are taken over, as MJCF calls them."""
 
 _BESIDE_AXLE_M = 1e-3
 """Distance from the driven axle up to which a support is below it."""
@@ -128,15 +131,7 @@ def _drawn(
     """Return the geoms to draw, by wheel (-1: chassis), and write their meshes."""
     from mrmg.mujoco_import import mujoco
 
-    model, data, kinds = description.model, description.data, mujoco.mjtGeom
-    shapes = {
-        kinds.mjGEOM_SPHERE: "sphere",
-        kinds.mjGEOM_CAPSULE: "capsule",
-        kinds.mjGEOM_ELLIPSOID: "ellipsoid",
-        kinds.mjGEOM_CYLINDER: "cylinder",
-        kinds.mjGEOM_BOX: "box",
-        kinds.mjGEOM_MESH: "mesh",
-    }
+    model, data = description.model, description.data
     wheels = (*found.driven, *found.steered)
     of_body = {body: index for index, w in enumerate(wheels) for body in w.bodies}
     seen = model.geom_contype | model.geom_conaffinity
@@ -144,33 +139,22 @@ def _drawn(
     drawn: dict[int, list[DrawnGeom]] = defaultdict(list)
     meshes: dict[str, int] = {}
     for geom in np.flatnonzero(np.isin(model.geom_bodyid, found.bodies)).tolist():
-        body, kind = int(model.geom_bodyid[geom]), kinds(model.geom_type[geom])
-        if kind not in shapes or (seen[geom] and body in looks):
+        body = int(model.geom_bodyid[geom])
+        name = mujoco.mjtGeom(model.geom_type[geom]).name
+        kind = name.removeprefix("mjGEOM_").lower()
+        if kind not in _DRAWN or (seen[geom] and body in looks):
             continue
         wheel = of_body.get(body, -1)
         center = found.origin_m + (wheels[wheel].place_m if wheel >= 0 else 0.0)
         quat = np.zeros(4)
         mujoco.mju_mat2Quat(quat, data.geom_xmat[geom])
         mesh = None
-        if kind == kinds.mjGEOM_MESH:
+        if kind == "mesh":
             mesh = f"mesh_{model.geom_dataid[geom]}"
             meshes[mesh] = int(model.geom_dataid[geom])
         pos, size = data.geom_xpos[geom] - center, model.geom_size[geom]
-        drawn[wheel].append(DrawnGeom(shapes[kind], size, pos, quat, mesh))
+        drawn[wheel].append(DrawnGeom(kind, size, pos, quat, mesh))
     for name, number in meshes.items():
-        _write_mesh(model, number, folder / f"{name}.stl")
+        folder.mkdir(parents=True, exist_ok=True)
+        mesh_of(model, number).export(str(folder / f"{name}.stl"))
     return drawn
-
-
-def _write_mesh(model: Any, mesh: int, path: Path) -> None:
-    import trimesh
-
-    first, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
-    start, faces = model.mesh_faceadr[mesh], model.mesh_facenum[mesh]
-    shape = trimesh.Trimesh(
-        model.mesh_vert[first : first + count],
-        model.mesh_face[start : start + faces],
-        process=False,
-    )
-    path.parent.mkdir(parents=True, exist_ok=True)
-    shape.export(str(path))
