@@ -36,10 +36,7 @@ def draw_problem(scene: Scene, path: Path) -> None:
         axes = own.add_subplot()
         prepare_map(axes, scene)
         scene_drawing.draw_ground(axes, scene)
-        for goal in scene.goals:
-            scene_drawing.draw_goal(axes, goal, points=SMALL_PT)
-        for station in scene.stations:
-            scene_drawing.draw_station(axes, station, points=SMALL_PT)
+        scene_drawing.draw_targets(axes, scene, {}, SMALL_PT)
         draw_starts(axes, scene)
         add_legend(own, handles, columns=2)
         _draw_labels(axes, scene, set(KINDS) - {"obstacle"})

@@ -19,7 +19,7 @@ from shapely.geometry.base import BaseGeometry
 
 from mrmg.counted import counted
 from mrmg.scene.region import Region
-from mrmg.scene.types import Goal, Robot, Scene, Station
+from mrmg.scene.types import Robot, Scene
 from mrmg.viz import style
 from mrmg.viz.contours import draw_contours
 from mrmg.viz.figures import new_figure, write_figure
@@ -173,40 +173,35 @@ def draw_ground(axes: Axes, scene: Scene, *, hatched: bool = True) -> None:
     draw_contours(axes, scene)
 
 
-def draw_goal(
+def draw_targets(
     axes: Axes,
-    goal: Goal,
-    *,
-    color: str = style.GOAL_OPEN,
+    scene: Scene,
+    colors: Mapping[str, str],
     points: float = LETTER_POINTS,
 ) -> None:
-    """Draw a goal region; a colour other than white means visited."""
-    draw_region(axes, goal.region, color, style.GOAL_EDGE, 0.13 * points)
+    """Draw goals, stations with squares, and wanted poses.
 
-
-def draw_station(
-    axes: Axes, station: Station, *, points: float = LETTER_POINTS
-) -> None:
-    """Draw a recharging station: its region with a square."""
-    width = 0.13 * points
-    draw_region(axes, station.region, style.STATION, style.STATION_EDGE, width)
-    axes.plot(
-        *station.region.center,
-        marker="s",
-        markersize=0.6 * points,
-        markerfacecolor=style.STATION,
-        markeredgecolor=style.STATION_EDGE,
-        markeredgewidth=0.1 * points,
-        zorder=6,
-    )
-
-
-def draw_targets(axes: Axes, scene: Scene, colors: Mapping[str, str]) -> None:
-    """Draw goals, stations and wanted poses; `colors` has those of visited goals."""
+    Args:
+        axes: where to draw, in metres.
+        scene: what to draw.
+        colors: of visited goals, by id.
+        points: size of the letters, which that of rims and squares goes with.
+    """
     for goal in scene.goals:
-        draw_goal(axes, goal, color=colors.get(goal.id, style.GOAL_OPEN))
+        color = colors.get(goal.id, style.GOAL_OPEN)
+        draw_region(axes, goal.region, color, style.GOAL_EDGE, 0.13 * points)
     for station in scene.stations:
-        draw_station(axes, station)
+        fill, edge = style.STATION, style.STATION_EDGE
+        draw_region(axes, station.region, fill, edge, 0.13 * points)
+        axes.plot(
+            *station.region.center,
+            marker="s",
+            markersize=0.6 * points,
+            markerfacecolor=fill,
+            markeredgecolor=edge,
+            markeredgewidth=0.1 * points,
+            zorder=6,
+        )
     draw_wanted_poses(axes, scene)
 
 
