@@ -35,7 +35,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache, partial
-from typing import Any
+from typing import Any, get_args
 
 from mission_tables import header, moments, print_ratios, print_scene
 from protocol import (
@@ -49,7 +49,7 @@ from protocol import (
 )
 
 import mrmg
-from mrmg.energy.model import ENERGY_PRESETS, EnergyPreset
+from mrmg.energy.model import EnergyPreset
 from mrmg.planning import plan_mission, profile_params
 from mrmg.planning.bounding import bounds_of
 from mrmg.planning.statistics import UNKNOWN
@@ -97,7 +97,7 @@ def parse_options() -> argparse.Namespace:
     )
     parser.add_argument(
         "--energy",
-        choices=ENERGY_PRESETS,
+        choices=get_args(EnergyPreset),
         help="what counts in all robots' energy models; default: as the scenes say",
     )
     parser.add_argument(

@@ -23,7 +23,7 @@ other consumers: the preset "paper".
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -32,8 +32,6 @@ PARTS = ("rolling", "turning", "inertia", "grade", "idle", "device")
 
 EnergyPreset = Literal["full", "paper"]
 """Which parts count: all of them, or those of the paper's cost."""
-
-ENERGY_PRESETS: tuple[EnergyPreset, ...] = get_args(EnergyPreset)
 
 GRAVITY_M_S2 = 9.81
 
