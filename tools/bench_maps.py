@@ -19,7 +19,7 @@ import bench
 from mission_tables import header, print_scene
 from protocol import Row, Trials, add_file_options, run, seed_range, write_document
 
-from mrmg.scene.importing.importing import import_map
+from mrmg.scene.importing.importing import import_files
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.populating.populate import populate
 from mrmg.scene.types import Scene
@@ -77,7 +77,7 @@ def parse_options() -> argparse.Namespace:
 def populated(path: Path, options: argparse.Namespace) -> Scene:
     """Return the scene of a map."""
     document = populate(
-        import_map(path),
+        import_files([path]).document,
         robots=options.robots,
         goals=options.goals,
         seed=options.placement,

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 import shapely
+from places import nearest
 from scipy.optimize import Bounds, LinearConstraint, milp
 from shapely import affinity
 from shapely.geometry import Polygon
@@ -71,7 +72,7 @@ def road_m(name: str, number: int = 0) -> np.ndarray:
     scene, ground = load_scene(name), ground_of(name, number)
     places = [robot.pose[:2] for robot in scene.robots]
     places += [tuple(target.region.center) for target in scene.targets()]
-    cells = [ground.nearest(place) for place in places]
+    cells = [nearest(ground, place) for place in places]
     return ground.distances(cells)[:, cells]
 
 
@@ -115,7 +116,7 @@ def test_every_target_can_be_reached_and_left(name: str) -> None:
     for kind in kinds_of(scene):
         ground, road = ground_of(name, kind[0]), road_m(name, kind[0])
         for target in scene.targets():
-            at = ground.nearest(target.region.center)
+            at = nearest(ground, target.region.center)
             assert ground.clearance_m[at] >= 1.0, target.id
         to_goal = road[np.ix_(kind, range(robots, robots + goals))]
         within = np.isfinite(to_goal).all(axis=0)

@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from places import import_map
 
 from mrmg.errors import ExitCode
 from mrmg.runs import pipeline
-from mrmg.scene.importing.importing import import_map
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.populating.populate import populate
 

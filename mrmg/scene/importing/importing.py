@@ -93,21 +93,3 @@ def _require_fit(layer: Layer, before: Sequence[Layer], source: str) -> None:
             "(gdal_merge.py -o ALL.tif FILE FILE), and import that"
         )
         raise SceneError(source, [Fault("", message)])
-
-
-def import_map(
-    path: str | Path, longest_side_m: float | None = 100.0
-) -> dict[str, Any]:
-    """Read one map as a scene document without robots or goals.
-
-    Args:
-        path: of any known format.
-        longest_side_m: what a polygon map's longer side is scaled to; None keeps the
-            size the file states.
-
-    Raises:
-        SceneError: if the file cannot be read; names every fault.
-        UsageError: if `longest_side_m` is not positive.
-    """
-    options = ImportOptions(longest_side_m=longest_side_m)
-    return import_files([Path(path)], options).document

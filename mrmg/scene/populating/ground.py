@@ -126,12 +126,6 @@ class Ground:
         sizes = np.bincount(label, weights=self.free)
         return np.asarray(self.free & (label == sizes.argmax()))
 
-    def nearest(self, point: Sequence[float]) -> int:
-        """Return the index of the nearest free grid point."""
-        offset = self.points_m - np.asarray(point)
-        distance = np.where(self.free, np.hypot(offset[:, 0], offset[:, 1]), np.inf)
-        return int(distance.argmin())
-
     def distances(self, sources: Sequence[int]) -> np.ndarray:
         """Return costs from `sources` to all points [m], shape (n, rows * columns)."""
         # One source at a time: SciPy holds the interpreter's lock, and Ctrl-C waits.

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from places import import_map
 
 from mrmg.errors import SceneError, UsageError
-from mrmg.scene.importing.importing import import_map
 from mrmg.scene.loading import dump_scene, scene_from_document
 from mrmg.scene.types import Scene
 

@@ -9,6 +9,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from places import nearest
 
 from mrmg.scene.populating.ground import Ground
 
@@ -44,7 +45,7 @@ def test_clearance_is_the_exact_distance(boxes: list[tuple[float, ...]]) -> None
 def test_open_ground_is_driven_nearly_straight() -> None:
     """Roads over the grid are never shorter than the line, and at most 2.8 % longer."""
     grid = ground()
-    start = grid.nearest((20.0, 15.0))
+    start = nearest(grid, (20.0, 15.0))
     road = grid.distances([start])[0][grid.free]
     line = np.hypot(*(grid.points_m[grid.free] - grid.points_m[start]).T)
     far = line > 1.0
@@ -55,22 +56,22 @@ def test_open_ground_is_driven_nearly_straight() -> None:
 def test_terrain_multiplies_the_cost() -> None:
     plain = ground()
     mud = ground(terrain=[(shapely.box(*FIELD), 2.5)])
-    ends = [plain.nearest((5, 5)), plain.nearest((35, 25))]
+    ends = [nearest(plain, (5, 5)), nearest(plain, (35, 25))]
     ratio = mud.distances(ends)[0, ends[1]] / plain.distances(ends)[0, ends[1]]
     assert ratio == pytest.approx(2.5)
 
 
 def test_later_terrain_counts() -> None:
     grid = ground(terrain=[(shapely.box(*FIELD), 2.5), (shapely.box(0, 0, 9, 9), 0.5)])
-    assert grid.multiplier[grid.nearest((4, 4))] == 0.5
-    assert grid.multiplier[grid.nearest((30, 20))] == 2.5
+    assert grid.multiplier[nearest(grid, (4, 4))] == 0.5
+    assert grid.multiplier[nearest(grid, (30, 20))] == 2.5
 
 
 def test_road_round_a_wall() -> None:
     """From one side of a wall to the other, round its end: two straight lines."""
     wall = shapely.box(19.5, 0, 20.5, 20)
     grid = ground([wall], margin_m=0.6)
-    ends = [grid.nearest((10, 5)), grid.nearest((30, 5))]
+    ends = [nearest(grid, (10, 5)), nearest(grid, (30, 5))]
     road = grid.distances(ends)[0, ends[1]]
     tip = 20.0 + 0.6
     a, b = grid.points_m[ends]
@@ -80,7 +81,7 @@ def test_road_round_a_wall() -> None:
 
 def test_walls_part_the_ground() -> None:
     grid = ground([shapely.box(19.5, 0, 20.5, 30)])
-    left, right = grid.nearest((5, 5)), grid.nearest((35, 5))
+    left, right = nearest(grid, (5, 5)), nearest(grid, (35, 5))
     assert grid.largest[left] != grid.largest[right]
     assert np.isinf(grid.distances([left])[0, right])
 
@@ -88,7 +89,7 @@ def test_walls_part_the_ground() -> None:
 def test_thin_walls_are_not_jumped() -> None:
     """A wall thinner than a cell still has its margin on both sides."""
     grid = ground([shapely.box(19.99, 0, 20.01, 30)], margin_m=0.55)
-    assert np.isinf(grid.distances([grid.nearest((5, 5))])[0, grid.nearest((35, 5))])
+    assert np.isinf(grid.distances([nearest(grid, (5, 5))])[0, nearest(grid, (35, 5))])
 
 
 def test_clearance_beside_the_map_is_none() -> None:
@@ -101,9 +102,9 @@ def test_clearance_beside_the_map_is_none() -> None:
 
 def test_road_to_nearest() -> None:
     grid = ground()
-    targets = np.array([grid.nearest((5, 5)), grid.nearest((35, 25))])
-    nearest = grid.road_to_nearest(targets)
-    assert nearest == pytest.approx(grid.distances(targets).min(axis=0))
+    targets = np.array([nearest(grid, (5, 5)), nearest(grid, (35, 25))])
+    found = grid.road_to_nearest(targets)
+    assert found == pytest.approx(grid.distances(targets).min(axis=0))
     assert np.isinf(grid.road_to_nearest(np.array([], dtype=int))).all()
 
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 import shapely
 import yaml
+from places import import_map, nearest
 
 from mrmg.errors import UsageError
-from mrmg.scene.importing.importing import import_map
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.loading.models import model_folder
 from mrmg.scene.populating.ground import Ground
@@ -58,8 +58,8 @@ def check_mission(document: dict[str, Any], robots: int, goals: int) -> Scene:
     )
     places = [robot.pose[:2] for robot in scene.robots]
     places += [tuple(target.region.center) for target in scene.targets()]
-    road = ground.distances([ground.nearest(p) for p in places])[
-        :, [ground.nearest(p) for p in places]
+    road = ground.distances([nearest(ground, p) for p in places])[
+        :, [nearest(ground, p) for p in places]
     ]
     battery = scene.robots[0].battery
     usable_J = battery.capacity_J - battery.reserve_J
