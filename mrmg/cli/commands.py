@@ -15,6 +15,7 @@ from mrmg.cli.run_options import given
 from mrmg.counted import counted
 from mrmg.errors import ExitCode
 from mrmg.runs.arguments import DEFAULT_VIDEO, RunArguments, VideoArguments
+from mrmg.runs.folder import RunFolder, Step, existing
 
 if TYPE_CHECKING:
     from mrmg.runs.steps import Run
@@ -59,7 +60,6 @@ def _scene(options: argparse.Namespace) -> Scene:
 
 def plan(options: argparse.Namespace) -> int:
     """Plan, and start a run folder."""
-    from mrmg.runs.folder import RunFolder, Step
     from mrmg.runs.pipeline import default_folder
     from mrmg.runs.replacing import require_room
     from mrmg.runs.steps import Run
@@ -101,7 +101,6 @@ def plan(options: argparse.Namespace) -> int:
 @contextmanager
 def opened_run(path: Path, *, trust_code: bool) -> Iterator[Run]:
     """Take up the run of a folder, show its progress, and keep other commands out."""
-    from mrmg.runs.folder import existing
     from mrmg.runs.steps import taken_up
 
     folder = existing(path)
@@ -111,8 +110,6 @@ def opened_run(path: Path, *, trust_code: bool) -> Iterator[Run]:
 
 def verify(options: argparse.Namespace) -> int:
     """Judge the plan of a run folder."""
-    from mrmg.runs.folder import Step
-
     work = _make(options, Step.VERIFY)
     verdict = work.folder.read_json("verdict.json", remedy="mrmg verify")
     found = [violation["message"] for violation in verdict["violations"]]
@@ -148,7 +145,6 @@ def _driven(options: argparse.Namespace) -> tuple[Run, str]:
     A drive other than that of the run goes to a folder of its own.
     """
     from mrmg.runs.drive import checked_drive
-    from mrmg.runs.folder import RunFolder
     from mrmg.runs.separate_drives import (
         begin_drive,
         drive_again,
@@ -182,8 +178,6 @@ def _driven(options: argparse.Namespace) -> tuple[Run, str]:
 
 def audit(options: argparse.Namespace) -> int:
     """Compare planned, metered and measured energy of a run folder."""
-    from mrmg.runs.folder import Step
-
     work = _make(options, Step.AUDIT, **given(options))
     account = work.folder.read_json("audit.json", remedy="mrmg audit")
     outcome = "mission done" if account["mission_ok"] else "mission failed"
@@ -197,8 +191,6 @@ _SHOWN = ("overview.png", "energy.png", "mission.gif", "mission.mp4", "report.ht
 
 def render(options: argparse.Namespace) -> int:
     """Make the pictures, the video and the report of a run folder."""
-    from mrmg.runs.folder import Step
-
     wanted = given(options, VideoArguments)
     work = _make(options, Step.RENDER, Step.DRAW, Step.REPORT, video=wanted)
     for name in _SHOWN:
@@ -209,8 +201,6 @@ def render(options: argparse.Namespace) -> int:
 
 def report(options: argparse.Namespace) -> int:
     """Write the summary and the report of a run folder anew."""
-    from mrmg.runs.folder import Step
-
     work = _make(options, Step.REPORT)
     page = str(work.folder.file("report.html"))
     terminal.print_result(options, work.summary(), [page])
@@ -225,7 +215,6 @@ def _make(
 ) -> Run:
     """Make steps of a run anew, with some of its arguments changed."""
     from mrmg.runs.drive import checked_drive
-    from mrmg.runs.folder import Step
 
     with opened_run(options.run, trust_code=options.trust_code) as work:
         folder = work.folder

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from mrmg.cli import show_commands, terminal
 from mrmg.cli.commands import opened_run
 from mrmg.errors import ExitCode
+from mrmg.runs.folder import Step
 
 if TYPE_CHECKING:
     from mrmg.runs.reproduction import Reproduction
@@ -57,8 +58,6 @@ def replay(options: argparse.Namespace) -> int:
 
 
 def _render(folder: Path, trust_code: bool) -> None:
-    from mrmg.runs.folder import Step
-
     with opened_run(folder, trust_code=trust_code) as run:
         run.make(Step.RENDER)
     print(folder / "mission.mp4")

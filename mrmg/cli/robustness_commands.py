@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import shlex
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ from mrmg.cli.run_options import add_options, given, help_of
 from mrmg.counted import counted
 from mrmg.errors import ExitCode
 from mrmg.runs import argument_values as values
+from mrmg.runs.folder import Step, existing
 
 if TYPE_CHECKING:
     from mrmg.studies.outcomes import Study
@@ -45,9 +47,6 @@ def add_robustness(verbs: Any) -> None:
 
 def robustness(options: argparse.Namespace) -> int:
     """Drive a plan under many disturbances."""
-    from dataclasses import replace
-
-    from mrmg.runs.folder import Step, existing
     from mrmg.runs.steps import taken_up
     from mrmg.studies.robustness.study import study_robustness
 
