@@ -159,7 +159,8 @@ class Study:
             "probability": self.feasible / len(self.trials),
             "confidence": CONFIDENCE,
             "interval": [low, high],
-            "failures": self._failures(),
+            # A trial may fail by several causes.
+            "failures": Counter(cause for each in self.trials for cause in each.causes),
             "margins": self._margins(),
             "worst": {
                 "seed": self.worst.seed,
@@ -167,10 +168,6 @@ class Study:
             },
             "outcomes": [asdict(trial) for trial in self.trials],
         }
-
-    def _failures(self) -> dict[str, int]:
-        """Return how many trials failed by each cause; one may fail by several."""
-        return dict(Counter(cause for trial in self.trials for cause in trial.causes))
 
     def _margins(self) -> dict[str, dict[str, float]]:
         """Return worst and quantiles of what kept the trials from failing."""

@@ -115,8 +115,8 @@ class Panel:
         self._base = Image.new("RGB", size, _BACKGROUND)
         self._cards_top = self._draw_head(ImageDraw.Draw(self._base))
         self._cards_bottom = float(size[1])
-        robots = len(scene.robots)
-        if size[1] - self._cards_top - robots * self._px(46) > self._legend_height:
+        room = size[1] - self._cards_top - len(scene.robots) * self._px(46)
+        if room > self._px(52 + 22 * ((len(style.map_key(scene)) + 1) // 2)):
             self._cards_bottom = self._draw_legend(ImageDraw.Draw(self._base))
 
     def draw(self, reading: Reading) -> np.ndarray:
@@ -224,10 +224,6 @@ class Panel:
         half = 0.13 * (bottom - top)
         bar = (left + self._px(20), row - half, right - self._px(74), row + half)
         draw_bar(pen, bar, reading.charge, robot.battery.reserve_fraction)
-
-    @property
-    def _legend_height(self) -> float:
-        return self._px(52 + 22 * ((len(style.map_key(self._scene)) + 1) // 2))
 
     def _draw_legend(self, pen: ImageDraw.ImageDraw) -> float:
         entries = style.map_key(self._scene)

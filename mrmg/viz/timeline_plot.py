@@ -47,7 +47,8 @@ def draw_timeline(
     """
     require_same_mission(scene, plan, log)
     rows, end_s = timeline_rows(scene, plan, log, (_NAMES_EM,))
-    tops_in = np.cumsum([_row_inches(row) for row in rows])
+    lines = np.array([row.line_count(0) for row in rows])
+    tops_in = np.cumsum(2.0 * _BAR_INCHES + _LINE_INCHES * lines)
     figure = new_figure(_WIDTH_INCHES, 1.0 + tops_in[-1])
     axes = figure.add_subplot()
     axes.set_xlim(0.0, end_s)
@@ -72,10 +73,6 @@ def draw_timeline(
         handles.append(Line2D([], [], **_EVENT, label="stop or new plan"))
     add_legend_above(figure, handles)
     write_figure(figure, path)
-
-
-def _row_inches(row: TimelineRow) -> float:
-    return 2.0 * _BAR_INCHES + _LINE_INCHES * row.line_count(0)
 
 
 def _draw_row(
