@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from mrmg.energy.metering import (
+    TimedStates,
     battery_content,
     battery_profile,
     find_visits,
@@ -22,20 +23,14 @@ from mrmg.simulation.log import ExecutionLog
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class BatteryCurve:
+class BatteryCurve(TimedStates):
     """Motion and battery content of one robot over time.
 
     Attributes:
-        robot: id of the robot.
-        time_s: shape (n,).
-        state: at each time, shape (n, 5).
         energy_J: content at each time, after a recharge, shape (n,).
         visits: of this robot; their `energy_J` is the content on arrival.
     """
 
-    robot: str
-    time_s: np.ndarray
-    state: np.ndarray
     energy_J: np.ndarray
     visits: tuple[Visit, ...]
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Protocol
 
 import numpy as np
 
@@ -27,7 +26,7 @@ from mrmg.energy.visits import (
     visit_of,
 )
 from mrmg.motion.dynamics import TURN_SPEEDS
-from mrmg.plans import Visit
+from mrmg.plans import Trajectory, Visit
 from mrmg.scene.types import Robot, Scene
 from mrmg.world.elevation import height_at, load_points
 from mrmg.world.terrain import multiplier_at, turning_multiplier_at
@@ -36,35 +35,23 @@ MEASURED_PARTS = ("drive", "idle", "device")
 """The parts that the work of the drives can be split into."""
 
 
-class Motion(Protocol):
-    """Timed states of one robot; `mission.Trajectory` is one."""
-
-    @property
-    def robot(self) -> str:
-        """Id of the robot."""
-
-    @property
-    def time_s(self) -> np.ndarray:
-        """Time of each state, increasing, shape (n + 1,)."""
-
-    @property
-    def state(self) -> np.ndarray:
-        """(x, y, theta, v, psi) at each time, shape (n + 1, 5)."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
-class LoggedMotion:
-    """A motion that was recorded rather than planned.
+class TimedStates:
+    """States of one robot, such as those that were recorded.
 
     Attributes:
         robot: id of the robot.
-        time_s: shape (n + 1,).
+        time_s: of each state, increasing, shape (n + 1,).
         state: (x [m], y [m], theta [rad], v [m/s], psi [rad]), shape (n + 1, 5).
     """
 
     robot: str
     time_s: np.ndarray
     state: np.ndarray
+
+
+Motion = Trajectory | TimedStates
+"""What was planned, or what was recorded."""
 
 
 _AS_MODELLED: Mapping[str, np.ndarray] = MappingProxyType({})
@@ -97,9 +84,7 @@ def step_energy_parts(
         marks_s = np.arange(time_s[0], time_s[-1], SHORTEST_ON_SLOPES_S)
         ends = np.append(np.searchsorted(time_s, marks_s - 1e-6), len(time_s) - 1)
         ends = np.unique(ends)
-        coarse = LoggedMotion(
-            robot=motion.robot, time_s=time_s[ends], state=state[ends]
-        )
+        coarse = TimedStates(robot=motion.robot, time_s=time_s[ends], state=state[ends])
         spans_W = _power_parts(scene, coarse, factor[ends[:-1]])
         parts_W = np.repeat(spans_W, np.diff(ends), axis=0)
     return np.asarray(parts_W * np.diff(time_s)[:, None])

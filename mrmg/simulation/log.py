@@ -14,7 +14,7 @@ import numpy as np
 
 from mrmg import storage
 from mrmg.columns import data_frame, named, state_columns
-from mrmg.energy.metering import LoggedMotion
+from mrmg.energy.metering import TimedStates
 from mrmg.errors import Fault, IdentityError, UsageError
 from mrmg.plans import Plan, plan_in_force
 from mrmg.scene.types import Scene
@@ -122,10 +122,10 @@ class ExecutionLog:
     plant: str = "default"
     bounded_solves: tuple[int, ...] = ()
 
-    def driven_motions(self) -> tuple[LoggedMotion, ...]:
+    def driven_motions(self) -> tuple[TimedStates, ...]:
         """Return the motion of each robot in the simulation."""
         return tuple(
-            LoggedMotion(robot=robot, time_s=self.time_s, state=state)
+            TimedStates(robot=robot, time_s=self.time_s, state=state)
             for robot, state in zip(self.robots, self.state, strict=True)
         )
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mrmg.energy.metering import LoggedMotion, battery_content
+from mrmg.energy.metering import TimedStates, battery_content
 from mrmg.energy.visits import Stay, first_stay, is_at, visit_of
 from mrmg.scene.types import Robot, Scene
 
@@ -50,7 +50,7 @@ class BatteryTracker:
             visit_of(self._robot.id, self._targets[name], self._time_s, stay.first)
             for name, stay in zip(self._tour, stays, strict=False)
         ]
-        motion = LoggedMotion(
+        motion = TimedStates(
             robot=self._robot.id, time_s=self._time_s, state=self._poses
         )
         content_J, arrival_J = battery_content(

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence, Set
 
 import numpy as np
 
-from mrmg.energy.metering import LoggedMotion, find_visits
+from mrmg.energy.metering import TimedStates, find_visits
 from mrmg.energy.visits import first_stay, is_at
 from mrmg.scene.types import Goal, Scene
 from mrmg.simulation.supervision import Observation
@@ -79,7 +79,7 @@ class History:
         time_s, state = np.array(self._time_s), np.stack(self._state, axis=1)
         entered = {}
         for index, name in enumerate(self._robots):
-            motion = LoggedMotion(robot=name, time_s=time_s, state=state[index])
+            motion = TimedStates(robot=name, time_s=time_s, state=state[index])
             visits = find_visits(self._scene, motion, tours[name])
             entered[name] = tuple(visit.target for visit in visits)
         return entered

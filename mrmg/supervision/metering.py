@@ -15,7 +15,7 @@ import numpy as np
 
 from mrmg.energy.metering import (
     MEASURED_PARTS,
-    LoggedMotion,
+    TimedStates,
     measured_energy_parts,
     step_energy_parts,
 )
@@ -92,7 +92,7 @@ class RobotMeter:
     def _estimate(
         self, time_s: np.ndarray, state: np.ndarray, drive_J: np.ndarray
     ) -> None:
-        motion = LoggedMotion(robot=self.robot.id, time_s=time_s, state=state)
+        motion = TimedStates(robot=self.robot.id, time_s=time_s, state=state)
         parts_J = step_energy_parts(self._scene, motion)
         driving_J = parts_J.sum(axis=1) - parts_J[:, _CONSUMERS].sum(axis=1)
         others_J = driving_J - parts_J[:, _ROLLING]

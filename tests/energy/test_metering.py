@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mrmg.energy.metering import (
-    LoggedMotion,
+    TimedStates,
     battery_content,
     battery_profile,
     find_visits,
@@ -61,14 +61,14 @@ def along(
     v_m_s: np.ndarray,
     time_s: np.ndarray,
     psi_rad: float = 0.0,
-) -> LoggedMotion:
+) -> TimedStates:
     """Return a motion along the strip's middle line."""
     state = np.zeros((len(time_s), 5))
     state[:, 0], state[:, 3], state[:, 4] = x_m, v_m_s, psi_rad
-    return LoggedMotion(robot="r", time_s=time_s, state=state)
+    return TimedStates(robot="r", time_s=time_s, state=state)
 
 
-def cruise(start_m: float, end_m: float, speed_m_s: float = 1.0) -> LoggedMotion:
+def cruise(start_m: float, end_m: float, speed_m_s: float = 1.0) -> TimedStates:
     time_s = np.arange(0.0, (end_m - start_m) / speed_m_s + 0.05, 0.1)
     return along(start_m + speed_m_s * time_s, np.full(len(time_s), speed_m_s), time_s)
 
@@ -278,7 +278,7 @@ def test_battery_falls_by_the_draw_and_is_full_after_the_station(scene: Scene) -
 
 
 def test_battery_never_holds_more_than_its_capacity(scene: Scene) -> None:
-    still = LoggedMotion(robot="r", time_s=np.arange(4.0), state=np.zeros((4, 5)))
+    still = TimedStates(robot="r", time_s=np.arange(4.0), state=np.zeros((4, 5)))
     content_J, _ = battery_content(scene, still, np.array([-50.0, 20.0, -50.0]), [])
     assert content_J.tolist() == [30000.0, 30000.0, 29980.0, 30000.0]
 
@@ -292,7 +292,7 @@ def test_visits_of_other_robots_do_not_recharge() -> None:
     motion = cruise(5, 65)
     others = find_visits(
         scene,
-        LoggedMotion(robot="q", time_s=motion.time_s, state=motion.state),
+        TimedStates(robot="q", time_s=motion.time_s, state=motion.state),
         ("s",),
     )
     assert (np.diff(battery_profile(scene, motion, others)) <= 0).all()

@@ -12,7 +12,7 @@ import pytest
 import shapely
 
 import mrmg
-from mrmg.energy.metering import LoggedMotion, step_energy_parts
+from mrmg.energy.metering import TimedStates, step_energy_parts
 from mrmg.errors import RunFolderError, UsageError
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene, TerrainArea
@@ -40,7 +40,7 @@ def measured_J(scene: Scene, log: ExecutionLog, index: int) -> float:
 
 
 def metered_J(scene: Scene, log: ExecutionLog, index: int) -> float:
-    motion = LoggedMotion(
+    motion = TimedStates(
         robot=log.robots[index], time_s=log.time_s, state=log.state[index]
     )
     return float(step_energy_parts(scene, motion).sum())

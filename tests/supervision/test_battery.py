@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mrmg.energy.metering import LoggedMotion, battery_content, find_visits
+from mrmg.energy.metering import TimedStates, battery_content, find_visits
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.supervision.battery import BatteryTracker
@@ -49,7 +49,7 @@ def test_it_comes_to_the_same_in_pieces(
     state = np.zeros((len(x), 5))
     state[:, 0] = np.repeat(x, 3)[: len(x)]
     draw_J = np.full(len(x) - 1, 0.7)
-    motion = LoggedMotion(robot="r", time_s=time_s, state=state)
+    motion = TimedStates(robot="r", time_s=time_s, state=state)
     visits = find_visits(scene, motion, TOUR)
     # The account goes on behind a target that was left out; the tracker waits for it.
     if [visit.target for visit in visits] != list(TOUR[: len(visits)]):

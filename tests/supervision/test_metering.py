@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from mrmg.energy.metering import LoggedMotion, battery_profile, find_visits
+from mrmg.energy.metering import TimedStates, battery_profile, find_visits
 from mrmg.planning import plan_mission
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
@@ -62,7 +62,7 @@ def fed(scene: Scene, plan: Plan, log: ExecutionLog, ticks: int) -> RobotMeter:
 def test_charge_is_followed_over_recharges(recharging: tuple[Scene, Plan]) -> None:
     scene, plan = recharging
     log = simulate(scene, plan)
-    motion = LoggedMotion(robot="r1", time_s=log.time_s, state=log.state[0])
+    motion = TimedStates(robot="r1", time_s=log.time_s, state=log.state[0])
     visits = find_visits(scene, motion, plan.tours["r1"])
     end_J = battery_profile(scene, motion, visits)[-1]
     capacity_J = scene.robots[0].battery.capacity_J

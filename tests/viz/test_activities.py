@@ -5,17 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from mrmg.energy.battery_curves import shown_curves
-from mrmg.energy.metering import LoggedMotion, find_visits
+from mrmg.energy.metering import TimedStates, find_visits
 from mrmg.viz.activities import activities
 
 
-def motion_of(speed: list[tuple[float, float]], tick_s: float = 0.1) -> LoggedMotion:
+def motion_of(speed: list[tuple[float, float]], tick_s: float = 0.1) -> TimedStates:
     """Return a drive along x from (duration [s], speed [m/s]) pieces."""
     v = np.concatenate([np.full(round(t / tick_s), v) for t, v in speed] + [[0.0]])
     state = np.zeros((len(v), 5))
     state[:, 0] = 5.0 + np.concatenate([[0.0], np.cumsum(v[:-1]) * tick_s])
     state[:, 1], state[:, 3] = 10.0, v
-    return LoggedMotion(robot="r1", time_s=tick_s * np.arange(len(v)), state=state)
+    return TimedStates(robot="r1", time_s=tick_s * np.arange(len(v)), state=state)
 
 
 def output(spans) -> list[tuple[str, float, float]]:
