@@ -36,27 +36,19 @@ class Frame:
             SceneError: if a map in local metres cannot take geographic coordinates.
         """
         points = np.asarray(points, dtype=float)[:, :2]
-        if crs is None or crs == self.crs:
-            moved = points
-        elif self.crs is None:
-            if not _is_metric(crs, points):
-                message = (
-                    f"has coordinates of {crs}, and the map it goes with is in local "
-                    "metres; import it alone, or state --crs local if it is, too"
-                )
-                raise SceneError(source, [Fault("", message)])
-            moved = points
-        else:
-            moved = np.stack(
-                _pyproj()
-                .Transformer.from_crs(crs, self.crs, always_xy=True)
-                .transform(points[:, 0], points[:, 1]),
-                axis=1,
+        if self.crs is not None and crs not in (None, self.crs):
+            transformer = _pyproj().Transformer.from_crs(crs, self.crs, always_xy=True)
+            points = np.stack(transformer.transform(*points.T), axis=1)
+        elif self.crs is None and crs is not None and not _is_metric(crs, points):
+            message = (
+                f"has coordinates of {crs}, and the map it goes with is in local "
+                "metres; import it alone, or state --crs local if it is, too"
             )
-        if not np.isfinite(moved).all():
+            raise SceneError(source, [Fault("", message)])
+        if not np.isfinite(points).all():
             message = f"has coordinates that are none of {crs}; state others with --crs"
             raise SceneError(source, [Fault("", message)])
-        return np.asarray(moved if crs is None else moved - self.origin_m)
+        return np.asarray(points if crs is None else points - self.origin_m)
 
     def placed(self, shape: Any, crs: str | None, source: str = "") -> Any:
         """Return a shape of another coordinate system in this frame; see `metres`."""
