@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -19,19 +18,6 @@ PLANTS = (DEFAULT_PLANT, "scrub")
 """The energy model's own law, and a ground contact that it does not know."""
 
 
-class Plant(Protocol):
-    """The ground contact of a running simulation."""
-
-    def resist(self, ground: Ground, level: np.ndarray) -> None:
-        """Set all frictions for the coming tick.
-
-        Args:
-            ground: what lies under the robots.
-            level: cosine of the slope along each heading, shape (R,): the slope carries
-                a part of the weight.
-        """
-
-
 @dataclass(frozen=True, slots=True)
 class ModelledGround:
     """Losses by the energy model's law: the driven axles lose all."""
@@ -40,10 +26,20 @@ class ModelledGround:
     fleet: Fleet
 
     def resist(self, ground: Ground, level: np.ndarray) -> None:
-        """Set the frictions of the driven axles."""
+        """Set the frictions of the driven axles for the coming tick.
+
+        Args:
+            ground: what lies under the robots.
+            level: cosine of the slope along each heading, shape (R,): the slope carries
+                a part of the weight.
+        """
         along_N = level * self.law.force_N(*ground)
         swing_N = ground.turning_multiplier * self.law.swing_N
         self.fleet.set_resistance(along_N, swing_N)
+
+
+Plant = ModelledGround | ScrubbingTyres
+"""The ground contact of a running simulation."""
 
 
 def plant_of(
