@@ -179,7 +179,7 @@ def draw_targets(
     colors: Mapping[str, str],
     points: float = LETTER_POINTS,
 ) -> None:
-    """Draw goals, stations with squares, and wanted poses.
+    """Draw goals, stations with squares, and where and how robots must end.
 
     Args:
         axes: where to draw, in metres.
@@ -202,15 +202,10 @@ def draw_targets(
             markeredgewidth=0.1 * points,
             zorder=6,
         )
-    draw_wanted_poses(axes, scene)
-
-
-def draw_wanted_poses(axes: Axes, scene: Scene) -> None:
-    """Draw where robots must end, and the headings of finishes and goals."""
-    colors = style.scene_robot_colors(scene)
+    robots = style.scene_robot_colors(scene)
     for robot in scene.robots:
         if robot.finish:
-            look = {"edgecolor": colors[robot.id], "linestyle": (0, (2, 1.5))}
+            look = {"edgecolor": robots[robot.id], "linestyle": (0, (2, 1.5))}
             _add_shape(axes, robot.finish.region.shape, fill=False, zorder=5, **look)
     for _, arrow, _ in wanted_headings(scene):
         _add_shape(axes, arrow, facecolor=style.GOAL_EDGE, linewidth=0.0, zorder=5)
