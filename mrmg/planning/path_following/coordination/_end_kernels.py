@@ -215,7 +215,10 @@ def passing_cost(search, room, count, first):
 
     That is the cost of conflicts, beside the time it takes.
     """
-    if not clear(search, room.state, count, first, room.corner):
+    if not clear(
+        search.own, search.spaces, search.zones, search.traffic, room.state, count,
+        first, room.corner,
+    ):  # fmt: skip
         return np.inf
     nears = list_near(search, room, first, count)
     return conflict_cost(search, room, nears, first, count)

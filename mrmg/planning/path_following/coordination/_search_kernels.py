@@ -128,7 +128,10 @@ def expand(search, nodes, room, a, motion, nears, row):
     at = place_of(nodes.table, key)
     if nodes.table[at] == key and motion != TRACK:
         return -1
-    if not clear(search, state, steps, first, room.corner):
+    if not clear(
+        search.own, search.spaces, search.zones, search.traffic, state, steps, first,
+        room.corner,
+    ):  # fmt: skip
         return -1
     conflict_s = conflict_cost(search, room, nears, first, steps)
     if not conflict_s < np.inf:
