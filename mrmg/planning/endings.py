@@ -36,6 +36,10 @@ FINISHES_CROWDED = (
     "{first} and {second} cannot both stand at their finishes: no two points of these "
     "are {needed_m:.2f} m apart, as the robots' bodies need"
 )
+FINISHES_IN_STATION = (
+    "{first} and {second} cannot both stand at their finishes: these lie in {station}, "
+    "which is for one robot at a time"
+)
 NO_TOURS = (
     "no tours exist that keep every battery above its reserve: even on the shortest "
     "paths, with any recharging and in any order, the fleet visits at most {served} of "

@@ -19,6 +19,7 @@ from mrmg.errors import Fault, SceneError
 from mrmg.planning.endings import (
     FINISH_CUT_OFF,
     FINISHES_CROWDED,
+    FINISHES_IN_STATION,
     GOAL_CUT_OFF,
     GOAL_OUT_OF_ENERGY,
     listed,
@@ -217,20 +218,22 @@ def _crowded_finish(scene: Scene) -> str | None:
     """Return which two robots cannot both be at their finishes.
 
     The discs about the reference points inside both footprints would overlap wherever
-    in their finishes the two stand.
+    in their finishes the two stand, or both would be at a station for one at a time.
     """
-    bound = [
-        (robot, outer_polygon(robot.finish.region))
-        for robot in scene.robots
-        if robot.finish
-    ]
-    for (first, first_region), (second, second_region) in combinations(bound, 2):
-        widest_m = _longest_distance_m(first_region, second_region)
+    bound = [(robot, robot.finish.region) for robot in scene.robots if robot.finish]
+    single = [station for station in scene.stations if station.one_at_a_time]
+    for (first, here), (second, there) in combinations(bound, 2):
+        widest_m = _longest_distance_m(outer_polygon(here), outer_polygon(there))
         needed_m = first.model.inscribed_radius_m + second.model.inscribed_radius_m
         if widest_m < needed_m:
             return FINISHES_CROWDED.format(
                 first=first.id, second=second.id, needed_m=needed_m
             )
+        for station in single:
+            if station.region.covers(here) and station.region.covers(there):
+                return FINISHES_IN_STATION.format(
+                    first=first.id, second=second.id, station=station.id
+                )
     return None
 
 

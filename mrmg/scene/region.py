@@ -65,3 +65,8 @@ class Region(ByContent):
         offset = points[:, None, :] - start[None]
         inside = edge[None, :, 0] * offset[..., 1] - edge[None, :, 1] * offset[..., 0]
         return np.asarray(inside.min(axis=1))
+
+    def covers(self, other: Region) -> bool:
+        """Return whether all of another region is inside, but for rounding."""
+        points = other.corners if len(other.corners) else other.center
+        return bool((self.depth(points) >= other.radius_m - 1e-9).all())

@@ -43,6 +43,7 @@ STATUSES = {
         "FINISH_CUT_OFF",
         "FINISH_OUT_OF_ENERGY",
         "FINISHES_CROWDED",
+        "FINISHES_IN_STATION",
         "NO_TOURS",
         "TOO_LATE",
         "NO_TIMELY_TOURS",
@@ -153,6 +154,17 @@ ROWS = (
             ]
         },
         ("r1 and r2",),
+    ),
+    Row(
+        "FINISHES_IN_STATION",
+        {
+            "stations": [circle("s", 20, 10, 4.0) | {"capacity": 1}],
+            "robots": [
+                car("r1", 4, 6, finish=ends_at(18, 10)),
+                car("r2", 4, 14, finish=ends_at(22, 10)),
+            ],
+        },
+        ("r1 and r2", "lie in s"),
     ),
     Row(
         "NO_TOURS",

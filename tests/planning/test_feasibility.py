@@ -517,3 +517,29 @@ def test_two_robots_cannot_end_in_one_place(
     assert (proof is not None) == crowded
     if crowded:
         assert "r1 and r2 cannot both stand at their finishes" in str(proof)
+
+
+WHOLE = {"circle": {"center": [20, 10], "radius": 4}}
+BOXED = {"polygon": [[16, 6], [24, 6], [24, 14], [16, 14]]}
+
+
+@pytest.mark.parametrize("shape", [WHOLE, BOXED])
+@pytest.mark.parametrize(
+    ("ends", "more", "possible"),
+    [
+        (WHOLE, {"capacity": 1}, False),
+        (WHOLE, {}, True),
+        ({"circle": {"center": [22, 10], "radius": 2.1}}, {"capacity": 1}, True),
+    ],
+)
+def test_only_one_robot_ends_in_a_station_for_one(
+    yard: MakeScene,
+    shape: dict[str, Any],
+    ends: dict[str, Any],
+    more: dict[str, Any],
+    possible: bool,
+) -> None:
+    robots = [car("r1", 4, 5, finish=WHOLE), car("r2", 4, 15, finish=ends)]
+    stations = [{"id": "s", **shape, **more}]
+    proof = proof_of_infeasibility(yard(robots=robots, stations=stations))
+    assert (proof is None) == possible
