@@ -100,6 +100,8 @@ class FreeGround:
     ) -> list[BaseGeometry]:
         """Return the narrow ground on the way of fewest narrow pieces to a region.
 
+        Where it ends beside wide ground, the line from there into the region is last.
+
         Args:
             start: where the way begins.
             wanted: region that is reached with a clearance of `narrow_m`.
@@ -112,7 +114,17 @@ class FreeGround:
         first = [i for i, node in enumerate(nodes) if node.distance(start) < narrow_m]
         last = {i for i, node in enumerate(nodes) if node.intersects(wanted)}
         way = _fewest(nodes, len(narrow), first, last)
-        return [nodes[i] for i in way if i < len(narrow)]
+        found = [nodes[i] for i in way if i < len(narrow)]
+        for i in way[-1:]:
+            beside = self.pieces(wide_m)[i - len(narrow)] if i >= len(narrow) else None
+            if beside and not beside.intersects(wanted):
+                found.append(shapely.shortest_line(beside, wanted))
+        return found
+
+    def clearance_m(self, point: Point) -> float:
+        """Return how far a point of the ground is from obstacles and bounds."""
+        free = shapely.box(*self.bounds).difference(self.obstacles)
+        return float(free.boundary.distance(point))
 
 
 @dataclass(frozen=True, slots=True)

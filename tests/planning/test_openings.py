@@ -278,3 +278,58 @@ def test_a_region_that_is_narrow_itself_is_named() -> None:
     assert result.plan is None
     place = result.reason.split("near (")[1].split(",")[0]
     assert float(place) > 22.0, result.reason
+
+
+def beside_a_wall(model: str, pose: list[float], ends: list[float]) -> Scene:
+    """Return a mission with a wall, in which r1 ends in a circle of 0.2 m."""
+    return scene_from_document(
+        {
+            "format": 1,
+            "name": "beside",
+            "bounds": [0, 0, 20, 12],
+            "obstacles": [
+                {"id": "w", "polygon": corners(shapely.box(4.0, 4.8, 16.0, 5.2))}
+            ],
+            "battery": {"capacity_m": 200},
+            "robots": [
+                {
+                    "id": "r1",
+                    "model": model,
+                    "pose": pose,
+                    "finish": {"circle": {"center": ends, "radius": 0.2}},
+                },
+                {"id": "r2", "model": model, "pose": [14, 2, 0], "finish": "start"},
+            ],
+        },
+        source="beside",
+    )
+
+
+@pytest.mark.parametrize(
+    ("model", "pose", "ends", "spacing_m"),
+    [
+        ("car", [10, 5.85, 0.0], [16, 9], 0.5),
+        ("car", [0.65, 6, 1.5708], [16, 9], 0.5),
+        ("car", [4, 8, 0.0], [10, 5.75], 0.5),
+        ("diffdrive", [4, 8, 0.0], [19.45, 8], 0.048),
+    ],
+)
+def test_starts_and_finishes_beside_walls(
+    model: str, pose: list[float], ends: list[float], spacing_m: float
+) -> None:
+    """Nothing is narrow there, but margins keep robots away from the place itself.
+
+    Only where there is a path, and no motion, robots are nearer to each other, too.
+    """
+    scene = beside_a_wall(model, pose, ends)
+    plan = planned(scene, params=PlannerParams(trees=1))
+    assert verify(scene, plan).ok
+    assert {passage.robot for passage in plan.narrow} == {"r1"}
+    least_m = certified_minimum_m(scene.robots[0].model)
+    assert all(passage.margin_m >= least_m - 1e-6 for passage in plan.narrow)
+    assert plan.margins["r1"][1] == pytest.approx(spacing_m)
+
+
+def test_a_start_too_near_a_wall_is_named() -> None:
+    reason = plan_mission(beside_a_wall("car", [10, 5.76, 0], [16, 9])).reason
+    assert "1.12 m wide near (10.0, 5.8)" in reason

@@ -13,9 +13,10 @@ import shapely
 from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
-from mrmg.planning.free_ground import FreeGround, bottleneck
+from mrmg.planning.free_ground import Bottleneck, FreeGround, bottleneck
 from mrmg.planning.problem.targets import target_depth_m
 from mrmg.planning.roadmap.fleet import PASSAGE_SLACK_M, margins_of
+from mrmg.planning.roadmap.vertices import planned_regions
 from mrmg.scene.margins import Margins, certified_minimum_m
 from mrmg.scene.region import Region
 from mrmg.scene.types import Robot, Scene
@@ -71,16 +72,25 @@ def openings_to(
 def tightest_openings(scene: Scene, margins: Margins) -> tuple[Opening, ...]:
     """Return all ground that is too narrow to turn in, at the certified minimum.
 
+    That is passages, and where robots start and have to get to.
+
     Args:
         scene: the mission.
         margins: stated for all robots.
     """
     found: list[Opening] = []
+    regions = [entered(scene, region) for region in planned_regions(scene)]
     for margin_m, least_m, numbers in _robots_alike(scene, margins):
         robot = scene.robots[numbers[0]]
         wide_m = robot.model.circumscribed_radius_m + margin_m
         needed_m = min(clearance_needed_m(robot, least_m), wide_m)
-        pieces = FreeGround.of(scene, robot).narrow_pieces(needed_m, wide_m)
+        ground = FreeGround.of(scene, robot)
+        wide = shapely.union_all(ground.pieces(wide_m))
+        places = [*regions, *(Point(*scene.robots[n].pose[:2]) for n in numbers)]
+        pieces = [
+            *ground.narrow_pieces(needed_m, wide_m),
+            *(place for place in places if not place.intersects(wide)),
+        ]
         reach_m = robot.model.circumscribed_radius_m + wide_m - needed_m
         shape = shapely.union_all(pieces).buffer(reach_m)
         if not shape.is_empty and least_m < margin_m:
@@ -158,20 +168,30 @@ def _openings(
 ) -> Iterator[Opening]:
     start = Point(*robot.pose[:2])
     wide_m = wide_clearance_m(robot, margin_m)
+    least_m, clear_m = least_margin_m(robot, margin_m), ground.clearance_m(start)
+    if clear_m < wide_m:
+        level_m = max(clear_m - clearance_needed_m(robot, 0.0), least_m)
+        yield _opening(start, robot, number, margin_m, min(level_m, margin_m))
     if ground.reaches(start, wanted, wide_m):
         return
-    for level_m in np.linspace(margin_m, least_margin_m(robot, margin_m), LEVELS):
+    for level_m in np.linspace(margin_m, least_m, LEVELS):
         needed_m = clearance_needed_m(robot, float(level_m))
         if ground.reaches(start, wanted, needed_m):
-            reach_m = robot.model.circumscribed_radius_m + wide_m - needed_m
             for narrow in ground.narrows(start, wanted, needed_m, wide_m):
-                yield Opening(
-                    shape=narrow.buffer(reach_m),
-                    margin_m=float(level_m),
-                    allowance_m=float(margin_m - level_m),
-                    robots=(number,),
-                )
+                yield _opening(narrow, robot, number, margin_m, float(level_m))
             return
+
+
+def _opening(
+    narrow: BaseGeometry, robot: Robot, number: int, margin_m: float, level_m: float
+) -> Opening:
+    lacking_m = wide_clearance_m(robot, margin_m) - clearance_needed_m(robot, level_m)
+    return Opening(
+        shape=narrow.buffer(robot.model.circumscribed_radius_m + lacking_m),
+        margin_m=level_m,
+        allowance_m=margin_m - level_m,
+        robots=(number,),
+    )
 
 
 def passages_missing(
@@ -193,6 +213,9 @@ def passages_missing(
         kept_m = least_margin_m(robot, margins_of(robot, margins)[0])
         needed_m = clearance_needed_m(robot, kept_m)
         gap = bottleneck(ground, start, entered(scene, region), needed_m)
+        clear_m = ground.clearance_m(start)
+        if gap is not None and clear_m < min(needed_m, 0.5 * gap.width_m):
+            gap = Bottleneck(2.0 * clear_m, start.x, start.y)
         if gap is None:
             lacking_m, text = 2.0 * needed_m, f"there is no way at all for {robot.id}"
         elif gap.width_m >= 2.0 * needed_m:
