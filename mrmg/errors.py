@@ -107,6 +107,32 @@ class MachineError(MrmgError):
     exit_code = ExitCode.MACHINE
 
 
+MADE_BY = {
+    "Scene": "mrmg.load_scene(...) gives one",
+    "Plan": "mrmg.plan(scene).plan is one, or None where `reason` says why",
+    "ExecutionLog": "mrmg.execute(scene, plan) gives one",
+    "str or Path": "give the path of a scene file, or a shipped scene's name",
+}
+"""Where the values come from that functions take, by type."""
+
+
+def require_types(*given: tuple[object, type | tuple[type, ...]]) -> None:
+    """Refuse values that are of other types than they must be.
+
+    Args:
+        given: each value, and its type, or types.
+
+    Raises:
+        UsageError: naming the type, and where its values come from.
+    """
+    for value, kind in given:
+        if not isinstance(value, kind):
+            kinds = kind if isinstance(kind, tuple) else (kind,)
+            name = " or ".join(each.__name__ for each in kinds)
+            got = "None" if value is None else f"{value!r:.60} ({type(value).__name__})"
+            raise UsageError(f"expected {name}, got {got}; {MADE_BY[name]}")
+
+
 def require_known(what: str, name: str, names: Iterable[str]) -> None:
     """Refuse a name that is none of some.
 

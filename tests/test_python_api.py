@@ -6,6 +6,7 @@ import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -111,3 +112,28 @@ def test_data_frames_need_pandas_only_when_asked_for(
         Plan.load(mixed).trajectories[0].to_dataframe()
     with pytest.raises(MachineError, match="pandas"):
         ExecutionLog.load(mixed).to_dataframe("d1")
+
+
+def test_values_of_other_types_are_refused_with_where_to_get_them() -> None:
+    scene = mrmg.load_scene("quickstart")
+    plan = Plan.load(Path(__file__).parent / "run_of_0.1.0")
+    none: Any = None
+    name: Any = "file.yaml"
+    number: Any = 5
+    no_plan = r"expected Plan, got None; mrmg.plan\(scene\).plan is one, or None where"
+    no_log = r"expected ExecutionLog, got None; mrmg.execute\(scene, plan\) gives one"
+    no_scene = r"expected Scene, got 'file.yaml' \(str\); mrmg.load_scene"
+    for call, message in (
+        (lambda: mrmg.verify(scene, none), no_plan),
+        (lambda: mrmg.execute(scene, none), no_plan),
+        (lambda: mrmg.drive(scene, none), no_plan),
+        (lambda: mrmg.audit(scene, none, none), no_plan),
+        (lambda: mrmg.audit(scene, plan, none), no_log),
+        (lambda: mrmg.render(scene, plan, none, "mission.mp4"), no_log),
+        (lambda: mrmg.plan(name), no_scene),
+        (lambda: mrmg.verify(name, plan), no_scene),
+        (lambda: mrmg.execute(name, plan), no_scene),
+        (lambda: mrmg.run(number), r"expected str or Path, got 5 \(int\); give the"),
+    ):
+        with pytest.raises(UsageError, match=message):
+            call()

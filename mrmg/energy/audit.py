@@ -42,6 +42,7 @@ from mrmg.energy.metering import MEASURED_PARTS, leg_entries, plan_ledger
 from mrmg.energy.mission_failures import mission_failures
 from mrmg.energy.model_mismatch import model_mismatches
 from mrmg.energy.visits import first_stay
+from mrmg.errors import require_types
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
@@ -69,16 +70,13 @@ def audit(
     Raises:
         RunFolderError: if the log is of another scene, plan or fleet.
     """
+    require_types((scene, Scene), (plan, Plan), (log, ExecutionLog))
     require_same_mission(scene, plan, log)
     measured = measured_curves(scene, plan, log)
     if log.disturbance is not None:
         scene = log.disturbance.actual_scene(scene)
-    metered_ledger = plan_ledger(
-        scene,
-        measured,
-        [visit for curve in measured for visit in curve.visits],
-        believed_rolling(plan, log),
-    )
+    visits = [visit for curve in measured for visit in curve.visits]
+    metered_ledger = plan_ledger(scene, measured, visits, believed_rolling(plan, log))
     goals_visited = _goals_visited(scene, log)
     robots = tuple(
         _robot_audit(

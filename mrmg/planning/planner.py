@@ -14,7 +14,7 @@ import numpy as np
 
 from mrmg import extensions
 from mrmg.background import Result, within
-from mrmg.errors import UsageError
+from mrmg.errors import UsageError, require_types
 from mrmg.planning import planners, routers
 from mrmg.planning.attempt import Attempt, Request
 from mrmg.planning.bounding import bounds_beside
@@ -95,6 +95,7 @@ def plan_mission(
             features that the planner does not know.
         MachineError: if a planner or router of another package is broken.
     """
+    require_types((scene, Scene))
     require_robots(scene)
     _require_known(options)
     if workers < 1:

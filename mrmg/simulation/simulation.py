@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mrmg.errors import require_known
+from mrmg.errors import require_known, require_types
 from mrmg.mujoco_import import mujoco
 from mrmg.plans import Plan
 from mrmg.scene.driven_parts import require_drivable
@@ -82,6 +82,7 @@ def simulate(
             that cannot be executed.
         IdentityError: if the plan is of another scene.
     """
+    require_types((scene, Scene), (plan, Plan))
     maker = controller_maker(controller)
     require_known("plant", plant, PLANTS)
     require_same_mission(scene, plan)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mrmg import storage
+from mrmg.errors import require_types
 from mrmg.planning import PlannerParams
 from mrmg.plans import DRIVEN_PLAN, Plan
 from mrmg.scene.driven_parts import require_drivable
@@ -74,6 +75,7 @@ def drive_mission(
             read, or a robot can only be planned for.
         IdentityError: if the plan is of another scene.
     """
+    require_types((scene, Scene), (plan, Plan))
     require_same_mission(scene, plan)
     require_drivable(scene.robots)
     params = params or ControlParams()

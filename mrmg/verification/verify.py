@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from mrmg.errors import require_types
 from mrmg.motion.dynamics import NU, NX
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
@@ -36,6 +37,7 @@ def verify(scene: Scene, plan: Plan) -> Verdict:
         plan: from any planner. A malformed one (other robots, unequal lengths, numbers
             that are not finite) is judged by that alone.
     """
+    require_types((scene, Scene), (plan, Plan))
     mismatch = _check_digest(scene, plan)
     malformed = [*_check_form(scene, plan)] or _check_coarseness(scene, plan)
     if malformed:

@@ -10,7 +10,7 @@ import av
 import numpy as np
 
 from mrmg import storage
-from mrmg.errors import UsageError
+from mrmg.errors import UsageError, require_types
 from mrmg.plans import Plan
 from mrmg.runs.arguments import VideoArguments
 from mrmg.runs.options import documented
@@ -53,6 +53,7 @@ def render_video(
     """
     if options.get("gif"):
         raise UsageError("gif: this writes an MP4; viz.gif.render_gif writes a GIF")
+    require_types((scene, Scene), (plan, Plan), (log, ExecutionLog))
     made = video_options(scene, log, VideoArguments(**options), _FITTING_S)
     ticks = frame_ticks(log, made)
     with storage.atomic_path(Path(path)) as temporary:

@@ -10,7 +10,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from mrmg import shipped
-from mrmg.errors import Fault, SceneError, nearest
+from mrmg.errors import Fault, SceneError, nearest, require_types
 from mrmg.scene.loading.assembly import Assembly
 from mrmg.scene.loading.faults import faults_of, shown
 from mrmg.scene.loading.places import id_at, lines_of
@@ -116,6 +116,7 @@ def scene_path(source: str | Path) -> Path:
     Raises:
         SceneError: if there is none.
     """
+    require_types((source, (str, Path)))
     names = shipped.scene_names()
     if str(source) in names:
         return shipped.scenes_folder() / f"{source}.yaml"
