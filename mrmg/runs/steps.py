@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mrmg import storage
-from mrmg.errors import ExitCode, MrmgError, RunFolderError
+from mrmg.errors import ExitCode, Fault, MrmgError, RunFolderError
 from mrmg.plans import Plan, PlanStatus, plan_in_force
 from mrmg.runs.arguments import RunArguments, recorded
 from mrmg.runs.code_digest import code_digest
@@ -109,11 +109,17 @@ class Run:
         return PlanStatus(self.planning()["status"])
 
     def plan(self) -> Plan:
-        """Return the plan."""
+        """Return the plan; refuse where there is none, saying how planning ended."""
+        known = self.folder.file("planning.json").exists()
+        if known and (status := self.status()) is not PlanStatus.SOLVED:
+            ended = f"planning ended {status.value}: {self.planning()['reason']}"
+            fault = Fault("planning.json", f"there is no plan; {ended}")
+            raise RunFolderError(str(self.folder.path), [fault])
         return Plan.load(self.folder.path)
 
     def plan_in_force(self) -> Plan:
         """Return the plan that was driven, joined where the mission was replanned."""
+        self.plan()
         return plan_in_force(self.folder.path)
 
     def log(self) -> ExecutionLog:

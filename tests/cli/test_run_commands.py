@@ -109,6 +109,10 @@ def test_an_infeasible_mission_ends_with_its_code(
     first = capsys.readouterr().out.splitlines()[0]
     assert "infeasible" in first
     assert "g1 is unreachable" in first
+    for later in ("verify", "execute", "audit", "render"):
+        assert main([later, str(tmp_path / "run")]) == ExitCode.INVALID_FILE
+        refused = capsys.readouterr().err
+        assert "no plan; planning ended infeasible: goal g1 is unreachable" in refused
 
 
 def test_a_run_that_an_older_version_called_a_timeout_is_readable(
