@@ -129,15 +129,17 @@ def import_robot(options: argparse.Namespace) -> int:
     from mrmg.scene.importing.robots.importing import import_robot as imported
 
     given = [item.replace(":=", "=").partition("=") for item in options.arg]
-    if not all(name and sign for name, sign, _ in given):
-        raise UsageError(f"--arg: got {options.arg}; expected NAME=VALUE")
+    arguments = {name: value for name, sign, value in given if name and sign}
+    if len(arguments) < len(given):
+        message = f"--arg: got {options.arg}; expected NAME=VALUE, each name once"
+        raise UsageError(message)
     folder = options.out or Path("models") / options.file.name.partition(".")[0]
     found = imported(
         options.file,
         folder,
         drive=options.drive,
         steer=options.steer,
-        arguments={name: value for name, _, value in given},
+        arguments=arguments,
     )
     for file in found.files:
         print(file)

@@ -128,13 +128,15 @@ def margins_from(value: Any) -> Margins:
         )
         for key, number in pairs:
             stated[key.strip()] = float(number)
+        if len(stated) < len(pairs):
+            stated = {}
     except (AttributeError, TypeError, ValueError):
         stated = {}
     fine = all(0.0 <= stated[key] <= LARGEST_M.get(key, -1.0) for key in stated)
     if not stated or not fine:
         raise UsageError(
-            f"margins: {value!r} are no margins such as obstacle=0.1,robot=0.3: in m, "
-            f"at most {LARGEST_M['obstacle']:g} from obstacles and "
+            f"margins: {value!r} are no margins such as obstacle=0.1,robot=0.3: each "
+            f"once, in m, at most {LARGEST_M['obstacle']:g} from obstacles and "
             f"{LARGEST_M['robot']:g} between robots"
         )
     return Margins(obstacle_m=stated.get("obstacle"), robot_m=stated.get("robot"))

@@ -134,3 +134,12 @@ def test_list_has_a_line_for_each_shipped_model(
 def test_no_such_model(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["robot", "check", "boat"]) == ExitCode.USAGE
     assert "unknown model 'boat'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("given", [["wide"], ["wide:=1", "wide:=2"]])
+def test_arguments_of_a_description_are_given_once_each(
+    given: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [word for argument in given for word in ("--arg", argument)]
+    assert main(["robot", "import", "cart.xacro", *words]) == ExitCode.USAGE
+    assert "expected NAME=VALUE, each name once" in capsys.readouterr().err

@@ -148,7 +148,9 @@ def test_small_robots_have_small_margins() -> None:
     assert (large.obstacle_m, large.robot_m) == (0.25, 0.5)
 
 
-@pytest.mark.parametrize("wrong", ["0.1", "obstacle=x", {"wall": 0.1}, "robot=3", ""])
+@pytest.mark.parametrize(
+    "wrong", ["0.1", "obstacle=x", {"wall": 0.1}, "robot=3", "", "robot=1,robot=1"]
+)
 def test_wrong_margins_are_refused(wrong: Any) -> None:
     with pytest.raises(UsageError, match=r"margins: .* at most 1 from obstacles"):
         plan_mission(gap(3.0), margins=wrong)
