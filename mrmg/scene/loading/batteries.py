@@ -7,7 +7,12 @@ import math
 from mrmg.compared import compared
 from mrmg.errors import Fault
 from mrmg.scene.loading.faults import EntryError
-from mrmg.scene.loading.schema import BatteryEntry, RobotEntry, StartEnergyEntry
+from mrmg.scene.loading.schema import (
+    LONGEST_STAY_S,
+    BatteryEntry,
+    RobotEntry,
+    StartEnergyEntry,
+)
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Battery
 
@@ -40,12 +45,13 @@ def battery_of(
         raise EntryError(Fault(f"{path}.start_energy", message))
     power_W = own.charging_power or fleet.charging_power or math.inf
     energy = model.energy_model
-    least_W = energy.idle_power_W + energy.device_power_W
-    if power_W <= least_W:
-        given_W, drawn_W = compared(power_W, least_W)
+    drawn_W = energy.idle_power_W + energy.device_power_W
+    least_W = drawn_W + capacity_J / LONGEST_STAY_S
+    if power_W < least_W:
         message = (
-            f"got {given_W} W; {robot.id} itself draws {drawn_W} W at rest, so its "
-            "battery would never be full; give more"
+            f"got {power_W:g} W; {robot.id} itself draws {drawn_W:g} W at rest, and "
+            f"its battery of {capacity_J:.0f} J must be full within a day; give at "
+            f"least {math.ceil(100.0 * least_W) / 100.0:g} W"
         )
         where = f"{path}.battery" if own.charging_power else "battery"
         raise EntryError(Fault(f"{where}.charging_power", message))

@@ -52,7 +52,8 @@ Details:
   full battery drives straight on at constant speed). A robot's own `battery` replaces
   what it names; without any capacity the model's standard battery counts.
 - A goal or station with `dwell` (s) counts as visited when the reference point of one
-  robot has been in its region for that long without a break, one target at a time.
+  robot has been in its region for that long without a break, one target at a time;
+  at most 86400 s, a day, in which `charging_power` must fill a battery, too.
 - A goal with `heading` (rad; within `heading_tolerance`, default 0.2) counts as visited
   while the robot's yaw is that, too, for all of its `dwell`.
 - A station with `capacity: 1` is for one robot at a time: at no time are the reference
@@ -114,6 +115,12 @@ from mrmg.scene.region import HEADING_TOLERANCE_RAD
 
 SCENE_FORMAT = 1
 
+LONGEST_STAY_S = 86400.0
+"""Longest dwell time, and time that filling a battery may take [s]: plans have a state
+for each tenth of a second of them."""
+
+Stay = Annotated[float, Field(ge=0, le=LONGEST_STAY_S, allow_inf_nan=False)]
+
 
 class ObstacleEntry(ShapedEntry):
     """Ground that robots must keep off."""
@@ -150,7 +157,7 @@ class RegionEntry(OneOf):
     """a disc: its center [x, y] and its radius in m"""
     polygon: Ring | None = None
     """at least 3 corners [x, y] in m"""
-    dwell: NotNegative | None = None
+    dwell: Stay | None = None
     """time in s that a visit takes"""
 
 
