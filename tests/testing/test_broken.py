@@ -293,6 +293,7 @@ MOVES = "return x + v * dt * cos(middle)"
             "it_gets_to_a_waypoint_ahead",
         ),
         (("share * limits[1]", "2.0 * limits[1]"), "it_gets_to_a_waypoint_ahead"),
+        (("share * limits[1]", "0.5 * limits[1]"), "it_gets_to_a_waypoint_ahead"),
         (("from math import", "import math\n\nCALLS = []\nfrom math import"), ""),
     ],
 )

@@ -36,6 +36,7 @@ loaded with `trust_code=True`, or `--trust-code`."""
 CHANGES = {
     "motion_model: unicycle": "motion_model: motion.py",
     "mjcf: diffdrive.xml": "",  # planned for, not simulated
+    "v_max: 1.6": "v_max: 0.8",
     "u1_max: 1.2": "u1_max: 0.8",  # m/s: its controls are speeds
     "u2_max: 2.0": "u2_max: 1.2",  # rad/s
 }
