@@ -92,13 +92,9 @@ def read_campaign(
     if not path.is_file():
         found = "is a folder" if path.is_dir() else "no such file"
         raise FileError(str(path), [Fault("", f"{found}; expected a campaign file")])
-    content = read_yaml(path, source=str(path))
-    try:
-        document = CampaignDocument.model_validate(content).model_dump()
-    except ValidationError as error:
-        raise _refused(path, faults_of(error, CampaignDocument)) from error
+    document, faults = _well_formed(read_yaml(path, source=str(path)))
     factors = _Factors(document, path.parent)
-    faults = [*factors.faults()]
+    faults += factors.faults()
     sources: list[SceneSource] = []
     for number, entry in enumerate(document["scenes"]):
         try:
@@ -107,8 +103,7 @@ def read_campaign(
             faults += _scene_faults(f"scenes.{number}", error)
     names = [source.name for source in sources]
     faults += _repeated("scenes", names, "give one of them another name")
-    if not faults:
-        faults += factors.scene_faults(sources)
+    faults += factors.scene_faults(sources)
     if faults:
         raise _refused(path, faults)
     try:
@@ -116,6 +111,20 @@ def read_campaign(
     except UsageError as error:
         raise _refused(path, [Fault("parameters", str(error))]) from error
     return Campaign(name=path.stem, document=document, trials=trials)
+
+
+def _well_formed(content: Any) -> tuple[dict[str, Any], list[Fault]]:
+    """Return the well-formed part of a file's content, and the faults of the rest."""
+    try:
+        return CampaignDocument.model_validate(content).model_dump(), []
+    except ValidationError as error:
+        faults = list(faults_of(error, CampaignDocument))
+    wrong = {fault.path.partition(".")[0] for fault in faults}
+    given = content if isinstance(content, dict) else {}
+    rest = {key: value for key, value in given.items() if str(key) not in wrong}
+    document = CampaignDocument.model_validate({"scenes": ["quickstart"], **rest})
+    lacking: dict[str, Any] = {} if "scenes" in rest else {"scenes": []}
+    return document.model_dump() | lacking, faults
 
 
 def _refused(path: Path, faults: Sequence[Fault]) -> FileError:
