@@ -149,6 +149,38 @@ def test_expressions_of_real_descriptions(mass: str, kg: float, tmp_path: Path) 
     assert model.mass_kg == pytest.approx(kg + 4)
 
 
+@pytest.mark.parametrize(
+    "extra",
+    [
+        '<x y="${9**9**9}"/>',
+        '<x y="${a**a**a}"/>',
+        "<x y=\"${'a'*10**10}\"/>",
+        '<x y="${10**10 * [a]}"/>',
+        '<x y="${1 &lt;&lt; 10**10}"/>',
+        '<x y="${sum(range(10**10))}"/>',
+        "<x y=\"${'%999999999d' % 1}\"/>",
+        '<x y="${b}"/>',
+        '<x y="$(eval 9**9**9)"/>',
+        '<x y="$(eval 2*(weight**9**9${close})"/>',
+        '<x y="${sum(range(10**30))}"/>',
+        '<x y="${factorial(10**9)}"/>',
+    ],
+)
+def test_expressions_that_are_too_large(extra: str, tmp_path: Path) -> None:
+    doubled = "".join(
+        f'<xacro:property name="b{n}" value="${{b{n - 1} + b{n - 1}}}"/>'
+        for n in range(1, 40)
+    )
+    known = (
+        '<xacro:arg name="weight" default="30"/>'
+        '<xacro:property name="close" value=")"/><xacro:property name="a" value="99"/>'
+        f'<xacro:property name="b0" value="${{\'ab\'}}"/>{doubled}'
+        '<xacro:property name="b" value="${b39}"/>'
+    )
+    with pytest.raises(SceneError, match="be too large: allowed are numbers of 100000"):
+        import_robot(written(tmp_path, known + extra), tmp_path / "rover")
+
+
 def test_command_ends_with_code_3(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -21,7 +21,7 @@ import numpy as np
 
 from mrmg.errors import Fault, SceneError
 from mrmg.extras import import_extra
-from mrmg.scene.importing.robots.expressions import ExpressionError, guarded
+from mrmg.scene.importing.robots.expressions import ExpressionError, cause_of, guarded
 from mrmg.scene.loading.mjcf import no_warning_file
 from mrmg.scene.loading.yaml_text import read_text
 
@@ -121,7 +121,7 @@ def _expanded(path: Path, arguments: Mapping[str, str]) -> str:
             own = guarded(xacro)
             document = own.process_file(str(path), mappings=dict(arguments))
     except Exception as error:  # xacro raises what the expressions in a file raise
-        cause = _cause(error)
+        cause = cause_of(error)
         if isinstance(cause, ExpressionError):
             raise SceneError(str(path), [Fault("", str(cause))]) from error
         # Of a file; xacro's own words repeat it.
@@ -130,12 +130,6 @@ def _expanded(path: Path, arguments: Mapping[str, str]) -> str:
         message = f"xacro cannot expand it: {reason}; --arg NAME=VALUE sets arguments"
         raise SceneError(str(path), [Fault("", message)]) from error
     return str(document.toxml())
-
-
-def _cause(error: Exception) -> Exception:
-    """Return what an error of xacro, which wraps others in its own, is about."""
-    inner = getattr(error, "exc", None)
-    return _cause(inner) if isinstance(inner, Exception) else error
 
 
 def _without_lost_meshes(root: ET.Element, folder: Path) -> list[str]:

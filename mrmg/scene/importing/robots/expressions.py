@@ -10,7 +10,8 @@ from __future__ import annotations
 import ast
 import importlib.util
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping
 from types import ModuleType
 from typing import Any
 
@@ -38,15 +39,35 @@ _FUNCTIONS = """
 _CALLS = {*_FUNCTIONS.split(), *(name for name in dir(math) if name[0] != "_")}
 
 
-class ExpressionError(ValueError):
-    """An expression of a file that is not evaluated, as it could run code."""
+LARGEST = 100_000
+"""Bits, characters or items that the operands of an expression give at most."""
 
-    def __init__(self, expression: str, part: str) -> None:
+_COUNTING = ("range", "factorial", "comb", "perm")
+"""Functions whose results grow with their arguments."""
+
+TOO_LARGE = (
+    f"be too large: allowed are numbers of {LARGEST} bits, and texts and lists of as "
+    "many characters and items"
+)
+
+
+class ExpressionError(ValueError):
+    """An expression of a file that is not evaluated, as it could do harm."""
+
+    def __init__(
+        self, expression: str, part: str, harm: str = f"run code: {ALLOWED}"
+    ) -> None:
         what = f"'{_short(part)}' in it" if part != expression else "it"
         super().__init__(
-            f"expression '{_short(expression)}' is not evaluated, as {what} could run "
-            f"code: {ALLOWED}"
+            f"expression '{_short(expression)}' is not evaluated, as {what} could "
+            f"{harm}"
         )
+
+
+def cause_of(error: Exception) -> Exception:
+    """Return what an error of xacro, which wraps others in its own, is about."""
+    inner = getattr(error, "exc", None)
+    return cause_of(inner) if isinstance(inner, Exception) else error
 
 
 def guarded(xacro: ModuleType) -> Any:
@@ -67,6 +88,7 @@ def guarded(xacro: ModuleType) -> Any:
 
     def guarded_evaluation(expression: str, *names: Any) -> Any:
         require_harmless(expression)
+        require_small(expression, lambda part: evaluate(part, *names))
         value = evaluate(expression, *names)
         # A property that held a function could be called by an allowed name.
         if _holds_function(value):
@@ -76,7 +98,11 @@ def guarded(xacro: ModuleType) -> Any:
     def guarded_extension(text: str) -> Any:
         command = text.removeprefix("$(").removesuffix(")").lstrip()
         if command.startswith("eval"):
-            require_harmless(command.removeprefix("eval"))
+            inner = command.removeprefix("eval")
+            require_harmless(inner)
+            require_small(  # it gives texts: those of lists tell types
+                inner, lambda part: ast.literal_eval(extend(f"$(eval [{part}])"))[0]
+            )
         return extend(text)
 
     vars(own).update(safe_eval=guarded_evaluation, eval_extension=guarded_extension)
@@ -95,6 +121,53 @@ def require_harmless(expression: str) -> None:
         if not _harmless(node):
             part = ast.get_source_segment(text, node)
             raise ExpressionError(text, part or text)
+
+
+def require_small(expression: str, value_of: Callable[[str], Any]) -> None:
+    """Raise an ExpressionError if a part of it gives something too large.
+
+    Args:
+        expression: that is harmless otherwise.
+        value_of: evaluates a part of it.
+    """
+    text = expression.strip()
+    for node in [*ast.walk(ast.parse(text, mode="eval"))][::-1]:  # inner ones first
+        if isinstance(node, ast.BinOp):
+            parts = [node.left, node.right]
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith(_COUNTING):
+            parts = node.args
+        else:
+            continue
+        try:
+            operands = [value_of(ast.unparse(part)) for part in parts]
+            if isinstance(node, ast.BinOp):
+                size = _size(node.op, *operands)
+            else:
+                size = max(map(abs, operands))
+        except Exception as error:
+            if isinstance(cause_of(error), ExpressionError):
+                raise
+            continue  # if it counts, evaluating it all raises it again
+        if size > LARGEST:
+            raise ExpressionError(text, ast.unparse(node), TOO_LARGE)
+
+
+def _size(operator: ast.operator, left: Any, right: Any) -> int:
+    """Return about how many bits, characters or items an operator gives at most."""
+    whole = isinstance(left, int) and isinstance(right, int)
+    match operator:
+        case ast.Pow() if whole:
+            return int(left.bit_length() * right)
+        case ast.LShift() if whole:
+            return int(left.bit_length() + right)
+        case ast.Mult() if not whole:
+            times, size = (left, right) if isinstance(left, int) else (right, left)
+            return int(times * len(size))
+        case ast.Mod() if isinstance(left, str):  # widths may be operands, too
+            return LARGEST + 1 if re.search(r"%[^a-zA-Z%]*(\*|\d{4})", left) else 0
+        case _ if whole:
+            return int(left.bit_length() + right.bit_length())
+    return len(left) + len(right)
 
 
 def _harmless(node: ast.AST) -> bool:
