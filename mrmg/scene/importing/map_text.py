@@ -88,7 +88,9 @@ class _Reader:
 
     def rows(self, lines: Sequence[_Line]) -> RawMap:
         shapes: list[BaseGeometry] = []
+        in_space = False
         for number, values in self._numbers(lines):
+            in_space |= len(values) == 9
             if len(values) in (2, 4, 6):
                 points = np.reshape(values, (-1, 2))
                 shapes.append((Point, LineString, Polygon)[len(points) - 1](points))
@@ -100,6 +102,12 @@ class _Reader:
                 f"no map, begins with '{lines[0][1][:30]}'; expected a sectioned map "
                 "or rows of 6, 4 or 2 numbers"
             )
+            if in_space:
+                message += (
+                    "; rows of 9 numbers are triangles in space: leave out the heights "
+                    "for obstacles, or make a GeoTIFF or an ESRI ASCII grid of them "
+                    "for an elevation"
+                )
             self.faults = [Fault("", message)]
         border = None if self.faults else _drawn_border(shapes)
         return RawMap(border=border, obstacles=tuple(shapes), unit_m=1.0)
