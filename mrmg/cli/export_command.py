@@ -16,7 +16,9 @@ def add_export(verbs: Any) -> None:
         "export",
         help="write the drive or the plan for other tools",
         description="Write the drive of a run, or its plan where nothing was driven: "
-        "as ROS 2 messages (mcap), orders and states of VDA 5050, GeoJSON or a table.",
+        "as ROS 2 messages (mcap), orders and states of VDA 5050, GeoJSON or a table. "
+        "All are in metres of the scene, GeoJSON too (it states the crs 'local'), as "
+        "scenes have no longitude and latitude.",
         command=export,
     )
     verb.add_run()
