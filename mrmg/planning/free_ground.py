@@ -123,8 +123,8 @@ class FreeGround:
 
     def clearance_m(self, point: Point) -> float:
         """Return how far a point of the ground is from obstacles and bounds."""
-        free = shapely.box(*self.bounds).difference(self.obstacles)
-        return float(free.boundary.distance(point))
+        edges = [shapely.box(*self.bounds).exterior, self.obstacles]
+        return float(shapely.GeometryCollection(edges).distance(point))
 
 
 @dataclass(frozen=True, slots=True)

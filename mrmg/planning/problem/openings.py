@@ -66,7 +66,7 @@ def openings_to(
         found += _openings(
             grounds[key], robot, number, margin_m, entered(scene, region)
         )
-    return tuple(found)
+    return tuple(dict.fromkeys(found))
 
 
 def tightest_openings(scene: Scene, margins: Margins) -> tuple[Opening, ...]:
