@@ -20,6 +20,9 @@ MOST_ROBOTS = 40
 FAR_M = 1e4
 """Length of lines that surely end beyond a wall [m]."""
 
+BESIDE_SHARE = 0.2
+"""Share of the width of ground below which a place lies beside a wall, not in a gap."""
+
 SPACING_M = 0.2
 """Distance of the points of paths that are looked at [m]."""
 
@@ -65,20 +68,23 @@ def narrowest_meeting(problem: Problem, tours: Sequence[Sequence[int]]) -> str:
     x, y = Frame.of(scene).on_the_map((at[0], at[1]))
     stopping = [o.shape for o in scene.barriers if o.stops(names[pair[0]])]
     walls = shapely.union_all([shapely.box(*scene.bounds).boundary, *stopping])
-    width_m = _width_between(walls, Point(x, y))
-    return f"{what} near ({x:.1f}, {y:.1f}), where it is {width_m:.2f} m wide"
+    near_m, width_m = _room_between(walls, Point(x, y))
+    wide = f"where it is {width_m:.2f} m wide"
+    if near_m < BESIDE_SHARE * width_m:
+        wide = f"{near_m:.2f} m from the nearest obstacle or edge of the map"
+    return f"{what} near ({x:.1f}, {y:.1f}), {wide}"
 
 
-def _width_between(walls: BaseGeometry, point: Point) -> float:
-    """Return the distance of the walls on two sides of a point, across the nearest."""
+def _room_between(walls: BaseGeometry, point: Point) -> tuple[float, float]:
+    """Return how far the nearest wall is, and how far apart those on two sides are."""
     nearest = shapely.shortest_line(point, walls)
     if not nearest.length:
-        return 0.0
+        return 0.0, 0.0
     (x, y), (wall_x, wall_y) = nearest.coords
     scale = FAR_M / nearest.length
     beyond = Point(x + (x - wall_x) * scale, y + (y - wall_y) * scale)
     across = shapely.LineString([point, beyond]).intersection(walls)
-    return float(nearest.length + point.distance(across))
+    return nearest.length, float(nearest.length + point.distance(across))
 
 
 def _points(path: np.ndarray) -> np.ndarray:
