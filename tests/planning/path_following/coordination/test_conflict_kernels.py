@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -16,22 +15,12 @@ from mrmg.planning.path_following.coordination._motion_kernels import (
     clear,
     first_conflict,
 )
-from mrmg.planning.problem._region_kernels import Zones
 from mrmg.planning.problem.problem import Problem
-from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS, Spaces
+from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.scene.types import Scene
 
 STEP_M = 0.2
 STEPS = 60
-
-
-class Search(NamedTuple):
-    """What of a search decides whether motions are clear."""
-
-    own: np.ndarray
-    spaces: Spaces
-    zones: Zones
-    traffic: Traffic
 
 
 @pytest.fixture
@@ -146,5 +135,8 @@ def is_clear(problem: Problem, states: np.ndarray, *, busy: bool) -> bool:
     mission = problem.mission
     traffic = traffic_of(problem, straight(problem.start[1], STEPS))
     traffic.busy[:] = busy
-    search = Search(mission.fleet[:1], mission.spaces, mission.zones, traffic)
-    return bool(clear(search, states, len(states) - 1, 0, corners()))
+    fleet, count = mission.fleet[:1], len(states) - 1
+    found = clear(
+        fleet, mission.spaces, mission.zones, traffic, states, count, 0, corners()
+    )
+    return bool(found)
