@@ -9,7 +9,7 @@ from mrmg.compilation.cache import (
     note_kernels_are_compiled,
 )
 from mrmg.compilation.clock import now_ns
-from mrmg.compilation.decorators import kernel
+from mrmg.compilation.decorators import kernel, record_type
 from mrmg.compilation.parallel import compile_in_processes
 
 __all__ = [
@@ -22,4 +22,5 @@ __all__ = [
     "kernels_are_compiled",
     "note_kernels_are_compiled",
     "now_ns",
+    "record_type",
 ]

@@ -1,4 +1,4 @@
-"""The decorator of kernels.
+"""The decorator of kernels, and the type of their records.
 
 Kernels copy arrays element by element: with a slice that an array is assigned to, numba
 compiles its message about shapes that do not fit, which takes 2.5 s of processor time.
@@ -7,10 +7,11 @@ compiles its message about shapes that do not fit, which takes 2.5 s of processo
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 from numba.extending import overload
 
 from mrmg.compilation.cache import to_be_kept
@@ -59,3 +60,12 @@ def kernel(function: F) -> F:
     order of additions, which would end reproducibility.
     """
     return function if numba.config.DISABLE_JIT else Kernel(function)  # type: ignore[return-value]
+
+
+def record_type(fields: Sequence[tuple[object, ...]]) -> np.dtype[np.void]:
+    """Return the type of records whose fields are attributes, uncompiled as compiled.
+
+    Args:
+        fields: name and type of each, as `numpy.dtype` takes them.
+    """
+    return np.dtype((np.record, list(fields)))

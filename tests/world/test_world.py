@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
+import pytest
 import shapely
 
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.world import _kernels
-from mrmg.world.world import World
+from mrmg.world.world import Opening, World
 
 WALL = {"id": "wall", "box": {"center": [30, 10], "size": [2, 8]}, "height": 1.0}
 KERB = {
@@ -64,3 +66,24 @@ def test_reach_covers_the_farthest_corner_and_the_margin() -> None:
     space = World.from_scene(fleet, margin_m=0.7).spaces[0]
     model = fleet.robots[0].model
     assert space.reach >= 0.7 + model.circumscribed_radius_m - 1e-12
+
+
+@pytest.mark.parametrize("away_m", [0.07, 0.15, 0.35])
+@pytest.mark.parametrize("opened", [False, True])
+def test_margins_are_smaller_by_the_allowance_in_openings(
+    away_m: float, opened: bool
+) -> None:
+    """0.3 m beside the wall, and 0.1 m in the opening."""
+    opening = Opening(
+        shape=shapely.Point(26.0, 10.0).buffer(3.0),
+        margin_m=0.1,
+        allowance_m=0.2,
+        robots=(0, 1, 2),
+    )
+    world = World.from_scene(
+        scene(WALL), cell_m=0.1, openings=(opening,) if opened else (), guide_m=0.05
+    )
+    corner = np.array(shapely.box(28.0, 9.5, 29.0 - away_m, 10.5).exterior.coords)[:-1]
+    middle, radius = corner.mean(axis=0), 0.5 * np.hypot(*np.ptp(corner, axis=0))
+    clear = _kernels.footprint_is_clear(world.spaces[0], corner, *middle, radius, 0.3)
+    assert clear == (away_m > (0.1 if opened else 0.3))

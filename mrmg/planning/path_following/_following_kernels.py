@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, record_type
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.problem._control_kernels import (
     braking_control,
@@ -35,7 +35,7 @@ TURNING_SHARE = 0.5
 """Share of the acceleration of turning with which a turn on the spot is slowed down."""
 
 
-COURSE_NODE = np.dtype(
+COURSE_NODE = record_type(
     [
         ("x", np.float64),  # [m]
         ("y", np.float64),  # [m]

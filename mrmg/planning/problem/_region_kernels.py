@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, record_type
 from mrmg.world._polygon_kernels import point_in_convex
 
-REGION = np.dtype(
+REGION = record_type(
     [
         ("center", np.float64, (2,)),  # [m]
         ("reach", np.float64),  # radius of the circle about it that holds the region

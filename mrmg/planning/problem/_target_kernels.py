@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, record_type
 from mrmg.planning.problem._control_kernels import wrap
 from mrmg.planning.problem._region_kernels import REGION, in_region
 
-TARGET = np.dtype(
+TARGET = record_type(
     [
         *REGION.descr,
         ("heading", np.float64),  # with which it is visited [rad]

@@ -6,14 +6,14 @@ from math import cos, sin
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, record_type
 from mrmg.energy.model import N_COEFFICIENTS
 from mrmg.world._kernels import FreeSpace
 
 MOST_CORNERS = 12
 """Most corners a footprint may have."""
 
-FLEET = np.dtype(
+FLEET = record_type(
     [
         ("model", np.int64),  # motion model id
         ("step_at", np.int64),  # address of a user's compiled step, else 0

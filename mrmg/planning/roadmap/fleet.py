@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
 from mrmg.errors import Fault, SceneError
@@ -158,5 +157,4 @@ def fleet_array(scene: Scene, world: World, margins: Margins) -> np.ndarray:
         one["capacity"] = battery.capacity_J
         one["charge"] = battery.charging_power_W
         one["reserve"] = battery.reserve_J + RESERVE_MARGIN * battery.capacity_J
-    # Uncompiled kernels find the fields of records as attributes only in such a view.
-    return fleet.view(np.recarray) if numba.config.DISABLE_JIT else fleet
+    return fleet

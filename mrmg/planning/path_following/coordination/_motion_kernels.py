@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, record_type
 from mrmg.motion._kernels import USER, steer_user, step
 from mrmg.planning.path_following._following_kernels import (
     advance,
@@ -50,7 +50,7 @@ REACH_STEPS = 80
 """Steps that driving along a curve may take beyond its length at full speed."""
 
 
-OTHER = np.dtype(
+OTHER = record_type(
     [
         ("last", np.int64),  # number of its last state
         ("closing", np.float64),  # what it and own robot near in a step, at most [m]

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import kernel, record_type
 from mrmg.motion._kernels import CAR, copy_numbers
 from mrmg.planning.path_following._following_kernels import Course, advance
 from mrmg.planning.path_following.coordination._field_kernels import (
@@ -112,7 +112,7 @@ class Setting(NamedTuple):
     dt: float
 
 
-NODE = np.dtype(
+NODE = record_type(
     [
         ("parent", np.int64),
         ("motion", np.int64),  # that led to it
