@@ -110,9 +110,9 @@ class Run:
 
     def plan(self) -> Plan:
         """Return the plan; refuse where there is none, saying how planning ended."""
-        known = self.folder.file("planning.json").exists()
-        if known and (status := self.status()) is not PlanStatus.SOLVED:
-            ended = f"planning ended {status.value}: {self.planning()['reason']}"
+        found = [file.name for file in self.folder.path.glob("plan*.json")]
+        if found == ["planning.json"] and self.status() is not PlanStatus.SOLVED:
+            ended = f"planning ended {self.status().value}: {self.planning()['reason']}"
             fault = Fault("planning.json", f"there is no plan; {ended}")
             raise RunFolderError(str(self.folder.path), [fault])
         return Plan.load(self.folder.path)
