@@ -30,6 +30,8 @@ from mrmg.planning.parameters import (
 )
 from mrmg.planning.path_following.coordination.coordination import coordinated
 from mrmg.planning.path_following.coordination.tasks import no_path
+from mrmg.planning.path_following.following import tour_path
+from mrmg.planning.path_following.narrow_turns import turned_outside
 from mrmg.planning.planners import find_planner
 from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.planning.routers import find_router
@@ -85,8 +87,10 @@ def coordinate_smallest() -> None:
 
 
 def follow_smallest() -> None:
-    """Follow paths in the smallest mission."""
+    """Follow paths in the smallest mission, as a robot that turns on the spot, too."""
     _plan_smallest(SMALL_PARAMS)
+    _, problem = _smallest_mission()
+    assert turned_outside(problem, 0, tour_path(problem, 0, [0]), passing=0.0)
 
 
 def guide_smallest() -> None:

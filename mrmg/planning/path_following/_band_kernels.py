@@ -27,6 +27,9 @@ RATE_WEIGHT = 20.0
 CLEARANCE_WEIGHT = 600.0
 """Cost per metre and square metre of missing clearance [m/m^3]."""
 
+TURNING_WEIGHT = 600.0
+"""Cost per square metre of clearance that a turn on the spot lacks [m/m^2]."""
+
 TARGET_WEIGHT = 600.0
 """Cost per square metre of a target's distance [m/m^2]."""
 
@@ -45,6 +48,7 @@ class CostMap(NamedTuple):
             point [m], shape (D,).
         length: of the footprint [m].
         room: clearance their centres need [m].
+        turning_room: clearance that the reference point needs in turns on the spot [m].
         curvature: greatest [1/m].
         curvature_rate: greatest change of it per metre [1/m^2].
         scrub: plain ground that turning by one radian is worth [m].
@@ -58,6 +62,7 @@ class CostMap(NamedTuple):
     disc: np.ndarray
     length: float
     room: float
+    turning_room: float
     curvature: float
     curvature_rate: float
     scrub: float
@@ -316,6 +321,15 @@ def band_cost(cost_map, stops, p, gear, pivot, nose, shape, gradient):
     total = add_terrain_and_clearance(cost_map, p, gear, gradient)
     total += add_bending(cost_map, p, gear, pivot, shape, gradient)
     total += add_evenness(p, gear, shape.size, gradient)
+    for v in range(len(pivot)):
+        if not pivot[v]:
+            continue
+        free, fx, fy = value_and_slope(cost_map, cost_map.distance, p[v, 0], p[v, 1])
+        lack = cost_map.turning_room - free
+        if lack > 0.0:
+            total += TURNING_WEIGHT * lack * lack
+            gradient[v, 0] -= 2.0 * TURNING_WEIGHT * lack * fx
+            gradient[v, 1] -= 2.0 * TURNING_WEIGHT * lack * fy
     for i in range(len(stops.node)):
         v = stops.node[i]
         off, dx, dy = outside(stops, i, p[v, 0], p[v, 1])

@@ -47,6 +47,9 @@ LEAST_PIVOT = 0.5
 TRACKING_M = 0.01
 """How much deeper than needed a path enters its targets, to begin with."""
 
+DIRECTION_M = 4.0
+"""How far before and after a target a way's direction is read."""
+
 SERIES = 200
 """Steps of L-BFGS after which nodes are spread evenly again."""
 
@@ -100,6 +103,22 @@ class Path:
         return np.unique(
             [0, *changes.tolist(), *self.pivot, *pauses, len(self.node) - 1]
         )
+
+
+def turns_of(path: Path) -> list[tuple[int, float]]:
+    """Return how much a path turns at its start and at its stops, in order [rad]."""
+    way, turns = path.way, []
+    for node in dict.fromkeys([0, *path.stop.tolist()]):
+        if node == len(way) - 1:
+            break
+        near = path.points(way[node] + DIRECTION_M * np.array([-1.0, 1.0]))
+        ahead = near[1] - path.node[node]
+        before = np.array([cos(path.heading), sin(path.heading)])
+        if node > 0:
+            before = path.node[node] - near[0]
+        turn = np.arctan2(before[0] * ahead[1] - before[1] * ahead[0], before @ ahead)
+        turns.append((node, abs(float(turn))))
+    return turns
 
 
 def visit_steps(targets: Targets, tour: Sequence[int], state: np.ndarray) -> list[int]:

@@ -43,6 +43,7 @@ def cost_map_of(problem: Problem, r: int, smooth: np.ndarray) -> CostMap:
         arm = float(robot["wheelbase"])
         rate = limit[4] / (arm * limit[1])
     energy = model.energy_model
+    margin_m = (1.0 + ROOM_SHARE) * float(robot["margin"])
     return CostMap(
         x_min=spaces.x_min,
         y_min=spaces.y_min,
@@ -51,7 +52,8 @@ def cost_map_of(problem: Problem, r: int, smooth: np.ndarray) -> CostMap:
         multiplier=smooth,
         disc=low[0] + length * (np.arange(pieces) + 0.5),
         length=float(high[0] - low[0]),
-        room=float(np.hypot(0.5 * length, half) + (1.0 + ROOM_SHARE) * robot["margin"]),
+        room=float(np.hypot(0.5 * length, half) + margin_m),
+        turning_room=model.circumscribed_radius_m + margin_m,
         curvature=path_curvature(robot),
         curvature_rate=float(CURVATURE_SHARE * rate),
         scrub=arm * energy.turning_force_N / max(energy.rolling_force_N, 1e-9),

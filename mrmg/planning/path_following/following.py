@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from math import cos, pi, radians, sin
+from math import pi, radians
 
 import numpy as np
 
@@ -19,9 +19,15 @@ from mrmg.motion._kernels import UNICYCLE, USER
 from mrmg.planning.assembly import plan_or_refusal
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
-from mrmg.planning.path_following.band import TRACKING_M, Path, smooth_path
+from mrmg.planning.path_following.band import (
+    TRACKING_M,
+    Path,
+    smooth_path,
+    turns_of,
+)
 from mrmg.planning.path_following.driven_legs import Leg, legs_driven_J
 from mrmg.planning.path_following.gears import with_best_gears
+from mrmg.planning.path_following.narrow_turns import turned_outside
 from mrmg.planning.path_following.refine import cost_maps_of, drive_paths
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.problem.problem import Problem
@@ -49,11 +55,11 @@ FIRST_PLAN_SHARE = 2.0 / 3.0
 """How much deeper than needed first plans enter targets, as a share of what is needed:
 they seldom miss one, which spares driving again."""
 
+PASSING = radians(90.0)
+"""Turn up to which it passes through a target that it cannot turn round in."""
+
 JUDGED_M = 4.0
 """Distance of the nodes of paths that only tours are judged by."""
-
-DIRECTION_M = 4.0
-"""How far before and after a target a way's direction is read."""
 
 
 def can_follow(problem: Problem) -> bool:
@@ -118,10 +124,11 @@ def follow_tours(
         if any(_same_gears(paths, before) for before in tried):
             continue
         tried.append(paths)
-        if number > 0 and not timed:
-            paths = [
-                _geared(problem, r, cost_maps[r], path) for r, path in enumerate(paths)
-            ]
+        judged = number > 0 and not timed
+        paths = [
+            _geared(problem, r, cost_maps[r] if judged else None, path)
+            for r, path in enumerate(paths)
+        ]
         tasks = [RobotTask(*one) for one in zip(stops, paths, cost_maps, strict=True)]
         others = partial(_otherwise, problem, tasks, paths, sharps, deeper_m)
         drive = drive_paths(problem, tasks, halt, others)
@@ -166,6 +173,8 @@ def _otherwise(
     tour, tried = [*paths[r].target], [paths[r]]
     for sharp in sharps:
         path = tour_path(problem, r, tour, sharp, deeper_m)
+        if problem.mission.fleet[r]["model"] == UNICYCLE:
+            path = turned_outside(problem, r, path, passing=0.0)
         if not any(np.array_equal(path.gear, before.gear) for before in tried):
             tried.append(path)
             yield RobotTask(tasks[r].tour, path, tasks[r].cost_map)
@@ -228,7 +237,7 @@ def tour_path(
         heading=heading,
         pause_s=np.zeros(len(tour)),
     )
-    turns = _turns(path)
+    turns = turns_of(path)
     if problem.mission.fleet[r]["model"] == UNICYCLE:
         pivots = [at for at, turn in turns if turn > PIVOT]
         return replace(path, pivot=np.array(pivots, np.int64))
@@ -238,23 +247,10 @@ def tour_path(
     return path
 
 
-def _geared(problem: Problem, r: int, cost_map: CostMap, path: Path) -> Path:
+def _geared(problem: Problem, r: int, cost_map: CostMap | None, path: Path) -> Path:
+    """Return a path with the gears that look best, of a car if it may be priced."""
     if problem.mission.fleet[r]["model"] == UNICYCLE:
+        return turned_outside(problem, r, path, PASSING)
+    if cost_map is None:
         return path
-    return with_best_gears(problem, r, cost_map, path, _turns(path))
-
-
-def _turns(path: Path) -> list[tuple[int, float]]:
-    """Return how much a path turns at its start and at its stops, in order [rad]."""
-    way, turns = path.way, []
-    for node in dict.fromkeys([0, *path.stop.tolist()]):
-        if node == len(way) - 1:
-            break
-        near = path.points(way[node] + DIRECTION_M * np.array([-1.0, 1.0]))
-        ahead = near[1] - path.node[node]
-        before = np.array([cos(path.heading), sin(path.heading)])
-        if node > 0:
-            before = path.node[node] - near[0]
-        turn = np.arctan2(before[0] * ahead[1] - before[1] * ahead[0], before @ ahead)
-        turns.append((node, abs(float(turn))))
-    return turns
+    return with_best_gears(problem, r, cost_map, path, turns_of(path))

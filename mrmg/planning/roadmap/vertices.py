@@ -27,6 +27,11 @@ NARROW_M = 2.5
 """Clearance below which the middle of a place gets vertices of its own [m]."""
 
 
+ANCHOR_SLACK = 0.75
+"""Cells by which a target's middle must have more clearance than a way needs: between
+cells distances are read too small by that much."""
+
+
 def planned_regions(scene: Scene) -> list[Region]:
     """Return the regions the planner numbers: goals, stations, finishes of robots."""
     finishes = [robot.finish.region for robot in scene.robots if robot.finish]
@@ -116,7 +121,7 @@ def _ridge(space: FreeSpace) -> np.ndarray:
 def _anchor(space: FreeSpace, passage: float, region: Region) -> np.ndarray:
     """Return a region's centre, or its clearest point where the centre is tight."""
     centre = np.asarray(region.center, dtype=float)
-    if _field_at(space, centre[None])[0] >= passage:
+    if _field_at(space, centre[None])[0] >= passage + ANCHOR_SLACK * space.cell:
         return centre
     x0, y0, x1, y1 = region.shape.bounds
     grid = np.stack(

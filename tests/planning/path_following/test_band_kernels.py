@@ -24,6 +24,7 @@ def cost_map(**changes: Any) -> CostMap:
         "disc": np.array([0.1, 0.6, 1.1]),
         "length": 1.5,
         "room": 0.9,
+        "turning_room": 1.5,
         "curvature": 0.4,
         "curvature_rate": 0.4,
         "scrub": 0.3,
@@ -50,12 +51,18 @@ NO_PIVOT = np.zeros(40, np.bool_)
 """Of paths that never turn on the spot."""
 
 
-def cost(ground: CostMap, marks: Stops, p: np.ndarray, gear: np.ndarray) -> Any:
+def cost(
+    ground: CostMap,
+    marks: Stops,
+    p: np.ndarray,
+    gear: np.ndarray,
+    pivot: np.ndarray = NO_PIVOT,
+) -> Any:
     """Return (cost, gradient) of a path that starts heading east."""
     gradient = np.zeros_like(p)
     shape = _band_kernels.new_shape(len(p) - 1)
     value = _band_kernels.band_cost(
-        ground, marks, p, gear, NO_PIVOT[: len(gear)], EAST, shape, gradient
+        ground, marks, p, gear, pivot[: len(gear)], EAST, shape, gradient
     )
     return value, gradient
 
@@ -72,7 +79,8 @@ def test_gradient_is_that_of_the_cost(seed: int) -> None:
     marks.targets.target[1]["corners"] = 3
     p = 3.0 + np.cumsum(0.4 + 0.8 * rng.random((n, 2)), axis=0)
     gear = np.where(np.arange(n - 1) < 6, 1, -1)
-    _, gradient = cost(ground, marks, p, gear)
+    pivot = np.arange(n - 1) % 5 == 3
+    _, gradient = cost(ground, marks, p, gear, pivot)
     slopes = np.zeros_like(p)
     for i in range(1, n):
         for j in range(2):
@@ -80,7 +88,7 @@ def test_gradient_is_that_of_the_cost(seed: int) -> None:
             for sign in (1.0, -1.0):
                 q = p.copy()
                 q[i, j] += sign * 1e-6
-                ends.append(cost(ground, marks, q, gear)[0])
+                ends.append(cost(ground, marks, q, gear, pivot)[0])
             slopes[i, j] = (ends[0] - ends[1]) / 2e-6
     scale = np.abs(gradient).max()
     assert np.abs(slopes - gradient).max() < 1e-6 * scale
@@ -93,6 +101,19 @@ def test_a_straight_way_costs_its_length(gear: int) -> None:
     p = np.stack([x, np.full(9, 5.0)], axis=1)
     value, _ = cost(cost_map(), stops(), p, np.full(8, gear))
     assert value == pytest.approx(8.0)
+
+
+def test_turns_on_the_spot_need_room() -> None:
+    p = np.stack([np.arange(1.0, 10.0), np.full(9, 5.0)], axis=1)
+    ground = cost_map(distance=np.full((80, 80), 1.2), disc=np.zeros(1))
+    pivot = np.arange(8) == 4
+    costs = [
+        cost(ground, stops(), p, np.ones(8, np.int64), turns)[0]
+        for turns in (NO_PIVOT, pivot)
+    ]
+    lacking_m = ground.turning_room - 1.2
+    weight = _band_kernels.TURNING_WEIGHT
+    assert costs[1] - costs[0] == pytest.approx(weight * lacking_m**2)
 
 
 def test_terrain_multiplies_the_length() -> None:
