@@ -11,6 +11,7 @@ from math import cos, pi, sin
 
 import numpy as np
 
+from mrmg.planning.path_following._following_kernels import ASKEW
 from mrmg.planning.path_following.band import Path, turns_of
 from mrmg.planning.path_following.cost_map import ROOM_SHARE
 from mrmg.planning.problem._clearance_kernels import has_room_to_turn
@@ -48,7 +49,7 @@ def turned_outside(problem: Problem, r: int, path: Path, passing: float) -> Path
             path = replace(path, pivot=path.pivot[path.pivot != stop])
             if turns.get(stop, pi) > passing:
                 path = _backed_in(problem, r, path, stop)
-    if 0 in path.pivot and not _turns_at(problem, r, *path.node[0]):
+    if turns.get(0, 0.0) > ASKEW and not _turns_at(problem, r, *path.node[0]):
         path = _driven_out(problem, r, path)
     return path
 
