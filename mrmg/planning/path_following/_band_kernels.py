@@ -226,13 +226,13 @@ def write_turns(p, gear, nose, shape):
 
 
 @kernel
-def bending_cost(cost_map, gear, pivot, shape):
+def bending_cost(cost_map, gear, pivot, stiff, shape):
     """Return the cost of turning, of too much curvature and of its changes.
 
-    Turns on the spot (`pivot`) have no curvature. Writes the cost's derivatives by turn
-    and size.
+    Turns on the spot (`pivot`) have no curvature. Any at the start costs `stiff` per
+    square radian. Writes the cost's derivatives by turn and size.
     """
-    total = 0.0
+    total = stiff * shape.turn[0] * shape.turn[0]
     n = len(shape.turn)
     shape.d_bend[:] = 0.0
     shape.d_size[:] = 0.0
@@ -240,6 +240,7 @@ def bending_cost(cost_map, gear, pivot, shape):
         rounded = sqrt(shape.turn[i] * shape.turn[i] + SOFT_TURN * SOFT_TURN)
         total += cost_map.scrub * (rounded - SOFT_TURN)
         shape.d_turn[i] = cost_map.scrub * shape.turn[i] / rounded
+    shape.d_turn[0] += 2.0 * stiff * shape.turn[0]
     for i in range(n):
         if pivot[i]:
             continue
@@ -273,7 +274,10 @@ def bending_cost(cost_map, gear, pivot, shape):
 @kernel
 def add_bending(cost_map, p, gear, pivot, shape, gradient):
     """Add the cost of turning, of too much curvature and of its changes."""
-    total = bending_cost(cost_map, gear, pivot, shape)
+    # At its start a robot that turns on the spot does so, whatever its path is.
+    free, _, _ = value_and_slope(cost_map, cost_map.distance, p[0, 0], p[0, 1])
+    stiff = TURNING_WEIGHT * max(0.0, cost_map.turning_room - free)
+    total = bending_cost(cost_map, gear, pivot, 0.0 if pivot[0] else stiff, shape)
     for i in range(len(shape.turn)):
         bx, by = p[i + 1, 0] - p[i, 0], p[i + 1, 1] - p[i, 1]
         size = shape.size[i]
@@ -321,15 +325,12 @@ def band_cost(cost_map, stops, p, gear, pivot, nose, shape, gradient):
     total = add_terrain_and_clearance(cost_map, p, gear, gradient)
     total += add_bending(cost_map, p, gear, pivot, shape, gradient)
     total += add_evenness(p, gear, shape.size, gradient)
-    for v in range(len(pivot)):
-        if not pivot[v]:
-            continue
+    for v in np.flatnonzero(pivot):
         free, fx, fy = value_and_slope(cost_map, cost_map.distance, p[v, 0], p[v, 1])
-        lack = cost_map.turning_room - free
-        if lack > 0.0:
-            total += TURNING_WEIGHT * lack * lack
-            gradient[v, 0] -= 2.0 * TURNING_WEIGHT * lack * fx
-            gradient[v, 1] -= 2.0 * TURNING_WEIGHT * lack * fy
+        lack = max(0.0, cost_map.turning_room - free)
+        total += TURNING_WEIGHT * lack * lack
+        gradient[v, 0] -= 2.0 * TURNING_WEIGHT * lack * fx
+        gradient[v, 1] -= 2.0 * TURNING_WEIGHT * lack * fy
     for i in range(len(stops.node)):
         v = stops.node[i]
         off, dx, dy = outside(stops, i, p[v, 0], p[v, 1])

@@ -35,15 +35,16 @@ def cost_map_of(problem: Problem, r: int, smooth: np.ndarray) -> CostMap:
     half = max(-low[1], high[1])
     pieces = max(1, int(np.ceil((high[0] - low[0]) / (DISCS_SHARE * 2.0 * half))))
     length = (high[0] - low[0]) / pieces
-    limit = robot["limit"]
+    limit, margin_m = robot["limit"], (1.0 + ROOM_SHARE) * float(robot["margin"])
     if robot["model"] == UNICYCLE:
         arm = float(robot["track"])
         rate = 4.0 * limit[4] / limit[1] ** 2
+        turning_room_m = model.circumscribed_radius_m + margin_m
     else:
         arm = float(robot["wheelbase"])
         rate = limit[4] / (arm * limit[1])
+        turning_room_m = 0.0
     energy = model.energy_model
-    margin_m = (1.0 + ROOM_SHARE) * float(robot["margin"])
     return CostMap(
         x_min=spaces.x_min,
         y_min=spaces.y_min,
@@ -53,7 +54,7 @@ def cost_map_of(problem: Problem, r: int, smooth: np.ndarray) -> CostMap:
         disc=low[0] + length * (np.arange(pieces) + 0.5),
         length=float(high[0] - low[0]),
         room=float(np.hypot(0.5 * length, half) + margin_m),
-        turning_room=model.circumscribed_radius_m + margin_m,
+        turning_room=turning_room_m,
         curvature=path_curvature(robot),
         curvature_rate=float(CURVATURE_SHARE * rate),
         scrub=arm * energy.turning_force_N / max(energy.rolling_force_N, 1e-9),

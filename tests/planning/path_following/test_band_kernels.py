@@ -116,6 +116,18 @@ def test_turns_on_the_spot_need_room() -> None:
     assert costs[1] - costs[0] == pytest.approx(weight * lacking_m**2)
 
 
+def test_robots_set_out_straight_where_they_have_no_room_to_turn() -> None:
+    turn = 0.3
+    p = np.array([[5.0, 5.0], [5.0 + cos(turn), 5.0 + sin(turn)]])
+    costs = []
+    for room in (1.2, 1.5):
+        ground = cost_map(distance=np.full((80, 80), 1.2), disc=np.zeros(1))
+        ground = ground._replace(turning_room=room)
+        costs.append(cost(ground, stops(), p, np.ones(1, np.int64))[0])
+    added = 0.3 * _band_kernels.TURNING_WEIGHT * turn**2
+    assert costs[1] - costs[0] == pytest.approx(added)
+
+
 def test_terrain_multiplies_the_length() -> None:
     p = np.stack([np.arange(1.0, 10.0), np.full(9, 5.0)], axis=1)
     ground = cost_map(multiplier=np.full((80, 80), 2.5))
