@@ -32,9 +32,10 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cache, partial
+from pathlib import Path
 from typing import Any, get_args
 
 from mission_tables import header, moments, print_ratios, print_scene
@@ -185,6 +186,21 @@ def missions(
             if not row["ok"]:
                 print(f"FAILED {scene.name} seed {seed}: {row}", file=sys.stderr)
             yield row
+
+
+def plan_each(
+    scenes: Iterable[tuple[str, Scene]], options: argparse.Namespace, command: str
+) -> int:
+    """Plan scenes, each with its source, a table's row each; return the exit code."""
+    trials = Trials(options.output, **deciding(options))
+    ok, table = True, list[Row]()
+    print(header(options))
+    for source, scene in scenes:
+        of_scene = list(missions(scene, source, options, trials))
+        ok &= all(row["ok"] for row in of_scene)
+        table += print_scene(Path(source).stem, of_scene, options)
+    write_document(options, command, table, ok)
+    return 0 if ok else 1
 
 
 def warmed(scene: Scene, options: argparse.Namespace) -> float | None:

@@ -16,8 +16,7 @@ from typing import Any
 
 import bench
 import numpy as np
-from mission_tables import header, print_scene
-from protocol import Row, Trials, add_file_options, run, seed_range, write_document
+from protocol import add_file_options, run, seed_range
 
 from mrmg import shipped
 from mrmg.scene.loading import scene_from_document
@@ -51,18 +50,9 @@ def main() -> int:
     """Run the bench; return 1 if any mission failed."""
     options = parse_options()
     print(f"{__doc__}\n{bench.protocol(options)}")
-    trials = Trials(options.output, **bench.deciding(options))
-    rows: list[Row] = []
-    table: list[Row] = []
-    print(header(options))
-    for number in options.halls:
-        scene = hall(options.model, number)
-        of_hall = list(bench.missions(scene, scene.name, options, trials))
-        rows += of_hall
-        table += print_scene(scene.name, of_hall, options)
-    ok = all(row["ok"] for row in rows)
-    write_document(options, "bench_docks", table, ok)
-    return 0 if ok else 1
+    halls = (hall(options.model, number) for number in options.halls)
+    scenes = ((scene.name, scene) for scene in halls)
+    return bench.plan_each(scenes, options, "bench_docks")
 
 
 def parse_options() -> argparse.Namespace:

@@ -16,8 +16,7 @@ import sys
 from pathlib import Path
 
 import bench
-from mission_tables import header, print_scene
-from protocol import Row, Trials, add_file_options, run, seed_range, write_document
+from protocol import add_file_options, run, seed_range
 
 from mrmg.scene.importing.importing import import_files
 from mrmg.scene.loading import scene_from_document
@@ -41,19 +40,8 @@ def main() -> int:
         return 2
     print(f"{__doc__}\n{options.robots} robots, {options.goals} goals, "
           f"placement {options.placement}\n\n{bench.protocol(options)}")  # fmt: skip
-    trials = Trials(options.output, **bench.deciding(options))
-    rows: list[Row] = []
-    table: list[Row] = []
-    print(header(options))
-    for path in options.maps:
-        of_map = list(
-            bench.missions(populated(path, options), str(path), options, trials)
-        )
-        rows += of_map
-        table += print_scene(path.stem, of_map, options)
-    ok = all(row["ok"] for row in rows)
-    write_document(options, "bench_maps", table, ok)
-    return 0 if ok else 1
+    scenes = ((str(path), populated(path, options)) for path in options.maps)
+    return bench.plan_each(scenes, options, "bench_maps")
 
 
 def parse_options() -> argparse.Namespace:
