@@ -121,10 +121,10 @@ class FreeGround:
                 found.append(shapely.shortest_line(beside, wanted))
         return found
 
-    def clearance_m(self, point: Point) -> float:
-        """Return how far a point of the ground is from obstacles and bounds."""
+    def clearance_m(self, shape: BaseGeometry) -> float:
+        """Return how far a point or shape is from obstacles and bounds."""
         edges = [shapely.box(*self.bounds).exterior, self.obstacles]
-        return float(shapely.GeometryCollection(edges).distance(point))
+        return float(shapely.GeometryCollection(edges).distance(shape))
 
 
 @dataclass(frozen=True, slots=True)

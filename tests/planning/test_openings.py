@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +15,7 @@ import mrmg
 from mrmg.errors import UsageError
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.frame import Frame
+from mrmg.planning.problem.problem import state_mission
 from mrmg.plans import Plan, PlanStatus
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.margins import certified_minimum_m, default_margins, kept_margins
@@ -282,15 +284,24 @@ def test_a_region_that_is_narrow_itself_is_named() -> None:
     assert float(place) > 22.0, result.reason
 
 
-def beside_a_wall(model: str, pose: list[float], ends: list[float]) -> Scene:
-    """Return a mission with a wall, in which r1 ends in a circle of 0.2 m."""
+WALL = (shapely.box(4.0, 4.8, 16.0, 5.2),)
+
+
+def beside_a_wall(
+    model: str,
+    pose: list[float],
+    ends: list[float],
+    walls: Sequence[shapely.Polygon] = WALL,
+) -> Scene:
+    """Return a mission with walls, in which r1 ends in a circle of 0.2 m."""
     return scene_from_document(
         {
             "format": 1,
             "name": "beside",
             "bounds": [0, 0, 20, 12],
             "obstacles": [
-                {"id": "w", "polygon": corners(shapely.box(4.0, 4.8, 16.0, 5.2))}
+                {"id": f"w{i}", "polygon": corners(wall)}
+                for i, wall in enumerate(walls)
             ],
             "battery": {"capacity_m": 200},
             "robots": [
@@ -330,6 +341,24 @@ def test_starts_and_finishes_beside_walls(
     least_m = certified_minimum_m(scene.robots[0].model)
     assert all(passage.margin_m >= least_m - 1e-6 for passage in plan.narrow)
     assert plan.margins["r1"][1] == pytest.approx(spacing_m)
+
+
+@pytest.mark.parametrize("behind_m", [0.06, 0.2, 0.4])
+@pytest.mark.parametrize("nose_in", [False, True])
+def test_cars_leave_bays_that_they_are_parked_in(
+    behind_m: float, nose_in: bool
+) -> None:
+    """Margins are smaller there from the first attempt on."""
+    reach_m = 1.5 if nose_in else 0.3
+    pose = [reach_m + behind_m, 7.0, np.pi if nose_in else 0.0]
+    walls = [shapely.box(0.0, y, 2.4, y + 0.2) for y in (5.95, 7.85)]
+    scene = beside_a_wall("car", pose, [16, 9], walls)
+    plan = planned(scene)
+    assert verify(scene, plan).ok
+    kept_m = default_margins(scene.robots[0].model).obstacle_m or 0.0
+    if behind_m < kept_m:
+        assert {passage.robot for passage in plan.narrow} == {"r1"}
+        assert state_mission(scene, 0, PlannerParams()).openings[0].robots == (0,)
 
 
 def test_a_start_too_near_a_wall_is_named() -> None:

@@ -6,11 +6,11 @@ target that there is no wide way to.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Collection, Hashable, Iterator, Sequence
 
 import numpy as np
 import shapely
-from shapely.geometry import Point
+from shapely.geometry import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.planning.free_ground import Bottleneck, FreeGround, bottleneck
@@ -168,29 +168,56 @@ def _openings(
 ) -> Iterator[Opening]:
     start = Point(*robot.pose[:2])
     wide_m = wide_clearance_m(robot, margin_m)
-    least_m, clear_m = least_margin_m(robot, margin_m), ground.clearance_m(start)
-    if clear_m < wide_m:
-        level_m = max(clear_m - clearance_needed_m(robot, 0.0), least_m)
-        yield _opening(start, robot, number, margin_m, min(level_m, margin_m))
     if ground.reaches(start, wanted, wide_m):
         return
-    for level_m in np.linspace(margin_m, least_m, LEVELS):
+    for level_m in np.linspace(margin_m, least_margin_m(robot, margin_m), LEVELS):
         needed_m = clearance_needed_m(robot, float(level_m))
         if ground.reaches(start, wanted, needed_m):
             for narrow in ground.narrows(start, wanted, needed_m, wide_m):
-                yield _opening(narrow, robot, number, margin_m, float(level_m))
+                yield _opening(narrow, robot, [number], margin_m, float(level_m))
             return
 
 
+def openings_at_starts(
+    scene: Scene, margins: Margins, numbers: Collection[int]
+) -> Iterator[Opening]:
+    """Yield the openings about the starts of robots that stand beside walls.
+
+    Args:
+        scene: the mission.
+        margins: stated for all robots.
+        numbers: of the robots that are looked at.
+    """
+    for margin_m, least_m, alike in _robots_alike(scene, margins):
+        looked_at = [number for number in alike if number in numbers]
+        ground = FreeGround.of(scene, scene.robots[alike[0]])
+        starts, level_m = [], margin_m
+        for robot in (scene.robots[number] for number in looked_at):
+            start = Point(*robot.pose[:2])
+            body = Polygon(robot.model.footprint_at(robot.pose))
+            gap_m = ground.clearance_m(body)
+            wide_m = wide_clearance_m(robot, margin_m)
+            if gap_m < margin_m or ground.clearance_m(start) < wide_m:
+                starts.append(start)
+                level_m = min(level_m, max(gap_m - STEERING_M, least_m))
+        if starts:
+            places = shapely.MultiPoint(starts)
+            yield _opening(places, robot, looked_at, margin_m, level_m)
+
+
 def _opening(
-    narrow: BaseGeometry, robot: Robot, number: int, margin_m: float, level_m: float
+    narrow: BaseGeometry,
+    robot: Robot,
+    numbers: Sequence[int],
+    margin_m: float,
+    level_m: float,
 ) -> Opening:
     lacking_m = wide_clearance_m(robot, margin_m) - clearance_needed_m(robot, level_m)
     return Opening(
         shape=narrow.buffer(robot.model.circumscribed_radius_m + lacking_m),
         margin_m=level_m,
         allowance_m=margin_m - level_m,
-        robots=(number,),
+        robots=tuple(numbers),
     )
 
 

@@ -10,9 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrmg.planning.roadmap import _roadmap_kernels
 from mrmg.planning.roadmap.fleet import travel_classes
-from mrmg.planning.roadmap.roadmap import Roadmap
+from mrmg.planning.roadmap.roadmap import Roadmap, edge_costs
 from mrmg.scene.margins import Margins
 from mrmg.scene.objective import Objective
 from mrmg.scene.types import Robot, Scene
@@ -68,24 +67,16 @@ def with_energies(
     vertex, successors = roadmap.arrays.vertex, roadmap.arrays.successor
     classes, class_of_robot = travel_classes(scene, world, margins)
     cost = np.zeros(successors.shape)
-    for (space, passage, slope), after, own in zip(
-        classes, successors, cost, strict=True
-    ):
+    for one, after, own in zip(classes, successors, cost, strict=True):
         here = np.broadcast_to(np.arange(len(vertex)), after.shape)[after >= 0]
         edge, which = np.unique(
             here * len(vertex) + after[after >= 0], return_inverse=True
         )
-        costs = _roadmap_kernels.edge_costs(
-            world.spaces[space],
-            world.terrain,
-            vertex,
-            edge // len(vertex),
-            edge % len(vertex),
-            passage,
-            slope.price,
-            slope.floor,
-        )
-        own[after >= 0] = costs[which, 0]
+        ends = np.divmod(edge, len(vertex))
+        costs = edge_costs(world, one, vertex, ends)[:, 0]
+        leaving = edge_costs(world, one._replace(passage=0.0), vertex, ends)[:, 0]
+        costs = np.where(np.isfinite(costs), costs, leaving)
+        own[after >= 0] = costs[which]
     energies = along_ways(roadmap, cost)
     targets = len(roadmap.targets)
     between = energies[:, :, :targets].transpose(0, 2, 1)

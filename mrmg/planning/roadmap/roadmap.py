@@ -1,11 +1,12 @@
 """ConstructPRM: a probabilistic roadmap with energy-weighted edges.
 
 Vertices are goals, stations, robot starts, points around obstacle corners and terrain
-borders, and free samples. An edge's weight is the integral of the terrain multiplier
-along it, in metres of plain ground (a robot's energy is that times its J/m on plain
-ground), and on slopes depends on the direction (`slopes`); dynamics are neglected,
-obstacles and clearance are not. One Dijkstra per target, against the edges, gives the
-cost-to-go fields the steering descends and the distance matrix the router needs.
+borders, free samples, and where robots that start beside walls have driven clear. An
+edge's weight is the integral of the terrain multiplier along it, in metres of plain
+ground (a robot's energy is that times its J/m on plain ground), and on slopes depends
+on the direction (`slopes`); dynamics are neglected, obstacles and clearance are not.
+One Dijkstra per target, against the edges, gives the cost-to-go fields the steering
+descends and the distance matrix the router needs.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
 from mrmg.planning.roadmap.fleet import TravelClass, travel_classes
 from mrmg.planning.roadmap.vertices import (
     ENTRY_DEPTH_M,
+    departure,
     planned_regions,
     reach_m,
     roadmap_vertices,
@@ -118,15 +120,26 @@ def build_roadmap(
         rng: source of the samples.
     """
     classes, class_of_robot = travel_classes(scene, world, margins)
+    n_targets = len(planned_regions(scene))
+    starts = n_targets + np.arange(len(scene.robots))
     vertex = roadmap_vertices(scene, world, classes, samples, rng)
+    own_class = [classes[c] for c in class_of_robot]
+    places = [
+        _departure(scene, world, r, own_class[r], vertex[v])
+        for r, v in enumerate(starts)
+    ]
+    leaving = (
+        np.repeat(starts, [len(place) for place in places]),
+        np.arange(len(vertex), len(vertex) + sum(map(len, places))),
+    )
+    vertex = np.concatenate([vertex, *places])
     height_m = None if scene.elevation is None else height_at(scene, vertex)
     ends = _candidate_edges(vertex, neighbours)
     paths = [
-        _cheapest_paths(scene, world, one, vertex, ends, height_m) for one in classes
+        _cheapest_paths(scene, world, one, vertex, ends, leaving, height_m)
+        for one in classes
     ]
     slopes = [one.slope for one in classes]
-    n_targets = len(planned_regions(scene))
-    starts = n_targets + np.arange(len(scene.robots))
     return Roadmap(
         arrays=RoadmapArrays(
             vertex=vertex,
@@ -147,6 +160,19 @@ def build_roadmap(
             *(f"finish of {robot.id}" for robot in scene.robots if robot.finish),
         ),
         height_m=height_m,
+    )
+
+
+def _departure(
+    scene: Scene, world: World, r: int, travel_class: TravelClass, start: np.ndarray
+) -> np.ndarray:
+    """Return where robot r's ways begin if none does at its start, (0 or 1, 2)."""
+    here = np.zeros(1, np.int64)
+    if np.isfinite(edge_costs(world, travel_class, start[None], (here, here))).all():
+        return np.zeros((0, 2))
+    space, passage, _ = travel_class
+    return departure(
+        scene.robots[r], world.spaces[space], world.obstacles[space], passage
     )
 
 
@@ -173,21 +199,22 @@ def _cheapest_paths(
     travel_class: TravelClass,
     vertex: np.ndarray,
     ends: tuple[np.ndarray, np.ndarray],
+    leaving: tuple[np.ndarray, np.ndarray],
     height_m: np.ndarray | None,
 ) -> _Paths:
-    """Weigh candidate edges for a travel class, and find its cheapest paths."""
-    space, passage, slope = travel_class
-    weight = _roadmap_kernels.edge_costs(
-        world.spaces[space],
-        world.terrain,
-        vertex,
-        *ends,
-        passage,
-        slope.price,
-        slope.floor,
+    """Weigh candidate edges for a travel class, and find its cheapest paths.
+
+    Edges by which robots leave their starts are not in question.
+    """
+    weight = np.concatenate(
+        [
+            edge_costs(world, travel_class, vertex, ends),
+            edge_costs(world, travel_class._replace(passage=0.0), vertex, leaving),
+        ]
     )
+    low, high = np.concatenate([ends, leaving], axis=1)
     usable = np.isfinite(weight[:, 0])
-    low, high, weight = ends[0][usable], ends[1][usable], weight[usable]
+    low, high, weight = low[usable], high[usable], weight[usable]
     ends = np.concatenate([high, low]), np.concatenate([low, high])
     backwards = csr_array((weight.T.ravel(), ends), shape=(len(vertex), len(vertex)))
     entries = _entries(scene, vertex, connected_components(backwards, False)[1])
@@ -198,7 +225,7 @@ def _cheapest_paths(
             backwards, indices=own, min_only=True, return_predecessors=True
         )
         successor[t] = np.maximum(before, -1)
-    energy = _with_potential(cost, height_m, slope.refund)
+    energy = _with_potential(cost, height_m, travel_class.slope.refund)
     return _Paths(
         edges=(low, high, weight),
         cost=cost,
@@ -206,6 +233,33 @@ def _cheapest_paths(
         energy=energy,
         distance=[energy[:, sources].min(axis=1) for sources in entries],
     )
+
+
+def edge_costs(
+    world: World,
+    travel_class: TravelClass,
+    vertex: np.ndarray,
+    ends: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """Return the costs of edges there and back, inf where blocked, shape (n, 2).
+
+    Args:
+        world: with obstacles and terrain.
+        travel_class: of the robots that drive along them.
+        vertex: positions [m], shape (V, 2).
+        ends: first and second vertices of the edges, shape (n,) each.
+    """
+    space, passage, slope = travel_class
+    cost: np.ndarray = _roadmap_kernels.edge_costs(
+        world.spaces[space],
+        world.terrain,
+        vertex,
+        *ends,
+        passage,
+        slope.price,
+        slope.floor,
+    )
+    return cost
 
 
 def _stacked(arrays: list[np.ndarray]) -> np.ndarray:

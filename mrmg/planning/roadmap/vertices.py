@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import cos, sin
 
 import numpy as np
 import shapely
 
 from mrmg.planning.roadmap.fleet import TravelClass
 from mrmg.scene.region import Region
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Robot, Scene
 from mrmg.world._kernels import FreeSpace
 from mrmg.world.world import World
 
@@ -30,6 +31,12 @@ NARROW_M = 2.5
 ANCHOR_SLACK = 0.75
 """Cells by which a target's middle must have more clearance than a way needs: between
 cells distances are read too small by that much."""
+
+FARTHEST_M = 4.0
+"""Way that a robot which starts beside a wall drives straight, at most, ..."""
+
+STEP_M = 0.1
+"""... and the distance of the places along it that are looked at."""
 
 
 def planned_regions(scene: Scene) -> list[Region]:
@@ -87,6 +94,36 @@ def roadmap_vertices(
         [_field_at(world.spaces[item.space], loose) for item in classes], axis=0
     )
     return np.concatenate([np.array(fixed).reshape(-1, 2), loose[widest >= passage]])
+
+
+def departure(
+    robot: Robot, space: FreeSpace, obstacles: shapely.Geometry, passage: float
+) -> np.ndarray:
+    """Return where a robot that starts beside a wall first has room for a way.
+
+    It drives there straight ahead, or back.
+
+    Args:
+        robot: the robot.
+        space: its free space.
+        obstacles: in its way.
+        passage: clearance of its line of travel [m].
+
+    Returns:
+        Shape (1, 2), or (0, 2) if there is no such place.
+    """
+    pose = np.array(robot.pose)
+    gears = (1.0, -1.0) if robot.model.limits.v_min_m_s < 0.0 else (1.0,)
+    ways = np.arange(STEP_M, FARTHEST_M, STEP_M)[:, None] * gears
+    places = np.tile(pose, (ways.size, 1))
+    places[:, :2] += np.outer(ways, [cos(pose[2]), sin(pose[2])])
+    room = _field_at(space, places[:, :2]) >= passage + ANCHOR_SLACK * space.cell
+    for place in places[room]:
+        bodies = robot.model.footprint_at([pose, place])
+        swept = shapely.MultiPoint(bodies.reshape(-1, 2)).convex_hull
+        if not swept.intersects(obstacles):
+            return np.array([place[:2]])
+    return np.zeros((0, 2))
 
 
 def _inner_points(region: Region) -> np.ndarray:

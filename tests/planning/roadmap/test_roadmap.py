@@ -14,9 +14,11 @@ import shapely
 from mrmg import seeding, shipped
 from mrmg.planning.roadmap.fleet import travel_classes
 from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
+from mrmg.planning.roadmap.vertices import departure
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.margins import Margins
 from mrmg.scene.types import Scene
+from mrmg.world._kernels import clearance_estimate
 from mrmg.world.elevation import height_at
 from mrmg.world.world import CELL_M, World
 
@@ -428,3 +430,44 @@ def test_room_in_a_goal_is_looked_for_with_every_robots_eyes() -> None:
     roadmap = make_roadmap(scene)
     assert np.isinf(roadmap.start_distance[0, 0])
     assert np.isfinite(roadmap.start_distance[1, 0])
+
+
+@pytest.mark.parametrize(
+    ("pose", "way"),
+    [
+        ([0.4, 20, 0.0], [1.0, 0.0]),  # its back to the map's edge: straight ahead
+        ([0.4, 8, 0.0], None),  # nor is there any to its back: a shed ahead
+        ([40, 39.55, -np.pi / 2], [0.0, -1.0]),
+        ([29.55, 12, 0.0], [-1.0, 0.0]),  # its rear axle between walls: back
+    ],
+)
+def test_robots_leave_walls_straight(
+    pose: list[float], way: list[float] | None
+) -> None:
+    """A car's rear axle is nearer to a wall behind it than half its width."""
+    sheds = [
+        {"id": "ahead", "box": {"center": [3.2, 8], "size": [2, 6]}},
+        {"id": "left", "box": {"center": [31, 12.8], "size": [3.5, 0.3]}},
+        {"id": "right", "box": {"center": [31, 11.2], "size": [3.5, 0.3]}},
+    ]
+    robot = {"id": "r1", "model": "car", "pose": pose}
+    scene = make_scene(robots=[robot], obstacles=sheds)
+    world = World.from_scene(scene)
+    classes, _ = travel_classes(scene, world, Margins())
+    space, passage = world.spaces[0], classes[0].passage
+    places = departure(scene.robots[0], space, world.obstacles[0], passage)
+    roadmap = make_roadmap(scene)
+    joined = np.isfinite(roadmap.start_distance).any()
+    assert joined == (way is not None)
+    assert len(places) == joined
+    if way is None:
+        return
+    apart = places[0] - pose[:2]
+    far_m = float(np.hypot(*apart))
+    assert apart / far_m == pytest.approx(way, abs=1e-9)
+    assert clearance_estimate(space, *places[0]) >= passage
+    model = scene.robots[0].model
+    bodies = model.footprint_at([pose, [*places[0], pose[2]]])
+    swept = shapely.MultiPoint(bodies.reshape(-1, 2)).convex_hull
+    assert not any(swept.intersects(shed.shape) for shed in scene.obstacles)
+    assert roadmap.start_distance[0, 0] >= np.hypot(55 - pose[0], 20 - pose[1]) - 2.0
