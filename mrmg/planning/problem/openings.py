@@ -14,7 +14,9 @@ from shapely.geometry import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.planning.free_ground import Bottleneck, FreeGround, bottleneck
+from mrmg.planning.problem._clearance_kernels import clear_of_obstacles
 from mrmg.planning.problem.targets import target_depth_m
+from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS, Spaces
 from mrmg.planning.roadmap.fleet import PASSAGE_SLACK_M, margins_of
 from mrmg.planning.roadmap.vertices import planned_regions
 from mrmg.scene.margins import Margins, certified_minimum_m
@@ -176,6 +178,22 @@ def _openings(
             for narrow in ground.narrows(start, wanted, needed_m, wide_m):
                 yield _opening(narrow, robot, [number], margin_m, float(level_m))
             return
+
+
+def cramped_starts(fleet: np.ndarray, spaces: Spaces, start: np.ndarray) -> list[int]:
+    """Return the robots that start nearer to obstacles than their margins.
+
+    Args:
+        fleet: the robots, shape (R,).
+        spaces: their free spaces.
+        start: their states, shape (R, 5).
+    """
+    corner = np.empty((MOST_CORNERS, 2))
+    return [
+        r
+        for r in range(len(fleet))
+        if not clear_of_obstacles(fleet[r : r + 1], spaces, start[r], corner)
+    ]
 
 
 def openings_at_starts(

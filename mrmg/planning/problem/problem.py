@@ -13,13 +13,13 @@ from mrmg.energy.model import CONSUMERS_W
 from mrmg.motion._kernels import CAR, write_states
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.preference import Preference
-from mrmg.planning.problem._clearance_kernels import clear_of_obstacles
 from mrmg.planning.problem._region_kernels import Zones
 from mrmg.planning.problem._target_kernels import Targets
 from mrmg.planning.problem.leg_times import routing_times
 from mrmg.planning.problem.openings import (
     LEAST_CELL_M,
     cell_m,
+    cramped_starts,
     guide_m,
     openings_at_starts,
     openings_to,
@@ -27,7 +27,7 @@ from mrmg.planning.problem.openings import (
 )
 from mrmg.planning.problem.targets import finish_of, gate_arrays, target_arrays
 from mrmg.planning.problem.time_weighting import priced_world, with_energies
-from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS, Spaces
+from mrmg.planning.roadmap._fleet_kernels import Spaces
 from mrmg.planning.roadmap.fleet import fleet_array, stack_spaces
 from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
 from mrmg.planning.roadmap.vertices import planned_regions
@@ -271,7 +271,9 @@ def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
     world = World.from_scene(scene, cell_m=cell_m(scene, params.margins))
     problem = _joined(scene, seed, params, world)
     unjoined = unjoined_places(problem)
-    beside_walls = {*_cramped(problem), *(r for r, _ in unjoined)}
+    fleet, spaces = problem.mission.fleet, problem.mission.spaces
+    cramped = cramped_starts(fleet, spaces, problem.start)
+    beside_walls = {*cramped, *(r for r, _ in unjoined)}
     openings = (
         *openings_at_starts(scene, params.margins, beside_walls),
         *openings_to(scene, params.margins, unjoined),
@@ -321,18 +323,6 @@ def _joined(scene: Scene, seed: int, params: PlannerParams, world: World) -> Pro
     if priced is not world:
         roadmap = with_energies(roadmap, scene, world, params.margins)
     return state_problem(scene, world, roadmap, params)
-
-
-def _cramped(problem: Problem) -> list[int]:
-    """Return the robots that start nearer to obstacles than their margins."""
-    mission, corner = problem.mission, np.empty((MOST_CORNERS, 2))
-    return [
-        r
-        for r in range(len(mission.fleet))
-        if not clear_of_obstacles(
-            mission.fleet[r : r + 1], mission.spaces, problem.start[r], corner
-        )
-    ]
 
 
 def unjoined_places(problem: Problem) -> list[tuple[int, Region]]:

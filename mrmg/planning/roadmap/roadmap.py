@@ -123,16 +123,13 @@ def build_roadmap(
     n_targets = len(planned_regions(scene))
     starts = n_targets + np.arange(len(scene.robots))
     vertex = roadmap_vertices(scene, world, classes, samples, rng)
-    own_class = [classes[c] for c in class_of_robot]
     places = [
-        _departure(scene, world, r, own_class[r], vertex[v])
-        for r, v in enumerate(starts)
+        _departure(scene, world, r, classes[c], vertex[starts[r]])
+        for r, c in enumerate(class_of_robot)
     ]
-    leaving = (
-        np.repeat(starts, [len(place) for place in places]),
-        np.arange(len(vertex), len(vertex) + sum(map(len, places))),
-    )
     vertex = np.concatenate([vertex, *places])
+    left = np.repeat(starts, [*map(len, places)])
+    leaving = left, len(vertex) - len(left) + np.arange(len(left))
     height_m = None if scene.elevation is None else height_at(scene, vertex)
     ends = _candidate_edges(vertex, neighbours)
     paths = [
