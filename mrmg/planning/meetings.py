@@ -57,9 +57,11 @@ def narrowest_meeting(problem: Problem, tours: Sequence[Sequence[int]]) -> str:
     else:
         moving = [r for r, path in enumerate(paths) if len(path) > 1]
         found = [
-            (_width_m(problem, r, point), (r,), tuple(point))
+            (width_m, (r,), tuple(point))
             for r in moving
-            for point in paths[r]
+            for width_m, point in zip(
+                _widths_m(problem, r, paths[r]).tolist(), paths[r], strict=True
+            )
         ]
         if not found:
             return f"no motions were found of {listed(names)}"
@@ -85,6 +87,14 @@ def _room_between(walls: BaseGeometry, point: Point) -> tuple[float, float]:
     beyond = Point(x + (x - wall_x) * scale, y + (y - wall_y) * scale)
     across = shapely.LineString([point, beyond]).intersection(walls)
     return nearest.length, float(nearest.length + point.distance(across))
+
+
+def _widths_m(problem: Problem, r: int, path: np.ndarray) -> np.ndarray:
+    """Return the widths of the ground along a path, inf as it leaves a wall behind."""
+    width_m = np.array([_width_m(problem, r, point) for point in path])
+    if width_m[0] < 2.0 * problem.scene.robots[r].model.half_width_m:
+        width_m[: int(np.argmax(np.diff(width_m) < 0.0)) + 1] = np.inf
+    return width_m
 
 
 def _points(path: np.ndarray) -> np.ndarray:

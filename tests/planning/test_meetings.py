@@ -19,15 +19,28 @@ WALLS = [
 ]  # a gap of 2 m at (10, 6)
 
 
+DIFFDRIVE = {"model": "diffdrive", "pose": [4, 6, 0]}
+PARKED = {"model": "car", "pose": [0.5, 6, 0]}  # its back to the map's edge
+
+
 @pytest.mark.parametrize(
-    ("obstacles", "goal", "said"),
+    ("robot", "obstacles", "goal", "said"),
     [
-        (WALLS, [16.0, 6.0], r", where it is 2\.\d\d m wide"),
-        ([], [19.0, 6.0], r", 1\.\d\d m from the nearest obstacle or edge of the map"),
+        (DIFFDRIVE, WALLS, [16.0, 6.0], r", where it is 2\.\d\d m wide"),
+        (PARKED, WALLS, [16.0, 6.0], r"near \((9|10)\..*, where it is 2\.\d\d m wide"),
+        (
+            DIFFDRIVE,
+            [],
+            [19.0, 6.0],
+            r", 1\.\d\d m from the nearest obstacle or edge of the map",
+        ),
     ],
 )
 def test_the_room_is_told_by_what_limits_it(
-    obstacles: list[dict[str, Any]], goal: list[float], said: str
+    robot: dict[str, Any],
+    obstacles: list[dict[str, Any]],
+    goal: list[float],
+    said: str,
 ) -> None:
     """A gap by its width, and a place beside one wall by the distance from it."""
     document = {
@@ -35,7 +48,7 @@ def test_the_room_is_told_by_what_limits_it(
         "name": "room",
         "bounds": [0, 0, 20, 12],
         "obstacles": obstacles,
-        "robots": [{"id": "r1", "model": "diffdrive", "pose": [4, 6, 0]}],
+        "robots": [{"id": "r1", **robot}],
         "goals": [{"id": "g1", "circle": {"center": goal, "radius": 0.4}}],
     }
     scene = scene_from_document(document, source="room")
