@@ -168,13 +168,17 @@ def drive_paths(
 def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, str]:
     """Return robot r's drive along its path, put right as often as it takes.
 
-    None, and why, if there is none.
+    None, and why, if there is none. None, too, of a car that must end with a heading:
+    only its path is put right, up to its last goal.
     """
     if problem.mission.fleet[r]["model"] == USER:
         return task.before, ""
     task.smooth(problem, SPACINGS_M)
-    if problem.steered_home[r]:
+    steered = bool(problem.steered_home[r])
+    tour = task.tour[: len(task.tour) - steered]
+    if steered and not tour:
         return None, ""
+    kept = None if steered else task.before
     targets, robot = problem.mission.targets, problem.scene.robots[r].id
     finish, reason = targets.finish[r], ""
     for _ in range(TRIES):
@@ -189,18 +193,18 @@ def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, st
             task.inflations.append(place)
             task.cost_map = inflated(task.cost_map, place)
             task.smooth(problem, SPACINGS_M[-1:])
-        elif len(visit_steps(targets, task.tour, drive.motion.state)) < len(task.tour):
+        elif len(visit_steps(targets, tour, drive.motion.state)) < len(tour):
             reason = f"{robot} misses targets of its tour"
             goals = [t for t in task.tour if t < targets.goals]
             if (targets.target["tolerance"][goals] < np.pi).any():
-                return task.before, ""  # its motions are searched for
+                return kept, ""  # its motions are searched for
             _enter_deeper(problem, task, drive.motion.state)
-        elif finish >= 0 and not at_target(targets, finish, end):
+        elif not steered and finish >= 0 and not at_target(targets, finish, end):
             reason = f"{robot} does not end where its finish requires"
             break
         else:
-            return drive, ""
-    return task.before, reason
+            return None if steered else drive, ""
+    return kept, "" if steered else reason
 
 
 def _on_its_way(problem: Problem, task: RobotTask, drive: Drive) -> str:
