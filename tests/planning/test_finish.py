@@ -93,23 +93,3 @@ def test_a_battery_must_last_to_the_finish(yard: MakeScene) -> None:
     )
     result = plan_mission(back, params=replace(QUICK, trees=2))
     assert result.plan is None
-
-
-def test_the_way_to_a_bay_is_as_smooth_as_any(yard: MakeScene) -> None:
-    """Up to its last goal a car drives as if it did not have to end with a heading."""
-    bay = [
-        {"id": f"b{y}", "box": {"center": [1.2, y], "size": [2.4, 0.15]}} for y in (5, 7)
-    ]
-    goals = [
-        {"id": f"g{i}", **disc(x, y, 0.7)}
-        for i, (x, y) in enumerate([(9, 16), (16, 4), (19, 16), (26, 15), (27, 6)])
-    ]
-    park = robot("r1", 1.8, 6.0, finish=disc(1.8, 6.0, 0.3, heading=pi))
-    park["pose"][2] = pi
-    free = {name: value for name, value in park.items() if name != "finish"}
-    costs_J = []
-    for one in (park, free):
-        scene = yard(goals=goals, obstacles=bay, robots=[one])
-        plan = verified_plan(scene, 0, PlannerParams())
-        costs_J.append(plan.cost_J)
-    print(costs_J)
