@@ -1,12 +1,12 @@
 """Openings: passages that only a smaller margin opens, and where that margin counts.
 
 Of the narrow places of a map (`free_ground`) those count that lie on the way to a
-target that there is no wide way to.
+target that there is no wide way to, and where robots start beside walls.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 
 import numpy as np
 import shapely
@@ -82,7 +82,8 @@ def tightest_openings(scene: Scene, margins: Margins) -> tuple[Opening, ...]:
     """
     found: list[Opening] = []
     regions = [entered(scene, region) for region in planned_regions(scene)]
-    for margin_m, least_m, numbers in _robots_alike(scene, margins):
+    everybody = range(len(scene.robots))
+    for margin_m, least_m, numbers in _robots_alike(scene, margins, everybody):
         robot = scene.robots[numbers[0]]
         wide_m = robot.model.circumscribed_radius_m + margin_m
         needed_m = min(clearance_needed_m(robot, least_m), wide_m)
@@ -108,11 +109,12 @@ def tightest_openings(scene: Scene, margins: Margins) -> tuple[Opening, ...]:
 
 
 def _robots_alike(
-    scene: Scene, margins: Margins
+    scene: Scene, margins: Margins, numbers: Iterable[int]
 ) -> Iterator[tuple[float, float, list[int]]]:
-    """Yield wanted and least margin, and the numbers, of robots of equal ground."""
+    """Yield wanted and least margin, and those numbers, of robots of equal ground."""
     alike: dict[tuple[float, float, Hashable], list[int]] = {}
-    for number, robot in enumerate(scene.robots):
+    for number in numbers:
+        robot = scene.robots[number]
         margin_m = margins_of(robot, margins)[0]
         sizes_m = robot.model.half_width_m, robot.model.circumscribed_radius_m
         stopping = tuple(i for i, o in enumerate(scene.barriers) if o.stops(robot.id))
@@ -197,20 +199,21 @@ def cramped_starts(fleet: np.ndarray, spaces: Spaces, start: np.ndarray) -> list
 
 
 def openings_at_starts(
-    scene: Scene, margins: Margins, numbers: Collection[int]
+    scene: Scene, margins: Margins, numbers: Iterable[int]
 ) -> Iterator[Opening]:
     """Yield the openings about the starts of robots that stand beside walls.
+
+    Robots that are alike have one in common, so that they go on sharing a roadmap.
 
     Args:
         scene: the mission.
         margins: stated for all robots.
         numbers: of the robots that are looked at.
     """
-    for margin_m, least_m, alike in _robots_alike(scene, margins):
-        looked_at = [number for number in alike if number in numbers]
+    for margin_m, least_m, alike in _robots_alike(scene, margins, numbers):
         ground = FreeGround.of(scene, scene.robots[alike[0]])
         starts, level_m = [], margin_m
-        for robot in (scene.robots[number] for number in looked_at):
+        for robot in (scene.robots[number] for number in alike):
             start = Point(*robot.pose[:2])
             body = Polygon(robot.model.footprint_at(robot.pose))
             gap_m = ground.clearance_m(body)
@@ -220,7 +223,7 @@ def openings_at_starts(
                 level_m = min(level_m, max(gap_m - STEERING_M, least_m))
         if starts:
             places = shapely.MultiPoint(starts)
-            yield _opening(places, robot, looked_at, margin_m, level_m)
+            yield _opening(places, robot, alike, margin_m, level_m)
 
 
 def _opening(

@@ -265,15 +265,15 @@ ROADMAPS = 3
 def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
     """Build the roadmap, denser while it does not join all goals, and the problem.
 
-    Where it joins some target to nothing as ways there are narrow, robots keep less
-    than their margins on these ways, and about starts that are nearer to obstacles.
+    Robots keep less than their margins on ways to targets that it does not join with
+    them, and about starts that are nearer to obstacles.
     """
     world = World.from_scene(scene, cell_m=cell_m(scene, params.margins))
     problem = _joined(scene, seed, params, world)
     unjoined = unjoined_places(problem)
     fleet, spaces = problem.mission.fleet, problem.mission.spaces
     cramped = cramped_starts(fleet, spaces, problem.start)
-    beside_walls = {*cramped, *(r for r, _ in unjoined)}
+    beside_walls = sorted({*cramped, *(r for r, _ in unjoined)})
     openings = (
         *openings_at_starts(scene, params.margins, beside_walls),
         *openings_to(scene, params.margins, unjoined),
