@@ -18,12 +18,7 @@ from mrmg.planning.problem._clearance_kernels import has_room_to_turn
 from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
-
-FARTHEST_M = 4.0
-"""Way from a narrow place within which a robot looks for room to turn."""
-
-STEP_M = 0.1
-"""Distance of the places that are looked at."""
+from mrmg.planning.roadmap.vertices import FARTHEST_M, STEP_M
 
 BEARINGS = 8
 """Places around a target's middle where a robot may turn round, ..."""

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from mrmg.planning.roadmap.fleet import travel_classes
-from mrmg.planning.roadmap.roadmap import Roadmap, edge_costs
+from mrmg.planning.roadmap.roadmap import Roadmap, edge_costs, leaving_costs
 from mrmg.scene.margins import Margins
 from mrmg.scene.objective import Objective
 from mrmg.scene.types import Robot, Scene
@@ -73,10 +73,12 @@ def with_energies(
             here * len(vertex) + after[after >= 0], return_inverse=True
         )
         ends = np.divmod(edge, len(vertex))
-        costs = edge_costs(world, one, vertex, ends)[:, 0]
-        leaving = edge_costs(world, one._replace(passage=0.0), vertex, ends)[:, 0]
-        costs = np.where(np.isfinite(costs), costs, leaving)
-        own[after >= 0] = costs[which]
+        costs = edge_costs(world, one, vertex, ends)
+        leaving = np.isinf(costs[:, 0])
+        costs[leaving] = leaving_costs(
+            world, one, vertex, (ends[0][leaving], ends[1][leaving])
+        )
+        own[after >= 0] = costs[which, 0]
     energies = along_ways(roadmap, cost)
     targets = len(roadmap.targets)
     between = energies[:, :, :targets].transpose(0, 2, 1)

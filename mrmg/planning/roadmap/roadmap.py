@@ -124,7 +124,7 @@ def build_roadmap(
     starts = n_targets + np.arange(len(scene.robots))
     vertex = roadmap_vertices(scene, world, classes, samples, rng)
     places = [
-        _departure(scene, world, r, classes[c], vertex[starts[r]])
+        _ways_begin_at(scene, world, r, classes[c], vertex[starts[r]])
         for r, c in enumerate(class_of_robot)
     ]
     vertex = np.concatenate([vertex, *places])
@@ -160,10 +160,10 @@ def build_roadmap(
     )
 
 
-def _departure(
+def _ways_begin_at(
     scene: Scene, world: World, r: int, travel_class: TravelClass, start: np.ndarray
 ) -> np.ndarray:
-    """Return where robot r's ways begin if none does at its start, (0 or 1, 2)."""
+    """Return where robot r's ways begin if none can at its start, (0 or 1, 2)."""
     here = np.zeros(1, np.int64)
     if np.isfinite(edge_costs(world, travel_class, start[None], (here, here))).all():
         return np.zeros((0, 2))
@@ -199,14 +199,11 @@ def _cheapest_paths(
     leaving: tuple[np.ndarray, np.ndarray],
     height_m: np.ndarray | None,
 ) -> _Paths:
-    """Weigh candidate edges for a travel class, and find its cheapest paths.
-
-    Edges by which robots leave their starts are not in question.
-    """
+    """Weigh candidate edges for a travel class, and find its cheapest paths."""
     weight = np.concatenate(
         [
             edge_costs(world, travel_class, vertex, ends),
-            edge_costs(world, travel_class._replace(passage=0.0), vertex, leaving),
+            leaving_costs(world, travel_class, vertex, leaving),
         ]
     )
     low, high = np.concatenate([ends, leaving], axis=1)
@@ -257,6 +254,19 @@ def edge_costs(
         slope.floor,
     )
     return cost
+
+
+def leaving_costs(
+    world: World,
+    travel_class: TravelClass,
+    vertex: np.ndarray,
+    ends: tuple[np.ndarray, np.ndarray],
+) -> np.ndarray:
+    """Return the costs of edges by which robots leave walls; see `edge_costs`.
+
+    They are known to be free (`departure`), though a disc has no room there.
+    """
+    return edge_costs(world, travel_class._replace(passage=0.0), vertex, ends)
 
 
 def _stacked(arrays: list[np.ndarray]) -> np.ndarray:

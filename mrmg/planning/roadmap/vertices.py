@@ -33,10 +33,10 @@ ANCHOR_SLACK = 0.75
 cells distances are read too small by that much."""
 
 FARTHEST_M = 4.0
-"""Way that a robot which starts beside a wall drives straight, at most, ..."""
+"""Way straight out of a narrow place within which a robot looks for room, ..."""
 
 STEP_M = 0.1
-"""... and the distance of the places along it that are looked at."""
+"""... and the distance of the places that are looked at."""
 
 
 def planned_regions(scene: Scene) -> list[Region]:

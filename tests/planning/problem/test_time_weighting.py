@@ -69,14 +69,19 @@ def test_ways_are_summed_up_along_successors(yard: Any) -> None:
     assert along_ways(roadmap, ones)[0, 0][finite].max() > 1.0
 
 
-def test_energies_of_ways_that_are_not_priced_are_the_distances(yard: Any) -> None:
-    scene = yard(terrain=[MUD])
+@pytest.mark.parametrize("x", [4.0, 0.7])  # its back to the map's edge at 0.7
+def test_energies_of_ways_that_are_not_priced_are_the_distances(
+    yard: Any, x: float
+) -> None:
+    robot = {"id": "r1", "model": "car", "pose": [x, 10, 0]}
+    scene = yard(terrain=[MUD], robots=[robot])
     world = World.from_scene(scene)
     assert priced_world(scene, world) is world
     roadmap = state_mission(scene, 0, PARAMS).roadmap
     again = with_energies(roadmap, scene, world, PARAMS.margins)
     assert again.distance == pytest.approx(roadmap.distance, rel=2e-3)
     assert again.start_distance == pytest.approx(roadmap.start_distance, rel=2e-3)
+    assert np.isfinite(again.start_distance).all()
 
 
 def test_who_is_in_a_hurry_drives_through_the_mud(yard: Any) -> None:

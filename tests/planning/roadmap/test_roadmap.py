@@ -436,7 +436,7 @@ def test_room_in_a_goal_is_looked_for_with_every_robots_eyes() -> None:
     ("pose", "way"),
     [
         ([0.4, 20, 0.0], [1.0, 0.0]),  # its back to the map's edge: straight ahead
-        ([0.4, 8, 0.0], None),  # nor is there any to its back: a shed ahead
+        ([0.4, 8, 0.0], None),  # a shed is in its way
         ([40, 39.55, -np.pi / 2], [0.0, -1.0]),
         ([29.55, 12, 0.0], [-1.0, 0.0]),  # its rear axle between walls: back
     ],
