@@ -7,22 +7,18 @@ on footprints too near to obstacles and on targets that are missed.
 
 from __future__ import annotations
 
-from math import atan2, ceil, floor, hypot, sqrt
+from math import ceil, floor, hypot, isfinite, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
 from mrmg.compilation import kernel
+from mrmg.planning.path_following._bending_kernels import (
+    add_aim,
+    bending_cost,
+    write_turns,
+)
 from mrmg.planning.problem._target_kernels import Targets
-
-SOFT_TURN = 0.05
-"""Angle below which the scrub of turning is rounded off [rad]."""
-
-CURVATURE_WEIGHT = 60.0
-"""Cost per metre of a curvature that exceeds the limit by its own size [m/m]."""
-
-RATE_WEIGHT = 20.0
-"""Likewise for changes of curvature."""
 
 CLEARANCE_WEIGHT = 600.0
 """Cost per metre and square metre of missing clearance [m/m^3]."""
@@ -76,32 +72,14 @@ class Stops(NamedTuple):
         node: number of the node, increasing, shape (S,).
         target: number of the target there, shape (S,).
         deeper: how deep the node is to lie inside [m], shape (S,).
+        aim: heading that the path is to have there [rad], NaN for any, shape (S,).
     """
 
     targets: Targets
     node: np.ndarray
     target: np.ndarray
     deeper: np.ndarray
-
-
-class Shape(NamedTuple):
-    """The form of a path, by segment and its first node, with the cost's derivatives.
-
-    Attributes:
-        size: length of the segment [m].
-        way: length its turn is spread over [m].
-        turn: at the first node [rad].
-        bend: curvature there [1/m].
-        d_turn, d_bend, d_size: derivatives of the cost.
-    """
-
-    size: np.ndarray
-    way: np.ndarray
-    turn: np.ndarray
-    bend: np.ndarray
-    d_turn: np.ndarray
-    d_bend: np.ndarray
-    d_size: np.ndarray
+    aim: np.ndarray
 
 
 @kernel
@@ -208,93 +186,24 @@ def density_at(cost_map, x, y, tx, ty, gear):
 
 
 @kernel
-def write_turns(p, gear, nose, shape):
-    """Write the length of each segment, and the turn and curvature at its first node.
-
-    At a change of gear the turn is that of the heading. The first turn is that from the
-    robot's heading at the start, along the unit vector `nose`.
-    """
-    ax, ay, last = nose[0], nose[1], 1
-    for i in range(len(p) - 1):
-        bx, by = p[i + 1, 0] - p[i, 0], p[i + 1, 1] - p[i, 1]
-        shape.size[i] = max(hypot(bx, by), 1e-6)
-        sign = last * gear[i]
-        shape.turn[i] = atan2((ax * by - ay * bx) * sign, (ax * bx + ay * by) * sign)
-        shape.way[i] = 0.5 * (shape.size[max(i - 1, 0)] + shape.size[i])
-        shape.bend[i] = shape.turn[i] / shape.way[i]
-        ax, ay, last = bx, by, gear[i]
-
-
-@kernel
-def bending_cost(cost_map, gear, pivot, stiff, shape):
-    """Return the cost of turning, of too much curvature and of its changes.
-
-    Turns on the spot (`pivot`) have no curvature. Any at the start costs `stiff` per
-    square radian. Writes the cost's derivatives by turn and size.
-    """
-    total = stiff * shape.turn[0] * shape.turn[0]
-    n = len(shape.turn)
-    shape.d_bend[:] = 0.0
-    shape.d_size[:] = 0.0
-    for i in range(n):
-        rounded = sqrt(shape.turn[i] * shape.turn[i] + SOFT_TURN * SOFT_TURN)
-        total += cost_map.scrub * (rounded - SOFT_TURN)
-        shape.d_turn[i] = cost_map.scrub * shape.turn[i] / rounded
-    shape.d_turn[0] += 2.0 * stiff * shape.turn[0]
-    for i in range(n):
-        if pivot[i]:
-            continue
-        at = max(i - 1, 0)
-        sharp = abs(shape.bend[i]) / cost_map.curvature - 1.0
-        if sharp > 0.0:
-            total += CURVATURE_WEIGHT * shape.way[i] * sharp * sharp
-            slope = 2.0 * CURVATURE_WEIGHT * shape.way[i] * sharp / cost_map.curvature
-            shape.d_bend[i] += slope if shape.bend[i] > 0.0 else -slope
-            shape.d_size[at] += 0.5 * CURVATURE_WEIGHT * sharp * sharp
-            shape.d_size[i] += 0.5 * CURVATURE_WEIGHT * sharp * sharp
-        if i == 0 or gear[i] != gear[at] or pivot[at]:
-            continue
-        rate = (shape.bend[i] - shape.bend[at]) / shape.size[at]
-        fast = abs(rate) / cost_map.curvature_rate - 1.0
-        if fast > 0.0:
-            total += RATE_WEIGHT * shape.size[at] * fast * fast
-            slope = 2.0 * RATE_WEIGHT * fast / cost_map.curvature_rate
-            slope = slope if rate > 0.0 else -slope
-            shape.d_bend[i] += slope
-            shape.d_bend[at] -= slope
-            shape.d_size[at] -= RATE_WEIGHT * fast * (fast + 2.0)
-    for i in range(n):
-        shape.d_turn[i] += shape.d_bend[i] / shape.way[i]
-        longer = -0.5 * shape.d_bend[i] * shape.bend[i] / shape.way[i]
-        shape.d_size[max(i - 1, 0)] += longer
-        shape.d_size[i] += longer
-    return total
-
-
-@kernel
-def add_bending(cost_map, p, gear, pivot, shape, gradient):
+def add_bending(cost_map, p, gear, pivot, nose, shape, gradient):
     """Add the cost of turning, of too much curvature and of its changes."""
     # At its start a robot that turns on the spot does so, whatever its path is.
     free, _, _ = value_and_slope(cost_map, cost_map.distance, p[0, 0], p[0, 1])
     stiff = TURNING_WEIGHT * max(0.0, cost_map.turning_room - free)
-    total = bending_cost(cost_map, gear, pivot, 0.0 if pivot[0] else stiff, shape)
-    for i in range(len(shape.turn)):
+    stiff, free_end = 0.0 if pivot[0] else stiff, not nose[1].any()
+    total = bending_cost(cost_map, gear, pivot, stiff, free_end, shape)
+    for i in range(len(p) - 1):
         bx, by = p[i + 1, 0] - p[i, 0], p[i + 1, 1] - p[i, 1]
         size = shape.size[i]
-        swing = shape.d_turn[i] / (size * size)
+        # The segment's direction counts in the turns at both its ends.
+        swing = (shape.d_turn[i] - shape.d_turn[i + 1]) / (size * size)
         stretch = shape.d_size[i] / size
         gx, gy = stretch * bx - swing * by, stretch * by + swing * bx
         gradient[i + 1, 0] += gx
         gradient[i + 1, 1] += gy
         gradient[i, 0] -= gx
         gradient[i, 1] -= gy
-        if i > 0:
-            ax, ay = p[i, 0] - p[i - 1, 0], p[i, 1] - p[i - 1, 1]
-            swing = shape.d_turn[i] / (shape.size[i - 1] * shape.size[i - 1])
-            gradient[i, 0] += swing * ay
-            gradient[i, 1] -= swing * ax
-            gradient[i - 1, 0] -= swing * ay
-            gradient[i - 1, 1] += swing * ax
     return total
 
 
@@ -302,7 +211,7 @@ def add_bending(cost_map, p, gear, pivot, shape, gradient):
 def add_evenness(p, gear, size, gradient):
     """Add the cost of unequal neighbours, which keeps nodes from gathering."""
     total = 0.0
-    for i in range(1, len(size)):
+    for i in range(1, len(gear)):
         if gear[i] != gear[i - 1]:
             continue
         uneven = size[i] - size[i - 1]
@@ -323,7 +232,7 @@ def band_cost(cost_map, stops, p, gear, pivot, nose, shape, gradient):
     gradient[:] = 0.0
     write_turns(p, gear, nose, shape)
     total = add_terrain_and_clearance(cost_map, p, gear, gradient)
-    total += add_bending(cost_map, p, gear, pivot, shape, gradient)
+    total += add_bending(cost_map, p, gear, pivot, nose, shape, gradient)
     total += add_evenness(p, gear, shape.size, gradient)
     for v in np.flatnonzero(pivot):
         free, fx, fy = value_and_slope(cost_map, cost_map.distance, p[v, 0], p[v, 1])
@@ -338,12 +247,9 @@ def band_cost(cost_map, stops, p, gear, pivot, nose, shape, gradient):
             total += TARGET_WEIGHT * off * off
             gradient[v, 0] += 2.0 * TARGET_WEIGHT * off * dx
             gradient[v, 1] += 2.0 * TARGET_WEIGHT * off * dy
+        if isfinite(stops.aim[i]) and 0 < v < len(gear):
+            for s in range(v - 1, v + 1):
+                ends = gradient[s : s + 2]
+                total += add_aim(cost_map, p[s], p[s + 1], gear[s], stops.aim[i], ends)
     gradient[0] = 0.0
     return total
-
-
-@kernel
-def new_shape(segments):
-    """Return an empty `Shape`."""
-    zero = np.zeros((7, segments))
-    return Shape(zero[0], zero[1], zero[2], zero[3], zero[4], zero[5], zero[6])

@@ -10,7 +10,8 @@ from math import hypot
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.planning.path_following._band_kernels import band_cost, new_shape
+from mrmg.planning.path_following._band_kernels import band_cost
+from mrmg.planning.path_following._bending_kernels import new_shape
 
 MEMORY = 8
 """Pairs of steps and changes of the gradient that L-BFGS remembers."""
@@ -81,11 +82,12 @@ def relax(cost_map, stops, p, gear, pivot, nose, rounds):
         p: nodes, the first one fixed; changed in place, shape (n, 2).
         gear: of each segment, 1 or -1, shape (n - 1,).
         pivot: whether the robot turns on the spot before it, shape (n - 1,).
-        nose: unit vector of the robot's heading at the start, shape (2,).
+        nose: unit vectors of the robot's headings at the start and at the end; zero if
+            it is free, shape (2, 2).
         rounds: steps of L-BFGS at most.
     """
     n = len(p)
-    shape = new_shape(n - 1)
+    shape = new_shape(n)
     gradient = np.zeros((n, 2))
     trial = np.zeros((n, 2))
     trial_gradient = np.zeros((n, 2))

@@ -73,6 +73,7 @@ class Path:
         pivot: numbers of the nodes at which the robot turns on the spot, shape (P,).
         heading: of the robot at the start [rad].
         pause_s: how long it stands at each stop, shape (S,).
+        aim: headings that it is to have at them [rad], NaN for any, shape (S,).
     """
 
     node: np.ndarray
@@ -83,6 +84,7 @@ class Path:
     pivot: np.ndarray
     heading: float
     pause_s: np.ndarray
+    aim: np.ndarray
 
     @property
     def way(self) -> np.ndarray:
@@ -137,12 +139,18 @@ def visit_steps(targets: Targets, tour: Sequence[int], state: np.ndarray) -> lis
     return visits
 
 
-def path_of(tour: Sequence[int], visits: Sequence[int], trajectory: Trajectory) -> Path:
+def path_of(
+    tour: Sequence[int],
+    visits: Sequence[int],
+    aim: np.ndarray,
+    trajectory: Trajectory,
+) -> Path:
     """Return the way a trajectory goes up to its last target.
 
     Args:
         tour: numbers of its targets.
         visits: steps at which they are visited.
+        aim: headings that the way is to have there (`Path`).
         trajectory: of one robot.
     """
     last = visits[-1] if visits else 0
@@ -158,6 +166,7 @@ def path_of(tour: Sequence[int], visits: Sequence[int], trajectory: Trajectory) 
         pivot=_pivots(state),
         heading=float(state[0, 2]),
         pause_s=np.zeros(len(visits)),
+        aim=aim,
     )
     return respaced(path)
 
@@ -247,6 +256,15 @@ def nimble_share(curvature: float) -> float:
     return min(1.0, max(LEAST_SHARE, NODE_TURN / (SPACINGS_M[-1] * curvature)))
 
 
+def _noses(path: Path) -> np.ndarray:
+    """Return the unit vectors of the headings at a path's ends, shape (2, 2)."""
+    noses = np.zeros((2, 2))
+    noses[0] = cos(path.heading), sin(path.heading)
+    if path.stop[-1:] == len(path.node) - 1 and np.isfinite(path.aim[-1]):
+        noses[1] = cos(path.aim[-1]), sin(path.aim[-1])
+    return noses
+
+
 def _relaxed(
     targets: Targets, cost_map: CostMap, path: Path, spacing_m: float
 ) -> tuple[Path, float]:
@@ -260,11 +278,11 @@ def _relaxed(
         pivot[path.pivot[path.pivot < len(pivot)]] = True
         cost = _relax_kernels.relax(
             cost_map,
-            Stops(targets, path.stop, path.target, path.deeper),
+            Stops(targets, path.stop, path.target, path.deeper, path.aim),
             node,
             path.gear,
             pivot,
-            np.array([cos(path.heading), sin(path.heading)]),
+            _noses(path),
             SERIES,
         )
         path = replace(path, node=node)

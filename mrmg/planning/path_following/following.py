@@ -2,8 +2,8 @@
 
 The roadmap's paths along tours are smoothed and followed in closed loop
 (`refine.drive_paths`). Where that succeeds, nearly always where there is room, that
-is all. Where robots get in each other's way, or a car must end with a heading, a
-search for motions starts from the paths (`coordination`).
+is all. Where robots get in each other's way, or do not come to a heading, a search for
+motions starts from the paths (`coordination`).
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from mrmg.motion._kernels import UNICYCLE, USER
 from mrmg.planning.assembly import plan_or_refusal
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
+from mrmg.planning.path_following.arrivals import with_arrivals
 from mrmg.planning.path_following.band import (
     TRACKING_M,
     Path,
@@ -116,21 +117,22 @@ def follow_tours(
     sharps = _turns_to_change_gear_at(problem, timed)
     for sharp in sharps:
         paths = [
-            tour_path(problem, r, tour[: len(tour) - steers], sharp, deeper_m)
-            for r, (tour, steers) in enumerate(
-                zip(stops, problem.steered_home, strict=True)
-            )
+            tour_path(problem, r, _led(problem, r, tour), sharp, deeper_m)
+            for r, tour in enumerate(stops)
         ]
         if any(_same_gears(paths, before) for before in tried):
             continue
         tried.append(paths)
         judged = number > 0 and not timed
         paths = [
-            _geared(problem, r, cost_maps[r] if judged else None, path)
+            _geared(problem, r, cost_maps[r], path, judged)
             for r, path in enumerate(paths)
         ]
-        tasks = [RobotTask(*one) for one in zip(stops, paths, cost_maps, strict=True)]
-        others = partial(_otherwise, problem, tasks, paths, sharps, deeper_m)
+        tasks = [
+            RobotTask(tour, path, cost_map, searched=len(path.stop) < len(tour))
+            for tour, path, cost_map in zip(stops, paths, cost_maps, strict=True)
+        ]
+        others = partial(_otherwise, problem, tasks, paths, sharps, deeper_m, judged)
         drive = drive_paths(problem, tasks, halt, others)
         if drive.trajectories:
             plan = plan_or_refusal(problem, seed, params, drive.trajectories, tours)
@@ -143,6 +145,15 @@ def follow_tours(
         if not drive.trajectories or halt[0]:
             break
     return failed
+
+
+def _led(problem: Problem, r: int, tour: list[int]) -> list[int]:
+    """Return the targets of a tour that a path leads to.
+
+    It has none if there is but one, with a heading: the search for motions finds the
+    shortest curve at once.
+    """
+    return [] if not tour[1:] and np.isfinite(problem.aims(r, tour)).all() else tour
 
 
 def _deeper_m(problem: Problem, number: int) -> float:
@@ -167,10 +178,22 @@ def _otherwise(
     paths: Sequence[Path],
     sharps: Sequence[float],
     deeper_m: float,
+    judged: bool,
     r: int,
 ) -> Iterator[RobotTask]:
-    """Yield what robot r may drive instead: its tour with changes of gear elsewhere."""
+    """Yield what robot r may drive instead: its tour with changes of gear elsewhere.
+
+    Where targets want headings its motions are searched for, from a path that has none.
+    """
     tour, tried = [*paths[r].target], [paths[r]]
+    aims = np.isfinite(paths[r].aim)
+    if aims.any():
+        led = tour[:-1] if tour[-1] == problem.mission.targets.finish[r] else tour
+        path = tour_path(problem, r, led, sharps[0], deeper_m)
+        path = replace(path, aim=np.full(len(led), np.nan))
+        path = _geared(problem, r, tasks[r].cost_map, path, judged)
+        yield RobotTask(tour, path, tasks[r].cost_map, searched=True)
+        return
     for sharp in sharps:
         path = tour_path(problem, r, tour, sharp, deeper_m)
         if problem.mission.fleet[r]["model"] == UNICYCLE:
@@ -236,6 +259,7 @@ def tour_path(
         pivot=np.zeros(0, np.int64),
         heading=heading,
         pause_s=np.zeros(len(tour)),
+        aim=problem.aims(r, tour),
     )
     turns = turns_of(path)
     if problem.mission.fleet[r]["model"] == UNICYCLE:
@@ -247,10 +271,13 @@ def tour_path(
     return path
 
 
-def _geared(problem: Problem, r: int, cost_map: CostMap | None, path: Path) -> Path:
+def _geared(
+    problem: Problem, r: int, cost_map: CostMap, path: Path, judged: bool
+) -> Path:
     """Return a path with the gears that look best, of a car if it may be priced."""
     if problem.mission.fleet[r]["model"] == UNICYCLE:
         return turned_outside(problem, r, path, PASSING)
-    if cost_map is None:
+    path = with_arrivals(problem, r, cost_map, path)
+    if not judged:
         return path
     return with_best_gears(problem, r, cost_map, path, turns_of(path))

@@ -43,19 +43,19 @@ def with_best_gears(
         path: the path.
         turns: nodes at which it may change gear, and how much it turns there [rad].
     """
-    least_m = _cost_m(problem, r, cost_map, path)
+    least_m = smoothed_cost_m(problem, r, cost_map, path)
     for at, turn in turns:
         if not DOUBTFUL[0] < turn < DOUBTFUL[1]:
             continue
         gear = np.where(np.arange(len(path.gear)) < at, path.gear, -path.gear)
         other = replace(path, gear=gear)
-        cost_m = _cost_m(problem, r, cost_map, other)
+        cost_m = smoothed_cost_m(problem, r, cost_map, other)
         if cost_m < least_m:
             path, least_m = other, cost_m
     return path
 
 
-def _cost_m(problem: Problem, r: int, cost_map: CostMap, path: Path) -> float:
+def smoothed_cost_m(problem: Problem, r: int, cost_map: CostMap, path: Path) -> float:
     """Return the cost of a path smoothed with few nodes, its time included."""
     path, cost_m = smooth_path(problem.mission.targets, cost_map, path, SPACINGS_M[:1])
     size = np.hypot(*np.diff(path.node, axis=0).T)

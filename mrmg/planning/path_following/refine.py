@@ -3,8 +3,8 @@
 Each robot's path is smoothed (`band`) and followed in closed loop (`tracking`), as if
 the robot were alone. What goes wrong is put right, and it drives again: where it would
 run into an obstacle, its path is led farther from obstacles; where it misses a target,
-deeper into it. Where robots then meet, a search over their motions that starts from
-their paths (`coordination`) decides who waits, or goes round.
+deeper into it, or to another heading. Where robots then meet, a search over their
+motions that starts from their paths (`coordination`) decides who waits, or goes round.
 
 A refined plan counts only if it visits the same targets in the same order as deep,
 keeps every battery above its reserve, and is better by the scene's objective.
@@ -30,6 +30,7 @@ from mrmg.planning.path_following.cost_map import cost_map_of, inflated, smooth_
 from mrmg.planning.path_following.pauses import with_pauses
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.path_following.tracking import Drive, Motion, drive_alone
+from mrmg.planning.problem._control_kernels import wrap
 from mrmg.planning.problem._target_kernels import at_target
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.problem.targets import target_depth_m
@@ -110,10 +111,9 @@ def along_trajectories(
         visits = visit_steps(targets, tour, trajectory.state)
         if len(visits) < len(tour):
             return ()
-        stops = len(tour) - problem.steered_home[r]
         path = no_path(problem, r)
         if not kept[r]:
-            path = path_of(tour[:stops], visits[:stops], trajectory)
+            path = path_of(tour, visits, problem.aims(r, tour), trajectory)
         before = Drive(Motion(trajectory.state, trajectory.control), True, np.zeros(0))
         tasks.append(RobotTask(tour, path, cost_maps[r], before))
     return drive_paths(problem, tasks, halt).trajectories
@@ -127,8 +127,8 @@ def drive_paths(
 ) -> FleetDrive:
     """Smooth paths and drive the fleet along them.
 
-    Each robot drives as if it were alone; where robots get in each other's way, or have
-    to end with a heading, a search for motions starts from their paths.
+    Each robot drives as if it were alone; where robots get in each other's way, or do
+    not come to a heading, a search for motions starts from their paths.
 
     Args:
         problem: the mission.
@@ -168,19 +168,29 @@ def drive_paths(
 def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, str]:
     """Return robot r's drive along its path, put right as often as it takes.
 
-    None, and why, if there is none. None, too, of a car that must end with a heading:
-    only its path is put right, up to its last goal.
+    None, and why, if there is none. None, too, of a robot whose motions are searched
+    for: only its path is put right.
     """
     if problem.mission.fleet[r]["model"] == USER:
         return task.before, ""
     task.smooth(problem, SPACINGS_M)
-    steered = bool(problem.steered_home[r])
-    tour = task.tour[: len(task.tour) - steered]
-    if steered and not tour:
-        return None, ""
-    kept = None if steered else task.before
+    if not task.searched:
+        return _put_right(problem, r, task)
+    if len(task.path.stop):
+        _put_right(problem, r, task)
+    return None, ""
+
+
+def _put_right(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, str]:
+    """Return robot r's drive along its path to all that it leads to, or None, and why.
+
+    Args:
+        problem: the mission.
+        r: robot.
+        task: its path is led round where it finds no room, and deeper into targets.
+    """
     targets, robot = problem.mission.targets, problem.scene.robots[r].id
-    finish, reason = targets.finish[r], ""
+    tour, reason = task.path.target.tolist(), ""
     for _ in range(TRIES):
         drive = drive_alone(problem, r, with_pauses(problem, r, task.path))
         end = drive.motion.state[-1]
@@ -195,16 +205,17 @@ def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, st
             task.smooth(problem, SPACINGS_M[-1:])
         elif len(visit_steps(targets, tour, drive.motion.state)) < len(tour):
             reason = f"{robot} misses targets of its tour"
-            goals = [t for t in task.tour if t < targets.goals]
-            if (targets.target["tolerance"][goals] < np.pi).any():
-                return kept, ""  # its motions are searched for
-            _enter_deeper(problem, task, drive.motion.state)
-        elif not steered and finish >= 0 and not at_target(targets, finish, end):
+            if task.searched:
+                break
+            _aim_better(problem, task, drive.motion.state)
+        elif targets.finish[r] in tour and not at_target(targets, tour[-1], end):
             reason = f"{robot} does not end where its finish requires"
-            break
+            if not np.isfinite(task.path.aim[-1]):
+                break
+            _aim_better(problem, task, drive.motion.state)
         else:
-            return None if steered else drive, ""
-    return kept, "" if steered else reason
+            return drive, ""
+    return task.before, reason
 
 
 def _on_its_way(problem: Problem, task: RobotTask, drive: Drive) -> str:
@@ -245,11 +256,11 @@ def tour_numbers(problem: Problem, plan: Plan) -> list[list[int]]:
     ]
 
 
-def _enter_deeper(problem: Problem, task: RobotTask, state: np.ndarray) -> None:
-    """Lead a path deeper into the targets that were missed."""
+def _aim_better(problem: Problem, task: RobotTask, state: np.ndarray) -> None:
+    """Lead a path deeper into targets, and to other headings, as much as was missed."""
     path, depth_m = task.path, target_depth_m(problem.scene)
-    regions = planned_regions(problem.scene)
-    deeper = path.deeper.copy()
+    regions, target = planned_regions(problem.scene), problem.mission.targets.target
+    deeper, aim = path.deeper.copy(), path.aim.copy()
     passed = 0
     for i, (node, t) in enumerate(zip(path.stop, path.target, strict=True)):
         gap = state[passed:, :2] - path.node[node]
@@ -257,5 +268,8 @@ def _enter_deeper(problem: Problem, task: RobotTask, state: np.ndarray) -> None:
         reached = float(regions[t].depth(state[passed : passed + 1, :2])[0])
         if reached < depth_m:
             deeper[i] += depth_m - reached + DEEPER_M
-    task.path = replace(path, deeper=deeper)
+        off = wrap(float(state[passed, 2] - target["heading"][t]))
+        if abs(off) > target["tolerance"][t]:
+            aim[i] -= off
+    task.path = replace(path, deeper=deeper, aim=aim)
     task.smooth(problem, SPACINGS_M[-1:])

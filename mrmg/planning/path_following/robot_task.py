@@ -22,6 +22,7 @@ class RobotTask:
         path: its way.
         cost_map: what the way is priced on.
         before: how the robot drove before; None if it did not.
+        searched: whether its motions are searched for from its path.
         inflations: places that it was led round.
 
     """
@@ -30,6 +31,7 @@ class RobotTask:
     path: Path
     cost_map: CostMap
     before: Drive | None = None
+    searched: bool = False
     inflations: list[np.ndarray] = field(default_factory=list)
 
     def smooth(self, problem: Problem, spacings_m: Sequence[float]) -> None:

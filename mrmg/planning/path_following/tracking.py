@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mrmg.energy.model import EFFECTIVE_MASS_KG, ROLLING_N
-from mrmg.motion._kernels import UNICYCLE, USER
+from mrmg.motion._kernels import CAR, UNICYCLE, USER
 from mrmg.planning.path_following import _tracking_kernels
 from mrmg.planning.path_following._following_kernels import COURSE_NODE, Course
 from mrmg.planning.path_following.band import Path, nimble_share
@@ -114,7 +114,8 @@ def course_of(problem: Problem, r: int, path: Path) -> Course:
     targets = problem.mission.targets
     finish = targets.finish[r]
     final = np.array([0.0, np.inf])
-    if finish >= 0 and targets.target["tolerance"][finish] < np.pi:
+    steered = robot["model"] == CAR  # it ends with the heading that its path has there
+    if finish >= 0 and targets.target["tolerance"][finish] < np.pi and not steered:
         aim = targets.target[finish]
         final[:] = aim["heading"], aim["tolerance"]
     return Course(

@@ -91,16 +91,20 @@ class Problem:
         """What plans are compared by."""
         return Preference.of(self.scene)
 
-    @property
-    def steered_home(self) -> np.ndarray:
-        """Whether robots are cars with a heading to end with, shape (R,).
+    def aims(self, robot: int, tour: Sequence[int]) -> np.ndarray:
+        """Return the headings that a path must have at the targets of a tour [rad].
 
-        Their paths lead to their last goals; motions from there are searched for.
+        NaN where they are free: robots that turn on the spot do so at the end.
+
+        Args:
+            robot: its number.
+            tour: numbers of its targets, shape (S,).
         """
-        targets = self.mission.targets
-        aims = targets.finish >= 0
-        aims[aims] = targets.target["tolerance"][targets.finish[aims]] < np.pi
-        return np.asarray(aims & (self.mission.fleet["model"] == CAR))
+        target = self.mission.targets.target[list(tour)]
+        free = target["tolerance"] >= np.pi
+        if self.mission.fleet["model"][robot] != CAR:
+            free |= np.array(tour) == self.mission.targets.finish[robot]
+        return np.where(free, np.nan, target["heading"])
 
     def trajectory(self, robot: int, control: np.ndarray) -> Trajectory:
         """Return the motion of a robot from its start under controls.

@@ -8,7 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mrmg.planning.path_following import _band_kernels, _relax_kernels
+from mrmg.planning.path_following import (
+    _band_kernels,
+    _bending_kernels,
+    _relax_kernels,
+)
 from mrmg.planning.path_following._band_kernels import CostMap, Stops
 from mrmg.planning.problem._target_kernels import TARGET, Targets
 
@@ -32,8 +36,12 @@ def cost_map(**changes: Any) -> CostMap:
     return CostMap(**{**given, **changes})
 
 
-def stops(*circles: tuple[int, float, float, float], deeper: float = 0.0) -> Stops:
-    """Return circular targets, each (node, x, y, radius)."""
+def stops(
+    *circles: tuple[int, float, float, float],
+    deeper: float = 0.0,
+    aim: float = float("nan"),
+) -> Stops:
+    """Return circular targets, each (node, x, y, radius), with an aim at all."""
     n = len(circles)
     target = np.zeros(n, TARGET).view(np.recarray)
     for i, (_, x, y, radius) in enumerate(circles):
@@ -43,10 +51,13 @@ def stops(*circles: tuple[int, float, float, float], deeper: float = 0.0) -> Sto
         node=np.array([c[0] for c in circles], np.int64),
         target=np.arange(n),
         deeper=np.full(n, deeper),
+        aim=np.full(n, aim),
     )
 
 
-EAST = np.array([1.0, 0.0])
+EAST = np.array([[1.0, 0.0], [0.0, 0.0]])
+"""Heading at the start; that at the end is free."""
+
 NO_PIVOT = np.zeros(40, np.bool_)
 """Of paths that never turn on the spot."""
 
@@ -57,12 +68,13 @@ def cost(
     p: np.ndarray,
     gear: np.ndarray,
     pivot: np.ndarray = NO_PIVOT,
+    nose: np.ndarray = EAST,
 ) -> Any:
     """Return (cost, gradient) of a path that starts heading east."""
     gradient = np.zeros_like(p)
-    shape = _band_kernels.new_shape(len(p) - 1)
+    shape = _bending_kernels.new_shape(len(p))
     value = _band_kernels.band_cost(
-        ground, marks, p, gear, pivot[: len(gear)], EAST, shape, gradient
+        ground, marks, p, gear, pivot[: len(gear)], nose, shape, gradient
     )
     return value, gradient
 
@@ -74,13 +86,15 @@ def test_gradient_is_that_of_the_cost(seed: int) -> None:
     ground = cost_map(
         distance=5.0 * rng.random((80, 80)), multiplier=1.0 + rng.random((80, 80))
     )
-    marks = stops((4, 5.0, 5.0, 0.5), (9, 9.0, 9.0, 0.4), deeper=0.1)
+    marks = stops((6, 5.0, 5.0, 0.5), (9, 9.0, 9.0, 0.4), deeper=0.1, aim=0.3)
     marks.targets.corner[1] = [[8, 8], [9, 8], [8.5, 9]]
     marks.targets.target[1]["corners"] = 3
     p = 3.0 + np.cumsum(0.4 + 0.8 * rng.random((n, 2)), axis=0)
     gear = np.where(np.arange(n - 1) < 6, 1, -1)
     pivot = np.arange(n - 1) % 5 == 3
-    _, gradient = cost(ground, marks, p, gear, pivot)
+    # Of a third of the cases the end is free.
+    nose = np.array([[1.0, 0.0], [cos(seed), sin(seed)]]) * [[1.0], [seed % 3 > 0]]
+    _, gradient = cost(ground, marks, p, gear, pivot, nose)
     slopes = np.zeros_like(p)
     for i in range(1, n):
         for j in range(2):
@@ -88,7 +102,7 @@ def test_gradient_is_that_of_the_cost(seed: int) -> None:
             for sign in (1.0, -1.0):
                 q = p.copy()
                 q[i, j] += sign * 1e-6
-                ends.append(cost(ground, marks, q, gear, pivot)[0])
+                ends.append(cost(ground, marks, q, gear, pivot, nose)[0])
             slopes[i, j] = (ends[0] - ends[1]) / 2e-6
     scale = np.abs(gradient).max()
     assert np.abs(slopes - gradient).max() < 1e-6 * scale
@@ -101,6 +115,21 @@ def test_a_straight_way_costs_its_length(gear: int) -> None:
     p = np.stack([x, np.full(9, 5.0)], axis=1)
     value, _ = cost(cost_map(), stops(), p, np.full(8, gear))
     assert value == pytest.approx(8.0)
+
+
+@pytest.mark.parametrize("gear", [1, -1])
+def test_a_way_bends_to_the_heading_at_its_end(gear: int) -> None:
+    """A quarter of a circle ends without a jump of curvature, whatever the gear."""
+    angle = np.linspace(0.0, pi / 2.0, 11)
+    p = np.stack([5.0 + 3.0 * np.sin(angle), 8.0 - 3.0 * np.cos(angle)], axis=1)
+    ground, way = cost_map(curvature=0.4, scrub=0.0), np.full(10, gear)
+    start = [float(gear), 0.0]
+    costs = [
+        cost(ground, stops(), p, way, nose=np.array([start, [0.0, north]]))[0]
+        for north in (float(gear), 0.0, -float(gear))
+    ]
+    assert costs[0] == pytest.approx(costs[1], rel=0.05)
+    assert costs[2] > 10.0 * costs[0]
 
 
 def test_turns_on_the_spot_need_room() -> None:
@@ -147,7 +176,7 @@ def test_an_arc_costs_length_and_scrub_and_more_beyond_the_limit() -> None:
         costs.append(value - 0.5 * pi * radius)
     assert 0.0 < costs[0] <= 0.3 * 0.5 * pi
     # Radius 2 m bends by 0.5 / m where 0.4 / m is allowed.
-    over = _band_kernels.CURVATURE_WEIGHT * 0.25**2 * pi
+    over = _bending_kernels.CURVATURE_WEIGHT * 0.25**2 * pi
     assert costs[1] - costs[0] == pytest.approx(over, rel=0.05)
 
 
@@ -220,8 +249,8 @@ def test_relaxing_never_costs_more_and_keeps_the_start(seed: int) -> None:
     p = 10.0 + np.cumsum(rng.normal(0.2, 0.5, (15, 2)), axis=0)
     gear = rng.choice([1, -1], 14)
     ground = cost_map(distance=np.cumsum(rng.normal(0.0, 0.1, (80, 80)), axis=1) + 1.5)
-    shape, gradient = _band_kernels.new_shape(14), np.zeros_like(p)
-    nose = np.array([cos(angle), sin(angle)])
+    shape, gradient = _bending_kernels.new_shape(15), np.zeros_like(p)
+    nose = np.array([[cos(angle), sin(angle)], [0.0, 0.0]])
     before = _band_kernels.band_cost(
         ground, stops(), p, gear, NO_PIVOT[:14], nose, shape, gradient
     )

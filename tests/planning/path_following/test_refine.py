@@ -111,7 +111,7 @@ def test_the_same_again(mission: Refined) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["quickstart", pytest.param("scene1", marks=pytest.mark.ci)]
+    "name", ["diffdrive", pytest.param("scene1", marks=pytest.mark.ci)]
 )
 def test_most_missions_gain(name: str) -> None:
     """What a search found without a path leaves something to gain."""

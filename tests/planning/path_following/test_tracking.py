@@ -74,6 +74,7 @@ def straight_path(problem: Problem, end_x: float) -> Path:
         pivot=none,
         heading=float(heading),
         pause_s=np.zeros(0),
+        aim=np.zeros(0),
     )
 
 

@@ -203,7 +203,7 @@ class _Planning:
             now = replace(now, weight=YIELDING_WEIGHT, soft_s=YIELDING_S)
         task = task_of(problem, r, tour, path, now)._replace(enough=FIRST_MOST)
         led = len(path.target) == len(tour) or (
-            problem.steered_home[r] and not tour[1:]
+            not tour[1:] and np.isfinite(problem.aims(r, tour)).all()
         )
         led &= bool(
             (problem.mission.targets.target["tolerance"][task.leg] >= np.pi).all()

@@ -88,6 +88,7 @@ def no_path(problem: Problem, r: int) -> Path:
         pivot=none,
         heading=float(problem.start[r, 2]),
         pause_s=np.zeros(0),
+        aim=np.zeros(0),
     )
 
 

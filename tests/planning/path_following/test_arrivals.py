@@ -1,0 +1,115 @@
+"""Targets that want a heading, come to along paths."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any
+
+import pytest
+
+import mrmg
+from mrmg.planning import PlannerParams, plan_mission
+from mrmg.planning.path_following.arrivals import with_arrivals
+from mrmg.planning.path_following.band import smooth_path
+from mrmg.planning.path_following.following import tour_path
+from mrmg.planning.path_following.refine import cost_maps_of
+from mrmg.planning.problem.problem import state_mission
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.types import Scene
+
+QUICK = PlannerParams(improvements=0)
+HEADINGS = [round(i * pi / 4.0 - 3.0, 2) for i in range(8)]
+
+
+def yard(
+    heading: float,
+    *places: tuple[float, float],
+    model: str = "car",
+    at_goal: float | None = None,
+) -> Scene:
+    """Return 30 x 20 m of open ground, for a robot that ends at the last place.
+
+    Args:
+        heading: at the end [rad].
+        places: of goals and of the end [m].
+        model: of the robot.
+        at_goal: heading at the first goal [rad].
+    """
+    goals: list[dict[str, Any]] = [
+        {"id": f"g{i}", "circle": {"center": list(center), "radius": 0.7}}
+        for i, center in enumerate(places[:-1])
+    ]
+    if at_goal is not None:
+        goals[0]["heading"] = at_goal
+    end = {"circle": {"center": list(places[-1]), "radius": 0.4}, "heading": heading}
+    robot = {"id": "r1", "model": model, "pose": [6, 10, 0], "finish": end}
+    return scene_from_document(
+        {
+            "format": 1,
+            "name": "yard",
+            "bounds": [0, 0, 30, 20],
+            "goals": goals,
+            "battery": {"capacity_m": 300},
+            "robots": [robot],
+        },
+        source="yard",
+    )
+
+
+def cost_m(scene: Scene, arriving: bool) -> float:
+    """Return the cost of the first robot's smoothed path along all its targets."""
+    problem = state_mission(scene, 0, QUICK)
+    targets, cost_map = problem.mission.targets, cost_maps_of(problem)[0]
+    path = tour_path(problem, 0, [*range(targets.goals), int(targets.finish[0])])
+    if arriving:
+        path = with_arrivals(problem, 0, cost_map, path)
+    return smooth_path(targets, cost_map, path)[1]
+
+
+@pytest.mark.parametrize(
+    ("heading", "goals", "share"),
+    [
+        (-2.21, ((12, 4), (20, 14)), 0.75),  # the gear changes at the goal
+        (1.71, ((15, 10), (8, 12)), 0.95),  # and beyond the finish
+        (-3.0, ((15, 10), (24, 10)), 0.82),
+    ],
+)
+def test_gears_suit_the_heading(
+    heading: float, goals: tuple[tuple[float, float], ...], share: float
+) -> None:
+    scene = yard(heading, *goals)
+    assert cost_m(scene, True) < share * cost_m(scene, False)
+
+
+@pytest.mark.parametrize("heading", HEADINGS)
+def test_other_gears_never_cost_more(heading: float) -> None:
+    scene = yard(heading, (15, 10), (24, 10))
+    assert cost_m(scene, True) < 1.01 * cost_m(scene, False)
+
+
+def found(scene: Scene) -> mrmg.Plan:
+    """Return the scene's plan, for which no motions were searched for."""
+    result = plan_mission(scene, seed=0, params=QUICK)
+    assert result.plan is not None, result.reason
+    assert mrmg.verify(scene, result.plan).violations == ()
+    assert result.statistics["coordinated"] == 0
+    return result.plan
+
+
+@pytest.mark.parametrize("goals", [((15, 10), (24, 10)), ((12, 4), (20, 14))])
+@pytest.mark.parametrize("heading", HEADINGS)
+def test_final_headings_take_no_search(
+    heading: float, goals: tuple[tuple[float, float], ...]
+) -> None:
+    """Turning round in the open takes less than half the way again."""
+    easiest_J = min(found(yard(one, *goals)).cost_J for one in HEADINGS[::3])
+    assert found(yard(heading, *goals)).cost_J < 1.5 * easiest_J
+
+
+@pytest.mark.parametrize("model", ["car", "diffdrive"])
+@pytest.mark.parametrize("heading", HEADINGS)
+def test_headings_at_goals_take_no_search(heading: float, model: str) -> None:
+    places = (12.0, 6.0), (18.0, 12.0), (26.0, 10.0)
+    free = found(yard(0.0, *places, model=model))
+    aimed = found(yard(0.0, *places, model=model, at_goal=heading))
+    assert aimed.cost_J < 1.6 * free.cost_J
