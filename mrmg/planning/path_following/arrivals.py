@@ -54,16 +54,16 @@ def _changed_at(path: Path, at: int) -> Path:
 def _passed_by(path: Path, bearing: float) -> Path:
     """Return the path that passes its end by, changes gear, and drives to it."""
     end, gear = path.node[-1], int(path.gear[-1])
-    angle = path.aim[-1] + bearing
+    angle = path.last_aim + bearing
     place = end + gear * PASSED_M * np.array([cos(angle), sin(angle)])
     far = np.hypot(*(path.node - end).T) > PASSED_M
-    last = path.stop[-2] if len(path.stop) > 1 else 0
-    kept = max(last, np.flatnonzero(far).max(initial=0)) + 1
+    begun = path.stop[path.stop < len(path.gear)].max(initial=0)
+    kept = max(begun, np.flatnonzero(far).max(initial=0)) + 1
     return replace(
         path,
         node=np.vstack([path.node[:kept], place, end]),
         gear=np.append(path.gear[: kept - 1], [gear, -gear]),
-        stop=np.append(path.stop[:-1], kept + 1),
+        stop=np.where(path.stop < len(path.gear), path.stop, kept + 1),
     )
 
 

@@ -98,6 +98,12 @@ class Path:
         return np.stack([np.interp(at_m, own, one) for one in self.node.T], axis=1)
 
     @property
+    def last_aim(self) -> float:
+        """Heading that it is to have at its end [rad], NaN for any."""
+        aims = self.aim[self.stop == len(self.node) - 1]
+        return float(next(iter(aims[np.isfinite(aims)]), np.nan))
+
+    @property
     def edges(self) -> np.ndarray:
         """Numbers of the nodes between which it is driven without a stop."""
         changes = np.flatnonzero(np.diff(self.gear)) + 1
@@ -260,8 +266,8 @@ def _noses(path: Path) -> np.ndarray:
     """Return the unit vectors of the headings at a path's ends, shape (2, 2)."""
     noses = np.zeros((2, 2))
     noses[0] = cos(path.heading), sin(path.heading)
-    if path.stop[-1:] == len(path.node) - 1 and np.isfinite(path.aim[-1]):
-        noses[1] = cos(path.aim[-1]), sin(path.aim[-1])
+    if np.isfinite(path.last_aim):
+        noses[1] = cos(path.last_aim), sin(path.last_aim)
     return noses
 
 

@@ -26,6 +26,7 @@ from mrmg.planning.path_following.band import (
     smooth_path,
     turns_of,
 )
+from mrmg.planning.path_following.coordination.tasks import is_one_pose
 from mrmg.planning.path_following.driven_legs import Leg, legs_driven_J
 from mrmg.planning.path_following.gears import with_best_gears
 from mrmg.planning.path_following.narrow_turns import turned_outside
@@ -153,7 +154,7 @@ def _led(problem: Problem, r: int, tour: list[int]) -> list[int]:
     It has none if there is but one, with a heading: the search for motions finds the
     shortest curve at once.
     """
-    return [] if not tour[1:] and np.isfinite(problem.aims(r, tour)).all() else tour
+    return [] if is_one_pose(problem, r, tour) else tour
 
 
 def _deeper_m(problem: Problem, number: int) -> float:
@@ -188,7 +189,7 @@ def _otherwise(
     tour, tried = [*paths[r].target], [paths[r]]
     aims = np.isfinite(paths[r].aim)
     if aims.any():
-        led = tour[:-1] if tour[-1] == problem.mission.targets.finish[r] else tour
+        led = tour[:-1] if aims[-1] else tour
         path = tour_path(problem, r, led, sharps[0], deeper_m)
         path = replace(path, aim=np.full(len(led), np.nan))
         path = _geared(problem, r, tasks[r].cost_map, path, judged)

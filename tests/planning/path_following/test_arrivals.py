@@ -22,7 +22,7 @@ HEADINGS = [round(i * pi / 4.0 - 3.0, 2) for i in range(8)]
 
 
 def yard(
-    heading: float,
+    heading: float | None,
     *places: tuple[float, float],
     model: str = "car",
     at_goal: float | None = None,
@@ -30,7 +30,7 @@ def yard(
     """Return 30 x 20 m of open ground, for a robot that ends at the last place.
 
     Args:
-        heading: at the end [rad].
+        heading: at the end [rad], None for any.
         places: of goals and of the end [m].
         model: of the robot.
         at_goal: heading at the first goal [rad].
@@ -41,7 +41,9 @@ def yard(
     ]
     if at_goal is not None:
         goals[0]["heading"] = at_goal
-    end = {"circle": {"center": list(places[-1]), "radius": 0.4}, "heading": heading}
+    end: dict[str, Any] = {"circle": {"center": list(places[-1]), "radius": 0.4}}
+    if heading is not None:
+        end["heading"] = heading
     robot = {"id": "r1", "model": model, "pose": [6, 10, 0], "finish": end}
     return scene_from_document(
         {
@@ -113,3 +115,12 @@ def test_headings_at_goals_take_no_search(heading: float, model: str) -> None:
     free = found(yard(0.0, *places, model=model))
     aimed = found(yard(0.0, *places, model=model, at_goal=heading))
     assert aimed.cost_J < 1.6 * free.cost_J
+
+
+@pytest.mark.parametrize("heading", HEADINGS)
+def test_a_goal_where_the_robot_ends_has_its_heading(heading: float) -> None:
+    """The last of the stops at the end of the way wants none."""
+    places = (22.0, 8.0), (22.0, 8.0)
+    ended = found(yard(heading, *places))
+    aimed = found(yard(None, *places, at_goal=heading))
+    assert aimed.cost_J < 1.1 * ended.cost_J

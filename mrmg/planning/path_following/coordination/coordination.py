@@ -50,6 +50,7 @@ from mrmg.planning.path_following.coordination.sequencing import in_sequence
 from mrmg.planning.path_following.coordination.tasks import (
     guided,
     horizon_steps,
+    is_one_pose,
     no_path,
     task_of,
 )
@@ -202,9 +203,7 @@ class _Planning:
         if yielding:
             now = replace(now, weight=YIELDING_WEIGHT, soft_s=YIELDING_S)
         task = task_of(problem, r, tour, path, now)._replace(enough=FIRST_MOST)
-        led = len(path.target) == len(tour) or (
-            not tour[1:] and np.isfinite(problem.aims(r, tour)).all()
-        )
+        led = len(path.target) == len(tour) or is_one_pose(problem, r, tour)
         led &= bool(
             (problem.mission.targets.target["tolerance"][task.leg] >= np.pi).all()
         )

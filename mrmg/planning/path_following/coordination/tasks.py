@@ -92,6 +92,11 @@ def no_path(problem: Problem, r: int) -> Path:
     )
 
 
+def is_one_pose(problem: Problem, r: int, tour: Sequence[int]) -> bool:
+    """Return whether robot r has but one target, and that wants a heading."""
+    return len(tour) == 1 and bool(np.isfinite(problem.aims(r, tour)).all())
+
+
 def stays_s(problem: Problem, r: int, legs: Sequence[int]) -> np.ndarray:
     """Return how long robot r stays at targets at most [s], shape (L,)."""
     targets, robot = problem.mission.targets, problem.mission.fleet[r]
