@@ -1,0 +1,141 @@
+"""Plan missions whose robots must end, and visit goals, with headings.
+
+Each yard is of 40 x 30 m with five boxes, three robots and seven goals; robots end
+within 0.4 m of a place, 0.2 rad off a heading at most, and the first --aimed goals
+want headings, too. Protocol: that of `tools/bench`, one row a yard; the same number
+gives the same yard.
+
+Finished missions are kept in --output FILE: the same command goes on from there after
+an interruption. Rows of --json are those of `tools/bench`.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from math import pi
+from typing import Any
+
+import bench
+import numpy as np
+from protocol import add_file_options, run, seed_range
+
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.types import Scene
+
+SIDES_M = 40.0, 30.0
+"""Sides of a yard."""
+
+BOXES, ROBOTS, GOALS = 5, 3, 7
+"""Numbers of them."""
+
+BOX_M = 1.0, 5.0
+"""Sides of boxes, least and most."""
+
+ROOM_M = 2.5
+"""Room about a place to the next box or to the border ..."""
+
+APART_M = 3.5
+"""... and to the next place."""
+
+GOAL_M, FINISH_M = 0.7, 0.4
+"""Radii of goals and of finishes."""
+
+CAPACITY_M = 400.0
+"""What batteries suffice for on plain ground."""
+
+
+def main() -> int:
+    """Run the bench; return 1 if any mission failed."""
+    options = parse_options()
+    print(f"{__doc__}\n{bench.protocol(options)}")
+    yards = (yard(options.model, number, options.aimed) for number in options.yards)
+    scenes = ((scene.name, scene) for scene in yards)
+    return bench.plan_each(scenes, options, "bench_headings")
+
+
+def parse_options() -> argparse.Namespace:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, prog="tools/bench_headings")
+    parser.add_argument("--model", default="car", help="default car")
+    parser.add_argument(
+        "--aimed", type=int, default=2, help="goals with headings, default 2"
+    )
+    parser.add_argument(
+        "--yards", type=seed_range, default="0-15", help="first-last, default 0-15"
+    )
+    parser.add_argument(
+        "--seeds", type=seed_range, default="0-0", help="first-last, default 0-0"
+    )
+    parser.add_argument("--budget", type=float, help="seconds of planning")
+    parser.add_argument("--execute", action="store_true", help="drive in MuJoCo too")
+    parser.add_argument("--bound", action="store_true", help="compare with a bound")
+    add_file_options(parser)
+    parser.set_defaults(profile=["default"], energy=None, nrpa=None)
+    return parser.parse_args()
+
+
+def yard(model: str, number: int, aimed: int) -> Scene:
+    """Return a yard for robots of a shipped model."""
+    rng = np.random.default_rng(number)
+    low, high = np.full(2, 4.0), np.array(SIDES_M) - 4.0
+    boxes = [(rng.uniform(low, high), rng.uniform(*BOX_M, 2)) for _ in range(BOXES)]
+    place = _places(boxes, rng)
+
+    def heading() -> float:
+        return round(float(rng.uniform(-pi, pi)), 2)
+
+    goals: list[dict[str, Any]] = [
+        {"id": f"g{i}", **_circle(next(place), GOAL_M)} for i in range(GOALS)
+    ]
+    for goal in goals[:aimed]:
+        goal["heading"] = heading()
+    robots = [
+        {
+            "id": f"r{i}",
+            "model": model,
+            "pose": [*next(place), heading()],
+            "finish": {**_circle(next(place), FINISH_M), "heading": heading()},
+        }
+        for i in range(ROBOTS)
+    ]
+    document = {
+        "format": 1,
+        "name": f"yard{number}",
+        "bounds": [0, 0, *SIDES_M],
+        "obstacles": [
+            {"id": f"o{i}", "box": {"center": _rounded(at), "size": _rounded(size)}}
+            for i, (at, size) in enumerate(boxes)
+        ],
+        "goals": goals,
+        "battery": {"capacity_m": CAPACITY_M},
+        "robots": robots,
+    }
+    return scene_from_document(document, source=f"yard {number}")
+
+
+def _places(
+    boxes: list[tuple[np.ndarray, np.ndarray]], rng: np.random.Generator
+) -> Iterator[list[float]]:
+    """Yield places with room about them, apart from each other."""
+    kept: list[np.ndarray] = []
+    while True:
+        at = rng.uniform(ROOM_M, np.array(SIDES_M) - ROOM_M)
+        clear = all(
+            (np.abs(at - middle) > 0.5 * size + ROOM_M).any() for middle, size in boxes
+        )
+        if clear and all(np.hypot(*(at - other)) > APART_M for other in kept):
+            kept.append(at)
+            yield _rounded(at)
+
+
+def _circle(center: list[float], radius: float) -> dict[str, Any]:
+    return {"circle": {"center": center, "radius": radius}}
+
+
+def _rounded(point: np.ndarray) -> list[float]:
+    return [round(float(x), 2) for x in point]
+
+
+if __name__ == "__main__":
+    run(main)
