@@ -32,6 +32,8 @@ from mrmg.planning.path_following.coordination.coordination import coordinated
 from mrmg.planning.path_following.coordination.tasks import no_path
 from mrmg.planning.path_following.following import tour_path
 from mrmg.planning.path_following.narrow_turns import turned_outside
+from mrmg.planning.path_following.poses import posed
+from mrmg.planning.path_following.refine import cost_maps_of
 from mrmg.planning.planners import find_planner
 from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.planning.routers import find_router
@@ -68,8 +70,8 @@ def load_kernels(planner: str, *, every: bool = True) -> None:
 
     Args:
         planner: name of it.
-        every: also those of the search for motions, which take a third of the time and
-            which many missions do not need.
+        every: also those of the searches for motions and for poses, which take a third
+            of the time and which many missions do not need.
     """
     if planner == GUIDED_TREE:
         guide_smallest()
@@ -77,6 +79,7 @@ def load_kernels(planner: str, *, every: bool = True) -> None:
         follow_smallest()
         if every:
             coordinate_smallest()
+            pose_smallest()
 
 
 def coordinate_smallest() -> None:
@@ -84,6 +87,13 @@ def coordinate_smallest() -> None:
     _, problem = _smallest_mission()
     never = np.zeros(1, np.bool_)
     assert coordinated(problem, [[0]], [no_path(problem, 0)], never)
+
+
+def pose_smallest() -> None:
+    """Find a way over poses in the smallest mission."""
+    _, problem = _smallest_mission()
+    never = np.zeros(1, np.bool_)
+    assert posed(problem, 0, cost_maps_of(problem)[0], [0], never)
 
 
 def follow_smallest() -> None:
@@ -113,7 +123,12 @@ def bound_smallest() -> None:
 
 
 _CALLS = {
-    PATH_FOLLOWING: (coordinate_smallest, follow_smallest, bound_smallest),
+    PATH_FOLLOWING: (
+        coordinate_smallest,
+        follow_smallest,
+        bound_smallest,
+        pose_smallest,
+    ),
     GUIDED_TREE: (guide_smallest, bound_smallest),
 }
 """What compiles all kernels of a part, what takes longest first: it would be waited for

@@ -8,14 +8,14 @@ motions starts from the paths (`coordination`).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from math import pi, radians
 
 import numpy as np
 
-from mrmg.motion._kernels import UNICYCLE, USER
+from mrmg.motion._kernels import CAR, UNICYCLE, USER
 from mrmg.planning.assembly import plan_or_refusal
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
@@ -30,6 +30,7 @@ from mrmg.planning.path_following.coordination.tasks import is_one_pose
 from mrmg.planning.path_following.driven_legs import Leg, legs_driven_J
 from mrmg.planning.path_following.gears import with_best_gears
 from mrmg.planning.path_following.narrow_turns import turned_outside
+from mrmg.planning.path_following.poses import posed
 from mrmg.planning.path_following.refine import cost_maps_of, drive_paths
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.problem.problem import Problem
@@ -116,6 +117,13 @@ def follow_tours(
     tried: list[list[Path]] = []
     failed = Followed(None, driven=False)
     sharps = _turns_to_change_gear_at(problem, timed)
+
+    @cache
+    def over_poses(r: int) -> RobotTask | None:
+        if problem.mission.fleet[r]["model"] != CAR:
+            return None
+        return posed(problem, r, cost_maps[r], stops[r], halt)
+
     for sharp in sharps:
         paths = [
             tour_path(problem, r, _led(problem, r, tour), sharp, deeper_m)
@@ -133,7 +141,9 @@ def follow_tours(
             RobotTask(tour, path, cost_map, searched=len(path.stop) < len(tour))
             for tour, path, cost_map in zip(stops, paths, cost_maps, strict=True)
         ]
-        others = partial(_otherwise, problem, tasks, paths, sharps, deeper_m, judged)
+        others = partial(
+            _otherwise, problem, tasks, paths, sharps, deeper_m, judged, over_poses
+        )
         drive = drive_paths(problem, tasks, halt, others)
         if drive.trajectories:
             plan = plan_or_refusal(problem, seed, params, drive.trajectories, tours)
@@ -180,15 +190,19 @@ def _otherwise(
     sharps: Sequence[float],
     deeper_m: float,
     judged: bool,
+    over_poses: Callable[[int], RobotTask | None],
     r: int,
 ) -> Iterator[RobotTask]:
     """Yield what robot r may drive instead: its tour with changes of gear elsewhere.
 
-    Where targets want headings its motions are searched for, from a path that has none.
+    A car may then drive over poses. Where targets want headings it does so at once; and
+    where that fails its motions are searched for, from a path that has none.
     """
     tour, tried = [*paths[r].target], [paths[r]]
     aims = np.isfinite(paths[r].aim)
     if aims.any():
+        if (task := over_poses(r)) is not None:
+            yield replace(task, inflations=[])
         led = tour[:-1] if aims[-1] else tour
         path = tour_path(problem, r, led, sharps[0], deeper_m)
         path = replace(path, aim=np.full(len(led), np.nan))
@@ -202,6 +216,8 @@ def _otherwise(
         if not any(np.array_equal(path.gear, before.gear) for before in tried):
             tried.append(path)
             yield RobotTask(tasks[r].tour, path, tasks[r].cost_map)
+    if (task := over_poses(r)) is not None:
+        yield replace(task, inflations=[])
 
 
 def _same_gears(paths: Sequence[Path], others: Sequence[Path]) -> bool:

@@ -173,9 +173,13 @@ def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, st
     """
     if problem.mission.fleet[r]["model"] == USER:
         return task.before, ""
+    first = task.path
     task.smooth(problem, SPACINGS_M)
     if not task.searched:
-        return _put_right(problem, r, task)
+        drive, failure = _put_right(problem, r, task)
+        if drive is task.before:
+            task.path = first
+        return drive, failure
     if len(task.path.stop):
         _put_right(problem, r, task)
     return None, ""

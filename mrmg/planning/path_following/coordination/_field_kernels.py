@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
+from mrmg.planning.problem._clearance_kernels import keeps_clear
 from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.planning.roadmap._heap_kernels import pop, push
@@ -20,6 +21,9 @@ DIAGONAL = sqrt(2.0)
 
 BEARINGS = 8
 """Headings that costs-to-go of turning know: those to the cells about one."""
+
+FITTING = 16
+"""Headings with which a robot may stand beside a wall."""
 
 
 class Guide(NamedTuple):
@@ -272,6 +276,35 @@ def add_region(targets, t, x_min, y_min, cell, region):
             if in_target(targets, t, x, y):
                 region[i, j] = True
     region[min(max(row, 0), rows - 1), min(max(column, 0), columns - 1)] = True
+
+
+@kernel
+def add_fitting(own, spaces, place, grid, fits):
+    """Mark the cells near a place where a robot keeps clear with some heading.
+
+    Args:
+        own: the robot, shape (1,).
+        spaces: free spaces of the fleet.
+        place: (x, y) [m].
+        grid: corner (x, y) of the grid and side of its cells [m].
+        fits: receives them, shape (ny, nx).
+    """
+    rows, columns = fits.shape
+    x_min, y_min, cell = grid
+    px, py = place
+    reach, corner, pose = 2.0 * own[0].radius, np.empty((MOST_CORNERS, 2)), np.zeros(3)
+    column, row = int(floor((px - x_min) / cell)), int(floor((py - y_min) / cell))
+    more = int(reach / cell) + 1
+    for i in range(max(0, row - more), min(rows, row + more + 1)):
+        for j in range(max(0, column - more), min(columns, column + more + 1)):
+            pose[0], pose[1] = x_min + (j + 0.5) * cell, y_min + (i + 0.5) * cell
+            if hypot(pose[0] - px, pose[1] - py) > reach:
+                continue
+            for k in range(FITTING):
+                pose[2] = 2.0 * pi * k / FITTING
+                if keeps_clear(own, spaces, pose, own[0].margin, corner):
+                    fits[i, j] = True
+                    break
 
 
 @kernel

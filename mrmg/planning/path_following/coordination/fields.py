@@ -59,6 +59,7 @@ class Fields:
         self._known: dict[tuple[int, float, tuple[int, ...]], np.ndarray] = {}
         self._turning: dict[tuple[int, ...], np.ndarray] = {}
         self._room: dict[tuple[int, float], np.ndarray] = {}
+        self._beside: dict[tuple[int, float, float], np.ndarray] = {}
         spaces = problem.mission.spaces
         cells = spaces.distance[0].size
         self._coarser = max(1, round((cells / MOST_CELLS) ** 0.5))
@@ -259,9 +260,27 @@ class Fields:
         lacking = (roomy_m - nearest) / max(roomy_m - needed_m, self._cell_m)
         free = nearest > needed_m - 0.5 * self._cell_m
         passable = free & self._has_room(r) | self._region(targets)
+        passable |= self._beside_walls(r, targets)
         return np.where(
             passable, 1.0 + TIGHT_PRICE * np.clip(lacking, 0.0, 1.0), np.inf
         )
+
+    def _beside_walls(self, r: int, targets: Sequence[int]) -> np.ndarray:
+        """Return which cells near robot r's start and targets it may stand in.
+
+        With its back to a wall its reference point is nearer to that than ways lead.
+        """
+        mission = self._problem.mission
+        centers = mission.targets.target["center"][list(targets)]
+        beside = np.zeros(self._shape, bool)
+        for x, y in [self._problem.start[r, :2].tolist(), *centers.tolist()]:
+            if (r, x, y) not in self._beside:
+                fits = self._beside[r, x, y] = np.zeros(self._shape, bool)
+                _field_kernels.add_fitting(
+                    mission.fleet[r : r + 1], mission.spaces, (x, y), self._grid, fits
+                )
+            beside |= self._beside[r, x, y]
+        return beside
 
     def _has_room(self, r: int) -> np.ndarray:
         """Return which cells have a point with the clearance that robot r needs.

@@ -1,0 +1,123 @@
+"""Ways of cars that have to turn among obstacles, found over their poses.
+
+They are for tours on which a car finds no room along the roadmap's paths: these know
+places but no headings. What is found can be driven as it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+
+from mrmg.planning.path_following import _pose_kernels, _shortening_kernels
+from mrmg.planning.path_following._band_kernels import CostMap, Stops
+from mrmg.planning.path_following._pose_kernels import POSE, PoseSearch
+from mrmg.planning.path_following.band import Path, visit_steps
+from mrmg.planning.path_following.coordination.fields import Fields
+from mrmg.planning.path_following.cost_map import ROOM_SHARE
+from mrmg.planning.path_following.pauses import with_pauses
+from mrmg.planning.path_following.robot_task import RobotTask
+from mrmg.planning.path_following.tracking import drive_alone
+from mrmg.planning.problem.problem import Problem
+
+HEADINGS = 32
+"""Headings in a full turn."""
+
+BEND_SHARE = 0.95
+"""Curvature of turns, as a share of the sharpest that paths may have."""
+
+CELL_SHARES = (0.8, 0.27, 0.27)
+"""Side of a cell, as a share of an arc's length: away from targets, near one, and near
+the start."""
+
+SLACK_M = 0.03
+"""Room beyond the margin near targets, for what driving is off its way [m]."""
+
+DEEPER_M = 0.03
+"""How much deeper than needed targets are entered, for the same reason."""
+
+CHANGE_M = 1.0
+"""Plain ground that a change of gear is worth [m]."""
+
+WEIGHTS = (1.2, 2.0)
+"""Weights of the cost-to-go that are tried: the second one is for long tours among many
+obstacles, where the first one would look at more poses than may be."""
+
+MOST_POSES = 400_000
+"""Poses of a search at most: about a second, and 40 MB."""
+
+
+def posed(
+    problem: Problem, r: int, cost_map: CostMap, tour: Sequence[int], halt: np.ndarray
+) -> RobotTask | None:
+    """Return a way of robot r over poses, which it has driven, or None.
+
+    Args:
+        problem: the mission.
+        r: robot, a car.
+        cost_map: what its paths are priced on.
+        tour: numbers of its targets.
+        halt: shape (1,); the search ends soon after it has turned true.
+    """
+    path = posed_path(problem, r, cost_map, tour, halt)
+    if path is None:
+        return None
+    drive = drive_alone(problem, r, with_pauses(problem, r, path))
+    visits = visit_steps(problem.mission.targets, tour, drive.motion.state)
+    if not drive.arrived or len(visits) < len(tour):
+        return None
+    before = replace(drive, spent_s=np.zeros(0))
+    return RobotTask(list(tour), path, cost_map, before)
+
+
+def posed_path(
+    problem: Problem, r: int, cost_map: CostMap, tour: Sequence[int], halt: np.ndarray
+) -> Path | None:
+    """Return a way of robot r over poses through its targets, or None; see `posed`."""
+    own, target = problem.mission.fleet[r : r + 1], np.array(tour, np.int64)
+    margin_m, bend = float(own[0]["margin"]), BEND_SHARE * cost_map.curvature
+    length, deeper = 2.0 * pi / HEADINGS / bend, np.full(len(tour), DEEPER_M)
+    search = PoseSearch(
+        own=own,
+        start=problem.start[r, :3].copy(),
+        spaces=problem.mission.spaces,
+        stops=Stops(
+            problem.mission.targets, target, target, deeper, problem.aims(r, tour)
+        ),
+        guide=Fields(problem).static(r, tour),
+        bend=bend,
+        length=length,
+        headings=HEADINGS,
+        cell=length * np.array(CELL_SHARES),
+        room=margin_m + np.array([ROOM_SHARE * margin_m, SLACK_M, 0.0]),
+        near=2.0 * float(own[0]["radius"]),
+        scrub=cost_map.scrub,
+        change=CHANGE_M,
+        weight=0.0,
+        halt=halt,
+    )
+    poses = np.empty(MOST_POSES, POSE)
+    for weight in WEIGHTS:
+        search = search._replace(weight=weight)
+        table = np.full(1 << (2 * MOST_POSES).bit_length(), -1, np.int64)
+        last = _pose_kernels.find_poses(search, poses, table)
+        if last >= 0:
+            break
+    if last < 1:
+        return None
+    pose, stop = _pose_kernels.poses_to(search, poses, last)
+    way, stop = _shortening_kernels.shortest_way(search, pose, stop)
+    return Path(
+        node=way[:, :2].copy(),
+        gear=way[1:, 2].astype(np.int64),
+        stop=stop,
+        target=target,
+        deeper=deeper,
+        pivot=np.zeros(0, np.int64),
+        heading=float(problem.start[r, 2]),
+        pause_s=np.zeros(len(tour)),
+        aim=search.stops.aim,
+    )

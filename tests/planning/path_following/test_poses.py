@@ -1,0 +1,224 @@
+"""Ways over poses, for cars that have to turn among obstacles."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Any
+
+import numpy as np
+import pytest
+from shapely import affinity
+from shapely.geometry import Point, Polygon, box
+from shapely.ops import unary_union
+
+import mrmg
+from mrmg.planning import PlannerParams, plan_mission
+from mrmg.planning.path_following import _pose_kernels, poses
+from mrmg.planning.path_following.band import Path
+from mrmg.planning.path_following.coordination.fields import Fields
+from mrmg.planning.path_following.poses import HEADINGS, posed, posed_path
+from mrmg.planning.path_following.refine import cost_maps_of
+from mrmg.planning.problem.problem import Problem, state_mission
+from mrmg.scene.loading import scene_from_document
+from mrmg.scene.types import Scene
+
+QUICK = PlannerParams(improvements=0)
+NEVER = np.zeros(1, bool)
+AISLE = [("low", 4.0), ("high", 8.0)]
+"""Racks beside an aisle in which a car cannot turn round, and their middles [m]."""
+
+OPPOSITE = ((10.0, 5.3), (10.5, 6.7))
+"""Places of goals beside the two racks."""
+
+
+def hall(
+    *places: tuple[float, float],
+    pose: tuple[float, float, float] = (3.0, 6.0, 0.0),
+    finish: dict[str, Any] | None = None,
+    model: str = "car",
+) -> Scene:
+    """Return a hall of 16 x 12 m with two racks, and goals for one robot.
+
+    Args:
+        places: of goals [m].
+        pose: of the robot.
+        finish: where it must end.
+        model: of the robot.
+    """
+    robot: dict[str, Any] = {"id": "r", "model": model, "pose": list(pose)}
+    if finish:
+        robot["finish"] = finish
+    return scene_from_document(
+        {
+            "format": 1,
+            "name": "hall",
+            "bounds": [0, 0, 16, 12],
+            "obstacles": [
+                {"id": name, "box": {"center": [10, y], "size": [7, 1]}, "height": 1.8}
+                for name, y in AISLE
+            ],
+            "goals": [
+                {"id": f"g{i}", "circle": {"center": list(at), "radius": 0.3}}
+                for i, at in enumerate(places)
+            ],
+            "battery": {"capacity_m": 300},
+            "robots": [robot],
+        },
+        source="hall",
+    )
+
+
+def stated(scene: Scene) -> tuple[Problem, list[int]]:
+    """Return the problem of a scene, and its targets in their order."""
+    problem = state_mission(scene, 0, QUICK)
+    targets = problem.mission.targets
+    ends = [int(t) for t in targets.finish if t >= 0]
+    return problem, [*range(targets.goals), *ends]
+
+
+def way_of(scene: Scene) -> tuple[Problem, Path]:
+    """Return the problem of a scene, and a way over poses through its targets."""
+    problem, tour = stated(scene)
+    path = posed_path(problem, 0, cost_maps_of(problem)[0], tour, NEVER)
+    assert path is not None
+    return problem, path
+
+
+def headings(path: Path) -> np.ndarray:
+    """Return the heading half way along each segment of a path [rad]."""
+    chord = np.diff(path.node, axis=0) * path.gear[:, None]
+    return np.arctan2(chord[:, 1], chord[:, 0])
+
+
+def free_ground(scene: Scene) -> Polygon:
+    """Return the ground of a scene without its obstacles."""
+    racks = unary_union([one.shape for one in scene.barriers])
+    return box(0, 0, 16, 12).difference(racks)
+
+
+DOCK = (0.56, 6.0, 0.0)
+"""A pose with the back to a wall."""
+
+DOCKED = {"circle": {"center": list(DOCK[:2]), "radius": 0.25}, "heading": DOCK[2]}
+
+MISSIONS = [
+    hall(*OPPOSITE),
+    hall(*OPPOSITE[::-1], pose=(3.0, 2.0, pi)),
+    hall((10.0, 5.3), pose=DOCK, finish=DOCKED),
+]
+
+
+@pytest.mark.parametrize("scene", MISSIONS)
+def test_ways_keep_clear(scene: Scene) -> None:
+    """Every footprint along a way lies in free ground, by shapely."""
+    _, path = way_of(scene)
+    footprint, free = Polygon(scene.robots[0].model.footprint_m), free_ground(scene)
+    middles = 0.5 * (path.node[1:] + path.node[:-1])
+    for (x, y), angle in zip(middles, headings(path), strict=True):
+        turned = affinity.rotate(footprint, angle, (0, 0), use_radians=True)
+        assert free.contains(affinity.translate(turned, x, y))
+
+
+@pytest.mark.parametrize("scene", MISSIONS)
+def test_ways_turn_as_cars_do(scene: Scene) -> None:
+    """No turn is sharper than the car's least radius, and none is on the spot."""
+    problem, path = way_of(scene)
+    radius_m = float(problem.mission.fleet[0]["turning_radius"])
+    angle = np.array([path.heading, *headings(path)])
+    turn = np.abs((np.diff(angle) + pi) % (2.0 * pi) - pi)
+    size = np.hypot(*np.diff(path.node, axis=0).T)
+    between = 0.5 * (size + np.concatenate([[0.0], size[:-1]]))
+    assert (turn <= between / radius_m + 1e-6).all()
+
+
+@pytest.mark.parametrize("scene", MISSIONS)
+def test_ways_visit_targets_in_order(scene: Scene) -> None:
+    """The nodes at stops lie in the targets' regions, and the last one ends the way."""
+    problem, path = way_of(scene)
+    places = [*scene.targets(), *[r.finish for r in scene.robots if r.finish]]
+    assert (np.diff(path.stop) >= 0).all()
+    assert path.stop[-1] == len(path.node) - 1
+    for node, target in zip(path.stop, path.target, strict=True):
+        assert places[target].region.shape.contains(Point(path.node[node]))
+    assert np.allclose(path.node[0], problem.start[0, :2])
+
+
+def test_shortening_gains_and_keeps_stops() -> None:
+    """Chains of shortest curves are shorter than the arcs that were found."""
+    problem, path = way_of(MISSIONS[0])
+    found: list[np.ndarray] = []
+
+    def poses_to(*given: Any) -> Any:
+        pose, stop = original(*given)
+        found.append(pose)
+        return pose, stop
+
+    original = _pose_kernels.poses_to
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(_pose_kernels, "poses_to", poses_to)
+        way_of(MISSIONS[0])
+    arcs_m = float(np.hypot(*np.diff(found[0][:, :2], axis=0).T).sum())
+    assert path.way[-1] < 0.99 * arcs_m
+    assert np.allclose(path.node[-1], found[0][-1, :2], atol=1e-3)
+    assert problem.mission.targets.goals == len(path.stop)
+
+
+def test_driving_needs_no_smoothing() -> None:
+    """A way is driven as it is, to all of its targets."""
+    problem, tour = stated(MISSIONS[0])
+    task = posed(problem, 0, cost_maps_of(problem)[0], tour, NEVER)
+    assert task is not None
+    assert task.before is not None
+    assert task.before.arrived
+
+
+def test_cost_to_go_reaches_robots_beside_walls() -> None:
+    """A car with its back to a wall has a way to its targets."""
+    problem, tour = stated(MISSIONS[2])
+    field = Fields(problem).static(0, tour)
+    column, row = (
+        int((value - corner) // field.cell)
+        for value, corner in zip(
+            problem.start[0, :2], (field.x_min, field.y_min), strict=True
+        )
+    )
+    assert np.isfinite(field.field[0, 0, row, column])
+
+
+def test_searches_end_when_told() -> None:
+    """A search that is halted finds nothing."""
+    problem, tour = stated(MISSIONS[0])
+    cost_map = cost_maps_of(problem)[0]
+    assert posed_path(problem, 0, cost_map, tour, np.ones(1, bool)) is None
+
+
+def test_searches_end_without_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A search that has no more room for poses finds nothing."""
+    problem, tour = stated(MISSIONS[0])
+    monkeypatch.setattr(poses, "MOST_POSES", 100)
+    assert posed_path(problem, 0, cost_maps_of(problem)[0], tour, NEVER) is None
+
+
+def test_headings_that_targets_want_are_kept() -> None:
+    """A way ends within a step of headings of what a finish wants."""
+    scene = MISSIONS[2]
+    _, path = way_of(scene)
+    last = headings(path)[-1]
+    assert abs((last + pi) % (2.0 * pi) - pi) < 2.0 * pi / HEADINGS
+
+
+BESIDE = (*OPPOSITE, (15.2, 6.0), (9.0, 2.7), (11.0, 9.3))
+"""Places of goals on both sides of both racks, and beside a wall."""
+
+
+@pytest.mark.parametrize(
+    "scene", [*MISSIONS, hall(*BESIDE), hall(*BESIDE, pose=DOCK, finish=DOCKED)]
+)
+def test_cars_get_through_halls(scene: Scene) -> None:
+    """Missions in halls have plans that the verifier accepts.
+
+    The last two have none by smoothed paths and the search for motions alone.
+    """
+    result = plan_mission(scene, params=QUICK)
+    assert result.plan is not None, result.reason
+    assert mrmg.verify(scene, result.plan).ok
