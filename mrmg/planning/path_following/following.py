@@ -117,19 +117,13 @@ def follow_tours(
     tried: list[list[Path]] = []
     failed = Followed(None, driven=False)
     sharps = _turns_to_change_gear_at(problem, timed)
-
-    @cache
-    def over_poses(r: int) -> RobotTask | None:
-        if problem.mission.fleet[r]["model"] != CAR:
-            return None
-        return posed(problem, r, cost_maps[r], stops[r], halt)
-
+    over_poses = cache(partial(_over_poses, problem, cost_maps, stops, halt))
     for sharp in sharps:
         paths = [
             tour_path(problem, r, _led(problem, r, tour), sharp, deeper_m)
             for r, tour in enumerate(stops)
         ]
-        if any(_same_gears(paths, before) for before in tried):
+        if halt[0] or any(_same_gears(paths, before) for before in tried):
             continue
         tried.append(paths)
         judged = number > 0 and not timed
@@ -145,16 +139,13 @@ def follow_tours(
             _otherwise, problem, tasks, paths, sharps, deeper_m, judged, over_poses
         )
         drive = drive_paths(problem, tasks, halt, others)
-        if drive.trajectories:
-            plan = plan_or_refusal(problem, seed, params, drive.trajectories, tours)
-            if isinstance(plan, Plan):
-                return Followed(plan)
-            leg_J = legs_driven_J(problem, drive.trajectories, tours)
-            failed = Followed(None, plan, leg_J=leg_J)
-        else:
-            failed = Followed(None, drive.failure, failed.driven)
-        if not drive.trajectories or halt[0]:
-            break
+        if not drive.trajectories:
+            return Followed(None, drive.failure, failed.driven)
+        plan = plan_or_refusal(problem, seed, params, drive.trajectories, tours)
+        if isinstance(plan, Plan):
+            return Followed(plan)
+        leg_J = legs_driven_J(problem, drive.trajectories, tours)
+        failed = Followed(None, plan, leg_J=leg_J)
     return failed
 
 
@@ -218,6 +209,19 @@ def _otherwise(
             yield RobotTask(tasks[r].tour, path, tasks[r].cost_map)
     if (task := over_poses(r)) is not None:
         yield replace(task, inflations=[])
+
+
+def _over_poses(
+    problem: Problem,
+    cost_maps: Sequence[CostMap],
+    stops: Sequence[list[int]],
+    halt: np.ndarray,
+    r: int,
+) -> RobotTask | None:
+    """Return robot r's way over poses, if it is a car and there is one."""
+    if problem.mission.fleet[r]["model"] != CAR:
+        return None
+    return posed(problem, r, cost_maps[r], stops[r], halt)
 
 
 def _same_gears(paths: Sequence[Path], others: Sequence[Path]) -> bool:

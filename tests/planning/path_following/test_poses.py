@@ -174,7 +174,7 @@ def test_driving_needs_no_smoothing() -> None:
 
 def test_cost_to_go_reaches_robots_beside_walls() -> None:
     """A car with its back to a wall has a way to its targets."""
-    problem, tour = stated(MISSIONS[2])
+    problem, tour = stated(hall((10.0, 5.3), pose=DOCK))
     field = Fields(problem).static(0, tour)
     column, row = (
         int((value - corner) // field.cell)
