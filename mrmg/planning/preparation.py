@@ -103,6 +103,12 @@ def follow_smallest() -> None:
     assert turned_outside(problem, 0, tour_path(problem, 0, [0]), passing=0.0)
 
 
+def follow_and_pose_smallest() -> None:
+    """Do both, which share most of their kernels."""
+    follow_smallest()
+    pose_smallest()
+
+
 def guide_smallest() -> None:
     """Plan the smallest mission by the paper's method."""
     _plan_smallest(SMALL_PAPER_PARAMS)
