@@ -117,7 +117,7 @@ def follow_tours(
     tried: list[list[Path]] = []
     failed = Followed(None, driven=False)
     sharps = _turns_to_change_gear_at(problem, timed)
-    over_poses = cache(partial(_over_poses, problem, cost_maps, stops, halt))
+    over_poses = cache(partial(_over_poses, problem, cost_maps, stops, halt, number))
     for sharp in sharps:
         paths = [
             tour_path(problem, r, _led(problem, r, tour), sharp, deeper_m)
@@ -216,12 +216,14 @@ def _over_poses(
     cost_maps: Sequence[CostMap],
     stops: Sequence[list[int]],
     halt: np.ndarray,
+    number: int,
     r: int,
 ) -> RobotTask | None:
     """Return robot r's way over poses, if it is a car and there is one."""
     if problem.mission.fleet[r]["model"] != CAR:
         return None
-    return posed(problem, r, cost_maps[r], stops[r], halt)
+    soon = number == 0
+    return posed(problem, r, cost_maps[r], stops[r], halt, soon=soon)
 
 
 def _same_gears(paths: Sequence[Path], others: Sequence[Path]) -> bool:

@@ -43,15 +43,21 @@ CHANGE_M = 1.0
 """Plain ground that a change of gear is worth [m]."""
 
 WEIGHTS = (1.2, 2.0)
-"""Weights of the cost-to-go that are tried: the second one is for long tours among many
-obstacles, where the first one would look at more poses than may be."""
+"""Weights of the cost-to-go: only the second one if a way is wanted soon, or after the
+first one, with which long tours take more poses than may be."""
 
 MOST_POSES = 400_000
 """Poses of a search at most: about a second, and 40 MB."""
 
 
 def posed(
-    problem: Problem, r: int, cost_map: CostMap, tour: Sequence[int], halt: np.ndarray
+    problem: Problem,
+    r: int,
+    cost_map: CostMap,
+    tour: Sequence[int],
+    halt: np.ndarray,
+    *,
+    soon: bool = False,
 ) -> RobotTask | None:
     """Return a way of robot r over poses, which it has driven, or None.
 
@@ -61,8 +67,9 @@ def posed(
         cost_map: what its paths are priced on.
         tour: numbers of its targets.
         halt: shape (1,); the search ends soon after it has turned true.
+        soon: whether a way soon is worth more than a cheap one.
     """
-    path = posed_path(problem, r, cost_map, tour, halt)
+    path = posed_path(problem, r, cost_map, tour, halt, soon=soon)
     if path is None:
         return None
     drive = drive_alone(problem, r, with_pauses(problem, r, path))
@@ -74,7 +81,13 @@ def posed(
 
 
 def posed_path(
-    problem: Problem, r: int, cost_map: CostMap, tour: Sequence[int], halt: np.ndarray
+    problem: Problem,
+    r: int,
+    cost_map: CostMap,
+    tour: Sequence[int],
+    halt: np.ndarray,
+    *,
+    soon: bool = False,
 ) -> Path | None:
     """Return a way of robot r over poses through its targets, or None; see `posed`."""
     own, target = problem.mission.fleet[r : r + 1], np.array(tour, np.int64)
@@ -100,7 +113,7 @@ def posed_path(
         halt=halt,
     )
     poses = np.empty(MOST_POSES, POSE)
-    for weight in WEIGHTS:
+    for weight in WEIGHTS[-1:] if soon else WEIGHTS:
         search = search._replace(weight=weight)
         table = np.full(1 << (2 * MOST_POSES).bit_length(), -1, np.int64)
         last = _pose_kernels.find_poses(search, poses, table)

@@ -163,6 +163,17 @@ def test_shortening_gains_and_keeps_stops() -> None:
     assert problem.mission.targets.goals == len(path.stop)
 
 
+def test_ways_are_cheaper_where_there_is_time() -> None:
+    """Between goals on both sides of an aisle, ways that have time are shorter."""
+    problem, tour = stated(hall(*((x, y) for x in (8.0, 10.0) for y in (5.25, 6.75))))
+    cost_map = cost_maps_of(problem)[0]
+    soon = posed_path(problem, 0, cost_map, tour, NEVER, soon=True)
+    cheap = posed_path(problem, 0, cost_map, tour, NEVER)
+    assert soon is not None
+    assert cheap is not None
+    assert cheap.way[-1] < 0.95 * soon.way[-1]
+
+
 def test_driving_needs_no_smoothing() -> None:
     """A way is driven as it is, to all of its targets."""
     problem, tour = stated(MISSIONS[0])
