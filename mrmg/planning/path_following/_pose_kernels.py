@@ -16,7 +16,7 @@ import numpy as np
 from mrmg.compilation import borrowed, kernel, record_type
 from mrmg.planning.path_following._band_kernels import Stops, outside
 from mrmg.planning.path_following.coordination._field_kernels import Guide, guide_at
-from mrmg.planning.path_following.coordination._node_kernels import is_new, place_of
+from mrmg.planning.path_following.coordination._node_kernels import place_of
 from mrmg.planning.problem._clearance_kernels import keeps_clear
 from mrmg.planning.problem._control_kernels import wrap
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS, Spaces
@@ -159,6 +159,14 @@ def cell_of(search, leg, heading, x, y):
 
 
 @kernel
+def write_start(search, first):
+    """Write the pose that a search begins with."""
+    first.before, first.gear, first.turn, first.heading, first.cost = -1, 0, 0, 0, 0.0
+    first.x, first.y, first.theta = search.start[0], search.start[1], search.start[2]
+    first.leg = legs_after(search, 0, search.start.reshape(1, 3))
+
+
+@kernel
 def find_poses(search, poses, table):
     """Find poses from the start through all targets; return the number of the last.
 
@@ -173,11 +181,12 @@ def find_poses(search, poses, table):
     search, poses, table = borrowed(search), borrowed(poses), borrowed(table)
     legs, most = len(search.stops.target), len(poses)
     key, entry = np.empty(most + 1), np.empty(most + 1, np.int64)
+    least = np.full(len(table), np.inf)  # cost of a cell's pose; of a closed one -inf
     piece, corner = np.empty((PIECES, 3)), np.empty((MOST_CORNERS, 2))
-    first = poses[0]
-    first.before, first.gear, first.turn, first.heading, first.cost = -1, 0, 0, 0, 0.0
-    first.x, first.y, first.theta = search.start[0], search.start[1], search.start[2]
-    first.leg = legs_after(search, 0, search.start.reshape(1, 3))
+    write_start(search, poses[0])
+    cell = cell_of(search, poses[0].leg, 0, search.start[0], search.start[1])
+    at = place_of(table, cell)
+    table[at], least[at] = cell, 0.0
     size, opened = 1, push(key, entry, 0, 0.0, 0)
     while opened > 0 and not search.halt[0]:
         a = entry[0]
@@ -185,8 +194,10 @@ def find_poses(search, poses, table):
         pose = poses[a]
         if pose.leg == legs:
             return a
-        if not is_new(table, cell_of(search, pose.leg, pose.heading, pose.x, pose.y)):
+        at = place_of(table, cell_of(search, pose.leg, pose.heading, pose.x, pose.y))
+        if pose.cost > least[at]:
             continue
+        least[at] = -np.inf
         for arc in range(WAYS_ON):
             gear, turn = 1 - arc // 3 * 2, arc % 3 - 1
             if gear < 0 and search.own[0].limit[0] >= 0.0:
@@ -194,28 +205,25 @@ def find_poses(search, poses, table):
             write_arc(search, pose, gear, turn, piece)
             x, y, theta = piece[-1]
             heading = (pose.heading + gear * turn) % search.headings
-            cell = cell_of(search, pose.leg, heading, x, y)
-            if table[place_of(table, cell)] == cell:
-                continue
-            if not rest_m(search, pose.leg, x, y) < np.inf:
+            leg = legs_after(search, pose.leg, piece)
+            turned = search.scrub * search.length * search.bend * abs(turn)
+            changed = search.change if gear * pose.gear < 0 else 0.0
+            cost = pose.cost + search.length + turned + changed
+            cell = cell_of(search, leg, heading, x, y)
+            at = place_of(table, cell)
+            rest = rest_m(search, leg, x, y)
+            if not (cost < least[at] and rest < np.inf):
                 continue
             if not is_free(search, pose.leg, piece, corner):
                 continue
-            leg = legs_after(search, pose.leg, piece)
-            rest = rest_m(search, leg, x, y)
-            if not rest < np.inf:
-                continue
             if size == most:
                 return -1
+            table[at], least[at] = cell, cost
             after = poses[size]
             after.before, after.gear, after.turn = a, gear, turn
-            after.heading, after.leg = heading, leg
+            after.heading, after.leg, after.cost = heading, leg, cost
             after.x, after.y, after.theta = x, y, theta
-            turned = search.scrub * search.length * search.bend * abs(turn)
-            changed = search.change if gear * pose.gear < 0 else 0.0
-            after.cost = pose.cost + search.length + turned + changed
-            value = after.cost + search.weight * rest
-            opened = push(key, entry, opened, value, size)
+            opened = push(key, entry, opened, cost + search.weight * rest, size)
             size += 1
     return -1
 

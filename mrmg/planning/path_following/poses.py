@@ -46,8 +46,8 @@ WEIGHTS = (1.2, 2.0)
 """Weights of the cost-to-go: only the second one if a way is wanted soon, or after the
 first one, with which long tours take more poses than may be."""
 
-MOST_POSES = 400_000
-"""Poses of a search at most: about a second, and 40 MB."""
+MOST_POSES = 200_000
+"""Poses of a search at most: about half a second, and 25 MB."""
 
 
 def posed(
