@@ -1,9 +1,9 @@
-"""Search over a car's poses along its tour, among obstacles alone.
+"""Search over a robot's poses along its tour, among obstacles alone.
 
 An A* whose nodes are poses, of which one counts in each cell of position and heading:
 hybrid A*, D. Dolgov et al., Practical search techniques in path planning for autonomous
 driving, 2008. A car drives straight or turns as sharply as its paths may, in either
-gear.
+gear; a robot that can turns on the spot.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import borrowed, kernel, record_type
+from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.path_following._band_kernels import Stops, outside
 from mrmg.planning.path_following.coordination._field_kernels import Guide, guide_at
 from mrmg.planning.path_following.coordination._node_kernels import place_of
@@ -23,7 +24,8 @@ from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS, Spaces
 from mrmg.planning.roadmap._heap_kernels import pop, push
 
 WAYS_ON = 6
-"""Arcs that lead on from a pose: straight, left and right, in either gear."""
+"""Arcs that lead on from a pose: to the right, straight, to the left, in either gear.
+"""
 
 PIECES = 3
 """Pieces of an arc; the pose at the end of each is looked at."""
@@ -51,12 +53,12 @@ class PoseSearch(NamedTuple):
     """What poses are searched for.
 
     Attributes:
-        own: the car, shape (1,).
+        own: the robot, shape (1,).
         start: its pose, shape (3,).
         spaces: free spaces of the fleet.
         stops: the targets, in order, and how deep they are entered.
         guide: costs-to-go on each leg.
-        bend: curvature of turns [1/m].
+        bend: curvature of a car's turns [1/m].
         length: of an arc [m].
         headings: in a full turn.
         cell: side of a cell of positions where a pose is, shape (3,) [m].
@@ -86,10 +88,31 @@ class PoseSearch(NamedTuple):
 
 
 @kernel
+def pivots(search, turn):
+    """Return whether a robot turns on the spot in an arc with such a turn."""
+    return turn != 0 and search.own[0].model == UNICYCLE
+
+
+@kernel
+def may_drive(search, gear, turn):
+    """Return whether a robot can drive an arc; to turn on the spot takes no gear."""
+    return gear > 0 or (search.own[0].limit[0] < 0.0 and not pivots(search, turn))
+
+
+@kernel
+def arc_cost(search, pose, gear, turn):
+    """Return the cost of an arc from a pose on [m of plain ground]."""
+    cost = search.scrub * abs(turn) * 2.0 * pi / search.headings
+    if not pivots(search, turn):
+        cost += search.length + (search.change if gear * pose.gear < 0 else 0.0)
+    return cost
+
+
+@kernel
 def write_arc(search, pose, gear, turn, piece):
     """Write the poses at the ends of an arc's pieces, shape (PIECES, 3)."""
-    way = gear * search.length / PIECES
-    swing = 0.5 * way * turn * search.bend
+    way = 0.0 if pivots(search, turn) else gear * search.length / PIECES
+    swing = gear * turn * pi / search.headings / PIECES
     chord = way * (sin(swing) / swing if turn != 0 else 1.0)
     x, y, theta = pose.x, pose.y, pose.theta
     for i in range(PIECES):
@@ -132,7 +155,7 @@ def legs_after(search, leg, piece):
 
 @kernel
 def is_free(search, leg, piece, corner):
-    """Return whether a car has room along an arc on a leg."""
+    """Return whether a robot has room along an arc on a leg."""
     for i in range(len(piece) - 1, -1, -1):
         room = search.room[where_is(search, leg, piece[i, 0], piece[i, 1])]
         if not keeps_clear(search.own, search.spaces, piece[i], room, corner):
@@ -200,15 +223,13 @@ def find_poses(search, poses, table):
         least[at] = -np.inf
         for arc in range(WAYS_ON):
             gear, turn = 1 - arc // 3 * 2, arc % 3 - 1
-            if gear < 0 and search.own[0].limit[0] >= 0.0:
+            if not may_drive(search, gear, turn):
                 continue
             write_arc(search, pose, gear, turn, piece)
             x, y, theta = piece[-1]
             heading = (pose.heading + gear * turn) % search.headings
             leg = legs_after(search, pose.leg, piece)
-            turned = search.scrub * search.length * search.bend * abs(turn)
-            changed = search.change if gear * pose.gear < 0 else 0.0
-            cost = pose.cost + search.length + turned + changed
+            cost = pose.cost + arc_cost(search, pose, gear, turn)
             cell = cell_of(search, leg, heading, x, y)
             at = place_of(table, cell)
             rest = rest_m(search, leg, x, y)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from math import ceil, cos, sin
+from math import atan2, ceil, cos, hypot, pi, sin
 
 import numpy as np
 
 from mrmg.compilation import borrowed, kernel
+from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.path_following._pose_kernels import PIECES, is_free
 from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
     MOST_PIECES,
     reeds_shepp,
 )
+from mrmg.planning.problem._control_kernels import wrap
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 
 SHORTEST_M = 1e-3
@@ -19,17 +21,48 @@ SHORTEST_M = 1e-3
 
 
 @kernel
+def write_turns(search, a, b, curve):
+    """Write the turn, the straight way and the turn from one pose to another.
+
+    Arguments and what is returned are those of `write_curve`; turns take no way.
+    """
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    far = hypot(dx, dy)
+    ahead, gear = (atan2(dy, dx) if far > SHORTEST_M else b[2]), 1.0
+    first, last = wrap(ahead - a[2]), wrap(b[2] - ahead)
+    if search.own[0].limit[0] < 0.0 and abs(first) + abs(last) > pi:
+        gear, first, last = -1.0, wrap(first + pi), wrap(last + pi)
+    step = 2.0 * pi / search.headings / PIECES
+    sizes = abs(first) / step, far * PIECES / search.length, abs(last) / step
+    if not sizes[0] + sizes[1] + sizes[2] < len(curve) - MOST_PIECES:
+        return 0, np.inf
+    x, y, theta, n = a[0], a[1], a[2], 0
+    for p in range(MOST_PIECES):
+        pieces = int(ceil(sizes[p] - 1e-9))
+        for _ in range(pieces):
+            if p == 1:
+                x, y = x + dx / pieces, y + dy / pieces
+            else:
+                theta += (first if p == 0 else last) / pieces
+            curve[n, 0], curve[n, 1], curve[n, 2], curve[n, 3] = x, y, theta, gear
+            n += 1
+    return n, far + search.scrub * (abs(first) + abs(last))
+
+
+@kernel
 def write_curve(search, a, b, curve):
     """Write the shortest curve from one pose to another, piece by piece.
 
     Args:
-        search: gives the curvature of turns.
+        search: gives the robot and the curvature of its turns.
         a, b: poses, shape (3,).
         curve: receives (x, y, heading, gear) at the ends of pieces, shape (n, 4).
 
     Returns:
         (number of them, cost [m of plain ground]); (0, inf) if there is no room.
     """
+    if search.own[0].model == UNICYCLE:
+        return write_turns(search, a, b, curve)
     turn, length = np.zeros(MOST_PIECES), np.zeros(MOST_PIECES)
     radius = 1.0 / search.bend
     total = reeds_shepp(b[0] - a[0], b[1] - a[1], a[2], b[2], radius, turn, length)
@@ -69,8 +102,8 @@ def shortest_way(search, pose, stop):
         stop: numbers of its poses at targets, shape (S,).
 
     Returns:
-        Its (x, y, gear) at the ends of pieces, shape (m, 3), and the numbers of those
-        at targets.
+        Its (x, y, heading, gear) at the ends of pieces, shape (m, 4), and the numbers
+        of those at targets.
     """
     search = borrowed(search)
     n, corner = len(pose), np.empty((MOST_CORNERS, 2))
@@ -89,21 +122,15 @@ def shortest_way(search, pose, stop):
             count, more = write_curve(search, pose[i], pose[j], curve)
             if cost[i] + more < cost[j] and is_free(search, leg, curve[:count], corner):
                 cost[j], before[j] = cost[i] + more, i
-    # The chain, last curve first, then its pieces in order.
-    chain, m = np.zeros(n, np.int64), 0
-    j = n - 1
+    chain, m, size, j = np.zeros(n, np.int64), 0, 1, n - 1  # last curve first
     while j > 0:
-        chain[m], m = j, m + 1
-        j = before[j]
-    way, size = np.empty((4 * PIECES * (n + MOST_PIECES), 3)), 1
-    way[0, 0], way[0, 1], way[0, 2] = pose[0, 0], pose[0, 1], 0.0
-    there = np.zeros(len(stop), np.int64)
-    for k in range(m - 1, -1, -1):
-        j = chain[k]
+        size += write_curve(search, pose[before[j]], pose[j], curve)[0]
+        chain[m], m, j = j, m + 1, before[j]
+    way, there = np.empty((size, 4)), np.zeros(len(stop), np.int64)
+    way[0, :3], way[0, 3], size = pose[0], 0.0, 1
+    for j in chain[:m][::-1]:
         count, _ = write_curve(search, pose[before[j]], pose[j], curve)
-        for i in range(count):
-            way[size, 0], way[size, 1] = curve[i, 0], curve[i, 1]
-            way[size, 2] = curve[i, 3]
-            size += 1
+        way[size : size + count] = curve[:count]
+        size += count
         there[stop == j] = size - 1
-    return way[:size].copy(), there
+    return way, there

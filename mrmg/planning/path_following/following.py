@@ -15,7 +15,7 @@ from math import pi, radians
 
 import numpy as np
 
-from mrmg.motion._kernels import CAR, UNICYCLE, USER
+from mrmg.motion._kernels import UNICYCLE, USER
 from mrmg.planning.assembly import plan_or_refusal
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
@@ -29,12 +29,10 @@ from mrmg.planning.path_following.band import (
 from mrmg.planning.path_following.coordination.tasks import is_one_pose
 from mrmg.planning.path_following.driven_legs import Leg, legs_driven_J
 from mrmg.planning.path_following.gears import with_best_gears
-from mrmg.planning.path_following.narrow_turns import turned_outside
 from mrmg.planning.path_following.poses import posed
 from mrmg.planning.path_following.refine import cost_maps_of, drive_paths
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.problem.problem import Problem
-from mrmg.planning.problem.targets import target_depth_m
 from mrmg.planning.routing.routing import Routing
 from mrmg.plans import Plan
 
@@ -53,13 +51,6 @@ PIVOT = radians(60.0)
 LEAST_SOC_MARGIN = 0.02
 """Share of a battery's capacity that plans always leave above its reserve: a robot may
 take a percent or two more than planned on slopes and in turns on the spot."""
-
-FIRST_PLAN_SHARE = 2.0 / 3.0
-"""How much deeper than needed first plans enter targets, as a share of what is needed:
-they seldom miss one, which spares driving again."""
-
-PASSING = radians(90.0)
-"""Turn up to which it passes through a target that it cannot turn round in."""
 
 JUDGED_M = 4.0
 """Distance of the nodes of paths that only tours are judged by."""
@@ -113,14 +104,13 @@ def follow_tours(
     stops = [whole_tour(problem, routing, r) for r in range(len(cost_maps))]
     tours = problem.visits(routing.tours)
     timed = problem.minimum_time or problem.preference.objective.makespan_weight > 0.0
-    deeper_m = _deeper_m(problem, number)
     tried: list[list[Path]] = []
     failed = Followed(None, driven=False)
     sharps = _turns_to_change_gear_at(problem, timed)
     over_poses = cache(partial(_over_poses, problem, cost_maps, stops, halt, number))
     for sharp in sharps:
         paths = [
-            tour_path(problem, r, _led(problem, r, tour), sharp, deeper_m)
+            tour_path(problem, r, _led(problem, r, tour), sharp)
             for r, tour in enumerate(stops)
         ]
         if halt[0] or any(_same_gears(paths, before) for before in tried):
@@ -135,9 +125,7 @@ def follow_tours(
             RobotTask(tour, path, cost_map, searched=len(path.stop) < len(tour))
             for tour, path, cost_map in zip(stops, paths, cost_maps, strict=True)
         ]
-        others = partial(
-            _otherwise, problem, tasks, paths, sharps, deeper_m, judged, over_poses
-        )
+        others = partial(_otherwise, problem, tasks, paths, judged, over_poses)
         drive = drive_paths(problem, tasks, halt, others)
         if not drive.trajectories:
             return Followed(None, drive.failure, failed.driven)
@@ -158,13 +146,6 @@ def _led(problem: Problem, r: int, tour: list[int]) -> list[int]:
     return [] if is_one_pose(problem, r, tour) else tour
 
 
-def _deeper_m(problem: Problem, number: int) -> float:
-    """Return how much deeper than needed paths of attempt `number` enter targets."""
-    if number == 0:
-        return FIRST_PLAN_SHARE * target_depth_m(problem.scene)
-    return TRACKING_M
-
-
 def _turns_to_change_gear_at(problem: Problem, timed: bool) -> tuple[float, ...]:
     """Return the turns from which on cars change gear, in the order of trying."""
     limit = problem.mission.fleet["limit"]
@@ -178,37 +159,24 @@ def _otherwise(
     problem: Problem,
     tasks: Sequence[RobotTask],
     paths: Sequence[Path],
-    sharps: Sequence[float],
-    deeper_m: float,
     judged: bool,
     over_poses: Callable[[int], RobotTask | None],
     r: int,
 ) -> Iterator[RobotTask]:
-    """Yield what robot r may drive instead: its tour with changes of gear elsewhere.
+    """Yield what robot r may do instead: drive over poses.
 
-    A car may then drive over poses. Where targets want headings it does so at once; and
-    where that fails its motions are searched for, from a path that has none.
+    Where targets want headings and that fails, its motions are searched for, from a
+    path that has none.
     """
-    tour, tried = [*paths[r].target], [paths[r]]
-    aims = np.isfinite(paths[r].aim)
+    if (task := over_poses(r)) is not None:
+        yield replace(task, inflations=[])
+    tour, aims = [*paths[r].target], np.isfinite(paths[r].aim)
     if aims.any():
-        if (task := over_poses(r)) is not None:
-            yield replace(task, inflations=[])
         led = tour[:-1] if aims[-1] else tour
-        path = tour_path(problem, r, led, sharps[0], deeper_m)
+        path = tour_path(problem, r, led)
         path = replace(path, aim=np.full(len(led), np.nan))
         path = _geared(problem, r, tasks[r].cost_map, path, judged)
         yield RobotTask(tour, path, tasks[r].cost_map, searched=True)
-        return
-    for sharp in sharps:
-        path = tour_path(problem, r, tour, sharp, deeper_m)
-        if problem.mission.fleet[r]["model"] == UNICYCLE:
-            path = turned_outside(problem, r, path, passing=0.0)
-        if not any(np.array_equal(path.gear, before.gear) for before in tried):
-            tried.append(path)
-            yield RobotTask(tasks[r].tour, path, tasks[r].cost_map)
-    if (task := over_poses(r)) is not None:
-        yield replace(task, inflations=[])
 
 
 def _over_poses(
@@ -219,8 +187,8 @@ def _over_poses(
     number: int,
     r: int,
 ) -> RobotTask | None:
-    """Return robot r's way over poses, if it is a car and there is one."""
-    if problem.mission.fleet[r]["model"] != CAR:
+    """Return robot r's way over poses, if there is one."""
+    if problem.mission.fleet[r]["model"] == USER:
         return None
     soon = number == 0
     return posed(problem, r, cost_maps[r], stops[r], halt, soon=soon)
@@ -253,7 +221,6 @@ def tour_path(
     r: int,
     tour: Sequence[int],
     sharp: float = SHARP,
-    deeper_m: float = TRACKING_M,
 ) -> Path:
     """Return the way of the roadmap along robot r's tour.
 
@@ -265,7 +232,6 @@ def tour_path(
         r: robot.
         tour: numbers of its targets.
         sharp: turn from which on a car changes gear [rad].
-        deeper_m: how much deeper than needed it enters its targets.
     """
     vertices, ends = problem.tour_vertices(r, tour)
     node = problem.roadmap.arrays.vertex[vertices]
@@ -278,7 +244,7 @@ def tour_path(
         gear=np.ones(len(node) - 1, np.int64),
         stop=stops,
         target=np.array(tour, np.int64),
-        deeper=np.full(len(tour), deeper_m),
+        deeper=np.full(len(tour), TRACKING_M),
         pivot=np.zeros(0, np.int64),
         heading=heading,
         pause_s=np.zeros(len(tour)),
@@ -299,7 +265,7 @@ def _geared(
 ) -> Path:
     """Return a path with the gears that look best, of a car if it may be priced."""
     if problem.mission.fleet[r]["model"] == UNICYCLE:
-        return turned_outside(problem, r, path, PASSING)
+        return path
     path = with_arrivals(problem, r, cost_map, path)
     if not judged:
         return path

@@ -1,6 +1,6 @@
-"""Ways of cars that have to turn among obstacles, found over their poses.
+"""Ways of robots that have to turn among obstacles, found over their poses.
 
-They are for tours on which a car finds no room along the roadmap's paths: these know
+They are for tours on which a robot finds no room along the roadmap's paths: these know
 places but no headings. What is found can be driven as it is.
 """
 
@@ -12,6 +12,7 @@ from math import pi
 
 import numpy as np
 
+from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.path_following import _pose_kernels, _shortening_kernels
 from mrmg.planning.path_following._band_kernels import CostMap, Stops
 from mrmg.planning.path_following._pose_kernels import POSE, PoseSearch
@@ -33,6 +34,9 @@ CELL_SHARES = (0.8, 0.27, 0.27)
 """Side of a cell, as a share of an arc's length: away from targets, near one, and near
 the start."""
 
+STRAIGHT_SHARE = 0.5
+"""Arc's length of a robot that turns on the spot, as a share of its radius."""
+
 SLACK_M = 0.03
 """Room beyond the margin near targets, for what driving is off its way [m]."""
 
@@ -40,7 +44,7 @@ DEEPER_M = 0.03
 """How much deeper than needed targets are entered, for the same reason."""
 
 CHANGE_M = 1.0
-"""Plain ground that a change of gear is worth [m]."""
+"""Plain ground that a change of gear is worth to a car [m]."""
 
 WEIGHTS = (1.2, 2.0)
 """Weights of the cost-to-go: only the second one if a way is wanted soon, or after the
@@ -63,7 +67,7 @@ def posed(
 
     Args:
         problem: the mission.
-        r: robot, a car.
+        r: robot that no user has modelled.
         cost_map: what its paths are priced on.
         tour: numbers of its targets.
         halt: shape (1,); the search ends soon after it has turned true.
@@ -92,7 +96,10 @@ def posed_path(
     """Return a way of robot r over poses through its targets, or None; see `posed`."""
     own, target = problem.mission.fleet[r : r + 1], np.array(tour, np.int64)
     margin_m, bend = float(own[0]["margin"]), BEND_SHARE * cost_map.curvature
-    length, deeper = 2.0 * pi / HEADINGS / bend, np.full(len(tour), DEEPER_M)
+    length, change_m = 2.0 * pi / HEADINGS / bend, CHANGE_M
+    if own[0]["model"] == UNICYCLE:
+        length, change_m = STRAIGHT_SHARE * float(own[0]["radius"]), 0.0
+    deeper = np.full(len(tour), DEEPER_M)
     search = PoseSearch(
         own=own,
         start=problem.start[r, :3].copy(),
@@ -108,7 +115,7 @@ def posed_path(
         room=margin_m + np.array([ROOM_SHARE * margin_m, SLACK_M, 0.0]),
         near=2.0 * float(own[0]["radius"]),
         scrub=cost_map.scrub,
-        change=CHANGE_M,
+        change=change_m,
         weight=0.0,
         halt=halt,
     )
@@ -123,13 +130,15 @@ def posed_path(
         return None
     pose, stop = _pose_kernels.poses_to(search, poses, last)
     way, stop = _shortening_kernels.shortest_way(search, pose, stop)
+    moves = np.append(True, np.hypot(*np.diff(way[:, :2], axis=0).T) > 0.0)
+    number = np.cumsum(moves) - 1
     return Path(
-        node=way[:, :2].copy(),
-        gear=way[1:, 2].astype(np.int64),
-        stop=stop,
+        node=way[moves, :2].copy(),
+        gear=way[moves, 3][1:].astype(np.int64),
+        stop=number[stop],
         target=target,
         deeper=deeper,
-        pivot=np.zeros(0, np.int64),
+        pivot=np.unique(number[~moves]),
         heading=float(problem.start[r, 2]),
         pause_s=np.zeros(len(tour)),
         aim=search.stops.aim,

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from math import pi
-
 from mrmg.compilation import kernel
 from mrmg.planning.roadmap._fleet_kernels import middle_at, space_of
 from mrmg.world._kernels import clearance_at_least, footprint_is_clear
 from mrmg.world._polygon_kernels import place_footprint
-
-HEADINGS = 24
-"""Headings of a robot that are looked at where it turns round."""
 
 
 @kernel
@@ -37,21 +32,3 @@ def keeps_clear(own, spaces, state, margin, corner):
         return True
     place_footprint(own[0].corner[:n], state[0], state[1], state[2], corner[:n])
     return footprint_is_clear(space, corner[:n], cx, cy, radius, margin)
-
-
-@kernel
-def has_room_to_turn(own, spaces, x, y, margin, corner):
-    """Return whether a robot keeps a margin as it turns round on the spot.
-
-    Args:
-        own: the robot, shape (1,).
-        spaces: free spaces of the fleet.
-        x, y: where it turns.
-        margin: that it keeps [m].
-        corner: room for a footprint, shape (M, 2).
-    """
-    for k in range(HEADINGS):
-        pose = x, y, 2.0 * pi * k / HEADINGS
-        if not keeps_clear(own, spaces, pose, margin, corner):
-            return False
-    return True

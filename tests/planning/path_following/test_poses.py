@@ -1,4 +1,4 @@
-"""Ways over poses, for cars that have to turn among obstacles."""
+"""Ways over poses, for robots that have to turn among obstacles."""
 
 from __future__ import annotations
 
@@ -107,16 +107,50 @@ MISSIONS = [
     hall((10.0, 5.3), pose=DOCK, finish=DOCKED),
 ]
 
+OF_TURNERS = [
+    hall((10.0, 5.0), (10.5, 7.0), model="diffdrive"),
+    hall((13.0, 5.0), pose=DOCK, finish=DOCKED, model="diffdrive"),
+]
+"""Missions of a robot that turns on the spot, though not where its goals are."""
 
-@pytest.mark.parametrize("scene", MISSIONS)
+
+@pytest.mark.parametrize("scene", [*MISSIONS, *OF_TURNERS])
 def test_ways_keep_clear(scene: Scene) -> None:
-    """Every footprint along a way lies in free ground, by shapely."""
+    """Every footprint along a way, turns included, lies in free ground, by shapely."""
     _, path = way_of(scene)
     footprint, free = Polygon(scene.robots[0].model.footprint_m), free_ground(scene)
     middles = 0.5 * (path.node[1:] + path.node[:-1])
-    for (x, y), angle in zip(middles, headings(path), strict=True):
+    poses = [*zip(middles, headings(path), strict=True)]
+    for pivot in path.pivot[path.pivot < len(path.gear)]:
+        before = headings(path)[pivot - 1] if pivot > 0 else path.heading
+        swing = (headings(path)[pivot] - before + pi) % (2.0 * pi) - pi
+        poses += [(path.node[pivot], before + t * swing) for t in np.linspace(0, 1, 9)]
+    for (x, y), angle in poses:
         turned = affinity.rotate(footprint, angle, (0, 0), use_radians=True)
         assert free.contains(affinity.translate(turned, x, y))
+
+
+@pytest.mark.parametrize("scene", OF_TURNERS)
+def test_robots_that_turn_on_the_spot_drive_straight_between(scene: Scene) -> None:
+    """Headings differ only where a way has a turn on the spot or changes gear."""
+    _, path = way_of(scene)
+    angle = np.array([path.heading, *headings(path)])
+    turn = np.abs((np.diff(angle) + pi) % (2.0 * pi) - pi)
+    assert set(np.flatnonzero(turn > 1e-6)) <= set(path.pivot)
+    assert len(path.pivot) > 0
+
+
+def test_robots_that_cannot_back_never_do() -> None:
+    """Without a gear to back in, a robot leaves a goal beside a rack forwards."""
+    problem, tour = stated(hall((10.0, 5.1), (3.0, 6.0), model="diffdrive"))
+    cost_map = cost_maps_of(problem)[0]
+    backed = posed_path(problem, 0, cost_map, tour, NEVER)
+    assert backed is not None
+    assert (backed.gear == -1).any()
+    problem.mission.fleet["limit"][0, 0] = 0.0
+    path = posed_path(problem, 0, cost_map, tour, NEVER)
+    assert path is not None
+    assert (path.gear == 1).all()
 
 
 @pytest.mark.parametrize("scene", MISSIONS)
@@ -131,7 +165,7 @@ def test_ways_turn_as_cars_do(scene: Scene) -> None:
     assert (turn <= between / radius_m + 1e-6).all()
 
 
-@pytest.mark.parametrize("scene", MISSIONS)
+@pytest.mark.parametrize("scene", [*MISSIONS, *OF_TURNERS])
 def test_ways_visit_targets_in_order(scene: Scene) -> None:
     """The nodes at stops lie in the targets' regions, and the last one ends the way."""
     problem, path = way_of(scene)
@@ -174,9 +208,10 @@ def test_ways_are_cheaper_where_there_is_time() -> None:
     assert cheap.way[-1] < 0.95 * soon.way[-1]
 
 
-def test_driving_needs_no_smoothing() -> None:
+@pytest.mark.parametrize("scene", [MISSIONS[0], *OF_TURNERS])
+def test_driving_needs_no_smoothing(scene: Scene) -> None:
     """A way is driven as it is, to all of its targets."""
-    problem, tour = stated(MISSIONS[0])
+    problem, tour = stated(scene)
     task = posed(problem, 0, cost_maps_of(problem)[0], tour, NEVER)
     assert task is not None
     assert task.before is not None
@@ -225,7 +260,7 @@ BESIDE = (*OPPOSITE, (15.2, 6.0), (9.0, 2.7), (11.0, 9.3))
 @pytest.mark.parametrize(
     "scene", [*MISSIONS, hall(*BESIDE), hall(*BESIDE, pose=DOCK, finish=DOCKED)]
 )
-def test_cars_get_through_halls(scene: Scene) -> None:
+def test_robots_get_through_halls(scene: Scene) -> None:
     """Missions in halls have plans that the verifier accepts.
 
     The last two have none by smoothed paths and the search for motions alone.
@@ -233,3 +268,12 @@ def test_cars_get_through_halls(scene: Scene) -> None:
     result = plan_mission(scene, params=QUICK)
     assert result.plan is not None, result.reason
     assert mrmg.verify(scene, result.plan).ok
+
+
+@pytest.mark.parametrize("scene", OF_TURNERS)
+def test_robots_that_turn_on_the_spot_need_no_search(scene: Scene) -> None:
+    """Goals beside racks and docks beside walls take no search for motions."""
+    result = plan_mission(scene, params=QUICK)
+    assert result.plan is not None, result.reason
+    assert mrmg.verify(scene, result.plan).ok
+    assert result.statistics["coordinated"] == 0
