@@ -38,12 +38,6 @@ MERGED_M = 0.1
 SHORTEST_M = 0.15
 """Way between two changes of gear below which there is none."""
 
-STAYING_M = 0.005
-"""Way of a step below which a robot stays where it is."""
-
-LEAST_PIVOT = 0.5
-"""Angle of a turn on the spot that counts as one [rad]."""
-
 TRACKING_M = 0.01
 """How much deeper than needed a path enters its targets, to begin with."""
 
@@ -169,23 +163,12 @@ def path_of(
         stop=np.array(visits, np.int64),
         target=np.array(tour, np.int64),
         deeper=np.full(len(visits), TRACKING_M),
-        pivot=_pivots(state),
+        pivot=np.zeros(0, np.int64),
         heading=float(state[0, 2]),
         pause_s=np.zeros(len(visits)),
         aim=aim,
     )
     return respaced(path)
-
-
-def _pivots(state: np.ndarray) -> np.ndarray:
-    """Return the steps at which turns on the spot end, shape (P,)."""
-    stays = np.hypot(*np.diff(state[:, :2], axis=0).T) < STAYING_M
-    turned = np.concatenate(
-        [[0.0], np.cumsum(np.where(stays, np.diff(state[:, 2]), 0))]
-    )
-    ends = np.flatnonzero(np.diff(np.concatenate([stays, [False]]).astype(int)) < 0) + 1
-    before = np.concatenate([[0.0], turned[ends[:-1]]]) if len(ends) else turned[:0]
-    return np.asarray(ends[np.abs(turned[ends] - before) > LEAST_PIVOT])
 
 
 def _gears(advance: np.ndarray) -> np.ndarray:
