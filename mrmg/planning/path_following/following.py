@@ -8,9 +8,9 @@ motions starts from the paths (`coordination`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import partial
 from math import pi, radians
 
 import numpy as np
@@ -38,9 +38,6 @@ from mrmg.plans import Plan
 
 SHARP = radians(110.0)
 """Turn at a target from which on a car goes on in its other gear [rad]."""
-
-LENIENT_TURNS = (pi, radians(150.0))
-"""The same where time counts, as far as there is room to turn round."""
 
 REVERSE_SPEED_SHARE = 0.9
 """Share of its speed forwards from which on a car is as fast backwards."""
@@ -88,9 +85,7 @@ def follow_tours(
 ) -> Followed:
     """Plan along tours.
 
-    Where time counts, cars that are slower backwards turn round rather than change
-    gear, if there is room. A robot that does not get through with one way of turning
-    tries the others, and so do all where their batteries do not suffice.
+    A robot that does not get through drives over poses, if there is a way.
 
     Args:
         problem: the mission.
@@ -104,37 +99,27 @@ def follow_tours(
     stops = [whole_tour(problem, routing, r) for r in range(len(cost_maps))]
     tours = problem.visits(routing.tours)
     timed = problem.minimum_time or problem.preference.objective.makespan_weight > 0.0
-    tried: list[list[Path]] = []
-    failed = Followed(None, driven=False)
-    sharps = _turns_to_change_gear_at(problem, timed)
-    over_poses = cache(partial(_over_poses, problem, cost_maps, stops, halt, number))
-    for sharp in sharps:
-        paths = [
-            tour_path(problem, r, _led(problem, r, tour), sharp)
-            for r, tour in enumerate(stops)
-        ]
-        if halt[0] or any(_same_gears(paths, before) for before in tried):
-            continue
-        tried.append(paths)
-        judged = number > 0 and not timed
-        paths = [
-            _geared(problem, r, cost_maps[r], path, judged)
-            for r, path in enumerate(paths)
-        ]
-        tasks = [
-            RobotTask(tour, path, cost_map, searched=len(path.stop) < len(tour))
-            for tour, path, cost_map in zip(stops, paths, cost_maps, strict=True)
-        ]
-        others = partial(_otherwise, problem, tasks, paths, judged, over_poses)
-        drive = drive_paths(problem, tasks, halt, others)
-        if not drive.trajectories:
-            return Followed(None, drive.failure, failed.driven)
-        plan = plan_or_refusal(problem, seed, params, drive.trajectories, tours)
-        if isinstance(plan, Plan):
-            return Followed(plan)
-        leg_J = legs_driven_J(problem, drive.trajectories, tours)
-        failed = Followed(None, plan, leg_J=leg_J)
-    return failed
+    sharp = _turn_to_change_gear_at(problem, timed)
+    paths = [
+        tour_path(problem, r, _led(problem, r, tour), sharp)
+        for r, tour in enumerate(stops)
+    ]
+    judged = number > 0 and not timed
+    paths = [
+        _geared(problem, r, cost_maps[r], path, judged) for r, path in enumerate(paths)
+    ]
+    tasks = [
+        RobotTask(tour, path, cost_map, searched=len(path.stop) < len(tour))
+        for tour, path, cost_map in zip(stops, paths, cost_maps, strict=True)
+    ]
+    others = partial(_otherwise, problem, tasks, judged, number == 0, halt)
+    drive = drive_paths(problem, tasks, halt, others)
+    if not drive.trajectories:
+        return Followed(None, drive.failure, driven=False)
+    plan = plan_or_refusal(problem, seed, params, drive.trajectories, tours)
+    if isinstance(plan, Plan):
+        return Followed(plan)
+    return Followed(None, plan, leg_J=legs_driven_J(problem, drive.trajectories, tours))
 
 
 def _led(problem: Problem, r: int, tour: list[int]) -> list[int]:
@@ -146,21 +131,22 @@ def _led(problem: Problem, r: int, tour: list[int]) -> list[int]:
     return [] if is_one_pose(problem, r, tour) else tour
 
 
-def _turns_to_change_gear_at(problem: Problem, timed: bool) -> tuple[float, ...]:
-    """Return the turns from which on cars change gear, in the order of trying."""
+def _turn_to_change_gear_at(problem: Problem, timed: bool) -> float:
+    """Return the turn at a target from which on cars change gear [rad].
+
+    Where time counts, those that are slower backwards never do.
+    """
     limit = problem.mission.fleet["limit"]
     slower = -limit[:, 0] < REVERSE_SPEED_SHARE * limit[:, 1]  # backwards than forwards
-    if timed and slower.any():
-        return (*LENIENT_TURNS, SHARP)
-    return (SHARP, *LENIENT_TURNS)
+    return pi if timed and bool(slower.any()) else SHARP
 
 
 def _otherwise(
     problem: Problem,
     tasks: Sequence[RobotTask],
-    paths: Sequence[Path],
     judged: bool,
-    over_poses: Callable[[int], RobotTask | None],
+    soon: bool,
+    halt: np.ndarray,
     r: int,
 ) -> Iterator[RobotTask]:
     """Yield what robot r may do instead: drive over poses.
@@ -168,35 +154,17 @@ def _otherwise(
     Where targets want headings and that fails, its motions are searched for, from a
     path that has none.
     """
-    if (task := over_poses(r)) is not None:
-        yield replace(task, inflations=[])
-    tour, aims = [*paths[r].target], np.isfinite(paths[r].aim)
+    task = tasks[r]
+    other = posed(problem, r, task.cost_map, task.tour, halt, soon=soon)
+    if other is not None:
+        yield other
+    led, aims = [*task.path.target], np.isfinite(task.path.aim)
     if aims.any():
-        led = tour[:-1] if aims[-1] else tour
+        led = led[:-1] if aims[-1] else led
         path = tour_path(problem, r, led)
         path = replace(path, aim=np.full(len(led), np.nan))
-        path = _geared(problem, r, tasks[r].cost_map, path, judged)
-        yield RobotTask(tour, path, tasks[r].cost_map, searched=True)
-
-
-def _over_poses(
-    problem: Problem,
-    cost_maps: Sequence[CostMap],
-    stops: Sequence[list[int]],
-    halt: np.ndarray,
-    number: int,
-    r: int,
-) -> RobotTask | None:
-    """Return robot r's way over poses, if there is one."""
-    if problem.mission.fleet[r]["model"] == USER:
-        return None
-    soon = number == 0
-    return posed(problem, r, cost_maps[r], stops[r], halt, soon=soon)
-
-
-def _same_gears(paths: Sequence[Path], others: Sequence[Path]) -> bool:
-    pairs = zip(paths, others, strict=True)
-    return all(np.array_equal(one.gear, other.gear) for one, other in pairs)
+        path = _geared(problem, r, task.cost_map, path, judged)
+        yield RobotTask(task.tour, path, task.cost_map, searched=True)
 
 
 def path_cost_J(problem: Problem, routing: Routing) -> float:

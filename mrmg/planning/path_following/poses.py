@@ -16,6 +16,7 @@ from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.path_following import _pose_kernels, _shortening_kernels
 from mrmg.planning.path_following._band_kernels import CostMap, Stops
 from mrmg.planning.path_following._pose_kernels import POSE, PoseSearch
+from mrmg.planning.path_following._shortening_kernels import SHORTEST_M
 from mrmg.planning.path_following.band import Path, visit_steps
 from mrmg.planning.path_following.coordination.fields import Fields
 from mrmg.planning.path_following.cost_map import ROOM_SHARE
@@ -130,7 +131,7 @@ def posed_path(
         return None
     pose, stop = _pose_kernels.poses_to(search, poses, last)
     way, stop = _shortening_kernels.shortest_way(search, pose, stop)
-    moves = np.append(True, np.hypot(*np.diff(way[:, :2], axis=0).T) > 0.0)
+    moves = np.append(True, np.hypot(*np.diff(way[:, :2], axis=0).T) > SHORTEST_M)
     number = np.cumsum(moves) - 1
     return Path(
         node=way[moves, :2].copy(),

@@ -46,10 +46,6 @@ SEARCH_MARGINS = (1.0, 0.0, 2.0)
 """Multiples of the route margin in the tours of successive searches: batteries may
 leave no room for it, or driving may take more than it allows for."""
 
-SEARCH_SOC_SHARES = ((1.0, 0.0), (1.0, 0.0), (0.0,))
-"""Multiples of the state-of-charge margin in the tours of successive searches: the next
-one counts where no tours leave so much."""
-
 LEAST_GAIN = 0.001
 """Share of the objective that a refinement must save to be followed by another."""
 
@@ -86,12 +82,11 @@ class Schedule:
             followed += [(LEAST_SOC_MARGIN, each) for each in further]
         margin = params.route_margin * SEARCH_MARGINS[number % len(SEARCH_MARGINS)]
         followed.append((LEAST_SOC_MARGIN, (Draw(first, 0.0, margin),)))
-        shares = SEARCH_SOC_SHARES[number % len(SEARCH_SOC_SHARES)]
         return Schedule(
             time_share=TIME_SHARES[number % len(TIME_SHARES)],
             followed=tuple(followed) if follows(problem, params) else (),
             search_margin=margin,
-            search_soc_margins=tuple(share * params.soc_margin for share in shares),
+            search_soc_margins=(params.soc_margin, 0.0),
         )
 
 
