@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import statistics
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -39,6 +40,10 @@ COMMANDS = {
     "--seeds 0-9 --profile default paper --energy paper",
     "missions": f"bench --scenes {SHIPPED} --seeds 0-4 --execute",
     "maps": "bench_maps",
+    "docks_car": "bench_docks --model car --halls 0-31 --execute",
+    "docks_diffdrive": "bench_docks --halls 0-31 --execute",
+    "headings_car": "bench_headings --yards 0-31 --execute",
+    "headings_diffdrive": "bench_headings --model diffdrive --yards 0-31 --execute",
     "clmapf": "bench_clmapf --seeds 0-2",
     "kinodynamic": "bench_kinodynamic",
     "routing": "bench_routing",
@@ -138,6 +143,7 @@ def page() -> str:
         "named": named,
         "ratio": ratio,
         "causes": causes,
+        "median": statistics.median,
     }
     return environment.get_template("benchmarks.md.j2").render()
 

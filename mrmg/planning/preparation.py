@@ -99,12 +99,6 @@ def follow_smallest() -> None:
     _plan_smallest(SMALL_PARAMS)
 
 
-def follow_and_pose_smallest() -> None:
-    """Do both, which share most of their kernels."""
-    follow_smallest()
-    pose_smallest()
-
-
 def guide_smallest() -> None:
     """Plan the smallest mission by the paper's method."""
     _plan_smallest(SMALL_PAPER_PARAMS)
