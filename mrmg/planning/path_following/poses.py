@@ -38,18 +38,17 @@ the start."""
 STRAIGHT_SHARE = 0.5
 """Arc's length of a robot that turns on the spot, as a share of its radius."""
 
-SLACK_M = 0.03
-"""Room beyond the margin near targets, for what driving is off its way [m]."""
-
 DEEPER_M = 0.03
-"""How much deeper than needed targets are entered, for the same reason."""
+"""How much deeper than needed targets are entered: driving is a little off its way."""
 
 CHANGE_M = 1.0
 """Plain ground that a change of gear is worth to a car [m]."""
 
-WEIGHTS = (1.2, 2.0)
-"""Weights of the cost-to-go: only the second one if a way is wanted soon, or after the
-first one, with which long tours take more poses than may be."""
+TRIES = ((1.2, 0.03), (2.0, 0.03), (2.0, 0.0))
+"""Weights of the cost-to-go, and room beyond the margin near targets [m], in turn. The
+first try is for cheap ways, and left out where one is wanted soon; long tours take more
+poses in it than may be. The last one is for places with no more room than the margin.
+"""
 
 MOST_POSES = 200_000
 """Poses of a search at most: about half a second, and 25 MB."""
@@ -113,7 +112,7 @@ def posed_path(
         length=length,
         headings=HEADINGS,
         cell=length * np.array(CELL_SHARES),
-        room=margin_m + np.array([ROOM_SHARE * margin_m, SLACK_M, 0.0]),
+        room=np.full(3, margin_m),
         near=2.0 * float(own[0]["radius"]),
         scrub=cost_map.scrub,
         change=change_m,
@@ -121,8 +120,9 @@ def posed_path(
         halt=halt,
     )
     poses = np.empty(MOST_POSES, POSE)
-    for weight in WEIGHTS[-1:] if soon else WEIGHTS:
-        search = search._replace(weight=weight)
+    for weight, slack_m in TRIES[1:] if soon else TRIES:
+        room = margin_m + np.array([ROOM_SHARE * margin_m, slack_m, 0.0])
+        search = search._replace(weight=weight, room=room)
         table = np.full(1 << (2 * MOST_POSES).bit_length(), -1, np.int64)
         last = _pose_kernels.find_poses(search, poses, table)
         if last >= 0:
