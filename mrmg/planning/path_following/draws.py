@@ -24,9 +24,12 @@ SPREADS = (0.0, 0.04, 0.08, 0.12, 0.06)
 """Standard deviations of the logarithms of the factors on energies and times in
 successive draws: the roadmap's energies are not quite what driving takes."""
 
+SURCHARGES = (0.0, 0.0, -0.06)
+"""Shares added to the roadmap's energies in successive draws; below 0, as paths drawn
+tight take less than the roadmap's."""
+
 TIMED_SURCHARGES = (0.06, 0.0, 0.12)
-"""Shares added to the roadmap's energies in successive draws where the makespan counts:
-who brakes hard and turns round needs more."""
+"""The same where the makespan counts: who brakes hard and turns round needs more."""
 
 RECHARGE_DRAWS, RECHARGE_GOALS = 8, 320
 """Draws that follow where tours recharge, and the goals in all of them, at most ..."""
@@ -61,7 +64,7 @@ class Draw:
     @staticmethod
     def of(number: int, timed: bool) -> Draw:
         """Return draw `number` of a mission in which the makespan counts or not."""
-        surcharges = TIMED_SURCHARGES if timed else (0.0,)
+        surcharges = TIMED_SURCHARGES if timed else SURCHARGES
         return Draw(
             number,
             SPREADS[number % len(SPREADS)],

@@ -45,10 +45,10 @@ CHANGE_M = 1.0
 """Plain ground that a change of gear is worth to a car [m]."""
 
 TRIES = ((1.2, 0.03), (2.0, 0.03), (2.0, 0.0))
-"""Weights of the cost-to-go, and room beyond the margin near targets [m], in turn. The
-first try is for cheap ways, and left out where one is wanted soon; long tours take more
-poses in it than may be. The last one is for places with no more room than the margin.
-"""
+"""Weights of the cost-to-go, and room beyond the margin near targets [m]. The first two
+tries are for cheap ways; long tours may take more poses in the first one than may be.
+The last two are for ways that are wanted soon, or at all: there are places with no more
+room than the margin."""
 
 MOST_POSES = 200_000
 """Poses of a search at most: about half a second, and 25 MB."""
@@ -120,7 +120,7 @@ def posed_path(
         halt=halt,
     )
     poses = np.empty(MOST_POSES, POSE)
-    for weight, slack_m in TRIES[1:] if soon else TRIES:
+    for weight, slack_m in TRIES[1:] if soon else TRIES[:2]:
         room = margin_m + np.array([ROOM_SHARE * margin_m, slack_m, 0.0])
         search = search._replace(weight=weight, room=room)
         table = np.full(1 << (2 * MOST_POSES).bit_length(), -1, np.int64)
