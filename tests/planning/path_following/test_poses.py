@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from math import pi
 from typing import Any
 
@@ -84,6 +86,21 @@ def way_of(scene: Scene) -> tuple[Problem, Path]:
     return problem, path
 
 
+@contextmanager
+def recorded() -> Iterator[list[np.ndarray]]:
+    """Yield a list that receives the poses that are found, before they are joined."""
+    original, found = _pose_kernels.poses_to, list[np.ndarray]()
+
+    def poses_to(*given: Any) -> Any:
+        pose, stop = original(*given)
+        found.append(pose)
+        return pose, stop
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(_pose_kernels, "poses_to", poses_to)
+        yield found
+
+
 def headings(path: Path) -> np.ndarray:
     """Return the heading half way along each segment of a path [rad]."""
     chord = np.diff(path.node, axis=0) * path.gear[:, None]
@@ -148,9 +165,12 @@ def test_robots_that_cannot_back_never_do() -> None:
     assert backed is not None
     assert (backed.gear == -1).any()
     problem.mission.fleet["limit"][0, 0] = 0.0
-    path = posed_path(problem, 0, cost_map, tour, NEVER)
+    with recorded() as found:
+        path = posed_path(problem, 0, cost_map, tour, NEVER)
     assert path is not None
     assert (path.gear == 1).all()
+    ahead = np.stack([np.cos(found[0][:-1, 2]), np.sin(found[0][:-1, 2])], axis=1)
+    assert ((np.diff(found[0][:, :2], axis=0) * ahead).sum(axis=1) > -1e-9).all()
 
 
 @pytest.mark.parametrize("scene", MISSIONS)
@@ -180,16 +200,7 @@ def test_ways_visit_targets_in_order(scene: Scene) -> None:
 def test_shortening_gains_and_keeps_stops() -> None:
     """Chains of shortest curves are shorter than the arcs that were found."""
     problem, path = way_of(MISSIONS[0])
-    found: list[np.ndarray] = []
-
-    def poses_to(*given: Any) -> Any:
-        pose, stop = original(*given)
-        found.append(pose)
-        return pose, stop
-
-    original = _pose_kernels.poses_to
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(_pose_kernels, "poses_to", poses_to)
+    with recorded() as found:
         way_of(MISSIONS[0])
     arcs_m = float(np.hypot(*np.diff(found[0][:, :2], axis=0).T).sum())
     assert path.way[-1] < 0.99 * arcs_m
