@@ -3,7 +3,7 @@
 An A* whose nodes are poses, of which one counts in each cell of position and heading:
 hybrid A*, D. Dolgov et al., Practical search techniques in path planning for autonomous
 driving, 2008. A car drives straight or turns as sharply as its paths may, in either
-gear; a robot that can turns on the spot.
+gear; a robot that can turn on the spot does so.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class PoseSearch(NamedTuple):
 
 @kernel
 def pivots(search, turn):
-    """Return whether a robot turns on the spot in an arc with such a turn."""
+    """Return whether a robot takes an arc with such a turn on the spot."""
     return turn != 0 and search.own[0].model == UNICYCLE
 
 

@@ -67,7 +67,7 @@ def posed(
 
     Args:
         problem: the mission.
-        r: robot that no user has modelled.
+        r: robot, whose motion is one of ours.
         cost_map: what its paths are priced on.
         tour: numbers of its targets.
         halt: shape (1,); the search ends soon after it has turned true.
