@@ -2,9 +2,9 @@
 
 Each robot's motion is found by a search over its own motions (`_search_kernels`), and
 who has priority over whom by a search over the orders of robots (`priorities`). Where
-the first round has found none, an order in which robots drive one after the other is
-looked for first (`sequencing`): in dense traffic that is soon there, or soon known to
-be missing. All that is found can be driven exactly, and keeps clear at every step.
+that finds none, and the first round neither, an order in which robots drive one after
+the other is looked for (`sequencing`): in dense traffic there often is one, though with
+longer motions. All that is found can be driven exactly, and keeps clear at every step.
 
 What is promised: every plan found keeps all margins. A round of the search ends without
 a plan when no order of the robots has one, with cells as fine and searches as long as
@@ -332,11 +332,9 @@ def coordinated(
             if alone is None:
                 return ()
             most = SEARCHES * now.most * robots / len(orders)
-            found = None
-            if now is not ROUNDS[0] and order is drawn:
+            found = priorities.search_priorities(alone, planning, most, halt)
+            if found is None and now is not ROUNDS[0] and order is drawn:
                 found = in_sequence(alone, planning, most, halt)
-            if found is None:
-                found = priorities.search_priorities(alone, planning, most, halt)
             if found is not None:
                 planning.round = replace(now, most=max(now.most, SHORTENING_MOST))
                 found = priorities.shortened(found, alone, planning, halt)
