@@ -57,10 +57,6 @@ class BrowserView:
         self._scene, self._replay = scene, replay
         self._world = replay.film.world if replay else build_world(scene)
         self._data = mujoco.MjData(self._world.model)
-        self._colors = {
-            robot: style.rgb(color)
-            for robot, color in style.scene_robot_colors(scene).items()
-        }
         self._server = _serve(host, port)
         self.address = f"http://{host}:{self._server.get_port()}"
         self._watch = threading.RLock()
@@ -101,11 +97,8 @@ class BrowserView:
             self._shown_tick = tick
             self._place(self._replay.film.log.qpos[tick])
             reading = self._replay.reading()
-            for goal in self._scene.goals:
-                robot = reading.visited.get(goal.id)
-                self.targets[goal.id].color = (
-                    self._colors[robot] if robot else style.rgb(style.GOAL_OPEN)
-                )
+            for goal, color in self._replay.film.goal_colors(reading).items():
+                self.targets[goal].color = style.rgb(color)
             mission, lines = spoken(self._scene, reading)
             for robot_reading, (name, words) in zip(reading.robots, lines, strict=True):
                 bar = _bar(robot_reading.charge)
@@ -146,17 +139,15 @@ class BrowserView:
 
     def _add_targets(self) -> dict[str, Any]:
         handles = {}
-        stations = {station.id for station in self._scene.stations}
         names = style.target_labels(self._scene)
         for target in self._scene.targets():
             mesh = geom_mesh(self._world.model, self._world.target_geom[target.id])
-            station = target.id in stations
-            color = style.STATION if station else style.GOAL_OPEN
+            fill, _ = style.target_colors(target)
             handles[target.id] = self._server.scene.add_mesh_simple(
                 f"/targets/{target.id}",
                 np.asarray(mesh.vertices),
                 np.asarray(mesh.faces),
-                color=style.rgb(color),
+                color=style.rgb(fill),
                 flat_shading=True,
                 cast_shadow=False,
             )
@@ -218,7 +209,7 @@ class BrowserView:
                 self._server.scene.add_line_segments(
                     f"/driven/{robot}",
                     pieces.astype(np.float32),
-                    self._colors[robot],
+                    style.rgb(replay.film.colors[robot]),
                     thickness=_PATH_WIDTH_M,
                 )
             )

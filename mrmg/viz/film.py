@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from matplotlib.colors import to_rgba
 from scipy.ndimage import gaussian_filter1d
 
 from mrmg.energy.battery_curves import (
@@ -33,7 +34,7 @@ _MAP_MARGIN = 1.03
 _CHASE_SHARE = 0.35
 _TAG_LIFT_M = 0.5
 _NAMED_WITHIN_M = 40.0
-_OPEN = (1.0, 1.0, 1.0, 0.9)
+_MARK_OPACITY = 0.9
 
 
 class Film:
@@ -113,6 +114,12 @@ class Film:
             ),
         )
 
+    def goal_colors(self, reading: Reading) -> dict[str, str]:
+        """Return the colour of each goal: of the robot that visited it, if any."""
+        colors = {goal.id: style.GOAL_OPEN for goal in self.scene.goals}
+        visited = reading.visited.items()
+        return colors | {goal: self.colors[robot] for goal, robot in visited}
+
     def _standing(self, robot: str, now_s: float) -> str:
         whole = now_s < self.broken_s.get(robot, 0.0)
         return "" if whole else standing_of(robot, self.plan, self.log)
@@ -157,10 +164,9 @@ class Stage:
             (label, self._top.to_pixels(spot[None])[0]) for _, label, spot in named
         ]
         self._marked: set[str] = set()
-        for goal in film.scene.goals:
-            view.color_target(goal.id, _OPEN)
-        for station in film.scene.stations:
-            view.color_target(station.id, _rgba(style.STATION))
+        for target in film.scene.targets():
+            fill, _ = style.target_colors(target)
+            view.color_target(target.id, to_rgba(fill, _MARK_OPACITY))
 
     def draw(self, tick: int) -> np.ndarray:
         """Return the picture at a tick of the log; ticks must not decrease."""
@@ -271,14 +277,10 @@ class Stage:
         before = len(self._marked)
         for goal, robot in reading.visited.items():
             if goal not in self._marked:
-                self._view.color_target(goal, _rgba(self._film.colors[robot]))
+                color = to_rgba(self._film.colors[robot], _MARK_OPACITY)
+                self._view.color_target(goal, color)
                 self._marked.add(goal)
         return len(self._marked) > before
-
-
-def _rgba(color: str) -> tuple[float, float, float, float]:
-    red, green, blue = style.rgb(color)
-    return red / 255.0, green / 255.0, blue / 255.0, 0.9
 
 
 def _labels(film: Film) -> list[tuple[str, Label, np.ndarray]]:

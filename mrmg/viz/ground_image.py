@@ -182,10 +182,9 @@ def _paint_paths(axes: Axes, scene: Scene, plan: Plan, letter_points: float) -> 
 
 
 def _paint_rims(axes: Axes, scene: Scene) -> None:
-    stations = {station.id for station in scene.stations}
     for target in scene.targets():
-        color = style.STATION_EDGE if target.id in stations else style.GOAL_EDGE
-        scene_drawing.draw_region(axes, target.region, "none", color, _points(5.0))
+        _, rim = style.target_colors(target)
+        scene_drawing.draw_region(axes, target.region, "none", rim, _points(5.0))
 
 
 def _points(pixels: float) -> float:

@@ -7,6 +7,7 @@ import time
 import warnings
 
 import numpy as np
+from matplotlib.colors import to_rgb, to_rgba
 
 from mrmg.errors import MachineError
 from mrmg.mujoco_import import mujoco
@@ -150,12 +151,8 @@ def _place(
     data.qpos[:] = replay.film.log.qpos[replay.tick]
     data.time = replay.time_s
     mujoco.mj_forward(model, data)
-    visited = replay.reading().visited
-    for goal in replay.film.scene.goals:
-        robot = visited.get(goal.id)
-        color = replay.film.colors[robot] if robot else style.GOAL_OPEN
-        rgb = np.array(style.rgb(color)) / 255.0
-        model.geom_rgba[world.target_geom[goal.id], :3] = rgb
+    for goal, color in replay.film.goal_colors(replay.reading()).items():
+        model.geom_rgba[world.target_geom[goal], :3] = to_rgb(color)
 
 
 def _look_from_above(camera: mujoco.MjvCamera, scene: Scene) -> None:
@@ -182,7 +179,7 @@ def annotate(extra: mujoco.MjvScene, scene: Scene, replay: Replay) -> None:
         _add_label(extra, at, f"{robot.id} {shown.percent}")
     room = (extra.maxgeom - extra.ngeom) // len(scene.robots)
     for robot, state in zip(scene.robots, log.state, strict=True):
-        color = np.array([*style.rgb(replay.film.colors[robot.id]), 255.0]) / 255.0
+        color = np.array(to_rgba(replay.film.colors[robot.id]))
         stride = max(math.ceil(len(state) / max(room, 1)), _LEAST_STRIDE)
         driven = lifted(scene, state[: replay.tick + 1 : stride, :2], _LINE_LIFT_M)
         for start, end in zip(driven[:-1], driven[1:], strict=True):

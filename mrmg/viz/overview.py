@@ -148,12 +148,11 @@ def _draw_cross(axes: Axes, x_m: float, y_m: float) -> None:
 def _draw_targets(axes: Axes, scene: Scene, plan: Plan | None) -> None:
     ranks = visit_ranks(plan) if plan is not None else {}
     colors = style.scene_robot_colors(scene)
-    first = {target: visits[0] for target, visits in ranks.items()}
-    faces = {target: colors[robot] for target, (robot, _) in first.items()}
+    visited = [(goal, *ranks[goal.id][0]) for goal in scene.goals if goal.id in ranks]
+    faces = {goal.id: colors[robot] for goal, robot, _ in visited}
     scene_drawing.draw_targets(axes, scene, faces)
-    for goal in scene.goals:
-        if goal.id in first:
-            _draw_rank(axes, goal.region.center, str(first[goal.id][1]))
+    for goal, _, rank in visited:
+        _draw_rank(axes, goal.region.center, str(rank))
 
 
 def _draw_rank(axes: Axes, center: np.ndarray, text: str) -> None:

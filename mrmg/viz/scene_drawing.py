@@ -19,7 +19,7 @@ from shapely.geometry.base import BaseGeometry
 
 from mrmg.counted import counted
 from mrmg.scene.region import Region
-from mrmg.scene.types import Robot, Scene
+from mrmg.scene.types import Robot, Scene, Station
 from mrmg.viz import style
 from mrmg.viz.contours import draw_contours
 from mrmg.viz.figures import new_figure, write_figure
@@ -187,21 +187,20 @@ def draw_targets(
         colors: of visited goals, by id.
         points: size of the letters, which that of rims and squares goes with.
     """
-    for goal in scene.goals:
-        color = colors.get(goal.id, style.GOAL_OPEN)
-        draw_region(axes, goal.region, color, style.GOAL_EDGE, 0.13 * points)
-    for station in scene.stations:
-        fill, edge = style.STATION, style.STATION_EDGE
-        draw_region(axes, station.region, fill, edge, 0.13 * points)
-        axes.plot(
-            *station.region.center,
-            marker="s",
-            markersize=0.6 * points,
-            markerfacecolor=fill,
-            markeredgecolor=edge,
-            markeredgewidth=0.1 * points,
-            zorder=6,
-        )
+    for target in scene.targets():
+        fill, edge = style.target_colors(target)
+        fill = colors.get(target.id, fill)
+        draw_region(axes, target.region, fill, edge, 0.13 * points)
+        if isinstance(target, Station):
+            axes.plot(
+                *target.region.center,
+                marker="s",
+                markersize=0.6 * points,
+                markerfacecolor=fill,
+                markeredgecolor=edge,
+                markeredgewidth=0.1 * points,
+                zorder=6,
+            )
     robots = style.scene_robot_colors(scene)
     for robot in scene.robots:
         if robot.finish:

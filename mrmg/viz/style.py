@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mrmg.scene.types import Obstacle, Scene
+from mrmg.scene.types import Goal, Obstacle, Scene, Station
 from mrmg.simulation import palette
 
 INK = "#1F2328"
@@ -110,6 +110,13 @@ def obstacle_color(obstacle: Obstacle) -> str:
     if obstacle.is_steep_ground:
         return STEEP_GROUND
     return OBSTACLE if obstacle.blocks is None else PARTIAL_OBSTACLE
+
+
+def target_colors(target: Goal | Station) -> tuple[str, str]:
+    """Return fill and rim of a target; goals are filled so until they are visited."""
+    if isinstance(target, Station):
+        return STATION, STATION_EDGE
+    return GOAL_OPEN, GOAL_EDGE
 
 
 def map_key(scene: Scene) -> list[KeyEntry]:
