@@ -19,7 +19,7 @@ from mrmg.simulation.log import ExecutionLog, require_same_mission
 from mrmg.simulation.world_model import build_world
 from mrmg.viz import style
 from mrmg.viz.activities import breakdowns, standing_of
-from mrmg.viz.ground_image import paint_trail, video_labels
+from mrmg.viz.ground_image import GroundFrame, paint_trail, video_labels
 from mrmg.viz.map_shapes import enclosing_circle
 from mrmg.viz.overlay import Panel, Reading, RobotReading
 from mrmg.viz.tags import Label, Tag, letter_px, place_tags
@@ -81,11 +81,13 @@ class Film:
         self.panel_pane = (slice(cut, height), slice(main, width))
         self.panel_size = (panel_width, height - cut)
         pane_ratio = main / height
-        self.map_height_m = _MAP_MARGIN * max(
-            y_max - y_min, (x_max - x_min) / pane_ratio
+        half_m = 0.5 * _MAP_MARGIN * max(y_max - y_min, (x_max - x_min) / pane_ratio)
+        self.map_frame = GroundFrame(
+            center_m=np.array([(x_min + x_max) / 2, (y_min + y_max) / 2]),
+            half_m=half_m * np.array([pane_ratio, 1.0]),
+            pixels=max(main, height),
         )
-        self.em_m = letter_px(height) * self.map_height_m / height
-        self.map_center = np.array([(x_min + x_max) / 2, (y_min + y_max) / 2])
+        self.em_m = letter_px(height) / self.map_frame.pixels_per_m
 
     def reading(self, tick: int) -> Reading:
         """Return what the panel shows at a tick."""
@@ -159,9 +161,10 @@ class Stage:
         self._cross = Label("✖", style.RESERVE, height, size_em=1.6)
         self._painted = 0
         self._trailed = 0
-        self._top = self._make_top_view()
+        radius_m = max(r.model.circumscribed_radius_m for r in film.scene.robots)
+        self._top = TopView(view, film.map_frame, radius_m)
         self._map_labels = [
-            (label, self._top.to_pixels(spot[None])[0]) for _, label, spot in named
+            (label, film.map_frame.to_pixels(spot)) for _, label, spot in named
         ]
         self._marked: set[str] = set()
         for target in film.scene.targets():
@@ -186,21 +189,10 @@ class Stage:
         picture[film.panel_pane] = self._panel.draw(reading)
         return picture
 
-    def _make_top_view(self) -> TopView:
-        film = self._film
-        rows, columns = film.main_pane
-        return TopView(
-            self._view,
-            center_m=film.map_center,
-            height_m=film.map_height_m,
-            size=(columns.stop - columns.start, rows.stop - rows.start),
-            radius_m=max(r.model.circumscribed_radius_m for r in film.scene.robots),
-        )
-
     def _draw_top(
         self, pane: np.ndarray, tick: int, reading: Reading, *, anew: bool
     ) -> None:
-        log, colors = self._film.log, self._film.colors
+        log, colors, frame = self._film.log, self._film.colors, self._film.map_frame
         trails = {
             colors[robot]: state[: tick + 1, :2]
             for robot, state in zip(log.robots, log.state, strict=True)
@@ -211,17 +203,15 @@ class Stage:
             for color, points in trails.items():
                 self._top.extend_trail(points[self._trailed - 1 :], color)
         self._trailed = tick + 1
-        at_m = log.state[:, tick, :2]
-        self._top.draw(log.qpos[tick], list(at_m), pane)
+        self._top.draw(log.qpos[tick], log.state[:, tick, :2], pane)
         circles = [
             enclosing_circle(robot, tuple(state[tick, :3]))
             for robot, state in zip(self._film.scene.robots, log.state, strict=True)
         ]
-        spots = self._top.to_pixels(np.array([middle for middle, _ in circles]))
-        reaches = [radius_m / self._top.pixel_m for _, radius_m in circles]
-        size = (pane.shape[1], pane.shape[0])
+        spots = frame.to_pixels(np.array([middle for middle, _ in circles]))
+        reaches = [radius_m * frame.pixels_per_m for _, radius_m in circles]
         taken = [(spot, label.half) for label, spot in self._map_labels]
-        beside = place_tags(self._tags, spots, reaches, taken, size)
+        beside = place_tags(self._tags, spots, reaches, taken, frame.size)
         self._lay_tags(pane, spots, beside, reading)
 
     def _draw_chase(self, pane: np.ndarray, tick: int, reading: Reading) -> None:
@@ -274,13 +264,12 @@ class Stage:
 
     def _mark_goals(self, reading: Reading) -> bool:
         """Give visited goals their robot's colour; return whether any is new."""
-        before = len(self._marked)
-        for goal, robot in reading.visited.items():
-            if goal not in self._marked:
-                color = to_rgba(self._film.colors[robot], _MARK_OPACITY)
-                self._view.color_target(goal, color)
-                self._marked.add(goal)
-        return len(self._marked) > before
+        new = reading.visited.keys() - self._marked
+        for goal in new:
+            color = self._film.colors[reading.visited[goal]]
+            self._view.color_target(goal, to_rgba(color, _MARK_OPACITY))
+        self._marked |= new
+        return bool(new)
 
 
 def _labels(film: Film) -> list[tuple[str, Label, np.ndarray]]:

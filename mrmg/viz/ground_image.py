@@ -23,9 +23,6 @@ from mrmg.viz.activities import thinned
 from mrmg.viz.map_labels import MapLabel, map_labels
 from mrmg.world.elevation import ground_mesh
 
-PIXELS = 2048
-"""Longer side of the image."""
-
 _DPI = 100
 _SPACING_M = 0.3
 _SUPERSAMPLING = 4
@@ -41,15 +38,17 @@ class GroundFrame:
     Attributes:
         center_m: of the rectangle, shape (2,).
         half_m: half its extents, shape (2,).
+        pixels: longer side of the image.
     """
 
     center_m: np.ndarray
     half_m: np.ndarray
+    pixels: int = 2048
 
     @property
     def pixels_per_m(self) -> float:
         """Resolution of the image."""
-        return float(PIXELS / (2.0 * self.half_m.max()))
+        return float(self.pixels / (2.0 * self.half_m.max()))
 
     @property
     def size(self) -> tuple[int, int]:
@@ -59,8 +58,16 @@ class GroundFrame:
 
     def to_pixels(self, points: np.ndarray) -> np.ndarray:
         """Return image coordinates (column, row) of points [m], shape (n, 2)."""
-        corner = self.center_m + self.half_m * (-1.0, 1.0)
-        return np.asarray((points - corner) * (1.0, -1.0) * self.pixels_per_m)
+        return np.asarray((points - self._corner_m) * (1.0, -1.0) * self.pixels_per_m)
+
+    def to_ground(self, pixels: np.ndarray) -> np.ndarray:
+        """Return the points [m] at image coordinates (column, row), shape (n, 2)."""
+        return np.asarray(self._corner_m + pixels * (1.0, -1.0) / self.pixels_per_m)
+
+    @property
+    def _corner_m(self) -> np.ndarray:
+        """The upper left one, shape (2,)."""
+        return np.asarray(self.center_m + self.half_m * (-1.0, 1.0))
 
 
 def paint_ground(

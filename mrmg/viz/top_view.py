@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from mrmg.viz import style
-from mrmg.viz.ground_image import paint_line
+from mrmg.viz.ground_image import GroundFrame, paint_line
 from mrmg.viz.tags import Label, letter_px, overlap
 from mrmg.viz.world_view import WorldView, top_camera
 
@@ -26,39 +26,20 @@ _DIFFERENCE = 10
 class TopView:
     """Draws an orthographic view of the whole map."""
 
-    def __init__(
-        self,
-        view: WorldView,
-        *,
-        center_m: np.ndarray,
-        height_m: float,
-        size: tuple[int, int],
-        radius_m: float,
-    ) -> None:
+    def __init__(self, view: WorldView, frame: GroundFrame, radius_m: float) -> None:
         """Set the window on the map.
 
         Args:
             view: the renderer.
-            center_m: middle of the window, shape (2,).
-            height_m: of the window.
-            size: width and height of the picture [pixels].
+            frame: what the picture covers.
             radius_m: of a circle about a robot's reference point that holds the robot.
         """
-        self._view = view
-        self._center_m = center_m
-        self._size = size
-        self.pixel_m = height_m / size[1]
-        self._half = math.ceil((radius_m + _MARGIN_M) / self.pixel_m)
-        width = style.DRIVEN.width_em * letter_px(size[1])
+        self._view, self._frame = view, frame
+        self._half = math.ceil((radius_m + _MARGIN_M) * frame.pixels_per_m)
+        width = style.DRIVEN.width_em * letter_px(frame.size[1])
         self._trail_width = max(width, _LEAST_TRAIL_PIXELS)
-        self._still = np.empty((size[1], size[0], 3), dtype=np.uint8)
+        self._still = np.empty((*frame.size[::-1], 3), dtype=np.uint8)
         self._background = self._still.copy()
-
-    def to_pixels(self, points: np.ndarray) -> np.ndarray:
-        """Return (column, row) of points [m], shape (n, 2)."""
-        middle = np.array(self._size) / 2.0
-        offset = (points[:, :2] - self._center_m) * (1.0, -1.0) / self.pixel_m
-        return np.asarray(offset + middle)
 
     def draw_background(
         self,
@@ -74,8 +55,8 @@ class TopView:
             labels: names and their middles (column, row).
         """
         self._view.place_robots_away(qpos)
-        camera = top_camera(self._center_m, self._view.highest_m)
-        height_m = self.pixel_m * self._size[1]
+        camera = top_camera(self._frame.center_m, self._view.highest_m)
+        height_m = 2.0 * self._frame.half_m[1]
         self._view.draw(camera, fovy=height_m, shadows=False, out=self._still)
         self._background = self._still.copy()
         for color, points in trails.items():
@@ -85,30 +66,28 @@ class TopView:
 
     def extend_trail(self, points: np.ndarray, color: str) -> None:
         """Paint a driven way through points [m], shape (n, 2), onto the background."""
-        paint_line(self._background, self.to_pixels(points), self._trail_width, color)
+        pixels = self._frame.to_pixels(points)
+        paint_line(self._background, pixels, self._trail_width, color)
 
-    def draw(
-        self, qpos: np.ndarray, points: Sequence[np.ndarray], out: np.ndarray
-    ) -> None:
+    def draw(self, qpos: np.ndarray, points: np.ndarray, out: np.ndarray) -> None:
         """Draw the map with its robots into `out`.
 
         Args:
             qpos: positions of the model.
-            points: reference point of each robot [m], shape (2,) each.
+            points: reference point of each robot [m], shape (n, 2).
             out: picture, shape (height, width, 3) of bytes.
         """
         out[:] = self._background
         self._view.place(qpos)
-        for column, row in np.round(self.to_pixels(np.array(points))).astype(int):
+        for column, row in np.round(self._frame.to_pixels(points)).astype(int):
             self._draw_patch(int(column), int(row), out)
 
     def _draw_patch(self, column: int, row: int, out: np.ndarray) -> None:
         half = self._half
         patch = np.empty((2 * half, 2 * half, 3), dtype=np.uint8)
-        middle = np.array(self._size) / 2.0
-        at = self._center_m + ((column, row) - middle) * (1.0, -1.0) * self.pixel_m
-        fovy = 2 * half * self.pixel_m
-        camera = top_camera(at, self._view.highest_m)
+        at_m = self._frame.to_ground(np.array([column, row]))
+        fovy = 2 * half / self._frame.pixels_per_m
+        camera = top_camera(at_m, self._view.highest_m)
         self._view.draw(camera, fovy=fovy, shadows=False, out=patch)
         shown, inner = overlap(out, patch, column - half, row - half)
         still, _ = overlap(self._still, patch, column - half, row - half)

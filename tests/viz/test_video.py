@@ -94,16 +94,15 @@ def test_fast_drawing_from_above_equals_drawing_everything(mission) -> None:
         pane = stage.draw(tick)[film.main_pane].astype(int)
         view.place(log.qpos[tick])
         whole = np.empty(pane.shape, dtype=np.uint8)
-        camera = top_camera(film.map_center)
-        view.draw(camera, fovy=film.map_height_m, shadows=False, out=whole)
+        camera = top_camera(film.map_frame.center_m)
+        height_m = 2.0 * film.map_frame.half_m[1]
+        view.draw(camera, fovy=height_m, shadows=False, out=whole)
     # Trails and tags are extra; where neither is, the pictures agree.
     different = np.abs(pane - whole.astype(int)).max(axis=2) > 12
     assert different.mean() < 0.03
-    pixel_m = film.map_height_m / pane.shape[0]
-    for x_m, y_m in log.state[:, tick, :2]:
+    for at_m in log.state[:, tick, :2]:
         # Ahead of the rear axle there is the body, and no trail yet.
-        column = pane.shape[1] / 2 + (x_m + 0.9 - film.map_center[0]) / pixel_m
-        row = pane.shape[0] / 2 - (y_m - film.map_center[1]) / pixel_m
+        column, row = film.map_frame.to_pixels(at_m + (0.9, 0.0))
         body = np.s_[int(row) - 2 : int(row) + 3, int(column) - 3 : int(column) + 4]
         assert not different[body].any()
 
@@ -114,11 +113,8 @@ def test_visited_goals_and_driven_trails_take_the_robot_s_color(mission) -> None
     ground = paint_ground(scene, plan, film.frame)
 
     def pixel(picture: np.ndarray, x_m: float, y_m: float) -> np.ndarray:
-        pane = picture[film.main_pane]
-        pixel_m = film.map_height_m / pane.shape[0]
-        column = pane.shape[1] / 2 + (x_m - film.map_center[0]) / pixel_m
-        row = pane.shape[0] / 2 - (y_m - film.map_center[1]) / pixel_m
-        return pane[int(row), int(column)].astype(int)
+        column, row = film.map_frame.to_pixels(np.array([x_m, y_m]))
+        return picture[film.main_pane][int(row), int(column)].astype(int)
 
     with open_view(film.world, ground, OPTIONS.size) as view:
         stage = Stage(film, view)
