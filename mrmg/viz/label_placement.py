@@ -94,22 +94,13 @@ def spots_around(
     spots, costs = [], []
     for ring, gap_em in enumerate(_RINGS_EM):
         corners = (hull[:, None] + signs * (half_m + gap_em * em_m)).reshape(-1, 2)
-        touching = shapely.get_coordinates(MultiPoint(corners).convex_hull)
-        spots.append(middle + _reach(touching - middle, direction) * direction)
+        touching = MultiPoint(corners).convex_hull
+        beyond = middle + np.ptp(corners, axis=0).sum() * direction
+        rays = shapely.linestrings([(middle, end) for end in beyond])
+        reach_m = shapely.length(shapely.intersection(rays, touching))
+        spots.append(middle + reach_m[:, None] * direction)
         costs.append(_DIRECTION_COST * turned + _RING_COST * ring)
     return np.concatenate(spots), np.concatenate(costs)
-
-
-def _reach(ring: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Return how far a convex ring about the origin lies in each direction, (n, 1)."""
-    edge = np.diff(ring, axis=0)
-    normal = np.stack([edge[:, 1], -edge[:, 0]], axis=1)
-    offset = (normal * ring[:-1]).sum(axis=1)
-    normal *= np.where(offset < 0.0, -1.0, 1.0)[:, None]
-    along = direction @ normal.T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        far = np.where(along > 1e-12, np.abs(offset) / along, np.inf)
-    return np.asarray(far.min(axis=1, keepdims=True))
 
 
 def place(
