@@ -11,11 +11,9 @@ from mrmg.counted import counted
 from mrmg.energy.text import energy_text
 from mrmg.scene.types import Robot, Scene
 from mrmg.viz import style
-from mrmg.viz.tags import draw_bar, font, text_width_em
+from mrmg.viz.tags import CARD, TEXT, draw_bar, font, text_width_em
 
 _BACKGROUND = "#14181E"
-_CARD = "#202730"
-_TEXT = "#F2F4F7"
 _FAINT = "#A4ADBA"
 _MOST_CHIP_ROWS = 5
 _UNNAMED_CHIP = 12.0
@@ -167,11 +165,11 @@ class Panel:
     def _draw_clock(self, pen: ImageDraw.ImageDraw, reading: Reading) -> None:
         left = self._px(18)
         large, bold = self._font(37, bold=True), self._font(16, bold=True)
-        pen.text((left, self._px(37)), reading.clock, font=large, fill=_TEXT)
+        pen.text((left, self._px(37)), reading.clock, font=large, fill=TEXT)
         end = (self._size[0] - left, self._px(54))
-        pen.text(end, f"{reading.used} used", font=bold, fill=_TEXT, anchor="ra")
+        pen.text(end, f"{reading.used} used", font=bold, fill=TEXT, anchor="ra")
         goals = f"{reading.goals_of(self._scene)} visited"
-        pen.text((left, self._px(90)), goals, font=self._font(16), fill=_TEXT)
+        pen.text((left, self._px(90)), goals, font=self._font(16), fill=TEXT)
 
     def _draw_goals(self, pen: ImageDraw.ImageDraw, reading: Reading) -> None:
         small = self._font(12, bold=True)
@@ -181,7 +179,7 @@ class Panel:
             x = self._px(18) + column * (width + self._px(4))
             y = self._px(115) + row * self._px(26)
             robot = reading.visited.get(goal.id)
-            color = _TEXT if robot else _FAINT
+            color = TEXT if robot else _FAINT
             pen.rounded_rectangle(
                 (x, y, x + width, y + self._px(21)),
                 radius=self._px(5),
@@ -204,7 +202,7 @@ class Panel:
         left, right = self._px(14), self._size[0] - self._px(14)
         bottom = top + pitch - self._px(6)
         middle = top + 0.30 * (bottom - top)
-        pen.rounded_rectangle((left, top, right, bottom), self._px(7), fill=_CARD)
+        pen.rounded_rectangle((left, top, right, bottom), self._px(7), fill=CARD)
         edge = (left, top, left + self._px(9), bottom)
         pen.rounded_rectangle(edge, self._px(4), fill=self._colors[robot.id])
         way, speed = reading.way("→"), f"{reading.speed_m_s:.1f} m/s"
@@ -214,13 +212,13 @@ class Panel:
         size = min(16.0, 0.27 * pitch / self._unit, room / needed_em)
         text = self._font(size, bold=True)
         name = (left + self._px(20), middle)
-        pen.text(name, robot.id, font=text, fill=_TEXT, anchor="lm")
+        pen.text(name, robot.id, font=text, fill=TEXT, anchor="lm")
         start = (left + self._px(20.0 + way_em * size), middle)
-        pen.text(start, way, font=text, fill=_TEXT, anchor="lm")
+        pen.text(start, way, font=text, fill=TEXT, anchor="lm")
         row = top + 0.73 * (bottom - top)
         end = right - self._px(14)
         pen.text((end, middle), speed, font=text, fill=_FAINT, anchor="rm")
-        pen.text((end, row), reading.percent, font=text, fill=_TEXT, anchor="rm")
+        pen.text((end, row), reading.percent, font=text, fill=TEXT, anchor="rm")
         half = 0.13 * (bottom - top)
         bar = (left + self._px(20), row - half, right - self._px(74), row + half)
         draw_bar(pen, bar, reading.charge, robot.battery.reserve_fraction)

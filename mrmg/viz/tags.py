@@ -13,8 +13,8 @@ from PIL import Image, ImageDraw, ImageFont
 from mrmg.scene.types import Robot
 from mrmg.viz import style
 
-_CARD = "#202730"
-_TEXT = "#F2F4F7"
+CARD = "#202730"
+TEXT = "#F2F4F7"
 _EMPTY = "#3A434F"
 _FULL = "#5FD0A5"
 _LOW = "#FF6B5E"
@@ -38,11 +38,11 @@ class Tag:
         width = max(46.0, (face.getlength(f"{robot.id} {_BROKEN}")) / self._unit + 8.0)
         self._bases = []
         for rim, text in ((color, robot.id), (_LOW, f"{robot.id} {_BROKEN}")):
-            base = Image.new("RGB", self._scaled(width, 27), _CARD)
+            base = Image.new("RGB", self._scaled(width, 27), CARD)
             pen = ImageDraw.Draw(base)
             pen.rectangle((0, 0, base.width - 1, base.height - 1), outline=rim, width=2)
             middle = (base.width / 2, 9.5 * self._unit)
-            pen.text(middle, text, font=face, fill=_TEXT, anchor="mm")
+            pen.text(middle, text, font=face, fill=TEXT, anchor="mm")
             self._bases.append(base)
         self.half = 0.5 * np.array(base.size, dtype=float)
         self._reach_up = 2.0 * self.half[1] + _LIFT * self._unit
@@ -192,7 +192,7 @@ def draw_bar(
     color = _LOW if charge < reserve + _LOW_SHARE * (1.0 - reserve) else _FULL
     pen.rectangle((left, top, left + full * (right - left), bottom), fill=color)
     mark = left + reserve * (right - left)
-    pen.line((mark, top - 1, mark, bottom + 1), fill=_TEXT, width=1)
+    pen.line((mark, top - 1, mark, bottom + 1), fill=TEXT, width=1)
 
 
 def overlap(
