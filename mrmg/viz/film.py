@@ -19,9 +19,10 @@ from mrmg.simulation.log import ExecutionLog, require_same_mission
 from mrmg.simulation.world_model import build_world
 from mrmg.viz import style
 from mrmg.viz.activities import breakdowns, standing_of
-from mrmg.viz.ground_image import GroundFrame, paint_trail, video_labels
+from mrmg.viz.ground_image import PAINTED, GroundFrame, paint_trail, video_labels
 from mrmg.viz.map_shapes import enclosing_circle
 from mrmg.viz.overlay import Panel, Reading, RobotReading
+from mrmg.viz.scene_drawing import LABEL_COLORS
 from mrmg.viz.tags import Label, Tag, letter_px, place_tags
 from mrmg.viz.top_view import TopView
 from mrmg.viz.video_options import VideoOptions
@@ -54,7 +55,6 @@ class Film:
         self.frame = floor_frame(self.world)
         self.colors = style.scene_robot_colors(scene)
         self.curves = measured_curves(scene, plan, log)
-        self.capacity_J = [robot.battery.capacity_J for robot in scene.robots]
         self.used_J = _used_J(self.curves)
         self.broken_s = breakdowns(log)
         ids = [robot.id for robot in scene.robots]
@@ -105,13 +105,13 @@ class Film:
             robots=tuple(
                 RobotReading(
                     robot=curve.robot,
-                    charge=float(curve.energy_J[tick]) / capacity_J,
+                    charge=float(curve.energy_J[tick]) / robot.battery.capacity_J,
                     speed_m_s=round(float(state[tick, 3]), 1) + 0.0,
                     heading_for=self._heading_for(curve, tick),
                     standing=self._standing(curve.robot, now_s),
                 )
-                for curve, state, capacity_J in zip(
-                    self.curves, self.log.state, self.capacity_J, strict=True
+                for curve, state, robot in zip(
+                    self.curves, self.log.state, self.scene.robots, strict=True
                 )
             ),
         )
@@ -203,7 +203,7 @@ class Stage:
             for color, points in trails.items():
                 self._top.extend_trail(points[self._trailed - 1 :], color)
         self._trailed = tick + 1
-        self._top.draw(log.qpos[tick], log.state[:, tick, :2], pane)
+        pane[:] = self._top.draw(log.qpos[tick], log.state[:, tick, :2])
         circles = [
             enclosing_circle(robot, tuple(state[tick, :3]))
             for robot, state in zip(self._film.scene.robots, log.state, strict=True)
@@ -220,7 +220,8 @@ class Stage:
         x_m, y_m = film.log.state[film.followed, tick, :2]
         z_m = height_at(film.scene, np.array([[x_m, y_m]]))[0]
         camera = chase_camera(float(x_m), float(y_m), float(z_m), float(film.yaw[tick]))
-        self._view.draw(camera, fovy=CHASE_FOVY_DEG, shadows=True, out=pane)
+        size = (pane.shape[1], pane.shape[0])
+        pane[:] = self._view.draw(camera, size, fovy=CHASE_FOVY_DEG, shadows=True)
         near_m = np.array([x_m, y_m])
         for label, spot in self._target_labels:
             if np.hypot(*(spot - near_m)) < _NAMED_WITHIN_M:
@@ -274,15 +275,13 @@ class Stage:
 
 def _labels(film: Film) -> list[tuple[str, Label, np.ndarray]]:
     """Return the names laid over the map: kind, name and place [m] of each."""
-    colors = {"goal": style.INK, "station": style.STATION_EDGE}
-    colors["obstacle"] = style.ON_OBSTACLE
     height = film.options.size[1]
     return [
         (
             label.kind,
-            Label(label.text, colors[label.kind], height, size_em=label.size_em),
+            Label(label.text, LABEL_COLORS[label.kind], height, size_em=label.size_em),
             np.array([label.x_m, label.y_m]),
         )
         for label in video_labels(film.scene, film.plan, film.em_m)
-        if label.kind in colors
+        if label.kind not in PAINTED
     ]

@@ -27,7 +27,8 @@ _DPI = 100
 _SPACING_M = 0.3
 _SUPERSAMPLING = 4
 _LETTER_PIXELS = 40.0
-_PAINTED = ("terrain", "height")
+PAINTED = ("terrain", "height")
+"""Kinds of names that lie on the ground; others are laid over the picture."""
 _RELIEF_CELL_M = 0.25
 
 
@@ -98,7 +99,7 @@ def paint_ground(
         _paint_paths(axes, scene, plan, letter_points)
     _paint_rims(axes, scene)
     painted = [
-        label for label in video_labels(scene, plan, em_m) if label.kind in _PAINTED
+        label for label in video_labels(scene, plan, em_m) if label.kind in PAINTED
     ]
     scene_drawing.draw_labels(axes, scene, painted, letter_points)
     canvas.draw()  # type: ignore[no-untyped-call]
@@ -108,7 +109,7 @@ def paint_ground(
 
 def video_labels(scene: Scene, plan: Plan | None, em_m: float) -> tuple[MapLabel, ...]:
     """Return the names on the map of a video; those of robots go with the robots."""
-    kinds = ("goal", "station", "obstacle", *_PAINTED)
+    kinds = ("goal", "station", "obstacle", *PAINTED)
     return map_labels(scene, plan, em_m=em_m, kinds=kinds)
 
 

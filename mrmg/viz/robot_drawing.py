@@ -95,10 +95,8 @@ def _draw_rendered(
     with open_view(world, ground, _PIXELS) as view:
         data = mujoco.MjData(world.model)
         for axes, camera, fovy in ((seen, corner, _FOVY_DEG), (above, top, seen_m)):
-            picture = np.empty((height, width, 3), dtype=np.uint8)
             view.place(data.qpos)
-            view.draw(camera, fovy=fovy, shadows=True, out=picture)
-            axes.imshow(picture)
+            axes.imshow(view.draw(camera, _PIXELS, fovy=fovy, shadows=True))
             axes.plot(*view.project(points).T, color=_OUTLINE, path_effects=HALO)
             if camera is top:
                 reference = view.project(np.zeros((1, 3)))

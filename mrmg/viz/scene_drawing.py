@@ -33,7 +33,7 @@ LETTER_POINTS = 10.0
 HALO = [withStroke(linewidth=2.5, foreground="white")]
 """What keeps text readable on anything."""
 _MARKERS = {"goal": "o", "station": "s"}
-_LABEL_COLORS = {
+LABEL_COLORS = {
     "goal": style.INK,
     "station": style.STATION_EDGE,
     "breakdown": style.RESERVE,
@@ -115,7 +115,7 @@ def draw_labels(
     """
     robots = style.scene_robot_colors(scene)
     for label in labels:
-        color = _LABEL_COLORS.get(label.kind) or robots[label.of]
+        color = LABEL_COLORS.get(label.kind) or robots[label.of]
         look: dict[str, Any] = {"color": color, "path_effects": HALO}
         if label.kind == "stop":
             bbox = {"boxstyle": "round,pad=0.12", "fc": color, "ec": "white"}

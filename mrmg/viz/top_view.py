@@ -38,8 +38,7 @@ class TopView:
         self._half = math.ceil((radius_m + _MARGIN_M) * frame.pixels_per_m)
         width = style.DRIVEN.width_em * letter_px(frame.size[1])
         self._trail_width = max(width, _LEAST_TRAIL_PIXELS)
-        self._still = np.empty((*frame.size[::-1], 3), dtype=np.uint8)
-        self._background = self._still.copy()
+        self._still = self._background = np.empty(0)
 
     def draw_background(
         self,
@@ -57,7 +56,8 @@ class TopView:
         self._view.place_robots_away(qpos)
         camera = top_camera(self._frame.center_m, self._view.highest_m)
         height_m = 2.0 * self._frame.half_m[1]
-        self._view.draw(camera, fovy=height_m, shadows=False, out=self._still)
+        size = self._frame.size
+        self._still = self._view.draw(camera, size, fovy=height_m, shadows=False)
         self._background = self._still.copy()
         for color, points in trails.items():
             self.extend_trail(points, color)
@@ -69,27 +69,26 @@ class TopView:
         pixels = self._frame.to_pixels(points)
         paint_line(self._background, pixels, self._trail_width, color)
 
-    def draw(self, qpos: np.ndarray, points: np.ndarray, out: np.ndarray) -> None:
-        """Draw the map with its robots into `out`.
+    def draw(self, qpos: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Return the map with its robots, shape (height, width, 3) of bytes.
 
         Args:
             qpos: positions of the model.
             points: reference point of each robot [m], shape (n, 2).
-            out: picture, shape (height, width, 3) of bytes.
         """
-        out[:] = self._background
+        picture = self._background.copy()
         self._view.place(qpos)
         for column, row in np.round(self._frame.to_pixels(points)).astype(int):
-            self._draw_patch(int(column), int(row), out)
+            self._draw_patch(int(column), int(row), picture)
+        return picture
 
-    def _draw_patch(self, column: int, row: int, out: np.ndarray) -> None:
-        half = self._half
-        patch = np.empty((2 * half, 2 * half, 3), dtype=np.uint8)
+    def _draw_patch(self, column: int, row: int, picture: np.ndarray) -> None:
+        half, size = self._half, (2 * self._half, 2 * self._half)
         at_m = self._frame.to_ground(np.array([column, row]))
         fovy = 2 * half / self._frame.pixels_per_m
         camera = top_camera(at_m, self._view.highest_m)
-        self._view.draw(camera, fovy=fovy, shadows=False, out=patch)
-        shown, inner = overlap(out, patch, column - half, row - half)
+        patch = self._view.draw(camera, size, fovy=fovy, shadows=False)
+        shown, inner = overlap(picture, patch, column - half, row - half)
         still, _ = overlap(self._still, patch, column - half, row - half)
         moved = np.abs(inner.astype(np.int16) - still).max(axis=2) > _DIFFERENCE
         shown[moved] = inner[moved]

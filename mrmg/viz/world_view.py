@@ -68,9 +68,7 @@ def chase_camera(
 class WorldView:
     """Draws states of a world offscreen; made by `open_view`."""
 
-    def __init__(
-        self, world: MujocoWorld, model: mujoco.MjModel, size: tuple[int, int]
-    ) -> None:
+    def __init__(self, world: MujocoWorld, model: mujoco.MjModel) -> None:
         """Set up drawing in the OpenGL context that is current."""
         self.model = model
         self.highest_m = highest_m(world.scene)
@@ -83,8 +81,8 @@ class WorldView:
         )
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         self._floor = model.texture(FLOOR)
-        self._size = size
         self._camera: Any = None
+        self._size = (0, 0)
 
     @property
     def ground(self) -> np.ndarray:
@@ -119,17 +117,22 @@ class WorldView:
         self.place(away)
 
     def draw(
-        self, camera: mujoco.MjvCamera, *, fovy: float, shadows: bool, out: np.ndarray
-    ) -> None:
-        """Draw the placed world into `out`.
+        self,
+        camera: mujoco.MjvCamera,
+        size: tuple[int, int],
+        *,
+        fovy: float,
+        shadows: bool,
+    ) -> np.ndarray:
+        """Return a picture of the placed world, shape (height, width, 3) of bytes.
 
         Args:
             camera: where to look from.
+            size: width and height of the picture [pixels].
             fovy: field of view [deg], or the height seen [m] if orthographic.
             shadows: whether things cast shadows.
-            out: picture, shape (height, width, 3) of bytes, row 0 at the top.
         """
-        height, width = out.shape[:2]
+        width, height = self._size = size
         self.model.vis.global_.fovy = fovy
         self._scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
         self._scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
@@ -146,11 +149,10 @@ class WorldView:
         mujoco.mjr_render(view, self._scene, self._context)
         pixels = np.empty((height, width, 3), dtype=np.uint8)
         mujoco.mjr_readPixels(pixels, None, view, self._context)
-        out[:] = pixels[::-1]
         self._camera = mujoco.mjv_averageCamera(
             self._scene.camera[0], self._scene.camera[1]
         )
-        self._size = (width, height)
+        return pixels[::-1]
 
     def project(self, points: np.ndarray) -> np.ndarray:
         """Return where points [m] appear in the last picture, shape (n, 3) -> (n, 2).
@@ -201,7 +203,7 @@ def open_view(
         model = drawable_spec(world, ground, size).compile()
         model.vis.quality.offsamples = _SMOOTH_SAMPLES if smooth else 0
         try:
-            view = WorldView(world, model, size)
+            view = WorldView(world, model)
         except mujoco.FatalError as error:
             raise MachineError(f"OpenGL could not be set up: {error}") from error
         with closing(view):

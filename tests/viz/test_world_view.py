@@ -47,11 +47,10 @@ def red_pixels(picture: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("pose", sorted(POSES))
 def test_a_mark_appears_where_it_is_projected(world, pose) -> None:
     camera, fovy = POSES[pose]
-    picture = np.empty((SIZE[1], SIZE[0], 3), dtype=np.uint8)
     with open_view(world, white_ground(world), SIZE) as view:
         view.color_target("g", RED)
         view.place(world.model.qpos0)
-        view.draw(camera, fovy=fovy, shadows=False, out=picture)
+        picture = view.draw(camera, SIZE, fovy=fovy, shadows=False)
         expected = view.project(np.array([[13.0, 11.5, 0.03]]))[0]
     found = red_pixels(picture)
     assert len(found) > 5
@@ -60,25 +59,22 @@ def test_a_mark_appears_where_it_is_projected(world, pose) -> None:
 
 def test_points_behind_the_camera_have_no_place(world) -> None:
     camera, fovy = POSES["chase"]
-    picture = np.empty((SIZE[1], SIZE[0], 3), dtype=np.uint8)
     with open_view(world, white_ground(world), SIZE) as view:
         view.place(world.model.qpos0)
-        view.draw(camera, fovy=fovy, shadows=False, out=picture)
+        view.draw(camera, SIZE, fovy=fovy, shadows=False)
         assert np.isnan(view.project(np.array([[-60.0, -10.0, 0.0]]))).all()
 
 
 def test_painted_ground_is_seen_after_its_update(world) -> None:
     camera, fovy = POSES["top"]
-    before = np.empty((SIZE[1], SIZE[0], 3), dtype=np.uint8)
-    after = before.copy()
     with open_view(world, white_ground(world), SIZE) as view:
         view.place(world.model.qpos0)
-        view.draw(camera, fovy=fovy, shadows=False, out=before)
+        before = view.draw(camera, SIZE, fovy=fovy, shadows=False)
         frame = floor_frame(world)
         column, row = frame.to_pixels(np.array([[25.0, 5.0]]))[0].astype(int)
         view.ground[row - 25 : row + 26, column - 25 : column + 26] = (255, 0, 0)
         view.update_ground()
-        view.draw(camera, fovy=fovy, shadows=False, out=after)
+        after = view.draw(camera, SIZE, fovy=fovy, shadows=False)
     assert len(red_pixels(before)) == 0
     center = red_pixels(after).mean(axis=0)
     assert center[1] == pytest.approx(160 + 5.0 * 10.0, abs=1.0)
@@ -87,12 +83,11 @@ def test_painted_ground_is_seen_after_its_update(world) -> None:
 
 def test_robots_can_be_put_out_of_sight(world) -> None:
     camera, fovy = POSES["top"]
-    pictures = np.empty((2, SIZE[1], SIZE[0], 3), dtype=np.uint8)
     with open_view(world, white_ground(world), SIZE) as view:
         view.place(world.model.qpos0)
-        view.draw(camera, fovy=fovy, shadows=False, out=pictures[0])
+        with_robots = view.draw(camera, SIZE, fovy=fovy, shadows=False)
         view.place_robots_away(world.model.qpos0)
-        view.draw(camera, fovy=fovy, shadows=False, out=pictures[1])
-    rows, columns = np.nonzero((pictures[0] != pictures[1]).any(axis=2))
+        without = view.draw(camera, SIZE, fovy=fovy, shadows=False)
+    rows, columns = np.nonzero((with_robots != without).any(axis=2))
     assert 160 + 10 * (3 - 0.6 - 20) <= columns.min() < columns.max() <= 160 - 10 * 15.2
     assert 120 - 10 * 8 <= rows.min() < rows.max() <= 120 - 10 * 6
