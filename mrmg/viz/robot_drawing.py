@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import why_not_driven
@@ -42,8 +41,12 @@ def draw_robot(model: RobotModel, path: Path) -> None:
     require_format(path)
     figure = new_figure(11.0, 6.6)
     figure.suptitle(model.name, fontsize=15, fontweight="bold")
-    shown, table = figure.subplots(2, 1, height_ratios=(4.2, 2.0))
-    seen, above = _halves(figure, shown)
+    rows = figure.add_gridspec(2, 1, height_ratios=(4.2, 2.0))
+    halves = rows[0].subgridspec(1, 2)
+    panels = [figure.add_subplot(place) for place in (halves[0], halves[1], rows[1])]
+    for axes in panels:
+        axes.axis("off")
+    seen, above, table = panels
     outline = np.vstack([model.footprint_m, model.footprint_m[:1]])
     if why_not_driven(model) is None:
         _draw_rendered(model, outline, seen, above)
@@ -57,24 +60,11 @@ def draw_robot(model: RobotModel, path: Path) -> None:
         above.set_ylabel("y [m]")
     seen.set_title("red: the footprint on the ground", fontsize=9, color=style.MUTED)
     above.set_title("from above; +: the reference point", fontsize=9, color=style.MUTED)
-    table.axis("off")
     table.text(
         0.02, 1.0, "\n".join(figure_lines(model)), family="monospace", fontsize=10,
         va="top", linespacing=1.35, transform=table.transAxes,
     )  # fmt: skip
     write_figure(figure, path)
-
-
-def _halves(figure: Figure, shown: Axes) -> tuple[Axes, Axes]:
-    """Return axes for both pictures in place of one."""
-    grid = shown.get_subplotspec()
-    assert grid is not None
-    shown.remove()
-    halves = grid.subgridspec(1, 2)
-    pair = (figure.add_subplot(halves[0]), figure.add_subplot(halves[1]))
-    for axes in pair:
-        axes.axis("off")
-    return pair
 
 
 def _draw_rendered(
