@@ -57,7 +57,6 @@ PLANNED, DRIVEN = LineLook(0.45, 0.33), LineLook(0.16, 1.0)
 _LONGEST_NAME = 10
 _HATCHES = ("..", "//", "xx", "\\\\", "++")
 _PALENESS = 0.25
-_WHITE = (1.0, 1.0, 1.0)
 _LUMINANCES = (0.26, 0.26, 0.26, 0.26, 0.10, 0.10, 0.06, 0.26)
 """How light the robots' colours may be, in the palette's order. Lines of 0.26 have a
 contrast of 3.4 on white; those of hues that colour-blind eyes would take for another
@@ -92,7 +91,7 @@ def terrain_classes(scene: Scene) -> dict[float, KeyEntry]:
     multipliers = sorted({area.multiplier for area in scene.terrain} - {1.0})
     looks = {
         value: (
-            _hex(_blend(palette.terrain_colour(value), _WHITE, _PALENESS)),
+            _hex(_paler(palette.terrain_colour(value), _PALENESS)),
             _HATCHES[rank % len(_HATCHES)],
         )
         for rank, value in enumerate(multipliers)
@@ -121,34 +120,26 @@ def target_colors(target: Goal | Station) -> tuple[str, str]:
 
 def map_key(scene: Scene) -> list[KeyEntry]:
     """Return the legend of a scene's map: all kinds of things that it holds."""
-    blocking = {obstacle.blocks is None for obstacle in scene.obstacles}
-    some_steep = any(obstacle.is_steep_ground for obstacle in scene.barriers)
+    barriers = {obstacle_color(barrier) for barrier in scene.barriers}
     classes = terrain_classes(scene)
-    entries = {
-        KeyEntry("goal", "goal", GOAL_OPEN, GOAL_EDGE): bool(scene.goals),
-        KeyEntry("recharging station ⚡", "station", STATION, STATION_EDGE): bool(
+    entries: dict[KeyEntry, object] = {
+        KeyEntry("goal", "goal", GOAL_OPEN, GOAL_EDGE): scene.goals,
+        KeyEntry("recharging station ⚡", "station", STATION, STATION_EDGE): (
             scene.stations
         ),
-        KeyEntry("obstacle", "area", OBSTACLE, OBSTACLE_EDGE): True in blocking,
-        KeyEntry(
-            "obstacle for some robots",
-            "area",
-            PARTIAL_OBSTACLE,
-            OBSTACLE_EDGE,
-            dashed=True,
-        ): False in blocking,
-        KeyEntry(
-            "too steep for some robots",
-            "area",
-            STEEP_GROUND,
-            OBSTACLE_EDGE,
-            dashed=True,
-        ): some_steep,
-        KeyEntry("plain ground ×1", "area", GROUND): bool(classes)
-        and 1.0 not in classes,
+        KeyEntry("obstacle", "area", OBSTACLE, OBSTACLE_EDGE): OBSTACLE in barriers,
+        _for_some_robots("obstacle", PARTIAL_OBSTACLE): PARTIAL_OBSTACLE in barriers,
+        _for_some_robots("too steep", STEEP_GROUND): STEEP_GROUND in barriers,
+        KeyEntry("plain ground ×1", "area", GROUND): classes and 1.0 not in classes,
         KeyEntry("contour line", "line", CONTOUR): scene.elevation is not None,
     }
     return [*(entry for entry, shown in entries.items() if shown), *classes.values()]
+
+
+def _for_some_robots(what: str, color: str) -> KeyEntry:
+    """Return the entry of what keeps some robots out and lets others through."""
+    label = f"{what} for some robots"
+    return KeyEntry(label, "area", color, OBSTACLE_EDGE, dashed=True)
 
 
 def robot_colors(robots: Sequence[str]) -> dict[str, str]:
@@ -200,9 +191,9 @@ def _ink(color: palette.Rgb, luminance: float) -> str:
 
 def _glow(color: palette.Rgb) -> str:
     share = 0.0
-    while _luminance(_blend(color, _WHITE, share)) < _LIGHTEST_LUMINANCE:
+    while _luminance(_paler(color, share)) < _LIGHTEST_LUMINANCE:
         share += 0.05
-    return _hex(_blend(color, _WHITE, share))
+    return _hex(_paler(color, share))
 
 
 def _luminance(color: palette.Rgb) -> float:
@@ -211,10 +202,9 @@ def _luminance(color: palette.Rgb) -> float:
     return float(0.2126 * red**2.2 + 0.7152 * green**2.2 + 0.0722 * blue**2.2)
 
 
-def _blend(color: palette.Rgb, other: palette.Rgb, share: float) -> palette.Rgb:
-    red, green, blue = (
-        (1.0 - share) * a + share * b for a, b in zip(color, other, strict=True)
-    )
+def _paler(color: palette.Rgb, share: float) -> palette.Rgb:
+    """Return a colour mixed with a share of white."""
+    red, green, blue = ((1.0 - share) * part + share for part in color)
     return red, green, blue
 
 

@@ -36,9 +36,10 @@ class Tag:
         self._reserve = robot.battery.reserve_fraction
         face = font(max(round(12 * self._unit), 9), bold=True)
         width = max(46.0, (face.getlength(f"{robot.id} {_BROKEN}")) / self._unit + 8.0)
+        size = (round(width * self._unit), round(27 * self._unit))
         self._bases = []
         for rim, text in ((color, robot.id), (_LOW, f"{robot.id} {_BROKEN}")):
-            base = Image.new("RGB", self._scaled(width, 27), CARD)
+            base = Image.new("RGB", size, CARD)
             pen = ImageDraw.Draw(base)
             pen.rectangle((0, 0, base.width - 1, base.height - 1), outline=rim, width=2)
             middle = (base.width / 2, 9.5 * self._unit)
@@ -99,9 +100,6 @@ class Tag:
         draw_bar(ImageDraw.Draw(image), bar, charge, self._reserve)
         left, top = np.round(spot - (self.half[0], self._reach_up)).astype(int).tolist()
         _paste(picture, np.asarray(image), left, top)
-
-    def _scaled(self, width: float, height: float) -> tuple[int, int]:
-        return round(width * self._unit), round(height * self._unit)
 
 
 def place_tags(
