@@ -58,11 +58,11 @@ class GroundFrame:
         return int(width), int(height)
 
     def to_pixels(self, points: np.ndarray) -> np.ndarray:
-        """Return image coordinates (column, row) of points [m], shape (n, 2)."""
+        """Return image coordinates (column, row) of points [m], shape (..., 2)."""
         return np.asarray((points - self._corner_m) * (1.0, -1.0) * self.pixels_per_m)
 
     def to_ground(self, pixels: np.ndarray) -> np.ndarray:
-        """Return the points [m] at image coordinates (column, row), shape (n, 2)."""
+        """Return the points [m] at image coordinates (column, row), shape (..., 2)."""
         return np.asarray(self._corner_m + pixels * (1.0, -1.0) / self.pixels_per_m)
 
     @property
