@@ -11,7 +11,7 @@ from mrmg.planning.problem._target_kernels import TARGET, Targets
 from mrmg.planning.roadmap.vertices import planned_regions
 from mrmg.scene.margins import LEAST_DEFAULT_M, tracking_error
 from mrmg.scene.region import Region
-from mrmg.scene.types import Finish, Goal, Scene, Station
+from mrmg.scene.types import Finish, Scene, Station
 
 ERRORS_DEEP = 3.0
 """How deep inside a region the planner drives, so that a tracked path enters it too, as
@@ -51,8 +51,17 @@ def target_arrays(scene: Scene) -> Targets:
     radius_m = [max(one.radius_m - depth_m, 0.5 * one.radius_m) for one in regions]
     target = np.zeros(len(regions), TARGET)
     corner = _fill_in(target, regions, shrunk, radius_m)
-    target["heading"], target["tolerance"] = _headings(scene)
-    target["dwell"], target["zone"] = _dwell_s(scene), _gates_of(scene)
+    target["tolerance"], target["zone"] = 2.0 * np.pi, -1
+    gates = {station.id: i for i, station in enumerate(_exclusive(scene))}
+    finishes = [robot.finish for robot in scene.robots if robot.finish]
+    for own, place in zip(target, [*scene.targets(), *finishes], strict=True):
+        if not isinstance(place, Station) and place.heading_rad is not None:
+            own["heading"] = place.heading_rad
+            own["tolerance"] = HEADING_SHARE * place.heading_tolerance_rad
+        if not isinstance(place, Finish):
+            own["zone"] = gates.get(place.id, -1)
+            if place.dwell_s > 0.0:
+                own["dwell"] = place.dwell_s + LONGER_S
     return Targets(
         goals=len(scene.goals),
         places=len(scene.targets()),
@@ -94,40 +103,8 @@ def _fill_in(
     return corner
 
 
-def _headings(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Return each target's heading, and the deviation from it that planning allows."""
-    count = len(planned_regions(scene))
-    heading, tolerance = np.zeros(count), np.full(count, 2.0 * np.pi)
-    finishes = [robot.finish for robot in scene.robots if robot.finish]
-    places: dict[int, Goal | Finish] = dict(enumerate(scene.goals))
-    places |= enumerate(finishes, len(scene.targets()))
-    for t, place in places.items():
-        if place.heading_rad is not None:
-            heading[t] = place.heading_rad
-            tolerance[t] = HEADING_SHARE * place.heading_tolerance_rad
-    return heading, tolerance
-
-
-def _dwell_s(scene: Scene) -> np.ndarray:
-    """Return how long robots stay at each target [s], shape (T,)."""
-    dwell_s = np.zeros(len(planned_regions(scene)))
-    for t, target in enumerate(scene.targets()):
-        if target.dwell_s > 0.0:
-            dwell_s[t] = target.dwell_s + LONGER_S
-    return dwell_s
-
-
 def _exclusive(scene: Scene) -> list[Station]:
     return [station for station in scene.stations if station.one_at_a_time]
-
-
-def _gates_of(scene: Scene) -> np.ndarray:
-    """Return each target's number among the gates, -1 for none, shape (T,)."""
-    zone = np.full(len(planned_regions(scene)), -1, np.int64)
-    numbers = {station.id: i for i, station in enumerate(_exclusive(scene))}
-    for t, target in enumerate(scene.targets()):
-        zone[t] = numbers.get(target.id, -1)
-    return zone
 
 
 def gate_arrays(scene: Scene) -> Zones:
