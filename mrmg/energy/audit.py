@@ -38,7 +38,7 @@ from mrmg.energy.audit_record import (
 from mrmg.energy.balance import balance_of, imbalances
 from mrmg.energy.battery_curves import MeasuredCurve, measured_curves
 from mrmg.energy.ledger import EnergyLedger
-from mrmg.energy.metering import MEASURED_PARTS, leg_entries, plan_ledger
+from mrmg.energy.metering import plan_ledger
 from mrmg.energy.mission_failures import mission_failures
 from mrmg.energy.model_mismatch import model_mismatches
 from mrmg.energy.visits import first_stay
@@ -106,19 +106,9 @@ def audit(
         goals_visited=goals_visited,
         planned=plan.ledger,
         metered=metered_ledger,
-        measured=_measured_ledger(measured),
-    )
-
-
-def _measured_ledger(curves: Iterable[MeasuredCurve]) -> EnergyLedger:
-    return EnergyLedger(
-        tuple(
-            entry
-            for curve in curves
-            for entry in leg_entries(
-                curve.robot, curve.drawn_J, MEASURED_PARTS, curve.visits
-            )
-        )
+        measured=EnergyLedger(
+            tuple(entry for curve in measured for entry in curve.entries)
+        ),
     )
 
 

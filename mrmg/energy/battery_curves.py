@@ -6,16 +6,17 @@ once for the log.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from mrmg.energy.ledger import LedgerEntry
 from mrmg.energy.metering import (
+    MEASURED_PARTS,
     TimedStates,
-    battery_content,
     battery_profile,
-    find_visits,
     measured_energy_parts,
+    visits_and_energy,
 )
 from mrmg.plans import Plan, Visit
 from mrmg.scene.types import Scene
@@ -47,9 +48,11 @@ class MeasuredCurve(BatteryCurve):
 
     Attributes:
         drawn_J: measured over each tick by part of `MEASURED_PARTS`, shape (n - 1, 3).
+        entries: the same by leg and part.
     """
 
     drawn_J: np.ndarray
+    entries: tuple[LedgerEntry, ...]
 
 
 def shown_curves(
@@ -94,21 +97,20 @@ def measured_curves(
     actual = log.disturbance.actual_scene(scene) if log.disturbance else scene
     found = []
     for motion, work_J in zip(log.driven_motions(), log.work_J, strict=True):
-        visits = find_visits(actual, motion, plan.tours.get(motion.robot, ()))
         drawn_J = measured_energy_parts(actual.robot(motion.robot), work_J, log.time_s)
-        draw_J = drawn_J.sum(axis=1)
-        content_J, arrival_J = battery_content(actual, motion, draw_J, visits)
+        tour = plan.tours.get(motion.robot, ())
+        visits, content_J, entries = visits_and_energy(
+            actual, motion, tour, drawn_J, parts=MEASURED_PARTS
+        )
         found.append(
             MeasuredCurve(
                 robot=motion.robot,
                 time_s=motion.time_s,
                 state=motion.state,
                 energy_J=content_J,
-                visits=tuple(
-                    replace(visit, energy_J=energy_J)
-                    for visit, energy_J in zip(visits, arrival_J, strict=True)
-                ),
+                visits=visits,
                 drawn_J=drawn_J,
+                entries=tuple(entries),
             )
         )
     _last[:] = [(scene, plan, log, tuple(found))]

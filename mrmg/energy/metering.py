@@ -163,6 +163,7 @@ def visits_and_energy(
     tour: Sequence[str],
     energy_J: np.ndarray | None = None,
     reckoned_J: Mapping[int, float] = FROM_THE_START,
+    parts: Sequence[str] = PARTS,
 ) -> tuple[tuple[Visit, ...], np.ndarray, list[LedgerEntry]]:
     """Return visits as `find_visits`, and what `battery_profile` and the ledger say.
 
@@ -170,9 +171,10 @@ def visits_and_energy(
         scene: names the targets.
         motion: planned or logged states of one robot.
         tour: ids of goals and stations.
-        energy_J: of each interval by part, shape (n, len(PARTS)); None for that of the
+        energy_J: of each interval by part, shape (n, len(parts)); None for that of the
             scene's energy model.
         reckoned_J: contents from which the battery is reckoned on, by state.
+        parts: names of the columns of `energy_J`.
     """
     visits: list[Visit] = []
     targets = {target.id: target for target in scene.targets()}
@@ -192,7 +194,7 @@ def visits_and_energy(
         replace(visit, energy_J=arrived_J)
         for visit, arrived_J in zip(visits, arrival_J, strict=True)
     )
-    return found, content_J, leg_entries(motion.robot, energy_J, PARTS, visits)
+    return found, content_J, leg_entries(motion.robot, energy_J, parts, visits)
 
 
 def battery_profile(

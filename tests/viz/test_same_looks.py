@@ -15,7 +15,7 @@ from matplotlib.patches import Circle
 from mrmg.energy import battery_curves
 from mrmg.energy.audit import audit
 from mrmg.energy.by_terrain import energy_by_terrain
-from mrmg.energy.metering import battery_content
+from mrmg.energy.metering import visits_and_energy
 from mrmg.report import page as report_page
 from mrmg.report.charts import chart_data
 from mrmg.report.formats import percent
@@ -98,11 +98,11 @@ def test_all_that_show_a_drive_read_its_curves_worked_out_once(
 ) -> None:
     contents = []
 
-    def counted(*arguments):
-        contents.append(battery_content(*arguments))
+    def counted(*arguments, **options):
+        contents.append(visits_and_energy(*arguments, **options))
         return contents[-1]
 
-    monkeypatch.setattr(battery_curves, "battery_content", counted)
+    monkeypatch.setattr(battery_curves, "visits_and_energy", counted)
     scene, plan, log = mission
     audit(scene, plan, log)
     energy_by_terrain(scene, plan, log)
