@@ -75,10 +75,18 @@ class Proofs:
 
     @cached_property
     def _simple(self) -> str | None:
-        scene = self.scene
-        return proof_of_infeasibility(scene, self.halt) or proof_of_lateness(
-            scene, self.step_s, self.halt
-        )
+        return proof_of_infeasibility(self.scene, self.halt) or self._of_lateness()
+
+    def _of_lateness(self) -> str | None:
+        """Return why no plan can keep the time limit, or None if no proof is known."""
+        limit_s = self.scene.time_limit_s
+        if math.isinf(limit_s):
+            return None
+        least_s = makespan_bound_s(self.scene, step_s=self.step_s, halt=self.halt)
+        if math.isinf(least_s) or not overtime_s(limit_s, least_s):
+            return None
+        least, _ = compared(least_s, limit_s, 1)
+        return endings.TOO_LATE.format(limit_s=limit_s, least=least)
 
     @cached_property
     def _of_no_tours(self) -> str | None:
@@ -86,25 +94,12 @@ class Proofs:
         if proof is not None:
             return _sentence(self.scene, proof)
         limit_s = self.scene.time_limit_s
-        divisions = None
-        if math.isfinite(limit_s):
-            divisions = Divisions.of(self.scene, step_s=self.step_s, halt=self.halt)
+        if math.isinf(limit_s):
+            return None
+        divisions = Divisions.of(self.scene, step_s=self.step_s, halt=self.halt)
         if divisions is None or math.isfinite(divisions.energy_within_J(limit_s)):
             return None
         return endings.NO_TIMELY_TOURS.format(limit_s=limit_s)
-
-
-def proof_of_lateness(
-    scene: Scene, step_s: float, halt: np.ndarray = NEVER
-) -> str | None:
-    """Return why no plan can keep the time limit, or None if no proof is known."""
-    if math.isinf(scene.time_limit_s):
-        return None
-    least_s = makespan_bound_s(scene, step_s=step_s, halt=halt)
-    if math.isinf(least_s) or not overtime_s(scene.time_limit_s, least_s):
-        return None
-    least, _ = compared(least_s, scene.time_limit_s, 1)
-    return endings.TOO_LATE.format(limit_s=scene.time_limit_s, least=least)
 
 
 def _sentence(scene: Scene, proof: NoTours) -> str:

@@ -7,7 +7,7 @@ at all. What is impossible then is impossible.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -69,27 +69,35 @@ def _with_others(proofs: Mapping[str, str], amounts: Mapping[str, str]) -> str:
     return f"{sentence}; likewise {listed(names)}"
 
 
-def impossible_goals(scene: Scene, halt: np.ndarray = NEVER) -> dict[str, str]:
-    """Return the goals that no robot can visit, each with the proof's sentence.
-
-    Raises:
-        Halted: once `halt[0]` has turned true.
-    """
-    reaches = _reaches(scene, halt)
-    short = _out_of_energy(scene, reaches, halt)
-    return _cut_off(scene, reaches) | _out_of_reach(short)
+def impossible_goals(scene: Scene) -> dict[str, str]:
+    """Return the goals that no robot can visit, each with the proof's sentence."""
+    reaches = _reaches(scene)
+    return _cut_off(scene, reaches) | _out_of_reach(_out_of_energy(scene, reaches))
 
 
-def energy_warnings(scene: Scene) -> list[str]:
-    """Return sentences on the goals that batteries are known not to reach.
+def mission_warnings(scene: Scene) -> list[str]:
+    """Return what is known to keep a mission from being done, before it is planned.
 
-    A goal is out of a battery's reach if the robot cannot even drive there on the
+    That is which goals and finishes are cut off, which finishes crowd each other, and
+    which goals are out of reach of batteries: the robot cannot even drive there on the
     shortest path, recharging at any station it can reach. Goals that no robot reaches
-    make a mission infeasible; they come first.
+    make a mission infeasible; they come before those that some cannot reach.
     """
     reaches = _reaches(scene)
     nobodys = _out_of_energy(scene, reaches)
-    warnings = [*_out_of_reach(nobodys).values()]
+    finishes = [_unreachable_finish(scene, reaches), _crowded_finish(scene)]
+    return [
+        *_cut_off(scene, reaches).values(),
+        *filter(None, finishes),
+        *_out_of_reach(nobodys).values(),
+        *_out_of_own_reach(scene, reaches, nobodys),
+    ]
+
+
+def _out_of_own_reach(
+    scene: Scene, reaches: Sequence[_Reach], nobodys: Container[str]
+) -> Iterator[str]:
+    """Yield sentences on robots that cannot reach goals that others can."""
     for reach in reaches:
         missing = {
             goal.id: reach.missing_energy_J(goal.region)
@@ -99,24 +107,11 @@ def energy_warnings(scene: Scene) -> list[str]:
         far = [name for name, missing_J in missing.items() if missing_J > 0.0]
         if far:
             most = energy_and_metres(max(missing.values()), reach.robot)
-            warnings.append(
+            yield (
                 f"{reach.robot.id} cannot reach {listed(far)} with its battery, even "
                 f"on the shortest path over every station: it is short of up to "
                 f"{most} above its reserve; other robots can"
             )
-    return warnings
-
-
-def mission_warnings(scene: Scene) -> list[str]:
-    """Return what is known to keep a mission from being done, before it is planned.
-
-    That is which goals and finishes are cut off, which finishes crowd each other, and
-    the warnings of `energy_warnings`.
-    """
-    reaches = _reaches(scene)
-    finishes = [_unreachable_finish(scene, reaches), _crowded_finish(scene)]
-    cut_off = _cut_off(scene, reaches).values()
-    return [*cut_off, *filter(None, finishes), *energy_warnings(scene)]
 
 
 def energy_and_metres(energy_J: float, robot: Robot) -> str:

@@ -16,7 +16,6 @@ import shapely
 import mrmg
 from mrmg.energy.metering import find_visits, plan_ledger
 from mrmg.planning.feasibility import (
-    energy_warnings,
     mission_warnings,
     proof_of_infeasibility,
 )
@@ -321,15 +320,15 @@ def test_a_goal_that_no_battery_reaches_is_warned_of_with_what_is_missing(
     yard: MakeScene,
 ) -> None:
     scene = long_scene(yard, 100.0, [])
-    (warning,) = energy_warnings(scene)
+    (warning,) = mission_warnings(scene)
     assert warning == proof_of_infeasibility(scene)
     assert "(10.0 m of plain ground)" in warning
-    assert energy_warnings(long_scene(yard, 112.0, [])) == []
+    assert mission_warnings(long_scene(yard, 112.0, [])) == []
 
 
 def test_one_robots_battery_is_warned_of_by_name(yard: MakeScene) -> None:
     robots = [car("r1", 4, 6), car("r2", 80, 14)]
-    (warning,) = energy_warnings(long_scene(yard, 60.0, [], robots=robots))
+    (warning,) = mission_warnings(long_scene(yard, 60.0, [], robots=robots))
     assert warning.startswith("r1 cannot reach far with its battery")
 
 
