@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
+from mrmg.energy.visits import runs
 from mrmg.planning.roadmap.fleet import margins_of
 from mrmg.plans import Plan, Trajectory
 from mrmg.scene.margins import Margins, NarrowPassage, certified_minimum_m
@@ -71,16 +72,14 @@ def _narrow(
     )
     distance_m = np.full(len(bodies), np.inf)
     distance_m[less[found[0]]] = distance
-    less = np.flatnonzero(distance_m < least_m)
-    for run in np.split(less, np.flatnonzero(np.diff(less) > 1) + 1):
-        if len(run):
-            tightest = int(run[distance_m[run].argmin()])
-            x_m, y_m = trajectory.state[tightest, :2].tolist()
-            yield NarrowPassage(
-                robot=robot.id,
-                start_s=round(float(run[0] * trajectory.dt_s), 9),
-                end_s=round(float(run[-1] * trajectory.dt_s), 9),
-                x_m=x_m,
-                y_m=y_m,
-                margin_m=float(distance_m[tightest]),
-            )
+    for first, end in runs(distance_m < least_m):
+        tightest = first + int(distance_m[first:end].argmin())
+        x_m, y_m = trajectory.state[tightest, :2].tolist()
+        yield NarrowPassage(
+            robot=robot.id,
+            start_s=round(float(first * trajectory.dt_s), 9),
+            end_s=round(float((end - 1) * trajectory.dt_s), 9),
+            x_m=x_m,
+            y_m=y_m,
+            margin_m=float(distance_m[tightest]),
+        )
