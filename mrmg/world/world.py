@@ -29,13 +29,11 @@ class Opening:
 
     Attributes:
         shape: where their bodies' middles are meanwhile.
-        margin_m: what they keep there.
-        allowance_m: by how much that is less than their margin.
+        allowance_m: by how much what they keep there is less than their margin.
         robots: their numbers.
     """
 
     shape: BaseGeometry
-    margin_m: float
     allowance_m: float
     robots: tuple[int, ...]
 

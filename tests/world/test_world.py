@@ -76,7 +76,6 @@ def test_margins_are_smaller_by_the_allowance_in_openings(
     """0.3 m beside the wall, and 0.1 m in the opening."""
     opening = Opening(
         shape=shapely.Point(26.0, 10.0).buffer(3.0),
-        margin_m=0.1,
         allowance_m=0.2,
         robots=(0, 1, 2),
     )

@@ -94,16 +94,12 @@ def tightest_openings(scene: Scene, margins: Margins) -> tuple[Opening, ...]:
             *ground.narrow_pieces(needed_m, wide_m),
             *(place for place in places if not place.intersects(wide)),
         ]
-        reach_m = robot.model.circumscribed_radius_m + wide_m - needed_m
-        shape = shapely.union_all(pieces).buffer(reach_m)
-        if not shape.is_empty and least_m < margin_m:
+        if pieces and least_m < margin_m:
+            reach_m = robot.model.circumscribed_radius_m + wide_m - needed_m
+            shape = shapely.union_all(pieces).buffer(reach_m)
+            allowance_m = margin_m - least_m
             found.append(
-                Opening(
-                    shape=shape,
-                    margin_m=least_m,
-                    allowance_m=margin_m - least_m,
-                    robots=tuple(numbers),
-                )
+                Opening(shape=shape, allowance_m=allowance_m, robots=tuple(numbers))
             )
     return tuple(found)
 
@@ -236,7 +232,6 @@ def _opening(
     lacking_m = wide_clearance_m(robot, margin_m) - clearance_needed_m(robot, level_m)
     return Opening(
         shape=narrow.buffer(robot.model.circumscribed_radius_m + lacking_m),
-        margin_m=level_m,
         allowance_m=margin_m - level_m,
         robots=tuple(numbers),
     )
