@@ -9,6 +9,7 @@ import shapely
 
 from mrmg.plans import Trajectory
 from mrmg.scene.types import Robot, Scene
+from mrmg.verification.motion_rules import changing_steps
 
 
 def obstacle_distance(scene: Scene, robot: Robot, poses: np.ndarray) -> np.ndarray:
@@ -22,19 +23,12 @@ def obstacle_distance(scene: Scene, robot: Robot, poses: np.ndarray) -> np.ndarr
     Returns:
         Distance [m], 0 on contact, shape (n,).
     """
-    new = np.concatenate([[True], (poses[1:, :3] != poses[:-1, :3]).any(axis=1)])
-    which = np.cumsum(new[: len(poses)]) - 1  # a robot that stays is looked at once
-    shapes = shapely.polygons(robot.model.footprint_at(poses[new[: len(poses)]]))
+    changes = changing_steps(poses[:, :3])  # a robot that stays is looked at once
+    shapes = shapely.polygons(robot.model.footprint_at(poses[changes]))
     blocking = [item.shape for item in scene.barriers if item.stops(robot.id)]
-    distance = np.asarray(
-        shapely.distance(shapes, shapely.boundary(shapely.box(*scene.bounds)))
-    )
-    if not blocking:
-        return np.asarray(distance[which])
-    tree = shapely.STRtree(blocking)
-    found, nearest = tree.query_nearest(shapes, return_distance=True, all_matches=False)
-    distance[found[0]] = np.minimum(distance[found[0]], nearest)
-    return np.asarray(distance[which])
+    tree = shapely.STRtree([shapely.box(*scene.bounds).exterior, *blocking])
+    _, distance = tree.query_nearest(shapes, return_distance=True, all_matches=False)
+    return np.asarray(distance[np.cumsum(changes) - 1])
 
 
 def robot_distance(robots: Sequence[Robot], poses: Sequence[np.ndarray]) -> np.ndarray:

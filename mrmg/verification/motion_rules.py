@@ -141,9 +141,9 @@ def replay(model: RobotModel, trajectory: Trajectory) -> np.ndarray:
     return np.asarray(np.array(found).reshape(-1, 5)[np.cumsum(changes) - 1])
 
 
-def changing_steps(state: np.ndarray, control: np.ndarray) -> np.ndarray:
+def changing_steps(*columns: np.ndarray) -> np.ndarray:
     """Return which steps are not like the one before them, shape (n, k) -> (n,)."""
-    rows = np.concatenate([state, control], axis=1)
+    rows = np.concatenate(columns, axis=1)
     differs = (rows[1:] != rows[:-1]).any(axis=1)
     return np.asarray(np.concatenate([[True], differs])[: len(rows)])
 
