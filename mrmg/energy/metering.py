@@ -29,7 +29,7 @@ from mrmg.motion.dynamics import TURN_SPEEDS
 from mrmg.plans import Trajectory, Visit
 from mrmg.scene.types import Robot, Scene
 from mrmg.world.elevation import height_at, load_points
-from mrmg.world.terrain import multiplier_at, turning_multiplier_at
+from mrmg.world.terrain import multipliers_at
 
 MEASURED_PARTS = ("drive", "idle", "device")
 """The parts that the work of the drives can be split into."""
@@ -106,11 +106,12 @@ def _power_parts(
     else:
         turn_rad = after[:, 2] - before[:, 2]
         turn_speed_m_s = track_m * np.abs(turn_rad) / duration_s
+    rolling, turning = multipliers_at(scene, middle[:, :2])
     return robot.model.energy_model.power_parts(
         speed_m_s=middle[:, 3],
         acceleration_m_s2=acceleration_m_s2,
-        turn_speed_m_s=turn_speed_m_s * turning_multiplier_at(scene, middle[:, :2]),
-        multiplier=rolling_factor * multiplier_at(scene, middle[:, :2]),
+        turn_speed_m_s=turn_speed_m_s * turning,
+        multiplier=rolling_factor * rolling,
         climb_m_s=np.diff(height_m) / duration_s,
     )
 

@@ -89,7 +89,7 @@ class TerrainUnderfoot:
     def under(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
         """Return the multipliers of rolling and turning at some places, shape (2, n).
 
-        They are equal to those of `multiplier_at` and `turning_multiplier_at`.
+        They are equal to those of `multipliers_at`.
         """
         places = zip(x_m.tolist(), y_m.tolist(), strict=True)
         return np.array([self._at(x, y) for x, y in places]).reshape(-1, 2).T

@@ -9,21 +9,19 @@ from mrmg.scene.types import Scene
 
 
 def multiplier_at(scene: Scene, points: np.ndarray) -> np.ndarray:
-    """Return the multiplier of rolling at each point, shape (n, 2) -> (n,).
+    """Return the multiplier of rolling at each point, shape (n, 2) -> (n,)."""
+    return np.asarray(multipliers_at(scene, points)[0])
+
+
+def multipliers_at(scene: Scene, points: np.ndarray) -> np.ndarray:
+    """Return the multipliers of rolling and of turning at each point, shape (2, n).
 
     Polygons count exactly. Where areas overlap, the later one of the scene counts;
-    elsewhere it is 1.
+    elsewhere both are 1.
     """
-    multiplier = np.array([1.0, *(area.multiplier for area in scene.terrain)])
-    return np.asarray(multiplier[area_at(scene, points)])
-
-
-def turning_multiplier_at(scene: Scene, points: np.ndarray) -> np.ndarray:
-    """Return the multiplier of turning at each point, shape (n, 2) -> (n,)."""
-    multiplier = np.array([1.0, *(area.turning_multiplier for area in scene.terrain)])
-    if np.all(multiplier == 1.0):
-        return np.ones(len(np.atleast_2d(points)))
-    return np.asarray(multiplier[area_at(scene, points)])
+    of_areas = [(area.multiplier, area.turning_multiplier) for area in scene.terrain]
+    multipliers = np.array([(1.0, 1.0), *of_areas])
+    return np.asarray(multipliers.T[:, area_at(scene, points)])
 
 
 def area_at(scene: Scene, points: np.ndarray) -> np.ndarray:

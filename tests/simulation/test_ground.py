@@ -12,7 +12,7 @@ from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
 from mrmg.simulation.ground import TerrainUnderfoot, believed_resistance
 from mrmg.simulation.simulation import simulate
-from mrmg.world.terrain import multiplier_at, turning_multiplier_at
+from mrmg.world.terrain import multipliers_at
 
 
 @pytest.fixture(scope="module")
@@ -68,10 +68,9 @@ def test_terrain_underfoot_is_the_scenes(name: str) -> None:
     places = rng.uniform((x_min - 5, y_min - 5), (x_max + 5, y_max + 5), (2000, 2))
     borders = [np.array(area.shape.exterior.coords) for area in scene.terrain]
     points = np.concatenate([places, *borders])
-    expected = multiplier_at(scene, points)
-    turning = turning_multiplier_at(scene, points)
+    rolling, turning = multipliers_at(scene, points)
     np.testing.assert_array_equal(
-        TerrainUnderfoot(scene).under(*points.T), [expected, turning]
+        TerrainUnderfoot(scene).under(*points.T), [rolling, turning]
     )
-    assert len(np.unique(expected)) > 1
+    assert len(np.unique(rolling)) > 1
     assert len(np.unique(turning)) > 1

@@ -9,7 +9,7 @@ import shapely
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.world import _kernels
-from mrmg.world.terrain import multiplier_at, turning_multiplier_at
+from mrmg.world.terrain import multiplier_at, multipliers_at
 from mrmg.world.world import CELL_M, World
 
 MUD = {"id": "mud", "box": {"center": [20, 10], "size": [16, 12]}, "multiplier": 4}
@@ -57,8 +57,9 @@ def test_the_later_area_counts_where_two_overlap(
 def test_terrain_may_resist_turning_by_a_factor_of_its_own() -> None:
     fields = scene({**MUD, "turning_multiplier": 3}, PLANK)
     points = np.array([(20, 10), (20, 15), (39, 1)], float)
-    assert multiplier_at(fields, points).tolist() == [1.5, 4.0, 1.0]
-    assert turning_multiplier_at(fields, points).tolist() == [1.0, 3.0, 1.0]
+    rolling, turning = multipliers_at(fields, points)
+    assert rolling.tolist() == multiplier_at(fields, points).tolist() == [1.5, 4.0, 1.0]
+    assert turning.tolist() == [1.0, 3.0, 1.0]
     grid = World.from_scene(fields).terrain
     found = [_kernels.turning_multiplier_in(grid, x, y) for x, y in points]
     assert found == [1.0, 3.0, 1.0]
