@@ -19,8 +19,8 @@ CELL_M = 0.25
 BUCKET_M = 2.0
 """Side of a bucket of obstacle edges."""
 
-NO_ALLOWANCE = np.zeros((0, 0))
-"""The allowances of a space without openings."""
+MARGIN_M = 1.0
+"""Largest clearance that footprint tests use."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,7 +58,6 @@ class World:
     def from_scene(
         scene: Scene,
         *,
-        margin_m: float = 1.0,
         cell_m: float = CELL_M,
         openings: Sequence[Opening] = (),
         guide_m: float = 0.0,
@@ -67,12 +66,11 @@ class World:
 
         Args:
             scene: the scene.
-            margin_m: largest clearance that footprint tests will use.
             cell_m: side of a cell of the grids.
             openings: places where robots keep less than their margins.
             guide_m: what distances in openings count for besides their allowances.
         """
-        reach = margin_m + max(
+        reach = MARGIN_M + max(
             robot.model.circumscribed_radius_m for robot in scene.robots
         )
         keys = [
@@ -149,7 +147,7 @@ def free_space(
         bucket_edge=near[np.argsort(bucket, kind="stable")],
         reach=float(reach),
         edge=edge,
-        allowance=NO_ALLOWANCE.copy(),
+        allowance=np.zeros((0, 0)),
         guide=0.0,
     )
 

@@ -9,7 +9,7 @@ import shapely
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.world import _kernels
-from mrmg.world.world import Opening, World
+from mrmg.world.world import MARGIN_M, Opening, World
 
 WALL = {"id": "wall", "box": {"center": [30, 10], "size": [2, 8]}, "height": 1.0}
 KERB = {
@@ -63,9 +63,9 @@ def test_without_particular_obstacles_there_is_one_space() -> None:
 
 def test_reach_covers_the_farthest_corner_and_the_margin() -> None:
     fleet = scene(WALL)
-    space = World.from_scene(fleet, margin_m=0.7).spaces[0]
+    space = World.from_scene(fleet).spaces[0]
     model = fleet.robots[0].model
-    assert space.reach >= 0.7 + model.circumscribed_radius_m - 1e-12
+    assert space.reach >= MARGIN_M + model.circumscribed_radius_m - 1e-12
 
 
 @pytest.mark.parametrize("away_m", [0.07, 0.15, 0.35])
