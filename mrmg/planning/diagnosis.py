@@ -24,8 +24,9 @@ from mrmg.planning.bound.tour_existence import NoTours, proof_of_no_tours
 from mrmg.planning.endings import listed
 from mrmg.planning.feasibility import (
     energy_and_metres,
+    finish_cut_off,
+    goal_cut_off,
     proof_of_infeasibility,
-    widest_gap,
 )
 from mrmg.planning.frame import Frame
 from mrmg.planning.halting import NEVER, Halted
@@ -106,14 +107,9 @@ def _sentence(scene: Scene, proof: NoTours) -> str:
     """Return the reason that a proof gives."""
     names = [goal.id for goal in scene.goals]
     if proof.unreachable:
-        goal = scene.goals[proof.unreachable[0]]
-        gap = widest_gap(scene, scene.robots, goal.region)
-        return endings.GOAL_CUT_OFF.format(goal=goal.id, gap=gap)
+        return goal_cut_off(scene, scene.goals[proof.unreachable[0]])
     if proof.cut_off:
-        robot = scene.robots[proof.cut_off[0]]
-        assert robot.finish is not None
-        gap = widest_gap(scene, [robot], robot.finish.region)
-        return endings.FINISH_CUT_OFF.format(robot=robot.id, gap=gap)
+        return finish_cut_off(scene, scene.robots[proof.cut_off[0]])
     if proof.homeless:
         robot = scene.robots[proof.homeless[0]]
         more = _more_energy(robot, proof.share)

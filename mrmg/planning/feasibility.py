@@ -8,7 +8,8 @@ at all. What is impossible then is impossible.
 from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -29,7 +30,7 @@ from mrmg.planning.halting import NEVER, check
 from mrmg.planning.path_bounds import Walls, outer_polygon, shortest_way_m
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
 from mrmg.scene.region import Region
-from mrmg.scene.types import Robot, Scene
+from mrmg.scene.types import Goal, Robot, Scene
 
 
 def require_robots(scene: Scene) -> None:
@@ -131,15 +132,26 @@ def _reaches(scene: Scene, halt: np.ndarray = NEVER) -> list[_Reach]:
 def _cut_off(scene: Scene, reaches: Sequence[_Reach]) -> dict[str, str]:
     """Return the goals that no robot of a fleet gets into, as far as obstacles go."""
     return {
-        goal.id: GOAL_CUT_OFF.format(
-            goal=goal.id, gap=widest_gap(scene, scene.robots, goal.region)
-        )
+        goal.id: goal_cut_off(scene, goal)
         for goal in scene.goals
         if reaches and not any(reach.is_connected(goal.region) for reach in reaches)
     }
 
 
-def widest_gap(scene: Scene, robots: Sequence[Robot], region: Region) -> str:
+def goal_cut_off(scene: Scene, goal: Goal) -> str:
+    """Return the sentence on a goal that no robot gets to."""
+    gap = _widest_gap(scene, scene.robots, goal.region)
+    return GOAL_CUT_OFF.format(goal=goal.id, gap=gap)
+
+
+def finish_cut_off(scene: Scene, robot: Robot) -> str:
+    """Return the sentence on a robot that does not get to its finish."""
+    assert robot.finish is not None
+    gap = _widest_gap(scene, [robot], robot.finish.region)
+    return FINISH_CUT_OFF.format(robot=robot.id, gap=gap)
+
+
+def _widest_gap(scene: Scene, robots: Sequence[Robot], region: Region) -> str:
     """Return in words how wide the widest gap on the way to a region is, and where.
 
     Args:
@@ -204,8 +216,7 @@ def _unreachable_finish(scene: Scene, reaches: Sequence[_Reach]) -> str | None:
     for reach in reaches:
         robot = reach.robot
         if robot.finish and not reach.is_connected(robot.finish.region):
-            gap = widest_gap(scene, [robot], robot.finish.region)
-            return FINISH_CUT_OFF.format(robot=robot.id, gap=gap)
+            return finish_cut_off(scene, robot)
     return None
 
 
@@ -249,8 +260,6 @@ class _Reach:
             the start.
         offset_m: distance of the disc's centre from the reference point.
         walls: obstacles the reference point cannot enter.
-        left_J: energy above the reserve with which the robot can leave each place it
-            can recharge at, and the start, at best: (region, energy).
     """
 
     scene: Scene
@@ -258,7 +267,6 @@ class _Reach:
     free: shapely.Geometry
     offset_m: float
     walls: Walls
-    left_J: tuple[tuple[Region | Point, float], ...]
 
     @staticmethod
     def of(scene: Scene, robot: Robot) -> _Reach:
@@ -271,15 +279,13 @@ class _Reach:
         turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
         disc = Point(turn @ centre + (x, y))
         parts = [part for part in ground.pieces(radius) if part.distance(disc) < 0.05]
-        reach = _Reach(
+        return _Reach(
             scene=scene,
             robot=robot,
             free=shapely.union_all(parts),
             offset_m=float(np.hypot(*centre)),
             walls=Walls.of(ground.obstacles),
-            left_J=(),
         )
-        return reach._with_stations()
 
     def is_connected(self, region: Region) -> bool:
         """Return whether the robot may get into a region as far as obstacles go."""
@@ -289,13 +295,18 @@ class _Reach:
     def missing_energy_J(self, region: Region) -> float:
         """Return what the robot lacks to get to a region; not positive if it may."""
         missing_J = np.inf
-        for place, energy_J in self.left_J:
+        for place, energy_J in self._left_J:
             missing_J = min(missing_J, self._least_J(place, region) - energy_J)
             if missing_J <= 0.0:
                 break
         return missing_J
 
-    def _with_stations(self) -> _Reach:
+    @cached_property
+    def _left_J(self) -> Sequence[tuple[Region | Point, float]]:
+        """Return the places that the robot can recharge at, and the start.
+
+        With each, the energy above the reserve with which it can leave it, at best.
+        """
         battery = self.robot.battery
         # Robots may pass through a station at speed, and roll on from there.
         kinetic_J = self.robot.model.top_kinetic_J
@@ -308,7 +319,7 @@ class _Reach:
                 if self._least_J(place, station.region) <= energy_J:
                     waiting.remove(station)
                     reached.append((station.region, full_J))
-        return replace(self, left_J=tuple(reached))
+        return reached
 
     def _least_J(self, place: Region | Point, region: Region) -> float:
         """Return a lower bound of the energy from a place to a region."""
