@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any
 
-import numpy as np
-
 from mrmg.extras import import_extra
-
-_SECONDS_MARK, _NANOSECONDS_MARK = 0x01FE02FD, 0x03FC04FB
-"""Stamps to be replaced; their bytes occur in no text of ASCII letters."""
 
 MAP_FRAME = "map"
 """Frame of the scene's coordinates."""
@@ -47,40 +42,6 @@ class RosTypes:
     def encoded(self, name: str, message: Any) -> bytes:
         """Return a message as CDR."""
         return bytes(self._store.serialize_cdr(message, _full(name)))
-
-    def encoded_series(
-        self,
-        name: str,
-        message_of: Callable[[Any, list[float]], Any],
-        time_s: np.ndarray,
-        values: np.ndarray,
-    ) -> list[bytes]:
-        """Return messages that differ in their stamps and in some numbers, as CDR.
-
-        One message with a mark in the place of each is encoded, and the marks are
-        replaced for all messages at once: encoding each would take ten times as long.
-
-        Args:
-            name: of the type.
-            message_of: returns the message of a header and of k numbers (float64).
-            time_s: of the messages, shape (n,).
-            values: their numbers, shape (n, k).
-        """
-        marks = np.arange(1, values.shape[1] + 1) * 1e300
-        seconds, nanos = np.divmod(np.round(time_s * 1e9).astype(np.int64), 10**9)
-        header = self._header(self.time(_SECONDS_MARK, _NANOSECONDS_MARK), MAP_FRAME)
-        model = self.encoded(name, message_of(header, marks.tolist()))
-        rows = np.tile(np.frombuffer(model, dtype=np.uint8), (len(time_s), 1))
-        columns = [
-            (np.uint32(_SECONDS_MARK), seconds.astype(np.uint32)),
-            (np.uint32(_NANOSECONDS_MARK), nanos.astype(np.uint32)),
-            *zip(marks, values.astype(np.float64).T, strict=True),
-        ]
-        for mark, column in columns:
-            numbers = np.ascontiguousarray(column)[:, None].view(np.uint8)
-            for place in re.finditer(re.escape(mark.tobytes()), model):
-                rows[:, place.start() : place.end()] = numbers
-        return [row.tobytes() for row in rows]
 
     def header(self, time_s: float, frame: str = MAP_FRAME) -> Any:
         """Return the header of a message in a frame."""

@@ -188,22 +188,22 @@ def _transforms(
     stamped = ros["geometry_msgs/TransformStamped"]
     transform = ros["geometry_msgs/Transform"]
     frames = [f"{names[course.robot.id]}/base_link" for course in mission.courses]
-
-    def message_of(header: Any, numbers: list[float]) -> Any:
-        rows = np.reshape(numbers, (-1, 7)).tolist()
-        transforms = [
-            transform(ros.vector(*row[:3]), ros.quaternion(*row[3:])) for row in rows
-        ]
-        return ros[kind](
-            [stamped(header, *each) for each in zip(frames, transforms, strict=True)]
-        )
-
     at = every(mission.time_s, TF_PERIOD_S)
-    poses = [_ros_poses(mission.scene, course.state[at]) for course in mission.courses]
-    time_s = mission.time_s[at]
-    messages = ros.encoded_series(kind, message_of, time_s, np.hstack(poses))
-    for at_s, cdr in zip(time_s.tolist(), messages, strict=True):
-        yield _Message(at_s, "/tf", kind, cdr)
+    poses = [
+        _ros_poses(mission.scene, course.state[at]).tolist()
+        for course in mission.courses
+    ]
+    for time_s, *places in zip(mission.time_s[at].tolist(), *poses, strict=True):
+        header = ros.header(time_s)
+        transforms = [
+            stamped(
+                header,
+                frame,
+                transform(ros.vector(*pose[:3]), ros.quaternion(*pose[3:])),
+            )
+            for frame, pose in zip(frames, places, strict=True)
+        ]
+        yield _Message(time_s, "/tf", kind, ros.encoded(kind, ros[kind](transforms)))
 
 
 def _poses(
@@ -211,15 +211,11 @@ def _poses(
 ) -> Iterator[_Message]:
     """Yield the poses of a robot's reference point."""
     kind = "geometry_msgs/PoseStamped"
-
-    def message_of(header: Any, numbers: list[float]) -> Any:
-        return ros[kind](header, ros.pose(numbers[:3], numbers[3:]))
-
     at = every(course.time_s, POSE_PERIOD_S)
-    time_s, poses = course.time_s[at], _ros_poses(scene, course.state[at])
-    messages = ros.encoded_series(kind, message_of, time_s, poses)
-    for at_s, cdr in zip(time_s.tolist(), messages, strict=True):
-        yield _Message(at_s, topic, kind, cdr)
+    poses = _ros_poses(scene, course.state[at]).tolist()
+    for time_s, pose in zip(course.time_s[at].tolist(), poses, strict=True):
+        message = ros[kind](ros.header(time_s), ros.pose(pose[:3], pose[3:]))
+        yield _Message(time_s, topic, kind, ros.encoded(kind, message))
 
 
 def _battery(ros: RosTypes, course: Course, topic: str) -> Iterator[_Message]:
