@@ -38,26 +38,19 @@ def occupancy_grid(ros: RosTypes, scene: Scene) -> Any:
     cell_m = max(MIN_CELL_M, longest_m / MAX_CELLS_PER_SIDE)
     columns = int(np.ceil((x_max - x_min) / cell_m - 1e-9))
     rows = int(np.ceil((y_max - y_min) / cell_m - 1e-9))
-    values = np.zeros((rows, columns), dtype=np.int8)
+    x, y = np.meshgrid(
+        x_min + cell_m * np.arange(columns), y_min + cell_m * np.arange(rows)
+    )
+    cells = shapely.STRtree(shapely.box(x, y, x + cell_m, y + cell_m).ravel())
+    values = np.zeros(rows * columns, dtype=np.int8)
     for obstacle in scene.barriers:
-        low = np.subtract(obstacle.shape.bounds[:2], (x_min, y_min)) // cell_m - 1
-        high = np.subtract(obstacle.shape.bounds[2:], (x_min, y_min)) // cell_m + 2
-        first = np.maximum(low, 0).astype(int)
-        end = np.minimum(high, (columns, rows)).astype(int)
-        x, y = np.meshgrid(
-            x_min + cell_m * np.arange(first[0], end[0]),
-            y_min + cell_m * np.arange(first[1], end[1]),
-        )
-        shapely.prepare(obstacle.shape)
-        cells = shapely.box(x, y, x + cell_m, y + cell_m)
+        touched = cells.query(obstacle.shape, predicate="intersects")
         value = OCCUPIED if obstacle.blocks is None else OCCUPIED_FOR_SOME
-        part = values[first[1] : end[1], first[0] : end[0]]
-        touched = shapely.intersects(obstacle.shape, cells)
-        part[touched] = np.maximum(part[touched], value)
+        values[touched] = np.maximum(values[touched], value)
     origin = ros.pose((x_min, y_min, 0.0), (0.0, 0.0, 0.0, 1.0))
     loaded = ros.header(0.0).stamp
     about = ros["nav_msgs/MapMetaData"](loaded, cell_m, columns, rows, origin)
-    return ros["nav_msgs/OccupancyGrid"](ros.header(0.0), about, values.ravel())
+    return ros["nav_msgs/OccupancyGrid"](ros.header(0.0), about, values)
 
 
 def scene_markers(ros: RosTypes, scene: Scene) -> Any:
