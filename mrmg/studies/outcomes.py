@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 
 from mrmg import storage
-from mrmg.energy.audit import audit
 from mrmg.energy.audit_record import EnergyAudit
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
@@ -71,18 +70,14 @@ class Trial:
     log_digest: str
 
 
-def assess_trial(
-    scene: Scene, plan: Plan, log: ExecutionLog, account: EnergyAudit | None = None
-) -> Trial:
+def assess_trial(scene: Scene, log: ExecutionLog, account: EnergyAudit) -> Trial:
     """Return what one execution came to; the seed of one without disturbance is 0.
 
     Args:
-        scene: what the plan was made for.
-        plan: what was to be driven.
+        scene: what was to be done.
         log: of the simulation.
-        account: the audit of these; made if None.
+        account: the audit of the plan and this log.
     """
-    account = account or audit(scene, plan, log)
     actual = log.disturbance.actual_scene(scene) if log.disturbance else scene
     weakest = min(account.robots, key=lambda robot: robot.min_charge_fraction)
     capacity_J = actual.robot(weakest.robot).battery.capacity_J

@@ -62,6 +62,10 @@ def test_the_interval_is_wilsons(counts: tuple[int, int]) -> None:
     )
 
 
+def assessed(scene: Scene, plan: Plan, log: ExecutionLog) -> Trial:
+    return assess_trial(scene, log, audit(scene, plan, log))
+
+
 @pytest.fixture
 def driven(
     make_scene: Callable[..., Scene],
@@ -78,7 +82,7 @@ def driven(
 
 def test_a_trial_that_went_well(driven: tuple[Scene, Plan, ExecutionLog]) -> None:
     scene, plan, log = driven
-    trial = assess_trial(scene, plan, log)
+    trial = assessed(scene, plan, log)
     assert (trial.seed, trial.feasible, trial.causes) == (4, True, ())
     assert trial.goals_visited == 1
     # The rear overhang of 0.3 m starts 5 m from the wall behind.
@@ -94,12 +98,12 @@ def test_the_reserve_is_kept_under_disturbances_too(
     driven: tuple[Scene, Plan, ExecutionLog],
 ) -> None:
     scene, plan, log = driven
-    spent = 1.0 - assess_trial(scene, plan, log).charge_fraction
+    spent = 1.0 - assessed(scene, plan, log).charge_fraction
 
     def with_capacity(factor: float) -> Trial:
         weak = RobotDisturbance(robot="r1", capacity=factor - 1.0)
         disturbance = Disturbance(seed=4, robots=(weak,))
-        return assess_trial(scene, plan, replace(log, disturbance=disturbance))
+        return assessed(scene, plan, replace(log, disturbance=disturbance))
 
     # The reserve is 1000 J, whatever the battery really holds.
     kept = with_capacity(spent * 1.01 + 0.05)
@@ -117,9 +121,9 @@ def test_the_reserve_is_kept_under_disturbances_too(
 def test_failures_are_told_apart(driven: tuple[Scene, Plan, ExecutionLog]) -> None:
     scene, plan, log = driven
     touch = Contact(time_s=1.0, robot="r1", other="wall", x_m=0.0, y_m=0.0)
-    touched = assess_trial(scene, plan, replace(log, contacts=(touch,)))
+    touched = assessed(scene, plan, replace(log, contacts=(touch,)))
     assert touched.causes == ("contact",)
-    stuck = assess_trial(
+    stuck = assessed(
         scene,
         plan,
         replace(
@@ -137,7 +141,7 @@ def test_a_drive_without_disturbance_is_judged_by_the_scene_s_batteries(
 ) -> None:
     scene, plan, log = driven
     account = audit(scene, plan, replace(log, disturbance=None))
-    trial = assess_trial(scene, plan, replace(log, disturbance=None), account)
+    trial = assess_trial(scene, replace(log, disturbance=None), account)
     robot = account.robot(trial.charge_robot)
     assert trial.charge_fraction == robot.min_charge_fraction
     battery = scene.robot(robot.robot).battery

@@ -24,10 +24,10 @@ from mrmg.runs.steps import planner_params
 from mrmg.scene.types import Scene
 from mrmg.studies.campaigns.scenes import SceneSource
 from mrmg.studies.outcomes import assess_trial
-from mrmg.supervision.driving import Drive
 
 if TYPE_CHECKING:
     from mrmg.energy.audit_record import EnergyAudit
+    from mrmg.simulation.log import ExecutionLog
     from mrmg.verification.verdict import Verdict
 
 REFUSED, ERROR = "refused", "error"
@@ -113,7 +113,7 @@ def _made(source: SceneSource, order: TrialOrder) -> dict[str, Any]:
     verified = time.perf_counter()
     driven = drive(scene, planned.plan, arguments)
     account = audit(scene, driven.plan, driven.log, **arguments.deciding("audit"))
-    result |= _of_drive(scene, planned.plan, verdict, driven, account)
+    result |= _of_drive(scene, planned.plan, verdict, driven.log, account)
     drive_s = time.perf_counter() - verified
     parts_s = {"compile": compile_s, "plan": plan_s, "verify": verified - began}
     return {"result": result, "time_s": {**parts_s, "drive": drive_s}}
@@ -133,12 +133,9 @@ def _made_by_run(scene: Scene, arguments: RunArguments) -> dict[str, Any]:
         files = {str(path.relative_to(folder)): path.read_bytes() for path in found}
         planning = record.planning
         result = _of_planning(scene, planning["status"], planning["reason"])
-        if record.log and record.verdict and record.audit and record.plan:
-            first, driven = (
-                Plan.load(folder),
-                Drive(log=record.log, plan=record.plan, replans=()),
-            )
-            result |= _of_drive(scene, first, record.verdict, driven, record.audit)
+        if record.log and record.verdict and record.audit:
+            plan = Plan.load(folder)
+            result |= _of_drive(scene, plan, record.verdict, record.log, record.audit)
     times_s = {"plan": planning["statistics"]["time_s"].get("total")}
     return {"result": result, "time_s": times_s, "files": files}
 
@@ -154,7 +151,7 @@ def _of_planning(scene: Scene, status: str, reason: str) -> dict[str, Any]:
 
 
 def _of_drive(
-    scene: Scene, plan: Plan, verdict: Verdict, driven: Drive, account: EnergyAudit
+    scene: Scene, plan: Plan, verdict: Verdict, log: ExecutionLog, account: EnergyAudit
 ) -> dict[str, Any]:
     """Return the figures of a mission that was driven.
 
@@ -162,11 +159,11 @@ def _of_drive(
         scene: the mission.
         plan: the first one.
         verdict: on it.
-        driven: with the plan in force at each time.
+        log: of the drive.
         account: the audit of it.
     """
-    trial = asdict(assess_trial(scene, driven.plan, driven.log, account))
-    unused = ("seed", "reasons", "charge_J", "charge_robot", "goals_visited", "causes")
+    trial = asdict(assess_trial(scene, log, account))
+    unused = ("seed", "reasons", "charge_J", "charge_robot")
     errors = [robot.measured_error_pct for robot in account.robots]
     broken = [violation.message for violation in verdict.violations[:1]]
     figures = {name: value for name, value in trial.items() if name not in unused}
@@ -174,16 +171,15 @@ def _of_drive(
         "feasible": verdict.ok and account.mission_ok,
         "reason": "; ".join([*broken, *account.reasons]),
         "causes": [*(["not verified"] if broken else []), *account.causes],
-        "goals_visited": len(account.goals_visited),
         "goals_skipped": len(plan.skipped),
         "cost_J": plan.cost_J,
         "makespan_s": plan.makespan_s,
         "metered_J": account.metered.total_J(),
         "measured_J": account.measured.total_J(),
         "measured_error_pct": max(errors, key=abs),
-        "contacts": len(driven.log.contacts),
+        "contacts": len(log.contacts),
         "recharges": len(account.recharges),
-        "replans": sum(event.action == "replan" for event in driven.log.events),
+        "replans": sum(event.action == "replan" for event in log.events),
         "plan_digest": plan.digest,
     }
 

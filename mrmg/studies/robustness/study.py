@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from mrmg import storage
+from mrmg.energy.audit import audit
 from mrmg.errors import UsageError
 from mrmg.plans import Plan, PlanStatus
 from mrmg.runs.arguments import RunArguments
@@ -70,7 +71,10 @@ def study_robustness(
     ]
     done: dict[int, Trial] = {}
     for number, content, _ in completed_trials(
-        jobs, make_trial, Engine(workers=workers), check=_read
+        jobs,
+        make_trial,
+        Engine(workers=workers),
+        check=lambda job, content: storage.typed(Trial, content),
     ):
         done[number] = storage.typed(Trial, content)
         if on_trial is not None:
@@ -112,13 +116,10 @@ def make_trial(folder: Path, arguments: RunArguments) -> dict[str, Any]:
     """Drive the plan of a run folder as the arguments want it, and judge the drive."""
     scene, plan = _mission(folder)
     driven = drive(scene, plan, arguments)
-    return asdict(assess_trial(scene, driven.plan, driven.log))
+    account = audit(scene, driven.plan, driven.log)
+    return asdict(assess_trial(scene, driven.log, account))
 
 
 @lru_cache(maxsize=1)
 def _mission(folder: Path) -> tuple[Scene, Plan]:
     return load_scene(folder / "scene.yaml"), Plan.load(folder)
-
-
-def _read(job: Job, content: Any) -> Trial:
-    return storage.typed(Trial, content)

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from mrmg import storage
+from mrmg.energy.audit import audit
 from mrmg.errors import UsageError
 from mrmg.plans import PlanStatus
 from mrmg.runs import pipeline
@@ -57,7 +58,8 @@ def test_the_worst_case_is_repeated_by_its_seed(
     worst = three[0].worst
     arguments = replace(run.arguments, disturb="", disturb_seed=worst.seed)
     driven = drive(run.scene, run.plan(), arguments)
-    assert assess_trial(run.scene, driven.plan, driven.log) == worst
+    account = audit(run.scene, driven.plan, driven.log)
+    assert assess_trial(run.scene, driven.log, account) == worst
 
 
 def test_a_stopped_study_is_taken_up(run: Run, three: tuple[Study, str]) -> None:
