@@ -230,17 +230,10 @@ def fit_pieces(
     Returns:
         Parameters of shape (p,).
     """
-    blocks = [
-        (
-            item.features / item.mean_power_W,
-            item.power_W / item.mean_power_W,
-            np.sqrt(item.duration_s / item.duration_s.sum()),
-        )
-        for item in runs
-    ]
-    features, power, weight = (
-        np.concatenate(parts) for parts in zip(*blocks, strict=True)
-    )
+    features = np.concatenate([item.features / item.mean_power_W for item in runs])
+    power = np.concatenate([item.power_W / item.mean_power_W for item in runs])
+    share = np.concatenate([item.duration_s / item.duration_s.sum() for item in runs])
+    weight = np.sqrt(share)
     held = hold / scale
 
     def errors(found: np.ndarray) -> np.ndarray:

@@ -93,7 +93,7 @@ def terrain_estimates(
     """Return what the runs on each terrain yield; the first terrain is plain ground."""
     found: list[TerrainEstimate] = []
     for name in fit.parameters:
-        rows = [at for at, run in enumerate(runs) if run.terrain == name]
+        rows = fit.rows(name)
         own = [runs[at] for at in rows]
         values = np.array(
             [_secants(model, fit.law, item) for item in fit.without[rows]]
