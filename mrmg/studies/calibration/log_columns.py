@@ -6,7 +6,6 @@ import csv
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -59,21 +58,10 @@ _SPELLINGS |= {"sec": "s", "radps": "rads", "rads1": "rads"}
 _SPELLINGS |= {"degps": "degs", "dps": "degs", "degs1": "degs"}
 
 
-@dataclass(frozen=True, slots=True)
-class LogColumns:
-    """The known columns of a log.
+def read_columns(path: Path, source: str) -> tuple[dict[str, np.ndarray], list[int]]:
+    """Return the known columns of a file, and the line of each row.
 
-    Attributes:
-        values: in SI units by what they are, each of shape (n,).
-        lines: of the file, by row.
-    """
-
-    values: dict[str, np.ndarray]
-    lines: tuple[int, ...]
-
-
-def read_columns(path: Path, source: str) -> LogColumns:
-    """Return the known columns of a file.
+    Columns are in SI units by what they hold, each of shape (n,).
 
     Args:
         path: of a CSV file, separated by commas, semicolons or tabs.
@@ -103,7 +91,7 @@ def read_columns(path: Path, source: str) -> LogColumns:
         kind: _values(rows[1:], at, _unit(names[at], kind, source), source)
         for kind, at in known.items()
     }
-    return LogColumns(values, tuple(line for line, _ in rows[1:]))
+    return values, [line for line, _ in rows[1:]]
 
 
 def _text(path: Path, source: str) -> str:

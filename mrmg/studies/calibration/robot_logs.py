@@ -113,12 +113,11 @@ def read_run(file: str, terrain: str, model: RobotModel) -> LoggedRun:
             f"'{terrain}' cannot name a terrain; use letters, digits, '_', '.' and "
             "'-', as ids in scenes do"
         )
-    log = read_columns(Path(file), file)
-    columns = log.values
+    columns, lines = read_columns(Path(file), file)
     time_s = columns["time"]
     late = np.flatnonzero(np.diff(time_s) < LEAST_STEP_S)
     if len(late):
-        line = log.lines[int(late[0]) + 1]
+        line = lines[int(late[0]) + 1]
         message = f"must increase, by {LEAST_STEP_S:g} s at least"
         raise FileError(file, [Fault("time", message, line=line)])
     speed_m_s, yaw_rate_rad_s, sides = _motion(columns, model, file)

@@ -71,10 +71,7 @@ def study_robustness(
     ]
     done: dict[int, Trial] = {}
     for number, content, _ in completed_trials(
-        jobs,
-        make_trial,
-        Engine(workers=workers),
-        check=lambda job, content: storage.typed(Trial, content),
+        jobs, make_trial, Engine(workers=workers), check=_read
     ):
         done[number] = storage.typed(Trial, content)
         if on_trial is not None:
@@ -123,3 +120,7 @@ def make_trial(folder: Path, arguments: RunArguments) -> dict[str, Any]:
 @lru_cache(maxsize=1)
 def _mission(folder: Path) -> tuple[Scene, Plan]:
     return load_scene(folder / "scene.yaml"), Plan.load(folder)
+
+
+def _read(job: Job, content: Any) -> Trial:
+    return storage.typed(Trial, content)
