@@ -24,7 +24,7 @@ from mrmg.scene.loading.schema import SceneDocument
 from mrmg.scene.loading.yaml_text import read_yaml
 from mrmg.simulation.controller import controller_names
 from mrmg.simulation.disturbance_spec import written_out
-from mrmg.studies.campaigns.scenes import SceneSource
+from mrmg.studies.campaigns.scenes import SceneSource, loaded_scene
 from mrmg.studies.campaigns.schema import MOST_TRIALS, CampaignDocument
 from mrmg.studies.campaigns.trial import TrialOrder
 
@@ -230,7 +230,7 @@ class _Factors:
             for number, value in enumerate(levels if self._is_of_scene(name) else ()):
                 for source in sources:
                     try:
-                        source.loaded().with_(**_nested({name: value}))
+                        loaded_scene(source).with_(**_nested({name: value}))
                     except MrmgError as error:
                         yield from _scene_faults(f"parameters.{name}.{number}", error)
 

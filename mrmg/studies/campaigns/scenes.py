@@ -95,10 +95,6 @@ class SceneSource:
         """Return what decides the scenes, as JSON data."""
         return [self.digest, self.populate, self.perturb]
 
-    def loaded(self) -> Scene:
-        """Return the scene of the files."""
-        return _loaded(self)
-
     def scene(self, seed: int, changes: Mapping[str, Any]) -> Scene:
         """Return the scene of a trial.
 
@@ -109,7 +105,7 @@ class SceneSource:
         Raises:
             SceneError, UsageError: if there is none.
         """
-        scene = self.loaded()
+        scene = loaded_scene(self)
         if self.populate:
             model = scene.robots[0].model.origin
             own = {"model": model.reference} if model else {}
@@ -134,7 +130,7 @@ def _populated(scene: Scene, recipe: Mapping[str, Any], trust_code: bool) -> Sce
 
 
 @lru_cache(maxsize=4)
-def _loaded(source: SceneSource) -> Scene:
+def loaded_scene(source: SceneSource) -> Scene:
     """Return the scene of a source's files.
 
     Models of the user's own need a folder: there is one for each in the user's cache.
