@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mrmg.energy.visits import is_at
+from mrmg.energy.visits import is_at, runs
 from mrmg.plans import Plan, Trajectory, Visit
 from mrmg.scene.types import Goal, Scene, Station
 
@@ -88,14 +88,14 @@ def route_of(scene: Scene, plan: Plan, robot: str) -> Route:
 
 def _visited(trajectory: Trajectory, visit: Visit, target: Goal | Station) -> Node:
     """Return the node of a visit: where it stands or is deepest in the region."""
-    depth_m = target.region.depth(trajectory.state[visit.step :, :2])
-    away = ~is_at(target, trajectory.state[visit.step :])
-    depth_m = depth_m[: int(away.argmax()) if away.any() else len(away)]
-    end = visit.step + len(depth_m)
-    moving = np.abs(trajectory.state[visit.step : end, 3]) >= STANDING_M_S
-    at = int(depth_m.argmax() if moving.all() else moving.argmin())
-    stays = int(moving[at:].argmax()) if moving[at:].any() else len(moving) - 1 - at
-    leave_s = float(trajectory.time_s[visit.step + at + stays])
+    states = trajectory.state[visit.step :]
+    away = ~is_at(target, states)
+    states = states[: int(away.argmax()) if away.any() else len(states)]
+    depth_m = target.region.depth(states[:, :2])
+    deepest = int(depth_m.argmax())
+    standing = runs(np.abs(states[:, 3]) < STANDING_M_S)
+    at, left = standing[0] if standing else (deepest, deepest)
+    leave_s = float(trajectory.time_s[visit.step + min(left, len(states) - 1)])
     return Node(
         id=target.id,
         step=visit.step + at,
