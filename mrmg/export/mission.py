@@ -17,6 +17,10 @@ from mrmg.scene.types import Robot, Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.viz.activities import CHARGING, Activity, activities, breakdowns
 
+PATH_PERIOD_S = 0.1
+PATH_TOLERANCE_M = 0.01
+"""How far lines between points of a path, so far apart in time, may be from it."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Course:
@@ -127,6 +131,17 @@ def bends(points: np.ndarray, tolerance_m: float) -> np.ndarray:
     numbered = np.column_stack([points, np.arange(len(points))])
     line = shapely.simplify(shapely.linestrings(numbered), tolerance_m)
     return np.asarray(shapely.get_coordinates(line, include_z=True)[:, 2], dtype=int)
+
+
+def path_indices(time_s: np.ndarray, state: np.ndarray) -> np.ndarray:
+    """Return indices of the states between which a path is drawn as straight lines.
+
+    Args:
+        time_s: of the states, shape (n,).
+        state: x, y and what else there is, shape (n, 2 or more).
+    """
+    at = every(time_s, PATH_PERIOD_S)
+    return np.asarray(at[bends(state[at, :2], PATH_TOLERANCE_M)])
 
 
 def read_mission(run_folder: Path, *, trust_code: bool = False) -> Mission:

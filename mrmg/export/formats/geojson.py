@@ -15,13 +15,11 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from mrmg import storage
-from mrmg.export.mission import Course, Mission, bends, every
+from mrmg.export.mission import Course, Mission, path_indices
 from mrmg.export.table import Files, Format
-from mrmg.plans import Visit
-from mrmg.scene.types import Goal, Scene, Station
+from mrmg.scene.types import Goal, Scene
 
-PATH_TOLERANCE_M = 0.01
-_PERIOD_S = 0.1
+_OF_A_VISIT = ("robot", "time_s", "energy_J")
 _LOCAL_METRES = {"type": "name", "properties": {"name": "local"}}
 
 
@@ -61,25 +59,21 @@ def _places(mission: Mission) -> Iterator[dict[str, Any]]:
     visits: dict[str, list[dict[str, Any]]] = {}
     for course in mission.courses:
         for visit in course.visits:
-            visits.setdefault(visit.target, []).append(_visit(visit))
-    scene = mission.scene
-    for kind, targets in (("goal", scene.goals), ("station", scene.stations)):
-        for target in targets:
-            yield _place(kind, target, visits.get(target.id, []))
-
-
-def _place(
-    kind: str, target: Goal | Station, visits: list[dict[str, Any]]
-) -> dict[str, Any]:
-    keys = {"kind": kind, "id": target.id, "dwell": target.dwell_s, "visits": visits}
-    region = target.region
-    if len(region.corners):
-        return _feature(region.shape, **keys)
-    return _feature(shapely.Point(region.center), radius=region.radius_m, **keys)
-
-
-def _visit(visit: Visit) -> dict[str, Any]:
-    return {"robot": visit.robot, "time_s": visit.time_s, "energy_J": visit.energy_J}
+            made = {name: getattr(visit, name) for name in _OF_A_VISIT}
+            visits.setdefault(visit.target, []).append(made)
+    for target in mission.scene.targets():
+        keys = {
+            "kind": "goal" if isinstance(target, Goal) else "station",
+            "id": target.id,
+            "dwell": target.dwell_s,
+            "visits": visits.get(target.id, []),
+        }
+        region = target.region
+        if len(region.corners):
+            yield _feature(region.shape, **keys)
+        else:
+            disc = {"radius": region.radius_m}
+            yield _feature(shapely.Point(region.center), **keys, **disc)
 
 
 def _robots(scene: Scene) -> Iterator[dict[str, Any]]:
@@ -97,8 +91,7 @@ def _robots(scene: Scene) -> Iterator[dict[str, Any]]:
 
 
 def _path(course: Course, motion: str) -> dict[str, Any]:
-    at = every(course.time_s, _PERIOD_S)
-    at = at[bends(course.state[at, :2], PATH_TOLERANCE_M)]
+    at = path_indices(course.time_s, course.state)
     at = np.resize(at, max(2, len(at)))  # a line has two points at least
     return _feature(
         shapely.LineString(course.state[at, :2]),

@@ -24,7 +24,7 @@ import numpy as np
 
 from mrmg import __version__
 from mrmg.energy.metering import Motion
-from mrmg.export.mission import Course, Mission, bends, every
+from mrmg.export.mission import Course, Mission, every, path_indices
 from mrmg.export.ros_messages import RosTypes, nanoseconds, ros_names
 from mrmg.export.ros_scene import (
     goal_markers,
@@ -41,7 +41,6 @@ from mrmg.world.elevation import ground_poses
 TF_PERIOD_S = 0.05
 POSE_PERIOD_S = 0.1
 BATTERY_PERIOD_S = 1.0
-PATH_TOLERANCE_M = 0.01
 
 _GRID, _MARKERS, _PATH = (
     "nav_msgs/OccupancyGrid",
@@ -149,8 +148,7 @@ def _still(
 
 def _path(ros: RosTypes, scene: Scene, motion: Motion) -> Any:
     """Return the path of a motion, with the times at which it gets to its bends."""
-    at = every(motion.time_s, POSE_PERIOD_S)
-    at = at[bends(motion.state[at, :2], PATH_TOLERANCE_M)]
+    at = path_indices(motion.time_s, motion.state)
     pose_stamped = ros["geometry_msgs/PoseStamped"]
     poses = [
         pose_stamped(ros.header(time_s), ros.pose(pose[:3], pose[3:]))
