@@ -12,12 +12,13 @@ import logging
 import os
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from concurrent.futures import CancelledError
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import get_context
+from queue import SimpleQueue
 from typing import Any
 
 from mrmg.errors import MachineError, UsageError, require_known
@@ -96,24 +97,15 @@ class Engine:
             initializer=end_with_parent,
             initargs=(os.getpid(),),
         )
-        waiting = enumerate(jobs)
 
-        def submitted(count: int) -> set[Future[tuple[int, Any]]]:
-            return {
-                pool.submit(_numbered, call, number, job)
-                for number, job in islice(waiting, count)
-            }
+        def submit(*job: Any) -> Any:
+            with sheltered_children():
+                return pool.submit(_numbered, call, *job)
 
         # The first lock starts Python's resource tracker, which lifts signal masks.
         get_context("spawn").Lock()
         try:
-            with sheltered_children():
-                running = submitted(2 * (self.workers or 1))
-            while running:
-                done, running = wait(running, return_when=FIRST_COMPLETED)
-                running |= submitted(len(done))
-                for future in done:
-                    yield future.result()
+            yield from _as_they_come(submit, jobs, 2 * (self.workers or 1))
         except BrokenProcessPool as error:
             raise MachineError(
                 f"a worker process was killed (out of memory?); {_GO_ON}, fewer "
@@ -132,20 +124,12 @@ class Engine:
                 id(part): client.submit(_itself, part, pure=False)
                 for part in {id(part): part for part, _ in jobs}.values()
             }
-            waiting = enumerate(jobs)
 
-            def submitted(count: int | None) -> list[Any]:
-                return [
-                    client.submit(
-                        _numbered, call, number, (shared[id(part)], item), pure=False
-                    )
-                    for number, (part, item) in islice(waiting, count)
-                ]
+            def submit(number: int, part: Any, item: Any) -> Any:
+                job = (call, number, shared[id(part)], item)
+                return client.submit(_numbered, *job, pure=False)
 
-            running = dask.as_completed(submitted(self.workers))
-            for future in running:
-                yield future.result()
-                running.update(submitted(1))
+            yield from _as_they_come(submit, jobs, self.workers)
         except (CancelledError, OSError, TimeoutError) as error:
             raise MachineError(f"the Dask scheduler was lost; {_GO_ON}") from error
         except dask.scheduler.KilledWorker as error:
@@ -178,8 +162,30 @@ class Engine:
             ) from error
 
 
-def _numbered(call: Call, number: int, job: tuple[Any, Any]) -> tuple[int, Any]:
-    return number, call(*job)
+def _as_they_come(submit: Callable[..., Any], jobs: Jobs, ahead: int | None) -> Results:
+    """Yield what comes of jobs as they end, in whatever order.
+
+    Args:
+        submit: takes a job's place and arguments, and returns a future of its result.
+        jobs: arguments of the calls.
+        ahead: how many are submitted at once; None for all.
+    """
+    waiting = enumerate(jobs)
+    ended: SimpleQueue[Any] = SimpleQueue()
+
+    def submit_next(count: int | None) -> None:
+        for number, job in islice(waiting, count):
+            submit(number, *job).add_done_callback(ended.put)
+
+    submit_next(ahead)
+    for _ in jobs:
+        future = ended.get()
+        submit_next(1)
+        yield future.result()
+
+
+def _numbered(call: Call, number: int, part: Any, item: Any) -> tuple[int, Any]:
+    return number, call(part, item)
 
 
 def _itself(value: Any) -> Any:
