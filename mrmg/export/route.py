@@ -26,18 +26,18 @@ class Node:
     """A place that a robot passes or stays at.
 
     Attributes:
-        id: unique in all routes of a plan.
         step: index of the planned state in which it gets there.
         leave_s: until when it stays, by the plan.
         deviation_m: how far from it the robot may pass.
         targets: goals and stations that it visits there.
+        id: unique in all routes of a plan; "" until all nodes of its route are known.
     """
 
-    id: str
     step: int
     leave_s: float = 0.0
     deviation_m: float = DEVIATION_M
     targets: tuple[Goal | Station, ...] = ()
+    id: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,20 +67,15 @@ class Route:
 def route_of(scene: Scene, plan: Plan, robot: str) -> Route:
     """Return the route of a robot: start, targets, changes of direction and end."""
     trajectory = plan.trajectory(robot)
-    last = len(trajectory.state) - 1
     targets = {target.id: target for target in scene.targets()}
+    ends = (0, len(trajectory.state) - 1)
     found = [
-        Node(id=f"{robot}-start", step=0),
+        *(Node(step=step) for step in (*ends, *_reversals(trajectory.state[:, 3]))),
         *(
             _visited(trajectory, visit, targets[visit.target])
             for visit in plan.visits
             if visit.robot == robot
         ),
-        *(
-            Node(id=f"{robot}-turn", step=step)
-            for step in _reversals(trajectory.state[:, 3])
-        ),
-        Node(id=f"{robot}-end", step=last),
     ]
     nodes = _joined(trajectory, sorted(found, key=lambda node: node.step))
     return Route(trajectory=trajectory, nodes=tuple(_named(robot, nodes)))
@@ -97,7 +92,6 @@ def _visited(trajectory: Trajectory, visit: Visit, target: Goal | Station) -> No
     at, left = standing[0] if standing else (deepest, deepest)
     leave_s = float(trajectory.time_s[visit.step + min(left, len(states) - 1)])
     return Node(
-        id=target.id,
         step=visit.step + at,
         leave_s=max(leave_s, visit.time_s + target.dwell_s),
         deviation_m=min(DEVIATION_M, float(depth_m[at])),

@@ -20,10 +20,6 @@ Files = Mapping[str, bytes]
 """Content of the files of an export by their path, relative to its folder."""
 
 
-def _none(folder: Path, versions: tuple[str, ...]) -> Iterable[Path]:
-    return ()
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format:
     """A format that a run can be exported to; a module calls its own `FORMAT`.
@@ -40,7 +36,7 @@ class Format:
     suffix: str = ""
     versions: tuple[str, ...] = ()
     files: Callable[[Mission, tuple[str, ...]], Files]
-    written_before: Callable[[Path, tuple[str, ...]], Iterable[Path]] = _none
+    written_before: Callable[[Path, tuple[str, ...]], Iterable[Path]] = lambda *_: ()
 
 
 def format_names() -> list[str]:
