@@ -87,14 +87,13 @@ def study_robustness(
 
 def execute_options(arguments: RunArguments) -> dict[str, str | bool]:
     """Return the options with which `mrmg execute` drives as `arguments` want it."""
-    options: dict[str, str | bool] = {"disturb": arguments.disturb or ""}
     usual = RunArguments()
-    for name in ("controller", "plant"):
-        if getattr(arguments, name) != getattr(usual, name):
-            options[name] = getattr(arguments, name)
-    if arguments.replan:
-        options["replan"] = True
-    return options
+    changed = {
+        name: getattr(arguments, name)
+        for name in ("controller", "plant", "replan")
+        if getattr(arguments, name) != getattr(usual, name)
+    }
+    return {"disturb": arguments.disturb or "", **changed}
 
 
 def _trials_folder(run: Run, arguments: RunArguments) -> Path:
