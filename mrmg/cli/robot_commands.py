@@ -81,10 +81,9 @@ def check_robot(options: argparse.Namespace) -> int:
     try:
         model, _ = load_model(folder, trust_code=options.trust_code)
         if model.has_custom_motion:
-            from mrmg.motion.user_motion import motion_of
+            from mrmg.planning.roadmap.fleet import motion_addresses
 
-            limits = model.limits.scaled(model.planning_share)
-            motion_of(model).compiled(limits.as_tuple())
+            motion_addresses(model)
     except SceneError as error:
         if options.json:
             faults = [asdict(fault) for fault in error.faults]

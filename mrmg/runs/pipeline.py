@@ -143,15 +143,12 @@ def rehearse(scene: Scene) -> list[str]:
         FileError: if it has no robots, its robots' own motions cannot be used, or
             MuJoCo cannot hold it.
     """
-    from mrmg.motion.user_motion import user_motion
     from mrmg.planning.feasibility import require_robots
+    from mrmg.planning.roadmap.fleet import motion_addresses
 
     require_robots(scene)
-    models = {robot.model.name: robot.model for robot in scene.robots}
-    for model in models.values():
-        if model.has_custom_motion:
-            limits = model.limits.scaled(model.planning_share)
-            user_motion(model.motion_model).compiled(limits.as_tuple())
+    for robot in scene.robots:
+        motion_addresses(robot.model)
     try:
         require_drivable(scene.robots)
     except UsageError as error:
