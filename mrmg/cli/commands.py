@@ -145,18 +145,12 @@ def _driven(options: argparse.Namespace) -> tuple[Run, str]:
     A drive other than that of the run goes to a folder of its own.
     """
     from mrmg.runs.drive import checked_drive
-    from mrmg.runs.separate_drives import (
-        begin_drive,
-        drive_again,
-        drive_apart,
-        folder_beside,
-    )
+    from mrmg.runs.separate_drives import drive_again, drive_apart, folder_beside
     from mrmg.simulation.log import require_same_mission
 
     undisturbed = RunArguments().deciding("drive")
     for name in ("controller", "plant"):
         del undisturbed[name]
-    again = {"overwrite": options.overwrite}
     kept = "driven before, --overwrite drives again"
     with opened_run(options.run, trust_code=options.trust_code) as run:
         folder = run.folder
@@ -166,12 +160,11 @@ def _driven(options: argparse.Namespace) -> tuple[Run, str]:
         place = options.out or (folder.path if own else folder_beside(run, asked))
         if place.resolve() == folder.path.resolve():
             run = replace(run, arguments=asked)
-            made = drive_again(run, **again)
+            made = drive_again(run, overwrite=options.overwrite)
             return run, f"in {folder.path}" if made else f"in {folder.path}; {kept}"
         require_same_mission(run.scene, run.plan())  # before there is a folder
         with RunFolder(place).opened_for_writing() as other:
-            work = begin_drive(run, other, asked, **again)
-            made = drive_apart(work, **again)
+            work, made = drive_apart(run, other, asked, overwrite=options.overwrite)
     page = place / "report.html"
     return work, f"report     {page}" if made else f"report     {page}; {kept}"
 

@@ -50,19 +50,23 @@ def _description(own: RunArguments, other: RunArguments) -> Iterator[str]:
         yield "no-replan"
 
 
-def begin_drive(
+def drive_apart(
     run: Run, folder: RunFolder, arguments: RunArguments, *, overwrite: bool
-) -> Run:
-    """Return a run in `folder` that has the plan of `run`, to be driven otherwise.
+) -> tuple[Run, bool]:
+    """Drive the plan of `run` in a folder of its own; verify, audit and report there.
 
     Args:
         run: has the plan.
         folder: for the drive.
         arguments: how to drive.
-        overwrite: replace other results that the folder holds.
+        overwrite: replace results that the folder holds.
+
+    Returns:
+        The run in `folder`, and whether the drive was made now: one that is there is
+        kept unless `overwrite`.
 
     Raises:
-        UsageError: if it holds some and they are not to be replaced.
+        UsageError: if it holds others and they are not to be replaced.
     """
     other = replace(run, folder=folder, arguments=arguments)
     plan = run.plan()
@@ -73,20 +77,11 @@ def begin_drive(
         folder.begin(Step.PLAN, arguments.to_json())
         write_planning(folder, files, plan, run.planning())
         folder.finish(Step.PLAN, other.fingerprint(Step.PLAN))
-    return other
-
-
-def drive_apart(run: Run, *, overwrite: bool) -> bool:
-    """Drive, verify, audit and report in the folder of `run`.
-
-    Returns:
-        Whether the drive was made now: one that is there is kept unless `overwrite`.
-    """
-    driven = drive_again(run, overwrite=overwrite)
+    driven = drive_again(other, overwrite=overwrite)
     for step in (Step.VERIFY, Step.AUDIT, Step.DRAW):
-        run.ensure(step)
-    run.make(Step.REPORT)
-    return driven
+        other.ensure(step)
+    other.make(Step.REPORT)
+    return other, driven
 
 
 def drive_again(run: Run, *, overwrite: bool) -> bool:
