@@ -58,11 +58,10 @@ def planner(record: RunRecord) -> Markup:
     return rendered(
         "planner.html.jinja",
         figures=figures,
-        objective=figures and judged(figures),
         hints=record.planning.get("hints", []),
         charts=[(COST, chart["title"])] if chart else [],
         rows=rows,
-        found=[{**item, "objective": judged(item)} for item in found_plans(record)],
+        found=found_plans(record),
     )
 
 
@@ -82,10 +81,10 @@ def cost_chart(record: RunRecord) -> dict[str, Any] | None:
     total_s = record.planning["statistics"]["time_s"]["total"]
     found_s = [float(item["time_s"]) for item in found]
     time_s = np.array([0.0, *found_s, max(total_s, found_s[-1])])
-    wanted = judged(record.summary["plan"])
+    wanted = record.summary["plan"]["objective"]
     unit, size = _SHOWN[wanted["unit"]]
-    values = [size * judged(item)["value"] for item in found]
-    bounds = [_scaled(judged(item)["bound"], size) for item in found]
+    values = [size * item["objective"]["value"] for item in found]
+    bounds = [_scaled(item["objective"]["bound"], size) for item in found]
     last = _scaled(wanted["bound"], size)
     value = np.array([np.nan, *values, values[-1]])
     bound = np.array([np.nan, *bounds, last])
@@ -105,20 +104,6 @@ def cost_chart(record: RunRecord) -> dict[str, Any] | None:
         limits=(_ROOM[0] * np.nanmin(shown), _ROOM[1] * np.nanmax(shown)),
         along_s=time_s,
     )
-
-
-def judged(figures: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return name, unit, value and bound of what a plan is judged by.
-
-    Before objectives could be chosen it was the energy.
-    """
-    energy = {
-        "name": "energy",
-        "unit": "J",
-        "value": figures["cost_J"],
-        "bound": figures.get("bound_J"),
-    }
-    return dict(figures.get("objective", energy))
 
 
 def _scaled(value: float | None, size: float) -> float:
