@@ -129,18 +129,11 @@ class Run:
         return ExecutionLog.load(self.folder.path)
 
     def account(self) -> EnergyAudit:
-        """Return the audit of the folder's drive, made once for its files."""
+        """Return the audit of the folder's drive."""
         from mrmg.energy.audit import audit
 
         decided = self.arguments.deciding("audit")
-        files = [self.folder.content(step) for step in (Step.PLAN, Step.EXECUTE)]
-        made_of = storage.canonical_json([self.scene.digest, decided, files])
-        if made_of not in _last_audit:
-            _last_audit.clear()
-            _last_audit[made_of] = audit(
-                self.scene, self.plan_in_force(), self.log(), **decided
-            )
-        return _last_audit[made_of]
+        return audit(self.scene, self.plan_in_force(), self.log(), **decided)
 
     def reason(self) -> str:
         """Return why there is no plan, or why the mission failed; "" if it did not."""
@@ -181,10 +174,6 @@ def taken_up(
         folder=folder,
         on_progress=on_progress,
     )
-
-
-_last_audit: dict[str, EnergyAudit] = {}
-"""The last audit by all that it was made of; several steps of a run need it."""
 
 
 def _plan(run: Run) -> Write:
