@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -23,14 +24,11 @@ def problem_digest(record: RunRecord) -> str:
 
 def scene_names(records: Sequence[RunRecord]) -> tuple[str, ...]:
     """Return the scenes' names, with digests where scenes of one name differ."""
-    digests = [problem_digest(record) for record in records]
-    named: dict[str, set[str]] = {}
-    for record, digest in zip(records, digests, strict=True):
-        named.setdefault(record.scene.name, set()).add(digest)
+    scenes = [(record.scene.name, problem_digest(record)) for record in records]
+    scenes_of_name = Counter(name for name, _ in {*scenes})
     return tuple(
-        name if len(named[name]) == 1 else f"{name} ({digest[:6]})"
-        for record, digest in zip(records, digests, strict=True)
-        for name in [record.scene.name]
+        name if scenes_of_name[name] == 1 else f"{name} ({digest[:6]})"
+        for name, digest in scenes
     )
 
 
