@@ -16,8 +16,6 @@ from mrmg.energy.text import energy_text
 from mrmg.errors import Fault
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
     from mrmg.planning import Improvement
     from mrmg.runs.arguments import RunArguments
     from mrmg.runs.steps import StepProgress
@@ -34,38 +32,13 @@ _DOING = {
 
 
 @contextmanager
-def progress() -> Iterator[Callable[[str, float, str], None] | None]:
+def progress() -> Iterator[Callable[[str, float | None, str], None] | None]:
     """Yield a callback that draws one bar per step; None away from a terminal.
 
-    Steps that are none of a run are called on the bar what they are called.
+    It takes the step, the share that is done, None where that is not known from the
+    start, and a text. Steps that are none of a run are called on the bar what they are
+    called.
     """
-    with _bars() as bars:
-        if bars is None:
-            yield None
-            return
-        tasks: dict[str, Any] = {}
-
-        def report(step: str, fraction: float, text: str) -> None:
-            if step not in tasks:
-                tasks[step] = bars.add_task(_DOING.get(step, step), total=1.0, note="")
-            bars.update(tasks[step], completed=fraction, note=text)
-
-        yield report
-
-
-@contextmanager
-def progress_of(doing: str) -> Iterator[Callable[[float, str], None] | None]:
-    """Yield a callback (fraction, text) that draws a bar; None away from a terminal.
-
-    Args:
-        doing: what the bar calls the work.
-    """
-    with progress() as report:
-        yield report and partial(report, doing)
-
-
-@contextmanager
-def _bars() -> Iterator[Progress | None]:
     if not sys.stderr.isatty():
         yield None
         return
@@ -78,8 +51,28 @@ def _bars() -> Iterator[Progress | None]:
         TimeElapsedColumn(),
         TextColumn("{task.fields[note]}", markup=False),
     )
+    tasks: dict[str, Any] = {}
     with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
-        yield bars
+
+        def report(step: str, fraction: float | None, text: str) -> None:
+            if step not in tasks:
+                whole = None if fraction is None else 1.0
+                doing = _DOING.get(step, step)
+                tasks[step] = bars.add_task(doing, total=whole, note="")
+            bars.update(tasks[step], completed=fraction, note=text)
+
+        yield report
+
+
+@contextmanager
+def progress_of(doing: str) -> Iterator[Callable[[float | None, str], None] | None]:
+    """Yield a callback (share, text) that draws a bar; None away from a terminal.
+
+    Args:
+        doing: what the bar calls the work.
+    """
+    with progress() as report:
+        yield report and partial(report, doing)
 
 
 def improvement_reporter(
@@ -131,17 +124,17 @@ def compile_kernels(arguments: RunArguments) -> None:
     chosen = profile_params(arguments.profile, planner=arguments.planner)
     if kernels_are_compiled(kernels_of(chosen.planner)):
         return
-    with _bars() as bars:
-        if bars is None:
+    with progress_of("compiling") as report:
+        if report is None:
             return  # planning does it
         from mrmg.planning.preparation import compile_kernels
 
-        task = bars.add_task("compiling", total=None, note="")
+        report(None, "")
         began = time.perf_counter()
         once = "once for this version"
         compile_kernels(
             chosen.planner,
-            lambda n: bars.update(task, note=f"{counted(n, 'kernel')}, {once}"),
+            lambda n: report(None, f"{counted(n, 'kernel')}, {once}"),
         )
         took_s = time.perf_counter() - began
     text = f"compiled {counted(compiled_kernels(), 'kernel')} in {took_s:.0f} s"
