@@ -91,7 +91,7 @@ def campaign(options: argparse.Namespace) -> int:
                 on_trial=partial(report, on_progress),
             )
     except KeyboardInterrupt:
-        print(report.kept(folder), file=sys.stderr)
+        print(f"mrmg: done and kept in {folder}: {report.done}", file=sys.stderr)
         raise
     lines = [*_lines(figures), *_places(folder, options.parquet)]
     terminal.print_result(options, figures, lines)
@@ -99,10 +99,10 @@ def campaign(options: argparse.Namespace) -> int:
 
 
 class _Progress:
-    """Shows how far a campaign has got, and notes it for the end."""
+    """Shows how far a campaign has got, and keeps it in words as `done`."""
 
     def __init__(self, trials: int) -> None:
-        self._done, self._trials = 0, trials
+        self.done = f"0 of {counted(trials, 'trial')}"
         self._printed = time.monotonic()
 
     def __call__(
@@ -114,8 +114,8 @@ class _Progress:
         left_s: float | None,
     ) -> None:
         """Show that one more trial is done; on a line now and then, off a terminal."""
-        self._done = done
-        text = f"{done} of {counted(trials, 'trial')}, {feasible} feasible"
+        self.done = f"{done} of {counted(trials, 'trial')}"
+        text = f"{self.done}, {feasible} feasible"
         if left_s:
             text += f", {terminal.about(left_s)} left"
         if report is not None:
@@ -125,13 +125,6 @@ class _Progress:
         if left_s is not None and now - self._printed > _LINE_EVERY_S:
             self._printed = now
             print(f"mrmg: {text}", file=sys.stderr)
-
-    def kept(self, folder: Path) -> str:
-        """Return what a user may want to know of a campaign that was stopped."""
-        return (
-            f"mrmg: done and kept in {folder}: {self._done} of "
-            f"{counted(self._trials, 'trial')}"
-        )
 
 
 def _lines(figures: dict[str, Any]) -> Iterator[str]:
