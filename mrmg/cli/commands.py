@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from mrmg.cli import terminal
 from mrmg.cli.run_options import given
@@ -171,7 +171,7 @@ def _driven(options: argparse.Namespace) -> tuple[Run, str]:
 
 def audit(options: argparse.Namespace) -> int:
     """Compare planned, metered and measured energy of a run folder."""
-    work = _make(options, Step.AUDIT, **given(options))
+    work = _make(options, Step.AUDIT)
     account = work.folder.read_json("audit.json", remedy="mrmg audit")
     outcome = "mission done" if account["mission_ok"] else "mission failed"
     lines = terminal.because(outcome, account["reasons"])
@@ -184,8 +184,7 @@ _SHOWN = ("overview.png", "energy.png", "mission.gif", "mission.mp4", "report.ht
 
 def render(options: argparse.Namespace) -> int:
     """Make the pictures, the video and the report of a run folder."""
-    wanted = given(options, VideoArguments)
-    work = _make(options, Step.RENDER, Step.DRAW, Step.REPORT, video=wanted)
+    work = _make(options, Step.RENDER, Step.DRAW, Step.REPORT)
     for name in _SHOWN:
         if work.folder.file(name).exists():
             print(work.folder.file(name))
@@ -200,18 +199,14 @@ def report(options: argparse.Namespace) -> int:
     return work.exit_code()
 
 
-def _make(
-    options: argparse.Namespace,
-    *steps: Any,
-    video: dict[str, Any] | None = None,
-    **changes: Any,
-) -> Run:
-    """Make steps of a run anew, with some of its arguments changed."""
+def _make(options: argparse.Namespace, *steps: Step) -> Run:
+    """Make steps of a run anew, with the arguments changed that are given."""
     from mrmg.runs.drive import checked_drive
 
     with opened_run(options.run, trust_code=options.trust_code) as work:
         folder = work.folder
-        changed = work.arguments.changed(video or {}, **changes)
+        video = replace(work.arguments.video, **given(options, VideoArguments))
+        changed = replace(work.arguments, video=video, **given(options))
         work = replace(work, arguments=checked_drive(work.scene, changed))
         shown = [step for step in (Step.DRAW, Step.REPORT) if folder.holds(step)]
         for step in steps:

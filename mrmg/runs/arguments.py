@@ -8,9 +8,9 @@ steps, the record in `run.json` and the report's command are all made from the f
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from mrmg import extensions, storage
 from mrmg.errors import Fault, RunFolderError, UsageError
@@ -189,10 +189,6 @@ class RunArguments(Checked):
             key: value for key, value in wanted.items() if value is not None
         }
         return scene.with_(**changes) if changes else scene
-
-    def changed(self, video: Mapping[str, Any], **changes: Any) -> Self:
-        """Return the arguments with some of them, and of the video's, changed."""
-        return replace(self, video=replace(self.video, **video), **changes)
 
     def to_json(self) -> dict[str, Any]:
         """Return the arguments as JSON data."""
