@@ -64,8 +64,8 @@ class WorkMeter:
         self._roots = np.array(roots)[:, None]
         own = (model.body_rootid[model.dof_bodyid] == self._roots).astype(float)
         tendon = _tendon_moment(model)
-        self._by_robot, self._tendons = _Sums(own), _Sums(tendon)
-        self._rubbed_by_robot = _Sums(
+        self._by_robot, self._tendons = _row_sums(own), _row_sums(tendon)
+        self._rubbed_by_robot = _row_sums(
             np.concatenate([own, (own @ np.abs(tendon.T) > 0.0).astype(float)], axis=1)
         )
         self._find_actuators(robots)
@@ -120,14 +120,14 @@ class WorkMeter:
             return
         ways, work_J = self._ways(), self._noted_work_J()
         self._own_J.append(self._by_tick(work_J))
-        self._steered_J += self._steers(work_J).sum(axis=0)
+        self._steered_J += (work_J @ self._steers).sum(axis=0)
         # Friction slides, or does no work: its force is the loss, against the way.
-        all_ways = np.concatenate([ways, self._tendons(ways)], axis=1)
+        all_ways = np.concatenate([ways, ways @ self._tendons], axis=1)
         slid = np.add.reduceat(np.abs(all_ways), begun, axis=0)
         rubbed_J = (self._friction_N[: len(begun)] * slid).sum(axis=0)
         taken_J = [-(rows[:used] * ways).sum(axis=0) for rows, _ in self._noted[1:]]
-        constrained_J, damped_J = self._by_robot(np.array(taken_J))
-        (in_joints_J,) = self._rubbed_by_robot(rubbed_J[None])
+        constrained_J, damped_J = np.array(taken_J) @ self._by_robot
+        (in_joints_J,) = rubbed_J[None] @ self._rubbed_by_robot
         self._lost_J += damped_J + in_joints_J, constrained_J - in_joints_J
         velocity[0] = velocity[used]
         self._used, self._begun = 0, []
@@ -140,14 +140,14 @@ class WorkMeter:
     def _noted_work_J(self) -> np.ndarray:
         """Return the work on each bus in the steps noted, (steps, buses)."""
         forces = self._noted[0][0][: self._used].take(self._outputs, axis=1)
-        return self._buses(forces * self._speeds(self._ways()))
+        return np.asarray(forces * (self._ways() @ self._speeds) @ self._buses)
 
     def _by_tick(self, work_J: np.ndarray) -> np.ndarray:
         """Return driving and braking work of the drives in each tick, (n, R, 2)."""
         if not self._begun:
             return np.empty((0, len(self._roots), 2))
         both_J = [
-            self._drives(np.add.reduceat(part(work_J, 0.0), self._begun, axis=0))
+            np.add.reduceat(part(work_J, 0.0), self._begun, axis=0) @ self._drives
             for part in (np.maximum, np.minimum)
         ]
         return np.stack(both_J, axis=2)
@@ -159,7 +159,7 @@ class WorkMeter:
         mujoco.mj_fwdPosition(model, data)
         momentum = np.zeros(model.nv)
         mujoco.mj_mulM(model, data, momentum, data.qvel)
-        (kinetic_J,) = self._by_robot(0.5 * momentum[None] * data.qvel)
+        (kinetic_J,) = 0.5 * momentum[None] * data.qvel @ self._by_robot
         own = model.body_rootid == self._roots
         lifted_J = -model.body_mass * (data.xipos @ model.opt.gravity)
         return np.stack([kinetic_J, (own * lifted_J).sum(axis=1)])
@@ -171,49 +171,37 @@ class WorkMeter:
         """
         model, place = self._model, {robot.id: at for at, robot in enumerate(robots)}
         outputs, buses = [], []
+        owners: list[int] = []  # of each bus
+        steering: list[bool] = []  # whether its work is that of a servo
         shared: dict[str, int] = {}
-        drives: list[tuple[int, int]] = []
-        steers: list[tuple[int, int]] = []
         for index in range(model.nactuator):
             own, _, part = model.actuator(index).name.partition("/")
             if own not in place or not is_metered(model, index):
                 continue
-            bus = len(drives) + len(steers)
+            bus = len(owners)
             if part in _WHEEL_MOTORS:
                 bus = shared.setdefault(own, bus)
             outputs.append(int(model.actuator_outadr[index]))
             buses.append(bus)
-            if bus == len(drives) + len(steers):
-                (steers if part in _STEERING else drives).append((place[own], bus))
+            if bus == len(owners):
+                owners.append(place[own])
+                steering.append(part in _STEERING)
         self._outputs = np.array(outputs, dtype=int)
-        number, fleet = len(drives) + len(steers), len(robots)
-        self._speeds = _Sums(transmission(model)[self._outputs])
-        self._buses = _Sums(_marked(number, [(b, at) for at, b in enumerate(buses)]))
-        self._drives = _Sums(_marked(fleet, drives, number))
-        self._steers = _Sums(_marked(fleet, steers, number))
+        steers = np.array(steering, dtype=bool)
+        by_robot = np.arange(len(robots))[:, None] == owners
+        self._speeds = _row_sums(transmission(model)[self._outputs])
+        self._buses = _row_sums(np.arange(len(owners))[:, None] == buses)
+        self._drives = _row_sums(by_robot & ~steers)
+        self._steers = _row_sums(by_robot & steers)
 
 
-class _Sums:
-    """Weighted sums of columns: products with the transpose of a sparse matrix."""
+def _row_sums(matrix: np.ndarray) -> np.ndarray | csc_array:
+    """Return the matrix of the sums of columns whose weights are the rows of `matrix`.
 
-    def __init__(self, matrix: np.ndarray) -> None:
-        """Sum columns by the rows of `matrix`, shape (rows, columns)."""
-        dense = np.ascontiguousarray(matrix.T)
-        self._matrix = dense if dense.size <= _DENSE_SIZE else csc_array(dense)
-
-    def __call__(self, values: np.ndarray) -> np.ndarray:
-        """Return the sums of `values`, shape (n, columns) -> (n, rows)."""
-        return np.asarray(values @ self._matrix)
-
-
-def _marked(
-    rows: int, places: Sequence[tuple[int, int]], columns: int | None = None
-) -> np.ndarray:
-    """Return a matrix of ones at some places, nought elsewhere."""
-    matrix = np.zeros((rows, len(places) if columns is None else columns))
-    for place in places:
-        matrix[place] = 1.0
-    return matrix
+    Values of shape (n, columns) times it are the sums, shape (n, rows).
+    """
+    turned = np.ascontiguousarray(matrix.T, dtype=float)
+    return turned if turned.size <= _DENSE_SIZE else csc_array(turned)
 
 
 def _tendon_moment(model: mujoco.MjModel) -> np.ndarray:
