@@ -29,8 +29,6 @@ class Course:
         plan: the joined plan, of all robots of the scene.
         parts_J: planned energy of each step by robot, shape (n, len(PARTS)) each; under
             the energy model that was believed when the step was planned.
-        rolling_factor: the believed rolling resistance over that of the scene's models,
-            by robot and step, shape (n,) each.
         charge_J: (step, battery contents by robot) from which the batteries were
             reckoned on, in order.
     """
@@ -38,7 +36,6 @@ class Course:
     scene: Scene
     plan: Plan
     parts_J: Mapping[str, np.ndarray]
-    rolling_factor: Mapping[str, np.ndarray]
     charge_J: tuple[tuple[int, Mapping[str, float]], ...]
 
     @staticmethod
@@ -49,9 +46,6 @@ class Course:
             plan=plan,
             parts_J={
                 item.robot: step_energy_parts(scene, item) for item in plan.trajectories
-            },
-            rolling_factor={
-                item.robot: np.ones(len(item.control)) for item in plan.trajectories
             },
             charge_J=(
                 (0, {robot.id: robot.battery.start_J for robot in scene.robots}),
@@ -135,7 +129,6 @@ class Course:
             visits=tuple(visits),
             ledger=EnergyLedger(tuple(entries)),
             content_J=content_J,
-            rolling_factor=self.rolling_factor,
         )
         return replace(self, plan=plan)
 
@@ -161,11 +154,10 @@ class Course:
             parts_J[item.robot] = np.concatenate(
                 [self.parts_J[item.robot][:step], step_energy_parts(scene, new)]
             )
-            factor = np.full(
-                len(control), _rolling_factor(self.scene, scene, item.robot)
-            )
+            before = self.plan.rolling_factor.get(item.robot, np.ones(step))
+            factor = _rolling_factor(self.scene, scene, item.robot)
             factors[item.robot] = np.concatenate(
-                [self.rolling_factor[item.robot][:step], factor]
+                [before[:step], np.full(len(control), factor)]
             )
             trajectories.append(
                 replace(
@@ -174,8 +166,10 @@ class Course:
                     control=np.concatenate([item.control[:step], control]),
                 )
             )
-        plan = replace(self.plan, trajectories=tuple(trajectories))
-        return replace(self, plan=plan, parts_J=parts_J, rolling_factor=factors)
+        plan = replace(
+            self.plan, trajectories=tuple(trajectories), rolling_factor=factors
+        )
+        return replace(self, plan=plan, parts_J=parts_J)
 
 
 def _rolling_factor(scene: Scene, believed: Scene, robot: str) -> float:
