@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from mrmg.motion.dynamics import DERIVATIVES, NX, SPEED_STATES
@@ -42,13 +40,13 @@ class FleetReference:
         time_s = np.minimum(plan_time_s, self.duration_s)
         piece = np.minimum((time_s / self._dt_s).astype(int), self._steps - 1)
         since_s = (time_s - self._dt_s * piece)[:, None]
-        return self._states(piece, since_s).reshape(len(time_s), -1, NX)
+        third, second, first, start = self._cubics[:, piece]
+        states = ((third * since_s + second) * since_s + first) * since_s + start
+        return np.asarray(states.reshape(len(time_s), -1, NX))
 
     def at_once(self, plan_time_s: float) -> np.ndarray:
         """Return the states at one plan time, shape (R, 5)."""
-        time_s = min(plan_time_s, self.duration_s)
-        piece = min(int(time_s / self._dt_s), self._steps - 1)
-        return self._states(piece, time_s - self._dt_s * piece).reshape(-1, NX)
+        return np.asarray(self.at(np.array([plan_time_s]))[0])
 
     def paced(
         self, clock_s: float, rate: float, period_s: float, count: int
@@ -59,16 +57,7 @@ class FleetReference:
         multiplied by it.
         """
         states = self.at(clock_s + rate * period_s * np.arange(count))
-        if rate == 1.0:
-            return states
         return np.where(self._is_speed, rate * states, states)
-
-    def _states(self, piece: Any, since_s: Any) -> np.ndarray:
-        """Return the cubics of pieces of the plan some time after their starts."""
-        third, second, first, start = self._cubics[:, piece]
-        return np.asarray(
-            ((third * since_s + second) * since_s + first) * since_s + start
-        )
 
 
 def speed_states(scene: Scene) -> np.ndarray:
