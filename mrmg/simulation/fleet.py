@@ -8,13 +8,11 @@ is left to a chassis for each motion model. What an MJCF must name stands in
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import ROOT
-from mrmg.scene.types import Scene
 from mrmg.simulation.ackermann import AckermannChassis
 from mrmg.simulation.chassis import part_ids
 from mrmg.simulation.differential import DifferentialChassis
@@ -35,14 +33,6 @@ _NUDGE_M_S = 1e-9
 """Speed that wakes a robot, and moves it by nothing that counts."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Group:
-    """The robots of one motion model: their places in the scene, and their chassis."""
-
-    index: np.ndarray
-    chassis: Chassis
-
-
 class Fleet:
     """All robots of a running simulation.
 
@@ -58,7 +48,13 @@ class Fleet:
         """
         model, robots = world.model, world.scene.robots
         self._model, self._data = model, data
-        self._groups = _grouped(model, data, world.scene)
+        kinds = np.array([robot.model.motion_model for robot in robots])
+        # Places in the scene of the robots of each motion model, and their chassis.
+        self._groups: list[tuple[np.ndarray, Chassis]] = []
+        for kind in dict.fromkeys(kinds.tolist()):
+            own = np.flatnonzero(kinds == kind)
+            chassis = _CHASSIS[kind](model, data, [robots[place] for place in own])
+            self._groups.append((own, chassis))
         self.work = WorkMeter(model, data, robots)
         root = part_ids(model.joint, robots, (ROOT,))
         root_q, root_v = model.jnt_qposadr[root], model.jnt_dofadr[root]
@@ -73,7 +69,7 @@ class Fleet:
 
         theta is unwrapped.
         """
-        fifth = self._gather([group.chassis.fifth_state() for group in self._groups])
+        fifth = self._gather([chassis.fifth_state() for _, chassis in self._groups])
         pose = self._data.qpos[self._pose].tolist()
         velocity = self._data.qvel[self._velocity].tolist()
         states = []
@@ -87,7 +83,7 @@ class Fleet:
 
     def axle_speed_m_s(self) -> np.ndarray:
         """Return the speed the driven axle rolls at, shape (R,)."""
-        return self._gather([group.chassis.axle_speed_m_s() for group in self._groups])
+        return self._gather([chassis.axle_speed_m_s() for _, chassis in self._groups])
 
     def set_resistance(self, resistance_N: np.ndarray, swing_N: np.ndarray) -> None:
         """Set the dry friction of the driven axles.
@@ -97,9 +93,8 @@ class Fleet:
             swing_N: against the way its wheels roll differently, shape (R,); counts for
                 differential drives.
         """
-        for group in self._groups:
-            own = group.index
-            group.chassis.set_resistance(resistance_N[own], swing_N[own])
+        for own, chassis in self._groups:
+            chassis.set_resistance(resistance_N[own], swing_N[own])
 
     def drive(
         self,
@@ -121,15 +116,14 @@ class Fleet:
         """
         self._wake((force_N != 0.0) | (w_from != w_to) | (self._turns & (w_to != 0.0)))
         multiplier = np.broadcast_to(turning_multiplier, len(force_N))
-        for group in self._groups:
-            own = group.index
-            group.chassis.command(
+        for own, chassis in self._groups:
+            chassis.command(
                 force_N[own], w_from[own], w_to[own], steps, multiplier[own]
             )
         self.work.start(steps)
         for step in range(steps):
-            for group in self._groups:
-                group.chassis.apply(step)
+            for _, chassis in self._groups:
+                chassis.apply(step)
             mujoco.mj_step(self._model, self._data)
             self.work.look()
 
@@ -143,22 +137,8 @@ class Fleet:
         self._data.qvel[self._velocity[asleep & commanded, 0]] = _NUDGE_M_S
 
     def _gather(self, parts: list[np.ndarray]) -> np.ndarray:
-        """Return the groups' values in the scene's order, shape (R, ...)."""
-        if len(parts) == 1:
-            return parts[0]
-        whole = np.empty((len(self._yaw), *parts[0].shape[1:]))
-        for group, part in zip(self._groups, parts, strict=True):
-            whole[group.index] = part
+        """Return the groups' values in the scene's order, shape (R,)."""
+        whole = np.empty(len(self._yaw))
+        for (own, _), part in zip(self._groups, parts, strict=True):
+            whole[own] = part
         return whole
-
-
-def _grouped(
-    model: mujoco.MjModel, data: mujoco.MjData, scene: Scene
-) -> tuple[_Group, ...]:
-    kinds = [robot.model.motion_model for robot in scene.robots]
-    groups = []
-    for kind in dict.fromkeys(kinds):
-        index = np.array([place for place, own in enumerate(kinds) if own == kind])
-        robots = [scene.robots[place] for place in index]
-        groups.append(_Group(index, _CHASSIS[kind](model, data, robots)))
-    return tuple(groups)
