@@ -30,7 +30,7 @@ class MujocoWorld:
         spec: the editable description.
         model: the compiled model.
         digest: fingerprint of the compiled model.
-        hull_owner: index of the robot whose hull a geom is, else -1, shape (ngeom,).
+        is_hull: whether a geom is the hull of a robot, shape (ngeom,).
         geom_label: what a contact calls each geom: the id of a robot or obstacle,
             "bounds" or "floor".
         target_geom: geom of each goal and station, by its id, for recolouring; none
@@ -42,7 +42,7 @@ class MujocoWorld:
     spec: mujoco.MjSpec
     model: mujoco.MjModel
     digest: str
-    hull_owner: np.ndarray
+    is_hull: np.ndarray
     geom_label: tuple[str, ...]
     target_geom: dict[str, int]
     chassis: np.ndarray
@@ -93,7 +93,7 @@ def _built(scene: Scene, drawn: bool) -> MujocoWorld:
         spec=spec,
         model=model,
         digest=_digest(model),
-        hull_owner=_hull_owner(scene, model),
+        is_hull=_is_hull(scene, model),
         geom_label=tuple(_label(model, geom) for geom in range(model.ngeom)),
         target_geom={
             target.id: model.geom(f"{kind}:{target.id}").id
@@ -183,11 +183,9 @@ def _digest(model: mujoco.MjModel) -> str:
     return storage.bytes_digest(buffer.tobytes())
 
 
-def _hull_owner(scene: Scene, model: mujoco.MjModel) -> np.ndarray:
-    owner = np.full(model.ngeom, -1)
-    for index, robot in enumerate(scene.robots):
-        owner[model.geom(f"{robot.id}/{HULL}").id] = index
-    return owner
+def _is_hull(scene: Scene, model: mujoco.MjModel) -> np.ndarray:
+    hulls = [model.geom(f"{robot.id}/{HULL}").id for robot in scene.robots]
+    return np.isin(np.arange(model.ngeom), hulls)
 
 
 def _label(model: mujoco.MjModel, geom: int) -> str:
