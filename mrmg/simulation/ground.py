@@ -49,25 +49,21 @@ class GroundResistance:
             swing_N=np.where(steers, 0.0, turning_N),
         )
 
-    def force_N(
-        self,
-        multiplier: np.ndarray,
-        steer: np.ndarray,
-        turning_multiplier: np.ndarray | float = 1.0,
-    ) -> np.ndarray:
-        """Return the force along the way by the energy model's law, shape (R,).
-
-        Args:
-            multiplier: of rolling on the terrain under each robot, shape (R,).
-            steer: psi [rad] of the cars, shape (R,).
-            turning_multiplier: of turning on that terrain, shape (R,).
-        """
-        turning = turning_multiplier * self.turning_N * np.abs(np.tan(steer))
-        return np.asarray(self.rolling_N * multiplier + turning)
+    def force_N(self, ground: Ground) -> np.ndarray:
+        """Return the force along the way by the energy model's law, shape (R,)."""
+        steer = np.abs(np.tan(ground.steer))
+        turning = ground.turning_multiplier * self.turning_N * steer
+        return np.asarray(self.rolling_N * ground.multiplier + turning)
 
 
 class Ground(NamedTuple):
-    """What resists the robots of a fleet: the arguments of `force_N`, each (R,)."""
+    """What resists the robots of a fleet, each of shape (R,).
+
+    Attributes:
+        multiplier: of rolling on the terrain under each robot.
+        steer: psi [rad] of the cars.
+        turning_multiplier: of turning on that terrain.
+    """
 
     multiplier: np.ndarray
     steer: np.ndarray
@@ -79,27 +75,19 @@ class TerrainUnderfoot:
 
     def __init__(self, scene: Scene) -> None:
         """Prepare the terrain of `scene`."""
-        self._areas = [
-            (area.shape, area.shape.bounds, (area.multiplier, area.turning_multiplier))
-            for area in reversed(scene.terrain)
-        ]
-        for shape, _, _ in self._areas:
-            shapely.prepare(shape)
+        factors = [(area.multiplier, area.turning_multiplier) for area in scene.terrain]
+        self._multipliers = np.array([(1.0, 1.0), *factors])
+        self._areas = shapely.STRtree([area.shape for area in scene.terrain])
 
     def under(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
         """Return the multipliers of rolling and turning at some places, shape (2, n).
 
         They are equal to those of `multipliers_at`.
         """
-        places = zip(x_m.tolist(), y_m.tolist(), strict=True)
-        return np.array([self._at(x, y) for x, y in places]).reshape(-1, 2).T
-
-    def _at(self, x: float, y: float) -> tuple[float, float]:
-        for shape, (x_min, y_min, x_max, y_max), multipliers in self._areas:
-            near = x_min <= x <= x_max and y_min <= y <= y_max
-            if near and shapely.contains_xy(shape, x, y):
-                return multipliers
-        return 1.0, 1.0
+        place, area = self._areas.query(shapely.points(x_m, y_m), predicate="within")
+        number = np.zeros(len(x_m), dtype=int)
+        np.maximum.at(number, place, area + 1)
+        return self._multipliers[number].T
 
 
 def believed_resistance(scene: Scene) -> GroundResistance:

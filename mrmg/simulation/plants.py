@@ -33,7 +33,7 @@ class ModelledGround:
             level: cosine of the slope along each heading, shape (R,): the slope carries
                 a part of the weight.
         """
-        along_N = level * self.law.force_N(*ground)
+        along_N = level * self.law.force_N(ground)
         swing_N = ground.turning_multiplier * self.law.swing_N
         self.fleet.set_resistance(along_N, swing_N)
 

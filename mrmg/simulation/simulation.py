@@ -161,7 +161,7 @@ class _Run:
         if seen is not true:
             level, slope = self._slopes_underfoot.under(seen)
         ground = seen_ground = self._ground(seen, steer)
-        believed = self._believed.force_N(*ground)
+        believed = self._believed.force_N(ground)
         wanted = self._drive.force_N(
             self._sensing.axle_speed_m_s,
             now[:, 0],

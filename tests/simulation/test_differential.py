@@ -11,7 +11,7 @@ import pytest
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
 from mrmg.simulation.fleet import Fleet
-from mrmg.simulation.ground import true_resistance
+from mrmg.simulation.ground import Ground, true_resistance
 from mrmg.simulation.world_model import MujocoWorld, build_world
 
 TICK_S = 0.02
@@ -60,7 +60,9 @@ def turning(scene: Scene, speed: float, yaw_rate: float) -> tuple[float, float]:
     world, data, fleet = started(scene)
     true = true_resistance(world)
     still = np.zeros(1)
-    fleet.set_resistance(true.force_N(still + 1.0, still), true.swing_N)
+    fleet.set_resistance(
+        true.force_N(Ground(still + 1.0, still, still + 1.0)), true.swing_N
+    )
     gain, most = 4.4 * scene.robots[0].model.mass_kg, 2.8 * 60.0
     asked, w = np.array([yaw_rate]), np.zeros(1)
     for _ in range(200):
@@ -96,7 +98,9 @@ def test_turning_on_the_spot_takes_what_the_model_says(
     """Three turns: C_turn m g times the track times the angle, and no way along."""
     world, data, fleet = started(scene)
     true, still = true_resistance(world), np.zeros(1)
-    fleet.set_resistance(true.force_N(still + 1.0, still), true.swing_N)
+    fleet.set_resistance(
+        true.force_N(Ground(still + 1.0, still, still + 1.0)), true.swing_N
+    )
     ramp = np.arange(50) / 50
     rates = np.concatenate([ramp, np.ones(950), ramp[::-1], np.zeros(50)])
     for now, following in zip(rates, rates[1:], strict=False):

@@ -10,7 +10,7 @@ import pytest
 
 from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
-from mrmg.simulation.ground import TerrainUnderfoot, believed_resistance
+from mrmg.simulation.ground import Ground, TerrainUnderfoot, believed_resistance
 from mrmg.simulation.simulation import simulate
 from mrmg.world.terrain import multipliers_at
 
@@ -32,7 +32,8 @@ def test_resistance_is_the_energy_models_power_over_the_speed(scene: Scene) -> N
     model = scene.robots[0].model.energy_model
     multiplier, steer = np.array([3.0, 1.0]), np.array([-0.4, 0.2])
     turning_multiplier = np.array([1.0, 2.5])
-    force = believed_resistance(scene).force_N(multiplier, steer, turning_multiplier)
+    ground = Ground(multiplier, steer, turning_multiplier)
+    force = believed_resistance(scene).force_N(ground)
     turn_speed = turning_multiplier * np.abs(np.tan(steer))
     parts = model.power_parts(
         np.ones(2), np.zeros(2), turn_speed, multiplier, np.zeros(2)

@@ -16,7 +16,7 @@ from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
 from mrmg.simulation.contacts import ContactWatch
 from mrmg.simulation.fleet import Fleet
-from mrmg.simulation.ground import believed_resistance, true_resistance
+from mrmg.simulation.ground import Ground, believed_resistance, true_resistance
 from mrmg.simulation.simulation import STEPS_PER_TICK
 from mrmg.simulation.world_model import build_world
 
@@ -128,7 +128,9 @@ def test_does_not_drift_at_rest(scene: Scene, model: RobotModel) -> None:
     data = mujoco.MjData(world.model)
     fleet = Fleet(world, data)
     true, still = true_resistance(world), np.zeros(1)
-    fleet.set_resistance(true.force_N(still + 1.0, still), true.swing_N)
+    fleet.set_resistance(
+        true.force_N(Ground(still + 1.0, still, still + 1.0)), true.swing_N
+    )
     turned = still + (0.4 if model.motion_model == "car" else 0.0)
     fleet.drive(still, still, turned, 50)
     before = fleet.state()
