@@ -7,7 +7,7 @@ The arc through a point at (a, b) in the robot's frame has the curvature
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,34 +18,32 @@ _TIGHT_RADIUS_M = 0.3
 """Radius of a turn below which no point is pursued round it."""
 
 
-@dataclass(frozen=True, slots=True)
-class PurePursuitParams:
-    """How far ahead to look and how firmly to act.
+ALONG_PER_S2 = 2.0
+"""Acceleration per error along the way."""
+
+SPEED_PER_S = 2.5
+"""Acceleration per error of the speed."""
+
+HEADING_PER_S = 3.0
+"""Yaw rate per error of the heading where nothing is ahead; of robots that turn on the
+spot."""
+
+
+class _Reach(NamedTuple):
+    """How far ahead to look, and how firmly to turn there.
 
     Attributes:
         least_lookahead_m: distance of the point ahead at standstill.
         lookahead_s: further distance per speed.
         steering_s: time in which psi, or omega, shall be brought to the arc's.
-        along_per_s2: acceleration per error along the way.
-        speed_per_s: acceleration per error of the speed.
-        heading_per_s: yaw rate per error of the heading where nothing is ahead; of
-            robots that turn on the spot.
     """
 
-    least_lookahead_m: float = 0.4
-    lookahead_s: float = 0.4
-    steering_s: float = 0.15
-    along_per_s2: float = 2.0
-    speed_per_s: float = 2.5
-    heading_per_s: float = 3.0
+    least_lookahead_m: float
+    lookahead_s: float
+    steering_s: float
 
 
-_PARAMS = {
-    "car": PurePursuitParams(),
-    "unicycle": PurePursuitParams(
-        least_lookahead_m=0.15, lookahead_s=0.2, steering_s=0.1
-    ),
-}
+_REACH = {"car": _Reach(0.4, 0.4, 0.15), "unicycle": _Reach(0.15, 0.2, 0.1)}
 """By motion model: the curvature of robots that turn by themselves changes sooner than
 a car's."""
 
@@ -60,26 +58,26 @@ class PurePursuit:
 
     def __init__(self, model: RobotModel) -> None:
         """Follow with a robot of `model`."""
-        self._params = _PARAMS[model.motion_model]
+        self._reach = _REACH[model.motion_model]
         self._turns = model.motion_model == "unicycle"
         self._wheelbase_m, self._w_limit = model.wheelbase_m, model.limits.w_max
 
     def correct(self, state: np.ndarray, reference: np.ndarray) -> np.ndarray:
         """Return the controls towards the point ahead, less the reference's."""
-        params = self._params
         ahead = _in_frame_of(state, reference)
         planned_u2 = (reference[1, 4] - reference[0, 4]) / HORIZON_STEP_S
         speed_error = reference[0, 3] - state[3]
-        u1 = params.along_per_s2 * ahead[0, 0] + params.speed_per_s * speed_error
-        u2 = (self._pursued_w(state, reference, ahead) - state[4]) / params.steering_s
+        u1 = ALONG_PER_S2 * ahead[0, 0] + SPEED_PER_S * speed_error
+        turn = self._pursued_w(state, reference, ahead) - state[4]
+        u2 = turn / self._reach.steering_s
         return np.array([u1, u2 - planned_u2])
 
     def _pursued_w(
         self, state: np.ndarray, reference: np.ndarray, ahead: np.ndarray
     ) -> float:
         """Return psi or omega of the arc; without a point, what the plan suggests."""
-        params = self._params
-        lookahead_m = params.least_lookahead_m + params.lookahead_s * abs(state[3])
+        reach = self._reach
+        lookahead_m = reach.least_lookahead_m + reach.lookahead_s * abs(state[3])
         direction = np.sign(reference[:, 3].sum())
         far = (direction * ahead[:, 0] > 0.0) & (np.hypot(*ahead.T) >= lookahead_m)
         # The arc ends where the robot turns back, or turns on the spot.
@@ -100,7 +98,7 @@ class PurePursuit:
             w = float(reference[0, 4])
             if self._turns:
                 error = math.remainder(reference[0, 2] - state[2], math.tau)
-                w += params.heading_per_s * error
+                w += HEADING_PER_S * error
         return min(max(w, -self._w_limit), self._w_limit)
 
 
