@@ -17,7 +17,7 @@ from mrmg.energy.ledger import EnergyLedger, LedgerEntry
 from mrmg.energy.metering import step_energy_parts, visits_and_energy
 from mrmg.plans import Plan, Visit
 from mrmg.scene.types import Scene
-from mrmg.supervision.stopping import Motion, motions_to_rest
+from mrmg.supervision.stopping import Motion, held, motions_to_rest
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,7 +77,7 @@ class Course:
         )
         longest = max(len(control) for _, control in motions.values())
         length = longest + round(pause_s / self.plan.dt_s)
-        motions = {name: _held(*motion, length) for name, motion in motions.items()}
+        motions = {name: held(*motion, length) for name, motion in motions.items()}
         return self._continued(step, motions, self.scene).with_tours(self.plan.tours)
 
     def resumed(
@@ -104,7 +104,7 @@ class Course:
                 new = planned[item.robot]
                 motions[item.robot] = (new.state, new.control)
             else:
-                motions[item.robot] = _held(item.state[-1:], np.zeros((0, 2)), length)
+                motions[item.robot] = held(item.state[-1:], np.zeros((0, 2)), length)
         joined = self._continued(self.steps, motions, rest)
         anew = (*self.charge_J, (self.steps, dict(charge_J)))
         return replace(joined, charge_J=anew).with_tours(tours)
@@ -178,14 +178,3 @@ def _rolling_factor(scene: Scene, believed: Scene, robot: str) -> float:
         of.robot(robot).model.energy_model.rolling_force_N for of in (scene, believed)
     )
     return known / modelled
-
-
-def _held(state: np.ndarray, control: np.ndarray, length: int) -> Motion:
-    """Return a motion lengthened to `length` steps by standing at its end."""
-    rest = state[-1].copy()
-    rest[3:] = 0.0
-    missing = length - len(control)
-    return (
-        np.concatenate([state, np.repeat(rest[None], missing, axis=0)]),
-        np.concatenate([control, np.zeros((missing, 2))]),
-    )

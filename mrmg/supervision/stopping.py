@@ -127,12 +127,8 @@ def _stopped_along_plan(
 def clearance_m(scene: Scene, motions: Mapping[str, Motion]) -> float:
     """Return the least distance of a robot to anything while it comes to rest."""
     robots = scene.robots
-    longest = max(len(states) for states, _ in motions.values())
-    poses = []
-    for robot in robots:
-        states, _ = motions[robot.id]
-        standing = np.repeat(states[-1:], longest - len(states), axis=0)
-        poses.append(np.concatenate([states, standing]))
+    longest = max(len(control) for _, control in motions.values())
+    poses = [held(*motions[robot.id], longest)[0] for robot in robots]
     distances_m = [
         obstacle_distance(scene, robot, own).min()
         for robot, own in zip(robots, poses, strict=True)
@@ -140,3 +136,14 @@ def clearance_m(scene: Scene, motions: Mapping[str, Motion]) -> float:
     if len(robots) > 1:
         distances_m.append(robot_distance(robots, poses).min())
     return float(min(distances_m))
+
+
+def held(state: np.ndarray, control: np.ndarray, length: int) -> Motion:
+    """Return a motion lengthened to `length` steps by standing at its end."""
+    rest = state[-1].copy()
+    rest[3:] = 0.0
+    missing = length - len(control)
+    return (
+        np.concatenate([state, np.repeat(rest[None], missing, axis=0)]),
+        np.concatenate([control, np.zeros((missing, 2))]),
+    )
