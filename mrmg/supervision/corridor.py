@@ -12,7 +12,20 @@ from mrmg.scene.types import Scene
 from mrmg.simulation.supervision import Observation
 from mrmg.supervision.course import Course
 from mrmg.supervision.metering import RobotMeter
-from mrmg.supervision.parameters import ControlParams
+
+OFF_M = 0.5
+"""How far a robot may be from its plan."""
+
+STALL_S = 2.0
+"""How long the fleet's clock may stand still."""
+
+ENERGY_SHARE = 0.10
+"""Excess of measured over planned energy since the last plan that is tolerated, as a
+share of the planned."""
+
+ENERGY_FLOOR = 0.01
+"""Further excess tolerated, as a share of the capacity: what is measured over a few
+metres is uncertain."""
 
 _STANDING_RATE = 0.1
 _CHANCE_M = 1.0
@@ -37,9 +50,9 @@ class Departure:
 class TrackingCorridor:
     """Reports when a robot is off its plan, or keeps the whole fleet waiting."""
 
-    def __init__(self, robots: Sequence[str], params: ControlParams) -> None:
+    def __init__(self, robots: Sequence[str]) -> None:
         """Start with a fleet that gets on."""
-        self._robots, self._params = robots, params
+        self._robots = robots
         self._got_on_s = 0.0
 
     def reset(self, time_s: float) -> None:
@@ -50,13 +63,13 @@ class TrackingCorridor:
         """Return how the corridor was left, if it was."""
         worst = int(now.off_m.argmax())
         robot, off_m = self._robots[worst], now.off_m[worst]
-        if off_m > self._params.off_m:
+        if off_m > OFF_M:
             text = f"{robot} is {off_m:.2f} m off its plan"
             return Departure("tracking", robot, text)
         if now.rate > _STANDING_RATE:
             self._got_on_s = now.time_s
         waited_s = now.time_s - self._got_on_s
-        if waited_s > self._params.stall_s:
+        if waited_s > STALL_S:
             text = f"the fleet has waited {waited_s:.1f} s for {robot}"
             return Departure("tracking", robot, text)
         return None
@@ -69,9 +82,8 @@ class EnergyCorridor:
     much more than planned the rest is expected to take, too.
     """
 
-    def __init__(self, course: Course, params: ControlParams) -> None:
+    def __init__(self, course: Course) -> None:
         """Reckon from the beginning of a course."""
-        self._params = params
         self.follow(course, 0, {}, course.scene)
 
     def follow(
@@ -116,11 +128,11 @@ class EnergyCorridor:
     def _left_by(
         self, robot: str, meter: RobotMeter, clock_s: float
     ) -> Departure | None:
-        params, capacity_J = self._params, meter.robot.battery.capacity_J
+        capacity_J = meter.robot.battery.capacity_J
         planned_J = self._planned(robot, self._step * self._dt_s, clock_s)
         measured_J = meter.used_J - self._used_J.get(robot, 0.0)
         excess_J = measured_J - planned_J
-        tolerated_J = params.energy_share * planned_J + params.energy_floor * capacity_J
+        tolerated_J = ENERGY_SHARE * planned_J + ENERGY_FLOOR * capacity_J
         if excess_J > tolerated_J:
             return Departure(
                 "energy",

@@ -16,7 +16,6 @@ from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
 from mrmg.simulation.simulation import simulate
 from mrmg.supervision.faults import checked_faults
-from mrmg.supervision.parameters import ControlParams
 from mrmg.supervision.replanning import Replan, Replanner
 from mrmg.supervision.supervisor import FleetSupervisor
 
@@ -52,7 +51,6 @@ def drive_mission(
     faults: Sequence[str] = (),
     seed: int = 0,
     planner: PlannerParams | None = None,
-    params: ControlParams | None = None,
     **simulation: Any,
 ) -> Drive:
     """Drive a plan in MuJoCo, and plan anew where the mission leaves it.
@@ -66,7 +64,6 @@ def drive_mission(
         faults: robots that break down, such as `r2@40s`.
         seed: of all random streams of planning anew.
         planner: parameters of planning anew; the default profile's if None.
-        params: corridors and effort.
         **simulation: further arguments of `simulate`: controller, disturbance, plant,
             on_progress.
 
@@ -78,17 +75,13 @@ def drive_mission(
     require_types((scene, Scene), (plan, Plan))
     require_same_mission(scene, plan)
     require_drivable(scene.robots)
-    params = params or ControlParams()
     supervisor = FleetSupervisor(
         scene,
         plan,
         faults=checked_faults(scene, tuple(faults)),
-        replanner=Replanner(
-            scene=scene, seed=seed, planner=planner or PlannerParams(), control=params
-        )
+        replanner=Replanner(scene=scene, seed=seed, planner=planner or PlannerParams())
         if replan
         else None,
-        params=params,
     )
     log = simulate(
         scene,

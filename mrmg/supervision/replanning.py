@@ -15,10 +15,16 @@ from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.feasibility import impossible_goals
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
-from mrmg.supervision.parameters import ControlParams
 from mrmg.supervision.remaining import FleetCondition, is_over, remaining_scene
 from mrmg.supervision.stays import OngoingStay, keeps_stays
 from mrmg.verification.verify import verify
+
+DRAWS = 2
+"""Seeds a new plan is tried with."""
+
+RESERVES = (1.25, 1.0, 0.5, 0.0)
+"""Shares of the reserve a new plan may be asked to keep, in order. What was measured is
+uncertain, so that a bit more is asked for at first."""
 
 _GIVEN_UP_AT_ONCE = 3
 """One in this many goals is given up when no plan is found and no proof states why."""
@@ -77,13 +83,11 @@ class Replanner:
         scene: the mission as it began.
         seed: of all random streams.
         planner: parameters of the planner.
-        control: how hard to try.
     """
 
     scene: Scene
     seed: int
     planner: PlannerParams
-    control: ControlParams
 
     def replan(self, condition: FleetCondition, number: int) -> Replan:
         """Return the outcome of the `number`th new planning.
@@ -94,7 +98,7 @@ class Replanner:
         some that are farthest from all robots.
         """
         given_up: dict[str, str] = {}
-        draws = self.control.draws
+        draws = DRAWS
         try:
             while True:
                 left = replace(condition, visited=condition.visited | set(given_up))
@@ -115,8 +119,9 @@ class Replanner:
 
     def _tried(self, left: FleetCondition, number: int, draws: int) -> Replan:
         """Return a plan for all goals that are left, or those proven impossible."""
-        shares = self.control.reserves
-        last = remaining_scene(self.scene, left, reserve_share=shares[-1], timely=False)
+        last = remaining_scene(
+            self.scene, left, reserve_share=RESERVES[-1], timely=False
+        )
         if is_over(last):
             return Replan()
         limited = math.isfinite(self.scene.time_limit_s)
@@ -124,7 +129,7 @@ class Replanner:
         tries = [
             (share, timely, stays)
             for timely in ((True, False) if limited else (True,))
-            for share in shares
+            for share in RESERVES
             for stays in ((left.stays, {}) if left.stays else ({},))
         ]
         for share, timely, stays in tries:

@@ -28,9 +28,20 @@ from mrmg.supervision.course import Course
 from mrmg.supervision.faults import StopFault
 from mrmg.supervision.history import History
 from mrmg.supervision.metering import RobotMeter
-from mrmg.supervision.parameters import ControlParams
 from mrmg.supervision.remaining import FleetCondition, is_over, remaining_scene
 from mrmg.supervision.replanning import Replan, Replanner
+
+TRACKED_M = 0.1
+"""Offset up to which a robot counts as being where its plan has it."""
+
+CHECK_S = 0.5
+"""Time between two looks at the energy."""
+
+PAUSE_S = 2.0
+"""How long the fleet stands for a new plan."""
+
+MOST_REPLANS = 10
+"""New plans after which only faults still stop the fleet."""
 
 _NO_PROGRESS_M = 1.0
 """Way between two hold-ups below which a robot makes no progress [m]."""
@@ -55,7 +66,6 @@ class FleetSupervisor:
         *,
         faults: Sequence[StopFault] = (),
         replanner: Replanner | None = None,
-        params: ControlParams,
     ) -> None:
         """Supervise a mission.
 
@@ -64,12 +74,11 @@ class FleetSupervisor:
             plan: it starts by.
             faults: in order of time.
             replanner: None to end the mission where the fleet had to be stopped.
-            params: corridors and effort.
         """
         self.events: tuple[Event, ...] = ()
         self.replans: list[Replan] = []
         self.course = Course.of(scene, plan)
-        self._scene, self._params, self._replanner = scene, params, replanner
+        self._scene, self._replanner = scene, replanner
         self._robots = [robot.id for robot in scene.robots]
         self._faults = list(faults)
         self._out_of_service: set[str] = set()
@@ -77,15 +86,15 @@ class FleetSupervisor:
         self._meters = {robot.id: RobotMeter(scene, robot) for robot in scene.robots}
         for name, meter in self._meters.items():
             meter.follow(plan.tours[name])
-        self._tracking = TrackingCorridor(self._robots, params)
-        self._energy = EnergyCorridor(self.course, params)
+        self._tracking = TrackingCorridor(self._robots)
+        self._energy = EnergyCorridor(self.course)
         self._history = History(scene)
         self._stopping = False
 
     def watch(self, now: Observation) -> Orders | None:
         """Look at the run after a tick; see `Supervisor.watch`."""
         self._history.add(now)
-        if self._history.unmetered_s >= self._params.check_s - 1e-9:
+        if self._history.unmetered_s >= CHECK_S - 1e-9:
             self._history.feed(self._meters)
         faulty = self._break_down(now)
         if self._stopping:
@@ -123,8 +132,7 @@ class FleetSupervisor:
 
     def _departure(self, now: Observation) -> Departure | None:
         """Return the corridor that was left, if replanning could help."""
-        limit = self._params.most_replans
-        if self._replanner is None or len(self.replans) >= limit or now.ended:
+        if self._replanner is None or len(self.replans) >= MOST_REPLANS or now.ended:
             return None
         departure = self._tracking.left(now)
         if departure is None and self._history.unmetered_s == 0.0:
@@ -140,12 +148,10 @@ class FleetSupervisor:
             return None
         states = {}
         for index, item in enumerate(self.course.plan.trajectories):
-            tracked = now.off_m[index] <= self._params.tracked_m
+            tracked = now.off_m[index] <= TRACKED_M
             on_plan = tracked and now.rate >= _SLOW_RATE
             states[item.robot] = item.state[step] if on_plan else now.state[index]
-        self.course = self.course.stopped(
-            step, states, self._out_of_service, self._params.pause_s
-        )
+        self.course = self.course.stopped(step, states, self._out_of_service, PAUSE_S)
         clock_s = now.clock_s if now.rate >= _SLOW_RATE else step * dt_s
         return Orders(plan=self.course.plan, clock_s=clock_s)
 
@@ -213,7 +219,7 @@ class FleetSupervisor:
         poses = {}
         for index, item in enumerate(self.course.plan.trajectories):
             gone = item.robot in self._out_of_service
-            true = now.off_m[index] > self._params.tracked_m or gone
+            true = now.off_m[index] > TRACKED_M or gone
             x, y, yaw = (now.state[index] if true else item.state[-1])[:3]
             poses[item.robot] = (float(x), float(y), float(yaw))
         visited = self._history.visited()

@@ -14,7 +14,6 @@ from mrmg.scene.types import Scene
 from mrmg.supervision.corridor import Departure, EnergyCorridor
 from mrmg.supervision.course import Course
 from mrmg.supervision.metering import RobotMeter
-from mrmg.supervision.parameters import ControlParams
 
 SPEED_M_S, DT_S, STEPS = 1.5, 0.1, 1000
 END_S = STEPS * DT_S
@@ -42,7 +41,7 @@ class Way:
             start_m: charge at the start, in metres of plain ground.
             reserves: scene whose reserves the plan keeps.
         """
-        corridor = EnergyCorridor(self.course, ControlParams())
+        corridor = EnergyCorridor(self.course)
         corridor.follow(self.course, 0, {}, reserves)
         robot = self.scene.robot("r1")
         battery = replace(robot.battery, start_J=start_m * self.metre_J)
