@@ -39,7 +39,7 @@ class AckermannChassis(Chassis):
         self._steer_q = model.jnt_qposadr[part_ids(model.joint, robots, parts.steer)]
         servos = part_ids(model.actuator, robots, parts.servos)
         self._steer_ctrl = model.actuator_ctrladr[servos].ravel()
-        self._control, self._share = data.ctrl, np.empty((0, 1))
+        self._control = data.ctrl
         self._find_drives(robots)
         # A servo with stiffness kp and damping kv follows a ramp kv / kp late.
         servo = servos[:, 0]
@@ -73,9 +73,7 @@ class AckermannChassis(Chassis):
     ) -> None:
         """Hold the traction force; ramp psi so that the servos are on it in time."""
         lag = self._servo_lag_s / (steps * self._step_s)
-        if len(self._share) != steps:
-            self._share = (np.arange(steps) / steps)[:, None]
-        share = self._share + lag
+        share = (np.arange(steps) / steps)[:, None] + lag
         tan_steer = np.tan(w_from + share * (w_to - w_from))[:, :, None]
         angles = np.arctan(tan_steer / (1.0 - self._swing * tan_steer))
         self._angles = angles.reshape(steps, -1)

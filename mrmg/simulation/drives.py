@@ -46,14 +46,11 @@ class ForceDrives:
         self._traction = moment.sum(axis=1) / radius_m
         self._gain = model.actuator_gainprm[ids, 0]
         # Constant and damping terms of an affine bias, which the control makes up for.
-        self._bias = model.actuator_biasprm[ids][:, [0, 2]].T
-        self._biased = bool(self._bias.any())
+        self._constant, self._damping = model.actuator_biasprm[ids][:, [0, 2]].T
         self._velocity, self._control = data.actuator_velocity, data.ctrl
 
     def command(self, force_N: np.ndarray) -> None:
         """Set the controls that give the traction forces `force_N`, shape (D,)."""
-        force = force_N / self._traction
-        if self._biased:
-            constant, damping = self._bias
-            force = force - constant - damping * self._velocity[self._out]
+        damped = self._damping * self._velocity[self._out]
+        force = force_N / self._traction - self._constant - damped
         self._control[self._ctrl] = force / self._gain
