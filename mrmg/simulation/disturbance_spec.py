@@ -88,9 +88,9 @@ def parse_disturbance(spec: str) -> DisturbanceRanges:
     if spec.strip().endswith((".yaml", ".yml")):
         return _of_document(read_yaml(Path(spec.strip()), source=spec.strip()), spec)
     words = [word.strip() for word in spec.split(",") if word.strip()]
-    ranges = DEFAULT_RANGES
-    if words and _is_base(words[0]):
-        ranges, words = _base(words[0]), words[1:]
+    base = _base(words[0]) if words else None
+    if base is not None:
+        del words[0]
     pairs = []
     for word in words:
         key, equals, value = word.partition("=")
@@ -100,7 +100,7 @@ def parse_disturbance(spec: str) -> DisturbanceRanges:
                 f"'{_FIELD}TERRAIN' in the first place, nor a file that ends in .yaml"
             )
         pairs.append((key.strip(), value.strip()))
-    return _amended(ranges, pairs)
+    return _amended(base or DEFAULT_RANGES, pairs)
 
 
 def written_out(spec: str) -> str:
@@ -125,22 +125,20 @@ def disturbance_text(ranges: DisturbanceRanges) -> str:
 def _of_document(document: Any, source: str) -> DisturbanceRanges:
     if not isinstance(document, dict):
         _refuse(f"{source} is no mapping of keys to values")
-    base = document.pop("base", "default")
-    if base != "default" and not (isinstance(base, str) and _is_base(base)):
+    word = document.pop("base", "default")
+    ranges = DEFAULT_RANGES if word == "default" else _base(str(word))
+    if ranges is None:
         allowed = f"default, {_WORD_OF_BASE}, {_FIELD}TERRAIN"
-        _refuse(f"base is {base!r}; allowed: {allowed}")
-    ranges = DEFAULT_RANGES if base == "default" else _base(base)
+        _refuse(f"base is {word!r}; allowed: {allowed}")
     return _amended(ranges, ((key, str(value)) for key, value in document.items()))
 
 
-def _is_base(word: str) -> bool:
-    return word == _WORD_OF_BASE or word.startswith(_FIELD)
-
-
-def _base(word: str) -> DisturbanceRanges:
-    """Return the ranges that a leading word stands for."""
+def _base(word: str) -> DisturbanceRanges | None:
+    """Return the ranges that a leading word stands for; None if it stands for none."""
     if word == _WORD_OF_BASE:
         return DisturbanceRanges()
+    if not word.startswith(_FIELD):
+        return None
     terrain = word.removeprefix(_FIELD)
     if terrain not in FIELD_SPREADS:
         _refuse(
