@@ -6,26 +6,21 @@ import numpy as np
 
 from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import ROOT
-from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
+from mrmg.simulation.disturbance import Disturbance
 from mrmg.simulation.world_model import MujocoWorld
 from mrmg.world.elevation import ground_poses
 
 
 def disturb_world(world: MujocoWorld, disturbance: Disturbance) -> None:
     """Change masses and grip of every robot in `world.model`, in place."""
-    for body, item in zip(world.chassis, disturbance.robots, strict=True):
-        _disturb_robot(world.model, int(body), item)
-    mujoco.mj_setConst(world.model, mujoco.MjData(world.model))
-
-
-def _disturb_robot(
-    model: mujoco.MjModel, chassis: int, disturbance: RobotDisturbance
-) -> None:
-    bodies = np.flatnonzero(model.body_rootid == model.body_rootid[chassis])
-    model.body_mass[bodies] *= 1.0 + disturbance.mass
-    model.body_inertia[bodies] *= 1.0 + disturbance.mass
-    geoms = np.isin(model.geom_bodyid, bodies)
-    model.geom_friction[geoms, 0] *= 1.0 + disturbance.friction
+    model = world.model
+    for chassis, item in zip(world.chassis, disturbance.robots, strict=True):
+        bodies = np.flatnonzero(model.body_rootid == model.body_rootid[chassis])
+        model.body_mass[bodies] *= 1.0 + item.mass
+        model.body_inertia[bodies] *= 1.0 + item.mass
+        geoms = np.isin(model.geom_bodyid, bodies)
+        model.geom_friction[geoms, 0] *= 1.0 + item.friction
+    mujoco.mj_setConst(model, mujoco.MjData(model))
 
 
 def move_starts(

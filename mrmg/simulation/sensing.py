@@ -89,7 +89,6 @@ class FilteredSensing(Sensing):
         self._speed = np.zeros(len(robots))
         self._commanded = np.zeros(len(robots))
         self._steer = np.zeros(len(robots))
-        self._looked = False
 
     def look(
         self, state: np.ndarray, axle_speed_m_s: np.ndarray, commanded_m_s: np.ndarray
@@ -97,12 +96,12 @@ class FilteredSensing(Sensing):
         """Predict by odometry, then correct by what is measured."""
         noise = np.stack([rng.standard_normal(4) for rng in self._rng])
         speed = self._seen_speed(axle_speed_m_s, commanded_m_s, noise[:, 3])
-        if self._looked:
+        if self._estimates:
             self._carry_on(speed, state[:, 4])
         self._true_poses.append(state[:, :3].copy())
         self._estimates.append(self._pose.copy())
         self._correct(noise[:, :3])
-        self._speed, self._steer, self._looked = speed, state[:, 4].copy(), True
+        self._speed, self._steer = speed, state[:, 4].copy()
         self.axle_speed_m_s = speed
         self.state = np.column_stack([self._pose, speed, self._steer])
 
