@@ -134,28 +134,20 @@ class EnergyCorridor:
         excess_J = measured_J - planned_J
         tolerated_J = ENERGY_SHARE * planned_J + ENERGY_FLOOR * capacity_J
         if excess_J > tolerated_J:
-            return Departure(
-                "energy",
-                robot,
-                "{} has used {} J since its plan began, planned were {} J".format(
-                    robot, *compared(measured_J, planned_J)
-                ),
-            )
+            used, planned = compared(measured_J, planned_J)
+            text = f"has used {used} J since its plan began, planned were {planned} J"
+            return Departure("energy", robot, f"{robot} {text}")
         chance_J = _CHANCE_M * meter.robot.model.energy_model.plain_ground_J_per_m()
         if excess_J <= chance_J or planned_J <= 0.0 or robot not in self._reserve_J:
             return None
         more = 1.0 + (excess_J - chance_J) / planned_J
         target, arrival_s = self._next_recharge(robot, clock_s)
         to_go_J = more * self._planned(robot, clock_s, arrival_s)
-        reserve_J = self._reserve_J[robot]
-        if meter.charge_J - to_go_J < reserve_J:
-            return Departure(
-                "energy",
-                robot,
-                "{} would get to {} with {} J, its reserve is {} J".format(
-                    robot, target, *compared(meter.charge_J - to_go_J, reserve_J)
-                ),
-            )
+        left_J, reserve_J = meter.battery.charge_J - to_go_J, self._reserve_J[robot]
+        if left_J < reserve_J:
+            left, reserve = compared(left_J, reserve_J)
+            text = f"would get to {target} with {left} J, its reserve is {reserve} J"
+            return Departure("energy", robot, f"{robot} {text}")
         return None
 
     @property

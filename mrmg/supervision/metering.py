@@ -9,8 +9,6 @@ its rolling resistance differs from its model's: over each second under power,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from mrmg.energy.metering import (
@@ -55,6 +53,7 @@ class RobotMeter:
         robot: whose energies are measured.
         used_J: drawn from the battery so far.
         rolling: estimate of the rolling resistance.
+        battery: follows its content.
     """
 
     def __init__(self, scene: Scene, robot: Robot) -> None:
@@ -64,16 +63,7 @@ class RobotMeter:
         model = robot.model.energy_model
         self.rolling = RollingEstimate(_PRIOR_M * model.plain_ground_J_per_m())
         self._scene = scene
-        self._battery = BatteryTracker(scene, robot)
-
-    @property
-    def charge_J(self) -> float:
-        """Battery content now."""
-        return self._battery.charge_J
-
-    def follow(self, tour: Sequence[str]) -> None:
-        """Expect the visits of a tour from now on."""
-        self._battery.follow(tour)
+        self.battery = BatteryTracker(scene, robot)
 
     def add(self, time_s: np.ndarray, state: np.ndarray, work_J: np.ndarray) -> None:
         """Take in some ticks.
@@ -86,7 +76,7 @@ class RobotMeter:
         parts_J = measured_energy_parts(self.robot, work_J, time_s)
         draw_J = parts_J.sum(axis=1)
         self.used_J += float(draw_J.sum())
-        self._battery.add(time_s, state[:, :3], draw_J)
+        self.battery.add(time_s, state[:, :3], draw_J)
         self._estimate(time_s, state, parts_J[:, _DRIVE])
 
     def _estimate(

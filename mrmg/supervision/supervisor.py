@@ -85,7 +85,7 @@ class FleetSupervisor:
         self._held_up_at: dict[str, np.ndarray] = {}
         self._meters = {robot.id: RobotMeter(scene, robot) for robot in scene.robots}
         for name, meter in self._meters.items():
-            meter.follow(plan.tours[name])
+            meter.battery.follow(plan.tours[name])
         self._tracking = TrackingCorridor(self._robots)
         self._energy = EnergyCorridor(self.course)
         self._history = History(scene)
@@ -191,7 +191,7 @@ class FleetSupervisor:
             outcome.scene, outcome.plan, condition.energy_J, tours
         )
         for name, meter in self._meters.items():
-            meter.follow(outcome.plan.tours.get(name, ()))
+            meter.battery.follow(outcome.plan.tours.get(name, ()))
         self._energy.follow(self.course, step, self._meters, outcome.scene)
         self._tracking.reset(now.time_s)
         for reason in dict.fromkeys(outcome.given_up.values()):
@@ -225,7 +225,9 @@ class FleetSupervisor:
         visited = self._history.visited()
         return FleetCondition(
             pose=poses,
-            energy_J={name: meter.charge_J for name, meter in self._meters.items()},
+            energy_J={
+                name: meter.battery.charge_J for name, meter in self._meters.items()
+            },
             rolling_factor={
                 name: meter.rolling.factor for name, meter in self._meters.items()
             },

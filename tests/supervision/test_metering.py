@@ -48,7 +48,7 @@ def recharging(make_yard: Callable[..., Scene]) -> tuple[Scene, Plan]:
 def fed(scene: Scene, plan: Plan, log: ExecutionLog, ticks: int) -> RobotMeter:
     """A meter that saw a log in pieces of some ticks."""
     meter = RobotMeter(scene, scene.robots[0])
-    meter.follow(plan.tours["r1"])
+    meter.battery.follow(plan.tours["r1"])
     for start in range(0, len(log.time_s) - 1, ticks):
         end = min(start + ticks, len(log.time_s) - 1)
         meter.add(
@@ -68,7 +68,7 @@ def test_charge_is_followed_over_recharges(recharging: tuple[Scene, Plan]) -> No
     capacity_J = scene.robots[0].battery.capacity_J
     for ticks in (1, 25, 400):
         meter = fed(scene, plan, log, ticks)
-        assert meter.charge_J == pytest.approx(end_J, abs=0.005 * capacity_J)
+        assert meter.battery.charge_J == pytest.approx(end_J, abs=0.005 * capacity_J)
         assert meter.used_J == pytest.approx(plan.cost_J, rel=0.02)
         assert meter.rolling.factor == pytest.approx(1.0, abs=0.01)
 
