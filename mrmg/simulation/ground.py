@@ -75,19 +75,27 @@ class TerrainUnderfoot:
 
     def __init__(self, scene: Scene) -> None:
         """Prepare the terrain of `scene`."""
-        factors = [(area.multiplier, area.turning_multiplier) for area in scene.terrain]
-        self._multipliers = np.array([(1.0, 1.0), *factors])
-        self._areas = shapely.STRtree([area.shape for area in scene.terrain])
+        self._areas = [
+            (area.shape, area.shape.bounds, (area.multiplier, area.turning_multiplier))
+            for area in reversed(scene.terrain)
+        ]
+        for shape, _, _ in self._areas:
+            shapely.prepare(shape)
 
     def under(self, x_m: np.ndarray, y_m: np.ndarray) -> np.ndarray:
         """Return the multipliers of rolling and turning at some places, shape (2, n).
 
         They are equal to those of `multipliers_at`.
         """
-        place, area = self._areas.query(shapely.points(x_m, y_m), predicate="within")
-        number = np.zeros(len(x_m), dtype=int)
-        np.maximum.at(number, place, area + 1)
-        return self._multipliers[number].T
+        places = zip(x_m.tolist(), y_m.tolist(), strict=True)
+        return np.array([self._at(x, y) for x, y in places]).reshape(-1, 2).T
+
+    def _at(self, x: float, y: float) -> tuple[float, float]:
+        for shape, (x_min, y_min, x_max, y_max), multipliers in self._areas:
+            near = x_min <= x <= x_max and y_min <= y <= y_max
+            if near and shapely.contains_xy(shape, x, y):
+                return multipliers
+        return 1.0, 1.0
 
 
 def believed_resistance(scene: Scene) -> GroundResistance:
