@@ -1,22 +1,14 @@
-"""Which actuators of an MJCF can be commanded as a force, and metered.
-
-MuJoCo is imported late, as in `mjcf`.
-"""
+"""Which actuators of an MJCF can be commanded as a force, and metered."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from mrmg.mujoco_import import mujoco
+from mrmg.mujoco_import import mujoco
 
 
 def transmission(model: mujoco.MjModel) -> np.ndarray:
     """Return what joint velocities make of actuators' velocities, shape (nout, nv)."""
-    from mrmg.mujoco_import import mujoco
-
     still = mujoco.MjData(model)
     mujoco.mj_forward(model, still)
     moment = np.zeros((model.nout, model.nv))
@@ -37,8 +29,6 @@ def is_metered(model: mujoco.MjModel, index: int) -> bool:
 
 def drive_fault(model: mujoco.MjModel, index: int, moment: np.ndarray) -> str:
     """Return why an actuator cannot be commanded as a force; "" if it can."""
-    from mrmg.mujoco_import import mujoco
-
     elsewhere = _transmission_fault(model, index)
     dofs = np.flatnonzero(moment)
     limited = model.jnt_actfrclimited[model.dof_jntid[dofs]].any()
@@ -66,8 +56,6 @@ def drive_fault(model: mujoco.MjModel, index: int, moment: np.ndarray) -> str:
 
 
 def _transmission_fault(model: mujoco.MjModel, index: int) -> str:
-    from mrmg.mujoco_import import mujoco
-
     kind, target = model.actuator_trntype[index], model.actuator_trnid[index, 0]
     joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
     if int(kind) in map(int, joints):

@@ -1,7 +1,7 @@
 """What a robot's MJCF states of it, measured in the compiled model.
 
-The only module below `execution` that needs MuJoCo, which it imports late: that takes a
-fifth of a second at best, and unchanged shipped models need no look.
+It imports MuJoCo, which takes a fifth of a second at best; as unchanged shipped models
+need no look, `models` imports the comparison of both files late.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from mrmg.mujoco_import import mujoco
 from mrmg.scene.driven_parts import CHASSIS, FLOOR_BIT, OBSTACLE_BIT, ROOT
 from mrmg.scene.loading.force_drive import drive_fault, transmission
 
@@ -24,8 +25,6 @@ _TURNED_RAD = 1.0
 @contextmanager
 def no_warning_file() -> Iterator[None]:
     """Keep MuJoCo from writing warnings to a file in the working directory."""
-    from mrmg.mujoco_import import mujoco
-
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda _: None)
     try:
@@ -47,23 +46,20 @@ class CompiledRobot:
         Raises:
             ValueError: if MuJoCo cannot use it, with its message.
         """
-        from mrmg.mujoco_import import mujoco
-
         self.file = path.name
-        self._mujoco = mujoco
         self._model = mujoco.MjSpec.from_file(str(path)).compile()
         self._data = mujoco.MjData(self._model)
         mujoco.mj_forward(self._model, self._data)
 
     def has(self, kind: str, name: str) -> bool:
         """Return whether there is a joint, body, geom, actuator, ... of that name."""
-        code = getattr(self._mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
-        return bool(self._mujoco.mj_name2id(self._model, code, name) >= 0)
+        code = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+        return bool(mujoco.mj_name2id(self._model, code, name) >= 0)
 
     def has_free_root(self) -> bool:
         """Return whether the joint `root` is free, and that of the chassis."""
         joint = self._model.joint(ROOT)
-        free = joint.type == self._mujoco.mjtJoint.mjJNT_FREE
+        free = joint.type == mujoco.mjtJoint.mjJNT_FREE
         return bool(free and joint.bodyid[0] == self._model.body(CHASSIS).id)
 
     @property
@@ -88,7 +84,7 @@ class CompiledRobot:
 
     def axis(self, joint: str | int) -> np.ndarray:
         """Return the axis of a hinge, shape (3,); zeros for a joint that is none."""
-        hinge = self._model.joint(joint).type == self._mujoco.mjtJoint.mjJNT_HINGE
+        hinge = self._model.joint(joint).type == mujoco.mjtJoint.mjJNT_HINGE
         return np.asarray(self._data.joint(joint).xaxis) if hinge else np.zeros(3)
 
     def place_m(self, joint: str) -> np.ndarray:
@@ -173,7 +169,7 @@ class CompiledRobot:
         self._data.ctrl[model.actuator_ctrladr[at]] = control
         if model.actuator_actadr[at] >= 0:  # a filter, once it has settled
             self._data.act[model.actuator_actadr[at]] = control
-        self._mujoco.mj_forward(model, self._data)
+        mujoco.mj_forward(model, self._data)
         forces_N = [
             self._data.joint(joint).qfrc_actuator[0] / self.radius_m(joint)
             for joint in joints
@@ -194,8 +190,8 @@ class CompiledRobot:
         """Return the angle a position servo holds for a control of 1; else 0."""
         actuator = self._model.actuator(servo)
         stiffness, gear = -float(actuator.biasprm[1]), float(actuator.gear[0])
-        affine = actuator.biastype == self._mujoco.mjtBias.mjBIAS_AFFINE
-        at_once = actuator.dyntype == self._mujoco.mjtDyn.mjDYN_NONE
+        affine = actuator.biastype == mujoco.mjtBias.mjBIAS_AFFINE
+        at_once = actuator.dyntype == mujoco.mjtDyn.mjDYN_NONE
         if not (affine and at_once and stiffness > 0.0 and gear):
             return 0.0
         return float(actuator.gainprm[0]) / stiffness / gear
@@ -217,7 +213,7 @@ class CompiledRobot:
 
     def _turn(self, joint: str, angle_rad: float) -> None:
         self._data.joint(joint).qpos[0] += angle_rad
-        self._mujoco.mj_fwdPosition(self._model, self._data)
+        mujoco.mj_fwdPosition(self._model, self._data)
 
     def _tyres(self, joint: str | int) -> list[int]:
         """Return the geoms of a wheel that touch the floor."""
@@ -235,8 +231,6 @@ def support_m(model: Any, data: Any, geom: int, direction: np.ndarray) -> float:
 
     Infinity for planes and height fields.
     """
-    from mrmg.mujoco_import import mujoco
-
     kinds = mujoco.mjtGeom
     kind, size = model.geom_type[geom], model.geom_size[geom]
     own = data.geom_xmat[geom].reshape(3, 3).T @ direction

@@ -21,7 +21,6 @@ from pydantic import Field, ValidationError
 from mrmg import shipped, storage
 from mrmg.energy.model import EnergyPreset
 from mrmg.errors import Fault, SceneError, UsageError, nearest
-from mrmg.scene.loading.consistency import mjcf_faults
 from mrmg.scene.loading.faults import faults_of
 from mrmg.scene.loading.margins_schema import MarginsEntry, TrackingErrorEntry
 from mrmg.scene.loading.places import lines_of
@@ -256,6 +255,8 @@ def _differences(model: RobotModel, mjcf: Path, entry: ModelDocument) -> list[Fa
     """
     if shipped.is_unchanged_model(_parameters(entry), mjcf):
         return []
+    from mrmg.scene.loading.consistency import mjcf_faults
+
     stated = "center_of_mass_m" in entry.model_fields_set
     return mjcf_faults(model, mjcf, center_stated=stated)
 
