@@ -6,14 +6,14 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, RootModel, ValidationError
+from pydantic import Field, RootModel
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError, UsageError
 from mrmg.scene.importing.frames import Frame
 from mrmg.scene.importing.layers import Area, Box, Layer
-from mrmg.scene.loading.faults import faults_of
+from mrmg.scene.loading.faults import validated
 from mrmg.scene.loading.places import lines_of
 from mrmg.scene.loading.shape_schema import Positive, Strict
 from mrmg.scene.loading.yaml_text import parse_yaml, read_text
@@ -51,10 +51,7 @@ def read_classes(path: Path | None, source: str) -> dict[str, Any]:
         if not isinstance(document, dict) or not document:
             message = "expected lines 'class: {multiplier: 1.5}' or 'class: obstacle'"
             raise SceneError(str(path), [Fault("", message)])
-        try:
-            return ClassTable.model_validate(document).root
-        except ValidationError as error:
-            raise SceneError(str(path), faults_of(error, ClassTable)) from error
+        return validated(ClassTable, document, str(path)).root
 
 
 def land_cover_layer(

@@ -5,13 +5,15 @@ from __future__ import annotations
 import types
 import typing
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import BaseModel, RootModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from mrmg.counted import counted
-from mrmg.errors import Fault, nearest
+from mrmg.errors import Fault, SceneError, nearest
+
+_Model = TypeVar("_Model", bound=BaseModel)
 
 _KINDS = {
     "float_type": "expected a number",
@@ -40,6 +42,23 @@ def parsed(model: type[BaseModel], item: Any) -> Any:
         return model.model_validate(item)
     except ValidationError:
         return None
+
+
+def validated(model: type[_Model], document: Any, source: str) -> _Model:
+    """Return a document as the model of its format.
+
+    Args:
+        model: of the format.
+        document: plain data.
+        source: what error messages call it.
+
+    Raises:
+        SceneError: naming every fault of the document.
+    """
+    try:
+        return model.model_validate(document)
+    except ValidationError as error:
+        raise SceneError(source, faults_of(error, model)) from error
 
 
 def faults_of(error: ValidationError, model: type[BaseModel]) -> list[Fault]:

@@ -16,12 +16,12 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import shapely
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from mrmg import shipped, storage
 from mrmg.energy.model import EnergyPreset
 from mrmg.errors import Fault, SceneError, UsageError, nearest
-from mrmg.scene.loading.faults import faults_of
+from mrmg.scene.loading.faults import validated
 from mrmg.scene.loading.margins_schema import MarginsEntry, TrackingErrorEntry
 from mrmg.scene.loading.places import lines_of
 from mrmg.scene.loading.shape_schema import (
@@ -217,10 +217,7 @@ def _checked_model(
     folder: Path, document: Any, source: str, trust_code: bool
 ) -> tuple[RobotModel, dict[str, Any]]:
     """Return the model that the content of a `robot.yaml` states."""
-    try:
-        entry = ModelDocument.model_validate(document)
-    except ValidationError as error:
-        raise SceneError(source, faults_of(error, ModelDocument)) from error
+    entry = validated(ModelDocument, document, source)
     faults = _motion_faults(entry, folder, trust_code) + _geometry_faults(entry)
     mjcf = None if entry.mjcf is None else file_within(folder, entry.mjcf)
     if isinstance(mjcf, str):

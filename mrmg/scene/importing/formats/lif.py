@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import shapely
-from pydantic import Field, ValidationError
+from pydantic import Field
 
 from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.importing.layers import ImportOptions, Layer, charges, lanes_note
 from mrmg.scene.importing.registry import Format, Head, read_json
-from mrmg.scene.loading.faults import faults_of
+from mrmg.scene.loading.faults import validated
 from mrmg.scene.loading.shape_schema import Number, Strict
 
 NODE_RADIUS_M = 0.5
@@ -87,11 +87,7 @@ class LifDocument(_Open):
 
 def read_lif(path: Path, options: ImportOptions) -> Layer:
     """Read the layouts of a LIF file; they share one frame, in metres."""
-    document = read_json(path)
-    try:
-        layouts = LifDocument.model_validate(document).layouts
-    except ValidationError as error:
-        raise SceneError(str(path), faults_of(error, LifDocument)) from error
+    layouts = validated(LifDocument, read_json(path), str(path)).layouts
     nodes: dict[str, NodeEntry] = {}
     charging: set[str] = set()
     pairs: dict[tuple[str, ...], None] = {}  # in the order of the file

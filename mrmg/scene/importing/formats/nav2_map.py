@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import shapely
-from pydantic import Field, ValidationError
+from pydantic import Field
 from shapely import affinity
 
 from mrmg.counted import counted
@@ -21,7 +21,7 @@ from mrmg.errors import Fault, SceneError
 from mrmg.scene.importing.layers import Area, ImportOptions, Layer
 from mrmg.scene.importing.raster_shapes import enclosing_polygons
 from mrmg.scene.importing.registry import Format, Head
-from mrmg.scene.loading.faults import faults_of
+from mrmg.scene.loading.faults import validated
 from mrmg.scene.loading.places import lines_of
 from mrmg.scene.loading.shape_schema import Number, Positive, Strict
 from mrmg.scene.loading.yaml_text import read_yaml
@@ -198,10 +198,8 @@ def read_grid(path: Path) -> OccupancyGrid:
         SceneError: naming every fault.
     """
     with lines_of(path):
-        try:
-            document = MapDocument.model_validate(read_yaml(path, source=str(path)))
-        except ValidationError as error:
-            raise SceneError(str(path), faults_of(error, MapDocument)) from error
+        content = read_yaml(path, source=str(path))
+        document = validated(MapDocument, content, str(path))
         if document.mode != "raw" and document.free_thresh > document.occupied_thresh:
             message = f"got {document.free_thresh}; must not exceed occupied_thresh"
             raise SceneError(str(path), [Fault("free_thresh", message)])
