@@ -20,8 +20,7 @@ from mrmg.errors import Fault, SceneError, UsageError, nearest
 from mrmg.scene.document import elevation_entry
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.loading.batteries import battery_of
-from mrmg.scene.loading.elevation import elevation_of
-from mrmg.scene.loading.elevation_schema import ElevationEntry
+from mrmg.scene.loading.elevation import ElevationEntry, elevation_of
 from mrmg.scene.loading.faults import EntryError, parsed
 from mrmg.scene.loading.geometry import region_of, shape_of
 from mrmg.scene.loading.margins_schema import MarginsEntry

@@ -96,7 +96,7 @@ from pydantic_core import PydanticCustomError
 
 from mrmg import shipped
 from mrmg.energy.model import EnergyPreset
-from mrmg.scene.loading.elevation_schema import ElevationEntry
+from mrmg.scene.loading.elevation import ElevationEntry
 from mrmg.scene.loading.margins_schema import MarginsEntry
 from mrmg.scene.loading.shape_schema import (
     CircleEntry,
