@@ -40,6 +40,9 @@ _ROUNDING_M = 1e-9
 
 _Entry = dict[str, Any]
 
+_PLACES = ("obstacles", "terrain", "goals", "stations")
+"""Lists of a scene file, but for the robots."""
+
 
 def scene_document(scene: Scene) -> _Entry:
     """Return the content of a scene file that loads as `scene`.
@@ -58,8 +61,9 @@ def _document(scene: Scene) -> _Entry:
     document: _Entry = copy.deepcopy(dict(written.document)) if written else {}
     document |= {"format": 1, "name": scene.name}
     document["bounds"] = [float(value) for value in scene.bounds]
-    for section in ("obstacles", "terrain", "goals", "stations"):
-        document[section] = _entries(scene, document.get(section, []), section)
+    known = entries_by_value(written.loaded, document) if written else {}
+    for section in _PLACES:
+        document[section] = _entries(scene, section, document, known)
     if not (scene.holds_loaded("elevation") and scene.holds_loaded("bounds")):
         document["elevation"] = _elevation(scene)
     if not scene.holds_loaded("objective"):
@@ -67,32 +71,33 @@ def _document(scene: Scene) -> _Entry:
     if not scene.holds_loaded("time_limit_s"):
         limit_s = float(scene.time_limit_s)
         document["time_limit"] = limit_s if math.isfinite(limit_s) else None
-    document["battery"], document["robots"] = _robots(scene, document)
+    document.setdefault("battery", {})
+    changed = [robot for robot in scene.robots if id(robot) not in known]
+    at_once = any(not robot.battery.takes_time_to_fill for robot in changed)
+    if at_once and "charging_power" in document["battery"]:
+        # A robot's own battery cannot take a charging power of the fleet's back.
+        document["battery"], known = {}, {}
+    document["robots"] = _entries(scene, "robots", document, known)
     return {key: value for key, value in document.items() if value is not None}
 
 
-def _entries(scene: Scene, entries: list[_Entry], section: str) -> list[_Entry]:
+def entries_by_value(scene: Scene, document: Mapping[str, Any]) -> dict[int, _Entry]:
+    """Return how the values of a scene are written in its document, by identity."""
+    return {
+        id(value): {"id": value.id, **entry}
+        for section in (*_PLACES, "robots")
+        for value, entry in zip(getattr(scene, section), document[section], strict=True)
+    }
+
+
+def _entries(
+    scene: Scene, section: str, document: _Entry, known: Mapping[int, _Entry]
+) -> list[_Entry]:
     """Return the entries of a section: those of unchanged values as written."""
     if scene.holds_loaded(section):
-        return entries
-    before = getattr(scene.written.loaded, section) if scene.written else ()
-    known = {id(value): entry for value, entry in zip(before, entries, strict=True)}
-    return [
-        {"id": value.id, **known[id(value)]} if id(value) in known else entry_of(value)
-        for value in getattr(scene, section)
-    ]
-
-
-def _robots(scene: Scene, document: _Entry) -> tuple[_Entry, list[_Entry]]:
-    """Return the fleet's battery and the robots' entries."""
-    fleet = document.get("battery", {})
-    kept = {id(robot) for robot in scene.written.loaded.robots} if scene.written else ()
-    changed = [robot for robot in scene.robots if id(robot) not in kept]
-    at_once = any(not robot.battery.takes_time_to_fill for robot in changed)
-    if at_once and "charging_power" in fleet:
-        # A robot's own battery cannot take a charging power of the fleet's back.
-        return {}, [_robot_entry(robot) for robot in scene.robots]
-    return fleet, _entries(scene, document.get("robots", []), "robots")
+        return list(document[section])
+    values = getattr(scene, section)
+    return [known.get(id(value)) or entry_of(value) for value in values]
 
 
 def entry_of(value: Any) -> Any:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from mrmg.errors import Fault, SceneError, nearest
-from mrmg.scene.document import WRITTEN, entry_of
+from mrmg.scene.document import WRITTEN, entries_by_value, entry_of
 from mrmg.scene.loading.faults import unknown_key
 from mrmg.scene.loading.reading import scene_from_document
-from mrmg.scene.loading.schema import SECTIONS, RobotEntry, SceneDocument
+from mrmg.scene.loading.schema import RobotEntry, SceneDocument
 from mrmg.scene.types import Scene
 
 _Entry = dict[str, Any]
@@ -30,7 +30,7 @@ def changed_scene(
     source = f"{scene.name} with {', '.join(changes) or 'no change'}"
     _refuse_unknown(changes, set(SceneDocument.model_fields) - {"format"}, source, "")
     before = scene.document
-    given = _plain(changes, _entries_by_value(scene, before))
+    given = _plain(changes, entries_by_value(scene, before))
     document = before | given
     if given.get("battery") is not None:
         document["battery"] = _merged_battery(before["battery"], given["battery"])
@@ -97,15 +97,6 @@ def _refuse_unknown(
     ]
     if faults:
         raise SceneError(source, faults)
-
-
-def _entries_by_value(scene: Scene, document: _Entry) -> dict[int, _Entry]:
-    """Return how the scene's own values are written, by their identity."""
-    return {
-        id(value): {"id": value.id, **entry}
-        for section in SECTIONS
-        for value, entry in zip(getattr(scene, section), document[section], strict=True)
-    }
 
 
 def _plain(value: Any, written: Mapping[int, _Entry]) -> Any:
