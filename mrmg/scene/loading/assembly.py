@@ -16,12 +16,12 @@ from typing import Any, TypeVar
 import shapely
 
 from mrmg import storage
-from mrmg.errors import Fault, SceneError, UsageError, nearest
+from mrmg.errors import Fault, SceneError, UsageError
 from mrmg.scene.document import elevation_entry
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.loading.batteries import battery_of
 from mrmg.scene.loading.elevation import ElevationEntry, elevation_of
-from mrmg.scene.loading.faults import EntryError, parsed
+from mrmg.scene.loading.faults import EntryError, parsed, unknown_robot
 from mrmg.scene.loading.geometry import region_of, shape_of
 from mrmg.scene.loading.margins_schema import MarginsEntry
 from mrmg.scene.loading.models import load_model, model_folder, with_reference
@@ -180,7 +180,7 @@ class Assembly:
     def _bounds(self) -> tuple[float, float, float, float] | None:
         raw = self._document.get("bounds")
         header = parsed(SceneDocument, {"format": 1, "name": "map", "bounds": raw})
-        if not isinstance(header, SceneDocument):
+        if header is None:
             return None
         x_min, y_min, x_max, y_max = header.bounds
         if x_min >= x_max or y_min >= y_max:
@@ -263,14 +263,10 @@ class Assembly:
         return loaded
 
     def _obstacle(self, entry: ObstacleEntry, path: str) -> Obstacle:
-        robots = self._robot_ids
         for place, name in enumerate(entry.blocks or []):
-            if name not in robots:
-                known = ", ".join(robots) if robots else "none"
-                self._fault(
-                    f"{path}.blocks.{place}",
-                    f"no robot '{name}'{nearest(name, robots)}; robots: {known}",
-                )
+            if name not in self._robot_ids:
+                message = unknown_robot(name, self._robot_ids)
+                self._fault(f"{path}.blocks.{place}", message)
         return Obstacle(
             id=entry.id or _default_id(path),
             shape=shape_of(entry, path),

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from mrmg.errors import Fault, SceneError, nearest
+from mrmg.errors import Fault, SceneError
 from mrmg.scene.document import WRITTEN, entries_by_value, entry_of
-from mrmg.scene.loading.faults import unknown_key
+from mrmg.scene.loading.faults import unknown_key, unknown_robot
 from mrmg.scene.loading.reading import scene_from_document
 from mrmg.scene.loading.schema import RobotEntry, SceneDocument
 from mrmg.scene.types import Scene
@@ -56,9 +56,7 @@ def changed_robot(
     source = f"{scene.name} with {robot_id}'s {', '.join(changes) or 'nothing'}"
     names = [robot.id for robot in scene.robots]
     if robot_id not in names:
-        known = f"robots: {', '.join(names) or 'none'}"
-        message = f"no robot '{robot_id}'{nearest(robot_id, names)}; {known}"
-        raise SceneError(source, [Fault("robots", message)])
+        raise SceneError(source, [Fault("robots", unknown_robot(robot_id, names))])
     place = names.index(robot_id)
     _refuse_unknown(changes, RobotEntry.model_fields, source, f"robots.{place}.")
     document = scene.document

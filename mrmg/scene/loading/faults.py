@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import types
 import typing
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, TypeVar
 
 from pydantic import BaseModel, RootModel, ValidationError
@@ -36,7 +36,7 @@ class EntryError(Exception):
         self.faults = faults
 
 
-def parsed(model: type[BaseModel], item: Any) -> Any:
+def parsed(model: type[_Model], item: Any) -> _Model | None:
     """Return `item` as an entry, or None: its faults are reported with the file's."""
     try:
         return model.model_validate(item)
@@ -132,6 +132,12 @@ def unknown_key(key: str, known: Iterable[str]) -> str:
     """Return the message for a key that is not in the format."""
     names = sorted(known)
     return f"unknown key{nearest(key, names)}; known keys: {', '.join(names)}"
+
+
+def unknown_robot(name: str, robots: Sequence[str]) -> str:
+    """Return the message for a robot that a scene does not have."""
+    known = ", ".join(robots) or "none"
+    return f"no robot '{name}'{nearest(name, robots)}; robots: {known}"
 
 
 def shown(value: Any) -> str:

@@ -67,14 +67,23 @@ def _step(
     return None, None, ""
 
 
-def id_at(document: dict[str, Any], path: str) -> str | None:
-    """Return the id of the entry of a scene that a path leads into, if it has one."""
+def entry_at(path: str) -> tuple[str, int]:
+    """Return the section of a scene that a path leads into, and the entry's index.
+
+    The index is -1 where the path leads into no entry.
+    """
     section, _, rest = path.partition(".")
     index = rest.partition(".")[0]
+    return section, int(index) if index.isdecimal() else -1
+
+
+def id_at(document: dict[str, Any], path: str) -> str | None:
+    """Return the id of the entry of a scene that a path leads into, if it has one."""
+    section, index = entry_at(path)
     items = document.get(section)
-    if not isinstance(items, list) or not index.isdecimal():
+    if not isinstance(items, list) or not 0 <= index < len(items):
         return None
-    entry = items[int(index)] if int(index) < len(items) else None
+    entry = items[index]
     given = entry.get("id") if isinstance(entry, dict) else None
     is_id = isinstance(given, str) and re.fullmatch(ID_PATTERN, given)
     return given if is_id else None

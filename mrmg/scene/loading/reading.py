@@ -13,7 +13,7 @@ from mrmg import shipped
 from mrmg.errors import Fault, SceneError, nearest, require_types
 from mrmg.scene.loading.assembly import Assembly
 from mrmg.scene.loading.faults import faults_of, shown
-from mrmg.scene.loading.places import id_at, lines_of
+from mrmg.scene.loading.places import entry_at, id_at, lines_of
 from mrmg.scene.loading.schema import SCENE_FORMAT, SceneDocument
 from mrmg.scene.loading.yaml_text import dump_yaml, read_yaml
 from mrmg.scene.types import Scene
@@ -160,8 +160,7 @@ def _place_in(document: dict[str, Any]) -> Callable[[Fault], tuple[int, int]]:
     order = {key: place for place, key in enumerate(document)}
 
     def place(fault: Fault) -> tuple[int, int]:
-        section, _, rest = fault.path.partition(".")
-        entry = rest.partition(".")[0]
-        return order.get(section, -1), int(entry) if entry.isdecimal() else -1
+        section, index = entry_at(fault.path)
+        return order.get(section, -1), index
 
     return place
