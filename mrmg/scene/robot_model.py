@@ -1,7 +1,7 @@
 """One kind of robot: its shape, motion, limits, tyres and battery.
 
 A model is a folder in `models/` with `robot.yaml` (this module's fields) and an MJCF
-file; `scene.loading` reads the YAML, `execution` compiles the MJCF.
+file; `scene.loading` reads the YAML, `simulation` compiles the MJCF.
 """
 
 from __future__ import annotations

@@ -184,14 +184,13 @@ class Assembly:
             return None
         x_min, y_min, x_max, y_max = header.bounds
         if x_min >= x_max or y_min >= y_max:
-            message = f"got {raw}; expected x_min < x_max and y_min < y_max"
-            self._fault("bounds", message)
-            return None
-        if max(x_max - x_min, y_max - y_min) > LARGEST_M:
-            message = f"got {raw}; expected sides of at most {LARGEST_M:.0f} m"
-            self._fault("bounds", message)
-            return None
-        return x_min, y_min, x_max, y_max
+            wanted = "x_min < x_max and y_min < y_max"
+        elif max(x_max - x_min, y_max - y_min) > LARGEST_M:
+            wanted = f"sides of at most {LARGEST_M:.0f} m"
+        else:
+            return x_min, y_min, x_max, y_max
+        self._fault("bounds", f"got {raw}; expected {wanted}")
+        return None
 
     def _robot(self, entry: RobotEntry, path: str) -> Robot:
         model, self._parameters[entry.id] = self._model(entry.model, f"{path}.model")

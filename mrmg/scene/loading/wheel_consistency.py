@@ -53,13 +53,11 @@ def wheel_faults(
         ("wheel.radius", model.wheel_radius_m, robot.radius_m(name))
         for name in robot.wheels
     ]
-    seen = set()
-    for key, stated_m, found_m in lengths:
-        wrong = apart(found_m, stated_m, LENGTH_SHARE * stated_m)
-        if wrong and (key, round(found_m, 6)) not in seen:
-            seen.add((key, round(found_m, 6)))
-            allowed = f"{LENGTH_SHARE:.0%}"
-            yield difference(key, stated_m, found_m, "m", allowed, robot.file)
+    yield from dict.fromkeys(  # wheels that are wrong alike are one fault
+        difference(key, stated_m, found_m, "m", f"{LENGTH_SHARE:.0%}", robot.file)
+        for key, stated_m, found_m in lengths
+        if apart(found_m, stated_m, LENGTH_SHARE * stated_m)
+    )
     yield from _tendons(model, robot, parts)
     yield from _spin(model, robot)
     grip = min(robot.grip(name) for name in parts.spin)

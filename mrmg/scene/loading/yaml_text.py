@@ -153,19 +153,14 @@ def read_text(path: Path, *, source: str) -> str:
         raise SceneError(source, [Fault("", message)]) from error
 
 
-class _TextKeyLoader(_CoreLoader):
-    """Takes keys as they are written: `10: x` has the key "10"."""
-
-    keys_as_text = True
-
-
 def parse_yaml(text: str, *, source: str, keys_as_text: bool = False) -> Any:
     """Turn YAML text into plain data.
 
     Args:
         text: the YAML.
         source: what error messages call it.
-        keys_as_text: whether keys that are numbers are allowed, as text.
+        keys_as_text: whether keys are taken as they are written: `10: x` has the key
+            "10".
 
     Raises:
         SceneError: if it is no YAML; names the line and column.
@@ -193,8 +188,9 @@ def _loaded(text: str, keys_as_text: bool) -> Any:
     if not keys_as_text:
         with suppress(*UNREADABLE, yaml.YAMLError):  # read again for the message
             return yaml.load(text, Loader=_FastLoader)  # noqa: S506 (a safe loader)
-    loader = _TextKeyLoader if keys_as_text else _CoreLoader
-    return yaml.load(text, Loader=loader)  # noqa: S506 (a safe loader)
+    loader = _CoreLoader(text)
+    loader.keys_as_text = keys_as_text
+    return loader.get_single_data()
 
 
 def _repeated(value: Any, sizes: dict[int, float]) -> float:
