@@ -119,21 +119,18 @@ def margins_from(value: Any) -> Margins:
     """
     if isinstance(value, Margins):
         return value
-    stated: dict[str, float] = {}
     try:
         pairs = (
             [part.split("=") for part in value.split(",")]
             if isinstance(value, str)
             else list(value.items())
         )
-        for key, number in pairs:
-            stated[key.strip()] = float(number)
-        if len(stated) < len(pairs):
-            stated = {}
+        stated = {key.strip(): float(number) for key, number in pairs}
+        each_once = len(stated) == len(pairs)
     except (AttributeError, TypeError, ValueError):
-        stated = {}
+        stated, each_once = {}, False
     fine = all(0.0 <= stated[key] <= LARGEST_M.get(key, -1.0) for key in stated)
-    if not stated or not fine:
+    if not stated or not each_once or not fine:
         raise UsageError(
             f"margins: {value!r} are no margins such as obstacle=0.1,robot=0.3: each "
             f"once, in m, at most {LARGEST_M['obstacle']:g} from obstacles and "

@@ -35,7 +35,7 @@ def slope_faults(
     for robot in robots:
         walls = [wall.shape for wall in obstacles if wall.stops(robot.id)]
         open_ground = ~shapely.contains_xy(shapely.union_all(walls), x, y)
-        allowed = np.maximum(steepest_climb(robot.model, multiplier), 0.0)
+        allowed = steepest_climb(robot.model, multiplier)
         excess = np.where(open_ground, slope - allowed, -np.inf)
         worst = int(np.argmax(excess))
         if excess[worst] <= 0.0:
@@ -90,7 +90,7 @@ def avoided_ground(
     slope, multiplier = elevation.steepest().ravel(), _multiplier(elevation, terrain)
     stopped: dict[bytes, list[str]] = {}
     for robot in robots:
-        steep = slope > np.maximum(steepest_climb(robot.model, multiplier), 0.0)
+        steep = slope > steepest_climb(robot.model, multiplier)
         stopped.setdefault(steep.tobytes(), []).append(robot.id)
     ground = [
         (part, tuple(names))
@@ -107,11 +107,11 @@ def steepest_climb(model: RobotModel, multiplier: np.ndarray) -> np.ndarray:
     """Return the slope up which a robot can do what is planned for it, shape (n,).
 
     Its driven axle transmits grip enough for slope, rolling resistance and the planned
-    acceleration together.
+    acceleration together; 0 where it does not even on level ground.
     """
     acceleration = model.planning_share * model.limits.u1_max_m_s2 / GRAVITY_M_S2
-    grip = model.usable_grip
-    return np.asarray(grip - model.rolling_coefficient * multiplier - acceleration)
+    rolling = model.rolling_coefficient * multiplier
+    return np.maximum(model.usable_grip - rolling - acceleration, 0.0)
 
 
 def _multiplier(elevation: Elevation, terrain: Sequence[TerrainArea]) -> np.ndarray:
