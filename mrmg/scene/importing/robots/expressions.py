@@ -87,8 +87,7 @@ def guarded(xacro: ModuleType) -> Any:
     evaluate, extend = own.safe_eval, own.eval_extension
 
     def guarded_evaluation(expression: str, *names: Any) -> Any:
-        require_harmless(expression)
-        require_small(expression, lambda part: evaluate(part, *names))
+        require_harmless(expression, lambda part: evaluate(part, *names))
         value = evaluate(expression, *names)
         # A property that held a function could be called by an allowed name.
         if _holds_function(value):
@@ -98,10 +97,9 @@ def guarded(xacro: ModuleType) -> Any:
     def guarded_extension(text: str) -> Any:
         command = text.removeprefix("$(").removesuffix(")").lstrip()
         if command.startswith("eval"):
-            inner = command.removeprefix("eval")
-            require_harmless(inner)
-            require_small(  # it gives texts: those of lists tell types
-                inner, lambda part: ast.literal_eval(extend(f"$(eval [{part}])"))[0]
+            require_harmless(  # it gives texts: those of lists tell types
+                command.removeprefix("eval"),
+                lambda part: ast.literal_eval(extend(f"$(eval [{part}])"))[0],
             )
         return extend(text)
 
@@ -109,29 +107,24 @@ def guarded(xacro: ModuleType) -> Any:
     return own
 
 
-def require_harmless(expression: str) -> None:
-    """Raise an ExpressionError unless evaluating an expression can run no code of it.
+def require_harmless(expression: str, value_of: Callable[[str], Any]) -> None:
+    """Refuse an expression that could run code or give something too large.
+
+    Args:
+        expression: to be evaluated.
+        value_of: evaluates a part of it that can run no code.
 
     Raises:
         ExpressionError: naming the part that could.
         SyntaxError: if it is no expression.
     """
     text = expression.strip()
-    for node in ast.walk(ast.parse(text, "<expression>", mode="eval")):
+    nodes = list(ast.walk(ast.parse(text, "<expression>", mode="eval")))
+    for node in nodes:
         if not _harmless(node):
             part = ast.get_source_segment(text, node)
             raise ExpressionError(text, part or text)
-
-
-def require_small(expression: str, value_of: Callable[[str], Any]) -> None:
-    """Raise an ExpressionError if a part of it gives something too large.
-
-    Args:
-        expression: that is harmless otherwise.
-        value_of: evaluates a part of it.
-    """
-    text = expression.strip()
-    for node in [*ast.walk(ast.parse(text, mode="eval"))][::-1]:  # inner ones first
+    for node in reversed(nodes):  # inner ones first
         if isinstance(node, ast.BinOp):
             parts = [node.left, node.right]
         elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith(_COUNTING):
