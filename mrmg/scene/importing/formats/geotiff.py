@@ -6,10 +6,8 @@ resampled to metres; a coordinate system that is metric already keeps its cells.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import shapely
@@ -18,7 +16,7 @@ from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError
 from mrmg.extras import import_extra
 from mrmg.scene.importing.frames import Frame, frame_of
-from mrmg.scene.importing.layers import Area, Box, ImportOptions, Layer
+from mrmg.scene.importing.layers import Area, ImportOptions, Layer
 from mrmg.scene.importing.raster_shapes import enclosing_polygons
 from mrmg.scene.importing.rasters import Raster, read_raster
 from mrmg.scene.importing.registry import Format, Head
@@ -58,36 +56,18 @@ def read_elevation(path: Path, options: ImportOptions) -> Layer:
     if min(heights.shape) < 2:
         message = f"{heights.shape[0]} x {heights.shape[1]} heights; expected 2 x 2"
         raise SceneError(str(path), [Fault("", message)])
-    layer = _layer(frame, _box(bounds), heights, options, notes, str(path))
-    return replace(layer, crs=crs)
-
-
-def _layer(
-    frame: Frame,
-    bounds: Box,
-    heights: np.ndarray,
-    options: ImportOptions,
-    notes: list[str],
-    source: str,
-) -> Layer:
     empty = np.isnan(heights)
     if empty.all():
-        raise SceneError(source, [Fault("", "holds no height in this area")])
+        raise SceneError(str(path), [Fault("", "holds no height in this area")])
     obstacles: list[Area] = []
     if empty.any():
-        fill = import_extra("rasterio.fill", extra="geo", purpose="reads GeoTIFF")
-        heights = fill.fillnodata(
-            heights, mask=~empty, max_search_distance=float(np.hypot(*heights.shape))
-        )
+        heights = _filled(heights, empty)
         notes.append(
             f"{counted(int(empty.sum()), 'cell')} without data taken as "
             f"{options.unknown}, at heights between those around them"
         )
-    if empty.any() and options.unknown == "obstacle":
-        obstacles = [
-            Area(_placed(shape, bounds, heights.shape), {"id": "no_data"})
-            for shape in enclosing_polygons(empty, options.tolerance)
-        ]
+        if options.unknown == "obstacle":
+            obstacles = _areas_of(empty, bounds, options.tolerance)
     rows, columns = heights.shape
     notes.append(
         f"{rows} x {columns} heights of {heights.min():.1f} to {heights.max():.1f} m; "
@@ -95,12 +75,20 @@ def _layer(
     )
     return Layer(
         frame=frame,
-        bounds=bounds,
+        crs=crs,
+        bounds=tuple(bounds.tolist()),
         heights=heights,
         obstacles=obstacles,
         closes_unknown=bool(obstacles),
         notes=notes,
     )
+
+
+def _filled(heights: np.ndarray, empty: np.ndarray) -> np.ndarray:
+    """Return heights with those of empty cells between those around them."""
+    fill = import_extra("rasterio.fill", extra="geo", purpose="reads GeoTIFF")
+    reach = float(np.hypot(*heights.shape))
+    return np.asarray(fill.fillnodata(heights, mask=~empty, max_search_distance=reach))
 
 
 def _resampled(raster: Raster, crs: str, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
@@ -134,17 +122,19 @@ def _resampled(raster: Raster, crs: str, frame: Frame) -> tuple[np.ndarray, np.n
     return found, np.concatenate([low + cell / 2, high - cell / 2])
 
 
-def _placed(shape: Any, bounds: Any, grid: tuple[int, ...]) -> Any:
-    """Return a shape of cells in metres; a cell's middle is a node."""
+def _areas_of(cells: np.ndarray, bounds: np.ndarray, tolerance: float) -> list[Area]:
+    """Return areas without data about cells, whose middles are nodes."""
     x_min, y_min, x_max, y_max = bounds
-    rows, columns = grid
+    rows, columns = cells.shape
     steps = np.array([x_max - x_min, y_min - y_max]) / [columns - 1, rows - 1]
-    return shapely.transform(shape, lambda p: (p - 0.5) * steps + [x_min, y_max])
 
+    def placed(points: np.ndarray) -> np.ndarray:
+        return np.asarray((points - 0.5) * steps + [x_min, y_max])
 
-def _box(bounds: Any) -> Box:
-    x_min, y_min, x_max, y_max = (float(value) for value in bounds)
-    return x_min, y_min, x_max, y_max
+    return [
+        Area(shapely.transform(shape, placed), {"id": "no_data"})
+        for shape in enclosing_polygons(cells, tolerance)
+    ]
 
 
 def _recognises(head: Head) -> bool:
