@@ -145,18 +145,13 @@ def _beside(outlines: _Outlines, cells: np.ndarray) -> np.ndarray:
     at = np.flatnonzero(outlines.ring[1:] == outlines.ring[:-1])
     begin, end = outlines.points[at], outlines.points[at + 1]
     low, high = np.minimum(begin, end), np.maximum(begin, end)
-    for axis in (0, 1):
-        counts = np.cumsum(np.pad(cells, 1), axis=1 - axis)
+    for axis, lines in enumerate((cells, cells.T)):
+        counts = np.cumsum(np.pad(lines, 1), axis=1)
         own = begin[:, axis] != end[:, axis]
         forward = (end > begin)[own, axis]
         # Cells lie north of a side that leads east, and west of one that leads north.
         line = low[own, 1 - axis] + (forward if axis == 0 else ~forward)
-        ends = (
-            counts[(line, to) if axis == 0 else (to, line)]
-            for to in (high[own, axis], low[own, axis])
-        )
-        last, first = ends
-        beside[at[own]] = last > first
+        beside[at[own]] = counts[line, high[own, axis]] > counts[line, low[own, axis]]
     return beside
 
 

@@ -14,7 +14,6 @@ import shapely
 
 from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError
-from mrmg.extras import import_extra
 from mrmg.scene.importing.frames import Frame, frame_of
 from mrmg.scene.importing.layers import Area, ImportOptions, Layer
 from mrmg.scene.importing.raster_shapes import enclosing_polygons
@@ -86,15 +85,17 @@ def read_elevation(path: Path, options: ImportOptions) -> Layer:
 
 def _filled(heights: np.ndarray, empty: np.ndarray) -> np.ndarray:
     """Return heights with those of empty cells between those around them."""
-    fill = import_extra("rasterio.fill", extra="geo", purpose="reads GeoTIFF")
+    from rasterio.fill import fillnodata
+
     reach = float(np.hypot(*heights.shape))
-    return np.asarray(fill.fillnodata(heights, mask=~empty, max_search_distance=reach))
+    return np.asarray(fillnodata(heights, mask=~empty, max_search_distance=reach))
 
 
 def _resampled(raster: Raster, crs: str, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
     """Return heights at nodes of `frame`, NaN beside the raster, and their bounds."""
-    warp = import_extra("rasterio.warp", extra="geo", purpose="reads GeoTIFF")
-    affine = import_extra("affine", extra="geo", purpose="reads GeoTIFF")
+    from affine import Affine
+    from rasterio import warp
+
     heights = raster.values
     rows, columns = heights.shape
     corners = [(0, 0), (columns, 0), (columns, rows), (0, rows), (0, 0)]
@@ -111,10 +112,10 @@ def _resampled(raster: Raster, crs: str, frame: Frame) -> tuple[np.ndarray, np.n
     warp.reproject(
         heights,
         found,
-        src_transform=affine.Affine(*raster.transform),
+        src_transform=Affine(*raster.transform),
         src_crs=crs,
         src_nodata=np.nan,
-        dst_transform=affine.Affine(cell, 0.0, left, 0.0, -cell, top),
+        dst_transform=Affine(cell, 0.0, left, 0.0, -cell, top),
         dst_crs=frame.crs,
         dst_nodata=np.nan,
         resampling=warp.Resampling.bilinear,
