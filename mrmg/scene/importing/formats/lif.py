@@ -6,8 +6,7 @@ serve, become stations; edges become lanes.
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -88,15 +87,9 @@ class LifDocument(_Open):
 def read_lif(path: Path, options: ImportOptions) -> Layer:
     """Read the layouts of a LIF file; they share one frame, in metres."""
     layouts = validated(LifDocument, read_json(path), str(path)).layouts
-    nodes: dict[str, NodeEntry] = {}
     charging: set[str] = set()
     pairs: dict[tuple[str, ...], None] = {}  # in the order of the file
-    faults: list[Fault] = []
-    keys = []  # of nodes, by their ids, which another layout may use again
-    for layout in layouts:
-        keys.append({node.nodeId: _key(node, layout, nodes) for node in layout.nodes})
-        faults += _given_twice(layout, keys[-1], nodes)
-        nodes |= {keys[-1][node.nodeId]: node for node in layout.nodes}
+    nodes, keys, faults = _nodes_of(layouts)
     everywhere = {node.nodeId: key for key, node in reversed(nodes.items())}
     for layout, own in zip(layouts, keys, strict=True):
         key_of = everywhere | own
@@ -146,25 +139,31 @@ def _place(name: str, node: NodeEntry) -> dict[str, Any]:
     return {"id": name, "circle": {"center": center, "radius": NODE_RADIUS_M}}
 
 
-def _key(node: NodeEntry, layout: LayoutEntry, known: Collection[str]) -> str:
-    own = node.nodeId
-    return f"{layout.layoutId}_{own}" if own in known else own
+def _nodes_of(
+    layouts: Sequence[LayoutEntry],
+) -> tuple[dict[str, NodeEntry], list[dict[str, str]], list[Fault]]:
+    """Return nodes by keys of their own, the keys by ids for each layout, and faults.
 
-
-def _given_twice(
-    layout: LayoutEntry, keys: Mapping[str, str], known: Collection[str]
-) -> list[Fault]:
-    """Return a fault for each node whose id another node of the layout has."""
-    count = Counter(node.nodeId for node in layout.nodes)
-    return [
-        Fault(
-            f"nodes.{name}",
-            f"is given more than once in layout '{layout.layoutId}'; the ids of its "
-            "nodes must differ",
-        )
-        for name, key in keys.items()
-        if count[name] > 1 or key in known
-    ]
+    Another layout may use an id again; one that does so itself has a fault.
+    """
+    nodes: dict[str, NodeEntry] = {}
+    keys: list[dict[str, str]] = []
+    faults: dict[str, Fault] = {}
+    for layout in layouts:
+        known = set(nodes)
+        keys.append({})
+        for node in layout.nodes:
+            name = node.nodeId
+            key = f"{layout.layoutId}_{name}" if name in known else name
+            if key in nodes:
+                message = (
+                    f"is given more than once in layout '{layout.layoutId}'; the ids "
+                    "of its nodes must differ"
+                )
+                faults[key] = Fault(f"nodes.{name}", message)
+            keys[-1][name] = key
+            nodes[key] = node
+    return nodes, keys, list(faults.values())
 
 
 def _recognises(head: Head) -> bool:
