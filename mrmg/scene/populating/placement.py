@@ -56,11 +56,7 @@ class Sites:
 
 
 def place_mission(
-    places: Sites,
-    robots: int,
-    goals: int,
-    stations: int,
-    rng: np.random.Generator,
+    places: Sites, robots: int, goals: int, stations: int, rng: np.random.Generator
 ) -> Placement:
     """Return the first placement whose two bounds on the capacity leave room.
 

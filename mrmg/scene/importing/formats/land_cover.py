@@ -11,11 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from mrmg.scene.importing.formats import geojson
 from mrmg.scene.importing.frames import frame_of
-from mrmg.scene.importing.land_cover import (
-    OBSTACLE,
-    land_cover_layer,
-    read_classes,
-)
+from mrmg.scene.importing.land_cover import OBSTACLE, land_cover_layer, read_classes
 from mrmg.scene.importing.layers import ImportOptions, Layer
 from mrmg.scene.importing.raster_shapes import enclosing_polygons
 from mrmg.scene.importing.rasters import read_raster

@@ -70,8 +70,7 @@ class OccupancyGrid:
     @property
     def place(self) -> tuple[Any, ...]:
         """What grids have in common whose cells lie on each other."""
-        stated = self.document
-        return (*stated.origin[:2], stated.origin[2:], stated.resolution)
+        return self.document.origin, self.document.resolution
 
     def placed(self, shape: Any) -> Any:
         """Return a shape of cells (column, row from the top) in metres of the map."""
@@ -141,10 +140,7 @@ def read_keepout(path: Path, options: ImportOptions) -> Layer:
     obstacles = grid.areas(closed, options.tolerance, id="keepout")
     cells = counted(int(closed.sum()), "cell")
     note = f"{cells} became {counted(len(obstacles), 'obstacle')}"
-    return Layer(
-        obstacles=obstacles,
-        notes=[note, *_notes(grid)],
-    )
+    return Layer(obstacles=obstacles, notes=[note, *_notes(grid)])
 
 
 def read_mask(path: Path, options: ImportOptions) -> Layer:
@@ -177,11 +173,7 @@ def read_mask(path: Path, options: ImportOptions) -> Layer:
     ]
     if len(values) > MOST_CLASSES:
         notes.append(f"its {len(values)} values were rounded to {MOST_CLASSES}")
-    return Layer(
-        obstacles=closed,
-        terrain=terrain,
-        notes=[*notes, *_notes(grid)],
-    )
+    return Layer(obstacles=closed, terrain=terrain, notes=[*notes, *_notes(grid)])
 
 
 def _notes(grid: OccupancyGrid) -> list[str]:
