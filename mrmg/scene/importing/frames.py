@@ -29,7 +29,7 @@ class Frame:
     crs: str | None = None
     origin_m: tuple[float, float] = (0.0, 0.0)
 
-    def metres(self, points: Any, crs: str | None, source: str = "") -> np.ndarray:
+    def metres(self, points: Any, crs: str | None, source: str) -> np.ndarray:
         """Return points of another coordinate system in this frame, shape (n, 2).
 
         Raises:
@@ -50,7 +50,7 @@ class Frame:
             raise SceneError(source, [Fault("", message)])
         return np.asarray(points if crs is None else points - self.origin_m)
 
-    def placed(self, shape: Any, crs: str | None, source: str = "") -> Any:
+    def placed(self, shape: Any, crs: str | None, source: str) -> Any:
         """Return a shape of another coordinate system in this frame; see `metres`."""
         return shapely.transform(shape, lambda points: self.metres(points, crs, source))
 
@@ -63,18 +63,19 @@ class Frame:
         return f"coordinates are those of {self.crs}{less}"
 
 
-def frame_of(crs: str | None, points: Any) -> Frame:
+def frame_of(crs: str | None, points: Any, source: str) -> Frame:
     """Return the frame of a first file: its own metres, or the UTM zone it is in.
 
     Args:
         crs: of the file; None for local metres.
         points: of the file, which decide where the frame begins, shape (n, 2).
+        source: what error messages call the file.
     """
     points = np.asarray(points, dtype=float)[:, :2]
     if crs is None:
         return Frame()
     metric = crs if _is_metric(crs, points) else _utm(crs, points)
-    low = Frame(metric).metres(points, crs).min(axis=0)
+    low = Frame(metric).metres(points, crs, source).min(axis=0)
     if np.abs(low).max() < FAR_M:
         return Frame(metric)
     return Frame(metric, (float(np.floor(low[0])), float(np.floor(low[1]))))

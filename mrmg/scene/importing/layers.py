@@ -213,7 +213,7 @@ def _bounds(source: str, layers: Sequence[Layer], options: ImportOptions) -> Box
     whole = shapely.box(*shapely.total_bounds(shown))
     if options.crop is not None:
         crop, first = shapely.box(*options.crop), layers[0]
-        cropped = first.frame.placed(crop, first.crs).envelope
+        cropped = first.frame.placed(crop, first.crs, source).envelope
         if not cropped.intersection(whole).area:
             extent = ", ".join(f"{value:g}" for value in whole.bounds)
             message = f"{options.crop} lies beside the map, which covers {extent}"

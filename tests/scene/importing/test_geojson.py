@@ -233,14 +233,18 @@ def test_local_maps_do_not_fit_geographic_features(
     assert scene_of(path, local, crs="local").bounds == (0.0, 0.0, 2.0, 2.0)
 
 
-def test_geographic_features_do_not_fit_a_local_map(
-    tmp_path: Path, write_map: Any
+def test_geographic_files_do_not_fit_a_local_map(
+    tmp_path: Path, write_map: Any, write_tiff: Any
 ) -> None:
     place = feature(shapely.Point(8.3, 47.8), kind="goal")
-    path = written(tmp_path / "a.geojson", [place], "EPSG:4326")
+    features = written(tmp_path / "a.geojson", [place], "EPSG:4326")
+    degrees = {"crs": "EPSG:4326", "corner": (8.3, 47.8), "cell": 1e-4}
+    heights = write_tiff(tmp_path / "b.tif", np.full((20, 20), 3.0), **degrees)
     local = write_map(tmp_path, np.full((20, 20), 254))
-    with pytest.raises(SceneError, match="the map it goes with is in local metres"):
-        scene_of(local, path)
+    for path in (features, heights):
+        message = f"{path.name}: 1 fault\n.*the map it goes with is in local metres"
+        with pytest.raises(SceneError, match=message):
+            scene_of(local, path)
 
 
 def test_crop_leaves_out_what_lies_beside(tmp_path: Path) -> None:

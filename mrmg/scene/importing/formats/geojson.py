@@ -60,7 +60,7 @@ def read_geojson(path: Path, options: ImportOptions) -> Layer:
         raise SceneError(str(path), faults)
     crs = crs_of(document, features, options, findings)
     points = shapely.get_coordinates([feature.shape for feature in features])
-    frame = options.frame or frame_of(crs, points)
+    frame = options.frame or frame_of(crs, points, str(path))
     features = [
         replace(feature, shape=frame.placed(feature.shape, crs, str(path)))
         for feature in features

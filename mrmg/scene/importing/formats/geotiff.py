@@ -32,9 +32,9 @@ _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 def read_elevation(path: Path, options: ImportOptions) -> Layer:
     """Read an elevation model; cells without data become obstacles, or free ground."""
-    raster = read_raster(path, options)
+    source, raster = str(path), read_raster(path, options)
     crs, heights, transform, notes = raster
-    frame = options.frame or frame_of(crs, raster.corners)
+    frame = options.frame or frame_of(crs, raster.corners, source)
     upright = transform[1] == transform[3] == 0.0
     if upright and (crs is None or frame.crs in (None, crs)):
         factor = int(np.ceil(np.sqrt(heights.size / MOST_NODES)))
@@ -44,20 +44,21 @@ def read_elevation(path: Path, options: ImportOptions) -> Layer:
         rows, columns = heights.shape
         last = (0.5 + factor * (columns - 1), 0.5 + factor * (rows - 1))
         left_top, right_bottom = raster.at([(0.5, 0.5), last])
-        (left, top), size = frame.metres([left_top], crs)[0], right_bottom - left_top
+        size = right_bottom - left_top
+        left, top = frame.metres([left_top], crs, source)[0]
         bounds = np.array([left, top + size[1], left + size[0], top])
     elif crs is None:
         message = "is turned and states no coordinate system; resample it north up"
-        raise SceneError(str(path), [Fault("transform", message)])
+        raise SceneError(source, [Fault("transform", message)])
     else:
-        heights, bounds = _resampled(raster, crs, frame)
+        heights, bounds = _resampled(raster, crs, frame, source)
         notes.append(f"resampled from {crs} to rows of {frame.crs}")
     if min(heights.shape) < 2:
         message = f"{heights.shape[0]} x {heights.shape[1]} heights; expected 2 x 2"
-        raise SceneError(str(path), [Fault("", message)])
+        raise SceneError(source, [Fault("", message)])
     empty = np.isnan(heights)
     if empty.all():
-        raise SceneError(str(path), [Fault("", "holds no height in this area")])
+        raise SceneError(source, [Fault("", "holds no height in this area")])
     obstacles: list[Area] = []
     if empty.any():
         heights = _filled(heights, empty)
@@ -91,7 +92,9 @@ def _filled(heights: np.ndarray, empty: np.ndarray) -> np.ndarray:
     return np.asarray(fillnodata(heights, mask=~empty, max_search_distance=reach))
 
 
-def _resampled(raster: Raster, crs: str, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+def _resampled(
+    raster: Raster, crs: str, frame: Frame, source: str
+) -> tuple[np.ndarray, np.ndarray]:
     """Return heights at nodes of `frame`, NaN beside the raster, and their bounds."""
     from affine import Affine
     from rasterio import warp
@@ -100,7 +103,7 @@ def _resampled(raster: Raster, crs: str, frame: Frame) -> tuple[np.ndarray, np.n
     rows, columns = heights.shape
     corners = [(0, 0), (columns, 0), (columns, rows), (0, rows), (0, 0)]
     sides = [np.linspace(*ends, _EDGE_POINTS) for ends in pairwise(corners)]
-    edge = frame.metres(raster.at(np.concatenate(sides)), crs)
+    edge = frame.metres(raster.at(np.concatenate(sides)), crs, source)
     low, high = edge.min(axis=0), edge.max(axis=0)
     cell = np.sqrt(shapely.Polygon(edge).area / heights.size)
     cell = max(cell, np.sqrt(np.prod(high - low) / MOST_NODES) * 1.01)

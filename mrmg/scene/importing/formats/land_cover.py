@@ -25,7 +25,7 @@ def read_land_cover(path: Path, options: ImportOptions) -> Layer:
     table = read_classes(options.classes, str(path))
     raster = read_raster(path, options)
     crs, classes, _, notes = raster
-    frame = options.frame or frame_of(crs, raster.corners)
+    frame = options.frame or frame_of(crs, raster.corners, str(path))
 
     def placed(points: np.ndarray) -> np.ndarray:
         return frame.metres(raster.at(points), crs, str(path))
@@ -38,7 +38,7 @@ def read_land_cover(path: Path, options: ImportOptions) -> Layer:
             shapes = enclosing_polygons(classes == value, tolerance)
             yield name, [shapely.transform(shape, placed) for shape in shapes]
 
-    bounds = shapely.MultiPoint(frame.metres(raster.corners, crs)).bounds
+    bounds = shapely.MultiPoint(frame.metres(raster.corners, crs, str(path))).bounds
     return land_cover_layer(table, shapes_by_class(), frame, crs, bounds, notes)
 
 
