@@ -65,24 +65,21 @@ def parameters_of(found: Survey, description: Description) -> dict[str, Paramete
     track = float(np.mean(tracks_m))
     spin = float(np.mean([wheel.inertia[0] + wheel.armature for wheel in wheels]))
     low, high = found.box_m
-    half_width = float(max(-low[1], high[1], track / 2))
-    back, front = float(min(low[0], -radius)), float(max(high[0], radius))
-    outline = [[back, -half_width], [front, -half_width], [front, half_width]]
-    outline.append([back, half_width])
+    side = max(-low[1], high[1], track / 2)
+    back, front = min(low[0], -radius), max(high[0], radius)
+    outline = [[back, -side], [front, -side], [front, side], [back, side]]
     shapes, joints = "its shapes", "its joints"
     values = {
-        "footprint": Parameter(_rounded(outline), "m", shapes),
-        "height": Parameter(_rounded(high[2]), "m", shapes),
+        "footprint": _read(outline, "m", shapes),
+        "height": _read(high[2], "m", shapes),
         "wheelbase": _wheelbase(found, back, front),
-        "track": Parameter(_rounded(track), "m", joints),
-        "mass": Parameter(_rounded(found.mass_kg), "kg", "its links"),
-        "center_of_mass": Parameter(_rounded(found.lead_m), "m", "its links"),
-        "wheel.radius": Parameter(_rounded(radius), "m", shapes),
-        "wheel.inertia": Parameter(_rounded(spin), "kg m^2", "its links"),
+        "track": _read(track, "m", joints),
+        "mass": _read(found.mass_kg, "kg", "its links"),
+        "center_of_mass": _read(found.lead_m, "m", "its links"),
+        "wheel.radius": _read(radius, "m", shapes),
+        "wheel.inertia": _read(spin, "kg m^2", "its links"),
         "wheel.count": Parameter(len(wheels), "", joints),
-        "wheel.mass": Parameter(
-            _rounded(np.mean([wheel.mass_kg for wheel in wheels])), "kg", "its links"
-        ),
+        "wheel.mass": _read(np.mean([w.mass_kg for w in wheels]), "kg", "its links"),
     }
     friction = _friction(found, description)
     values |= _limits(found, description.limits, radius, track, friction.value)
@@ -90,16 +87,14 @@ def parameters_of(found: Survey, description: Description) -> dict[str, Paramete
     push_N = _ROLLING * found.mass_kg * GRAVITY_M_S2
     capacity = push_N / _EFFICIENCY * RANGE_M
     return values | {
-        "planning_share": Parameter(0.85, "", None, share),
+        "planning_share": _assumed(0.85, "", share),
         "rolling_coefficient": _numeric(description, "rolling_coefficient", _ROLLING),
         "turning_coefficient": _numeric(description, "turning_coefficient", _TURNING),
         "friction_coefficient": friction,
-        "drive_efficiency": Parameter(_EFFICIENCY, "", None, "motor, gear, inverter"),
-        "regeneration_efficiency": Parameter(0.0, "", None, "brakes by friction"),
-        "idle_power": Parameter(0.0, "W", None, "not fed by this battery"),
-        "battery_capacity": Parameter(
-            _rounded(capacity), "J", None, f"{RANGE_M:g} m of plain ground"
-        ),
+        "drive_efficiency": _assumed(_EFFICIENCY, "", "motor, gear, inverter"),
+        "regeneration_efficiency": _assumed(0.0, "", "brakes by friction"),
+        "idle_power": _assumed(0.0, "W", "not fed by this battery"),
+        "battery_capacity": _assumed(capacity, "J", f"{RANGE_M:g} m of plain ground"),
     }
 
 
@@ -125,27 +120,25 @@ def _limits(
     turning = sum(w.inertia[0] + w.armature for w in (*found.driven, *found.steered))
     push = push_N / (found.mass_kg + turning / radius**2)
     values = {
-        "limits.v_min": Parameter(_rounded(-speed / 2), "m/s", None, "half as fast"),
+        "limits.v_min": _assumed(-speed / 2, "m/s", "half as fast"),
         "limits.v_max": Parameter(_rounded(speed), "m/s", read, "" if read else slow),
-        "limits.u1_max": Parameter(
-            _rounded(min(push, speed / _START_TIME_S)), "m/s^2", None, held
-        ),
+        "limits.u1_max": _assumed(min(push, speed / _START_TIME_S), "m/s^2", held),
     }
     if found.steered:
         length = float(np.mean([wheel.place_m[0] for wheel in found.steered]))
         inner = math.tan(0.98 * min(found.steering_rad, 1.2))
         turn = math.atan(inner / (1.0 + 0.5 * track / length * inner))
         where = "its steering joints' range, which the inner wheel uses up"
-        values["limits.w_max"] = Parameter(_rounded(turn), "rad", where)
+        values["limits.w_max"] = _read(turn, "rad", where)
         rate, unit = turn / _START_TIME_S, "rad/s"
     else:
         turn = speed / track
         reason = "half of what the wheels allow on the spot"
-        values["limits.w_max"] = Parameter(_rounded(turn), "rad/s", None, reason)
+        values["limits.w_max"] = _assumed(turn, "rad/s", reason)
         moment = _GRIP_USED * grip * found.mass_kg * track / 2
         rate = min(turn / _START_TIME_S, moment / _yaw_inertia(found))
         unit = "rad/s^2"
-    values["limits.u2_max"] = Parameter(_rounded(rate), unit, None, "full in 0.6 s")
+    values["limits.u2_max"] = _assumed(rate, unit, "full in 0.6 s")
     return values
 
 
@@ -154,16 +147,16 @@ def _numeric(description: Description, name: str, assumed: float) -> Parameter:
     stated = [model.numeric(at) for at in range(model.nnumeric)]
     found = [float(item.data[0]) for item in stated if item.name == name]
     if found:
-        return Parameter(_rounded(found[0]), "", f"its numeric '{name}'")
-    return Parameter(assumed, "", None, "firm tyre on firm soil, as of shipped models")
+        return _read(found[0], "", f"its numeric '{name}'")
+    return _assumed(assumed, "", "firm tyre on firm soil, as of shipped models")
 
 
 def _friction(found: Survey, description: Description) -> Parameter:
     names = [description.model.body(b).name for w in found.driven for b in w.bodies]
     stated = [description.friction[n] for n in names if n in description.friction]
     if stated and min(stated) < _MOST_FRICTION:
-        return Parameter(_rounded(min(stated)), "", "its wheels' friction")
-    return Parameter(_FRICTION, "", None, "rubber on dry ground")
+        return _read(min(stated), "", "its wheels' friction")
+    return _assumed(_FRICTION, "", "rubber on dry ground")
 
 
 def _yaw_inertia(found: Survey) -> float:
@@ -178,13 +171,21 @@ def _yaw_inertia(found: Survey) -> float:
 def _wheelbase(found: Survey, back: float, front: float) -> Parameter:
     if found.steered:
         length = float(np.mean([wheel.place_m[0] for wheel in found.steered]))
-        return Parameter(_rounded(length), "m", "its joints")
+        return _read(length, "m", "its joints")
     supports = [abs(x) for x in found.supports_m if abs(x) > 1e-3]
     if supports:
         length = max(supports)
-        return Parameter(_rounded(length), "m", "its supports: driven axle to caster")
+        return _read(length, "m", "its supports: driven axle to caster")
     reason = "driven axle to the farther end of the footprint; no caster was found"
-    return Parameter(_rounded(max(-back, front)), "m", None, reason)
+    return _assumed(max(-back, front), "m", reason)
+
+
+def _read(value: Any, unit: str, source: str) -> Parameter:
+    return Parameter(_rounded(value), unit, source)
+
+
+def _assumed(value: float, unit: str, reason: str) -> Parameter:
+    return Parameter(_rounded(value), unit, None, reason)
 
 
 def _rounded(value: Any) -> Any:
