@@ -223,15 +223,10 @@ def _document(
         return [round(float(value), 3) for value in ground.points_m[places[place]]]
 
     def regions(name: str, chosen: list[int], radius_m: float) -> list[dict[str, Any]]:
+        radius = round(radius_m * _size(robot_model), 3)
         return [
-            {
-                "id": f"{name}{k + 1}",
-                "circle": {
-                    "center": at(p),
-                    "radius": round(radius_m * _size(robot_model), 3),
-                },
-            }
-            for k, p in enumerate(chosen)
+            {"id": f"{name}{k}", "circle": {"center": at(p), "radius": radius}}
+            for k, p in enumerate(chosen, start=1)
         ]
 
     return {
@@ -241,11 +236,11 @@ def _document(
         "battery": {"capacity_m": float(placement.capacity_m), "reserve": RESERVE},
         "robots": [
             {
-                "id": f"r{k + 1}",
+                "id": f"r{k}",
                 "model": model,
                 "pose": [*at(p), _open_heading(ground, places[p], robot_model)],
             }
-            for k, p in enumerate(placement.robots)
+            for k, p in enumerate(placement.robots, start=1)
         ],
     }
 
