@@ -11,7 +11,7 @@ import numpy as np
 
 from mrmg.errors import Fault, SceneError
 from mrmg.extras import import_extra
-from mrmg.scene.importing.frames import LOCAL, known_crs
+from mrmg.scene.importing.frames import LOCAL, Frame, frame_of, known_crs
 from mrmg.scene.importing.layers import Box, ImportOptions
 
 _NOWHERE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
@@ -30,27 +30,35 @@ class Raster(NamedTuple):
     """One band of a raster.
 
     Attributes:
+        source: its file, as error messages name it.
         crs: its coordinate system; None for local metres.
+        frame: the coordinates of the scene.
         values: of its cells, rows from the top; NaN where it has no data.
         transform: from (column, row) to coordinates, as in GDAL: x = a column + b row
             + c, y = d column + e row + f. Rows that run west to east lead south.
         notes: what was changed or assumed.
     """
 
+    source: str
     crs: str | None
+    frame: Frame
     values: np.ndarray
     transform: tuple[float, ...]
     notes: list[str]
 
-    @property
-    def corners(self) -> np.ndarray:
-        """The coordinates of its corners, shape (4, 2)."""
-        rows, columns = self.values.shape
-        return self.at([(0, 0), (columns, 0), (columns, rows), (0, rows)])
+    def metres(self, cells: Any) -> np.ndarray:
+        """Return places (column, row) in the coordinates of the scene, shape (n, 2).
 
-    def at(self, cells: Any) -> np.ndarray:
-        """Return the coordinates of places (column, row), shape (n, 2)."""
-        return _at(self.transform, cells)
+        Raises:
+            SceneError: if the scene cannot take coordinates of the raster.
+        """
+        return self.frame.metres(_at(self.transform, cells), self.crs, self.source)
+
+
+def outline(cells: np.ndarray) -> list[tuple[int, int]]:
+    """Return the corners (column, row) of a grid of cells, as a closed ring."""
+    rows, columns = cells.shape
+    return [(0, 0), (columns, 0), (columns, rows), (0, rows), (0, 0)]
 
 
 def read_raster(path: Path, options: ImportOptions) -> Raster:
@@ -107,7 +115,9 @@ def _first_band(source: Any, options: ImportOptions, name: str) -> Raster:
         values = values[:: 1 if e < 0.0 else -1, :: 1 if a > 0.0 else -1]
         c, f = min(c, c + a * values.shape[1]), max(f, f + e * values.shape[0])
         a, e = abs(a), -abs(e)
-    return Raster(crs, values, (a, b, c, d, e, f), notes)
+    transform = (a, b, c, d, e, f)
+    frame = options.frame or frame_of(crs, _at(transform, outline(values)), name)
+    return Raster(name, crs, frame, values, transform, notes)
 
 
 def _cells_in(

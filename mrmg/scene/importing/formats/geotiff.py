@@ -14,10 +14,9 @@ import shapely
 
 from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError
-from mrmg.scene.importing.frames import Frame, frame_of
 from mrmg.scene.importing.layers import Area, ImportOptions, Layer
 from mrmg.scene.importing.raster_shapes import enclosing_polygons
-from mrmg.scene.importing.rasters import Raster, read_raster
+from mrmg.scene.importing.rasters import Raster, outline, read_raster
 from mrmg.scene.importing.registry import Format, Head
 from mrmg.scene.loading.elevation import MOST_NODES
 
@@ -32,9 +31,8 @@ _TIFF = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 
 def read_elevation(path: Path, options: ImportOptions) -> Layer:
     """Read an elevation model; cells without data become obstacles, or free ground."""
-    source, raster = str(path), read_raster(path, options)
-    crs, heights, transform, notes = raster
-    frame = options.frame or frame_of(crs, raster.corners, source)
+    raster = read_raster(path, options)
+    source, crs, frame, heights, transform, notes = raster
     upright = transform[1] == transform[3] == 0.0
     if upright and (crs is None or frame.crs in (None, crs)):
         factor = int(np.ceil(np.sqrt(heights.size / MOST_NODES)))
@@ -43,15 +41,13 @@ def read_elevation(path: Path, options: ImportOptions) -> Layer:
             heights = heights[::factor, ::factor]
         rows, columns = heights.shape
         last = (0.5 + factor * (columns - 1), 0.5 + factor * (rows - 1))
-        left_top, right_bottom = raster.at([(0.5, 0.5), last])
-        size = right_bottom - left_top
-        left, top = frame.metres([left_top], crs, source)[0]
-        bounds = np.array([left, top + size[1], left + size[0], top])
+        (left, top), (right, bottom) = raster.metres([(0.5, 0.5), last])
+        bounds = np.array([left, bottom, right, top])
     elif crs is None:
         message = "is turned and states no coordinate system; resample it north up"
         raise SceneError(source, [Fault("transform", message)])
     else:
-        heights, bounds = _resampled(raster, crs, frame, source)
+        heights, bounds = _resampled(raster)
         notes.append(f"resampled from {crs} to rows of {frame.crs}")
     if min(heights.shape) < 2:
         message = f"{heights.shape[0]} x {heights.shape[1]} heights; expected 2 x 2"
@@ -92,18 +88,14 @@ def _filled(heights: np.ndarray, empty: np.ndarray) -> np.ndarray:
     return np.asarray(fillnodata(heights, mask=~empty, max_search_distance=reach))
 
 
-def _resampled(
-    raster: Raster, crs: str, frame: Frame, source: str
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return heights at nodes of `frame`, NaN beside the raster, and their bounds."""
+def _resampled(raster: Raster) -> tuple[np.ndarray, np.ndarray]:
+    """Return heights at nodes of the scene, NaN beside the raster, and their bounds."""
     from affine import Affine
     from rasterio import warp
 
-    heights = raster.values
-    rows, columns = heights.shape
-    corners = [(0, 0), (columns, 0), (columns, rows), (0, rows), (0, 0)]
-    sides = [np.linspace(*ends, _EDGE_POINTS) for ends in pairwise(corners)]
-    edge = frame.metres(raster.at(np.concatenate(sides)), crs, source)
+    heights, frame = raster.values, raster.frame
+    sides = [np.linspace(*ends, _EDGE_POINTS) for ends in pairwise(outline(heights))]
+    edge = raster.metres(np.concatenate(sides))
     low, high = edge.min(axis=0), edge.max(axis=0)
     cell = np.sqrt(shapely.Polygon(edge).area / heights.size)
     cell = max(cell, np.sqrt(np.prod(high - low) / MOST_NODES) * 1.01)
@@ -116,7 +108,7 @@ def _resampled(
         heights,
         found,
         src_transform=Affine(*raster.transform),
-        src_crs=crs,
+        src_crs=raster.crs,
         src_nodata=np.nan,
         dst_transform=Affine(cell, 0.0, left, 0.0, -cell, top),
         dst_crs=frame.crs,

@@ -10,11 +10,10 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.scene.importing.formats import geojson
-from mrmg.scene.importing.frames import frame_of
 from mrmg.scene.importing.land_cover import OBSTACLE, land_cover_layer, read_classes
 from mrmg.scene.importing.layers import ImportOptions, Layer
 from mrmg.scene.importing.raster_shapes import enclosing_polygons
-from mrmg.scene.importing.rasters import read_raster
+from mrmg.scene.importing.rasters import outline, read_raster
 from mrmg.scene.importing.registry import Format, Head
 
 
@@ -24,11 +23,7 @@ def read_land_cover(path: Path, options: ImportOptions) -> Layer:
         return geojson.read_geojson(path, options)
     table = read_classes(options.classes, str(path))
     raster = read_raster(path, options)
-    crs, classes, _, notes = raster
-    frame = options.frame or frame_of(crs, raster.corners, str(path))
-
-    def placed(points: np.ndarray) -> np.ndarray:
-        return frame.metres(raster.at(points), crs, str(path))
+    classes = raster.values
 
     def shapes_by_class() -> Iterator[tuple[str, list[BaseGeometry]]]:
         for value in np.unique(classes[~np.isnan(classes)]):
@@ -36,10 +31,12 @@ def read_land_cover(path: Path, options: ImportOptions) -> Layer:
             # What is terrain must not grow over its neighbours.
             tolerance = options.tolerance if table.get(name) == OBSTACLE else 0.0
             shapes = enclosing_polygons(classes == value, tolerance)
-            yield name, [shapely.transform(shape, placed) for shape in shapes]
+            yield name, [shapely.transform(shape, raster.metres) for shape in shapes]
 
-    bounds = shapely.MultiPoint(frame.metres(raster.corners, crs, str(path))).bounds
-    return land_cover_layer(table, shapes_by_class(), frame, crs, bounds, notes)
+    bounds = shapely.MultiPoint(raster.metres(outline(classes))).bounds
+    return land_cover_layer(
+        table, shapes_by_class(), raster.frame, raster.crs, bounds, raster.notes
+    )
 
 
 FORMAT = Format(
