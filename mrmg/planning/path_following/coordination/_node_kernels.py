@@ -213,11 +213,10 @@ def cost_to_go_s(search, place, state):
     if on_path and segment < search.course.size[0]:
         time_s = along_path_s(search, leg, left, state)
     elif target >= 0:
-        known = len(task.guide.turning) > 0
         posed = search.targets.target[target].tolerance < pi
-        if known:
+        if len(task.guide.turning) > 0:
             time_s += TURNING_SHARE * turning_at(task.guide, leg, state)
-        if posed and own[0].model == CAR:
+        elif posed and own[0].model == CAR:
             posed_s = posing_time_s(own, search.targets, target, x, y, state[2])
             if leg + 1 < legs or (leg < legs and task.finish >= 0):
                 center = search.targets.target[target].center
@@ -225,7 +224,7 @@ def cost_to_go_s(search, place, state):
                     task.guide, leg + 1, step_number, center[0], center[1]
                 )
             time_s = max(time_s, posed_s)
-        elif posed and not known:
+        elif posed:
             time_s += posing_time_s(own, search.targets, target, x, y, state[2])
     return time_s + task.later_s[leg]
 

@@ -207,11 +207,13 @@ class Fields:
     def turning(self, r: int, targets: Sequence[int]) -> np.ndarray:
         """Return what turning costs robot r beside its costs-to-go [s] (`Guide`).
 
-        It is `UNKNOWN` for too many poses.
+        It is `UNKNOWN` for cars, whose searches take longer with it among boxes than
+        without, and for too many poses.
         """
         if (r, *targets) not in self._turning:
+            car = self._problem.mission.fleet[r]["model"] == CAR
             poses = len(targets) * BEARINGS * self._shape[0] * self._shape[1]
-            known = 0 < poses <= MOST_POSES
+            known = not car and 0 < poses <= MOST_POSES
             found = self._turns(r, targets) if known else UNKNOWN
             self._turning[r, *targets] = found
         return self._turning[r, *targets]
@@ -220,8 +222,6 @@ class Fields:
         mission = self._problem.mission
         robot, price = mission.fleet[r], self._price(r, targets)
         back, top, rate = np.maximum(np.abs(robot["limit"][:3]), 1e-6)
-        if robot["model"] == CAR:
-            rate = top / robot["turning_radius"]
         heading = 2.0 * np.pi / BEARINGS * np.arange(BEARINGS)
         turn_s = heading[1] / rate * np.where(price < np.inf, price, 1.0)
         turning = np.zeros((len(targets), BEARINGS, *self._shape))

@@ -185,8 +185,10 @@ def poses_s(problem: Problem, r: int, task: Task, guide: Guide) -> np.ndarray:
     for leg, target in enumerate(task.leg):
         excess_s[: leg + 1] += stop_s * (targets.target["tolerance"][target] < pi)
     for leg, (one, other) in enumerate(pairwise(tour)):
-        known = own[0]["model"] != CAR and len(guide.turning) > 0
-        if known or (targets.target["tolerance"][[one, other]] >= pi).any():
+        if (
+            len(guide.turning) > 0
+            or (targets.target["tolerance"][[one, other]] >= pi).any()
+        ):
             continue
         x, y = targets.target["center"][one]
         time_s = posing_time_s(
