@@ -40,7 +40,6 @@ class Routes(NamedTuple):
             After n goals front is n + 2 if all is up to date.
         plain: 1 where the battery lasts for the route without a station, and labels
             are of that way alone, shape (R + 1,).
-        changed: 1 where a route differs from what it is a copy of, shape (R + 1,).
     """
 
     goal: np.ndarray
@@ -49,7 +48,6 @@ class Routes(NamedTuple):
     front: np.ndarray
     back: np.ndarray
     plain: np.ndarray
-    changed: np.ndarray
 
 
 def new_routes(robots: int, goals: int) -> Routes:
@@ -61,30 +59,27 @@ def new_routes(robots: int, goals: int) -> Routes:
         np.zeros(robots + 1, np.int64),
         np.zeros(robots + 1, np.int64),
         np.zeros(robots + 1, np.int64),
-        np.ones(robots + 1, np.int64),
     )
 
 
 @kernel
-def copy_routes(source, copy, changed):
-    """Copy those routes that have changed, and the absent goals."""
-    robots = len(changed) - 1
-    for r in range(robots + 1):
-        if changed[r] or r == robots:
-            copy.length[r] = source.length[r]
-            copy_numbers(source.goal[r, : source.length[r]], copy.goal[r])
-            copy_numbers(source.known[r], copy.known[r])
-            copy.front[r] = source.front[r]
-            copy.back[r] = source.back[r]
-            copy.plain[r] = source.plain[r]
+def copy_routes(source, copy):
+    """Copy all routes, and the absent goals."""
+    for r in range(len(source.length)):
+        copy.length[r] = source.length[r]
+        copy_numbers(source.goal[r, : source.length[r]], copy.goal[r])
+        copy_numbers(source.known[r], copy.known[r])
+        copy.front[r] = source.front[r]
+        copy.back[r] = source.back[r]
+        copy.plain[r] = source.plain[r]
 
 
 @kernel
-def copy_labels(legs, routes, changed, source, copy):
-    """Copy the labels of those routes that have changed."""
+def copy_labels(legs, routes, source, copy):
+    """Copy the labels of all routes."""
     ends = legs.goals + 2 * len(legs.robot)
     for r in range(len(legs.robot)):
-        n = routes.length[r] if changed[r] else -1
+        n = routes.length[r]
         for i in range(2 * n + 1):
             row = ends - len(legs.robot) + r
             if i < 2 * n:
@@ -110,7 +105,6 @@ def update(legs, routes, labels, shorter):
                 routes.plain[r] = suffices
                 routes.front[r] = routes.back[r] = 0
             label(legs, routes, labels, r)
-            routes.changed[r] = 1
 
 
 @kernel

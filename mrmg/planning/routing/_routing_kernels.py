@@ -126,16 +126,14 @@ def search(legs, state, rounds, span, random):
         warmth = hot * span[0] * (span[1] / span[0]) ** (k / (rounds + 1))
         if k == 0 or found < value - warmth * log(1.0 - random_unit(random)):
             value = found
-            copy_routes(routes, present, routes.changed)
-            copy_labels(legs, routes, routes.changed, state.labels, state.kept)
+            copy_routes(routes, present)
+            copy_labels(legs, routes, state.labels, state.kept)
             if found < best_value:
                 best_value = found
-                routes.changed[:] = 1
-                copy_routes(routes, best, routes.changed)
+                copy_routes(routes, best)
         else:
-            copy_routes(present, routes, routes.changed)
-            copy_labels(legs, routes, routes.changed, state.kept, state.labels)
-        routes.changed[:] = 0
+            copy_routes(present, routes)
+            copy_labels(legs, routes, state.kept, state.labels)
 
 
 @kernel
@@ -163,8 +161,7 @@ def settle(legs, state):
     Returns their energy [J], with IMPOSSIBLE for each absent goal.
     """
     routes = state.routes
-    routes.changed[:] = 1
-    copy_routes(state.best, routes, routes.changed)
+    copy_routes(state.best, routes)
     routes.front[:] = routes.back[:] = 0
     update(legs, routes, state.labels, True)
     robots = len(routes.length) - 1
