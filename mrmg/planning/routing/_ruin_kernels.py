@@ -69,23 +69,17 @@ def choose_ruin(routes, neighbour, random, home, gone):
 
 @kernel
 def cut_string(routes, r, goal, longest, random, gone):
-    """Flag a string of a route that holds a goal, or two with a piece kept between."""
+    """Flag a string of a route that holds a goal."""
     n = routes.length[r]
     index = 0
     while routes.goal[r, index] != goal:
         index += 1
     size = 1 + random_below(random, min(longest, n))
-    kept = 0
-    if size > 1 and random_unit(random) < 0.5:
-        while size + kept < n and random_unit(random) > 0.1:
-            kept += 1
-    low = max(0, index - size - kept + 1)
-    high = min(index, n - size - kept)
+    low = max(0, index - size + 1)
+    high = min(index, n - size)
     first = low + random_below(random, high - low + 1)
-    skip = 1 + random_below(random, size - 1)
-    for i in range(size + kept):
-        if i < skip or i >= skip + kept:
-            gone[routes.goal[r, first + i]] = 1
+    for i in range(first, first + size):
+        gone[routes.goal[r, i]] = 1
 
 
 @kernel
