@@ -55,7 +55,7 @@ class State(NamedTuple):
         routes, labels: those that are tried.
         present, kept: those that are left for others, and their labels.
         best: the best met.
-        gone, home, key: room for values of each goal, shape (G,).
+        gone, home: room for values of each goal, shape (G,).
     """
 
     routes: Routes
@@ -65,7 +65,6 @@ class State(NamedTuple):
     best: Routes
     gone: np.ndarray
     home: np.ndarray
-    key: np.ndarray
 
 
 def new_state(problem: RoutingArrays, legs: Legs) -> State:
@@ -77,17 +76,8 @@ def new_state(problem: RoutingArrays, legs: Legs) -> State:
         each.goal[robots, : targets.sum()] = np.flatnonzero(targets)
     labels = new_labels(legs)
     kept = labels._replace(way=labels.way.copy(), head=labels.head.copy())
-    room = np.zeros(goals, np.int64)
-    return State(
-        routes,
-        labels,
-        present,
-        kept,
-        best,
-        room,
-        room.copy(),
-        np.zeros(goals),
-    )
+    gone, home = np.zeros((2, goals), np.int64)
+    return State(routes, labels, present, kept, best, gone, home)
 
 
 @kernel
@@ -142,7 +132,7 @@ def recreate(legs, state, random, blink, balance):
     routes, labels, absent = state.routes, state.labels, len(legs.robot)
     remove_goals(routes, state.gone)
     update(legs, routes, labels, True)
-    order_absent(legs, routes, random, state.key)
+    order_absent(legs, routes, random)
     n = routes.length[absent]
     routes.length[absent] = 0
     for i in range(n):

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from mrmg.compilation import kernel
+from mrmg.motion._kernels import copy_numbers
 from mrmg.planning.routing._random_kernels import random_below, random_unit
 
 RUINED, RUINED_OF_MANY = 10, 20
@@ -139,20 +142,15 @@ def exchange(routes, a, cut_a, b, cut_b):
 
 
 @kernel
-def order_absent(legs, routes, random, key):
+def order_absent(legs, routes, random):
     """Put the absent goals into a drawn order, or the farthest or nearest first."""
     robots = len(routes.length) - 1
+    absent = routes.goal[robots, : routes.length[robots]]
+    rank = np.empty(len(absent))
     draw = random_unit(random)
-    for k in range(routes.length[robots]):
-        goal = routes.goal[robots, k]
-        rank = random_unit(random)
+    for k in range(len(absent)):
+        rank[k] = random_unit(random)
         if draw > 0.6:
-            rank = legs.remote[goal]
-            rank = -rank if draw < 0.85 else rank
-        i = k
-        while i > 0 and key[i - 1] > rank:
-            key[i] = key[i - 1]
-            routes.goal[robots, i] = routes.goal[robots, i - 1]
-            i -= 1
-        key[i] = rank
-        routes.goal[robots, i] = goal
+            remote = legs.remote[absent[k]]
+            rank[k] = -remote if draw < 0.85 else remote
+    copy_numbers(absent[np.argsort(rank, kind="mergesort")], absent)
