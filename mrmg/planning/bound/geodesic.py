@@ -83,12 +83,11 @@ class Field:
         np.minimum.at(low, look.arc, self.at(look) - look.slack)
         return low
 
-    def highest(self, look: Look) -> np.ndarray:
-        """Return bounds of the greatest value on each arc, -inf if blocked, (K,)."""
-        high, value = np.full(ARCS, -np.inf), self.at(look)
-        reached = value < 0.5 * UNREACHED
-        np.maximum.at(high, look.arc[reached], (value + look.slack)[reached])
-        return high
+    def highest(self, look: Look) -> float:
+        """Return a bound of the greatest value at points; 0 if all are blocked."""
+        value = self.at(look)
+        high = (value + look.slack)[value < 0.5 * UNREACHED]
+        return float(high.max()) if len(high) else 0.0
 
     def _certified(self, raw: np.ndarray) -> np.ndarray:
         certified = np.interp(raw, self.level, self.certified)
@@ -250,8 +249,7 @@ class Ways:
             fields = list(threads.map(field_from, regions))
         looks = [ground.look_at(border(one), 0.5 * SPACING_M) for one in regions]
         pairs = zip(fields, looks, strict=True)
-        highest = np.array([field.highest(look).max() for field, look in pairs])
-        highest[highest == -np.inf] = 0.0  # no free point: nothing gets there
+        highest = np.array([field.highest(look) for field, look in pairs])
         check(halt)
         lowest = np.array([[field.lowest(look) for look in looks] for field in fields])
         check(halt)
