@@ -30,9 +30,6 @@ before and after the cheapest ones of some round are known."""
 LEAST_RISE = 0.001
 """Share by which a round must raise the bound to be followed by another."""
 
-WORK_SHARE = 0.8
-"""Share of the work left that the next round may take, by what the last two took."""
-
 FINE_ARC_GOALS = 16
 """Goals up to which tours are told apart by all arcs; beyond, by pairs of them, as
 otherwise labels would be too many ..."""
@@ -86,7 +83,7 @@ def touring_bound_J(
     visits = visits or Visits.all_remembered(problem)
     best, pairs = relaxed.cost_J, _pairs_of(ways, relaxed.tours)
     settled_J, rest, cheapest, all_near = -math.inf, None, False, False
-    step, before = STEP, 0
+    step = STEP
     leg = _room_for_legs(ways, problem.goals)
     for _ in range(rounds):
         tightened = _tighten(pairs)
@@ -107,33 +104,12 @@ def touring_bound_J(
             settled_J = best
         else:
             best = max(best, most)
-        step = _next_step(step, before, labels, work)
-        if enough or step < LEAST_RISE:
+        if enough or labels >= work:
             break
-        step = min(step, FINE_STEP if math.isfinite(settled_J) else STEP)
-        before = labels
+        step = FINE_STEP if math.isfinite(settled_J) else STEP
         if labels > LONG_ROUND and not all_near:
             pairs, rest, all_near = pairs | _near_pairs(ways), None, True
     return best
-
-
-def _next_step(step: float, before: int, labels: int, work: int) -> float:
-    """Return the share by which costlier tours are looked at in the next round.
-
-    Labels grow as exp(g x) with the share x; g is that of the last two rounds.
-
-    Args:
-        step: share of the last round.
-        before: labels of the round before it; 0 if there was none.
-        labels: labels of the last round.
-        work: labels that are left.
-    """
-    if labels >= work:
-        return 0.0
-    if not 0 < before < labels:
-        return STEP
-    growth = math.log(labels / before) / step
-    return min(STEP, max(0.0, math.log(WORK_SHARE * work / labels)) / growth)
 
 
 def _pairs_of(ways: Sequence[ArcWays], tours: Sequence[Sequence[int]]) -> Pairs:
