@@ -94,8 +94,11 @@ class Parser(argparse.ArgumentParser):
         return options
 
     def arguments(self) -> list[argparse.Action]:
-        """Return all arguments; argparse has no public name for them."""
-        return self._actions
+        """Return the arguments that help shows, so no retired spellings of options.
+
+        Argparse has no public name for them.
+        """
+        return [each for each in self._actions if each.help != argparse.SUPPRESS]
 
     def verbs(self) -> Mapping[str, Parser]:
         """Return the parsers of the verbs by their names."""
@@ -105,10 +108,8 @@ class Parser(argparse.ArgumentParser):
         return {}
 
     def options(self) -> list[str]:
-        """Return the spellings of all options."""
-        return [
-            name for argument in self.arguments() for name in argument.option_strings
-        ]
+        """Return the spellings of all options, retired ones among them."""
+        return [name for each in self._actions for name in each.option_strings]
 
     def error(self, message: str) -> NoReturn:
         """Print the message and a usage line, and end the program."""

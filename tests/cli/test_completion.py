@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import pty
 import re
@@ -79,11 +80,23 @@ def verbs(parser: Parser, words: str = "mrmg") -> Iterator[tuple[str, Parser]]:
         yield from verbs(inner, f"{words} {name}")
 
 
+@pytest.mark.parametrize("shell", SHELLS)
+def test_retired_spellings_are_not_offered(
+    shell: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    assert "soc-margin" in script
+    assert "spare" not in script
+    assert argparse.SUPPRESS not in script
+
+
 @pytest.mark.parametrize("script", ["bash", "fish"], indirect=True)
 def test_all_verbs_and_options_are_offered(script: Path) -> None:
     offered = OFFERED[script.suffix[1:]]
     for words, parser in verbs(make_parser()):
-        long = [name for name in parser.options() if name.startswith("--")]
+        shown = [name for each in parser.arguments() for name in each.option_strings]
+        long = [name for name in shown if name.startswith("--")]
         assert sorted(offered(script, f"{words} --")) == sorted(long)
         if parser.verbs():
             assert sorted(offered(script, f"{words} ")) == sorted(parser.verbs())
