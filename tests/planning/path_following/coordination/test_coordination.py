@@ -108,6 +108,29 @@ def test_both_halves_of_a_round_begin_with_other_robots(
     assert sorted(map(list, orders)) == [[0, 1], [1, 0]]
 
 
+def test_an_order_of_driving_is_looked_for_only_where_priorities_have_failed(
+    yard: Callable[..., Scene],
+    state: Callable[..., Problem],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where there is no such order, looking for one takes all nodes of a round."""
+    tried: list[str] = []
+
+    def priorities_fail(*_: Any) -> None:
+        tried.append("priorities")
+
+    def no_order(*_: Any) -> None:
+        tried.append("order")
+
+    monkeypatch.setattr(coordination, "in_sequence", no_order)
+    asked = *_two_robots(yard, state), np.zeros(1, bool)
+    assert coordinated(*asked, rounds=ROUNDS[1:2])
+    assert tried == []
+    monkeypatch.setattr(coordination.priorities, "search_priorities", priorities_fail)
+    assert coordinated(*asked, rounds=ROUNDS[:2]) == ()
+    assert tried == ["priorities"] * 3 + ["order", "priorities"]
+
+
 def test_no_motion_is_found_once_a_search_has_taken_its_nodes(
     yard: Callable[..., Scene], state: Callable[..., Problem]
 ) -> None:
