@@ -108,9 +108,9 @@ def _charge_charts(
 
 
 def _percent_limits(values: Iterable[list[float | None]]) -> tuple[float, float]:
-    """Return the limits of an axis of charge, which batteries in debt go below."""
+    """Return what an axis of charge shows; batteries in debt go below zero."""
     low = min(value for line in values for value in line if value is not None)
-    return (0.0 if low >= 0.0 else 1.05 * low), 105.0
+    return min(0.0, low), 100.0
 
 
 def _percent(curve: BatteryCurve, battery: Battery, time_s: np.ndarray) -> np.ndarray:
