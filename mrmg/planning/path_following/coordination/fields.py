@@ -58,6 +58,7 @@ class Fields:
         self._problem = problem
         self._known: dict[tuple[int, float, tuple[int, ...]], np.ndarray] = {}
         self._turning: dict[tuple[int, ...], np.ndarray] = {}
+        self._ground: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self._room: dict[tuple[int, float], np.ndarray] = {}
         self._beside: dict[tuple[int, float, float], np.ndarray] = {}
         spaces = problem.mission.spaces
@@ -249,6 +250,14 @@ class Fields:
 
         In its targets it has.
         """
+        if r not in self._ground:
+            self._ground[r] = self._priced(r)
+        free, price = self._ground[r]
+        passable = free | self._region(targets) | self._beside_walls(r, targets)
+        return np.where(passable, price, np.inf)
+
+    def _priced(self, r: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return where robot r has room without targets, and the price of a metre."""
         robot, n = self._problem.mission.fleet[r], self._coarser
         distance = self._problem.mission.spaces.distance[robot["space"]]
         rows, columns = self._shape
@@ -258,12 +267,8 @@ class Fields:
         needed_m = float(robot["passage"])
         roomy_m = float(robot["radius"] + robot["margin"])
         lacking = (roomy_m - nearest) / max(roomy_m - needed_m, self._cell_m)
-        free = nearest > needed_m - 0.5 * self._cell_m
-        passable = free & self._has_room(r) | self._region(targets)
-        passable |= self._beside_walls(r, targets)
-        return np.where(
-            passable, 1.0 + TIGHT_PRICE * np.clip(lacking, 0.0, 1.0), np.inf
-        )
+        free = (nearest > needed_m - 0.5 * self._cell_m) & self._has_room(r)
+        return free, 1.0 + TIGHT_PRICE * np.clip(lacking, 0.0, 1.0)
 
     def _beside_walls(self, r: int, targets: Sequence[int]) -> np.ndarray:
         """Return which cells near robot r's start and targets it may stand in.
