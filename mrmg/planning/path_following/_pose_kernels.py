@@ -66,7 +66,7 @@ class PoseSearch(NamedTuple):
         near: distance from the start, and from a target's edge, that is near [m].
         scrub: plain ground that turning by one radian is worth [m].
         change: plain ground that a change of gear is worth [m].
-        weight: of the cost-to-go.
+        slack: how much more than the first way to a target others to it may cost [m].
         halt: shape (1,); the search ends soon after it has turned true.
     """
 
@@ -83,7 +83,7 @@ class PoseSearch(NamedTuple):
     near: float
     scrub: float
     change: float
-    weight: float
+    slack: float
     halt: np.ndarray
 
 
@@ -210,13 +210,18 @@ def find_poses(search, poses, table):
     cell = cell_of(search, poses[0].leg, 0, search.start[0], search.start[1])
     at = place_of(table, cell)
     table[at], least[at] = cell, 0.0
+    reached, most_m = 0, 0.0  # targets; cost of ways that others follow
     size, opened = 1, push(key, entry, 0, 0.0, 0)
     while opened > 0 and not search.halt[0]:
-        a = entry[0]
+        a, estimate = entry[0], key[0]
         opened = pop(key, entry, opened)
         pose = poses[a]
         if pose.leg == legs:
             return a
+        if pose.leg < reached and estimate > most_m:
+            continue
+        if pose.leg > reached:
+            reached, most_m = pose.leg, estimate + search.slack
         at = place_of(table, cell_of(search, pose.leg, pose.heading, pose.x, pose.y))
         if pose.cost > least[at]:
             continue
@@ -244,7 +249,7 @@ def find_poses(search, poses, table):
             after.before, after.gear, after.turn = a, gear, turn
             after.heading, after.leg, after.cost = heading, leg, cost
             after.x, after.y, after.theta = x, y, theta
-            opened = push(key, entry, opened, cost + search.weight * rest, size)
+            opened = push(key, entry, opened, cost + rest, size)
             size += 1
     return -1
 

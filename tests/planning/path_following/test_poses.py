@@ -32,6 +32,9 @@ AISLE = [("low", 4.0), ("high", 8.0)]
 OPPOSITE = ((10.0, 5.3), (10.5, 6.7))
 """Places of goals beside the two racks."""
 
+BESIDE = (*OPPOSITE, (15.2, 6.0), (9.0, 2.7), (11.0, 9.3))
+"""Places of goals on both sides of both racks, and beside a wall."""
+
 
 def hall(
     *places: tuple[float, float],
@@ -87,13 +90,13 @@ def way_of(scene: Scene) -> tuple[Problem, Path]:
 
 
 @contextmanager
-def recorded() -> Iterator[list[np.ndarray]]:
-    """Yield a list that receives the poses that are found, before they are joined."""
-    original, found = _pose_kernels.poses_to, list[np.ndarray]()
+def recorded() -> Iterator[list[tuple[np.ndarray, float]]]:
+    """Yield a list that receives poses as they are found, and the cost of their way."""
+    original, found = _pose_kernels.poses_to, list[tuple[np.ndarray, float]]()
 
-    def poses_to(*given: Any) -> Any:
-        pose, stop = original(*given)
-        found.append(pose)
+    def poses_to(search: Any, poses: np.ndarray, last: int) -> Any:
+        pose, stop = original(search, poses, last)
+        found.append((pose, float(poses["cost"][last])))
         return pose, stop
 
     with pytest.MonkeyPatch.context() as patch:
@@ -169,8 +172,9 @@ def test_robots_that_cannot_back_never_do() -> None:
         path = posed_path(problem, 0, cost_map, tour, NEVER)
     assert path is not None
     assert (path.gear == 1).all()
-    ahead = np.stack([np.cos(found[0][:-1, 2]), np.sin(found[0][:-1, 2])], axis=1)
-    assert ((np.diff(found[0][:, :2], axis=0) * ahead).sum(axis=1) > -1e-9).all()
+    pose, _ = found[0]
+    ahead = np.stack([np.cos(pose[:-1, 2]), np.sin(pose[:-1, 2])], axis=1)
+    assert ((np.diff(pose[:, :2], axis=0) * ahead).sum(axis=1) > -1e-9).all()
 
 
 @pytest.mark.parametrize("scene", MISSIONS)
@@ -202,21 +206,39 @@ def test_shortening_gains_and_keeps_stops() -> None:
     problem, path = way_of(MISSIONS[0])
     with recorded() as found:
         way_of(MISSIONS[0])
-    arcs_m = float(np.hypot(*np.diff(found[0][:, :2], axis=0).T).sum())
+    pose, _ = found[0]
+    arcs_m = float(np.hypot(*np.diff(pose[:, :2], axis=0).T).sum())
     assert path.way[-1] < 0.99 * arcs_m
-    assert np.allclose(path.node[-1], found[0][-1, :2], atol=1e-3)
+    assert np.allclose(path.node[-1], pose[-1, :2], atol=1e-3)
     assert problem.mission.targets.goals == len(path.stop)
 
 
 def test_ways_are_cheaper_where_there_is_time() -> None:
-    """Between goals on both sides of an aisle, ways that have time are shorter."""
+    """Between goals on both sides of an aisle, ways that have time cost less."""
     problem, tour = stated(hall(*((x, y) for x in (8.0, 10.0) for y in (5.25, 6.75))))
     cost_map = cost_maps_of(problem)[0]
-    soon = posed_path(problem, 0, cost_map, tour, NEVER, soon=True)
-    cheap = posed_path(problem, 0, cost_map, tour, NEVER)
-    assert soon is not None
-    assert cheap is not None
-    assert cheap.way[-1] < 0.95 * soon.way[-1]
+    with recorded() as found:
+        assert posed_path(problem, 0, cost_map, tour, NEVER, soon=True) is not None
+        assert posed_path(problem, 0, cost_map, tour, NEVER) is not None
+    (_, soon_m), (_, cheap_m) = found
+    assert cheap_m < 0.95 * soon_m
+
+
+def test_long_tours_take_poses_by_the_target(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Twice as many targets take about twice as many poses, and no more."""
+    looked_at = []
+    original = _pose_kernels.find_poses
+
+    def find_poses(search: Any, poses: np.ndarray, table: np.ndarray) -> int:
+        poses["cost"] = -1.0
+        last = original(search, poses, table)
+        looked_at.append(int((poses["cost"] >= 0.0).sum()))
+        return int(last)
+
+    monkeypatch.setattr(_pose_kernels, "find_poses", find_poses)
+    for rounds in (1, 2):
+        way_of(hall(*rounds * BESIDE))
+    assert looked_at[1] < 3 * looked_at[0]
 
 
 @pytest.mark.parametrize("scene", [MISSIONS[0], *OF_TURNERS])
@@ -262,10 +284,6 @@ def test_headings_that_targets_want_are_kept() -> None:
     _, path = way_of(scene)
     last = headings(path)[-1]
     assert abs((last + pi) % (2.0 * pi) - pi) < 2.0 * pi / HEADINGS
-
-
-BESIDE = (*OPPOSITE, (15.2, 6.0), (9.0, 2.7), (11.0, 9.3))
-"""Places of goals on both sides of both racks, and beside a wall."""
 
 
 @pytest.mark.parametrize(
