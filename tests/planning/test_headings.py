@@ -16,7 +16,7 @@ from mrmg.energy.visits import is_at
 from mrmg.errors import UsageError
 from mrmg.planning import PlannerParams, plan_mission, profile_params
 from mrmg.plans import Plan
-from mrmg.scene.loading import dump_scene, load_scene
+from mrmg.scene.loading import dump_scene, load_scene, scene_from_document
 from mrmg.scene.types import Scene
 
 MakeScene = Callable[..., Scene]
@@ -110,3 +110,54 @@ def test_scenes_with_headings_are_written_as_they_are_read(
 def test_the_paper_s_method_refuses_headings(yard: MakeScene) -> None:
     with pytest.raises(UsageError, match=r"goals with headings \(g0, g1, g2, g3\)"):
         plan_mission(hall(yard, 0, "car"), params=profile_params("paper"))
+
+
+def test_cars_come_to_poses_that_they_find_no_motion_to_at_once() -> None:
+    """A box stands between a car's start and where it must end, others on its way.
+
+    The search for motions, which tours to a single pose begin with, fails.
+    """
+    ends = {
+        "r0": ([17.53, 14.99], 2.87, [31.21, 9.4, -0.78]),
+        "r1": ([34.62, 8.34], -2.65, [6.26, 12.3, 2.37]),
+        "r2": ([27.0, 15.67], 1.29, [10.81, 15.15, -2.69]),
+    }
+    goals: dict[str, tuple[list[float], dict[str, float]]] = {
+        "g1": ([25.8, 5.83], {"heading": -0.25}),
+        "g4": ([11.87, 25.74], {}),
+        "g5": ([19.16, 7.92], {}),
+    }
+    scene = scene_from_document(
+        {
+            "format": 1,
+            "name": "poses",
+            "bounds": [0, 0, 40, 30],
+            "obstacles": [
+                {
+                    "id": "o1",
+                    "box": {"center": [23.44, 12.28], "size": [4.21, 1.7]},
+                    "height": 1.0,
+                }
+            ],
+            "battery": {"capacity_m": 400},
+            "goals": [
+                {"id": name, "circle": {"center": center, "radius": 0.7}, **heading}
+                for name, (center, heading) in goals.items()
+            ],
+            "robots": [
+                {
+                    "id": name,
+                    "model": "car",
+                    "pose": pose,
+                    "finish": {
+                        "circle": {"center": center, "radius": 0.4},
+                        "heading": heading,
+                        "heading_tolerance": 0.2,
+                    },
+                }
+                for name, (center, heading, pose) in ends.items()
+            ],
+        },
+        source="poses",
+    )
+    planned(scene)

@@ -101,7 +101,7 @@ def follow_tours(
     timed = problem.minimum_time or problem.preference.objective.makespan_weight > 0.0
     sharp = _turn_to_change_gear_at(problem, timed)
     paths = [
-        tour_path(problem, r, _led(problem, r, tour), sharp)
+        tour_path(problem, r, _led(problem, r, tour, number), sharp)
         for r, tour in enumerate(stops)
     ]
     judged = number > 0 and not timed
@@ -122,13 +122,13 @@ def follow_tours(
     return Followed(None, plan, leg_J=legs_driven_J(problem, drive.trajectories, tours))
 
 
-def _led(problem: Problem, r: int, tour: list[int]) -> list[int]:
-    """Return the targets of a tour that a path leads to.
+def _led(problem: Problem, r: int, tour: list[int], number: int) -> list[int]:
+    """Return the targets of a tour that a path leads to in an attempt.
 
-    It has none if there is but one, with a heading: the search for motions finds the
-    shortest curve at once.
+    In the first one it has none if there is but one, with a heading: the search for
+    motions nearly always finds the shortest curve at once.
     """
-    return [] if is_one_pose(problem, r, tour) else tour
+    return [] if number == 0 and is_one_pose(problem, r, tour) else tour
 
 
 def _turn_to_change_gear_at(problem: Problem, timed: bool) -> float:
