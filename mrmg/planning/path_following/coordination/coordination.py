@@ -2,9 +2,10 @@
 
 Each robot's motion is found by a search over its own motions (`_search_kernels`), and
 who has priority over whom by a search over the orders of robots (`priorities`). Where
-that finds none, and the first round neither, an order in which robots drive one after
-the other is looked for (`sequencing`): in dense traffic there often is one, though with
-longer motions. All that is found can be driven exactly, and keeps clear at every step.
+that finds none, an order in which robots drive one after the other is looked for
+(`sequencing`), from the second round on with other motions than they would make alone,
+too: in dense traffic there often is one, though with longer motions. All that is found
+can be driven exactly, and keeps clear at every step.
 
 What is promised: every plan found keeps all margins. A round of the search ends without
 a plan when no order of the robots has one, with cells as fine and searches as long as
@@ -333,8 +334,9 @@ def coordinated(
                 return ()
             most = SEARCHES * now.most * robots / len(orders)
             found = priorities.search_priorities(alone, planning, most, halt)
-            if found is None and now is not ROUNDS[0] and order is drawn:
-                found = in_sequence(alone, planning, most, halt)
+            if found is None:
+                further = now is not ROUNDS[0] and order is drawn
+                found = in_sequence(alone, planning, most if further else 0, halt)
             if found is not None:
                 planning.round = replace(now, most=max(now.most, SHORTENING_MOST))
                 found = priorities.shortened(found, alone, planning, halt)

@@ -3,18 +3,23 @@
 An order in which each robot drives once, from where it starts to its end, is a monotone
 plan: M. Stilman, J.-U. Schamburek, J. Kuffner, T. Asfour: Manipulation planning among
 movable obstacles, ICRA 2007. It needs no search in time, so that what leads nowhere
-fails soon. Robots then set out as soon as they keep apart from those before them in the
-order as these move, and from those after them as they stand; or they move otherwise
-among these, where that is sooner. Setting out once the others are through is left to
-them all the while, as in the revised prioritized planning of M. Cap, P. Novak,
-A. Kleiner, M. Selecky: Prioritized planning algorithms for trajectory coordination of
-multiple mobile robots, T-ASE 2015; unless another one ends elsewhere than in the order,
-or the steps that motions may last are over. Then there are no motions.
+fails soon. The motions that robots would make alone come first: each robot waits for
+those that start on its way, and for those whose ways its end is on. Where that goes
+round in a circle, other motions are looked for.
+
+Robots then set out as soon as they keep apart from those before them in the order as
+these move, and from those after them as they stand; or they move otherwise among these,
+where that is sooner. Setting out once the others are through is left to them all the
+while, as in the revised prioritized planning of M. Cap, P. Novak, A. Kleiner,
+M. Selecky: Prioritized planning algorithms for trajectory coordination of multiple
+mobile robots, T-ASE 2015; unless another one ends elsewhere than in the order, or the
+steps that motions may last are over. Then there are no motions.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from graphlib import CycleError, TopologicalSorter
 
 import numpy as np
 
@@ -36,15 +41,41 @@ def in_sequence(
     Args:
         alone: what robots would do without the others; who drives longer is first.
         planning: finds motions.
-        most: nodes that all searches for the order may look at.
+        most: nodes that searches for other motions may look at; with none, robots make
+            the motions that they would make alone.
         halt: shape (1,); the search ends soon after it has turned true.
     """
     starts = [_standing(r, motion.state[0], planning) for r, motion in enumerate(alone)]
-    order = sorted(range(len(alone)), key=lambda r: -len(alone[r].control))
-    planning.most = planning.nodes + most
-    drives = _drives(starts, tuple(order), planning, halt, set())
+    drives = _in_order(alone, starts, planning)
+    if drives is None and most > 0:
+        order = sorted(range(len(alone)), key=lambda r: -len(alone[r].control))
+        planning.most = planning.nodes + most
+        drives = _drives(starts, tuple(order), planning, halt, set())
     planning.most = np.inf
     return None if drives is None else _overlapping(starts, drives, planning, halt)
+
+
+def _in_order(
+    alone: Sequence[Motion], starts: Sequence[Motion], planning: MotionPlanning
+) -> dict[int, Motion] | None:
+    """Return the motions that robots would make alone, in an order; None without one.
+
+    Args:
+        alone: these motions.
+        starts: motions that lead nowhere, from where robots start.
+        planning: tells where motions meet.
+    """
+    ends = [_standing(r, motion.state[-1], planning) for r, motion in enumerate(alone)]
+    before: dict[int, set[int]] = {r: set() for r in range(len(alone))}
+    for r, motion in enumerate(alone):
+        for at, first in ((starts, True), (ends, False)):
+            meeting = planning.conflicts(r, [*at[:r], motion, *at[r + 1 :]])
+            for other in np.flatnonzero(np.isfinite(meeting)).tolist():
+                before[r if first else other].add(other if first else r)
+    try:
+        return {r: alone[r] for r in TopologicalSorter(before).static_order()}
+    except CycleError:
+        return None
 
 
 def _drives(

@@ -102,6 +102,7 @@ def test_both_halves_of_a_round_begin_with_other_robots(
     shares: list[float] = []
     monkeypatch.setattr(coordination._Planning, "find_alone", noted)
     monkeypatch.setattr(coordination.priorities, "search_priorities", nothing)
+    monkeypatch.setattr(coordination, "in_sequence", lambda *_: None)
     found = coordinated(*_two_robots(yard, state), np.zeros(1, bool), rounds=ROUNDS[:1])
     assert found == ()
     assert shares == [0.5, 0.5]
@@ -113,14 +114,17 @@ def test_an_order_of_driving_is_looked_for_only_where_priorities_have_failed(
     state: Callable[..., Problem],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Where there is no such order, looking for one takes all nodes of a round."""
+    """Where there is no such order, looking for one takes all nodes of a round.
+
+    The first round, and second halves, have no nodes for it.
+    """
     tried: list[str] = []
 
     def priorities_fail(*_: Any) -> None:
         tried.append("priorities")
 
-    def no_order(*_: Any) -> None:
-        tried.append("order")
+    def no_order(_alone: Any, _planning: Any, most: float, _: Any) -> None:
+        tried.append("any order" if most > 0 else "order as they are")
 
     monkeypatch.setattr(coordination, "in_sequence", no_order)
     asked = *_two_robots(yard, state), np.zeros(1, bool)
@@ -128,7 +132,8 @@ def test_an_order_of_driving_is_looked_for_only_where_priorities_have_failed(
     assert tried == []
     monkeypatch.setattr(coordination.priorities, "search_priorities", priorities_fail)
     assert coordinated(*asked, rounds=ROUNDS[:2]) == ()
-    assert tried == ["priorities"] * 3 + ["order", "priorities"]
+    as_they_are = ["priorities", "order as they are"]
+    assert tried == [*as_they_are * 2, "priorities", "any order", *as_they_are]
 
 
 def test_no_motion_is_found_once_a_search_has_taken_its_nodes(

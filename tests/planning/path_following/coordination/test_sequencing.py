@@ -97,13 +97,18 @@ def meeting(one: np.ndarray, other: np.ndarray) -> float:
     return float(meet.argmax()) if meet.any() else np.inf
 
 
-def has_order(grid: Grid) -> bool:
-    """Return whether robots can drive in some order, all others standing."""
+def has_order(grid: Grid, most: float) -> bool:
+    """Return whether robots can drive in some order, all others standing.
+
+    They take what ways they like, or with no nodes the ones they would take alone.
+    """
     for order in permutations(range(ROBOTS)):
         at = list(grid.start)
         for r in order:
             others = at[:r] + at[r + 1 :]
-            if not grid.way(at[r], grid.end[r], others):
+            alone = grid.way(at[r], grid.end[r], ())
+            way = grid.way(at[r], grid.end[r], others) if most > 0 else alone
+            if not way or set(way) & set(others):
                 break
             at[r] = grid.end[r]
         else:
@@ -112,34 +117,41 @@ def has_order(grid: Grid) -> bool:
 
 
 def from_starts(grid: Grid) -> list[Motion]:
-    """Return what robots would do without the others."""
-    return [
-        motion_along(grid.way(start, end, ()) or [start])
+    """Return what robots would do without the others; none if one has no way."""
+    ways = [
+        grid.way(start, end, ())
         for start, end in zip(grid.start, grid.end, strict=True)
     ]
+    return [motion_along(way) for way in ways] if all(ways) else []
 
 
-def test_an_order_is_found_wherever_there_is_one() -> None:
-    ordered = 0
+@pytest.mark.parametrize("most", [0, np.inf])
+def test_an_order_is_found_wherever_there_is_one(most: float) -> None:
+    """With no nodes, robots make the motions that they would make alone."""
+    ordered, without = 0, 0
     for seed in range(300):
         grid = Grid(seed)
-        found = in_sequence(from_starts(grid), grid, np.inf, np.zeros(1, bool))
-        assert (found is not None) == has_order(grid), seed
+        if not (alone := from_starts(grid)):
+            continue
+        found = in_sequence(alone, grid, most, np.zeros(1, bool))
+        assert (found is not None) == has_order(grid, most), seed
         if found is None:
+            without += 1
             continue
         ordered += 1
         for r, motion in enumerate(found):
             assert tuple(motion.state[0, :2]) == grid.start[r]
             assert tuple(motion.state[-1, :2]) == grid.end[r]
             assert not np.isfinite(grid.conflicts(r, found)).any(), seed
-    assert 50 < ordered < 250
+    assert min(ordered, without) > 40
 
 
 @pytest.mark.parametrize(("most", "halted"), [(2, False), (np.inf, True)])
 def test_nothing_is_found_with_too_few_nodes_or_halted(
     most: float, halted: bool
 ) -> None:
-    seed = next(seed for seed in range(100) if has_order(Grid(seed)))
+    ordered = (seed for seed in range(300) if has_order(Grid(seed), np.inf))
+    seed = next(seed for seed in ordered if not has_order(Grid(seed), 0))
     grid = Grid(seed)
     assert in_sequence(from_starts(grid), grid, most, np.array([halted])) is None
 
