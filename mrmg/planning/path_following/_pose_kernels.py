@@ -4,6 +4,10 @@ An A* whose nodes are poses, of which one counts in each cell of position and he
 hybrid A*, D. Dolgov et al., Practical search techniques in path planning for autonomous
 driving, 2008. A car drives straight or turns as sharply as its paths may, in either
 gear; a robot that can turn on the spot does so.
+
+Once a target is reached, ways go on from there alone: else long tours would take more
+poses than there is room for. A robot that can turn round, or back out the way it came,
+loses no way by that, only some of the cheapest ones.
 """
 
 from __future__ import annotations
@@ -66,7 +70,7 @@ class PoseSearch(NamedTuple):
         near: distance from the start, and from a target's edge, that is near [m].
         scrub: plain ground that turning by one radian is worth [m].
         change: plain ground that a change of gear is worth [m].
-        slack: how much more than the first way to a target others to it may cost [m].
+        weight: of the cost-to-go.
         halt: shape (1,); the search ends soon after it has turned true.
     """
 
@@ -83,7 +87,7 @@ class PoseSearch(NamedTuple):
     near: float
     scrub: float
     change: float
-    slack: float
+    weight: float
     halt: np.ndarray
 
 
@@ -210,18 +214,16 @@ def find_poses(search, poses, table):
     cell = cell_of(search, poses[0].leg, 0, search.start[0], search.start[1])
     at = place_of(table, cell)
     table[at], least[at] = cell, 0.0
-    reached, most_m = 0, 0.0  # targets; cost of ways that others follow
-    size, opened = 1, push(key, entry, 0, 0.0, 0)
+    reached, size, opened = 0, 1, push(key, entry, 0, 0.0, 0)
     while opened > 0 and not search.halt[0]:
-        a, estimate = entry[0], key[0]
+        a = entry[0]
         opened = pop(key, entry, opened)
         pose = poses[a]
         if pose.leg == legs:
             return a
-        if pose.leg < reached and estimate > most_m:
+        if pose.leg < reached:
             continue
-        if pose.leg > reached:
-            reached, most_m = pose.leg, estimate + search.slack
+        reached = pose.leg
         at = place_of(table, cell_of(search, pose.leg, pose.heading, pose.x, pose.y))
         if pose.cost > least[at]:
             continue
@@ -249,7 +251,7 @@ def find_poses(search, poses, table):
             after.before, after.gear, after.turn = a, gear, turn
             after.heading, after.leg, after.cost = heading, leg, cost
             after.x, after.y, after.theta = x, y, theta
-            opened = push(key, entry, opened, cost + rest, size)
+            opened = push(key, entry, opened, cost + search.weight * rest, size)
             size += 1
     return -1
 
