@@ -44,9 +44,9 @@ DEEPER_M = 0.03
 CHANGE_M = 1.0
 """Plain ground that a change of gear is worth to a car [m]."""
 
-WEIGHTS = (1.0, 1.3)
-"""Weights of the cost-to-go, where cheap ways are wanted, and where ways soon: these
-take two thirds of the time."""
+SOON_WEIGHT = 1.3
+"""Weight of the cost-to-go where ways are wanted soon: it takes two thirds of the time,
+and ways cost more."""
 
 ROOMS_M = (0.03, 0.0)
 """Room beyond the margin near targets, in successive tries: there are places with no
@@ -118,7 +118,7 @@ def posed_path(
         near=2.0 * float(own[0]["radius"]),
         scrub=cost_map.scrub,
         change=change_m,
-        weight=WEIGHTS[soon],
+        weight=SOON_WEIGHT if soon else 1.0,
         halt=halt,
     )
     poses = np.empty(MOST_POSES, POSE)
