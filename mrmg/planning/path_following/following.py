@@ -2,8 +2,9 @@
 
 The roadmap's paths along tours are smoothed and followed in closed loop
 (`refine.drive_paths`). Where that succeeds, nearly always where there is room, that
-is all. Where robots get in each other's way, or do not come to a heading, a search for
-motions starts from the paths (`coordination`).
+is all. A robot that does not get through, or to a heading, drives over poses (`poses`).
+Where robots get in each other's way, a search for motions starts from the paths
+(`coordination`).
 """
 
 from __future__ import annotations
@@ -112,7 +113,7 @@ def follow_tours(
         RobotTask(tour, path, cost_map, searched=len(path.stop) < len(tour))
         for tour, path, cost_map in zip(stops, paths, cost_maps, strict=True)
     ]
-    others = partial(_otherwise, problem, tasks, judged, number == 0, halt)
+    others = partial(_otherwise, problem, tasks, number == 0, halt)
     drive = drive_paths(problem, tasks, halt, others)
     if not drive.trajectories:
         return Followed(None, drive.failure, driven=False)
@@ -142,29 +143,13 @@ def _turn_to_change_gear_at(problem: Problem, timed: bool) -> float:
 
 
 def _otherwise(
-    problem: Problem,
-    tasks: Sequence[RobotTask],
-    judged: bool,
-    soon: bool,
-    halt: np.ndarray,
-    r: int,
+    problem: Problem, tasks: Sequence[RobotTask], soon: bool, halt: np.ndarray, r: int
 ) -> Iterator[RobotTask]:
-    """Yield what robot r may do instead: drive over poses.
-
-    Where targets want headings and that fails, its motions are searched for, from a
-    path that has none.
-    """
+    """Yield what robot r may do instead: drive over poses."""
     task = tasks[r]
     other = posed(problem, r, task.cost_map, task.tour, halt, soon=soon)
     if other is not None:
         yield other
-    led, aims = [*task.path.target], np.isfinite(task.path.aim)
-    if aims.any():
-        led = led[:-1] if aims[-1] else led
-        path = tour_path(problem, r, led)
-        path = replace(path, aim=np.full(len(led), np.nan))
-        path = _geared(problem, r, task.cost_map, path, judged)
-        yield RobotTask(task.tour, path, task.cost_map, searched=True)
 
 
 def path_cost_J(problem: Problem, routing: Routing) -> float:

@@ -127,8 +127,8 @@ def drive_paths(
 ) -> FleetDrive:
     """Smooth paths and drive the fleet along them.
 
-    Each robot drives as if it were alone; where robots get in each other's way, or do
-    not come to a heading, a search for motions starts from their paths.
+    Each robot drives as if it were alone; where robots get in each other's way, a
+    search for motions starts from their paths.
 
     Args:
         problem: the mission.
@@ -169,20 +169,18 @@ def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, st
     """Return robot r's drive along its path, put right as often as it takes.
 
     None, and why, if there is none. None, too, of a robot whose motions are searched
-    for: only its path is put right.
+    for.
     """
+    if task.searched:
+        return None, ""
     if problem.mission.fleet[r]["model"] == USER:
         return task.before, ""
     first = task.path
     task.smooth(problem, SPACINGS_M)
-    if not task.searched:
-        drive, failure = _put_right(problem, r, task)
-        if drive is task.before:
-            task.path = first
-        return drive, failure
-    if len(task.path.stop):
-        _put_right(problem, r, task)
-    return None, ""
+    drive, failure = _put_right(problem, r, task)
+    if drive is task.before:
+        task.path = first
+    return drive, failure
 
 
 def _put_right(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, str]:
@@ -209,8 +207,6 @@ def _put_right(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None,
             task.smooth(problem, SPACINGS_M[-1:])
         elif len(visit_steps(targets, tour, drive.motion.state)) < len(tour):
             reason = f"{robot} misses targets of its tour"
-            if task.searched:
-                break
             _aim_better(problem, task, drive.motion.state)
         elif targets.finish[r] in tour and not at_target(targets, tour[-1], end):
             reason = f"{robot} does not end where its finish requires"

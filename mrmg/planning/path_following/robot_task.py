@@ -22,7 +22,7 @@ class RobotTask:
         path: its way.
         cost_map: what the way is priced on.
         before: how the robot drove before; None if it did not.
-        searched: whether its motions are searched for from its path.
+        searched: whether its motions are searched for, as it has no path to a pose.
         inflations: places that it was led round.
 
     """
