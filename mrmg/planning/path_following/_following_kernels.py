@@ -10,6 +10,7 @@ import numpy as np
 from mrmg.compilation import kernel, record_type
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.problem._control_kernels import (
+    REST,
     braking_control,
     control_towards,
     stands,
@@ -46,6 +47,8 @@ COURSE_NODE = record_type(
         ("fastest", np.float64),  # speed at which it is passed at most [m/s]
         ("pause", np.int64),  # steps for which the robot stands there: see Course
         ("rest_s", np.float64),  # what is left, as time on plain ground [s]
+        ("heading", np.float64),  # that the robot turns to where it stands there ...
+        ("tolerance", np.float64),  # ... and the deviation allowed, inf for any [rad]
     ]
 )
 """A node of a path."""
@@ -55,7 +58,7 @@ class Course(NamedTuple):
     """A path, and what its robot must know of it.
 
     A stretch ends where the gear changes or the robot turns on the spot; robots pause
-    at the ends of stretches only.
+    at the ends of stretches only, and there alone turn on the spot to a heading.
 
     Attributes:
         node: `COURSE_NODE`, shape (N,).
@@ -63,15 +66,12 @@ class Course(NamedTuple):
         ease: deceleration that costs nothing [m/s^2].
         stiffness: how fast it returns to its path: errors decay over about its inverse
             [1/m].
-        final: heading in which a robot that turns on the spot ends, and the allowed
-            deviation from that, inf for any [rad], shape (2,).
     """
 
     node: np.ndarray
     size: np.ndarray
     ease: float
     stiffness: float
-    final: np.ndarray
 
 
 @kernel
@@ -99,16 +99,25 @@ def bend_at(course, i, s):
 
 
 @kernel
-def turned(course, state):
-    """Return whether a robot has the heading that it must end with."""
-    return abs(wrap(course.final[0] - state[2])) < 0.5 * course.final[1]
+def lacking(course, i, state):
+    """Return the angle by which a robot has to turn where it stands at a node [rad]."""
+    off = wrap(course.node[i].heading - state[2])
+    return off if abs(off) >= 0.5 * course.node[i].tolerance else 0.0
 
 
 @kernel
-def turning_rate(own, lacking):
+def at_rest(own, course, segment, state):
+    """Return whether a robot stands at its path's end as it is to end there."""
+    if segment < course.size[0] or not stands(own, 0, state):
+        return False
+    return lacking(course, max(course.size[0] - 1, 0), state) == 0.0
+
+
+@kernel
+def turning_rate(own, angle):
     """Return the rate at which a robot turns on the spot by an angle [rad/s]."""
-    w = sqrt(2.0 * TURNING_SHARE * own[0].limit[4] * abs(lacking))
-    return w if lacking > 0.0 else -w
+    w = sqrt(2.0 * TURNING_SHARE * own[0].limit[4] * abs(angle))
+    return w if angle > 0.0 else -w
 
 
 @kernel
@@ -168,19 +177,24 @@ def track_control(own, course, segment, stood, state, dt):
     """
     size = course.size[0]
     if segment >= size or size < 2:
-        if turned(course, state):
+        angle = lacking(course, max(size - 1, 0), state)
+        if angle == 0.0:
             u1, u2 = braking_control(own, 0, state, dt)
             return u1, u2, segment, stood, 0.0
-        rate = turning_rate(own, wrap(course.final[0] - state[2]))
-        u1, u2 = control_towards(own, 0, state, 0.0, rate, dt)
+        u1, u2 = control_towards(own, 0, state, 0.0, turning_rate(own, angle), dt)
         return u1, u2, segment, stood, 0.0
     i, _, left, off, v, w = follow(own, course, segment, state)
     if left < ARRIVED_M:
+        last = course.node[i].end
+        angle = lacking(course, last, state)
         v = 0.0
         if own[0].model == UNICYCLE:
-            w = 0.0
-        if stands(own, 0, state):
-            last = course.node[i].end
+            w = (
+                turning_rate(own, angle)
+                if angle != 0.0 and abs(state[3]) < REST
+                else 0.0
+            )
+        if angle == 0.0 and stands(own, 0, state):
             stood += 1
             if stood > course.node[last].pause:
                 stood = 0

@@ -6,9 +6,8 @@ import numpy as np
 
 from mrmg.compilation import kernel
 from mrmg.motion._kernels import step
-from mrmg.planning.path_following._following_kernels import track_control, turned
+from mrmg.planning.path_following._following_kernels import at_rest, track_control
 from mrmg.planning.problem._clearance_kernels import clear_of_obstacles
-from mrmg.planning.problem._control_kernels import stands
 from mrmg.planning.problem._target_kernels import askew, in_target
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.world._kernels import multiplier_in
@@ -38,8 +37,7 @@ def drive(own, spaces, terrain, course, dt, spent_s, state, control):
     corner = np.empty((MOST_CORNERS, 2))
     segment, stood, spent = 0 if course.size[0] > 1 else course.size[0], 0, 0.0
     for k in range(len(control)):
-        done = segment >= course.size[0] and turned(course, state[k])
-        if done and stands(own, 0, state[k]):
+        if at_rest(own, course, segment, state[k]):
             return k, True
         before = segment
         u1, u2, segment, stood, off = track_control(

@@ -111,19 +111,17 @@ def course_of(problem: Problem, r: int, path: Path) -> Course:
         tight = steerable_speeds(problem, r, node)
         node["fastest"] = _speed_limits(path, tight, ease)
         node["rest_s"] = (path.way[-1] - path.way) / robot["limit"][1]
-    targets = problem.mission.targets
-    finish = targets.finish[r]
-    final = np.array([0.0, np.inf])
-    steered = robot["model"] == CAR  # it ends with the heading that its path has there
-    if finish >= 0 and targets.target["tolerance"][finish] < np.pi and not steered:
-        aim = targets.target[finish]
-        final[:] = aim["heading"], aim["tolerance"]
+    if robot["model"] != CAR:  # which has the heading of its path
+        aims = problem.mission.targets.target[path.target]
+        fixed = aims["tolerance"] < np.pi
+        at = path.stop[fixed]
+        node["heading"][at] = aims["heading"][fixed]
+        node["tolerance"][at] = aims["tolerance"][fixed]
     return Course(
         node=node,
         size=np.array([n]),
         ease=ease,
         stiffness=STIFFNESS / nimble_share(path_curvature(robot)),
-        final=final,
     )
 
 
@@ -141,7 +139,7 @@ def course_with_rest(
 def empty_path(most: int) -> np.ndarray:
     """Return room for the nodes of a path: `COURSE_NODE`, shape (most,)."""
     node = np.zeros(most, COURSE_NODE)
-    node["gear"], node["fastest"] = 1, np.inf
+    node["gear"], node["fastest"], node["tolerance"] = 1, np.inf, np.inf
     return node
 
 

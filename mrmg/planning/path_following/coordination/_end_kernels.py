@@ -125,29 +125,33 @@ def drive_to(search, target, room, control):
         return steer_to(search, target, state, control)
     x, y, heading = free_pose(search, target, corner)
     free = targets.target[target].tolerance >= pi
-    course.final[0], course.final[1] = heading, np.inf
+    tolerance = np.inf if free else targets.target[target].tolerance
     if own[0].model == CAR:
         if free:
             heading = np.arctan2(y - state[0, 1], x - state[0, 0])
             if abs(wrap(heading - state[0, 2])) > 0.5 * pi:
                 heading = wrap(heading + pi)
         radius = drivable_radius(own[0])
-        if not write_curve(own, state[0], x, y, heading, course, radius) < np.inf:
+        if (
+            not write_curve(own, state[0], x, y, heading, tolerance, course, radius)
+            < np.inf
+        ):
             return -1
         return drive_curve(search, course, corner, state, control)
     curved = -1
     if not free:
-        course.final[1] = targets.target[target].tolerance
         radius = smooth_radius(own[0])
-        if write_curve(own, state[0], x, y, heading, course, radius) < np.inf:
+        total = write_curve(own, state[0], x, y, heading, tolerance, course, radius)
+        if total < np.inf:
             curved = drive_curve(search, course, corner, state, control)
         if curved >= 0 and not at_target(targets, target, state[curved]):
             curved = -1
-    if not write_curve(own, state[0], x, y, heading, course, 0.0) < np.inf:
+    total = write_curve(own, state[0], x, y, heading, tolerance, course, 0.0)
+    if not total < np.inf:
         return -1
     count = drive_curve(search, course, corner, state, control)
     if curved >= 0 and (count < 0 or curved < count):
-        write_curve(own, state[0], x, y, heading, course, smooth_radius(own[0]))
+        write_curve(own, state[0], x, y, heading, tolerance, course, radius)
         count = drive_curve(search, course, corner, state, control)
     return count
 

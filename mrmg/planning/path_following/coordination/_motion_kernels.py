@@ -15,8 +15,8 @@ from mrmg.compilation import kernel, record_type
 from mrmg.motion._kernels import USER, steer_user, step
 from mrmg.planning.path_following._following_kernels import (
     advance,
+    at_rest,
     track_control,
-    turned,
 )
 from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
     MOST_PIECES,
@@ -26,7 +26,6 @@ from mrmg.planning.problem._clearance_kernels import clear_of_obstacles
 from mrmg.planning.problem._control_kernels import (
     braking_control,
     control_towards,
-    stands,
 )
 from mrmg.planning.problem._region_kernels import in_region
 from mrmg.planning.roadmap._fleet_kernels import middle_at
@@ -250,13 +249,14 @@ def smooth_radius(robot):
 
 
 @kernel
-def write_curve(own, state, x, y, theta, course, radius):
+def write_curve(own, state, x, y, theta, tolerance, course, radius):
     """Write a path to a pose: the shortest curve of a radius, or a line.
 
     Args:
         own: the robot, shape (1,).
         state: where it begins.
         x, y, theta: where it ends.
+        tolerance: deviation from that heading up to which it does not turn there [rad].
         course: receives the path.
         radius: of turns [m]; 0 for a line, which ends with any heading.
 
@@ -302,6 +302,8 @@ def write_curve(own, state, x, y, theta, course, radius):
             course.node[n].way = course.node[n - 1].way + abs(chord)
             course.node[n].bend = bend
     course.node.end[stretch : n + 1] = n
+    course.node.tolerance[:n] = np.inf
+    course.node[n].heading, course.node[n].tolerance = theta, tolerance
     course.size[0] = n + 1 if n > 0 else 0
     return total
 
@@ -325,8 +327,7 @@ def drive_curve(search, course, corner, state, control):
     most = min(most, len(control) - 1)
     segment = 0 if course.size[0] > 1 else course.size[0]
     for k in range(most):
-        done = segment >= course.size[0] and turned(course, state[k])
-        if done and stands(own, 0, state[k]):
+        if at_rest(own, course, segment, state[k]):
             return k
         u1, u2, segment, _, _ = track_control(own, course, segment, LONG, state[k], dt)
         control[k, 0], control[k, 1] = u1, u2

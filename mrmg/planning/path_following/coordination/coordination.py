@@ -90,7 +90,6 @@ def empty_course(most: int) -> Course:
         size=np.zeros(1, np.int64),
         ease=0.0,
         stiffness=1.0,
-        final=np.array([0.0, np.inf]),
     )
 
 
