@@ -34,6 +34,10 @@ WAYS_ON = 6
 PIECES = 3
 """Pieces of an arc; the pose at the end of each is looked at."""
 
+STRAIGHTER = 0.1
+"""How much nearer to its heading than needed a target is visited [rad]: driving is a
+little off its way."""
+
 AWAY, AT_TARGET, AT_START = range(3)
 """Where a pose is: anywhere, near a target, near the start."""
 
@@ -148,7 +152,7 @@ def legs_after(search, leg, piece):
         while leg < len(stops.target):
             target = stops.targets.target[stops.target[leg]]
             # Headings are steps apart: one of them counts as what a target wants.
-            most = max(target.tolerance, pi / search.headings)
+            most = max(target.tolerance - STRAIGHTER, pi / search.headings)
             off, _, _ = outside(stops, leg, piece[i, 0], piece[i, 1])
             askew = abs(wrap(target.heading - piece[i, 2]))
             if off > 0.0 or (target.tolerance < pi and askew > most):

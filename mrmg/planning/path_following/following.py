@@ -27,6 +27,7 @@ from mrmg.planning.path_following.band import (
     smooth_path,
     turns_of,
 )
+from mrmg.planning.path_following.coordination.rounds import ROUNDS, Round
 from mrmg.planning.path_following.coordination.tasks import is_one_pose
 from mrmg.planning.path_following.driven_legs import Leg, legs_driven_J
 from mrmg.planning.path_following.gears import with_best_gears
@@ -83,6 +84,7 @@ def follow_tours(
     seed: int,
     halt: np.ndarray,
     number: int = 0,
+    rounds: Sequence[Round] = ROUNDS[:1],
 ) -> Followed:
     """Plan along tours.
 
@@ -95,6 +97,7 @@ def follow_tours(
         seed: of the search that the plan belongs to.
         halt: shape (1,); following ends soon after it has turned true.
         number: of the attempt; the first one finds a plan soon rather than a cheap one.
+        rounds: of the search for motions where robots get in each other's way.
     """
     cost_maps = cost_maps_of(problem)
     stops = [whole_tour(problem, routing, r) for r in range(len(cost_maps))]
@@ -114,7 +117,7 @@ def follow_tours(
         for tour, path, cost_map in zip(stops, paths, cost_maps, strict=True)
     ]
     others = partial(_otherwise, problem, tasks, number == 0, halt)
-    drive = drive_paths(problem, tasks, halt, others)
+    drive = drive_paths(problem, tasks, halt, others, rounds=rounds)
     if not drive.trajectories:
         return Followed(None, drive.failure, driven=False)
     plan = plan_or_refusal(problem, seed, params, drive.trajectories, tours)

@@ -7,7 +7,6 @@ places but no headings. What is found can be driven as it is.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -82,8 +81,7 @@ def posed(
     visits = visit_steps(problem.mission.targets, tour, drive.motion.state)
     if not drive.arrived or len(visits) < len(tour):
         return None
-    before = replace(drive, spent_s=np.zeros(0))
-    return RobotTask(list(tour), path, cost_map, before)
+    return RobotTask(list(tour), path, cost_map, drive)
 
 
 def posed_path(

@@ -24,7 +24,7 @@ from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import SPACINGS_M, path_of, visit_steps
 from mrmg.planning.path_following.coordination.coordination import coordinated
-from mrmg.planning.path_following.coordination.rounds import ROUNDS
+from mrmg.planning.path_following.coordination.rounds import ROUNDS, Round
 from mrmg.planning.path_following.coordination.tasks import no_path
 from mrmg.planning.path_following.cost_map import cost_map_of, inflated, smooth_terrain
 from mrmg.planning.path_following.pauses import with_pauses
@@ -46,6 +46,9 @@ DEEPER_M = 0.005
 
 SWERVES = 3
 """Times that a robot's path is led round a place."""
+
+ROBOTS_MEET = "no motions were found that keep the robots apart"
+"""Why driving failed where robots get in each other's way."""
 
 NEAR_M = 3.0
 """How near to each other two places are the same."""
@@ -124,6 +127,8 @@ def drive_paths(
     tasks: Sequence[RobotTask],
     halt: np.ndarray,
     others: Callable[[int], Iterable[RobotTask]] = lambda r: (),
+    *,
+    rounds: Sequence[Round] = ROUNDS[:1],
 ) -> FleetDrive:
     """Smooth paths and drive the fleet along them.
 
@@ -135,6 +140,7 @@ def drive_paths(
         tasks: what each robot drives; changed as its path is.
         halt: shape (1,); driving ends soon after it has turned true.
         others: what a robot that does not get through may drive instead.
+        rounds: of the search for motions.
     """
     tasks, drives = list(tasks), []
     for r in range(len(tasks)):
@@ -157,12 +163,12 @@ def drive_paths(
         [task.tour for task in tasks],
         [with_pauses(problem, r, task.path) for r, task in enumerate(tasks)],
         halt,
-        rounds=ROUNDS[:1],
+        rounds=rounds,
         drives=drives,
     )
     if trajectories:
         return FleetDrive(trajectories)
-    return FleetDrive((), "no motions were found that keep the robots apart")
+    return FleetDrive((), ROBOTS_MEET)
 
 
 def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, str]:

@@ -17,7 +17,7 @@ import numpy as np
 from mrmg.planning.attempt import Attempt, Request
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following.coordination.coordination import coordinated
-from mrmg.planning.path_following.coordination.rounds import rounds_of
+from mrmg.planning.path_following.coordination.rounds import ROUNDS, rounds_of
 from mrmg.planning.path_following.coordination.tasks import no_path
 from mrmg.planning.path_following.draws import Draw, Tours, drawn_tours, tours_of
 from mrmg.planning.path_following.driven_legs import Leg, with_driven_legs
@@ -27,7 +27,11 @@ from mrmg.planning.path_following.following import (
     follow_tours,
     whole_tour,
 )
-from mrmg.planning.path_following.refine import along_trajectories, refine
+from mrmg.planning.path_following.refine import (
+    ROBOTS_MEET,
+    along_trajectories,
+    refine,
+)
 from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Plan
 
@@ -90,16 +94,18 @@ class Schedule:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Learnt:
     """What an attempt learns by following tours.
 
     Attributes:
         useless: least state-of-charge margin at which tours are of no use.
+        met: whether robots got in each other's way so that no motions were found.
         leg_J: energies of legs as they were driven.
     """
 
     useless: dict[Tours, float] = field(default_factory=dict)
+    met: bool = False
     leg_J: dict[Leg, float] = field(default_factory=dict)
 
 
@@ -241,7 +247,9 @@ def follow_paths(
             request.seed,
             request.halt,
             request.number,
+            ROUNDS[1:2] if learnt.met else ROUNDS[:1],
         )
+        learnt.met |= followed.failure == ROBOTS_MEET
         learnt.useless[tours.tours] = soc_margin if followed.driven else 0.0
         plan, failure = followed.plan, followed.failure or failure
         learnt.leg_J.update(followed.leg_J)

@@ -11,7 +11,7 @@ from shapely.affinity import rotate, translate
 
 import mrmg
 from mrmg.planning import PlannerParams
-from mrmg.planning.path_following.band import Path
+from mrmg.planning.path_following.band import Path, visit_steps
 from mrmg.planning.path_following.tracking import (
     deceleration,
     drive_alone,
@@ -124,3 +124,56 @@ def test_a_drive_ends_at_rest_with_the_heading_asked_for(
     assert np.abs(drive.motion.state[-1, 3:]).max() < 1e-9
     tolerance = float(problem.mission.targets.target["tolerance"][0])
     assert abs(drive.motion.state[-1, 2] - 1.5) <= tolerance
+
+
+def test_a_robot_that_stands_where_it_ends_turns_and_comes_to_rest(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    finish = {"circle": {"center": [25, 10], "radius": 1}, "heading": 1.5}
+    robot = {"id": "r1", "model": "diffdrive", "pose": [25, 10, 0], "finish": finish}
+    problem = state(yard(robots=[robot]))
+    end = int(problem.mission.targets.finish[0])
+    path = Path(
+        node=np.array([[25.0, 10.0]]),
+        gear=np.zeros(0, np.int64),
+        stop=np.array([0]),
+        target=np.array([end]),
+        deeper=np.zeros(1),
+        pivot=np.zeros(0, np.int64),
+        heading=0.0,
+        pause_s=np.zeros(1),
+        aim=np.array([1.5]),
+    )
+    drive = drive_alone(problem, 0, path)
+    assert drive.arrived
+    assert np.abs(drive.motion.state[-1, 3:]).max() < 1e-9
+    assert abs(drive.motion.state[-1, 2] - 1.5) < 0.3
+
+
+def test_robots_that_turn_on_the_spot_turn_to_headings_on_their_way(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    """Its path leads east past a target that wants it to look back, and on north."""
+    wanted = {"heading": -2.6, "heading_tolerance": 0.2}
+    scene = yard(
+        goals=[
+            {"id": "g", "circle": {"center": [10, 10], "radius": 0.5}, **wanted},
+            {"id": "h", "circle": {"center": [10, 16], "radius": 0.5}},
+        ],
+        robots=[{"id": "r", "model": "diffdrive", "pose": [4, 10, 0]}],
+    )
+    problem = state(scene, samples=50)
+    path = Path(
+        node=np.array([[4.0, 10.0], [10.0, 10.0], [10.0, 16.0]]),
+        gear=np.ones(2, np.int64),
+        stop=np.array([1, 2]),
+        target=np.array([0, 1]),
+        deeper=np.zeros(2),
+        pivot=np.array([1]),
+        heading=0.0,
+        pause_s=np.zeros(2),
+        aim=np.array([-2.6, np.nan]),
+    )
+    drive = drive_alone(problem, 0, path)
+    assert drive.arrived
+    assert len(visit_steps(problem.mission.targets, [0, 1], drive.motion.state)) == 2

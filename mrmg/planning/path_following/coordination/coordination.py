@@ -45,6 +45,8 @@ from mrmg.planning.path_following.coordination.rounds import (
     SEARCHES,
     SHORTENING_MOST,
     UNTIMED_SHARE,
+    YIELDING_S,
+    YIELDING_WEIGHT,
     Round,
 )
 from mrmg.planning.path_following.coordination.sequencing import in_sequence
@@ -69,12 +71,6 @@ from mrmg.planning.path_following.tracking import (
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.plans import Trajectory
-
-YIELDING_WEIGHT = 1.1
-"""Weight of the cost-to-go for a robot that makes room for others."""
-
-YIELDING_S = 20.0
-"""Cost of conflicts with the others for such a robot [s]."""
 
 MOST_CURVE_NODES = 1500
 """Nodes of the curve that a robot drives home along, at most."""
@@ -127,6 +123,10 @@ class _Planning:
         self._courses = [
             course_with_rest(problem, r, path, drive)
             for r, (path, drive) in enumerate(zip(paths, drives, strict=True))
+        ]
+        self._follows = [  # whether it has driven along a path to all its targets
+            drive is not None and 0 < len(tour) == len(path.target)
+            for tour, path, drive in zip(tours, paths, drives, strict=True)
         ]
         self._fields = Fields(problem)
         self._traffic = FleetTraffic(problem, horizon)
@@ -182,6 +182,10 @@ class _Planning:
         yielding: bool,
     ) -> Motion | None:
         traffic = self._traffic.around(r, motions, above)
+        hard = traffic.robot["hard"]
+        if hard.any() and not self._fields.are_timed(r, self._tours[r], traffic):
+            # Those that it must not meet may stand long before all others do.
+            traffic = traffic._replace(end=int(traffic.robot["last"][hard].max()))
         for task, course in self._tasks(r, traffic, yielding):
             found = self._search(r, task, traffic, course)
             if found is not None:
@@ -196,23 +200,26 @@ class _Planning:
 
         If there is room for costs-to-go that know when the others are where, a short
         search without them comes first; the one with them does without the path: robots
-        that turn on the spot have the way down the costs-to-go instead.
+        that turn on the spot have the way down the costs-to-go instead. A robot that
+        has driven along a path to several targets keeps to it: without it, motions as
+        long as its tour would be searched for.
         """
         problem, path, tour = self._problem, self._paths[r], self._tours[r]
         now, course = self.round, self._courses[r]
         if yielding:
             now = replace(now, weight=YIELDING_WEIGHT, soft_s=YIELDING_S)
-        task = task_of(problem, r, tour, path, now)._replace(enough=FIRST_MOST)
+        follows = self._follows[r]
+        task = task_of(problem, r, tour, path, now, driven=follows)
+        task = task._replace(enough=FIRST_MOST)
         led = len(path.target) == len(tour) or is_one_pose(problem, r, tour)
-        led &= bool(
-            (problem.mission.targets.target["tolerance"][task.leg] >= np.pi).all()
-        )
+        led &= bool(np.isfinite(task.along).all())
         turning = self._fields.turning(r, tour) if now.turning else UNKNOWN
         guide = NO_GUIDE
         if not (led and self.round is ROUNDS[0]):
             guide = self._fields.static(r, tour)._replace(turning=turning)
         along = guided(problem, r, task, path, guide)
         known = self._fields.are_timed(r, tour, traffic)
+        known &= not (follows and len(tour) > 1)
         if known and not (yielding or r in self._blocked):
             yield along._replace(most=min(FIRST_MOST, now.most)), course
         if not known:

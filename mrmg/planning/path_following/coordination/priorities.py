@@ -122,15 +122,16 @@ def _children(node: _Node, planning: MotionPlanning) -> Iterator[_Node]:
 
     The two are those whose motions conflict soonest. Conflicts of robots that have been
     given priorities come before all others: so a dead end is met soon after the choice
-    that leads there. The robot with the longer motion is given priority first; the
-    other order is looked at only where that leaves as many conflicts, or leads nowhere.
+    that leads there. One that stands is given priority first, else the robot with the
+    longer motion; the other order is looked at only where that leaves as many
+    conflicts, or leads nowhere.
     """
     ordered = node.above.any(axis=0) | node.above.any(axis=1)
     conflict = np.where(np.logical_or.outer(ordered, ordered), node.conflict, np.inf)
     if not np.isfinite(conflict).any():
         conflict = node.conflict
     pair = divmod(int(conflict.argmin()), len(node.motions))
-    low, high = sorted(pair, key=lambda r: len(node.motions[r].control))
+    low, high = sorted(pair, key=lambda r: len(node.motions[r].control) or np.inf)
     found = []
     for one, other in ((low, high), (high, low)):
         if node.above[other, one]:

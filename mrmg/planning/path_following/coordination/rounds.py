@@ -60,6 +60,12 @@ UNTIMED_SHARE = 10
 """How many times as many nodes a search along several targets may have, where its
 costs-to-go do not know when the other robots are where."""
 
+YIELDING_WEIGHT = 1.1
+"""Weight of the cost-to-go for a robot that makes room for others."""
+
+YIELDING_S = 20.0
+"""Cost of conflicts with the others for such a robot [s]."""
+
 
 def rounds_of(number: int) -> Sequence[Round]:
     """Return the round of an attempt: later ones try harder, then they begin anew."""

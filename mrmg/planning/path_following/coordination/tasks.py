@@ -109,7 +109,13 @@ def stays_s(problem: Problem, r: int, legs: Sequence[int]) -> np.ndarray:
 
 
 def task_of(
-    problem: Problem, r: int, tour: Sequence[int], path: Path, effort: Round
+    problem: Problem,
+    r: int,
+    tour: Sequence[int],
+    path: Path,
+    effort: Round,
+    *,
+    driven: bool = False,
 ) -> Task:
     """Return what robot r is to do, without costs-to-go but along its path.
 
@@ -119,6 +125,7 @@ def task_of(
         tour: its targets; a finish comes last.
         path: along them, or an empty one.
         effort: how hard it is searched for.
+        driven: whether the path has been driven, to all targets and their headings.
     """
     robot, targets = problem.mission.fleet[r], problem.mission.targets
     dt_s, finish = problem.dt_s, int(targets.finish[r])
@@ -126,8 +133,8 @@ def task_of(
     along, stay_s = np.full(len(legs), np.inf), stays_s(problem, r, legs)
     led = min(len(legs), len(path.stop))
     along[:led] = path.way[path.stop[:led]]
-    # A path may well pass through a target with another heading than it wants.
-    along[targets.target["tolerance"][legs] < pi] = np.inf
+    if not driven:  # it may well pass through a target with another heading
+        along[targets.target["tolerance"][legs] < pi] = np.inf
     stay_s[:led] = path.pause_s[:led]
     queues = targets.target["zone"].max() >= 0
     standing = LONG_HOLD_SHARE if queues else HOLD_SHARE

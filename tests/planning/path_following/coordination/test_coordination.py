@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import mrmg
+from mrmg.planning import PlannerParams
 from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.coordination import coordination
 from mrmg.planning.path_following.coordination.coordination import (
@@ -155,3 +156,48 @@ def _two_robots(
     robots = [{"id": f"r{y}", "model": "diffdrive", "pose": [6, y, 0]} for y in (8, 12)]
     problem = state(yard(robots=robots), samples=50)
     return problem, [[], []], [no_path(problem, r) for r in range(2)]
+
+
+@pytest.mark.parametrize("model", ["car", "diffdrive", "husky"])
+@pytest.mark.parametrize("aimed", [False, True])
+def test_long_tours_lead_round_robots_that_stand(
+    aimed: bool, model: str, yard: Callable[..., Scene]
+) -> None:
+    """Two that have too little charge for any goal stand in a lane that all lie behind.
+
+    The first attempt finds it.
+    """
+    places = [[18, 10], [40, 12], [44, 5], [40, 34], [12, 34], [6, 28], [30, 30]]
+    looks = {"heading": 2.0, "heading_tolerance": 0.3}
+    goals = [
+        {
+            "id": f"g{i}",
+            "circle": {"center": at, "radius": 0.6},
+            **(looks if aimed and i % 2 else {}),
+        }
+        for i, at in enumerate(places)
+    ]
+    standing = [
+        {
+            "id": f"s{x}",
+            "model": model,
+            "pose": [x, 9, 0],
+            "battery": {"capacity_m": 8},
+            "finish": {"circle": {"center": [x, 9], "radius": 0.4}},
+        }
+        for x in (11, 25)
+    ]
+    scene = yard(
+        bounds=[0, 0, 48, 40],
+        battery={"capacity_m": 2000},
+        obstacles=[
+            {"polygon": [[0, 13], [34, 13], [34, 16], [0, 16]]},
+            {"polygon": [[0, 0], [34, 0], [34, 4.5], [0, 4.5]]},
+        ],
+        goals=goals,
+        robots=[{"id": "r", "model": model, "pose": [4, 9, 0]}, *standing],
+    )
+    params = PlannerParams(trees=1, improvements=0)
+    result = mrmg.plan(scene, params=params)
+    assert result.plan is not None, result.reason
+    assert mrmg.verify(scene, result.plan).ok
