@@ -117,7 +117,7 @@ def at_rest(own, course, segment, state):
 def turning_rate(own, angle):
     """Return the rate at which a robot turns on the spot by an angle [rad/s]."""
     w = sqrt(2.0 * TURNING_SHARE * own[0].limit[4] * abs(angle))
-    return w if angle > 0.0 else -w
+    return w if angle >= 0.0 else -w
 
 
 @kernel
@@ -189,11 +189,7 @@ def track_control(own, course, segment, stood, state, dt):
         angle = lacking(course, last, state)
         v = 0.0
         if own[0].model == UNICYCLE:
-            w = (
-                turning_rate(own, angle)
-                if angle != 0.0 and abs(state[3]) < REST
-                else 0.0
-            )
+            w = turning_rate(own, angle) if abs(state[3]) < REST else 0.0
         if angle == 0.0 and stands(own, 0, state):
             stood += 1
             if stood > course.node[last].pause:

@@ -27,11 +27,7 @@ from mrmg.planning.path_following.following import (
     follow_tours,
     whole_tour,
 )
-from mrmg.planning.path_following.refine import (
-    ROBOTS_MEET,
-    along_trajectories,
-    refine,
-)
+from mrmg.planning.path_following.refine import ROBOTS_MEET, along_trajectories, refine
 from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Plan
 

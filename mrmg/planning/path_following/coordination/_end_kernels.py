@@ -132,10 +132,8 @@ def drive_to(search, target, room, control):
             if abs(wrap(heading - state[0, 2])) > 0.5 * pi:
                 heading = wrap(heading + pi)
         radius = drivable_radius(own[0])
-        if (
-            not write_curve(own, state[0], x, y, heading, tolerance, course, radius)
-            < np.inf
-        ):
+        total = write_curve(own, state[0], x, y, heading, tolerance, course, radius)
+        if not total < np.inf:
             return -1
         return drive_curve(search, course, corner, state, control)
     curved = -1

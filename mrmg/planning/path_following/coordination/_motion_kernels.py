@@ -23,10 +23,7 @@ from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
     reeds_shepp,
 )
 from mrmg.planning.problem._clearance_kernels import clear_of_obstacles
-from mrmg.planning.problem._control_kernels import (
-    braking_control,
-    control_towards,
-)
+from mrmg.planning.problem._control_kernels import braking_control, control_towards
 from mrmg.planning.problem._region_kernels import in_region
 from mrmg.planning.roadmap._fleet_kernels import middle_at
 from mrmg.world._polygon_kernels import convex_distance, place_footprint

@@ -218,8 +218,8 @@ class _Planning:
         if not (led and self.round is ROUNDS[0]):
             guide = self._fields.static(r, tour)._replace(turning=turning)
         along = guided(problem, r, task, path, guide)
-        known = self._fields.are_timed(r, tour, traffic)
-        known &= not (follows and len(tour) > 1)
+        keeps_to_it = follows and len(tour) > 1
+        known = not keeps_to_it and self._fields.are_timed(r, tour, traffic)
         if known and not (yielding or r in self._blocked):
             yield along._replace(most=min(FIRST_MOST, now.most)), course
         if not known:
