@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -113,41 +114,33 @@ def test_a_drive_keeps_its_margin_or_ends_where_it_would_not(
         assert np.isinf(drive.spent_s[-1])
 
 
+@pytest.mark.parametrize("x_m", [4.0, 25.0])
 def test_a_drive_ends_at_rest_with_the_heading_asked_for(
-    yard: Callable[..., Scene], state: Callable[..., Problem]
+    x_m: float, yard: Callable[..., Scene], state: Callable[..., Problem]
 ) -> None:
+    """Also if it only turns, as the robot stands where it ends."""
     finish = {"circle": {"center": [25, 10], "radius": 1}, "heading": 1.5}
-    robot = {"id": "r1", "model": "diffdrive", "pose": [4, 10, 0], "finish": finish}
-    problem = state(yard(robots=[robot]))
-    drive = drive_alone(problem, 0, straight_path(problem, 25.0))
-    assert drive.arrived
-    assert np.abs(drive.motion.state[-1, 3:]).max() < 1e-9
-    tolerance = float(problem.mission.targets.target["tolerance"][0])
-    assert abs(drive.motion.state[-1, 2] - 1.5) <= tolerance
-
-
-def test_a_robot_that_stands_where_it_ends_turns_and_comes_to_rest(
-    yard: Callable[..., Scene], state: Callable[..., Problem]
-) -> None:
-    finish = {"circle": {"center": [25, 10], "radius": 1}, "heading": 1.5}
-    robot = {"id": "r1", "model": "diffdrive", "pose": [25, 10, 0], "finish": finish}
+    robot = {"id": "r1", "model": "diffdrive", "pose": [x_m, 10, 0], "finish": finish}
     problem = state(yard(robots=[robot]))
     end = int(problem.mission.targets.finish[0])
-    path = Path(
-        node=np.array([[25.0, 10.0]]),
-        gear=np.zeros(0, np.int64),
-        stop=np.array([0]),
+    straight = straight_path(problem, 25.0)
+    nodes = 30 if x_m < 25.0 else 1
+    path = replace(
+        straight,
+        node=straight.node[:nodes],
+        gear=straight.gear[: nodes - 1],
+        stop=np.array([nodes - 1]),
         target=np.array([end]),
         deeper=np.zeros(1),
-        pivot=np.zeros(0, np.int64),
-        heading=0.0,
         pause_s=np.zeros(1),
         aim=np.array([1.5]),
     )
     drive = drive_alone(problem, 0, path)
     assert drive.arrived
     assert np.abs(drive.motion.state[-1, 3:]).max() < 1e-9
-    assert abs(drive.motion.state[-1, 2] - 1.5) < 0.3
+    tolerance = float(problem.mission.targets.target["tolerance"][end])
+    assert tolerance < 0.3
+    assert abs(drive.motion.state[-1, 2] - 1.5) <= tolerance
 
 
 def test_robots_that_turn_on_the_spot_turn_to_headings_on_their_way(
