@@ -156,7 +156,8 @@ def body(pose: Sequence[float]) -> shapely.Polygon:
 
 def start_clearance_m(content: Mapping[str, Any]) -> float:
     """Return how near to a disc any car starts [m], negative where they overlap."""
-    discs = shapely.points(np.array(content["map"]["obstacles"] or [], float))
+    centers = np.array(content["map"]["obstacles"] or [], float).reshape(-1, 2)
+    discs = shapely.points(centers)
     if not len(discs):
         return math.inf
     bodies = [body(agent["start"]) for agent in content["agents"]]

@@ -46,6 +46,12 @@ def test_files_are_planned_and_those_with_overlaps_listed(
     assert written["overlapping"] == [{"file": "map_40by40_obst1_agents2_ex2"}]
 
 
+@pytest.mark.parametrize("obstacles", [None, []])
+def test_files_may_have_no_obstacle(obstacles: list[list[float]] | None) -> None:
+    content = {**yaml.safe_load(FREE), "map": {"obstacles": obstacles}}
+    assert bench_clmapf.overlap_m(content) == 0.0
+
+
 def test_yaw_is_clockwise_in_the_files() -> None:
     west, south, east, north = bench_clmapf.body([5.0, 5.0, 1.5708]).bounds
     assert [west, south, east, north] == pytest.approx([4, 3, 6, 6], abs=1e-3)
