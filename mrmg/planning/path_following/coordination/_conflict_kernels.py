@@ -2,14 +2,80 @@
 
 from __future__ import annotations
 
+from math import hypot
+
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.planning.path_following.coordination._motion_kernels import (
-    first_conflict,
-)
 from mrmg.planning.problem._region_kernels import in_region
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS, middle_at
+from mrmg.world._polygon_kernels import (
+    convex_distance,
+    pass_apart,
+    place_footprint,
+)
+
+
+@kernel
+def first_conflict(own, traffic, other, state, count, first, corner):
+    """Return the first of some states in which two robots are too near, or -1.
+
+    Where their margin is less than what they near in half a step, they are too near in
+    the state after a step in which they meet, too.
+
+    Args:
+        own: the robot that moves, shape (1,).
+        traffic: the other robots.
+        other: one of them.
+        state: states 1 to `count` are looked at; the last one lasts, shape (n, 5).
+        count: number of the last one.
+        first: step of state 0.
+        corner: room for two footprints, shape (2, M, 2).
+    """
+    n, m = own[0].corners, traffic.fleet[other].corners
+    mine, theirs = own[0].corner[:n], traffic.fleet[other].corner[:m]
+    margin = max(own[0].spacing, traffic.fleet[other].spacing)
+    closing = traffic.robot[other].closing
+    narrow = margin < 0.5 * closing  # they may meet between steps and be apart at both
+    enough = margin + closing if narrow else margin
+    reach = own[0].radius + traffic.fleet[other].radius + enough
+    last, their_last = len(state) - 1, traffic.robot[other].last
+    k = 0 if narrow else 1
+    while k <= count:
+        j = min(max(first + k, 0), their_last)
+        pose, its = state[min(k, last)], traffic.pose[other, j]
+        x, y = middle_at(own[0], pose)
+        apart = hypot(x - traffic.middle[other, j, 0], y - traffic.middle[other, j, 1])
+        if apart >= reach:  # until they may have come near to each other
+            k += max(1, int((apart - reach) / closing))
+            continue
+        place_footprint(mine, pose[0], pose[1], pose[2], corner[0, :n])
+        place_footprint(theirs, its[0], its[1], its[2], corner[1, :m])
+        distance = convex_distance(corner[0, :n], corner[1, :m], enough)
+        if distance < margin and k > 0:
+            return k
+        if narrow and distance < enough and k < count:
+            next_pose = state[min(k + 1, last)]
+            its_next = traffic.pose[other, min(max(first + k + 1, 0), their_last)]
+            if not pass_apart(
+                mine, theirs, pose, next_pose, its, its_next, distance, corner
+            ):
+                return k + 1
+        k += 1
+    return -1
+
+
+@kernel
+def blocked_for_good(own, traffic, state, first, corner):
+    """Return whether a robot that stands from step `first` on is ever run into."""
+    still = state.reshape(1, 5)
+    for other in range(len(traffic.robot)):
+        count = max(1, traffic.robot[other].last - first + 1)
+        if traffic.robot[other].hard and (
+            first_conflict(own, traffic, other, still, count, first - 1, corner) >= 0
+        ):
+            return True
+    return False
 
 
 @kernel

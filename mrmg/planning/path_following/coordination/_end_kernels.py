@@ -8,14 +8,16 @@ import numpy as np
 
 from mrmg.compilation import kernel
 from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, step
+from mrmg.planning.path_following.coordination._conflict_kernels import (
+    blocked_for_good,
+    first_conflict,
+)
 from mrmg.planning.path_following.coordination._motion_kernels import (
     BRAKE,
     HOME,
-    blocked_for_good,
     clear,
     drivable_radius,
     drive_curve,
-    first_conflict,
     smooth_radius,
     write_curve,
 )

@@ -25,8 +25,6 @@ from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
 from mrmg.planning.problem._clearance_kernels import clear_of_obstacles
 from mrmg.planning.problem._control_kernels import braking_control, control_towards
 from mrmg.planning.problem._region_kernels import in_region
-from mrmg.planning.roadmap._fleet_kernels import middle_at
-from mrmg.world._polygon_kernels import convex_distance, place_footprint
 
 BRAKE, HOME, VISIT, STAY, WAIT, TRACK, HOLD, MOVE = range(-5, 3)
 """Brake, or drive home, and be through; drive to a target's pose; stand in a target, or
@@ -80,54 +78,6 @@ class Traffic(NamedTuple):
     busy_left: np.ndarray
     release: np.ndarray
     end: int
-
-
-@kernel
-def first_conflict(own, traffic, other, state, count, first, corner):
-    """Return the first of some states in which two robots are too near, or -1.
-
-    Args:
-        own: the robot that moves, shape (1,).
-        traffic: the other robots.
-        other: one of them.
-        state: states 1 to `count` are looked at; the last one lasts, shape (n, 5).
-        count: number of the last one.
-        first: step of state 0.
-        corner: room for two footprints, shape (2, M, 2).
-    """
-    n, m = own[0].corners, traffic.fleet[other].corners
-    margin = max(own[0].spacing, traffic.fleet[other].spacing)
-    reach = own[0].radius + traffic.fleet[other].radius + margin
-    k = 1
-    while k <= count:
-        i, j = min(k, len(state) - 1), min(first + k, traffic.robot[other].last)
-        pose, its = state[i], traffic.pose[other, j]
-        x, y = middle_at(own[0], pose)
-        apart = hypot(x - traffic.middle[other, j, 0], y - traffic.middle[other, j, 1])
-        if apart >= reach:  # until they may have come near to each other
-            k += max(1, int((apart - reach) / traffic.robot[other].closing))
-            continue
-        place_footprint(own[0].corner[:n], pose[0], pose[1], pose[2], corner[0, :n])
-        place_footprint(
-            traffic.fleet[other].corner[:m], its[0], its[1], its[2], corner[1, :m]
-        )
-        if convex_distance(corner[0, :n], corner[1, :m], margin) < margin:
-            return k
-        k += 1
-    return -1
-
-
-@kernel
-def blocked_for_good(own, traffic, state, first, corner):
-    """Return whether a robot that stands from step `first` on is ever run into."""
-    still = state.reshape(1, 5)
-    for other in range(len(traffic.robot)):
-        count = max(1, traffic.robot[other].last - first + 1)
-        if traffic.robot[other].hard and (
-            first_conflict(own, traffic, other, still, count, first - 1, corner) >= 0
-        ):
-            return True
-    return False
 
 
 @kernel

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 import shapely
 
+from mrmg.planning.path_following.coordination._conflict_kernels import (
+    blocked_for_good,
+    first_conflict,
+)
 from mrmg.planning.path_following.coordination._motion_kernels import (
     OTHER,
     Traffic,
-    blocked_for_good,
     clear,
-    first_conflict,
 )
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
@@ -95,6 +97,36 @@ def test_the_first_conflict_is_where_robots_come_too_near(
     traffic = traffic_of(problem, other)
     fleet = problem.mission.fleet[:1]
     assert first_conflict(fleet, traffic, 1, own, STEPS, 0, corners()) == expected
+
+
+def test_robots_that_meet_between_steps_are_in_conflict(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    """At right angles the corners of two cars overlap for less than a step."""
+    robots = [
+        {"id": name, "model": "car", "pose": pose, "margins": {"robot": 0.0}}
+        for name, pose in {"r1": [4, 10, 0], "r2": [15, 3, 0.5 * np.pi]}.items()
+    ]
+    problem = state(yard(robots=robots), samples=50)
+    fleet, between = problem.mission.fleet[:1], np.linspace(0.0, 1.0, 21)[:, None]
+    unseen = 0
+    for back_m in np.linspace(-4.0, 4.0, 400):
+        own = straight(problem.start[0], STEPS)
+        other = straight(problem.start[1] + [0.0, back_m, 0.0, 0.0, 0.0], STEPS)
+        least_m = [
+            apart_m(
+                problem, *(a[k] + between * (a[k + 1] - a[k]) for a in (own, other))
+            )
+            for k in range(STEPS)
+        ]
+        at_steps_m = apart_m(problem, own, other)
+        meet, near = np.min(least_m) <= 0.0, np.min(least_m) < 0.02
+        unseen += meet and at_steps_m.min() > 0.0
+        traffic = traffic_of(problem, other)
+        found = first_conflict(fleet, traffic, 1, own, STEPS, 0, corners())
+        assert (found >= 0) or not meet, back_m
+        assert found < 0 or near, back_m
+    assert unseen >= 2
 
 
 @pytest.mark.parametrize(
