@@ -68,12 +68,14 @@ class Followed:
         plan: along them, None if there is none.
         failure: why there is none, in words.
         driven: whether they could be driven, if not on the charge there is.
+        led: whether a path led any robot.
         leg_J: energies of the legs that were driven, if that gave no plan.
     """
 
     plan: Plan | None
     failure: str = ""
     driven: bool = True
+    led: bool = True
     leg_J: Mapping[Leg, float] = field(default_factory=dict)
 
 
@@ -119,7 +121,8 @@ def follow_tours(
     others = partial(_otherwise, problem, tasks, number == 0, halt)
     drive = drive_paths(problem, tasks, halt, others, rounds=rounds)
     if not drive.trajectories:
-        return Followed(None, drive.failure, driven=False)
+        led = any(len(path.target) > 0 for path in paths)
+        return Followed(None, drive.failure, driven=False, led=led)
     plan = plan_or_refusal(problem, seed, params, drive.trajectories, tours)
     if isinstance(plan, Plan):
         return Followed(plan)

@@ -97,11 +97,13 @@ class Learnt:
     Attributes:
         useless: least state-of-charge margin at which tours are of no use.
         met: whether robots got in each other's way so that no motions were found.
+        searched: whether these were searched for without any path.
         leg_J: energies of legs as they were driven.
     """
 
     useless: dict[Tours, float] = field(default_factory=dict)
     met: bool = False
+    searched: bool = False
     leg_J: dict[Leg, float] = field(default_factory=dict)
 
 
@@ -156,14 +158,20 @@ def _tries(problem: Problem, request: Request, schedule: Schedule) -> Iterator[A
         yield follow_paths(kept, request, draws, soc_margin, learnt)
     for soc_margin in schedule.search_soc_margins:
         kept = problem.with_soc_margin(soc_margin).with_margin(schedule.search_margin)
-        searched = search_motions(kept, request)
+        searched = search_motions(kept, request, further=int(learnt.searched))
         yield searched
         if searched.tours_found:
             return
 
 
-def search_motions(problem: Problem, request: Request) -> Attempt:
-    """Search for motions along tours, and refine their plan."""
+def search_motions(problem: Problem, request: Request, further: int = 0) -> Attempt:
+    """Search for motions along tours, and refine their plan.
+
+    Args:
+        problem: the mission.
+        request: the attempt.
+        further: how many rounds further than that of the attempt the search begins.
+    """
     began = time.perf_counter()
     routing = tours_of(problem, request)
     routing_s = time.perf_counter() - began
@@ -177,7 +185,7 @@ def search_motions(problem: Problem, request: Request) -> Attempt:
         [no_path(problem, r) for r in robots],
         request.halt,
         seed=request.stream_seed("coordination"),
-        rounds=rounds_of(request.number),
+        rounds=rounds_of(request.number + further),
     )
     tours = problem.visits(routing.tours)
     plans: list[Plan] = []
@@ -246,6 +254,7 @@ def follow_paths(
             ROUNDS[1:2] if learnt.met else ROUNDS[:1],
         )
         learnt.met |= followed.failure == ROBOTS_MEET
+        learnt.searched |= learnt.met and not followed.led
         learnt.useless[tours.tours] = soc_margin if followed.driven else 0.0
         plan, failure = followed.plan, followed.failure or failure
         learnt.leg_J.update(followed.leg_J)

@@ -5,7 +5,9 @@ prioritization for multi-agent path finding, AAAI 2019. Each node is a partial o
 the robots and a motion for each of them that has no conflict with higher ones. Where
 two motions conflict, one child gives one robot priority and the other child the other
 one. The search goes depth first and back, so that it looks at every order that may
-matter.
+matter. Where a robot has no motion it goes back to the last order of two robots that
+are in question there (conflict-directed backjumping: P. Prosser, Hybrid algorithms for
+the constraint satisfaction problem, Computational Intelligence 9, 1993).
 """
 
 from __future__ import annotations
@@ -100,31 +102,64 @@ def search_priorities(
     """
     robots = len(motions)
     conflict = np.stack([planning.conflicts(r, motions) for r in range(robots)])
+    if not np.isfinite(conflict).any():
+        return tuple(motions)
     root = _Node(np.zeros((robots, robots), bool), tuple(motions), conflict)
-    stack: list[Iterator[_Node]] = [iter([root])]
-    seen: dict[tuple[object, ...], _Node] = {}  # two may make room for a third in turn
+    stack = [_Frame.of(root, (), planning)]
+    seen: dict[tuple[object, ...], np.ndarray] = {}  # two may make room in turn
     planning.most = planning.nodes + most
     while stack and planning.nodes < planning.most and not halt[0]:
-        node = next(stack[-1], None)
-        if node is None:
+        frame = stack[-1]
+        pair, child = next(frame.children, ((), None))
+        if child is None:
             stack.pop()
-        elif seen.setdefault(node.key, node) is not node:
-            continue
-        elif not np.isfinite(node.conflict).any():
-            return node.motions
+            while stack and not frame.blamed[list(frame.pair)].all():
+                stack[-1].blamed[:] = frame.blamed
+                frame = stack.pop()
+            if stack:
+                stack[-1].blamed[frame.blamed] = True
+        elif not np.isfinite(child.conflict).any():
+            return child.motions
+        elif child.key in seen:
+            frame.blamed[seen[child.key]] = True
         else:
-            stack.append(_children(node, planning))
+            stack.append(_Frame.of(child, pair, planning))
+            seen[child.key] = stack[-1].blamed
     return None
 
 
-def _children(node: _Node, planning: MotionPlanning) -> Iterator[_Node]:
-    """Yield the nodes in which one of two robots in conflict has priority.
+@dataclass(frozen=True, slots=True)
+class _Frame:
+    """A node that is being looked at.
+
+    Attributes:
+        pair: the two robots whose order led to the node.
+        children: its children that are left, each with the two robots that it orders.
+        blamed: robots whose orders have a part in all failures so far, shape (R,).
+    """
+
+    pair: tuple[int, ...]
+    children: Iterator[tuple[tuple[int, ...], _Node]]
+    blamed: np.ndarray
+
+    @staticmethod
+    def of(node: _Node, pair: tuple[int, ...], planning: MotionPlanning) -> _Frame:
+        """Return a node whose children are all left."""
+        blamed = np.zeros(len(node.motions), bool)
+        return _Frame(pair, _children(node, planning, blamed), blamed)
+
+
+def _children(
+    node: _Node, planning: MotionPlanning, blamed: np.ndarray
+) -> Iterator[tuple[tuple[int, ...], _Node]]:
+    """Yield the nodes in which one of two robots in conflict has priority, and the two.
 
     The two are those whose motions conflict soonest. Conflicts of robots that have been
     given priorities come before all others: so a dead end is met soon after the choice
     that leads there. One that stands is given priority first, else the robot with the
     longer motion; the other order is looked at only where that leaves as many
-    conflicts, or leads nowhere.
+    conflicts, or leads nowhere. `blamed` receives the robots in question where there is
+    no motion.
     """
     ordered = node.above.any(axis=0) | node.above.any(axis=1)
     conflict = np.where(np.logical_or.outer(ordered, ordered), node.conflict, np.inf)
@@ -132,22 +167,27 @@ def _children(node: _Node, planning: MotionPlanning) -> Iterator[_Node]:
         conflict = node.conflict
     pair = divmod(int(conflict.argmin()), len(node.motions))
     low, high = sorted(pair, key=lambda r: len(node.motions[r].control) or np.inf)
+    blamed[list(pair)] = True
     found = []
     for one, other in ((low, high), (high, low)):
         if node.above[other, one]:
+            blamed[node.above[other]] = True
             continue
-        child = _with_priority(node, one, other, planning)
+        child = _with_priority(node, one, other, planning, blamed)
         if child is not None and child.cost < node.cost:
-            yield child
+            yield pair, child
         elif child is not None:
             found.append(child)
-    yield from sorted(found, key=lambda child: child.cost)
+    yield from ((pair, child) for child in sorted(found, key=lambda child: child.cost))
 
 
 def _with_priority(
-    node: _Node, low: int, high: int, planning: MotionPlanning
+    node: _Node, low: int, high: int, planning: MotionPlanning, blamed: np.ndarray
 ) -> _Node | None:
-    """Return the node in which one more robot has priority over another one."""
+    """Return the node in which one more robot has priority over another one.
+
+    None where a robot has no motion: `blamed` receives those above it, and itself.
+    """
     above = node.above.copy()
     upper = np.append(np.flatnonzero(above[high]), high)
     lower = np.append(np.flatnonzero(above[:, low]), low)
@@ -161,6 +201,7 @@ def _with_priority(
             found = _giving_way(low, high, above, motions, planning)
             conflict[high] = conflict[:, high] = planning.conflicts(high, motions)
         if found is None:
+            blamed[above[r]] = blamed[r] = True
             return None
         motions[r] = found
         conflict[r] = conflict[:, r] = planning.conflicts(r, motions)
