@@ -8,11 +8,11 @@ too: in dense traffic there often is one, though with longer motions. All that i
 can be driven exactly, and keeps clear at every step.
 
 What is promised: every plan found keeps all margins. A round of the search ends without
-a plan when no order of the robots has one, with cells as fine and searches as long as
-the round allows, or when it has looked at as many nodes as it may. Rounds are finer and
-longer, one after the other, then they begin anew; each begins with other motions. A
-round is in two halves: in the second one robots find their motions alone in the reverse
-order, as those that lead nowhere often come of who was first.
+a plan when no order of the robots that may matter has one, with cells as fine and
+searches as long as the round allows, or when it has looked at as many nodes as it may.
+Rounds are finer and longer, one after the other, then they begin anew; each begins with
+other motions. A round is in two halves: in the second one robots find their motions
+alone in the reverse order, as those that lead nowhere often come of who was first.
 """
 
 from __future__ import annotations
