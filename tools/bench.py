@@ -188,6 +188,23 @@ def missions(
             yield row
 
 
+def add_mission_options(parser: argparse.ArgumentParser, seeds: str) -> None:
+    """Let a bench of other missions take the options that `plan_each` reads.
+
+    Args:
+        parser: of its command line.
+        seeds: first and last one by default.
+    """
+    parser.add_argument(
+        "--seeds", type=seed_range, default=seeds, help=f"first-last, default {seeds}"
+    )
+    parser.add_argument("--budget", type=float, help="seconds of planning")
+    parser.add_argument("--execute", action="store_true", help="drive in MuJoCo too")
+    parser.add_argument("--bound", action="store_true", help="compare with a bound")
+    add_file_options(parser)
+    parser.set_defaults(profile=["default"], energy=None, nrpa=None)
+
+
 def plan_each(
     scenes: Iterable[tuple[str, Scene]], options: argparse.Namespace, command: str
 ) -> int:

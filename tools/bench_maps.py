@@ -16,7 +16,7 @@ import sys
 from pathlib import Path
 
 import bench
-from protocol import add_file_options, run, seed_range
+from protocol import run
 
 from mrmg.scene.importing.importing import import_files
 from mrmg.scene.loading import scene_from_document
@@ -51,14 +51,7 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument("--robots", type=int, default=4, help="default 4")
     parser.add_argument("--goals", type=int, default=20, help="default 20")
     parser.add_argument("--placement", type=int, default=3, help="its seed, default 3")
-    parser.add_argument(
-        "--seeds", type=seed_range, default="0-19", help="first-last, default 0-19"
-    )
-    parser.add_argument("--budget", type=float, help="seconds of planning")
-    parser.add_argument("--execute", action="store_true", help="drive in MuJoCo too")
-    parser.add_argument("--bound", action="store_true", help="compare with a bound")
-    add_file_options(parser)
-    parser.set_defaults(profile=["default"], energy=None, nrpa=None)
+    bench.add_mission_options(parser, seeds="0-19")
     return parser.parse_args()
 
 

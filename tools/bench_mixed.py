@@ -21,7 +21,7 @@ from typing import Any
 
 import bench
 import numpy as np
-from protocol import add_file_options, run, seed_range
+from protocol import run, seed_range
 
 from mrmg.errors import UsageError
 from mrmg.scene.importing.importing import import_files
@@ -59,14 +59,7 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument(
         "--missions", type=seed_range, default="0-60", help="first-last, default 0-60"
     )
-    parser.add_argument(
-        "--seeds", type=seed_range, default="0-0", help="first-last, default 0-0"
-    )
-    parser.add_argument("--budget", type=float, help="seconds of planning")
-    parser.add_argument("--execute", action="store_true", help="drive in MuJoCo too")
-    parser.add_argument("--bound", action="store_true", help="compare with a bound")
-    add_file_options(parser)
-    parser.set_defaults(profile=["default"], energy=None, nrpa=None)
+    bench.add_mission_options(parser, seeds="0-0")
     return parser.parse_args()
 
 
