@@ -9,46 +9,31 @@ from pathlib import Path
 import bench_maps
 import pytest
 
-MAP = """\
-[SCALE]
-1
-[BORDER]
-0 0
-60 0
-60 40
-0 40
-[OBSTACLE]
-25 10
-35 10
-35 30
-25 30
-"""
-
 
 def test_the_bench_plans_on_a_map_and_writes_rows(
+    hall: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    path, output = tmp_path / "hall.txt", tmp_path / "rows.jsonl"
-    path.write_text(MAP)
+    output = tmp_path / "rows.jsonl"
     options = ["--robots", "2", "--goals", "3", "--seeds", "0-1"]
     options += ["--json", str(tmp_path / "maps.json")]
     monkeypatch.setattr(
-        sys, "argv", ["bench", str(path), *options, "--output", str(output)]
+        sys, "argv", ["bench", str(hall), *options, "--output", str(output)]
     )
     assert bench_maps.main() == 0
     assert "\nhall | 2/2 | " in capsys.readouterr().out
     rows = [json.loads(line) for line in output.read_text().splitlines()]
     assert [row["seed"] for row in rows] == [0, 1]
     for row in rows:
-        assert row["problem"]["source"] == str(path)
+        assert row["problem"]["source"] == str(hall)
         assert (row["problem"]["robots"], row["problem"]["goals"]) == (2, 3)
         assert row["violations"] == 0
     written = json.loads((tmp_path / "maps.json").read_text())
     (line,) = written["rows"]
     assert (line["scene"], line["ok"], line["runs"]) == ("hall", 2, 2)
-    assert [Path(one).name for one in written["protocol"]["maps"]] == [path.name]
+    assert [Path(one).name for one in written["protocol"]["maps"]] == [hall.name]
 
 
 def test_a_map_that_is_not_there_is_named(

@@ -12,29 +12,6 @@ import bench_mixed
 import numpy as np
 import pytest
 
-MAP = """\
-[SCALE]
-1
-[BORDER]
-0 0
-60 0
-60 40
-0 40
-[OBSTACLE]
-25 10
-35 10
-35 30
-25 30
-"""
-
-
-@pytest.fixture
-def hall(tmp_path: Path) -> Path:
-    """A map."""
-    path = tmp_path / "hall.txt"
-    path.write_text(MAP)
-    return path
-
 
 def test_the_bench_plans_missions_and_writes_rows(
     hall: Path, monkeypatch: pytest.MonkeyPatch
