@@ -311,9 +311,11 @@ def add_fitting(own, spaces, place, grid, fits):
 def guide_at(guide, leg, step, x, y):
     """Return the cost-to-go of a point on a leg at a step [s].
 
-    It is bilinear, of the cells around the point that have a value.
+    It is bilinear, of the cells around the point that have a value. The last leg's
+    costs count for all after it: `NO_GUIDE` has those of one.
     """
-    field = guide.field[leg, min(step // guide.layer, guide.field.shape[1] - 1)]
+    legs, layers = guide.field.shape[:2]
+    field = guide.field[min(leg, legs - 1), min(step // guide.layer, layers - 1)]
     rows, columns = field.shape
     fx = (x - guide.x_min) / guide.cell - 0.5
     fy = (y - guide.y_min) / guide.cell - 0.5

@@ -12,7 +12,11 @@ import pytest
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following.coordination import _field_kernels
 from mrmg.planning.path_following.coordination._field_kernels import BEARINGS
-from mrmg.planning.path_following.coordination.fields import MOST_POSES, Fields
+from mrmg.planning.path_following.coordination.fields import (
+    MOST_POSES,
+    NO_GUIDE,
+    Fields,
+)
 from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.scene.types import Scene
 
@@ -115,3 +119,8 @@ def test_costs_to_go_lead_through_gaps_that_are_wide_enough_alone(
     way_m = top * float(_field_kernels.guide_at(guide, 0, 0, 3.0, 5.0))
     assert (way_m < 2.0 * 9.0) == through
     assert way_m < inf
+
+
+@pytest.mark.parametrize("leg", [0, 1, 7])
+def test_who_does_without_costs_to_go_has_none_on_any_leg(leg: int) -> None:
+    assert _field_kernels.guide_at(NO_GUIDE, leg, 0, 3.0, 5.0) == 0.0
