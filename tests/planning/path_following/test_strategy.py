@@ -5,7 +5,7 @@ Both refine what they find: plans of one attempt are each better than the one be
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -19,7 +19,9 @@ import mrmg
 from mrmg.energy.metering import battery_profile
 from mrmg.planning import Attempt, PlannerParams, Problem, Request
 from mrmg.planning.path_following import strategy
+from mrmg.planning.path_following.coordination.rounds import ROUNDS, Round
 from mrmg.planning.path_following.following import Followed
+from mrmg.planning.path_following.refine import ROBOTS_MEET
 from mrmg.planning.path_following.strategy import (
     Learnt,
     Schedule,
@@ -137,6 +139,21 @@ def test_tours_that_failed_are_counted_with_the_search(
     assert found.counts["path_following_plans"] == 2
     assert found.counts["router_calls"] >= 5
     assert found.counts["coordinated"] == 1
+
+
+@pytest.mark.parametrize(("led", "begins_at"), [(True, 0), (False, 1)])
+def test_no_search_without_paths_is_made_twice(
+    led: bool, begins_at: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where following has searched without paths, the search begins a round further."""
+    met = Followed(None, ROBOTS_MEET, driven=False, led=led)
+    rounds: list[Sequence[Round]] = []
+    monkeypatch.setattr(strategy, "follow_tours", lambda *_, **__: met)
+    monkeypatch.setattr(
+        strategy, "coordinated", lambda *_, **given: rounds.append(given["rounds"])
+    )
+    attempted(path_following, "quickstart")
+    assert rounds == [ROUNDS[begins_at : begins_at + 1]]
 
 
 @pytest.mark.parametrize("soc_margin", [0.0, 0.1, 0.2])
