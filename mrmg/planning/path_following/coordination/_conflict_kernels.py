@@ -9,19 +9,15 @@ import numpy as np
 from mrmg.compilation import kernel
 from mrmg.planning.problem._region_kernels import in_region
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS, middle_at
-from mrmg.world._polygon_kernels import (
-    convex_distance,
-    pass_apart,
-    place_footprint,
-)
+from mrmg.world._polygon_kernels import convex_distance, pass_apart, place_footprint
 
 
 @kernel
 def first_conflict(own, traffic, other, state, count, first, corner):
     """Return the first of some states in which two robots are too near, or -1.
 
-    Where their margin is less than what they near in half a step, they are too near in
-    the state after a step in which they meet, too.
+    Where their margin is less than what they may come nearer to each other in half a
+    step, that is also the state after a step in the course of which they meet.
 
     Args:
         own: the robot that moves, shape (1,).

@@ -7,8 +7,8 @@ two motions conflict, one child gives one robot priority and the other child the
 one. The search goes depth first and back, so that it looks at every order that may
 matter. Where a robot has no motion it goes back to the last order of two robots that
 are in question there (conflict-directed backjumping: P. Prosser, Hybrid algorithms for
-the constraint satisfaction problem, Computational Intelligence 9, 1993). That
-leaves out orders of all others, which matter only as far as robots make room for them.
+the constraint satisfaction problem, Computational Intelligence 9, 1993). Orders of
+other robots are left out then: they matter only as far as robots make room for them.
 """
 
 from __future__ import annotations
