@@ -106,25 +106,24 @@ def search_priorities(
     if not np.isfinite(conflict).any():
         return tuple(motions)
     root = _Node(np.zeros((robots, robots), bool), tuple(motions), conflict)
-    stack = [_Frame.of(root, (), planning)]
+    stack = [_Frame.of(root, planning)]
     seen: dict[tuple[object, ...], np.ndarray] = {}  # two may make room in turn
     planning.most = planning.nodes + most
     while stack and planning.nodes < planning.most and not halt[0]:
         frame = stack[-1]
-        pair, child = next(frame.children, ((), None))
+        child = next(frame.children, None)
         if child is None:
-            stack.pop()
-            while stack and not frame.blamed[list(frame.pair)].all():
-                stack[-1].blamed[:] = frame.blamed
-                frame = stack.pop()
+            blamed = stack.pop().blamed
+            while stack and not blamed[stack[-1].pair].all():
+                stack.pop().blamed[:] = blamed
             if stack:
-                stack[-1].blamed[frame.blamed] = True
+                stack[-1].blamed[blamed] = True
         elif not np.isfinite(child.conflict).any():
             return child.motions
         elif child.key in seen:
             frame.blamed[seen[child.key]] = True
         else:
-            stack.append(_Frame.of(child, pair, planning))
+            stack.append(_Frame.of(child, planning))
             seen[child.key] = stack[-1].blamed
     return None
 
@@ -134,52 +133,58 @@ class _Frame:
     """A node that is being looked at.
 
     Attributes:
-        pair: the two robots whose order led to the node.
-        children: its children that are left, each with the two robots that it orders.
+        pair: two robots in conflict, one of which has priority in each child.
+        children: that are left.
         blamed: robots whose orders have a part in all failures so far, shape (R,).
     """
 
-    pair: tuple[int, ...]
-    children: Iterator[tuple[tuple[int, ...], _Node]]
+    pair: list[int]
+    children: Iterator[_Node]
     blamed: np.ndarray
 
     @staticmethod
-    def of(node: _Node, pair: tuple[int, ...], planning: MotionPlanning) -> _Frame:
+    def of(node: _Node, planning: MotionPlanning) -> _Frame:
         """Return a node whose children are all left."""
-        blamed = np.zeros(len(node.motions), bool)
-        return _Frame(pair, _children(node, planning, blamed), blamed)
+        pair, blamed = _pair(node), np.zeros(len(node.motions), bool)
+        blamed[pair] = True
+        return _Frame(pair, _children(node, pair, planning, blamed), blamed)
 
 
-def _children(
-    node: _Node, planning: MotionPlanning, blamed: np.ndarray
-) -> Iterator[tuple[tuple[int, ...], _Node]]:
-    """Yield the nodes in which one of two robots in conflict has priority, and the two.
+def _pair(node: _Node) -> list[int]:
+    """Return the two robots whose motions conflict soonest.
 
-    The two are those whose motions conflict soonest. Conflicts of robots that have been
-    given priorities come before all others: so a dead end is met soon after the choice
-    that leads there. One that stands is given priority first, else the robot with the
-    longer motion; the other order is looked at only where that leaves as many
-    conflicts, or leads nowhere. `blamed` receives the robots in question where there is
-    no motion.
+    Conflicts of robots that have been given priorities come before all others: so a
+    dead end is met soon after the choice that leads there. One that stands comes last,
+    else the robot with the longer motion.
     """
     ordered = node.above.any(axis=0) | node.above.any(axis=1)
     conflict = np.where(np.logical_or.outer(ordered, ordered), node.conflict, np.inf)
     if not np.isfinite(conflict).any():
         conflict = node.conflict
     pair = divmod(int(conflict.argmin()), len(node.motions))
-    low, high = sorted(pair, key=lambda r: len(node.motions[r].control) or np.inf)
-    blamed[list(pair)] = True
+    return sorted(pair, key=lambda r: len(node.motions[r].control) or np.inf)
+
+
+def _children(
+    node: _Node, pair: list[int], planning: MotionPlanning, blamed: np.ndarray
+) -> Iterator[_Node]:
+    """Yield the nodes in which one of two robots in conflict has priority.
+
+    The second one is given priority first; the other order is looked at only where that
+    leaves as many conflicts, or leads nowhere. `blamed` receives the robots in question
+    where there is no motion.
+    """
     found = []
-    for one, other in ((low, high), (high, low)):
+    for one, other in (pair, pair[::-1]):
         if node.above[other, one]:
             blamed[node.above[other]] = True
             continue
         child = _with_priority(node, one, other, planning, blamed)
         if child is not None and child.cost < node.cost:
-            yield pair, child
+            yield child
         elif child is not None:
             found.append(child)
-    yield from ((pair, child) for child in sorted(found, key=lambda child: child.cost))
+    yield from sorted(found, key=lambda child: child.cost)
 
 
 def _with_priority(
