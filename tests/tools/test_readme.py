@@ -72,7 +72,7 @@ def test_every_command_line_is_understood(line: str) -> None:
 def test_every_tool_exists_with_its_options(tool: str, arguments: str) -> None:
     assert os.access(ROOT / "tools" / tool, os.X_OK)
     own = "\n".join(map(tool_source, (tool, f"{tool}.py")))
-    imported = re.findall(r"^from (\w+) import", own, re.MULTILINE)
+    imported = re.findall(r"^(?:from|import) (\w+)", own, re.MULTILINE)
     texts = [own, *(tool_source(f"{name}.py") for name in imported)]
     assert set(OPTION.findall(arguments)) <= set(OPTION.findall("\n".join(texts)))
 
