@@ -166,6 +166,23 @@ def footprint_is_clear(space, placed, cx, cy, radius, margin):
 
 
 @kernel
+def footprint_distance(space, placed, cx, cy, radius):
+    """Return the distance of a placed footprint from the nearest edge [m].
+
+    It is at most what the free space's `reach` has beyond the radius.
+    """
+    column = min(
+        max(int((cx - space.x_min) / space.bucket), 0), space.bucket_columns - 1
+    )
+    row = min(max(int((cy - space.y_min) / space.bucket), 0), space.bucket_rows - 1)
+    b, nearest = row * space.bucket_columns + column, space.reach - radius
+    for e in space.bucket_edge[space.bucket_start[b] : space.bucket_start[b + 1]]:
+        edge = space.edge[e].reshape(2, 2)
+        nearest = min(nearest, convex_distance(placed, edge, nearest))
+    return nearest
+
+
+@kernel
 def edges_are_clear(edge, near, placed, margin):
     """Return whether a placed footprint keeps `margin` from some edges; exact.
 

@@ -7,7 +7,7 @@ import numpy as np
 from mrmg.compilation import kernel
 from mrmg.motion._kernels import step
 from mrmg.planning.path_following._following_kernels import at_rest, track_control
-from mrmg.planning.problem._clearance_kernels import clear_of_obstacles
+from mrmg.planning.problem._clearance_kernels import moves_clear
 from mrmg.planning.problem._target_kernels import askew, in_target
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.world._kernels import multiplier_in
@@ -49,7 +49,7 @@ def drive(own, spaces, terrain, course, dt, spent_s, state, control):
         if stood == 0:
             spent += dt * multiplier_in(terrain, state[k, 0], state[k, 1])
         strays = abs(off) > STRAYED_M
-        if strays or not clear_of_obstacles(own, spaces, state[k + 1], corner):
+        if strays or not moves_clear(own, spaces, state[k], state[k + 1], corner):
             return k + 1, False
     return len(control), False
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from math import hypot
+
 from mrmg.compilation import kernel
 from mrmg.planning.roadmap._fleet_kernels import middle_at, space_of
-from mrmg.world._kernels import clearance_at_least, footprint_is_clear
-from mrmg.world._polygon_kernels import place_footprint
-
-
-@kernel
-def clear_of_obstacles(own, spaces, state, corner):
-    """Return whether a robot keeps its margin from obstacles; see `keeps_clear`."""
-    return keeps_clear(own, spaces, state, own[0].margin, corner)
+from mrmg.world._kernels import (
+    clearance_at_least,
+    footprint_distance,
+    footprint_is_clear,
+)
+from mrmg.world._polygon_kernels import BULGE, place_footprint
 
 
 @kernel
@@ -32,3 +32,44 @@ def keeps_clear(own, spaces, state, margin, corner):
         return True
     place_footprint(own[0].corner[:n], state[0], state[1], state[2], corner[:n])
     return footprint_is_clear(space, corner[:n], cx, cy, radius, margin)
+
+
+@kernel
+def moves_clear(own, spaces, before, state, corner):
+    """Return whether a robot keeps its margin after a step, and touches nothing in it.
+
+    Where its margins before and after it are less than what it moves, it is followed
+    through the step by conservative advancement, as in `pass_apart`.
+
+    Args:
+        own: the robot, shape (1,).
+        spaces: free spaces of the fleet.
+        before, state: its states.
+        corner: room for a footprint, shape (M, 2).
+    """
+    margin, radius = own[0].margin, own[0].radius
+    if not keeps_clear(own, spaces, state, margin, corner):
+        return False
+    space = space_of(spaces, own[0].space)
+    reach = radius + hypot(own[0].middle[0], own[0].middle[1])
+    way = hypot(state[0] - before[0], state[1] - before[1])
+    way += reach * abs(state[2] - before[2])
+    if way <= 2.0 * margin and space.allowance.shape[0] == 0:
+        return True
+    footprint, t = own[0].corner[: own[0].corners], 0.0
+    cx, cy = middle_at(own[0], state)
+    if clearance_at_least(space, cx, cy) > radius + way:
+        return True
+    pose = state[:3].copy()
+    while True:
+        placed = corner[: len(footprint)]
+        place_footprint(footprint, pose[0], pose[1], pose[2], placed)
+        cx, cy = middle_at(own[0], pose)
+        distance = footprint_distance(space, placed, cx, cy, radius)
+        if distance >= (1.0 - t) * way:
+            return True
+        if distance < BULGE * way:
+            return False
+        t += distance / way
+        for i in range(3):
+            pose[i] = state[i] + t * (before[i] - state[i])

@@ -14,7 +14,7 @@ from shapely.geometry import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.planning.free_ground import Bottleneck, FreeGround, bottleneck
-from mrmg.planning.problem._clearance_kernels import clear_of_obstacles
+from mrmg.planning.problem._clearance_kernels import keeps_clear
 from mrmg.planning.problem.targets import target_depth_m
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS, Spaces
 from mrmg.planning.roadmap.fleet import PASSAGE_SLACK_M, margins_of
@@ -190,7 +190,9 @@ def cramped_starts(fleet: np.ndarray, spaces: Spaces, start: np.ndarray) -> list
     return [
         r
         for r in range(len(fleet))
-        if not clear_of_obstacles(fleet[r : r + 1], spaces, start[r], corner)
+        if not keeps_clear(
+            fleet[r : r + 1], spaces, start[r], fleet[r]["margin"], corner
+        )
     ]
 
 

@@ -22,7 +22,7 @@ from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
     MOST_PIECES,
     reeds_shepp,
 )
-from mrmg.planning.problem._clearance_kernels import clear_of_obstacles
+from mrmg.planning.problem._clearance_kernels import moves_clear
 from mrmg.planning.problem._control_kernels import braking_control, control_towards
 from mrmg.planning.problem._region_kernels import in_region
 
@@ -97,7 +97,7 @@ def clear(own, spaces, zones, traffic, state, count, first, corner):
     """
     busy = traffic.busy
     for k in range(count, 0, -1):  # where a motion ends most is in the way
-        if not clear_of_obstacles(own, spaces, state[k], corner[0]):
+        if not moves_clear(own, spaces, state[k - 1], state[k], corner[0]):
             return False
         for zone in range(len(zones.zone)):
             j = min(first + k, busy.shape[1] - 1)
@@ -279,6 +279,6 @@ def drive_curve(search, course, corner, state, control):
         u1, u2, segment, _, _ = track_control(own, course, segment, LONG, state[k], dt)
         control[k, 0], control[k, 1] = u1, u2
         step(own[0], state[k], u1, u2, dt, state[k + 1])
-        if not clear_of_obstacles(own, search.spaces, state[k + 1], corner):
+        if not moves_clear(own, search.spaces, state[k], state[k + 1], corner):
             return -1
     return -1
