@@ -218,7 +218,7 @@ def _obstacle(problem: Problem, request: Request, search: Search) -> str:
     )
     blocked = [search.blocked] if search.blocked else []
     if any(routing.tours) or any(r.finish for r in scene.robots) or not blocked:
-        blocked.append(narrowest_meeting(problem, routing.tours))
+        blocked.append(narrowest_meeting(problem, routing.tours, params.margins))
     return endings.NO_PROGRESS.format(blocked="; ".join(blocked), searched=searched)
 
 
@@ -242,8 +242,9 @@ def _headings_in_the_way(scene: Scene, request: Request) -> list[str]:
             for robot in scene.robots
         ),
     )
-    own = Frame.of(free).scene(free)
-    problem = state_mission(own, request.seed, request.params)
+    frame = Frame.of(free, request.params.margins)
+    params = frame.params(request.params)
+    problem = state_mission(frame.scene(free), request.seed, params)
     found = path_following(problem, request)
     return goals + [f"the finish of {name}" for name in headed] if found.plans else []
 

@@ -117,7 +117,8 @@ def _out_of_own_reach(
 
 def energy_and_metres(energy_J: float, robot: Robot) -> str:
     """Return an energy in words, for one robot in metres of plain ground, too."""
-    metres = energy_J / robot.model.energy_model.plain_ground_J_per_m()
+    units = energy_J / robot.model.energy_model.plain_ground_J_per_m()
+    metres = units * robot.model.unit_m
     return f"{energy_J:.0f} J ({metres:.1f} m of plain ground)"
 
 

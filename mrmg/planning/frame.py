@@ -5,13 +5,17 @@ over the map from west to east; a search that draws by chance would go another w
 the same mission elsewhere. So planning moves the map's corner to the origin and turns
 the map by quarters until the fleet starts in its lower left, and replays the controls
 it found where the mission really is.
+
+Lengths that planning is made for, such as a grid's cells, are those of robots about a
+metre long. For a fleet of much smaller or larger ones all lengths are stated in another
+unit, and masses so that energies stay what they are.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import compress
-from math import pi, remainder, tau
+from math import log2, pi, remainder, sqrt, tau
 from typing import TypeVar
 
 import numpy as np
@@ -23,10 +27,14 @@ from mrmg.planning.assembly import make_plan
 from mrmg.planning.attempt import Attempt
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.problem.problem import Problem
+from mrmg.planning.roadmap.fleet import margins_of
 from mrmg.plans import Plan
 from mrmg.scene.elevation import Elevation
+from mrmg.scene.margins import STATES_NONE, Margins, TrackingError
 from mrmg.scene.region import Region
+from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Finish, Goal, Robot, Scene
+from mrmg.world.world import MARGIN_M
 
 _Target = TypeVar("_Target", Goal, Finish)
 
@@ -41,6 +49,19 @@ SEAM_RAD = 0.01
 """Headings lie within a half turn of this, so that 3.1416 stays what it is."""
 
 
+ORDINARY_M = (0.15, 2.0)
+"""Radii of circles about robots for which a metre is the unit: of the fleet's the
+geometric mean counts."""
+
+USUAL_M = 0.8
+"""Radius that the others have in theirs, but for a power of two: so nothing is rounded
+differently."""
+
+MOST_AREA = 2.5e5
+"""Area of the map in squares of a unit smaller than a metre, at most: it bounds the
+cells of grids."""
+
+
 @dataclass(frozen=True, slots=True)
 class Frame:
     """Where a map is moved to be planned on.
@@ -48,37 +69,49 @@ class Frame:
     Attributes:
         bounds: of the map as it lies [m].
         quarters: quarter turns to the left, 0-3.
+        margins: stated for all robots; the robots' own count where they state none.
+        unit_m: unit of all lengths in the frame [m].
     """
 
     bounds: tuple[float, float, float, float]
     quarters: int
+    margins: Margins = STATES_NONE
+    unit_m: float = 1.0
 
     @staticmethod
-    def of(scene: Scene) -> Frame:
+    def of(scene: Scene, margins: Margins = STATES_NONE) -> Frame:
         """Return a scene's frame.
 
-        Maps are not turned if the fleet starts all around the middle, nor moved or
-        turned if a robot has a user's motion, which may depend on the place.
+        Maps are not turned if the fleet starts all around the middle, and stay as they
+        are if a robot has a user's motion, which may depend on the place.
         """
         if any(robot.model.motion_model not in MODEL_ID for robot in scene.robots):
-            return Frame((0.0, 0.0, *scene.bounds[2:]), 0)
+            return Frame((0.0, 0.0, *scene.bounds[2:]), 0, margins, 1.0)
+        unit_m = _unit_m(scene, margins)
         x_min, y_min, x_max, y_max = scene.bounds
         start = np.array([robot.pose[:2] for robot in scene.robots])
         offset = start - (0.5 * (x_min + x_max), 0.5 * (y_min + y_max))
         for x, y in (offset.mean(axis=0), offset[0]):
             for quarters in range(4):
                 if x < CENTRED_M and y <= -CENTRED_M:
-                    return Frame(scene.bounds, quarters)
+                    return Frame(scene.bounds, quarters, margins, unit_m)
                 x, y = -y, x
-        return Frame(scene.bounds, 0)
+        return Frame(scene.bounds, 0, margins, unit_m)
 
     @property
     def is_the_maps(self) -> bool:
         """Whether the map lies in this frame already."""
-        return self.quarters == 0 and self.bounds[:2] == (0.0, 0.0)
+        moved = self.quarters != 0 or self.bounds[:2] != (0.0, 0.0)
+        return not moved and self.unit_m == 1.0
+
+    def params(self, params: PlannerParams) -> PlannerParams:
+        """Return parameters for the mission in the frame."""
+        if self.unit_m == 1.0:
+            return params
+        return replace(params, obstacle_margin_m=None, robot_margin_m=None)
 
     def points(self, xy: np.ndarray) -> np.ndarray:
-        """Return where points of the map are in the frame [m], shape (n, 2)."""
+        """Return where points of the map are in the frame, shape (n, 2)."""
         x_min, y_min, x_max, y_max = self.bounds
         x, y = np.asarray(xy, float).reshape(-1, 2).T
         moved = (
@@ -88,12 +121,12 @@ class Frame:
             (y - y_min, x_max - x),
         )[self.quarters]
         # -0.0 and 0.0 would be different bits.
-        return np.round(np.stack(moved, axis=1), DECIMALS) + 0.0
+        return np.round(np.stack(moved, axis=1) / self.unit_m, DECIMALS) + 0.0
 
     def on_the_map(self, point: tuple[float, float]) -> tuple[float, float]:
         """Return where a point of the frame is on the map [m]."""
         x_min, y_min, x_max, y_max = self.bounds
-        across, up = point
+        across, up = point[0] * self.unit_m, point[1] * self.unit_m
         return (
             (across + x_min, up + y_min),
             (up + x_min, y_max - across),
@@ -142,13 +175,26 @@ class Frame:
             # Scene files leave the lowest, or of two the left one, for the last.
             lowest = np.lexsort(corners.T)[0]
             corners = np.roll(corners, -1 - lowest, axis=0)
-        return replace(region, center=self.points(region.center)[0], corners=corners)
+        return replace(
+            region,
+            center=self.points(region.center)[0],
+            radius_m=region.radius_m / self.unit_m,
+            corners=corners,
+        )
 
     def _robot(self, robot: Robot) -> Robot:
         (x, y), yaw = self.points(np.array(robot.pose[:2]))[0], robot.pose[2]
         finish = robot.finish and self._target(robot.finish)
         pose = (float(x), float(y), self.heading(yaw))
-        return replace(robot, pose=pose, finish=finish)
+        placed = replace(robot, pose=pose, finish=finish)
+        if self.unit_m == 1.0:
+            return placed
+        obstacle_m, robot_m = margins_of(robot, self.margins)
+        margins = Margins(
+            obstacle_m=obstacle_m / self.unit_m, robot_m=robot_m / self.unit_m
+        )
+        model = in_unit(robot.model, self.unit_m)
+        return replace(placed, model=model, margins=margins)
 
     def _target(self, target: _Target) -> _Target:
         yaw = target.heading_rad
@@ -160,9 +206,58 @@ class Frame:
 
     def _heights(self, height_m: np.ndarray) -> np.ndarray:
         # Rows go from south to north, so that a turn to the left is one to the right.
-        turned = np.ascontiguousarray(np.rot90(height_m, -self.quarters))
+        turned = np.rot90(height_m, -self.quarters) / self.unit_m
+        turned = np.ascontiguousarray(turned)
         turned.setflags(write=False)
         return turned
+
+
+def _unit_m(scene: Scene, margins: Margins) -> float:
+    """Return the unit of lengths for a scene's robots [m]."""
+    outlines = [robot.model.footprint_m for robot in scene.robots]
+    middles = [0.5 * (one.min(axis=0) + one.max(axis=0)) for one in outlines]
+    radii = [
+        float(np.hypot(*(one - middle).T).max())
+        for one, middle in zip(outlines, middles, strict=True)
+    ]
+    radius_m = float(np.exp(np.mean(np.log(radii))))
+    if ORDINARY_M[0] <= radius_m <= ORDINARY_M[1]:
+        return 1.0
+    unit_m = float(2.0 ** round(log2(radius_m / USUAL_M)))
+    x_min, y_min, x_max, y_max = scene.bounds
+    widest_m = max(margins_of(robot, margins)[0] for robot in scene.robots)
+    least_m = max(
+        sqrt((x_max - x_min) * (y_max - y_min) / MOST_AREA), widest_m / MARGIN_M
+    )
+    while unit_m < min(least_m, 1.0):
+        unit_m *= 2.0
+    return unit_m
+
+
+def in_unit(model: RobotModel, unit_m: float) -> RobotModel:
+    """Return a robot model with lengths in another unit, and energies as they are."""
+    limits, error = model.limits, model.tracking_error
+    return replace(
+        model,
+        unit_m=unit_m,
+        footprint_m=model.footprint_m / unit_m,
+        height_m=model.height_m / unit_m,
+        wheelbase_m=model.wheelbase_m / unit_m,
+        track_m=model.track_m / unit_m,
+        limits=replace(
+            limits,
+            v_min_m_s=limits.v_min_m_s / unit_m,
+            v_max_m_s=limits.v_max_m_s / unit_m,
+            u1_max_m_s2=limits.u1_max_m_s2 / unit_m,
+        ),
+        mass_kg=model.mass_kg * unit_m**2,
+        center_of_mass_m=model.center_of_mass_m / unit_m,
+        wheel_radius_m=model.wheel_radius_m / unit_m,
+        tracking_error=error
+        and TrackingError(
+            nominal_m=error.nominal_m / unit_m, disturbed_m=error.disturbed_m / unit_m
+        ),
+    )
 
 
 def on_the_map(
@@ -193,10 +288,14 @@ def _moved(
 
     None if accounting refuses what it accepted a nanometre away.
     """
-    start = np.zeros_like(problem.start)
+    start, fleet = np.zeros_like(problem.start), problem.mission.fleet.copy()
     start[:, :3] = [robot.pose for robot in scene.robots]
-    problem = replace(problem, scene=scene, start=start)
+    units_m = [robot.model.unit_m for robot in problem.scene.robots]
+    fleet["wheelbase"] *= units_m
+    mission = problem.mission._replace(fleet=fleet)
+    problem = replace(problem, scene=scene, start=start, mission=mission)
     trajectories = [
-        problem.trajectory(r, one.control) for r, one in enumerate(plan.trajectories)
+        problem.trajectory(r, one.control * (unit_m, 1.0))
+        for r, (one, unit_m) in enumerate(zip(plan.trajectories, units_m, strict=True))
     ]
     return make_plan(problem, plan.seed, params, trajectories, plan.tours)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -13,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from mrmg.planning.endings import listed
 from mrmg.planning.frame import Frame
 from mrmg.planning.problem.problem import Problem
+from mrmg.scene.margins import STATES_NONE, Margins
 
 MOST_ROBOTS = 40
 """Robots whose paths are compared at most."""
@@ -27,14 +29,21 @@ SPACING_M = 0.2
 """Distance of the points of paths that are looked at [m]."""
 
 
-def narrowest_meeting(problem: Problem, tours: Sequence[Sequence[int]]) -> str:
+def narrowest_meeting(
+    problem: Problem,
+    tours: Sequence[Sequence[int]],
+    margins: Margins = STATES_NONE,
+) -> str:
     """Return which robots' ways meet where there is least room, in words.
 
     Args:
         problem: the mission as it lies, with arrays in its frame.
         tours: numbers of each robot's targets, without finishes.
+        margins: stated for all robots.
     """
     scene = problem.scene
+    frame = Frame.of(scene, margins)
+    problem = replace(problem, scene=frame.scene(scene))
     finish = problem.mission.targets.finish
     paths = [
         _points(problem.path(r, [*tour, *[int(finish[r])] * int(finish[r] >= 0)]))
@@ -67,7 +76,7 @@ def narrowest_meeting(problem: Problem, tours: Sequence[Sequence[int]]) -> str:
             return f"no motions were found of {listed(names)}"
         _, pair, at = min(found)
         what = f"the narrowest place on the way of {names[pair[0]]} is"
-    x, y = Frame.of(scene).on_the_map((at[0], at[1]))
+    x, y = frame.on_the_map((at[0], at[1]))
     stopping = [o.shape for o in scene.barriers if o.stops(names[pair[0]])]
     walls = shapely.union_all([shapely.box(*scene.bounds).boundary, *stopping])
     near_m, width_m = _room_between(walls, Point(x, y))

@@ -177,16 +177,15 @@ class _Planning:
 
     def result(self, with_bound: bool) -> PlanResult:
         """Return the result of planning."""
-        own = Frame.of(self.scene).scene(self.scene)
+        frame = Frame.of(self.scene, self.params.margins)
+        own, params = frame.scene(self.scene), frame.params(self.params)
         bounding = self._bounding(own) if with_bound else None
         load_kernels(self.params.planner, every=self.params.budget_s is not None)
         for robot in own.robots:
             motion_addresses(robot.model)
         self.statistics.begin()
         proofs = Proofs(self.scene, self.params.dt_s, self.request.halt)
-        problem = self._in_time(
-            partial(state_mission, own, self.request.seed, self.params)
-        )
+        problem = self._in_time(partial(state_mission, own, self.request.seed, params))
         self.statistics.time_s["init"] = self.statistics.elapsed()
         if problem is None:
             proof = self._in_time(partial(proofs.reason, tours_missing=False))
@@ -262,7 +261,8 @@ class _Planning:
 
         @cache
         def tight() -> Problem | None:
-            near = with_least_spacing(problem.scene, self.params.margins)
+            stated = Frame.of(self.scene, self.params.margins).params(self.params)
+            near = with_least_spacing(problem.scene, stated.margins)
             bare = replace(self.params, obstacle_margin_m=None, robot_margin_m=None)
             tighter = tightened(near, self.request.seed, bare)
             # Plans are of the scene as it is.

@@ -150,7 +150,8 @@ def _plan_smallest(params: PlannerParams) -> None:
 @cache
 def _smallest_mission() -> tuple[Scene, Problem]:
     scene = _smallest_scene()
-    return scene, state_mission(Frame.of(scene).scene(scene), 0, SMALL_PARAMS)
+    own = Frame.of(scene).scene(scene)
+    return scene, state_mission(own, 0, SMALL_PARAMS)
 
 
 @cache

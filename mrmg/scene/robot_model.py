@@ -123,6 +123,7 @@ class RobotModel(ByContent):
         files: what the MJCF and a custom motion consist of, read when the model was
             made.
         origin: where it was loaded from; None for one made in memory.
+        unit_m: unit of its lengths [m]: a metre, but for planning (`planning.frame`).
     """
 
     name: str
@@ -154,6 +155,7 @@ class RobotModel(ByContent):
     tracking_error: TrackingError | None = None
     files: ModelFiles = ModelFiles((), ())
     origin: ModelOrigin | None = None
+    unit_m: float = 1.0
 
     def __post_init__(self) -> None:
         named = (self.mjcf, Path(self.motion_model) if self.has_custom_motion else None)
@@ -204,7 +206,7 @@ class RobotModel(ByContent):
     @property
     def energy_model(self) -> EnergyModel:
         """The energy model with this robot's coefficients."""
-        weight_N = self.mass_kg * GRAVITY_M_S2
+        weight_N = self.mass_kg * GRAVITY_M_S2 / self.unit_m
         full = EnergyModel(
             rolling_force_N=self.rolling_coefficient * weight_N,
             turning_force_N=self.turning_coefficient * weight_N,

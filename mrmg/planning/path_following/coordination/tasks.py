@@ -20,8 +20,8 @@ from mrmg.planning.problem.problem import Problem
 MOTION_SHARE = 0.6
 """Way that a motion leads at full speed, in lengths of the robot."""
 
-MOTION_S = (0.3, 1.2)
-"""Time that a motion lasts, at least and at most [s]."""
+LEAST_MOTION_S = 0.3
+"""Time that a motion lasts at least [s]."""
 
 BEARINGS = 8
 """Directions in which a custom motion model is steered."""
@@ -55,8 +55,7 @@ LEAST_STEPS = 1500
 def motion_steps(robot: np.ndarray, dt_s: float, fineness: float) -> int:
     """Return the number of steps that a robot's motions last."""
     way_m = MOTION_SHARE * 2.0 * float(robot["radius"]) / fineness
-    least_s, most_s = MOTION_S
-    lasting_s = min(most_s, max(least_s, way_m / float(robot["limit"][1])))
+    lasting_s = max(LEAST_MOTION_S, way_m / float(robot["limit"][1]))
     return ceil(lasting_s / dt_s - 1e-9)
 
 
