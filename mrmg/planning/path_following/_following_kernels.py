@@ -32,6 +32,10 @@ ASKEW = 0.1
 FAR_ASKEW = 1.0
 """... and beyond which it stops to do so [rad]."""
 
+CREEPING, STANDING, PREVIEWED = 0.02, 0.05, 0.2
+"""Speeds with which a robot arrives at least, below which it counts as standing, and
+with which the path is looked at ahead at least: in units of its `pace`."""
+
 TURNING_SHARE = 0.5
 """Share of the acceleration of turning with which a turn on the spot is slowed down."""
 
@@ -121,6 +125,12 @@ def turning_rate(own, angle):
 
 
 @kernel
+def pace(robot):
+    """Return the unit of low speeds: 1 m/s, or the robot's top speed if it is less."""
+    return min(1.0, robot.limit[1])
+
+
+@kernel
 def follow(own, course, i, state):
     """Return (segment, way, way left in this gear, off the path, wanted v and w)."""
     i, s = advance(course, i, state[0], state[1])
@@ -140,12 +150,13 @@ def follow(own, course, i, state):
     left = course.node[course.node[i].end].way - s
     top = own[0].limit[1] if gear > 0 else -own[0].limit[0]
     ease = course.ease
-    v = min(top, sqrt(2.0 * ease * max(left - 0.5 * ARRIVED_M, 0.0)) + 0.02)
+    slow = pace(own[0])
+    v = min(top, sqrt(2.0 * ease * max(left - 0.5 * ARRIVED_M, 0.0)) + CREEPING * slow)
     near = max(course.node[i + 1].way - s, 0.0)
     v = min(v, sqrt(course.node[i + 1].fastest ** 2 + 2.0 * ease * near))
-    ahead = s + max(abs(state[3]), 0.2) * PREVIEW_S
+    ahead = s + max(abs(state[3]), PREVIEWED * slow) * PREVIEW_S
     bend = bend_at(course, i, ahead)
-    standing = abs(state[3]) < 0.05
+    standing = abs(state[3]) < STANDING * slow
     stiffness = course.stiffness
     bend -= stiffness * stiffness * off + 2.0 * stiffness * sin(askew)
     if own[0].model == UNICYCLE:

@@ -9,7 +9,11 @@ import numpy as np
 from mrmg.energy.model import EFFECTIVE_MASS_KG, ROLLING_N
 from mrmg.motion._kernels import CAR, UNICYCLE, USER
 from mrmg.planning.path_following import _tracking_kernels
-from mrmg.planning.path_following._following_kernels import COURSE_NODE, Course
+from mrmg.planning.path_following._following_kernels import (
+    COURSE_NODE,
+    Course,
+    pace,
+)
 from mrmg.planning.path_following.band import Path, nimble_share
 from mrmg.planning.path_following.cost_map import path_curvature
 from mrmg.planning.problem.problem import Problem
@@ -32,8 +36,8 @@ planned."""
 HARD_SHARE = 0.9
 """Share of the largest deceleration that robots in a hurry brake with."""
 
-CRAWL_M_S = 0.3
-"""Speed to which sharp turns slow down at least."""
+CRAWL = 0.3
+"""Speed to which sharp turns slow down at least, in units of the robot's `pace`."""
 
 STIFFNESS = 0.8
 """How fast robots return to their paths [1/m]; nimbler ones faster."""
@@ -164,7 +168,7 @@ def steerable_speeds(problem: Problem, r: int, node: np.ndarray) -> np.ndarray:
         sharp = np.minimum(np.abs(bend[1:]), np.abs(bend[:-1]))
         arm = float(robot["wheelbase"])
         speed = limit[4] * (1.0 + (arm * sharp) ** 2) / (arm * change)
-    speed = np.maximum(speed, CRAWL_M_S)
+    speed = np.maximum(speed, CRAWL * pace(robot))
     return np.asarray(np.minimum(np.append(speed, np.inf), np.insert(speed, 0, np.inf)))
 
 
