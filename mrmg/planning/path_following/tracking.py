@@ -22,8 +22,9 @@ from mrmg.planning.problem.time_weighting import brakes_hard
 SLOWEST = 4
 """Driving may take so many times as long as the path does at full speed."""
 
-LEAST_STEPS = 400
-"""Steps that driving may take in any case."""
+LEAST_STEPS, BRAKINGS = 400, 4.0
+"""Steps that driving may take in any case, or times as long as braking from full speed
+takes for each stretch of the path."""
 
 COASTING_SHARE = 0.95
 """Share of rolling resistance's deceleration that robots slow down with."""
@@ -78,7 +79,9 @@ def drive_alone(problem: Problem, r: int, path: Path) -> Drive:
     own = problem.mission.fleet[r : r + 1]
     top = float(np.abs(own[0]["limit"][:2]).min())
     longest_s = SLOWEST * float(path.way[-1]) / top + float(path.pause_s.sum())
-    most = int(longest_s / problem.dt_s) + LEAST_STEPS
+    brakings_s = BRAKINGS * len(path.edges) * top / float(own[0]["limit"][3])
+    more = max(LEAST_STEPS, int(brakings_s / problem.dt_s))
+    most = int(longest_s / problem.dt_s) + more
     state, control = np.zeros((most + 1, 5)), np.zeros((most, 2))
     state[0] = problem.start[r]
     spent_s = np.full(len(path.node), np.inf)

@@ -26,8 +26,8 @@ from mrmg.planning.problem._control_kernels import braking_control, stands, wrap
 from mrmg.planning.problem._target_kernels import at_target, in_target
 from mrmg.planning.roadmap._heap_kernels import push
 
-MOST_BRAKING_STEPS = 300
-"""Steps within which every robot comes to rest."""
+ROOM_STEPS = 300
+"""Steps that are left for braking at least."""
 
 HOME_STEPS = 4000
 """Steps that driving home may take."""
@@ -49,10 +49,20 @@ LEAST_NEARNESS = 0.2
 
 
 @kernel
+def braking_steps(own, dt):
+    """Return steps within which a robot comes to rest from any speed."""
+    limit = own[0].limit
+    stop_s = max(limit[1], -limit[0]) / limit[3]
+    if own[0].model != CAR:
+        stop_s = max(stop_s, limit[2] / limit[4])
+    return max(ROOM_STEPS, int(stop_s / dt) + 2)
+
+
+@kernel
 def brake(own, dt, state, control):
     """Write the braking from state[0] until the robot stands; return the steps."""
-    k = 0
-    while k < MOST_BRAKING_STEPS and not stands(own, 0, state[k]):
+    k, most = 0, braking_steps(own, dt)
+    while k < most and not stands(own, 0, state[k]):
         u1, u2 = braking_control(own, 0, state[k], dt)
         control[k, 0], control[k, 1] = u1, u2
         step(own[0], state[k], u1, u2, dt, state[k + 1])
@@ -71,7 +81,7 @@ def steer_to(search, target, state, control):
     aim = targets.target[target]
     center, heading, near = aim.center, aim.heading, 0.5 * aim.reach
     arrived = False
-    for k in range(min(HOME_STEPS, len(control) - MOST_BRAKING_STEPS)):
+    for k in range(min(HOME_STEPS, len(control) - braking_steps(own, dt))):
         here = state[k]
         gap = hypot(center[0] - here[0], center[1] - here[1])
         arrived = gap < (2.0 * near if arrived else near)

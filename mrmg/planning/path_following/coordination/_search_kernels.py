@@ -17,8 +17,8 @@ from mrmg.compilation import borrowed, kernel
 from mrmg.motion._kernels import USER, copy_numbers
 from mrmg.planning.path_following._following_kernels import advance
 from mrmg.planning.path_following.coordination._end_kernels import (
-    MOST_BRAKING_STEPS,
     brake,
+    braking_steps,
     conflict_cost,
     drive_to,
     end_from,
@@ -160,7 +160,8 @@ def stand(search, nodes, room, a, motion, tail, last):
         tail, last: steps from node a on.
     """
     task, first = search.task, nodes.node[a].step
-    if first + last + MOST_BRAKING_STEPS >= len(room.control):
+    stop = braking_steps(search.own, search.dt)
+    if first + last + stop >= len(room.control):
         return
     for k in range(tail, last):
         copy_numbers(room.state[k], room.state[k + 1])
@@ -189,8 +190,8 @@ def visit(search, nodes, room, a):
     task, first, leg = search.task, nodes.node[a].step, nodes.node[a].leg
     copy_numbers(nodes.state[a], room.state[0])
     count = drive_to(search, task.leg[leg], room, room.control)
-    last = first + count
-    if count < 0 or last + MOST_BRAKING_STEPS >= len(room.control):
+    last, stop = first + count, braking_steps(search.own, search.dt)
+    if count < 0 or last + stop >= len(room.control):
         return
     after = room.state[count]
     if not at_target(search.targets, task.leg[leg], after):
@@ -270,11 +271,12 @@ def follow_path(search, nodes, room, a, tries):
 
     All of them are opened for what else leads on from them.
     """
+    stop = braking_steps(search.own, search.dt)
     while a >= 0 and nodes.size[0] + WAYS_ON < search.task.most:
         tries = offer(search, nodes, room, a, tries)
         segment, first = nodes.node[a].segment, nodes.node[a].step
         on_path = 0 <= segment < search.course.size[0]
-        if not on_path or first + 2 * MOST_BRAKING_STEPS >= len(room.control):
+        if not on_path or first + 2 * stop >= len(room.control):
             return tries
         copy_numbers(nodes.state[a], room.state[0])
         nears = list_near(search, room, first, search.task.steps)
@@ -301,6 +303,7 @@ def find_motion(search, nodes, room, start, control):
     begin = 0 if search.course.size[0] > 1 else OFF_PATH
     add(search, nodes, -1, HOLD, start, (0, leg, begin, 0), 0.0)
     motions, tries, most = len(task.motion), 0, task.most
+    stop = braking_steps(search.own, search.dt)
     while nodes.size[1] > 0 and nodes.size[0] + motions + WAYS_ON < most:
         value, number = nodes.key[0], nodes.entry[0]
         nodes.size[1] = pop(nodes.key, nodes.entry, nodes.size[1])
@@ -308,7 +311,7 @@ def find_motion(search, nodes, room, start, control):
         node = nodes.node[a]
         if node.motion <= HOME:
             return write_controls(search, nodes, room, a, control)
-        if node.step + 2 * MOST_BRAKING_STEPS >= len(control):
+        if node.step + 2 * stop >= len(control):
             continue
         if widened == 0:
             tries = follow_path(search, nodes, room, a, tries)

@@ -48,8 +48,8 @@ LONG_HOLD_SHARE = 0.02
 SLOWEST = 4.0
 """Motions may take so many times as long as way and stays do at full speed ..."""
 
-LEAST_STEPS = 1500
-"""... and so many steps more."""
+LEAST_STEPS, BRAKINGS = 1500, 5.0
+"""... and so many steps more, or times as long as braking from full speed takes."""
 
 
 def motion_steps(robot: np.ndarray, dt_s: float, fineness: float) -> int:
@@ -224,4 +224,6 @@ def horizon_steps(
         spans_s.append(longest_m / float(top[r]))
         # One robot may have to wait for the stays of all others.
         standing_s += max(float(stays_s(problem, r, tour).sum()), path.pause_s.sum())
-    return int((SLOWEST * max(spans_s) + standing_s) / problem.dt_s) + LEAST_STEPS
+    stop_s = float((top / mission.fleet["limit"][:, 3]).max())
+    more = max(LEAST_STEPS, int(BRAKINGS * stop_s / problem.dt_s))
+    return int((SLOWEST * max(spans_s) + standing_s) / problem.dt_s) + more
