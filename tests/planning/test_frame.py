@@ -1,4 +1,4 @@
-"""The map's own frame: what a mission costs does not depend on where its map lies.
+"""The map's own frame: neither a map's place nor its robots' size makes a difference.
 
 Maps lie along the axes, so that turns by quarters are all there are.
 """
@@ -13,13 +13,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 import mrmg
 from mrmg.planning import PlannerParams, plan_mission
-from mrmg.planning.frame import Frame
+from mrmg.planning.frame import Frame, in_unit
 from mrmg.planning.problem.problem import state_mission
 from mrmg.plans import Plan
 from mrmg.scene.loading import scene_from_document
+from mrmg.scene.margins import Margins
+from mrmg.scene.objective import MAKESPAN
+from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
 
 SCENES = Path(__file__).parents[1] / "scenes"
@@ -176,3 +180,126 @@ def test_maps_of_robots_with_their_own_motion_stay() -> None:
     users = replace(moved, robots=(own, second))
     assert not Frame.of(moved).is_the_maps
     assert Frame.of(users).scene(users) is users
+
+
+# --- robots of other sizes ---------------------------------------------------------
+
+
+def model_of_size(model: RobotModel, size: float) -> RobotModel:
+    """Return a model so many times as long that drives as many lengths a second."""
+    limits = model.limits
+    return replace(
+        model,
+        footprint_m=size * model.footprint_m,
+        wheelbase_m=size * model.wheelbase_m,
+        track_m=size * model.track_m,
+        center_of_mass_m=size * model.center_of_mass_m,
+        wheel_radius_m=size * model.wheel_radius_m,
+        limits=replace(
+            limits,
+            v_min_m_s=size * limits.v_min_m_s,
+            v_max_m_s=size * limits.v_max_m_s,
+            u1_max_m_s2=size * limits.u1_max_m_s2,
+        ),
+    )
+
+
+def of_size(scene: Scene, size: float) -> Scene:
+    """Return a scene, its targets circles, in which all is so many times as long.
+
+    Batteries hold more where robots are faster.
+    """
+    more = max(1.0, size) ** 2
+
+    def shape(item: Any) -> Any:
+        larger = shapely.transform(item.shape, lambda points: size * points)
+        return replace(item, shape=larger)
+
+    def target(item: Any) -> Any:
+        region = item.region
+        assert not len(region.corners)
+        circle = replace(
+            region, center=size * region.center, radius_m=size * region.radius_m
+        )
+        return replace(item, region=circle)
+
+    x_min, y_min, x_max, y_max = scene.bounds
+    return replace(
+        scene,
+        bounds=(size * x_min, size * y_min, size * x_max, size * y_max),
+        obstacles=tuple(map(shape, scene.obstacles)),
+        terrain=tuple(map(shape, scene.terrain)),
+        goals=tuple(map(target, scene.goals)),
+        stations=tuple(map(target, scene.stations)),
+        robots=tuple(
+            replace(
+                robot,
+                model=model_of_size(robot.model, size),
+                pose=(size * robot.pose[0], size * robot.pose[1], robot.pose[2]),
+                finish=robot.finish and target(robot.finish),
+                battery=replace(
+                    robot.battery,
+                    capacity_J=more * robot.battery.capacity_J,
+                    start_J=more * robot.battery.start_J,
+                ),
+                margins=Margins(obstacle_m=0.1 * size, robot_m=0.2 * size),
+            )
+            for robot in scene.robots
+        ),
+    )
+
+
+@pytest.mark.parametrize("size", [2.0**-5, 2.0**-3, 4.0, 8.0])
+def test_missions_of_small_and_large_robots_are_as_easy(size: float) -> None:
+    """Lengths that suit robots of a metre are walls to some and blurred to others."""
+    scene = replace(as_it_lies("two_swap")[0], objective=MAKESPAN)
+    ordinary, other = (of_size(scene, each) for each in (1.0, size))
+    plan, same = plan_of(ordinary), plan_of(other)
+    assert mrmg.verify(other, same).violations == ()
+    assert same.makespan_s == pytest.approx(plan.makespan_s, rel=0.2)
+    assert set(same.margins.values()) == {(0.1 * size, 0.2 * size)}
+
+
+def test_fleets_that_differ_in_size_alone_are_equal_in_their_frames() -> None:
+    scene, _ = as_it_lies("station_needed")
+    frames = [Frame.of(of_size(scene, size)) for size in (2.0**-5, 2.0**-6, 2.0**5)]
+    first, *others = (
+        frame.scene(of_size(scene, size))
+        for frame, size in zip(frames, (2.0**-5, 2.0**-6, 2.0**5), strict=True)
+    )
+    assert [frame.unit_m for frame in frames] == [2.0**-5, 2.0**-6, 2.0**5]
+    for other in others:
+        assert other.bounds == first.bounds
+        for one, two in zip(first.robots, other.robots, strict=True):
+            assert one.pose == two.pose
+            assert one.margins == two.margins
+            assert one.model.limits == two.model.limits
+            assert np.array_equal(one.model.footprint_m, two.model.footprint_m)
+        for here, there in zip(first.targets(), other.targets(), strict=True):
+            assert here.region.radius_m == there.region.radius_m
+            assert np.array_equal(here.region.center, there.region.center)
+
+
+@pytest.mark.parametrize("unit_m", [0.125, 4.0])
+def test_the_unit_of_lengths_leaves_powers_as_they_are(unit_m: float) -> None:
+    model = mrmg.load_scene("quickstart").robots[0].model
+    rng = np.random.default_rng(0)
+    v, a, turn, climb = rng.uniform(-2.0, 2.0, (4, 100))
+    multiplier = rng.uniform(1.0, 3.0, 100)
+    turn = np.abs(turn)
+    powers = [
+        each.energy_model.power_parts(v / u, a / u, turn / u, multiplier, climb / u)
+        for each, u in ((model, 1.0), (in_unit(model, unit_m), unit_m))
+    ]
+    assert powers[1] == pytest.approx(powers[0], rel=1e-12)
+
+
+def test_ordinary_robots_and_wide_maps_have_metres() -> None:
+    scene, _ = as_it_lies("two_swap")
+    for size in (0.25, 1.0, 1.5):
+        assert Frame.of(of_size(scene, size)).unit_m == 1.0
+    small = of_size(scene, 2.0**-5)
+    wide = replace(small, bounds=(0.0, 0.0, 500.0, 500.0))
+    assert Frame.of(wide).unit_m == 1.0
+    keeps_away = Margins(obstacle_m=0.5)
+    assert Frame.of(small, keeps_away).unit_m == 0.5
