@@ -7,7 +7,8 @@ Every robot must be at rest within its own goal at the end (0.5 m; unicycles wit
 and with robots that have arrived included: `mrmg.verify` judges that, with true
 headings. As the files bound only the centres of robots, the bounds are wider by half a
 robot, so that centres stay within the file's. A file that is called infeasible must be
-answered so.
+answered so. `--size` makes all lengths so many times as long, margins and ways in a
+second too, and with `--slower` all takes so many times as long.
 
 Finished plans are kept in --output FILE: the same command goes on from there after an
 interruption. Rows of --json: `file`, `solved` of `runs`, `plan_s_median`, `plan_s_p95`,
@@ -23,6 +24,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -40,10 +42,12 @@ from mrmg.scene.types import Scene
 
 FOLDER = Path(__file__).resolve().parents[2] / "shared" / "kinodynamic"
 
+OBSTACLE_MARGIN_M, ROBOT_MARGIN_M = 0.08, 0.15
+
 PARAMS = PlannerParams(
     samples=600,
-    obstacle_margin_m=0.08,
-    robot_margin_m=0.15,
+    obstacle_margin_m=OBSTACLE_MARGIN_M,
+    robot_margin_m=ROBOT_MARGIN_M,
     improvements=0,
     refinements=0,
     trees=40,
@@ -62,6 +66,14 @@ LIMITS = {
     "unicycle": {"v_min": -0.5, "v_max": 0.5, "w_max": 0.5},
 }
 
+IN_LENGTHS = ("v_min", "v_max", "u1_max")
+PER_TIME = {
+    "car": {"v_min": 1, "v_max": 1, "w_max": 0, "u1_max": 2, "u2_max": 1},
+    "unicycle": {"v_min": 1, "v_max": 1, "w_max": 1, "u1_max": 2, "u2_max": 2},
+    "motion.py": {"v_min": 1, "v_max": 1, "w_max": 1, "u1_max": 1, "u2_max": 1},
+}
+"""Limits that are lengths over powers of time, and these powers by motion model."""
+
 FIRST_ORDER = Path(__file__).with_name("first_order.py").read_text()
 """Motion of the first-order unicycles, as a user would write it."""
 
@@ -76,8 +88,11 @@ def main() -> int:
     parser.add_argument(
         "--seeds", type=seed_range, default="0-9", help="first-last, default 0-9"
     )
+    parser.add_argument("--size", type=float, default=1.0, help="of all lengths")
+    parser.add_argument("--slower", type=float, default=1.0, help="of all times")
     add_file_options(parser)
     options = parser.parse_args()
+    scale = Scale(options.size, options.slower)
     files = sorted(p for p in options.folder.glob("*.yaml") if options.only in p.name)
     if not files:
         print(f"no benchmark files in {options.folder}", file=sys.stderr)
@@ -86,21 +101,52 @@ def main() -> int:
     trials = Trials(options.output)
     print("file | solved | plan_s median | p95 | makespan_s median | / straight line")
     with tempfile.TemporaryDirectory() as folder:
-        table = [bench(path, options.seeds, Path(folder), trials) for path in files]
+        table = [
+            bench(path, options.seeds, Path(folder), trials, scale) for path in files
+        ]
     ok = all(row["solved"] == row["runs"] for row in table)
     write_document(options, "bench_kinodynamic", table, ok)
     return 0 if ok else 1
 
 
-def bench(path: Path, seeds: range, folder: Path, trials: Trials) -> Row:
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """How much longer a file's lengths are made, and how much slower its robots.
+
+    Attributes:
+        size: multiple of all lengths.
+        slower: multiple of all times.
+    """
+
+    size: float = 1.0
+    slower: float = 1.0
+
+    @property
+    def params(self) -> PlannerParams:
+        """Parameters of planning."""
+        return replace(
+            PARAMS,
+            obstacle_margin_m=self.size * OBSTACLE_MARGIN_M,
+            robot_margin_m=self.size * ROBOT_MARGIN_M,
+        )
+
+
+AS_IT_IS = Scale()
+
+
+def bench(
+    path: Path, seeds: range, folder: Path, trials: Trials, scale: Scale = AS_IT_IS
+) -> Row:
     """Plan one file for all seeds; print and return its row."""
-    scene = benchmark_scene(path, folder)
-    ready = cache(partial(plan_mission, scene, seed=seeds.start, params=PARAMS))
+    scene = benchmark_scene(path, folder, scale)
+    ready = cache(partial(plan_mission, scene, seed=seeds.start, params=scale.params))
     digest = storage.bytes_digest(path.read_bytes())
     rows = []
     for seed in seeds:
-        make = partial(planned, path.stem, scene, seed, ready)
-        rows.append(trials.row(make, file=path.stem, digest=digest, seed=seed))
+        make = partial(planned, path.stem, scene, seed, ready, scale)
+        asked = {} if scale == AS_IT_IS else asdict(scale)
+        row = trials.row(make, file=path.stem, digest=digest, seed=seed, **asked)
+        rows.append(row)
         if not rows[-1]["ok"]:
             print(f"seed {seed}: {rows[-1]['fault']}", file=sys.stderr)
     times = sorted(row["plan_s"] for row in rows)
@@ -114,7 +160,7 @@ def bench(path: Path, seeds: range, folder: Path, trials: Trials) -> Row:
         "plan_s_median": statistics.median(times),
         "plan_s_p95": times[int(0.95 * (len(times) - 1))],
         "makespan_s_median": middle_s,
-        "to_straight_line": middle_s and middle_s / straight_line_s(scene),
+        "to_straight_line": middle_s and middle_s / straight_line_s(scene, scale),
         "status": rows[-1]["status"] if infeasible else None,
         "reason": rows[-1]["reason"] if infeasible else None,
     }
@@ -132,11 +178,13 @@ def is_infeasible(name: str) -> bool:
     return name.startswith("infeasible")
 
 
-def planned(name: str, scene: Scene, seed: int, ready: Callable[[], Any]) -> Row:
+def planned(
+    name: str, scene: Scene, seed: int, ready: Callable[[], Any], scale: Scale
+) -> Row:
     """Plan a file with one seed and judge the answer; return its row."""
     ready()
     began = time.perf_counter()
-    result = plan_mission(scene, seed=seed, params=PARAMS)
+    result = plan_mission(scene, seed=seed, params=scale.params)
     row: Row = {
         "file": name,
         "seed": seed,
@@ -154,33 +202,37 @@ def planned(name: str, scene: Scene, seed: int, ready: Callable[[], Any]) -> Row
     return row
 
 
-def straight_line_s(scene: Scene) -> float:
+def straight_line_s(scene: Scene, scale: Scale = AS_IT_IS) -> float:
     """Return the longest way as the crow flies at top speed [s]."""
     times = []
     for robot in scene.robots:
         assert robot.finish is not None
         way = np.hypot(*(np.array(robot.pose[:2]) - robot.finish.region.center))
-        times.append((way - 0.5) / robot.model.limits.v_max_m_s)
+        times.append((way - 0.5 * scale.size) / robot.model.limits.v_max_m_s)
     return float(max(times))
 
 
-def benchmark_scene(path: Path, folder: Path) -> Scene:
+def benchmark_scene(path: Path, folder: Path, scale: Scale = AS_IT_IS) -> Scene:
     """Return a benchmark file as a scene; writes robot models into `folder`."""
+    size = scale.size
     content = yaml.safe_load(path.read_text())
     world = content["environment"]
     robots, half = [], 0.0
     for number, entry in enumerate(content["robots"]):
-        model, width = robot_model(entry, folder)
-        half = max(half, 0.5 * width + PARAMS.obstacle_margin_m)
-        robots.append(robot_entry(f"r{number}", entry, model))
+        model, width = robot_model(entry, folder, scale)
+        half = max(half, 0.5 * width + OBSTACLE_MARGIN_M)
+        robots.append(robot_entry(f"r{number}", entry, model, size))
     low, high = world["min"], world["max"]
     document = {
         "format": 1,
         "name": path.stem,
-        "bounds": [*(float(x) - half for x in low), *(float(x) + half for x in high)],
+        "bounds": [
+            *(size * (x - half) for x in low),
+            *(size * (x + half) for x in high),
+        ],
         "obstacles": [
-            {"box": {"center": list(map(float, box["center"])),
-                     "size": list(map(float, box["size"]))}}
+            {"box": {"center": [size * x for x in box["center"]],
+                     "size": [size * x for x in box["size"]]}}
             for box in world["obstacles"]
         ],
         "robots": robots,
@@ -189,42 +241,48 @@ def benchmark_scene(path: Path, folder: Path) -> Scene:
     return scene_from_document(document, source=str(path), trust_code=True)
 
 
-def robot_entry(name: str, entry: dict[str, Any], model: str) -> dict[str, Any]:
+def robot_entry(
+    name: str, entry: dict[str, Any], model: str, size: float
+) -> dict[str, Any]:
     """Return a robot of the scene: where it starts and must end."""
     start, goal = list(map(float, entry["start"])), list(map(float, entry["goal"]))
     # Cars: x y v phi theta; unicycles: x y theta v omega.
     car = "car" in entry["type"]
     yaw = start[4] if car else start[2]
     radius = 0.5 if car else (0.05 if "first" in entry["type"] else 0.2)
-    finish: dict[str, Any] = {"circle": {"center": goal[:2], "radius": radius}}
+    center = [size * x for x in goal[:2]]
+    finish: dict[str, Any] = {"circle": {"center": center, "radius": size * radius}}
     if not car:
         finish["heading"] = goal[2]
-    return {"id": name, "model": model, "pose": [*start[:2], yaw], "finish": finish}
+    pose = [size * start[0], size * start[1], yaw]
+    return {"id": name, "model": model, "pose": pose, "finish": finish}
 
 
-def robot_model(entry: dict[str, Any], folder: Path) -> tuple[str, float]:
-    """Write a robot's model; return its folder and its longer side [m]."""
+def robot_model(entry: dict[str, Any], folder: Path, scale: Scale) -> tuple[str, float]:
+    """Write a robot's model; return its folder and its longer side in the file."""
     kind = entry["type"]
     length, width = entry.get("size", (0.5, 0.25))
-    base = folder / f"{kind}_{length}_{width}"
+    size, slower = scale.size, scale.slower
+    base = folder / f"{kind}_{length}_{width}_{size:g}_{slower:g}"
     base.mkdir(exist_ok=True)
     car = "car" in kind
-    rate = 1.0 if car else 0.25
+    limits = {**LIMITS["car" if car else "unicycle"]}
+    limits["u1_max"] = limits["u2_max"] = 1.0 if car else 0.25
     document = {
         **COMMON,
         "motion_model": "car" if car else "unicycle",
-        "wheelbase": 0.5,
+        "wheelbase": 0.5 * size,
         "footprint": [
-            [sx * length / 2, sy * width / 2]
+            [size * sx * length / 2, size * sy * width / 2]
             for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))
         ],
-        "limits": {
-            **LIMITS["car" if car else "unicycle"], "u1_max": rate, "u2_max": rate,
-        },
+        "limits": limits,
     }  # fmt: skip
     if "first_order" in kind:
         document["motion_model"] = "motion.py"
-        document["limits"] |= {"u1_max": 0.5, "u2_max": 0.5}
+        limits |= {"u1_max": 0.5, "u2_max": 0.5}
+    for name, power in PER_TIME[str(document["motion_model"])].items():
+        limits[name] *= (size if name in IN_LENGTHS else 1.0) / slower**power
         (base / "motion.py").write_text(FIRST_ORDER)
     (base / "robot.yaml").write_text(yaml.safe_dump(document))
     return str(base), float(max(length, width))

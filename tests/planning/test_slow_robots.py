@@ -1,0 +1,90 @@
+"""Robots that take a long time for their length, or to brake, as rovers do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+import mrmg
+from mrmg.planning import PlannerParams, plan_mission
+from mrmg.plans import Plan
+from mrmg.scene.robot_model import RobotModel
+from mrmg.scene.types import Scene
+
+PARAMS = PlannerParams(samples=400, improvements=0)
+
+
+def slower(model: RobotModel, times: float) -> RobotModel:
+    """Return a model that does all it does in so many times the time."""
+    limits, car = model.limits, model.motion_model == "car"
+    return replace(
+        model,
+        idle_power_W=model.idle_power_W / times,
+        device_power_W=model.device_power_W / times,
+        limits=replace(
+            limits,
+            v_min_m_s=limits.v_min_m_s / times,
+            v_max_m_s=limits.v_max_m_s / times,
+            w_max=limits.w_max if car else limits.w_max / times,
+            u1_max_m_s2=limits.u1_max_m_s2 / times**2,
+            u2_max=limits.u2_max / (times if car else times**2),
+        ),
+    )
+
+
+def with_models(scene: Scene, change: Callable[[RobotModel], RobotModel]) -> Scene:
+    robots = (replace(one, model=change(one.model)) for one in scene.robots)
+    return replace(scene, robots=tuple(robots))
+
+
+def plan_of(scene: Scene) -> Plan:
+    result = plan_mission(scene, params=PARAMS)
+    assert result.plan is not None, result.reason
+    assert mrmg.verify(scene, result.plan).violations == ()
+    return result.plan
+
+
+@pytest.mark.parametrize("name", ["diffdrive", "mixed"])
+def test_slow_robots_take_the_same_energy_and_their_time(name: str) -> None:
+    scene = mrmg.load_scene(name)
+    plan = plan_of(scene)
+    slow = plan_of(with_models(scene, lambda model: slower(model, 40.0)))
+    assert slow.cost_J == pytest.approx(plan.cost_J, rel=0.02)
+    assert slow.makespan_s == pytest.approx(40.0 * plan.makespan_s, rel=0.3)
+
+
+def test_slow_robots_make_room_for_each_other(yard: Callable[..., Scene]) -> None:
+    """In as few motions as others, or none would end."""
+    robots = [
+        {
+            "id": name,
+            "model": "car",
+            "pose": pose,
+            "finish": {"circle": {"center": goal, "radius": 0.5}},
+        }
+        for name, pose, goal in (
+            ("r1", [4, 10, 0], [26, 10]),
+            ("r2", [26, 10, 3.14], [4, 10]),
+            ("r3", [15, 3, 1.57], [15, 17]),
+            ("r4", [15, 17, -1.57], [15, 3]),
+        )
+    ]
+    scene = yard(robots=robots, objective="makespan")
+    plan = plan_of(scene)
+    slow = plan_of(with_models(scene, lambda model: slower(model, 20.0)))
+    assert slow.makespan_s < 1.5 * 20.0 * plan.makespan_s
+
+
+@pytest.mark.parametrize("name", ["diffdrive", "mixed"])
+def test_sluggish_robots_have_the_time_to_brake(name: str) -> None:
+    """For a minute and more."""
+
+    def sluggish(model: RobotModel) -> RobotModel:
+        least = 0.02 * model.limits.u1_max_m_s2
+        return replace(model, limits=replace(model.limits, u1_max_m_s2=least))
+
+    scene = with_models(mrmg.load_scene(name), sluggish)
+    assert scene.robots[0].model.limits.u1_max_m_s2 < 0.05
+    plan_of(scene)
