@@ -201,6 +201,8 @@ REFUSED = {
     "wheelbase_m",
     # A whole of its own, which the robots at hand have not:
     "motor",
+    # Of planning alone:
+    "unit_m",
 }
 """Changed alone these make no valid scene, or none that a file can state."""
 

@@ -13,6 +13,7 @@ from shapely.affinity import rotate, translate
 import mrmg
 from mrmg.planning import PlannerParams
 from mrmg.planning.path_following.band import Path, visit_steps
+from mrmg.planning.path_following.following import tour_path
 from mrmg.planning.path_following.tracking import (
     deceleration,
     drive_alone,
@@ -170,3 +171,39 @@ def test_robots_that_turn_on_the_spot_turn_to_headings_on_their_way(
     drive = drive_alone(problem, 0, path)
     assert drive.arrived
     assert len(visit_steps(problem.mission.targets, [0, 1], drive.motion.state)) == 2
+
+
+def test_slow_robots_do_not_stop_in_bends(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    """They would if they counted as standing, and turned on the spot, all the while."""
+    robots = [{"id": "r1", "model": "diffdrive", "pose": [4, 10, 0]}]
+    way = np.linspace(0.0, 6.0, 61)
+    bends = np.stack([4.0 + way, 10.0 + 0.3 * (1.0 - np.cos(2.0 * way))], axis=1)
+    goals = [{"id": "g", "circle": {"center": bends[-1].tolist(), "radius": 0.5}}]
+    taken_s = []
+    for times in (1.0, 40.0):
+        scene = yard(robots=robots, goals=goals)
+        robot = scene.robots[0]
+        limits = replace(
+            robot.model.limits,
+            v_min_m_s=robot.model.limits.v_min_m_s / times,
+            v_max_m_s=robot.model.limits.v_max_m_s / times,
+            w_max=robot.model.limits.w_max / times,
+            u1_max_m_s2=robot.model.limits.u1_max_m_s2 / times**2,
+            u2_max=robot.model.limits.u2_max / times**2,
+        )
+        slow = replace(robot, model=replace(robot.model, limits=limits))
+        problem = state(replace(scene, robots=(slow,)), samples=0)
+        straight = tour_path(problem, 0, [0])
+        path = replace(
+            straight,
+            node=bends,
+            gear=np.ones(len(bends) - 1, np.int64),
+            stop=np.array([len(bends) - 1]),
+            pivot=np.zeros(0, np.int64),
+        )
+        drive = drive_alone(problem, 0, path)
+        assert drive.arrived
+        taken_s.append(len(drive.motion.control) * problem.dt_s / times)
+    assert taken_s[1] < taken_s[0], taken_s

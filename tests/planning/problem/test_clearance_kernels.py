@@ -43,7 +43,7 @@ def test_steps_that_touch_are_found_and_others_allowed(
     corner = np.empty((MOST_CORNERS, 2))
     rng = np.random.default_rng(0)
     found = {True: 0, False: 0}
-    for _ in range(4000):
+    for _ in range(1500):
         before, after = np.zeros(5), np.zeros(5)
         before[:3] = rng.uniform((12, 8, -np.pi), (23, 15, np.pi))
         after[:3] = before[:3] + rng.uniform(-1, 1, 3) * (0.6, 0.6, 0.5)
@@ -59,4 +59,4 @@ def test_steps_that_touch_are_found_and_others_allowed(
             assert clear or away_m.min() < 0.03 * way_m + TOUCH_M, (before, after)
             found[clear] += 1
     assert found[False] > 10
-    assert found[True] > 1000
+    assert found[True] > 300
