@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mrmg.compilation import kernel
-from mrmg.world._polygon_kernels import convex_distance
+from mrmg.world._polygon_kernels import convex_distance, point_segment_distance
 
 
 class FreeSpace(NamedTuple):
@@ -166,17 +166,21 @@ def footprint_is_clear(space, placed, cx, cy, radius, margin):
 
 
 @kernel
-def footprint_distance(space, placed, cx, cy, radius):
+def footprint_distance(space, placed, cx, cy, radius, enough):
     """Return the distance of a placed footprint from the nearest edge [m].
 
-    It is at most what the free space's `reach` has beyond the radius.
+    It is at most `enough`, and what the free space's `reach` has beyond the radius.
     """
     column = min(
         max(int((cx - space.x_min) / space.bucket), 0), space.bucket_columns - 1
     )
     row = min(max(int((cy - space.y_min) / space.bucket), 0), space.bucket_rows - 1)
-    b, nearest = row * space.bucket_columns + column, space.reach - radius
+    b = row * space.bucket_columns + column
+    nearest = min(enough, space.reach - radius)
     for e in space.bucket_edge[space.bucket_start[b] : space.bucket_start[b + 1]]:
+        x0, y0, x1, y1 = space.edge[e]
+        if point_segment_distance(cx, cy, x0, y0, x1, y1) >= radius + nearest:
+            continue
         edge = space.edge[e].reshape(2, 2)
         nearest = min(nearest, convex_distance(placed, edge, nearest))
     return nearest

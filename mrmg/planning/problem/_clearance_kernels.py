@@ -48,25 +48,29 @@ def moves_clear(own, spaces, before, state, corner):
         corner: room for a footprint, shape (M, 2).
     """
     margin, radius = own[0].margin, own[0].radius
-    if not keeps_clear(own, spaces, state, margin, corner):
-        return False
     space = space_of(spaces, own[0].space)
     reach = radius + hypot(own[0].middle[0], own[0].middle[1])
     way = hypot(state[0] - before[0], state[1] - before[1])
     way += reach * abs(state[2] - before[2])
-    if way <= 2.0 * margin and space.allowance.shape[0] == 0:
-        return True
+    kept = 0.0
+    if space.allowance.shape[0] == 0:  # else it may have kept less before the step
+        kept = margin
+        if way <= 2.0 * kept:
+            return keeps_clear(own, spaces, state, margin, corner)
+        within = way - kept < space.reach - radius
+        if within and keeps_clear(own, spaces, state, way - kept, corner):
+            return True
+    if not keeps_clear(own, spaces, state, margin, corner):
+        return False
     footprint, t = own[0].corner[: own[0].corners], 0.0
-    cx, cy = middle_at(own[0], state)
-    if clearance_at_least(space, cx, cy) > radius + way:
-        return True
     pose = state[:3].copy()
     while True:
         placed = corner[: len(footprint)]
         place_footprint(footprint, pose[0], pose[1], pose[2], placed)
         cx, cy = middle_at(own[0], pose)
-        distance = footprint_distance(space, placed, cx, cy, radius)
-        if distance >= (1.0 - t) * way:
+        enough = (1.0 - t) * way - kept
+        distance = footprint_distance(space, placed, cx, cy, radius, enough)
+        if distance >= enough:
             return True
         if distance < BULGE * way:
             return False

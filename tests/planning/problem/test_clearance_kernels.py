@@ -27,15 +27,24 @@ def distances_m(scene: Scene, before: np.ndarray, after: np.ndarray) -> np.ndarr
     return np.asarray(shapely.distance(bodies, shapely.union_all(walls)))
 
 
+@pytest.mark.parametrize("margin_m", [0.0, 0.1])
 @pytest.mark.parametrize("model", ["car", "diffdrive"])
 def test_steps_that_touch_are_found_and_others_allowed(
-    yard: Callable[..., Scene], state: Callable[..., Problem], model: str
+    yard: Callable[..., Scene],
+    state: Callable[..., Problem],
+    model: str,
+    margin_m: float,
 ) -> None:
-    """With next to no margin corners poke between the footprints at both ends."""
+    """With little margin corners poke between the footprints at both ends."""
     post = {"id": "post", "box": {"center": [15, 10], "size": [0.3, 0.3], "yaw": 0.7}}
     wall = {"id": "wall", "box": {"center": [20, 14], "size": [6, 0.5]}}
     robots = [
-        {"id": "r", "model": model, "pose": [4, 10, 0], "margins": {"obstacle": 0.0}}
+        {
+            "id": "r",
+            "model": model,
+            "pose": [4, 10, 0],
+            "margins": {"obstacle": margin_m},
+        }
     ]
     scene = yard(robots=robots, obstacles=[post, wall])
     problem = state(scene, samples=50)
@@ -43,11 +52,13 @@ def test_steps_that_touch_are_found_and_others_allowed(
     corner = np.empty((MOST_CORNERS, 2))
     rng = np.random.default_rng(0)
     found = {True: 0, False: 0}
-    for _ in range(1500):
+    for _ in range(3000):
         before, after = np.zeros(5), np.zeros(5)
         before[:3] = rng.uniform((12, 8, -np.pi), (23, 15, np.pi))
-        after[:3] = before[:3] + rng.uniform(-1, 1, 3) * (0.6, 0.6, 0.5)
-        if not all(keeps_clear(own, spaces, at, 0.0, corner) for at in (before, after)):
+        moved = (1.0 + 10.0 * margin_m) * rng.uniform(-1.0, 1.0, 3)
+        after[:3] = before[:3] + moved * (0.7, 0.7, 0.6)
+        ends = (before, after)
+        if not all(keeps_clear(own, spaces, at, margin_m, corner) for at in ends):
             continue
         away_m = distances_m(scene, before[:3], after[:3])
         clear = bool(moves_clear(own, spaces, before, after, corner))
@@ -58,5 +69,5 @@ def test_steps_that_touch_are_found_and_others_allowed(
             way_m = np.hypot(*(after - before)[:2]) + 2.0 * abs(after[2] - before[2])
             assert clear or away_m.min() < 0.03 * way_m + TOUCH_M, (before, after)
             found[clear] += 1
-    assert found[False] > 10
+    assert found[False] > 5
     assert found[True] > 300
