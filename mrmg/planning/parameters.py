@@ -95,10 +95,10 @@ class PlannerParams:
         refinements: times that the plan of each tree is smoothed and driven again,
             as long as that saves energy.
         obstacle_margin_m: distance kept from obstacles at the time steps [m], by every
-            robot; None for each robot's own (`kept_margins`). Between two steps
-            of 0.1 s no corner of the car moves more than 0.16 m from both ends, so its
-            default also keeps the motion in between clear, and leaves room for
-            tracking errors.
+            robot; None for each robot's own (`kept_margins`). Between two steps no
+            corner of the car moves more than 0.16 m from both ends, so that its default
+            keeps it clear in between, too; where a margin is less than that, robots are
+            followed through each step.
         robot_margin_m: distance kept between robots at the time steps [m], likewise.
         route_margin: surcharge on roadmap energies in routing, for what the roadmap
             does
