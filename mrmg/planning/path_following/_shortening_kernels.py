@@ -65,7 +65,8 @@ def write_curve(search, a, b, curve):
         return write_turns(search, a, b, curve)
     turn, length = np.zeros(MOST_PIECES), np.zeros(MOST_PIECES)
     radius = 1.0 / search.bend
-    total = reeds_shepp(b[0] - a[0], b[1] - a[1], a[2], b[2], radius, turn, length)
+    dx, dy, reverses = b[0] - a[0], b[1] - a[1], search.own[0].limit[0] < 0.0
+    total = reeds_shepp(dx, dy, a[2], b[2], radius, reverses, turn, length)
     if not total < search.length * (len(curve) / PIECES - MOST_PIECES):
         return 0, np.inf
     x, y, theta = a[0], a[1], a[2]

@@ -183,8 +183,8 @@ def tour_path(
 ) -> Path:
     """Return the way of the roadmap along robot r's tour.
 
-    A car changes gear at a target where its way turns sharply; a robot that can turns
-    on the spot there.
+    A car that can changes gear at a target where its way turns sharply; a robot that
+    can turns on the spot there.
 
     Args:
         problem: the mission.
@@ -213,8 +213,9 @@ def tour_path(
     if problem.mission.fleet[r]["model"] == UNICYCLE:
         pivots = [at for at, turn in turns if turn > PIVOT]
         return replace(path, pivot=np.array(pivots, np.int64))
+    reverses = bool(problem.mission.fleet[r]["limit"][0] < 0.0)
     for at, turn in turns:
-        if turn > sharp:
+        if reverses and turn > sharp:
             path.gear[at:] *= -1
     return path
 
@@ -223,7 +224,8 @@ def _geared(
     problem: Problem, r: int, cost_map: CostMap, path: Path, judged: bool
 ) -> Path:
     """Return a path with the gears that look best, of a car if it may be priced."""
-    if problem.mission.fleet[r]["model"] == UNICYCLE:
+    robot = problem.mission.fleet[r]
+    if robot["model"] == UNICYCLE or not robot["limit"][0] < 0.0:
         return path
     path = with_arrivals(problem, r, cost_map, path)
     if not judged:

@@ -77,7 +77,8 @@ class Drive:
 def drive_alone(problem: Problem, r: int, path: Path) -> Drive:
     """Drive robot r along its path, from its start, with the stays at its stops."""
     own = problem.mission.fleet[r : r + 1]
-    top = float(np.abs(own[0]["limit"][:2]).min())
+    speeds = np.abs(own[0]["limit"][:2])
+    top = float(speeds[speeds > 0.0].min())
     longest_s = SLOWEST * float(path.way[-1]) / top + float(path.pause_s.sum())
     brakings_s = BRAKINGS * len(path.edges) * top / float(own[0]["limit"][3])
     more = max(LEAST_STEPS, int(brakings_s / problem.dt_s))

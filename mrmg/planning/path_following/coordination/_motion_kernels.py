@@ -214,7 +214,8 @@ def write_curve(own, state, x, y, theta, tolerance, course, radius):
     dx, dy = x - state[0], y - state[1]
     turn, length = np.zeros(MOST_PIECES), np.zeros(MOST_PIECES)
     if radius > 0.0:
-        total = reeds_shepp(dx, dy, state[2], theta, radius, turn, length)
+        reverses = own[0].limit[0] < 0.0
+        total = reeds_shepp(dx, dy, state[2], theta, radius, reverses, turn, length)
         heading = state[2]
     else:
         total = length[0] = hypot(dx, dy)

@@ -233,15 +233,15 @@ def cost_to_go_s(search, place, state):
 def posing_time_s(own, targets, target, x, y, theta):
     """Return the time from a pose to a target's heading there, without obstacles [s].
 
-    Of a car that is the time along the shortest curve; of robots that can turn on the
-    spot, that of the turn alone.
+    Of a car that is the time along the shortest curve, as if it could reverse; of
+    robots that can turn on the spot, that of the turn alone.
     """
     aim = targets.target[target]
     if own[0].model == CAR:
         turn, length = np.empty(MOST_PIECES), np.empty(MOST_PIECES)
         dx, dy = aim.center[0] - x, aim.center[1] - y
         radius = CURVE_SHARE * own[0].turning_radius
-        curve = reeds_shepp(dx, dy, theta, aim.heading, radius, turn, length)
+        curve = reeds_shepp(dx, dy, theta, aim.heading, radius, True, turn, length)
         return max(0.0, curve - aim.reach) / own[0].limit[1] if curve < np.inf else 0.0
     off = abs(wrap(aim.heading - theta)) - aim.tolerance
     return max(0.0, off) / own[0].limit[2]

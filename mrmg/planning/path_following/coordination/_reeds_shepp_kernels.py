@@ -1,9 +1,13 @@
-"""Shortest curves of a car that may reverse, between two poses without obstacles.
+"""Shortest curves of a car between two poses without obstacles.
 
 J. A. Reeds, L. A. Shepp: Optimal paths for a car that goes both forwards and backwards,
 Pacific Journal of Mathematics 145, 1990. Of their words, those with at most three
 pieces (C|C|C, CC|C, C|CC and CSC) are looked at: the others are seldom shorter, and
 never by much.
+
+A car that cannot reverse drives CSC and CCC: L. E. Dubins, On curves of minimal length
+with a constraint on average curvature, American Journal of Mathematics 79, 1957. An arc
+that a word drives backwards leads to the same pose as the rest of its circle.
 """
 
 from __future__ import annotations
@@ -21,29 +25,27 @@ MOST_PIECES = 3
 
 @kernel
 def _straight_same(x, y, phi):
-    """Return (found, t, u, v) of L+ S+ L+ (formula 8.1)."""
+    """Return (found, t, u, v) of L S+ L (formula 8.1), its arcs either way."""
     dx, dy = x - sin(phi), y - 1.0 + cos(phi)
     t = atan2(dy, dx)
-    v = wrap(phi - t)
-    return t >= 0.0 and v >= 0.0, t, hypot(dx, dy), v
+    return True, t, hypot(dx, dy), wrap(phi - t)
 
 
 @kernel
 def _straight_other(x, y, phi):
-    """Return (found, t, u, v) of L+ S+ R+ (formula 8.2)."""
+    """Return (found, t, u, v) of L S+ R (formula 8.2), its arcs either way."""
     dx, dy = x + sin(phi), y - 1.0 - cos(phi)
     far2 = dx * dx + dy * dy
     if far2 < 4.0:
         return False, 0.0, 0.0, 0.0
     u = sqrt(far2 - 4.0)
     t = wrap(atan2(dy, dx) + atan2(2.0, u))
-    v = wrap(t - phi)
-    return t >= 0.0 and v >= 0.0, t, u, v
+    return True, t, u, wrap(t - phi)
 
 
 @kernel
 def _turns(x, y, phi):
-    """Return (found, t, u, v) of L+ R- L (formulas 8.3 and 8.4)."""
+    """Return (found, t, u, v) of L R- L (formulas 8.3 and 8.4), others either way."""
     dx, dy = x - sin(phi), y - 1.0 + cos(phi)
     far = hypot(dx, dy)
     if far > 4.0:
@@ -51,18 +53,18 @@ def _turns(x, y, phi):
     direction = atan2(dy, dx)
     u = -2.0 * asin(0.25 * far)
     t = wrap(direction + 0.5 * u + pi)
-    v = wrap(phi - t + u)
-    return t >= 0.0 and u <= 0.0, t, u, v
+    return True, t, u, wrap(phi - t + u)
 
 
 @kernel
-def reeds_shepp(dx, dy, start, goal, radius, turn, length):
+def reeds_shepp(dx, dy, start, goal, radius, reverses, turn, length):
     """Write the shortest curve found between two poses; return its length [m].
 
     Args:
         dx, dy: from the first position to the second [m].
         start, goal: headings there [rad].
         radius: of turns [m].
+        reverses: whether the car may drive backwards.
         turn: receives 1 for pieces to the left, 0 straight, -1 to the right; (3,).
         length: receives the pieces' lengths [m], negative in reverse; (3,).
     """
@@ -73,6 +75,8 @@ def reeds_shepp(dx, dy, start, goal, radius, turn, length):
     for word in range(4):
         for mirrored in range(4):
             back, side = mirrored & 1, mirrored >> 1
+            if back and not reverses:
+                continue
             x = -x0 if back else x0
             y = -y0 if side else y0
             phi = -phi0 if back != side else phi0
@@ -92,6 +96,11 @@ def reeds_shepp(dx, dy, start, goal, radius, turn, length):
                 found, v, u, t = _turns(xb, yb, phi)
                 third = 1.0
             if not found:
+                continue
+            if not reverses:
+                t, v = t % (2.0 * pi), v % (2.0 * pi)
+                u = u % (2.0 * pi) if second != 0.0 else u
+            elif (v if word == 3 else t) < 0.0 or (word < 2 and v < 0.0):
                 continue
             total = abs(t) + abs(u) + abs(v)
             if total >= best:

@@ -31,7 +31,7 @@ def test_curves_end_where_they_are_asked_to_and_are_no_longer_mirrored() -> None
     found = 0
     for _ in range(2000):
         (dx, dy), (start, goal) = rng.uniform(-6, 6, 2), rng.uniform(-pi, pi, 2)
-        way = reeds_shepp(dx, dy, start, goal, 1.3, turn, length)
+        way = reeds_shepp(dx, dy, start, goal, 1.3, True, turn, length)
         if not np.isfinite(way):
             continue
         found += 1
@@ -40,9 +40,9 @@ def test_curves_end_where_they_are_asked_to_and_are_no_longer_mirrored() -> None
         assert abs(remainder(heading - goal, tau)) < 1e-6
         assert abs(np.abs(length).sum() - way) < 1e-9
         assert way >= hypot(dx, dy) - 1e-9
-        mirrored = reeds_shepp(dx, -dy, -start, -goal, 1.3, turn, length)
+        mirrored = reeds_shepp(dx, -dy, -start, -goal, 1.3, True, turn, length)
         assert abs(mirrored - way) < 1e-6
-        back = reeds_shepp(-dx, -dy, goal, start, 1.3, turn, length)
+        back = reeds_shepp(-dx, -dy, goal, start, 1.3, True, turn, length)
         assert back <= way + 1e-6
     assert found > 1900
 
@@ -50,6 +50,35 @@ def test_curves_end_where_they_are_asked_to_and_are_no_longer_mirrored() -> None
 def test_straight_ahead_and_back_are_straight() -> None:
     turn, length = np.zeros(3), np.zeros(3)
     for way in (5.0, -5.0):
-        found = reeds_shepp(way, 0.0, 0.0, 0.0, 1.0, turn, length)
+        found = reeds_shepp(way, 0.0, 0.0, 0.0, 1.0, True, turn, length)
         assert abs(found - 5.0) < 1e-9
         assert abs(length.sum() - way) < 1e-9
+
+
+def test_cars_that_cannot_reverse_drive_forwards_all_the_way() -> None:
+    rng = np.random.default_rng(1)
+    turn, length = np.zeros(3), np.zeros(3)
+    for _ in range(1000):
+        (dx, dy), (start, goal) = rng.uniform(-6, 6, 2), rng.uniform(-pi, pi, 2)
+        way = reeds_shepp(dx, dy, start, goal, 1.3, False, turn, length)
+        assert np.isfinite(way)
+        assert (length >= 0.0).all()
+        assert abs(length.sum() - way) < 1e-9
+        x, y, heading = end_of(start, 1.3, turn, length)
+        assert hypot(x - dx, y - dy) < 1e-6
+        assert abs(remainder(heading - goal, tau)) < 1e-6
+        reversing = reeds_shepp(dx, dy, start, goal, 1.3, True, turn, length)
+        assert way >= reversing - 1e-9 or np.isinf(reversing)
+
+
+def test_they_drive_curves_as_short_as_any_there_is() -> None:
+    """Poses that random curves lead to are not farther than these."""
+    rng = np.random.default_rng(2)
+    turn, length = np.zeros(3), np.zeros(3)
+    sides = [(1, 0, 1), (-1, 0, -1), (1, 0, -1), (-1, 0, 1), (1, -1, 1), (-1, 1, -1)]
+    for _ in range(2000):
+        one = np.array(sides[rng.integers(len(sides))], float)
+        driven = rng.uniform(0.0, 1.3 * pi, 3)
+        x, y, heading = end_of(0.4, 1.3, one, driven)
+        way = reeds_shepp(x, y, 0.4, heading, 1.3, False, turn, length)
+        assert way <= driven.sum() + 1e-6
