@@ -5,10 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import mrmg
 from mrmg.planning import PlannerParams, plan_mission
+from mrmg.planning.path_following.coordination._end_kernels import brake, braking_steps
+from mrmg.planning.path_following.coordination.tasks import horizon_steps, no_path
+from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Plan
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
@@ -88,3 +92,23 @@ def test_sluggish_robots_have_the_time_to_brake(name: str) -> None:
     scene = with_models(mrmg.load_scene(name), sluggish)
     assert scene.robots[0].model.limits.u1_max_m_s2 < 0.05
     plan_of(scene)
+
+
+def test_searches_have_room_for_braking_from_full_speed(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    """Of a robot that takes ten minutes for it, twice over."""
+
+    def sluggish(model: RobotModel) -> RobotModel:
+        least = model.limits.v_max_m_s / 600.0
+        return replace(model, limits=replace(model.limits, u1_max_m_s2=least))
+
+    problem = state(with_models(yard(), sluggish), samples=0)
+    own, dt_s = problem.mission.fleet[:1], problem.dt_s
+    horizon = horizon_steps(problem, [[0]], [no_path(problem, 0)])
+    states, controls = np.zeros((horizon + 1, 5)), np.zeros((horizon, 2))
+    states[0, 3] = own[0]["limit"][1]
+    steps = brake(own, dt_s, states, controls)
+    assert steps > 5000
+    assert abs(states[steps, 3]) < 1e-9
+    assert 2 * braking_steps(own, dt_s) < horizon

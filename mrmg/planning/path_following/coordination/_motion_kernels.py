@@ -40,9 +40,8 @@ SPACING_M = 0.3
 LONG = 1 << 40
 """Steps after which no stay keeps a robot: motions end stays themselves."""
 
-REACH_STEPS, BRAKINGS = 80, 3.0
-"""Steps that driving along a curve may take beyond its length at full speed, or so many
-times as braking from that takes."""
+REACH_STEPS = 80
+"""Steps that driving along a curve may take beyond its length at full speed."""
 
 
 OTHER = record_type(
@@ -272,8 +271,7 @@ def drive_curve(search, course, corner, state, control):
     """
     own, dt = search.own, search.dt
     way = course.node[max(course.size[0] - 1, 0)].way
-    top, stop_s = own[0].limit[1], own[0].limit[1] / own[0].limit[3]
-    most = int(way / (top * dt)) + max(REACH_STEPS, int(BRAKINGS * stop_s / dt))
+    most = int(way / (own[0].limit[1] * dt)) + REACH_STEPS
     most = min(most, len(control) - 1)
     segment = 0 if course.size[0] > 1 else course.size[0]
     for k in range(most):
