@@ -251,7 +251,7 @@ def follow_paths(
             request.seed,
             request.halt,
             request.number,
-            ROUNDS[1:2] if learnt.met else ROUNDS[:1],
+            rounds_of(request.number + learnt.met),
         )
         learnt.met |= followed.failure == ROBOTS_MEET
         learnt.searched |= learnt.met and not followed.led
