@@ -214,13 +214,8 @@ class Frame:
 
 def _unit_m(scene: Scene, margins: Margins) -> float:
     """Return the unit of lengths for a scene's robots [m]."""
-    outlines = [robot.model.footprint_m for robot in scene.robots]
-    middles = [0.5 * (one.min(axis=0) + one.max(axis=0)) for one in outlines]
-    radii = [
-        float(np.hypot(*(one - middle).T).max())
-        for one, middle in zip(outlines, middles, strict=True)
-    ]
-    radius_m = float(np.exp(np.mean(np.log(radii))))
+    radii_m = [robot.model.radius_m for robot in scene.robots]
+    radius_m = float(np.exp(np.mean(np.log(radii_m))))
     if ORDINARY_M[0] <= radius_m <= ORDINARY_M[1]:
         return 1.0
     unit_m = float(2.0 ** round(log2(radius_m / USUAL_M)))

@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from mrmg.planning.endings import listed
 from mrmg.planning.frame import Frame
 from mrmg.planning.problem.problem import Problem
-from mrmg.scene.margins import STATES_NONE, Margins
+from mrmg.scene.margins import Margins
 
 MOST_ROBOTS = 40
 """Robots whose paths are compared at most."""
@@ -32,7 +32,7 @@ SPACING_M = 0.2
 def narrowest_meeting(
     problem: Problem,
     tours: Sequence[Sequence[int]],
-    margins: Margins = STATES_NONE,
+    margins: Margins,
 ) -> str:
     """Return which robots' ways meet where there is least room, in words.
 

@@ -175,10 +175,14 @@ class _Planning:
         """Parameters of the run."""
         return self.request.params
 
+    @property
+    def frame(self) -> Frame:
+        """The frame that is planned in."""
+        return Frame.of(self.scene, self.params.margins)
+
     def result(self, with_bound: bool) -> PlanResult:
         """Return the result of planning."""
-        frame = Frame.of(self.scene, self.params.margins)
-        own, params = frame.scene(self.scene), frame.params(self.params)
+        own, params = self.frame.scene(self.scene), self.frame.params(self.params)
         bounding = self._bounding(own) if with_bound else None
         load_kernels(self.params.planner, every=self.params.budget_s is not None)
         for robot in own.robots:
@@ -261,8 +265,8 @@ class _Planning:
 
         @cache
         def tight() -> Problem | None:
-            stated = Frame.of(self.scene, self.params.margins).params(self.params)
-            near = with_least_spacing(problem.scene, stated.margins)
+            margins = self.frame.params(self.params).margins
+            near = with_least_spacing(problem.scene, margins)
             bare = replace(self.params, obstacle_margin_m=None, robot_margin_m=None)
             tighter = tightened(near, self.request.seed, bare)
             # Plans are of the scene as it is.

@@ -261,6 +261,17 @@ class RobotModel(ByContent):
         return float(np.hypot(self.footprint_m[:, 0], self.footprint_m[:, 1]).max())
 
     @property
+    def middle_m(self) -> np.ndarray:
+        """Middle of the footprint in the robot's frame [m], shape (2,)."""
+        outline = self.footprint_m
+        return np.asarray(0.5 * (outline.min(axis=0) + outline.max(axis=0)))
+
+    @property
+    def radius_m(self) -> float:
+        """Radius of the circle about the footprint's middle that holds it."""
+        return float(np.hypot(*(self.footprint_m - self.middle_m).T).max())
+
+    @property
     def turning_radius_m(self) -> float:
         """Smallest turning radius of the reference point in the planner's limits."""
         if self.motion_model != "car":

@@ -74,7 +74,7 @@ def _draw_rendered(
     size_m = 2.0 * model.circumscribed_radius_m
     world = build_world(Scene.around(model, 20.0 * size_m))
     ground = np.broadcast_to(_GROUND, (16, 16, 3)).copy()
-    middle = 0.5 * (model.footprint_m.min(axis=0) + model.footprint_m.max(axis=0))
+    middle = model.middle_m
     away_m = 0.7 * (size_m + model.height_m) / math.tan(math.radians(_FOVY_DEG))
     corner = camera_at([*middle, 0.4 * model.height_m], 215.0, -22.0, away_m)
     top = top_camera(middle)

@@ -196,6 +196,26 @@ def yard() -> Callable[..., Scene]:
 
 
 @pytest.fixture
+def crossing(yard: Callable[..., Scene]) -> Scene:
+    """Return a yard that four cars cross, two and two from opposite sides."""
+    robots = [
+        {
+            "id": name,
+            "model": "car",
+            "pose": pose,
+            "finish": {"circle": {"center": goal, "radius": 0.5}},
+        }
+        for name, pose, goal in (
+            ("r1", [4, 10, 0], [26, 10]),
+            ("r2", [26, 10, 3.14], [4, 10]),
+            ("r3", [15, 3, 1.57], [15, 17]),
+            ("r4", [15, 17, -1.57], [15, 3]),
+        )
+    ]
+    return yard(robots=robots, goals=[], objective="makespan")
+
+
+@pytest.fixture
 def state() -> Callable[..., Problem]:
     """Return the maker of planning problems."""
     return state_scene

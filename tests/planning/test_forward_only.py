@@ -77,18 +77,5 @@ def test_they_go_round_to_headings(yard: Callable[..., Scene], model: str) -> No
     forward_plan_of(yard(robots=robots, goals=goals))
 
 
-def test_they_make_room_for_each_other(yard: Callable[..., Scene]) -> None:
-    robots = [
-        {
-            "id": name,
-            "model": "car",
-            "pose": pose,
-            "finish": {"circle": {"center": goal, "radius": 0.5}},
-        }
-        for name, pose, goal in (
-            ("r1", [4, 10, 0], [26, 10]),
-            ("r2", [26, 10, 3.14], [4, 10]),
-            ("r3", [15, 3, 1.57], [15, 17]),
-        )
-    ]
-    forward_plan_of(yard(robots=robots, goals=[], objective="makespan"))
+def test_they_make_room_for_each_other(crossing: Scene) -> None:
+    forward_plan_of(crossing)

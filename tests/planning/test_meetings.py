@@ -13,6 +13,7 @@ from mrmg.planning.frame import Frame
 from mrmg.planning.meetings import narrowest_meeting
 from mrmg.planning.problem.problem import state_mission
 from mrmg.scene.loading import scene_from_document
+from mrmg.scene.margins import STATES_NONE
 
 WALLS = [
     {"box": {"center": [10.0, y], "size": [1.0, 5.0]}} for y in (2.5, 9.5)
@@ -54,5 +55,5 @@ def test_the_room_is_told_by_what_limits_it(
     scene = scene_from_document(document, source="room")
     problem = state_mission(Frame.of(scene).scene(scene), 0, PlannerParams())
     assert problem is not None
-    told = narrowest_meeting(replace(problem, scene=scene), [[0]])
+    told = narrowest_meeting(replace(problem, scene=scene), [[0]], STATES_NONE)
     assert re.search(said + "$", told), told

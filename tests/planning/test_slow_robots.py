@@ -59,25 +59,10 @@ def test_slow_robots_take_the_same_energy_and_their_time(name: str) -> None:
     assert slow.makespan_s == pytest.approx(40.0 * plan.makespan_s, rel=0.3)
 
 
-def test_slow_robots_make_room_for_each_other(yard: Callable[..., Scene]) -> None:
+def test_slow_robots_make_room_for_each_other(crossing: Scene) -> None:
     """In as few motions as others, or none would end."""
-    robots = [
-        {
-            "id": name,
-            "model": "car",
-            "pose": pose,
-            "finish": {"circle": {"center": goal, "radius": 0.5}},
-        }
-        for name, pose, goal in (
-            ("r1", [4, 10, 0], [26, 10]),
-            ("r2", [26, 10, 3.14], [4, 10]),
-            ("r3", [15, 3, 1.57], [15, 17]),
-            ("r4", [15, 17, -1.57], [15, 3]),
-        )
-    ]
-    scene = yard(robots=robots, objective="makespan")
-    plan = plan_of(scene)
-    slow = plan_of(with_models(scene, lambda model: slower(model, 20.0)))
+    plan = plan_of(crossing)
+    slow = plan_of(with_models(crossing, lambda model: slower(model, 20.0)))
     assert slow.makespan_s < 1.5 * 20.0 * plan.makespan_s
 
 

@@ -17,7 +17,7 @@ import numpy as np
 from mrmg.planning.attempt import Attempt, Request
 from mrmg.planning.parameters import PlannerParams
 from mrmg.planning.path_following.coordination.coordination import coordinated
-from mrmg.planning.path_following.coordination.rounds import ROUNDS, rounds_of
+from mrmg.planning.path_following.coordination.rounds import rounds_of
 from mrmg.planning.path_following.coordination.tasks import no_path
 from mrmg.planning.path_following.draws import Draw, Tours, drawn_tours, tours_of
 from mrmg.planning.path_following.driven_legs import Leg, with_driven_legs

@@ -134,7 +134,6 @@ def fleet_array(scene: Scene, world: World, margins: Margins) -> np.ndarray:
         if len(outline) > MOST_CORNERS:
             message = f"has {len(outline)} corners, at most {MOST_CORNERS} are allowed"
             raise SceneError(model.name, [Fault("footprint", message)])
-        middle = 0.5 * (outline.min(axis=0) + outline.max(axis=0))
         one = fleet[r]
         one["model"] = MODEL_ID.get(model.motion_model, USER)
         one["step_at"], one["steer_at"] = motion_addresses(model)
@@ -143,8 +142,8 @@ def fleet_array(scene: Scene, world: World, margins: Margins) -> np.ndarray:
         one["limit"] = limits.as_tuple()
         one["corner"][: len(outline)] = outline
         one["corners"] = len(outline)
-        one["middle"] = middle
-        one["radius"] = np.hypot(*(outline - middle).T).max()
+        one["middle"] = model.middle_m
+        one["radius"] = model.radius_m
         one["turning_radius"] = model.turning_radius_m
         one["passage"] = passage_m(robot, margins)
         one["margin"], one["spacing"] = np.maximum(
