@@ -267,15 +267,32 @@ def _aim_better(problem: Problem, task: RobotTask, state: np.ndarray) -> None:
     path, depth_m = task.path, target_depth_m(problem.scene)
     regions, target = planned_regions(problem.scene), problem.mission.targets.target
     deeper, aim = path.deeper.copy(), path.aim.copy()
-    passed = 0
-    for i, (node, t) in enumerate(zip(path.stop, path.target, strict=True)):
-        gap = state[passed:, :2] - path.node[node]
-        passed += int(np.hypot(*gap.T).argmin())
-        reached = float(regions[t].depth(state[passed : passed + 1, :2])[0])
+    nearest = state[nearest_in_order(state[:, :2], path.node[path.stop])]
+    for i, (at, t) in enumerate(zip(nearest, path.target, strict=True)):
+        reached = float(regions[t].depth(at[None, :2])[0])
         if reached < depth_m:
             deeper[i] += depth_m - reached + DEEPER_M
-        off = wrap(float(state[passed, 2] - target["heading"][t]))
+        off = wrap(float(at[2] - target["heading"][t]))
         if abs(off) > target["tolerance"][t]:
             aim[i] -= off
     task.path = replace(path, deeper=deeper, aim=aim)
     task.smooth(problem, SPACINGS_M[-1:])
+
+
+def nearest_in_order(way: np.ndarray, places: np.ndarray) -> list[int]:
+    """Return which points of a way are nearest to places that it passes in this order.
+
+    Those whose distances have the least sum; a place may come twice.
+
+    Args:
+        way: shape (n, 2).
+        places: shape (m, 2).
+    """
+    sums_m = [np.zeros(len(way))]
+    for place in places:
+        before = np.minimum.accumulate(sums_m[-1])
+        sums_m.append(before + np.hypot(*(way - place).T))
+    nearest = [len(way) - 1]
+    for sum_m in reversed(sums_m[1:]):
+        nearest.append(int(sum_m[: nearest[-1] + 1].argmin()))
+    return nearest[:0:-1]

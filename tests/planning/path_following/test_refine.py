@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import combinations_with_replacement
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,11 @@ import pytest
 import mrmg
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.path_following.band import visit_steps
-from mrmg.planning.path_following.refine import refine, tour_numbers
+from mrmg.planning.path_following.refine import (
+    nearest_in_order,
+    refine,
+    tour_numbers,
+)
 from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.planning.problem.targets import target_depth_m
 from mrmg.plans import Plan
@@ -207,3 +212,26 @@ def test_robots_still_end_where_they_must(yard: Callable[..., Scene]) -> None:
     assert one.after.cost_J <= one.before.cost_J
     assert mrmg.verify(one.scene, one.before).violations == ()
     assert mrmg.verify(one.scene, one.after).violations == ()
+
+
+def test_places_on_a_way_are_found_in_their_order() -> None:
+    """As by trying all of them; a place to which the way comes back is there twice."""
+    rng = np.random.default_rng(7)
+    for _ in range(50):
+        way = rng.uniform(0.0, 9.0, (12, 2))
+        places = rng.uniform(0.0, 9.0, (3, 2))
+        places = np.vstack([places, places[:1]])
+        gap = np.hypot(*(way[:, None] - places).T)
+        best = min(
+            sum(gap[i, k] for i, k in enumerate(steps))
+            for steps in combinations_with_replacement(range(len(way)), len(places))
+        )
+        found = nearest_in_order(way, places)
+        assert found == sorted(found)
+        assert sum(gap[i, k] for i, k in enumerate(found)) == pytest.approx(best)
+
+
+def test_a_station_is_met_each_time_that_a_tour_comes_to_it() -> None:
+    way = np.array([[0, 0], [5, 0.4], [9, 0], [5, 0.1], [0, 0]], float)
+    stops = np.array([[5, 0], [9, 0], [5, 0]], float)
+    assert nearest_in_order(way, stops) == [1, 2, 3]
