@@ -79,6 +79,19 @@ def test_sluggish_robots_have_the_time_to_brake(name: str) -> None:
     plan_of(scene)
 
 
+@pytest.mark.parametrize("name", ["scene1", "mixed"])
+def test_robots_that_steer_slowly_follow_their_paths(name: str) -> None:
+    def slowly(model: RobotModel) -> RobotModel:
+        least = 0.15 * model.limits.u2_max
+        return replace(model, limits=replace(model.limits, u2_max=least))
+
+    scene = mrmg.load_scene(name)
+    result = plan_mission(with_models(scene, slowly), params=PARAMS)
+    assert result.plan is not None, result.reason
+    assert result.statistics["coordinated"] == 0
+    assert result.plan.cost_J < 1.2 * plan_of(scene).cost_J
+
+
 def test_searches_have_room_for_braking_from_full_speed(
     yard: Callable[..., Scene], state: Callable[..., Problem]
 ) -> None:

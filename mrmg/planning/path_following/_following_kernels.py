@@ -169,6 +169,9 @@ def follow(own, course, i, state):
     else:
         w = atan(gear * own[0].wheelbase * bend)
     w = max(-own[0].limit[2], min(own[0].limit[2], w))
+    # No farther than errors take to decay until the steering, or the turning, is there.
+    late_s = abs(w - state[4]) / own[0].limit[4]
+    v = min(v, 1.0 / max(stiffness * late_s, 1e-9))
     if standing and own[0].model != UNICYCLE and abs(w - state[4]) > ALIGNED:
         v = 0.0
     return i, s, left, off, gear * v, w

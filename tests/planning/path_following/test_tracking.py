@@ -207,3 +207,17 @@ def test_slow_robots_do_not_stop_in_bends(
         assert drive.arrived
         taken_s.append(len(drive.motion.control) * problem.dt_s / times)
     assert taken_s[1] < taken_s[0], taken_s
+
+
+@pytest.mark.parametrize("share", [1.0, 0.15, 0.05])
+def test_robots_that_steer_slowly_come_back_to_their_paths(
+    share: float, yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    """From a heading 30 degrees off; they swing too far where they do not slow down."""
+    scene = yard(robots=[{"id": "r1", "model": "car", "pose": [4, 10, 0.5]}])
+    robot = scene.robots[0]
+    slowly = replace(robot.model.limits, u2_max=share * robot.model.limits.u2_max)
+    robot = replace(robot, model=replace(robot.model, limits=slowly))
+    problem = state(replace(scene, robots=(robot,)), samples=0)
+    drive = drive_alone(problem, 0, straight_path(problem, 25.0))
+    assert drive.arrived
