@@ -173,7 +173,10 @@ def steerable_speeds(problem: Problem, r: int, node: np.ndarray) -> np.ndarray:
         arm = float(robot["wheelbase"])
         speed = limit[4] * (1.0 + (arm * sharp) ** 2) / (arm * change)
     speed = np.maximum(speed, CRAWL * pace(robot))
-    return np.asarray(np.minimum(np.append(speed, np.inf), np.insert(speed, 0, np.inf)))
+    speed = np.minimum(np.append(speed, np.inf), np.insert(speed, 0, np.inf))
+    if robot["model"] == UNICYCLE:
+        speed = np.minimum(speed, limit[2] / np.maximum(np.abs(bend), 1e-9))
+    return np.asarray(speed)
 
 
 def _speed_limits(path: Path, tight: np.ndarray, ease: float) -> np.ndarray:

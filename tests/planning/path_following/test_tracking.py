@@ -45,7 +45,7 @@ def test_slowing_down_leaves_rolling_to_be_overcome(
 
 @pytest.mark.parametrize("name", ["quickstart", "diffdrive"])
 def test_robots_can_steer_along_an_arc_as_fast_as_is_said(name: str) -> None:
-    """At that speed the steering, or the turning, changes as fast as it can."""
+    """At that speed steering or turning change as fast as they can, or turning is."""
     problem = state_mission(mrmg.load_scene(name), 0, PlannerParams(samples=100))
     robot = problem.mission.fleet[0]
     way = np.linspace(0.0, 6.0, 601)
@@ -56,10 +56,13 @@ def test_robots_can_steer_along_an_arc_as_fast_as_is_said(name: str) -> None:
     v = speed[1:-1]
     if name == "diffdrive":
         rate = v * np.diff(bend[1:]) / np.diff(way[1:]) * v
+        turning = v * bend[1:-1]
     else:
         steering = np.arctan(float(robot["wheelbase"]) * bend)
         rate = v * np.diff(steering[1:]) / np.diff(way[1:])
-    assert rate == pytest.approx(np.full(len(v), robot["limit"][4]), rel=0.03)
+        turning = np.zeros(len(v))
+    most = np.maximum(rate / robot["limit"][4], turning / robot["limit"][2])
+    assert most == pytest.approx(np.ones(len(v)), rel=0.03)
 
 
 def straight_path(problem: Problem, end_x: float) -> Path:
@@ -207,6 +210,31 @@ def test_slow_robots_do_not_stop_in_bends(
         assert drive.arrived
         taken_s.append(len(drive.motion.control) * problem.dt_s / times)
     assert taken_s[1] < taken_s[0], taken_s
+
+
+def test_robots_that_brake_slowly_do_so_before_bends(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    """Even when they drive as fast as they can."""
+    scene = yard(robots=[{"id": "r1", "model": "husky", "pose": [4, 10, 0]}])
+    robot = scene.robots[0]
+    weak = replace(robot.model.limits, u1_max_m_s2=0.06)
+    robot = replace(robot, model=replace(robot.model, limits=weak))
+    problem = state(replace(scene, robots=(robot,)), samples=0)
+    angle = np.linspace(-0.5 * np.pi, 0.0, 17)
+    bend = np.array([14.0, 11.0]) + np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    straight = np.linspace([4.0, 10.0], [14.0, 10.0], 101)
+    nodes = np.vstack([straight, bend[1:], [[15.0, 12.0], [15.0, 13.0]]])
+    path = replace(
+        straight_path(problem, 25.0),
+        node=nodes,
+        gear=np.ones(len(nodes) - 1, np.int64),
+    )
+    drive = drive_alone(replace(problem, minimum_time=True), 0, path)
+    assert drive.arrived
+    assert drive.motion.state[:, 3].max() > 0.6
+    driven = shapely.LineString(drive.motion.state[:, :2])
+    assert driven.hausdorff_distance(shapely.LineString(nodes)) < 0.15
 
 
 @pytest.mark.parametrize("share", [1.0, 0.15, 0.05])
