@@ -189,8 +189,8 @@ def test_places_of_the_frame_are_found_on_the_map(quarters: int) -> None:
 
 
 def test_narrow_corners_are_turned_in_with_the_certified_minimum() -> None:
-    """A differential drive 0.85 m long turns in the corner of a corridor 1.2 m wide."""
-    walls = {"a": (6, 0, 20, 5.5), "b": (0, 6.7, 12, 20), "c": (13.2, 5.5, 20, 13)}
+    """A differential drive 0.85 m long turns in the corner of a corridor 1.1 m wide."""
+    walls = {"a": (6, 0, 20, 5.5), "b": (0, 6.6, 12, 20), "c": (13.1, 5.5, 20, 13)}
     scene = scene_from_document(
         {
             "format": 1,
