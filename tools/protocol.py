@@ -45,6 +45,9 @@ _FILES = ("json", "output", "figure", "runs")
 
 _ROOT = Path(__file__).parents[1]
 
+_RESULTS = ("BENCHMARKS.md", "tools/results")
+"""What benches write themselves, by `tools/benchmarks --run`."""
+
 _PACKAGES = ("mrmg", "mujoco", "casadi", "numpy", "scipy", "shapely", "numba")
 
 
@@ -89,23 +92,26 @@ def state() -> str:
     return digest.hexdigest()[:16]
 
 
-def commit() -> str | None:
-    """Return the commit of the checkout, marked where tracked files differ from it."""
-    call = [
-        "git",
-        "describe",
-        "--always",
-        "--abbrev=12",
-        "--exclude=*",
-        "--dirty=-changed",
-    ]
+def commit(root: Path = _ROOT) -> str | None:
+    """Return the commit of a checkout, marked where tracked files differ from it.
+
+    Results that other benches have just stored do not count.
+    """
+    results = (f":(exclude){path}" for path in _RESULTS)
+    calls = (
+        ("rev-parse", "--short=12", "HEAD"),
+        ("status", "--porcelain", "--untracked-files=no", "--", ".", *results),
+    )
     try:
-        found = subprocess.run(
-            call, cwd=Path(__file__).parent, capture_output=True, text=True, check=True
+        found, changes = (
+            subprocess.run(
+                ["git", *call], cwd=root, capture_output=True, text=True, check=True
+            ).stdout.strip()
+            for call in calls
         )
     except (OSError, subprocess.CalledProcessError):
         return None
-    return found.stdout.strip()
+    return f"{found}-changed" if changes else found
 
 
 def cpu() -> str:

@@ -6,6 +6,7 @@ import argparse
 import json
 import platform
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -55,3 +56,28 @@ def test_a_document_names_its_command_and_no_place_of_the_machine(
     assert str(map_file.parents[2]) not in found.read_text()
     assert reported["load"] >= 0.0
     assert re.fullmatch(r"\d{4}-\d\d-\d\d", reported["date"])
+
+
+def test_a_commit_is_marked_where_more_than_results_differ(tmp_path: Path) -> None:
+    """Results of one bench do not make those of the next one count as changed."""
+
+    def git(*call: str) -> None:
+        who = ("-c", "user.name=a", "-c", "user.email=a")
+        subprocess.run(["git", *who, *call], cwd=tmp_path, check=True)
+
+    assert protocol.commit(tmp_path) is None
+    git("init", "-q")
+    for name in ("code.py", "BENCHMARKS.md", "tools/results/one.json"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("1")
+    git("add", ".")
+    git("commit", "-qm", "all")
+    found = protocol.commit(tmp_path)
+    assert found is not None
+    assert re.fullmatch("[0-9a-f]{12}", found)
+    (tmp_path / "BENCHMARKS.md").write_text("2")
+    (tmp_path / "tools/results/one.json").write_text("2")
+    (tmp_path / "beside.txt").write_text("2")
+    assert protocol.commit(tmp_path) == found
+    (tmp_path / "code.py").write_text("2")
+    assert protocol.commit(tmp_path) == f"{found}-changed"
