@@ -6,9 +6,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import pytest
+from solved import verified_plan
 
 import mrmg
-from mrmg.planning import PlannerParams, plan_mission
+from mrmg.planning import PlannerParams
 from mrmg.planning.path_following.following import tour_path
 from mrmg.planning.problem.problem import Problem
 from mrmg.plans import Plan
@@ -29,15 +30,8 @@ def forwards(scene: Scene) -> Scene:
     return replace(scene, robots=tuple(robots))
 
 
-def plan_of(scene: Scene) -> Plan:
-    result = plan_mission(scene, params=PARAMS)
-    assert result.plan is not None, result.reason
-    assert mrmg.verify(scene, result.plan).violations == ()
-    return result.plan
-
-
 def forward_plan_of(scene: Scene) -> Plan:
-    plan = plan_of(forwards(scene))
+    plan = verified_plan(forwards(scene), 0, PARAMS)
     assert all((one.state[:, 3] >= -1e-9).all() for one in plan.trajectories)
     return plan
 
@@ -45,7 +39,7 @@ def forward_plan_of(scene: Scene) -> Plan:
 @pytest.mark.parametrize("name", ["scene1", "diffdrive", "mixed"])
 def test_missions_without_reverse_gears_have_plans(name: str) -> None:
     scene = mrmg.load_scene(name)
-    assert forward_plan_of(scene).cost_J < 1.15 * plan_of(scene).cost_J
+    assert forward_plan_of(scene).cost_J < 1.15 * verified_plan(scene, 0, PARAMS).cost_J
 
 
 def test_their_paths_do_not_change_gear(

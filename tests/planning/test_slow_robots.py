@@ -7,13 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from solved import verified_plan
 
 import mrmg
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.path_following.coordination._end_kernels import brake, braking_steps
 from mrmg.planning.path_following.coordination.tasks import horizon_steps, no_path
 from mrmg.planning.problem.problem import Problem
-from mrmg.plans import Plan
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
 
@@ -43,26 +43,23 @@ def with_models(scene: Scene, change: Callable[[RobotModel], RobotModel]) -> Sce
     return replace(scene, robots=tuple(robots))
 
 
-def plan_of(scene: Scene) -> Plan:
-    result = plan_mission(scene, params=PARAMS)
-    assert result.plan is not None, result.reason
-    assert mrmg.verify(scene, result.plan).violations == ()
-    return result.plan
-
-
 @pytest.mark.parametrize("name", ["diffdrive", "mixed"])
 def test_slow_robots_take_the_same_energy_and_their_time(name: str) -> None:
     scene = mrmg.load_scene(name)
-    plan = plan_of(scene)
-    slow = plan_of(with_models(scene, lambda model: slower(model, 40.0)))
+    plan = verified_plan(scene, 0, PARAMS)
+    slow = verified_plan(
+        with_models(scene, lambda model: slower(model, 40.0)), 0, PARAMS
+    )
     assert slow.cost_J == pytest.approx(plan.cost_J, rel=0.02)
     assert slow.makespan_s == pytest.approx(40.0 * plan.makespan_s, rel=0.3)
 
 
 def test_slow_robots_make_room_for_each_other(crossing: Scene) -> None:
     """In as few motions as others, or none would end."""
-    plan = plan_of(crossing)
-    slow = plan_of(with_models(crossing, lambda model: slower(model, 20.0)))
+    plan = verified_plan(crossing, 0, PARAMS)
+    slow = verified_plan(
+        with_models(crossing, lambda model: slower(model, 20.0)), 0, PARAMS
+    )
     assert slow.makespan_s < 1.5 * 20.0 * plan.makespan_s
 
 
@@ -76,7 +73,7 @@ def test_sluggish_robots_have_the_time_to_brake(name: str) -> None:
 
     scene = with_models(mrmg.load_scene(name), sluggish)
     assert scene.robots[0].model.limits.u1_max_m_s2 < 0.05
-    plan_of(scene)
+    verified_plan(scene, 0, PARAMS)
 
 
 @pytest.mark.parametrize("name", ["scene1", "mixed"])
@@ -89,7 +86,7 @@ def test_robots_that_steer_slowly_follow_their_paths(name: str) -> None:
     result = plan_mission(with_models(scene, slowly), params=PARAMS)
     assert result.plan is not None, result.reason
     assert result.statistics["coordinated"] == 0
-    assert result.plan.cost_J < 1.2 * plan_of(scene).cost_J
+    assert result.plan.cost_J < 1.2 * verified_plan(scene, 0, PARAMS).cost_J
 
 
 def test_searches_have_room_for_braking_from_full_speed(

@@ -152,7 +152,7 @@ def empty_path(most: int) -> np.ndarray:
 
 
 def steerable_speeds(problem: Problem, r: int, node: np.ndarray) -> np.ndarray:
-    """Return the speed up to which a robot can steer along its path, shape (n,).
+    """Return the speed up to which a robot can steer and turn along its path, (n,).
 
     Args:
         problem: the mission.
