@@ -9,7 +9,7 @@ from mrmg.compilation.cache import (
     note_kernels_are_compiled,
 )
 from mrmg.compilation.clock import now_ns
-from mrmg.compilation.decorators import kernel, record_type
+from mrmg.compilation.decorators import inlined, kernel, record_type
 from mrmg.compilation.parallel import compile_in_processes
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "cache_folder",
     "compile_in_processes",
     "compiled_kernels",
+    "inlined",
     "kernel",
     "kernel_sources",
     "kernels_are_compiled",

@@ -30,13 +30,14 @@ class Kernel:
 
     Args:
         function: it.
+        inline: whether it is compiled anew into each kernel that calls it.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], *, inline: bool = False) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
 
-        @overload(self, jit_options=_OPTIONS)
+        @overload(self, jit_options={**_OPTIONS, "forceinline": inline})
         @functools.wraps(function)
         def _compile_for_kernels(*_: Any) -> Callable[..., Any]:
             return function
@@ -60,6 +61,18 @@ def kernel(function: F) -> F:
     order of additions, which would end reproducibility.
     """
     return function if numba.config.DISABLE_JIT else Kernel(function)  # type: ignore[return-value]
+
+
+def inlined(function: F) -> F:
+    """Compile `function` as `kernel` does, but into each kernel that calls it.
+
+    It is for what the innermost loops of a search call: to hand on arrays takes longer
+    than what is done with them there (the search for motions takes half the time).
+    Elsewhere it only makes compiling longer.
+    """
+    if numba.config.DISABLE_JIT:
+        return function
+    return Kernel(function, inline=True)  # type: ignore[return-value]
 
 
 def record_type(fields: Sequence[tuple[object, ...]]) -> np.dtype[np.void]:

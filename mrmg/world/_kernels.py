@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import inlined, kernel
 from mrmg.world._polygon_kernels import convex_distance, point_segment_distance
 
 
@@ -82,7 +82,7 @@ class TerrainGrid(NamedTuple):
     turning: np.ndarray = UNIFORM_TURNING
 
 
-@kernel
+@inlined
 def clearance_at_least(space, x, y):
     """Return a lower bound of the signed distance from obstacles [m]; -inf off grid.
 
@@ -127,7 +127,7 @@ def bilinear(value, column, row):
     return low * (1.0 - v) + high * v
 
 
-@kernel
+@inlined
 def footprint_is_clear(space, placed, cx, cy, radius, margin):
     """Return whether a placed footprint keeps `margin` [m] from every obstacle; exact.
 
@@ -171,6 +171,8 @@ def footprint_distance(space, placed, cx, cy, radius, enough):
 
     It is at most `enough`, and what the free space's `reach` has beyond the radius.
     """
+    if clearance_at_least(space, cx, cy) >= radius + enough:
+        return enough
     column = min(
         max(int((cx - space.x_min) / space.bucket), 0), space.bucket_columns - 1
     )

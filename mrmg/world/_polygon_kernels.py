@@ -18,6 +18,13 @@ it strays v w dt^2 / 8 from v dt [m], and w dt is at most 0.2."""
 
 
 @kernel
+def point_distance(ax, ay, bx, by):
+    """Return the distance of two points; `hypot`, which never overflows, is slower."""
+    dx, dy = bx - ax, by - ay
+    return sqrt(dx * dx + dy * dy)
+
+
+@kernel
 def point_segment_distance(px, py, ax, ay, bx, by):
     """Return the distance of a point from a segment."""
     dx = bx - ax
@@ -27,8 +34,7 @@ def point_segment_distance(px, py, ax, ay, bx, by):
     if length2 > 0.0:
         t = ((px - ax) * dx + (py - ay) * dy) / length2
         t = min(1.0, max(0.0, t))
-    ex, ey = px - ax - t * dx, py - ay - t * dy
-    return sqrt(ex * ex + ey * ey)
+    return point_distance(px, py, ax + t * dx, ay + t * dy)
 
 
 @kernel
@@ -111,8 +117,12 @@ def convex_distance(first, second, enough):
 @kernel
 def place_footprint(footprint, x, y, theta, out):
     """Write the footprint's corners at a pose into `out`, shape (m, 2)."""
-    c = cos(theta)
-    s = sin(theta)
+    place_turned(footprint, x, y, cos(theta), sin(theta), out)
+
+
+@kernel
+def place_turned(footprint, x, y, c, s, out):
+    """Write the corners where cosine and sine of the heading are known."""
     for i in range(len(footprint)):
         out[i, 0] = x + c * footprint[i, 0] - s * footprint[i, 1]
         out[i, 1] = y + s * footprint[i, 0] + c * footprint[i, 1]
@@ -121,11 +131,11 @@ def place_footprint(footprint, x, y, theta, out):
 @kernel
 def way_of_corners(footprint, start, end):
     """Return how far any point of a footprint moves from pose to pose at most [m]."""
-    x, y = end[0] - start[0], end[1] - start[1]
     reach2 = 0.0
     for corner in footprint:
         reach2 = max(reach2, corner[0] * corner[0] + corner[1] * corner[1])
-    return sqrt(x * x + y * y) + sqrt(reach2) * abs(end[2] - start[2])
+    way = point_distance(start[0], start[1], end[0], end[1])
+    return way + sqrt(reach2) * abs(end[2] - start[2])
 
 
 @kernel

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from math import atan, atan2, hypot, pi, sin, sqrt
+from math import atan, atan2, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel, record_type
+from mrmg.compilation import inlined, kernel, record_type
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.problem._control_kernels import (
     REST,
@@ -78,13 +78,13 @@ class Course(NamedTuple):
     stiffness: float
 
 
-@kernel
+@inlined
 def advance(course, i, x, y):
     """Return (segment, way along the path) nearest to a point, from segment i on."""
     while True:
         ax, ay = course.node[i].x, course.node[i].y
         bx, by = course.node[i + 1].x - ax, course.node[i + 1].y - ay
-        size = hypot(bx, by)
+        size = sqrt(bx * bx + by * by)
         along = ((x - ax) * bx + (y - ay) * by) / max(size, 1e-9)
         if along < size or i + 1 >= course.node[i].end:
             return i, course.node[i].way + along
@@ -136,7 +136,7 @@ def follow(own, course, i, state):
     i, s = advance(course, i, state[0], state[1])
     ax, ay = course.node[i].x, course.node[i].y
     bx, by = course.node[i + 1].x - ax, course.node[i + 1].y - ay
-    size = max(hypot(bx, by), 1e-9)
+    size = max(sqrt(bx * bx + by * by), 1e-9)
     tx, ty = bx / size, by / size
     gear = course.node[i].gear
     off = tx * (state[1] - ay) - ty * (state[0] - ax)

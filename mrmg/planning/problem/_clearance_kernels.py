@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from math import hypot
-
-from mrmg.compilation import kernel
+from mrmg.compilation import inlined
 from mrmg.planning.roadmap._fleet_kernels import middle_at, space_of
 from mrmg.world._kernels import (
     clearance_at_least,
     footprint_distance,
     footprint_is_clear,
 )
-from mrmg.world._polygon_kernels import BULGE, place_footprint
+from mrmg.world._polygon_kernels import BULGE, place_footprint, point_distance
 
 
-@kernel
+@inlined
 def keeps_clear(own, spaces, state, margin, corner):
     """Return whether a robot keeps a margin from obstacles.
 
@@ -34,7 +32,7 @@ def keeps_clear(own, spaces, state, margin, corner):
     return footprint_is_clear(space, corner[:n], cx, cy, radius, margin)
 
 
-@kernel
+@inlined
 def moves_clear(own, spaces, before, state, corner):
     """Return whether a robot keeps its margin after a step, and touches nothing in it.
 
@@ -49,19 +47,15 @@ def moves_clear(own, spaces, before, state, corner):
     """
     margin, radius = own[0].margin, own[0].radius
     space = space_of(spaces, own[0].space)
-    reach = radius + hypot(own[0].middle[0], own[0].middle[1])
-    way = hypot(state[0] - before[0], state[1] - before[1])
+    reach = radius + point_distance(0.0, 0.0, own[0].middle[0], own[0].middle[1])
+    way = point_distance(before[0], before[1], state[0], state[1])
     way += reach * abs(state[2] - before[2])
-    kept = 0.0
-    if space.allowance.shape[0] == 0:  # else it may have kept less before the step
-        kept = margin
-        if way <= 2.0 * kept:
-            return keeps_clear(own, spaces, state, margin, corner)
-        within = way - kept < space.reach - radius
-        if within and keeps_clear(own, spaces, state, way - kept, corner):
-            return True
     if not keeps_clear(own, spaces, state, margin, corner):
         return False
+    # In openings it may have kept less before the step.
+    kept = margin if space.allowance.shape[0] == 0 else 0.0
+    if way <= 2.0 * kept:
+        return True
     footprint, t = own[0].corner[: own[0].corners], 0.0
     pose = state[:3].copy()
     while True:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from math import hypot
 from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel, record_type
-from mrmg.world._polygon_kernels import point_in_convex
+from mrmg.compilation import inlined, record_type
+from mrmg.world._polygon_kernels import point_distance, point_in_convex
 
 REGION = record_type(
     [
@@ -32,7 +31,7 @@ class Zones(NamedTuple):
     corner: np.ndarray
 
 
-@kernel
+@inlined
 def in_region(region, corner, x, y):
     """Return whether a point lies in a region.
 
@@ -41,6 +40,6 @@ def in_region(region, corner, x, y):
         corner: its padded corners, shape (M, 2).
         x, y: the point [m].
     """
-    if hypot(x - region.center[0], y - region.center[1]) > region.reach:
+    if point_distance(x, y, region.center[0], region.center[1]) > region.reach:
         return False
     return region.corners == 0 or point_in_convex(x, y, corner[: region.corners])

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel, record_type
+from mrmg.compilation import inlined, record_type
 from mrmg.planning.problem._control_kernels import wrap
 from mrmg.planning.problem._region_kernels import REGION, in_region
 
@@ -41,13 +41,13 @@ class Targets(NamedTuple):
     corner: np.ndarray
 
 
-@kernel
+@inlined
 def in_target(targets, t, x, y):
     """Return whether a point lies in a target's region."""
     return in_region(targets.target[t], targets.corner[t], x, y)
 
 
-@kernel
+@inlined
 def askew(targets, t, state):
     """Return how far a robot is off a target's heading beyond what is allowed [rad]."""
     target = targets.target[t]
@@ -56,7 +56,7 @@ def askew(targets, t, state):
     return max(0.0, abs(wrap(target.heading - state[2])) - target.tolerance)
 
 
-@kernel
+@inlined
 def at_target(targets, t, state):
     """Return whether a robot is in a target's region, with its heading."""
     return in_target(targets, t, state[0], state[1]) and askew(targets, t, state) == 0.0

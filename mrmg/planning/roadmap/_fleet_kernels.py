@@ -6,7 +6,7 @@ from math import cos, sin
 
 import numpy as np
 
-from mrmg.compilation import kernel, record_type
+from mrmg.compilation import inlined, kernel, record_type
 from mrmg.energy.model import N_COEFFICIENTS
 from mrmg.world._kernels import FreeSpace
 
@@ -49,12 +49,14 @@ bucket starts and allowances have one more axis, edges are numbered through."""
 @kernel
 def middle_at(robot, state):
     """Return the middle (x, y) of a robot's footprint in a state [m]."""
-    c, s = cos(state[2]), sin(state[2])
     mx, my = robot.middle[0], robot.middle[1]
+    if mx == my == 0.0:
+        return state[0], state[1]
+    c, s = cos(state[2]), sin(state[2])
     return state[0] + c * mx - s * my, state[1] + s * mx + c * my
 
 
-@kernel
+@inlined
 def space_of(spaces, index):
     """Return one free space of the stack."""
     return FreeSpace(

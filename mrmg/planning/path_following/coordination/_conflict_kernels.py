@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
-from math import hypot
+from math import cos, sin
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import inlined, kernel
 from mrmg.planning.problem._region_kernels import in_region
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS, middle_at
-from mrmg.world._polygon_kernels import convex_distance, pass_apart, place_footprint
+from mrmg.world._polygon_kernels import (
+    convex_distance,
+    pass_apart,
+    place_footprint,
+    place_turned,
+    point_distance,
+)
 
 
-@kernel
+@inlined
 def first_conflict(own, traffic, other, state, count, first, corner):
     """Return the first of some states in which two robots are too near, or -1.
 
@@ -41,12 +47,13 @@ def first_conflict(own, traffic, other, state, count, first, corner):
         j = min(max(first + k, 0), their_last)
         pose, its = state[min(k, last)], traffic.pose[other, j]
         x, y = middle_at(own[0], pose)
-        apart = hypot(x - traffic.middle[other, j, 0], y - traffic.middle[other, j, 1])
+        middle = traffic.middle[other, j]
+        apart = point_distance(x, y, middle[0], middle[1])
         if apart >= reach:  # until they may have come near to each other
             k += max(1, int((apart - reach) / closing))
             continue
         place_footprint(mine, pose[0], pose[1], pose[2], corner[0, :n])
-        place_footprint(theirs, its[0], its[1], its[2], corner[1, :m])
+        place_turned(theirs, its[0], its[1], its[3], its[4], corner[1, :m])
         distance = convex_distance(corner[0, :n], corner[1, :m], enough)
         if distance < margin and k > 0:
             return k
@@ -90,6 +97,7 @@ def note_motion(fleet, zones, traffic, inside, r, count):
         pose = traffic.pose[r, min(k, count - 1)]
         if k < count:
             traffic.middle[r, k, 0], traffic.middle[r, k, 1] = middle_at(fleet[r], pose)
+            pose[3], pose[4] = cos(pose[2]), sin(pose[2])
         for zone in range(len(zones.zone)):
             inside[r, zone, k] = in_region(
                 zones.zone[zone], zones.corner[zone], pose[0], pose[1]

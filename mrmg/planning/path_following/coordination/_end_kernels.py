@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from math import cos, hypot, pi, sin
+from math import cos, pi, sin
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import borrowed, inlined, kernel
 from mrmg.motion._kernels import CAR, USER, copy_numbers, steer_user, step
 from mrmg.planning.path_following.coordination._conflict_kernels import (
     blocked_for_good,
@@ -25,6 +25,7 @@ from mrmg.planning.problem._clearance_kernels import keeps_clear
 from mrmg.planning.problem._control_kernels import braking_control, stands, wrap
 from mrmg.planning.problem._target_kernels import at_target, in_target
 from mrmg.planning.roadmap._heap_kernels import push
+from mrmg.world._polygon_kernels import point_distance
 
 ROOM_STEPS = 300
 """Steps that are left for braking at least."""
@@ -83,7 +84,7 @@ def steer_to(search, target, state, control):
     arrived = False
     for k in range(min(HOME_STEPS, len(control) - braking_steps(own, dt))):
         here = state[k]
-        gap = hypot(center[0] - here[0], center[1] - here[1])
+        gap = point_distance(here[0], here[1], center[0], center[1])
         arrived = gap < (2.0 * near if arrived else near)
         if arrived and at_target(targets, target, here):
             return k + brake(own, dt, state[k:], control[k:])
@@ -166,7 +167,7 @@ def drive_to(search, target, room, control):
     return count
 
 
-@kernel
+@inlined
 def list_near(search, room, first, steps):
     """Write which robots may be met within some steps; return their number.
 
@@ -182,10 +183,8 @@ def list_near(search, room, first, steps):
         if not (traffic.robot[other].hard or traffic.robot[other].soft):
             continue
         j = min(first, traffic.robot[other].last)
-        apart = hypot(
-            state[0] - traffic.middle[other, j, 0],
-            state[1] - traffic.middle[other, j, 1],
-        )
+        middle = traffic.middle[other, j]
+        apart = point_distance(state[0], state[1], middle[0], middle[1])
         reach = 2.0 * own[0].radius + traffic.fleet[other].radius
         reach += max(own[0].spacing, traffic.fleet[other].spacing)
         if apart < reach + (steps + 1) * traffic.robot[other].closing:
@@ -194,7 +193,7 @@ def list_near(search, room, first, steps):
     return count
 
 
-@kernel
+@inlined
 def conflict_cost(search, room, nears, first, steps):
     """Return the cost of conflicts with others in some steps [s]; inf if forbidden.
 
@@ -216,9 +215,9 @@ def conflict_cost(search, room, nears, first, steps):
         apart = reach
         for k in range(conflict, min(steps, conflict + search.task.steps) + 1):
             j = min(first + k, traffic.robot[other].last)
-            dx = room.state[k, 0] - traffic.middle[other, j, 0]
-            dy = room.state[k, 1] - traffic.middle[other, j, 1]
-            apart = min(apart, hypot(dx, dy))
+            pose, middle = room.state[k], traffic.middle[other, j]
+            gap = point_distance(pose[0], pose[1], middle[0], middle[1])
+            apart = min(apart, gap)
         cost += search.task.soft_s * max(LEAST_NEARNESS, 1.0 - apart / reach)
     return cost
 
@@ -229,6 +228,7 @@ def passing_cost(search, room, count, first):
 
     That is the cost of conflicts, beside the time it takes.
     """
+    search, room = borrowed(search), borrowed(room)
     if not clear(
         search.own, search.spaces, search.zones, search.traffic, room.state, count,
         first, room.corner,
@@ -268,7 +268,7 @@ def add_end(search, nodes, room, a, motion, count):
 def is_tried(search, target, state, tries):
     """Return whether to drive to a target from a state: from afar more rarely."""
     center = search.targets.target[target].center
-    far = hypot(state[0] - center[0], state[1] - center[1])
+    far = point_distance(state[0], state[1], center[0], center[1])
     return tries % (1 + int(0.2 * far / max(search.own[0].radius, 0.1))) == 0
 
 

@@ -5,17 +5,21 @@ Static ones know obstacles alone; timed ones also know where the other robots ar
 
 from __future__ import annotations
 
-from math import cos, floor, hypot, pi, sin, sqrt
+from math import cos, floor, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import inlined, kernel
 from mrmg.planning.problem._clearance_kernels import keeps_clear
 from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.planning.roadmap._heap_kernels import pop, push
-from mrmg.world._polygon_kernels import place_footprint, point_convex_distance
+from mrmg.world._polygon_kernels import (
+    place_turned,
+    point_convex_distance,
+    point_distance,
+)
 
 DIAGONAL = sqrt(2.0)
 
@@ -146,21 +150,24 @@ def timed_cost_to_go(price, seed, penalty, hold, field):
         field: receives the costs; the last layer is there, shape (T, ny, nx).
     """
     rows, columns = price.shape
+    beside = np.full((rows + 2, columns + 2), np.inf)  # with a border, and no branches:
+    across = beside.copy()  # so the compiler takes several cells at once
     for t in range(len(field) - 2, -1, -1):
-        later = field[t + 1]
         for i in range(rows):
             for j in range(columns):
-                field[t, i, j] = np.inf
-                if not (price[i, j] < np.inf and penalty[t, i, j] < np.inf):
-                    continue
-                best = min(seed[t, i, j], hold[i, j] + later[i, j])
-                for a in range(max(0, i - 1), min(rows, i + 2)):
-                    for b in range(max(0, j - 1), min(columns, j + 2)):
-                        if later[a, b] < best and (a != i or b != j):
-                            way = DIAGONAL if a != i and b != j else 1.0
-                            cost = 0.5 * way * (price[i, j] + price[a, b])
-                            best = min(best, cost + later[a, b])
-                field[t, i, j] = penalty[t, i, j] + best
+                half = 0.5 * price[i, j]
+                beside[i + 1, j + 1] = half + field[t + 1, i, j]
+                across[i + 1, j + 1] = DIAGONAL * half + field[t + 1, i, j]
+        for i in range(rows):
+            for j in range(columns):
+                half = 0.5 * price[i, j]
+                sides = min(beside[i, j + 1], beside[i + 2, j + 1])
+                sides = min(sides, beside[i + 1, j], beside[i + 1, j + 2])
+                corners = min(across[i, j], across[i, j + 2])
+                corners = min(corners, across[i + 2, j], across[i + 2, j + 2])
+                best = min(half + sides, DIAGONAL * half + corners)
+                best = min(best, seed[t, i, j], hold[i, j] + field[t + 1, i, j])
+                field[t, i, j] = penalty[t, i, j] + (best if half < np.inf else half)
 
 
 @kernel
@@ -230,14 +237,14 @@ def add_others(own, traffic, inner, grid, layer, soft_s, penalty):
         if not (traffic.robot[other].hard or traffic.robot[other].soft):
             continue
         it = traffic.fleet[other]
-        placed = corner[: it.corners]
+        outline, placed = it.corner[: it.corners], corner[: it.corners]
         near = inner + max(own[0].spacing, it.spacing) - 0.5 * cell
         reach = own[0].radius + it.radius
         far = near + it.radius
         for t in range(len(penalty)):
             k = min(t * layer, traffic.robot[other].last)
             pose, middle = traffic.pose[other, k], traffic.middle[other, k]
-            place_footprint(it.corner[: it.corners], pose[0], pose[1], pose[2], placed)
+            place_turned(outline, pose[0], pose[1], pose[3], pose[4], placed)
             first_row = max(0, int(floor((middle[1] - far - y_min) / cell)))
             last_row = min(rows - 1, int(floor((middle[1] + far - y_min) / cell)))
             first = max(0, int(floor((middle[0] - far - x_min) / cell)))
@@ -245,7 +252,7 @@ def add_others(own, traffic, inner, grid, layer, soft_s, penalty):
             for i in range(first_row, last_row + 1):
                 for j in range(first, last + 1):
                     x, y = x_min + (j + 0.5) * cell, y_min + (i + 0.5) * cell
-                    apart = hypot(x - middle[0], y - middle[1])
+                    apart = point_distance(x, y, middle[0], middle[1])
                     if apart >= far or penalty[t, i, j] == np.inf:
                         continue
                     if not point_convex_distance(x, y, placed) < near:
@@ -298,7 +305,7 @@ def add_fitting(own, spaces, place, grid, fits):
     for i in range(max(0, row - more), min(rows, row + more + 1)):
         for j in range(max(0, column - more), min(columns, column + more + 1)):
             pose[0], pose[1] = x_min + (j + 0.5) * cell, y_min + (i + 0.5) * cell
-            if hypot(pose[0] - px, pose[1] - py) > reach:
+            if point_distance(px, py, pose[0], pose[1]) > reach:
                 continue
             for k in range(FITTING):
                 pose[2] = 2.0 * pi * k / FITTING
@@ -307,7 +314,7 @@ def add_fitting(own, spaces, place, grid, fits):
                     break
 
 
-@kernel
+@inlined
 def guide_at(guide, leg, step, x, y):
     """Return the cost-to-go of a point on a leg at a step [s].
 

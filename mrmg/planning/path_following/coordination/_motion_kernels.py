@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel, record_type
+from mrmg.compilation import borrowed, inlined, kernel, record_type
 from mrmg.motion._kernels import USER, steer_user, step
 from mrmg.planning.path_following._following_kernels import (
     advance,
@@ -60,7 +60,7 @@ class Traffic(NamedTuple):
 
     Attributes:
         fleet: all robots, shape (R,).
-        pose: states at each step, of which (x, y, theta) count, shape (R, K, 5).
+        pose: x, y, heading, and its cosine and sine, at each step, shape (R, K, 5).
         middle: middles of the footprints, shape (R, K, 2).
         robot: `OTHER`, shape (R,).
         busy: whether a robot that must not be met is in a mutual-exclusion zone, shape
@@ -80,7 +80,7 @@ class Traffic(NamedTuple):
     end: int
 
 
-@kernel
+@inlined
 def clear(own, spaces, zones, traffic, state, count, first, corner):
     """Return whether states 1 to `count` keep clear of obstacles and occupied zones.
 
@@ -269,6 +269,7 @@ def drive_curve(search, course, corner, state, control):
         state: from state[0] on, shape (n, 5).
         control: shape (n, 2).
     """
+    search, course, corner = borrowed(search), borrowed(course), borrowed(corner)
     own, dt = search.own, search.dt
     way = course.node[max(course.size[0] - 1, 0)].way
     most = int(way / (own[0].limit[1] * dt)) + REACH_STEPS

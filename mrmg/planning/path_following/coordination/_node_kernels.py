@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel, record_type
+from mrmg.compilation import inlined, kernel, record_type
 from mrmg.motion._kernels import CAR, copy_numbers
 from mrmg.planning.path_following._following_kernels import Course, advance
 from mrmg.planning.path_following.coordination._field_kernels import (
@@ -158,7 +158,7 @@ class Scratch(NamedTuple):
     curve: Course
 
 
-@kernel
+@inlined
 def cell_of(task, state, leg, step):
     """Return the number of the cell that a state lies in; `step` 0 leaves out time."""
     key = np.int64(floor(state[0] / task.resolution[0])) & 0x3FFF
@@ -171,7 +171,7 @@ def cell_of(task, state, leg, step):
     return key << 13 | step // task.steps & 0x1FFF
 
 
-@kernel
+@inlined
 def place_of(table, key):
     """Return the place of a key in a table of 2^n places, or the one it would have."""
     mask = len(table) - 1
@@ -192,7 +192,7 @@ def is_new(table, key):
     return True
 
 
-@kernel
+@inlined
 def cost_to_go_s(search, place, state):
     """Return an estimate of the time from a state to the end of the task [s].
 
@@ -279,7 +279,7 @@ def queueing_s(search, leg, step_number):
     return task.hold_share * search.dt * left[min(step_number, len(left) - 1)]
 
 
-@kernel
+@inlined
 def add(search, nodes, a, motion, state, place, cost):
     """Add a node and open it, if its cost-to-go is finite; return it or -1.
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import inlined, kernel
 from mrmg.planning.path_following.coordination._motion_kernels import HOLD, MOVE, move
 
 ROLLED = 509
@@ -65,7 +65,7 @@ def rolled_out(search, rollouts, state, control):
     return row
 
 
-@kernel
+@inlined
 def carry(rollout, steps, state):
     """Write the states of a rollout that begins at state[0].
 

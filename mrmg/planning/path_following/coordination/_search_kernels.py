@@ -9,11 +9,11 @@ time to time it tries to drive home along the shortest curve.
 
 from __future__ import annotations
 
-from math import atan2, hypot, pi
+from math import atan2, pi, sqrt
 
 import numpy as np
 
-from mrmg.compilation import borrowed, kernel
+from mrmg.compilation import borrowed, inlined, kernel
 from mrmg.motion._kernels import USER, copy_numbers
 from mrmg.planning.path_following._following_kernels import advance
 from mrmg.planning.path_following.coordination._end_kernels import (
@@ -69,7 +69,7 @@ AFTER_END = 1.6
 With 2, makespans of dense traffic are up to 3 % shorter; with 1, up to 7 % longer."""
 
 
-@kernel
+@inlined
 def legs_done(targets, task, leg, state, first, last):
     """Return the leg that a robot is on after some states; a stay ends none."""
     for k in range(first, last + 1):
@@ -82,14 +82,14 @@ def legs_done(targets, task, leg, state, first, last):
     return leg
 
 
-@kernel
+@inlined
 def rejoined(course, left, state):
     """Return (segment or OFF_PATH, least segment it may rejoin) of a state."""
     i, s = advance(course, left, state[0], state[1])
     for _ in range(2):
         dx = course.node[i + 1].x - course.node[i].x
         dy = course.node[i + 1].y - course.node[i].y
-        size = max(hypot(dx, dy), 1e-9)
+        size = max(sqrt(dx * dx + dy * dy), 1e-9)
         ex, ey = state[0] - course.node[i].x, state[1] - course.node[i].y
         along, off = (ex * dx + ey * dy) / size, (dx * ey - dy * ex) / size
         ahead = atan2(dy, dx) + (0.0 if course.node[i].gear > 0 else pi)
@@ -103,8 +103,8 @@ def rejoined(course, left, state):
     return OFF_PATH, left
 
 
-@kernel
-def expand(search, nodes, room, a, motion, nears, row):
+@inlined
+def add_motion(search, nodes, room, a, motion, nears, row):
     """Add what a motion leads to from node a if it is free and new; return it or -1.
 
     Args:
@@ -147,6 +147,24 @@ def expand(search, nodes, room, a, motion, nears, row):
     cost = node.cost + share * steps * search.dt + conflict_s
     place = (first + steps, leg, segment, left)
     return add(search, nodes, a, motion, after, place, cost)
+
+
+@kernel
+def expand(search, nodes, room, a, begin, end):
+    """Add what motions from `begin` to before `end` lead to from node a.
+
+    Returns:
+        The node that the last one leads to, or -1.
+    """
+    search, nodes, room = borrowed(search), borrowed(nodes), borrowed(room)
+    task, node, last, row = search.task, nodes.node[a], -1, -1
+    copy_numbers(nodes.state[a], room.state[0])
+    nears = list_near(search, room, node.step, task.steps)
+    if begin >= HOLD and search.own[0].model != USER:
+        row = rolled_out(search, nodes.rollouts, room.state[0], room.control)
+    for motion in range(begin, end):
+        last = add_motion(search, nodes, room, a, motion, nears, row)
+    return last
 
 
 @kernel
@@ -278,9 +296,7 @@ def follow_path(search, nodes, room, a, tries):
         on_path = 0 <= segment < search.course.size[0]
         if not on_path or first + 2 * stop >= len(room.control):
             return tries
-        copy_numbers(nodes.state[a], room.state[0])
-        nears = list_near(search, room, first, search.task.steps)
-        a = expand(search, nodes, room, a, TRACK, nears, -1)
+        a = expand(search, nodes, room, a, TRACK, HOLD)
     return tries
 
 
@@ -323,13 +339,8 @@ def find_motion(search, nodes, room, start, control):
                 )
                 continue
         copy_numbers(nodes.state[a], room.state[0])
-        wait(search, nodes, room, a)  # lists robots of its own
-        nears = list_near(search, room, node.step, task.steps)
-        row = -1
-        if search.own[0].model != USER:
-            row = rolled_out(search, nodes.rollouts, room.state[0], room.control)
-        for motion in range(HOLD, MOVE + motions):
-            expand(search, nodes, room, a, motion, nears, row)
+        wait(search, nodes, room, a)
+        expand(search, nodes, room, a, HOLD, MOVE + motions)
         if nodes.size[2] >= 0:
             most = min(most, max(task.enough, int(AFTER_END * nodes.size[0])))
     if nodes.size[2] >= 0:  # the best there is, if not good enough to end sooner

@@ -47,11 +47,12 @@ def straight(pose: np.ndarray, steps: int) -> np.ndarray:
 def traffic_of(problem: Problem, states: np.ndarray, *, hard: bool = True) -> Traffic:
     """What robot r1 sees of robot r2, which goes through some states."""
     fleet = problem.mission.fleet
-    pose = np.stack([np.zeros_like(states), states])
+    c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
+    seen = np.column_stack([states[:, :3], c, s])
+    pose = np.stack([np.zeros_like(seen), seen])
     model = problem.scene.robots[1].model
     footprint = shapely.MultiPoint(model.footprint_m).bounds
     ahead, aside = (footprint[2] + footprint[0]) / 2, (footprint[3] + footprint[1]) / 2
-    c, s = np.cos(states[:, 2]), np.sin(states[:, 2])
     closing_m = 3.0 * STEP_M
     offset = np.stack([c * ahead - s * aside, s * ahead + c * aside], axis=1)
     return Traffic(
