@@ -2,8 +2,9 @@
 
 numba counts who uses an array, in memory that all threads share: for every array of a
 tuple that is handed on, and twice for each call. Where kernels hand on whole missions
-that takes a third of their time. A kernel whose caller holds its arguments anyway,
-which Python does, need not count them.
+that takes most of their time. A kernel whose caller holds its arguments anyway need not
+count them: nor need all that is compiled into it (`inlined`). What it calls otherwise
+does not know, and asks at each use.
 """
 
 from __future__ import annotations

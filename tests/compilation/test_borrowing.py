@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import borrowed, kernel
+from mrmg.compilation import borrowed, inlined, kernel
 
 
 class Inner(NamedTuple):
@@ -30,6 +30,29 @@ def add_up(outer):
         own[i] = outer.inner.factor * outer.inner.weight[i] * outer.record[i].length
     outer.total[0] = own.sum()
     return outer.total[0]
+
+
+@inlined
+def weighed(inner, i):
+    """Return a part of the total."""
+    return inner.factor * inner.weight[i]
+
+
+@kernel
+def weigh(outer, total):
+    """Write what `add_up` does, by a function of its own."""
+    outer, total = borrowed((outer, total))
+    for i in range(len(outer.record)):
+        total[i] = weighed(outer.inner, i) * outer.record[i].length
+
+
+def test_inlined_kernels_read_and_write_what_their_callers_borrow() -> None:
+    record = np.zeros(3, np.dtype([("length", np.float64)])).view(np.recarray)
+    record.length[:] = [1.0, 2.0, 3.0]
+    outer = Outer(Inner(np.ones(3), 2.0), np.asarray(record), np.zeros(1))
+    total = np.zeros(3)
+    weigh(outer, total)
+    assert total.tolist() == [2.0, 4.0, 6.0]
 
 
 def test_borrowed_arrays_are_read_and_written_and_stay_their_owners() -> None:

@@ -7,12 +7,12 @@ on footprints too near to obstacles and on targets that are missed.
 
 from __future__ import annotations
 
-from math import ceil, floor, hypot, isfinite, sqrt
+from math import ceil, floor, isfinite, sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import borrowed, inlined, kernel
 from mrmg.planning.path_following._bending_kernels import (
     add_aim,
     bending_cost,
@@ -82,7 +82,7 @@ class Stops(NamedTuple):
     aim: np.ndarray
 
 
-@kernel
+@inlined
 def value_and_slope(cost_map, grid, x, y):
     """Return (value, d/dx, d/dy) of one of a cost map's grids, bilinear."""
     rows, columns = grid.shape
@@ -108,7 +108,7 @@ def outside(stops, i, x, y):
     region, corner = stops.targets.target[t], stops.targets.corner[t]
     if region.corners == 0:
         dx, dy = x - region.center[0], y - region.center[1]
-        far = hypot(dx, dy)
+        far = sqrt(dx * dx + dy * dy)
         off = far - region.reach + stops.deeper[i]
         return (off, dx / far, dy / far) if off > 0.0 else (0.0, 0.0, 0.0)
     worst, nx, ny = 0.0, 0.0, 0.0
@@ -116,7 +116,7 @@ def outside(stops, i, x, y):
     for k in range(n):
         j = k + 1 if k + 1 < n else 0
         ex, ey = corner[j, 0] - corner[k, 0], corner[j, 1] - corner[k, 1]
-        size = hypot(ex, ey)
+        size = sqrt(ex * ex + ey * ey)
         ox, oy = x - corner[k, 0], y - corner[k, 1]
         off = (ey * ox - ex * oy) / size + stops.deeper[i]
         if off > worst:
@@ -131,6 +131,7 @@ def add_terrain_and_clearance(cost_map, p, gear, gradient):
     A segment is looked at in pieces no longer than the footprint, which is laid on the
     middle of each: so that no wall, however thin, lies between two of them.
     """
+    cost_map, p, gear, gradient = borrowed((cost_map, p, gear, gradient))
     total = 0.0
     for i in range(len(p) - 1):
         bx, by = p[i + 1, 0] - p[i, 0], p[i + 1, 1] - p[i, 1]
@@ -154,7 +155,7 @@ def add_terrain_and_clearance(cost_map, p, gear, gradient):
     return total
 
 
-@kernel
+@inlined
 def density_at(cost_map, x, y, tx, ty, gear):
     """Return the cost per metre at a point, its gradient, and its slope by turning.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import atan2, hypot, sqrt
+from math import atan2, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -61,7 +61,7 @@ def write_turns(p, gear, nose, shape):
         bx, by, next_gear = nose[1, 0], nose[1, 1], 1
         if i < n:
             bx, by, next_gear = p[i + 1, 0] - p[i, 0], p[i + 1, 1] - p[i, 1], gear[i]
-            shape.size[i] = max(hypot(bx, by), 1e-6)
+            shape.size[i] = max(sqrt(bx * bx + by * by), 1e-6)
         sign = last * next_gear
         shape.turn[i] = atan2((ax * by - ay * bx) * sign, (ax * bx + ay * by) * sign)
         ahead = shape.size[i] if i < n else 0.0
@@ -131,7 +131,7 @@ def add_aim(cost_map, a, b, gear, aim, gradient):
         gradient: of the two nodes, shape (2, 2).
     """
     ex, ey = b[0] - a[0], b[1] - a[1]
-    size = max(hypot(ex, ey), 1e-6)
+    size = max(sqrt(ex * ex + ey * ey), 1e-6)
     off = wrap(atan2(gear * ey, gear * ex) - aim)
     sharp = abs(off) / (0.5 * size * cost_map.curvature) - 1.0
     if sharp <= 0.0:

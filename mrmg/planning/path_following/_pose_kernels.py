@@ -20,7 +20,7 @@ import numpy as np
 from mrmg.compilation import borrowed, kernel, record_type
 from mrmg.motion._kernels import UNICYCLE
 from mrmg.planning.path_following._band_kernels import Stops, outside
-from mrmg.planning.path_following.coordination._field_kernels import Guide, guide_at
+from mrmg.planning.path_following.coordination._guide_kernels import Guide, guide_at
 from mrmg.planning.path_following.coordination._node_kernels import place_of
 from mrmg.planning.problem._clearance_kernels import keeps_clear
 from mrmg.planning.problem._control_kernels import wrap

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import kernel
+from mrmg.compilation import borrowed, inlined, kernel
 from mrmg.planning.routing._legs_kernels import (
     CHARGE_TIME,
     LIMIT,
@@ -111,7 +111,7 @@ def place_at(legs, r, goal, length, end, step):
     return goal[step - 1] if end == 0 else goal[length - step]
 
 
-@kernel
+@inlined
 def add_label(label, row, n, new):
     """Add a label to a row of n unless one is as good in all; return their number.
 
@@ -201,6 +201,7 @@ def extend(way, head, rows, leg, path, stops, battery):
             from which the ways begin.
         battery: as `battery_of` returns it.
     """
+    way, head, path = borrowed((way, head, path))
     row, next_row = rows
     slot, paths, end = stops
     n, ways = 0, int(head[row, WAYS])
@@ -245,6 +246,7 @@ def label_route(legs, labels, r, goal, length, held, plain):
         held: steps from the start and the finish whose labels hold already.
         plain: whether no station is needed.
     """
+    legs, labels, goal = borrowed((legs, labels, goal))
     own, home, slot, paths = legs.table[r], legs.home[r], 0, 0
     battery, stations = battery_of(legs, r), legs.near.shape[3]
     for end in range(2):

@@ -228,7 +228,7 @@ def passing_cost(search, room, count, first):
 
     That is the cost of conflicts, beside the time it takes.
     """
-    search, room = borrowed(search), borrowed(room)
+    search, room = borrowed((search, room))
     if not clear(
         search.own, search.spaces, search.zones, search.traffic, room.state, count,
         first, room.corner,

@@ -269,7 +269,7 @@ def drive_curve(search, course, corner, state, control):
         state: from state[0] on, shape (n, 5).
         control: shape (n, 2).
     """
-    search, course, corner = borrowed(search), borrowed(course), borrowed(corner)
+    search, course, corner = borrowed((search, course, corner))
     own, dt = search.own, search.dt
     way = course.node[max(course.size[0] - 1, 0)].way
     most = int(way / (own[0].limit[1] * dt)) + REACH_STEPS

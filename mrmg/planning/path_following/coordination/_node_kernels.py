@@ -10,7 +10,7 @@ import numpy as np
 from mrmg.compilation import inlined, kernel, record_type
 from mrmg.motion._kernels import CAR, copy_numbers
 from mrmg.planning.path_following._following_kernels import Course, advance
-from mrmg.planning.path_following.coordination._field_kernels import (
+from mrmg.planning.path_following.coordination._guide_kernels import (
     Guide,
     guide_at,
     turning_at,

@@ -156,7 +156,7 @@ def expand(search, nodes, room, a, begin, end):
     Returns:
         The node that the last one leads to, or -1.
     """
-    search, nodes, room = borrowed(search), borrowed(nodes), borrowed(room)
+    search, nodes, room = borrowed((search, nodes, room))
     task, node, last, row = search.task, nodes.node[a], -1, -1
     copy_numbers(nodes.state[a], room.state[0])
     nears = list_near(search, room, node.step, task.steps)
@@ -311,8 +311,8 @@ def find_motion(search, nodes, room, start, control):
         start: its state, shape (5,).
         control: receives the controls, shape (n, 2).
     """
-    search, nodes, room = borrowed(search), borrowed(nodes), borrowed(room)
-    start, control = borrowed(start), borrowed(control)
+    search, nodes, room = borrowed((search, nodes, room))
+    start, control = borrowed((start, control))
     task = search.task
     copy_numbers(start, room.state[0])
     leg = legs_done(search.targets, task, 0, room.state, 0, 0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from mrmg.motion._kernels import CAR
 from mrmg.planning.path_following.coordination import _field_kernels
-from mrmg.planning.path_following.coordination._field_kernels import BEARINGS, Guide
+from mrmg.planning.path_following.coordination._guide_kernels import BEARINGS, Guide
 from mrmg.planning.path_following.coordination._motion_kernels import Traffic
 from mrmg.planning.problem.problem import Problem
 from mrmg.world import _raster_kernels

@@ -11,7 +11,7 @@ import numpy as np
 from mrmg.energy.model import CONSUMERS_W
 from mrmg.motion._kernels import CAR, USER
 from mrmg.planning.path_following.band import Path
-from mrmg.planning.path_following.coordination._field_kernels import Guide, guide_at
+from mrmg.planning.path_following.coordination._guide_kernels import Guide, guide_at
 from mrmg.planning.path_following.coordination._node_kernels import Task, posing_time_s
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE
 from mrmg.planning.path_following.coordination.rounds import Round

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from mrmg.planning.parameters import PlannerParams
-from mrmg.planning.path_following.coordination import _field_kernels
-from mrmg.planning.path_following.coordination._field_kernels import BEARINGS
+from mrmg.planning.path_following.coordination import _field_kernels, _guide_kernels
+from mrmg.planning.path_following.coordination._guide_kernels import BEARINGS
 from mrmg.planning.path_following.coordination.fields import (
     MOST_POSES,
     NO_GUIDE,
@@ -77,7 +77,7 @@ def test_turning_is_counted_beside_the_way(
 
     def turn_s(theta: float) -> float:
         at = np.array([4.0, 10.0, theta, 0.0, 0.0])
-        return float(_field_kernels.turning_at(guide, 0, at))
+        return float(_guide_kernels.turning_at(guide, 0, at))
 
     assert turn_s(0.0) == pytest.approx(0.0, abs=1e-9)
     assert turn_s(pi / 8) == pytest.approx(pi / 8 / rate)
@@ -116,11 +116,11 @@ def test_costs_to_go_lead_through_gaps_that_are_wide_enough_alone(
     assert not problem.openings
     guide = Fields(problem).static(0, [0])
     top = float(problem.mission.fleet[0]["limit"][1])
-    way_m = top * float(_field_kernels.guide_at(guide, 0, 0, 3.0, 5.0))
+    way_m = top * float(_guide_kernels.guide_at(guide, 0, 0, 3.0, 5.0))
     assert (way_m < 2.0 * 9.0) == through
     assert way_m < inf
 
 
 @pytest.mark.parametrize("leg", [0, 1, 7])
 def test_who_does_without_costs_to_go_has_none_on_any_leg(leg: int) -> None:
-    assert _field_kernels.guide_at(NO_GUIDE, leg, 0, 3.0, 5.0) == 0.0
+    assert _guide_kernels.guide_at(NO_GUIDE, leg, 0, 3.0, 5.0) == 0.0
