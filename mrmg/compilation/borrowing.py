@@ -3,8 +3,8 @@
 numba counts who uses an array, in memory that all threads share: for every array of a
 tuple that is handed on, and twice for each call. Where kernels hand on whole missions
 that takes most of their time. A kernel whose caller holds its arguments anyway need not
-count them: nor need all that is compiled into it (`inlined`). What it calls otherwise
-does not know, and asks at each use.
+count them, and neither need the kernels that are compiled into it (`inlined`). Others
+that it calls cannot know that, and ask at each use.
 """
 
 from __future__ import annotations

@@ -60,19 +60,24 @@ def kernel(function: F) -> F:
     Fast-math and parallel reductions would let a branch of the search depend on the
     order of additions, which would end reproducibility.
     """
-    return function if numba.config.DISABLE_JIT else Kernel(function)  # type: ignore[return-value]
+    return _compiled(function, inline=False)
 
 
 def inlined(function: F) -> F:
     """Compile `function` as `kernel` does, but into each kernel that calls it.
 
-    It is for what the innermost loops of a search call: to hand on arrays takes longer
-    than what is done with them there (the search for motions takes half the time).
-    Elsewhere it only makes compiling longer.
+    It is for what the innermost loops of a search call, where handing arrays on takes
+    longer than what is done with them: the search for motions takes half the time with
+    it. Elsewhere it only makes compiling longer.
     """
+    return _compiled(function, inline=True)
+
+
+def _compiled(function: F, *, inline: bool) -> F:
+    """Return a function that is compiled, where numba is not told to compile none."""
     if numba.config.DISABLE_JIT:
         return function
-    return Kernel(function, inline=True)  # type: ignore[return-value]
+    return Kernel(function, inline=inline)  # type: ignore[return-value]
 
 
 def record_type(fields: Sequence[tuple[object, ...]]) -> np.dtype[np.void]:

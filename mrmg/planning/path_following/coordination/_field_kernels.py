@@ -125,8 +125,9 @@ def timed_cost_to_go(price, seed, penalty, hold, field):
         field: receives the costs; the last layer is there, shape (T, ny, nx).
     """
     rows, columns = price.shape
-    beside = np.full((rows + 2, columns + 2), np.inf)  # with a border, and no branches:
-    across = beside.copy()  # so the compiler takes several cells at once
+    # Borders spare the loops all branches, so that several cells are reckoned at once.
+    beside = np.full((rows + 2, columns + 2), np.inf)
+    across = beside.copy()
     for t in range(len(field) - 2, -1, -1):
         for i in range(rows):
             for j in range(columns):
