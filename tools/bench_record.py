@@ -26,7 +26,7 @@ class BenchRow:
         capacity_m: of the first robot's battery, as metres of plain ground.
         init_s, routing_s, first_s, total_s: times of planning; `first_s` is None
             without a plan.
-        path_following_plans: how often the fleet followed paths, without a motion tree;
+        path_following_plans: how often the fleet followed paths, without a search;
             files of earlier versions do not say it.
         iterations: expansions of motion trees.
         conditions: machine, versions, budget.

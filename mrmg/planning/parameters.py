@@ -12,8 +12,8 @@ from mrmg.scene.margins import STATES_NONE, Margins
 PROFILES = ("default", "paper")
 
 PATH_FOLLOWING, GUIDED_TREE = PLANNERS = extensions.BUILT_IN[extensions.PLANNERS]
-"""Planners of this package: path following along tours, with a motion tree where that
-fails; and the paper's method (`guided_tree`)."""
+"""Planners of this package: path following along tours, with a search for motions where
+that fails; and the paper's method (`guided_tree`)."""
 
 THOROUGH = 6
 """Refinements of each plan when there is a budget to be spent."""
@@ -88,11 +88,11 @@ class PlannerParams:
         dt_s: step of the motion model, dt [s].
         trees: attempts at most; one that fails is followed by one with new draws.
         improvements: further attempts after the first plan; the cheapest plan counts.
-        follow_paths: follow paths along tours without a tree where that succeeds.
+        follow_paths: follow paths along tours, without a search where that succeeds.
         soc_margin: share of every battery's capacity that plans leave above the reserve
             where they can, for robots that take more than their models say. With a
             tenth, a robot that uses all it may on one charge can take 12 % more.
-        refinements: times that the plan of each tree is smoothed and driven again,
+        refinements: times that the plan of an attempt is smoothed and driven again,
             as long as that saves energy.
         obstacle_margin_m: distance kept from obstacles at the time steps [m], by every
             robot; None for each robot's own (`kept_margins`). Between two steps no
@@ -101,8 +101,7 @@ class PlannerParams:
             followed through each step.
         robot_margin_m: distance kept between robots at the time steps [m], likewise.
         route_margin: surcharge on roadmap energies in routing, for what the roadmap
-            does
-            not see: turns, corrections, speed changes.
+            does not see: turns, corrections, speed changes.
         budget_s: time limit [s]; None for none. With a limit only validity is promised,
             without one the plan is a function of scene, seed and parameters.
     """

@@ -40,6 +40,9 @@ TURNING_SHARE = 0.5
 """Share of the acceleration of turning with which a turn on the spot is slowed down."""
 
 
+START = -1
+"""Segment of a robot that stays, or turns, where its path begins."""
+
 COURSE_NODE = record_type(
     [
         ("x", np.float64),  # [m]
@@ -62,7 +65,8 @@ class Course(NamedTuple):
     """A path, and what its robot must know of it.
 
     A stretch ends where the gear changes or the robot turns on the spot; robots pause
-    at the ends of stretches only, and there alone turn on the spot to a heading.
+    at the start and the ends of stretches only, and there alone turn on the spot to a
+    heading.
 
     Attributes:
         node: `COURSE_NODE`, shape (N,).
@@ -107,6 +111,14 @@ def lacking(course, i, state):
     """Return the angle by which a robot has to turn where it stands at a node [rad]."""
     off = wrap(course.node[i].heading - state[2])
     return off if abs(off) >= 0.5 * course.node[i].tolerance else 0.0
+
+
+@kernel
+def first_segment(course, state):
+    """Return the segment that a robot begins on."""
+    if course.node[0].pause > 0 or lacking(course, 0, state) != 0.0:
+        return START
+    return 0 if course.size[0] > 1 else course.size[0]
 
 
 @kernel
@@ -184,22 +196,25 @@ def track_control(own, course, segment, stood, state, dt):
     Args:
         own: the robot, shape (1,).
         course: its path.
-        segment: that it is on; the number of nodes once it stands at the path's end.
+        segment: that it is on; START as long as it stays where it begins, and the
+            number of nodes once it stands at the path's end.
         stood: steps for which it has stood at the end of its stretch.
         state: its state.
         dt: step [s].
     """
     size = course.size[0]
-    if segment >= size or size < 2:
+    if segment >= size:
         angle = lacking(course, max(size - 1, 0), state)
         if angle == 0.0:
             u1, u2 = braking_control(own, 0, state, dt)
             return u1, u2, segment, stood, 0.0
         u1, u2 = control_towards(own, 0, state, 0.0, turning_rate(own, angle), dt)
         return u1, u2, segment, stood, 0.0
-    i, _, left, off, v, w = follow(own, course, segment, state)
-    if left < ARRIVED_M:
+    i, last, left, off, v, w = segment, 0, 0.0, 0.0, 0.0, 0.0
+    if segment != START:
+        i, _, left, off, v, w = follow(own, course, segment, state)
         last = course.node[i].end
+    if left < ARRIVED_M:
         angle = lacking(course, last, state)
         v = 0.0
         if own[0].model == UNICYCLE:

@@ -6,7 +6,11 @@ import numpy as np
 
 from mrmg.compilation import kernel
 from mrmg.motion._kernels import step
-from mrmg.planning.path_following._following_kernels import at_rest, track_control
+from mrmg.planning.path_following._following_kernels import (
+    at_rest,
+    first_segment,
+    track_control,
+)
 from mrmg.planning.problem._clearance_kernels import moves_clear
 from mrmg.planning.problem._target_kernels import askew, in_target
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
@@ -35,7 +39,7 @@ def drive(own, spaces, terrain, course, dt, spent_s, state, control):
         stray from its path after the last of them, or there was no more room.
     """
     corner = np.empty((MOST_CORNERS, 2))
-    segment, stood, spent = 0 if course.size[0] > 1 else course.size[0], 0, 0.0
+    segment, stood, spent = first_segment(course, state[0]), 0, 0.0
     for k in range(len(control)):
         if at_rest(own, course, segment, state[k]):
             return k, True

@@ -35,7 +35,8 @@ def with_arrivals(problem: Problem, r: int, cost_map: CostMap, path: Path) -> Pa
         path: the path.
     """
     for i in np.flatnonzero(np.isfinite(path.aim) & (path.stop > 0)).tolist():
-        places = [0, *path.stop[:i].tolist()][-LAST_STOPS - 1 :]
+        earlier = {0, *path.stop[:i].tolist()} - {int(path.stop[i])}
+        places = sorted(earlier)[-LAST_STOPS - 1 :]
         before = _part(path, 0, int(path.stop[i]))
         ways = [before, *(_changed_at(before, at) for at in places[1:])]
         ways += [_passed_by(before, bearing) for bearing in BEARINGS]

@@ -56,6 +56,7 @@ def with_driven_legs(problem: Problem, leg_J: Mapping[Leg, float]) -> Problem:
     """
     if not leg_J:
         return problem
+    problem = problem.with_margin(0.0)
     routing = problem.mission.routing
     at = tuple(np.array(list(leg_J)).T)
     driven_J = np.maximum(0.0, list(leg_J.values()))
@@ -65,5 +66,4 @@ def with_driven_legs(problem: Problem, leg_J: Mapping[Leg, float]) -> Problem:
     routing = routing._replace(
         cost=cost, escape=share * routing.escape, finish=share * routing.finish
     )
-    mission = problem.mission._replace(routing=routing)
-    return replace(problem, mission=mission, route_margin=0.0)
+    return replace(problem, mission=problem.mission._replace(routing=routing))

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from math import pi, radians
+from math import radians
 
 import numpy as np
 
@@ -105,9 +105,8 @@ def follow_tours(
     stops = [whole_tour(problem, routing, r) for r in range(len(cost_maps))]
     tours = problem.visits(routing.tours)
     timed = problem.minimum_time or problem.preference.objective.makespan_weight > 0.0
-    sharp = _turn_to_change_gear_at(problem, timed)
     paths = [
-        tour_path(problem, r, _led(problem, r, tour, number), sharp)
+        tour_path(problem, r, _led(problem, r, tour, number), timed)
         for r, tour in enumerate(stops)
     ]
     judged = number > 0 and not timed
@@ -136,16 +135,6 @@ def _led(problem: Problem, r: int, tour: list[int], number: int) -> list[int]:
     motions nearly always finds the shortest curve at once.
     """
     return [] if number == 0 and is_one_pose(problem, r, tour) else tour
-
-
-def _turn_to_change_gear_at(problem: Problem, timed: bool) -> float:
-    """Return the turn at a target from which on cars change gear [rad].
-
-    Where time counts, those that are slower backwards never do.
-    """
-    limit = problem.mission.fleet["limit"]
-    slower = -limit[:, 0] < REVERSE_SPEED_SHARE * limit[:, 1]  # backwards than forwards
-    return pi if timed and bool(slower.any()) else SHARP
 
 
 def _otherwise(
@@ -179,18 +168,18 @@ def tour_path(
     problem: Problem,
     r: int,
     tour: Sequence[int],
-    sharp: float = SHARP,
+    timed: bool = False,
 ) -> Path:
     """Return the way of the roadmap along robot r's tour.
 
-    A car that can changes gear at a target where its way turns sharply; a robot that
-    can turns on the spot there.
+    A car that can changes gear at a target where its way turns sharply, but not where
+    time counts and it is slower backwards; a robot that can turns on the spot there.
 
     Args:
         problem: the mission.
         r: robot.
         tour: numbers of its targets.
-        sharp: turn from which on a car changes gear [rad].
+        timed: whether time counts.
     """
     vertices, ends = problem.tour_vertices(r, tour)
     node = problem.roadmap.arrays.vertex[vertices]
@@ -210,12 +199,13 @@ def tour_path(
         aim=problem.aims(r, tour),
     )
     turns = turns_of(path)
+    backwards, forwards = np.abs(problem.mission.fleet[r]["limit"][:2])
     if problem.mission.fleet[r]["model"] == UNICYCLE:
         pivots = [at for at, turn in turns if turn > PIVOT]
         return replace(path, pivot=np.array(pivots, np.int64))
-    reverses = bool(problem.mission.fleet[r]["limit"][0] < 0.0)
+    least = REVERSE_SPEED_SHARE * forwards if timed else 0.0
     for at, turn in turns:
-        if reverses and turn > sharp:
+        if turn > SHARP and backwards > 0.0 and backwards >= least:
             path.gear[at:] *= -1
     return path
 

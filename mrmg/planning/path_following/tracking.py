@@ -106,6 +106,8 @@ def course_of(problem: Problem, r: int, path: Path) -> Course:
     robot, n = problem.mission.fleet[r], len(path.node)
     node, ease = empty_path(max(2, n)), deceleration(problem, r)
     node["x"], node["y"] = np.resize(path.node, (len(node), 2)).T
+    pause = np.ceil(path.pause_s / problem.dt_s).astype(int)
+    np.add.at(node["pause"], path.stop, pause)
     if n > 1:
         chord = np.diff(path.node, axis=0)
         size = np.hypot(*chord.T)
@@ -114,8 +116,6 @@ def course_of(problem: Problem, r: int, path: Path) -> Course:
         for a, b in zip(edges, edges[1:], strict=False):
             node["end"][a:b] = b
             node["bend"][a : b + 1] = _bends(chord[a:b], size[a:b])
-        pause = np.ceil(path.pause_s / problem.dt_s).astype(int)
-        np.add.at(node["pause"], path.stop, pause)
         tight = steerable_speeds(problem, r, node)
         node["fastest"] = _speed_limits(path, tight, ease)
         node["rest_s"] = (path.way[-1] - path.way) / robot["limit"][1]

@@ -124,3 +124,24 @@ def test_a_goal_where_the_robot_ends_has_its_heading(heading: float) -> None:
     ended = found(yard(heading, *places))
     aimed = found(yard(None, *places, at_goal=heading))
     assert aimed.cost_J < 1.1 * ended.cost_J
+
+
+@pytest.mark.parametrize("model", ["car", "diffdrive"])
+def test_many_goals_at_one_place_have_their_headings(model: str) -> None:
+    places = 6 * ((15.0, 10.0),) + ((24.0, 10.0),)
+    scene = yard(0.0, *places, model=model)
+    goals = [{**goal, "heading": 1.5} for goal in scene.document["goals"]]
+    found(scene_from_document({**scene.document, "goals": goals}, source="yard"))
+
+
+@pytest.mark.parametrize("model", ["car", "diffdrive"])
+@pytest.mark.parametrize("dwell_s", [0.0, 5.0])
+def test_robots_stay_and_turn_where_they_begin(model: str, dwell_s: float) -> None:
+    """At a goal that they are in; a unicycle has its heading to turn to as well."""
+    scene = yard(None, (6.2, 10.0), (24.0, 10.0), model=model)
+    goal = {**scene.document["goals"][0], "dwell": dwell_s}
+    if model == "diffdrive":
+        goal["heading"] = 2.0
+    staying = scene_from_document({**scene.document, "goals": [goal]}, source="yard")
+    plan = found(staying)
+    assert plan.makespan_s < found(scene).makespan_s + dwell_s + 8.0

@@ -1,4 +1,4 @@
-"""Drafts: plans along tours without a tree."""
+"""Plans driven straight along tours."""
 
 from __future__ import annotations
 
@@ -152,3 +152,16 @@ def test_models_of_users_do_not_follow_paths(yard: Callable[..., Scene]) -> None
     fleet["model"] = USER
     mission = problem.mission._replace(fleet=fleet)
     assert not can_follow(replace(problem, mission=mission))
+
+
+def test_each_car_changes_gear_by_its_own_speeds(yard: Callable[..., Scene]) -> None:
+    """One that is slow backwards keeps none of the others from backing out."""
+    fast = {"like": "car", "limits": {"v_min": -2.0}}
+    robots = [
+        {"id": "r1", "model": fast, "pose": [19, 10, 0]},
+        {"id": "r2", "model": "car", "pose": [19, 15, 0]},
+    ]
+    scene = yard(**{**OUT_AND_BACK, "robots": robots}, objective="makespan")
+    problem = state_mission(scene, 0, PARAMS)
+    paths = [tour_path(problem, r, [0, 1], timed=True) for r in (0, 1)]
+    assert [bool((path.gear < 0).any()) for path in paths] == [True, False]
