@@ -154,5 +154,14 @@ def _cell(value: Any) -> Any:
 def _write_parquet(rows: Sequence[Mapping[str, Any]], path: Path) -> None:
     arrow = import_extra("pyarrow", extra="parquet", purpose="writes Parquet files")
     parquet = import_extra("pyarrow.parquet", extra="parquet", purpose="")
+    columns = {name: _column([row[name] for row in rows]) for name in rows[0]}
     with storage.atomic_path(path) as temporary:
-        parquet.write_table(arrow.Table.from_pylist(list(rows)), temporary)
+        parquet.write_table(arrow.table(columns), temporary)
+
+
+def _column(values: list[Any]) -> list[Any]:
+    """Return a column of one type: text where a factor's values are of several."""
+    kinds = {type(value) for value in values if value is not None}
+    if len(kinds) > 1 and kinds != {int, float}:
+        return [None if value is None else str(_cell(value)) for value in values]
+    return values

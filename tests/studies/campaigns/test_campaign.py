@@ -48,6 +48,17 @@ def test_the_table_has_a_row_for_each_trial(made: Path, campaign: Campaign) -> N
     assert [row["causes"] for row in rows] == ["", "", "infeasible", "infeasible"]
 
 
+def test_values_of_several_types_are_text_in_the_parquet_table(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    file = tmp_path / "mixed.yaml"
+    parameters = "{time_limit: [null, 100], skip_unreachable: [true, false]}"
+    file.write_text(f"scenes: {SCENES}/goal_enclosed.yaml\nparameters: {parameters}\n")
+    run_campaign(read_campaign(file), tmp_path / "out", parquet=True)
+    columns = parquet.read_table(tmp_path / "out" / "trials.parquet").to_pydict()
+    assert columns["time_limit"] == ["null", "null", "100", "100"]
+    assert columns["skip_unreachable"] == [True, False] * 2
+
+
 def test_a_stopped_campaign_is_taken_up(
     campaign: Campaign, made: Path, tmp_path: Path
 ) -> None:
