@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import asdict, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,6 @@ from mrmg.runs.drive import drive
 from mrmg.runs.folder import TRIALS_FOLDER, Step
 from mrmg.runs.steps import Run
 from mrmg.scene.driven_parts import require_drivable
-from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
 from mrmg.simulation.disturbance_spec import written_out
 from mrmg.studies.engine import Engine
@@ -61,10 +59,11 @@ def study_robustness(
     require_drivable(run.scene.robots)
     arguments = replace(run.arguments, disturb=written_out(disturb), disturb_seed=0)
     place = _trials_folder(run, arguments)
+    mission = run.scene, run.plan()
     jobs = [
         Job(
             path=place / f"{number:06d}.json",
-            shared=run.folder.path,
+            shared=mission,
             item=replace(arguments, disturb_seed=number),
         )
         for number in range(seed, seed + trials)
@@ -108,17 +107,12 @@ def _trials_folder(run: Run, arguments: RunArguments) -> Path:
     return own / mark
 
 
-def make_trial(folder: Path, arguments: RunArguments) -> dict[str, Any]:
-    """Drive the plan of a run folder as the arguments want it, and judge the drive."""
-    scene, plan = _mission(folder)
+def make_trial(mission: tuple[Scene, Plan], arguments: RunArguments) -> dict[str, Any]:
+    """Drive a plan as the arguments want it, and judge the drive."""
+    scene, plan = mission
     driven = drive(scene, plan, arguments)
     account = audit(scene, driven.plan, driven.log)
     return asdict(assess_trial(scene, driven.log, account))
-
-
-@lru_cache(maxsize=1)
-def _mission(folder: Path) -> tuple[Scene, Plan]:
-    return load_scene(folder / "scene.yaml"), Plan.load(folder)
 
 
 def _read(job: Job, content: Any) -> Trial:

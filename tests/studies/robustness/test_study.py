@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ from mrmg.errors import UsageError
 from mrmg.plans import PlanStatus
 from mrmg.runs import pipeline
 from mrmg.runs.drive import drive
-from mrmg.runs.folder import RunFolder
+from mrmg.runs.folder import RunFolder, Step
 from mrmg.runs.steps import Run, taken_up
 from mrmg.studies.outcomes import Study, assess_trial
 from mrmg.studies.robustness.study import study_robustness
@@ -53,8 +54,6 @@ def test_trials_have_the_seeds_asked_for(three: tuple[Study, str]) -> None:
 def test_the_worst_case_is_repeated_by_its_seed(
     run: Run, three: tuple[Study, str]
 ) -> None:
-    from dataclasses import replace
-
     worst = three[0].worst
     arguments = replace(run.arguments, disturb="", disturb_seed=worst.seed)
     driven = drive(run.scene, run.plan(), arguments)
@@ -94,6 +93,16 @@ def test_trials_of_another_plan_go(run: Run) -> None:
     stale.mkdir(parents=True)
     study_robustness(run, trials=1)
     assert not stale.exists()
+
+
+def test_a_new_plan_in_the_same_folder_is_driven(run: Run) -> None:
+    first = study_robustness(run, trials=1)
+    again = replace(run, arguments=replace(run.arguments, seed=1))
+    again.make(Step.PLAN)
+    second = study_robustness(again, trials=1)
+    driven = drive(again.scene, again.plan(), replace(again.arguments, disturb=""))
+    assert first.trials[0].log_digest != driven.log.digest
+    assert second.trials[0].log_digest == driven.log.digest
 
 
 def test_disturbances_are_told_apart(run: Run) -> None:
