@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterator
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,10 +52,11 @@ def replay(options: argparse.Namespace) -> int:
             trust_code=options.trust_code,
         )
     terminal.print_result(options, outcome.to_json(), _lines(outcome, out))
-    if options.render:
-        _render(out, options.trust_code)
-    if options.view:
-        show_commands.watch(str(out), trust_code=options.trust_code)
+    with redirect_stdout(sys.stderr if options.json else sys.stdout):
+        if options.render:
+            _render(out, options.trust_code)
+        if options.view:
+            show_commands.watch(str(out), trust_code=options.trust_code)
     return ExitCode.OK if outcome.same_causes else ExitCode.MISSION_FAILED
 
 

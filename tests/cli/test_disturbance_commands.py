@@ -139,6 +139,10 @@ def test_a_failed_execution_is_replayed(
     assert (run / "replay" / "log.json").exists()
     assert main(["replay", str(run / "capsule.zip"), "--json"]) == ExitCode.OK
     assert json.loads(capsys.readouterr().out)["same_bits"] is True
+    film = ["--json", "--render", "--overwrite"]
+    assert main(["replay", str(run / "capsule.zip"), *film]) == ExitCode.OK
+    assert json.loads(capsys.readouterr().out)["same_bits"] is True
+    assert (run / "replay" / "mission.mp4").exists()
 
 
 def test_what_is_no_capsule_is_refused(
