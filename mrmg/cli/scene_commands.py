@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import shlex
 import sys
@@ -23,7 +24,7 @@ def new(options: argparse.Namespace) -> int:
     from mrmg.scene.new_scene import new_scene
 
     given = options.name.removesuffix(".yaml")
-    if Path(given).name in ("", ".."):
+    if Path(given).name in ("", "..") or not given.isprintable():
         raise UsageError(f"NAME: got '{options.name}'; expected a name such as farm")
     out = options.out or Path(f"{given}.yaml")
     if os.path.lexists(out):
@@ -197,7 +198,8 @@ def _box(words: Sequence[str]) -> tuple[float, float, float, float]:
         x_min, y_min, x_max, y_max = numbers
     except ValueError:
         x_min = x_max = y_min = y_max = 0.0
-    if not (x_min < x_max and y_min < y_max):
+    is_finite = all(map(math.isfinite, (x_min, y_min, x_max, y_max)))
+    if not (is_finite and x_min < x_max and y_min < y_max):
         message = f"--crop: got '{' '.join(words)}'; expected X_MIN Y_MIN X_MAX Y_MAX"
         raise UsageError(message)
     return x_min, y_min, x_max, y_max

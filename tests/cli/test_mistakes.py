@@ -59,6 +59,12 @@ INVALID, USAGE = ExitCode.INVALID_FILE, ExitCode.USAGE
         ("scene draw farm.yaml -o farm.yaml/a.png", USAGE, "farm.yaml is a file"),
         ("scene import farm.yaml -o empty", INVALID, "farm.yaml: 1 fault"),
         ("scene new .", USAGE, "expected a name such as farm"),
+        ("scene new x\udcff", USAGE, r"got 'x\udcff'; expected a name such as farm"),
+        (
+            "scene import farm.yaml --crop 0 0 inf inf",
+            USAGE,
+            "--crop: got '0 0 inf",
+        ),
         ("scene new farm", USAGE, "farm.yaml is there already"),
     ],
 )
