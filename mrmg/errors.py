@@ -112,6 +112,7 @@ MADE_BY = {
     "Plan": "mrmg.plan(scene).plan is one, or None where `reason` says why",
     "ExecutionLog": "mrmg.execute(scene, plan) gives one",
     "str or Path": "give the path of a scene file, or a shipped scene's name",
+    "VideoArguments": "mrmg.runs.arguments.VideoArguments(view='chase') is one",
 }
 """Where the values come from that functions take, by type."""
 

@@ -7,7 +7,7 @@ a message that states what is allowed.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from typing import Any, TypeVar
 
@@ -99,7 +99,8 @@ def name(value: Any) -> str:
 
 def words(value: Any) -> tuple[str, ...]:
     """Read several texts."""
-    if isinstance(value, str) or not all(isinstance(word, str) for word in value):
+    listed = isinstance(value, Collection) and not isinstance(value, str)
+    if not listed or not all(isinstance(word, str) for word in value):
         raise ValueError(f"{value!r} is not a sequence of texts")
     return tuple(value)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from mrmg.errors import ExitCode, UsageError
+from mrmg.errors import ExitCode, UsageError, require_types
 from mrmg.plans import PlanStatus
 from mrmg.runs.arguments import (
     DEFAULT_VIDEO,
@@ -76,6 +76,7 @@ def run(
     if not isinstance(loaded, Scene):
         loaded = load_scene(loaded, trust_code=trust_code)
     require_drivable(loaded.robots)
+    require_types((video or DEFAULT_VIDEO, VideoArguments))
     asked = _arguments(loaded, {**arguments, "video": video or DEFAULT_VIDEO})
     scene = asked.scene(loaded)
     require_faithful(scene, scene.document)  # before there is a folder

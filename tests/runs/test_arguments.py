@@ -98,6 +98,8 @@ def test_the_keywords_of_run_are_its_options() -> None:
         ({"profile": "fast"}, "profile: 'fast'; allowed: default, paper"),
         ({"objective": {"time": 1.0}}, "objective: .*1:50"),
         ({"faults": "r1@3s"}, "faults: 'r1@3s' is not a sequence"),
+        ({"faults": None}, "faults: None is not a sequence of texts"),
+        ({"faults": 5}, "faults: 5 is not a sequence of texts"),
         ({"fault": ["r9@3s"]}, "robots of 'quickstart': r1, r2"),
         ({"budget_s": 3.0, "trees": 2}, "trees is not allowed with budget_s"),
         ({"controller": "mpcc"}, "allowed: mpc"),
@@ -109,6 +111,12 @@ def test_wrong_keywords_are_refused_before_anything_is_written(
 ) -> None:
     with pytest.raises(UsageError, match=named):
         mrmg.run("quickstart", out=tmp_path / "run", video=None, **wrong)
+    assert not (tmp_path / "run").exists()
+
+
+def test_how_the_video_is_made_is_no_text(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="expected VideoArguments, got 'chase'"):
+        mrmg.run("quickstart", out=tmp_path / "run", video="chase")  # type: ignore[arg-type]
     assert not (tmp_path / "run").exists()
 
 
