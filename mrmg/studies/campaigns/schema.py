@@ -35,6 +35,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
+from pydantic_core import PydanticCustomError
 
 from mrmg.runs import argument_values as values
 from mrmg.scene.loading.json_schema import schema_of
@@ -58,8 +59,12 @@ def _seeds(value: Any) -> Any:
             ends = values.seed(first), values.seed(last or first)
         except ValueError:
             return value
-        if 0 <= ends[1] - ends[0] < MOST_TRIALS:
-            return list(range(ends[0], ends[1] + 1))
+        if ends[0] > ends[1]:
+            raise PydanticCustomError("falling", "a range that does not fall")
+        if ends[1] - ends[0] >= MOST_TRIALS:
+            most = f"a range of at most {MOST_TRIALS} seeds"
+            raise PydanticCustomError("too_many", most)
+        return list(range(ends[0], ends[1] + 1))
     return _listed(value) if isinstance(value, int) else value
 
 

@@ -45,7 +45,7 @@ class TrialOrder:
     Attributes:
         arguments: of the run, seeds included.
         changes: keys of the scene file with other values.
-        code: `runs.steps.code_digest` of whoever asks.
+        code: `runs.code_digest` of whoever asks.
         with_run: whether the files of a run folder are wanted.
     """
 
