@@ -115,11 +115,11 @@ def _model_and_places(options: argparse.Namespace) -> tuple[RobotModel, Path, Pa
     """
     from mrmg.runs.replacing import require_absent
     from mrmg.scene.loading.models import load_model
-    from mrmg.studies.calibration.files import require_other_folder
+    from mrmg.studies.calibration.files import require_changeable
 
     folder = folder_of_model(options.model)
     out = options.out or Path(f"calibrated-{folder.name}")
-    require_other_folder(folder, out)
+    require_changeable(folder, out, in_place=options.in_place)
     require_absent(out, overwrite=options.overwrite)
     model, _ = load_model(folder, trust_code=options.trust_code)
     return model, folder, out

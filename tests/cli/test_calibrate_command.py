@@ -58,6 +58,7 @@ def test_a_wrong_model_is_put_right(model_folder: Path) -> None:
         (["calibrate", "no/such/folder"], "no such folder"),
         (["calibrate", "car", "--plot", "fit.bmp"], ".png"),
         (["calibrate", "car", "-o", str(CAR)], "name another folder"),
+        (["calibrate", "car", "--in-place"], "mrmg robot new NAME --like car"),
     ],
 )
 def test_wrong_usage_is_told_before_anything_is_driven(

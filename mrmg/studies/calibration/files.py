@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from mrmg import storage
+from mrmg import shipped, storage
 from mrmg.errors import UsageError
 from mrmg.scene.loading.editing import with_values
 from mrmg.scene.loading.yaml_text import dump_yaml
@@ -41,10 +41,8 @@ def write_calibration(
         in_place: write the calibrated `robot.yaml` into `model_folder`, too.
 
     Raises:
-        UsageError: if both folders are the same.
         SceneError: if `robot.yaml` cannot be changed.
     """
-    require_other_folder(model_folder, folder)
     source = model_folder / MODEL_FILE
     text = with_values(
         source.read_text(encoding="utf-8"), calibration.changes(), source=str(source)
@@ -67,12 +65,23 @@ def write_terrain(calibration: LogCalibration, folder: Path) -> None:
     storage.write_text(folder / TERRAIN_FILE, head + dump_yaml({"terrain": entries}))
 
 
-def require_other_folder(model_folder: Path, folder: Path) -> None:
-    """Refuse to write the calibrated copy over the model.
+def require_changeable(model_folder: Path, folder: Path, *, in_place: bool) -> None:
+    """Refuse to write the calibrated copy over the model, or over a shipped one.
+
+    Args:
+        model_folder: the model.
+        folder: where the copy is to lie.
+        in_place: whether the model itself is to be changed, too.
 
     Raises:
-        UsageError: if both folders are the same.
+        UsageError: if both folders are the same, or a shipped model was to be changed.
     """
+    if in_place and model_folder.resolve().parent == shipped.models_folder().resolve():
+        name = model_folder.name
+        raise UsageError(
+            f"--in-place does not change the shipped model '{name}'; make a copy with "
+            f"'mrmg robot new NAME --like {name}', and calibrate that"
+        )
     if folder.resolve() == model_folder.resolve():
         raise UsageError(
             f"{folder} is the model itself; name another folder, and use --in-place "

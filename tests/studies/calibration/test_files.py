@@ -75,15 +75,6 @@ def test_in_place_changes_the_model_itself_too(
     assert not (model_folder / "calibration.json").exists()
 
 
-def test_the_model_is_not_its_own_copy(
-    model_folder: Path, calibration: Calibration
-) -> None:
-    before = (model_folder / "robot.yaml").read_text()
-    with pytest.raises(UsageError, match="name another folder"):
-        write_calibration(calibration, model_folder, model_folder, in_place=True)
-    assert (model_folder / "robot.yaml").read_text() == before
-
-
 def test_a_model_file_that_lacks_a_value_is_refused_and_nothing_written(
     model_folder: Path, calibration: Calibration, tmp_path: Path
 ) -> None:
