@@ -10,7 +10,6 @@ interpreter ends. So a command that leaves work behind ends without that
 from __future__ import annotations
 
 import atexit
-import math
 import threading
 from collections.abc import Callable, Collection
 from concurrent.futures import FIRST_COMPLETED, Future, wait
@@ -60,7 +59,7 @@ def finished(
         futures: what is waited for.
         within_s: how long [s]; inf for as long as it takes.
     """
-    timeout_s = None if math.isinf(within_s) else within_s
+    timeout_s = None if within_s > threading.TIMEOUT_MAX else within_s
     return wait(futures, timeout=timeout_s, return_when=FIRST_COMPLETED).done
 
 

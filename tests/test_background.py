@@ -26,6 +26,7 @@ SET = np.ones(1, np.bool_)
 def test_what_ends_in_time_gives_its_result() -> None:
     assert within(lambda: 3, math.inf) == 3
     assert within(lambda: 3, 60.0) == 3
+    assert within(lambda: threading.Event().wait(0.05), 1e10) is False
 
 
 def test_what_does_not_end_in_time_is_left_behind() -> None:

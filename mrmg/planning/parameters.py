@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, field, replace
 
 from mrmg import extensions, storage
@@ -136,7 +137,7 @@ class PlannerParams:
             "obstacle_margin_m": 0.0 <= (self.obstacle_margin_m or 0.0) <= 1.0,
             "robot_margin_m": 0.0 <= (self.robot_margin_m or 0.0) <= 2.0,
             "route_margin": 0.0 <= self.route_margin <= 1.0,
-            "budget_s": self.budget_s is None or self.budget_s > 0.0,
+            "budget_s": self.budget_s is None or 0.0 < self.budget_s < math.inf,
         }
         refuse_values(self, allowed, "planner parameters")
         if self.planner == GUIDED_TREE and self.router.method != "nrpa":

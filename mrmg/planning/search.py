@@ -149,8 +149,9 @@ class Search:
         if self.params.budget_s is None:
             yield
             return
+        left_s = self.statistics.left_s(self.params.budget_s)
         alarm = threading.Timer(
-            self.statistics.left_s(self.params.budget_s), lambda: self.halt.fill(True)
+            min(left_s, threading.TIMEOUT_MAX), lambda: self.halt.fill(True)
         )
         alarm.daemon = True
         alarm.start()

@@ -24,6 +24,7 @@ from mrmg.planning.routing.routing import RouterParams
         ("improvements", -1),
         ("budget_s", 0.0),
         ("budget_s", -3.0),
+        ("budget_s", float("inf")),
     ],
 )
 def test_values_out_of_range_are_refused_by_name(name: str, value: Any) -> None:
