@@ -84,9 +84,12 @@ def user_motion(path: str, content: str = "") -> UserMotion:
         SceneError: naming what the file lacks.
     """
     module = _imported(path)
-    faults = []
+    faults: list[Fault] = []
+    found: dict[str, Any] = {}
     for name, parameters in _PARAMETERS.items():
         function = getattr(module, name, None)
+        function = getattr(function, "py_func", function)  # where numba.njit made it
+        found[name] = function
         wanted = f"{name}({', '.join(parameters)})"
         if not inspect.isfunction(function):
             faults.append(Fault(name, f"is not defined; expected a function {wanted}"))
@@ -95,7 +98,7 @@ def user_motion(path: str, content: str = "") -> UserMotion:
             faults.append(Fault(name, f"is {given}; expected {wanted}"))
     if faults:
         raise SceneError(path, faults)
-    return UserMotion(source=path, step=module.step, steer=module.steer)
+    return UserMotion(source=path, **found)
 
 
 def _imported(path: str) -> ModuleType:
@@ -107,7 +110,7 @@ def _imported(path: str) -> ModuleType:
         # Not through importlib: a __pycache__ that came along is other code than this.
         code = compile(Path(path).read_bytes(), path, "exec", dont_inherit=True)
         exec(code, module.__dict__)
-    except Exception as error:  # a user's file may do anything
+    except (Exception, SystemExit) as error:  # a user's file may do anything
         reason = f"cannot be imported: {type(error).__name__}: {error}"
         raise SceneError(path, [Fault("", reason)]) from error
     return module

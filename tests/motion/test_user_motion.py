@@ -167,12 +167,20 @@ def test_an_edited_motion_is_never_used_for_the_old_one(tmp_path: Path) -> None:
             r"cannot be imported: ModuleNotFound",
         ),
         ("def step(", "def step((", r"cannot be imported: SyntaxError"),
+        ("def step(", "raise SystemExit\n\ndef step(", "cannot be imported: SystemEx"),
     ],
 )
 def test_bad_files(tmp_path: Path, old: str, new: str, message: str) -> None:
     folder = model_folder(tmp_path, SLIDER.replace(old, new, 1))
     with pytest.raises(SceneError, match=message):
         user_motion(str(folder / "motion.py"))
+
+
+def test_functions_may_be_compiled_by_the_file_itself(tmp_path: Path) -> None:
+    source = SLIDER.replace("def step(", "@njit\ndef step(", 1)
+    folder = model_folder(tmp_path, f"from numba import njit\n{source}")
+    motion = user_motion(str(folder / "motion.py"))
+    assert all(motion.compiled((0.0, 1.0, 1.0, 1.0, 1.0)))
 
 
 def test_what_numba_cannot_compile_is_told(tmp_path: Path) -> None:
