@@ -36,6 +36,9 @@ def add_replay(verbs: Any) -> None:
     verb.add_flag("--view", "watch it in three dimensions")
     verb.add_trust()
     verb.add_json("the outcome as JSON")
+    verb.set_defaults(
+        place=None, host=show_commands.LOCAL_HOST, port=show_commands.PORT
+    )
 
 
 def replay(options: argparse.Namespace) -> int:
@@ -56,7 +59,8 @@ def replay(options: argparse.Namespace) -> int:
         if options.render:
             _render(out, options.trust_code)
         if options.view:
-            show_commands.watch(str(out), trust_code=options.trust_code)
+            options.source = str(out)
+            show_commands.view(options)
     return ExitCode.OK if outcome.same_causes else ExitCode.MISSION_FAILED
 
 

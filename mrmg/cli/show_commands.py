@@ -58,7 +58,7 @@ def add_show(verbs: Any) -> None:
     viewer.add_trust()
 
 
-def compare(options: argparse.Namespace) -> int:
+def compare(options: argparse.Namespace) -> None:
     """Set runs side by side: a table, and a page with their courses."""
     from mrmg.report.compare import compare_runs
     from mrmg.report.compare_page import write_comparison
@@ -68,63 +68,36 @@ def compare(options: argparse.Namespace) -> int:
     write_comparison(comparison, page)
     lines = [comparison.to_text(), "", str(page)]
     terminal.print_result(options, comparison.to_json(), lines)
-    return ExitCode.OK
 
 
-def figure(options: argparse.Namespace) -> int:
+def figure(options: argparse.Namespace) -> None:
     """Draw one figure of a run for a paper."""
     from mrmg.viz.figure import draw_figure
 
     out = options.out or Path(f"{options.kind}.pdf")
     draw_figure(options.run, options.kind, out, trust_code=options.trust_code)
     print(out)
-    return ExitCode.OK
 
 
 def view(options: argparse.Namespace) -> int:
     """Show a run or a scene in three dimensions, until stopped."""
-    return watch(
-        options.source,
-        place=options.place,
-        host=options.host,
-        port=options.port,
-        trust_code=options.trust_code,
-    )
-
-
-def watch(
-    source: str,
-    *,
-    place: str | None = None,
-    host: str = LOCAL_HOST,
-    port: int = PORT,
-    trust_code: bool = False,
-) -> int:
-    """Show a run or a scene until stopped.
-
-    Args:
-        source: run folder, scene file or name of a shipped scene.
-        place: "window" or "browser"; None for a window where there is a screen.
-        host: address a page is served on.
-        port: of the page.
-        trust_code: whether robot models may bring Python code (`scene.loading.trust`).
-    """
     from mrmg.scene.loading import load_scene
     from mrmg.viz.replay import replay_of
 
-    if (Path(source) / "run.json").exists():
-        replay = replay_of(Path(source), trust_code=trust_code)
+    if (Path(options.source) / "run.json").exists():
+        replay = replay_of(Path(options.source), trust_code=options.trust_code)
         scene = replay.film.scene
     else:
-        replay, scene = None, load_scene(source, trust_code=trust_code)
-    if (place or ("window" if _has_screen() else "browser")) == "window":
+        replay = None
+        scene = load_scene(options.source, trust_code=options.trust_code)
+    if (options.place or ("window" if _has_screen() else "browser")) == "window":
         from mrmg.viz.native_view import open_window
 
         open_window(scene, replay)
         return ExitCode.OK
     from mrmg.viz.browser_view import BrowserView
 
-    page = BrowserView(scene, replay, host=host, port=port)
+    page = BrowserView(scene, replay, host=options.host, port=options.port)
     try:
         address = f"open {page.address} in a browser"
         print(f"{scene.name}: {address}; Ctrl-C ends", flush=True)
