@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from mrmg.cli import log_options, terminal
 from mrmg.cli.run_options import add_options, given
 from mrmg.counted import counted
-from mrmg.errors import ExitCode, UsageError
+from mrmg.errors import UsageError
 
 if TYPE_CHECKING:
     from mrmg.scene.robot_model import RobotModel
@@ -50,10 +50,11 @@ def add_calibrate(verbs: Any) -> None:
     verb.add_json("calibration.json alone")
 
 
-def calibrate(options: argparse.Namespace) -> int:
+def calibrate(options: argparse.Namespace) -> None:
     """Calibrate a robot model, and leave a calibrated copy with the plot of the fit."""
     if options.groups:
-        return _calibrate_from_logs(options)
+        _calibrate_from_logs(options)
+        return
     from mrmg.studies.calibration.calibrate import calibrate
     from mrmg.studies.calibration.files import write_calibration
     from mrmg.viz.calibration_plot import draw_calibration
@@ -69,10 +70,9 @@ def calibrate(options: argparse.Namespace) -> int:
         draw_calibration(calibration, plot)
     lines = [*_lines(calibration), f"  {out / 'robot.yaml'}", f"  {plot}"]
     terminal.print_result(options, calibration.to_json(), lines)
-    return ExitCode.OK
 
 
-def _calibrate_from_logs(options: argparse.Namespace) -> int:
+def _calibrate_from_logs(options: argparse.Namespace) -> None:
     """Fit a robot model to logs, and leave a calibrated copy with page and terrain."""
     from mrmg.report.log_page import calibration_html
     from mrmg.storage import write_text
@@ -104,7 +104,6 @@ def _calibrate_from_logs(options: argparse.Namespace) -> int:
     files = [f"  {out / name}" for name in ("robot.yaml", TERRAIN_FILE, PAGE_FILE)]
     lines = [*_log_lines(calibration), *files]
     terminal.print_result(options, calibration.to_json(), lines)
-    return ExitCode.OK
 
 
 def _model_and_places(options: argparse.Namespace) -> tuple[RobotModel, Path, Path]:

@@ -12,7 +12,6 @@ from typing import Any
 
 from mrmg.cli import terminal
 from mrmg.counted import counted
-from mrmg.errors import ExitCode
 from mrmg.runs import argument_values as values
 
 _LINE_EVERY_S = 10.0
@@ -60,7 +59,7 @@ def add_campaign(verbs: Any) -> None:
     verb.add_json("summary.json alone")
 
 
-def campaign(options: argparse.Namespace) -> int:
+def campaign(options: argparse.Namespace) -> None:
     """Make the trials of a campaign."""
     from mrmg.studies.campaigns.campaign import run_campaign
     from mrmg.studies.campaigns.reading import read_campaign
@@ -95,7 +94,6 @@ def campaign(options: argparse.Namespace) -> int:
         raise
     lines = [*_lines(figures), *_places(folder, options.parquet)]
     terminal.print_result(options, figures, lines)
-    return ExitCode.OK
 
 
 class _Progress:

@@ -182,13 +182,12 @@ def audit(options: argparse.Namespace) -> int:
 _SHOWN = ("overview.png", "energy.png", "mission.gif", "mission.mp4", "report.html")
 
 
-def render(options: argparse.Namespace) -> int:
+def render(options: argparse.Namespace) -> None:
     """Make the pictures, the video and the report of a run folder."""
     work = _make(options, Step.RENDER, Step.DRAW, Step.REPORT)
     for name in _SHOWN:
         if work.folder.file(name).exists():
             print(work.folder.file(name))
-    return ExitCode.OK
 
 
 def report(options: argparse.Namespace) -> int:

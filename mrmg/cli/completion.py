@@ -12,7 +12,6 @@ from pathlib import Path
 
 from mrmg import shipped
 from mrmg.cli.usage import Parser
-from mrmg.errors import ExitCode
 from mrmg.templates import rendered
 
 SHELLS = ("bash", "zsh", "fish")
@@ -42,7 +41,7 @@ class _Argument:
     repeats: bool
 
 
-def completion(options: argparse.Namespace) -> int:
+def completion(options: argparse.Namespace) -> None:
     """Print the completion script of a shell."""
     from mrmg.cli.parser import make_parser
 
@@ -61,7 +60,6 @@ def completion(options: argparse.Namespace) -> int:
         steps=[f'"{before} {word}"' for before, _, word in words],
     )
     print(script, end="")
-    return ExitCode.OK
 
 
 def _verbs(parser: Parser, name: str = "") -> Iterator[tuple[str, list[_Argument]]]:

@@ -6,7 +6,6 @@ import argparse
 from typing import Any
 
 from mrmg.cli import terminal
-from mrmg.errors import ExitCode
 from mrmg.export.table import format_names
 
 
@@ -33,7 +32,7 @@ def add_export(verbs: Any) -> None:
     verb.add_json("the names of the files as JSON")
 
 
-def export(options: argparse.Namespace) -> int:
+def export(options: argparse.Namespace) -> None:
     """Write a run in a format of other tools."""
     from mrmg.export.exporting import export_run
 
@@ -47,4 +46,3 @@ def export(options: argparse.Namespace) -> int:
     )
     names = [str(path) for path in files]
     terminal.print_result(options, names, names)
-    return ExitCode.OK

@@ -37,7 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         code = options.command(options)
         sys.stdout.flush()
-        return int(code)
+        return int(code or ExitCode.OK)
     except MrmgError as error:
         return _refused(str(error), error.exit_code)
     except KeyboardInterrupt:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from mrmg.cli import terminal
-from mrmg.errors import ExitCode, MachineError, SceneError, UsageError
+from mrmg.errors import MachineError, SceneError, UsageError
 
 
 def add_robot(verbs: Any) -> None:
@@ -71,7 +71,7 @@ def _add_import(acts: Any) -> None:
     )
 
 
-def check_robot(options: argparse.Namespace) -> int:
+def check_robot(options: argparse.Namespace) -> None:
     """Report the faults of a robot model, or show it."""
     from mrmg.cli.calibrate_command import folder_of_model
     from mrmg.scene.loading.models import load_model
@@ -94,7 +94,6 @@ def check_robot(options: argparse.Namespace) -> int:
     found |= {"figures": robot_figures(model), "picture": picture}
     lines = [f"{model.name}: valid", *(f"  {line}" for line in figure_lines(model))]
     terminal.print_result(options, found, [*lines, *([picture] if picture else [])])
-    return ExitCode.OK
 
 
 def _draw(model: Any, out: Path | None) -> str | None:
@@ -112,7 +111,7 @@ def _draw(model: Any, out: Path | None) -> str | None:
     return str(picture)
 
 
-def new_robot(options: argparse.Namespace) -> int:
+def new_robot(options: argparse.Namespace) -> None:
     """Begin a robot model of the user's own."""
     from mrmg.scene.new_robot import new_robot as written
 
@@ -120,10 +119,9 @@ def new_robot(options: argparse.Namespace) -> int:
     for file in written(folder, like=options.like):
         print(file)
     _print_next(folder, "next, after changing both files")
-    return ExitCode.OK
 
 
-def import_robot(options: argparse.Namespace) -> int:
+def import_robot(options: argparse.Namespace) -> None:
     """Make a robot model of a description of another tool."""
     from mrmg.scene.importing.robots.importing import import_robot as imported
 
@@ -149,7 +147,6 @@ def import_robot(options: argparse.Namespace) -> int:
     for line in found.assumed:
         print(f"  {line}")
     _print_next(folder, "next")
-    return ExitCode.OK
 
 
 def _print_next(folder: Path, when: str) -> None:
@@ -160,7 +157,7 @@ def _print_next(folder: Path, when: str) -> None:
     print(f"in a scene: {{id: r1, model: {reference}, pose: [5, 5, 0]}}")
 
 
-def list_robots(options: argparse.Namespace) -> int:
+def list_robots(options: argparse.Namespace) -> None:
     """List the shipped robot models with their figures."""
     from mrmg import shipped
     from mrmg.scene.loading.models import load_model
@@ -188,4 +185,3 @@ def list_robots(options: argparse.Namespace) -> int:
         for first, second, *others in (heads, *rows)
     ]
     terminal.print_result(options, found, lines)
-    return ExitCode.OK

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 from mrmg.cli import terminal
 from mrmg.cli.run_options import add_options, given, help_of
 from mrmg.counted import counted
-from mrmg.errors import ExitCode
 from mrmg.runs import argument_values as values
 from mrmg.runs.folder import Step, existing
 
@@ -45,7 +44,7 @@ def add_robustness(verbs: Any) -> None:
     verb.add_json("the study of robustness.json alone")
 
 
-def robustness(options: argparse.Namespace) -> int:
+def robustness(options: argparse.Namespace) -> None:
     """Drive a plan under many disturbances."""
     from mrmg.runs.steps import taken_up
     from mrmg.studies.robustness.study import study_robustness
@@ -71,7 +70,6 @@ def robustness(options: argparse.Namespace) -> int:
         if folder.file("report.html").exists():
             run.make(Step.REPORT)
     terminal.print_result(options, study.to_json(), _lines(study, options.run))
-    return ExitCode.OK
 
 
 def _trial_reporter(report: Callable[[float, str], None] | None) -> OnTrial | None:

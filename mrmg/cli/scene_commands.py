@@ -16,10 +16,10 @@ from typing import Any
 from mrmg import storage
 from mrmg.cli import terminal
 from mrmg.counted import counted
-from mrmg.errors import ExitCode, Fault, FileError, UsageError
+from mrmg.errors import Fault, FileError, UsageError
 
 
-def new(options: argparse.Namespace) -> int:
+def new(options: argparse.Namespace) -> None:
     """Write a commented scene to begin with."""
     from mrmg.scene.new_scene import new_scene
 
@@ -33,10 +33,9 @@ def new(options: argparse.Namespace) -> int:
     print(f"{out}\nnext:")
     for verb in ("scene check", "scene draw", "run"):
         print(f"  mrmg {verb} {shlex.quote(str(out))}")
-    return ExitCode.OK
 
 
-def list_(options: argparse.Namespace) -> int:
+def list_(options: argparse.Namespace) -> None:
     """List the shipped scenes with their figures and what they are for."""
     from mrmg import shipped
     from mrmg.scene.loading.yaml_text import parse_yaml
@@ -52,10 +51,9 @@ def list_(options: argparse.Namespace) -> int:
             "{:<12}{:>7}{:>7}{:>10}".format(name, *counts)
             + f"{f'{x_max - x_min:g} x {y_max - y_min:g}':>12}  {why}"
         )
-    return ExitCode.OK
 
 
-def check(options: argparse.Namespace) -> int:
+def check(options: argparse.Namespace) -> None:
     """Report what `mrmg run` would refuse of a scene, and what it warns of."""
     from mrmg.planning.feasibility import mission_warnings
     from mrmg.planning.roadmap.fleet import margins_of
@@ -93,7 +91,6 @@ def check(options: argparse.Namespace) -> int:
         *(f"  note: {note}" for note in notes),
     ]
     terminal.print_result(options, _findings([], warnings, notes), lines)
-    return ExitCode.OK
 
 
 def _findings(*lists: Sequence[Fault]) -> dict[str, list[dict[str, Any]]]:
@@ -101,7 +98,7 @@ def _findings(*lists: Sequence[Fault]) -> dict[str, list[dict[str, Any]]]:
     return {name: [asdict(item) for item in items] for name, items in named}
 
 
-def draw(options: argparse.Namespace) -> int:
+def draw(options: argparse.Namespace) -> None:
     """Draw a scene into a picture."""
     from mrmg.scene.loading import load_scene
     from mrmg.viz.figures import require_format
@@ -112,10 +109,9 @@ def draw(options: argparse.Namespace) -> int:
     require_format(picture)
     draw_scene(scene, picture)
     print(picture)
-    return ExitCode.OK
 
 
-def roadmap(options: argparse.Namespace) -> int:
+def roadmap(options: argparse.Namespace) -> None:
     """Write a scene's roadmap as GraphML, for analysis with other tools."""
     import networkx as nx
 
@@ -146,10 +142,9 @@ def roadmap(options: argparse.Namespace) -> int:
         f"{counted(graph.number_of_edges(), 'edge')}, "
         f"{counted(parts, 'connected part')}"
     )
-    return ExitCode.OK
 
 
-def schema(options: argparse.Namespace) -> int:
+def schema(options: argparse.Namespace) -> None:
     """Print the JSON Schema of scenes, robot models, campaigns or summaries."""
     from mrmg.runs.summary_model import summary_schema
     from mrmg.scene.loading.json_schema import robot_schema, scene_schema
@@ -162,10 +157,9 @@ def schema(options: argparse.Namespace) -> int:
         "summary": summary_schema,
     }
     print(json.dumps(made[options.kind](), indent=2))
-    return ExitCode.OK
 
 
-def import_(options: argparse.Namespace) -> int:
+def import_(options: argparse.Namespace) -> None:
     """Read maps, layouts and features of other tools as a scene."""
     from mrmg.scene.importing.importing import import_files
     from mrmg.scene.importing.layers import ImportOptions
@@ -189,7 +183,6 @@ def import_(options: argparse.Namespace) -> int:
     )
     source = ", ".join(str(file) for file in options.files)
     _write(found.document, options.out, source, found.notes)
-    return ExitCode.OK
 
 
 def _box(words: Sequence[str]) -> tuple[float, float, float, float]:
@@ -205,7 +198,7 @@ def _box(words: Sequence[str]) -> tuple[float, float, float, float]:
     return x_min, y_min, x_max, y_max
 
 
-def populate(options: argparse.Namespace) -> int:
+def populate(options: argparse.Namespace) -> None:
     """Place robots, goals and stations in a scene."""
     from mrmg.scene.loading import load_scene
     from mrmg.scene.populating.populate import populate as populated
@@ -221,7 +214,6 @@ def populate(options: argparse.Namespace) -> int:
         trust_code=options.trust_code,
     )
     _write(document, options.out, options.scene)
-    return ExitCode.OK
 
 
 def _require_absent(options: argparse.Namespace) -> None:

@@ -18,7 +18,10 @@ class _Verbs(argparse._SubParsersAction):  # type: ignore[type-arg]
     """The verbs of a parser, each of which shows its help text on its own page, too."""
 
     def add_parser(self, name: str, **details: Any) -> Any:
-        """Add a verb; see argparse. `command` is what it calls with its options."""
+        """Add a verb; see argparse.
+
+        `command` is what it calls with its options; returns an exit code, None for 0.
+        """
         summary, command = details.get("help", ""), details.pop("command", None)
         verb = super().add_parser(name, **{"description": summary, **details})
         verb.summary = summary
