@@ -20,64 +20,52 @@ LAST_PORT = 65535
 _Number = TypeVar("_Number", int, float)
 
 
-def seed(value: Any) -> int:
-    """Read a seed: a whole number of at least 0."""
-    allowed = "a whole number of at least 0"
-    return _number(int, value, lambda number: number >= 0, allowed)
-
-
-def count(value: Any) -> int:
-    """Read a number of things: a whole number of at least 1."""
-    allowed = "a whole number of at least 1"
-    return _number(int, value, lambda number: number >= 1, allowed)
-
-
-def port(value: Any) -> int:
-    """Read the number of a port."""
-    allowed = f"a port: a whole number of 1 to {LAST_PORT}"
-    return _number(int, value, lambda number: 1 <= number <= LAST_PORT, allowed)
-
-
-def positive(value: Any) -> float:
-    """Read a positive number."""
-    allowed = "a positive number"
-    return _number(float, value, lambda number: 0.0 < number < math.inf, allowed)
-
-
-def time(value: Any) -> float:
-    """Read a time: a number of at least 0."""
-    allowed = "a number of at least 0"
-    return _number(float, value, lambda number: 0.0 <= number < math.inf, allowed)
-
-
-def share(value: Any) -> float:
-    """Read a share: a number of at least 0 and less than 1."""
-    allowed = "a share: a number of at least 0 and less than 1"
-    return _number(float, value, lambda number: 0.0 <= number < 1.0, allowed)
-
-
-def _number(
-    read: Callable[[str], _Number],
-    value: Any,
-    is_allowed: Callable[[_Number], bool],
-    allowed: str,
-) -> _Number:
-    """Return the number that a text or value stands for.
+def _reader(
+    read: Callable[[str], _Number], is_allowed: Callable[[_Number], bool], allowed: str
+) -> Callable[[Any], _Number]:
+    """Return a reader of numbers.
 
     Args:
         read: makes a number of a text: int or float.
-        value: the text or value.
         is_allowed: whether a number is.
         allowed: which are, for the message.
-
-    Raises:
-        ValueError: if the value stands for no number, or for one that is not allowed.
     """
-    with suppress(ValueError):  # a text that is no number is refused below, too
-        number = read(str(value))
-        if is_allowed(number):
-            return number
-    raise ValueError(f"{value!r} is not {allowed}")
+
+    def number_of(value: Any) -> _Number:
+        with suppress(ValueError):  # a text that is no number is refused below, too
+            number = read(str(value))
+            if is_allowed(number):
+                return number
+        raise ValueError(f"{value!r} is not {allowed}")
+
+    return number_of
+
+
+seed = _reader(int, lambda number: number >= 0, "a whole number of at least 0")
+"""Read a seed: a whole number of at least 0."""
+
+count = _reader(int, lambda number: number >= 1, "a whole number of at least 1")
+"""Read a number of things: a whole number of at least 1."""
+
+port = _reader(
+    int,
+    lambda number: 1 <= number <= LAST_PORT,
+    f"a port: a whole number of 1 to {LAST_PORT}",
+)
+"""Read the number of a port."""
+
+positive = _reader(float, lambda number: 0.0 < number < math.inf, "a positive number")
+"""Read a positive number."""
+
+time = _reader(float, lambda number: 0.0 <= number < math.inf, "a number of at least 0")
+"""Read a time: a number of at least 0."""
+
+share = _reader(
+    float,
+    lambda number: 0.0 <= number < 1.0,
+    "a share: a number of at least 0 and less than 1",
+)
+"""Read a share: a number of at least 0 and less than 1."""
 
 
 def switch(value: Any) -> bool:

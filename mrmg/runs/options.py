@@ -17,7 +17,6 @@ from itertools import pairwise
 from typing import Any, TypeVar
 
 from mrmg.errors import UsageError
-from mrmg.runs import argument_values as values
 
 _OPTION = "option"
 _MARK = "`:\n"
@@ -76,9 +75,7 @@ class Option:
             return []
         if value == self.bare or value is True:
             return [self.flag]
-        if value is False:
-            return [self.flag.replace("--", "--no-", 1)]
-        if isinstance(self.default, tuple) and self.read is values.words:
+        if isinstance(value, tuple):
             return [word for each in value for word in (self.flag, each)]
         return [self.flag, _text(value)]
 
@@ -88,8 +85,6 @@ def _text(value: Any) -> str:
         return ",".join(f"{key}={_text(number)}" for key, number in value.items())
     if isinstance(value, Mapping):  # the weights of an objective
         return f"{_text(value['energy'])}:{_text(value['makespan'])}"
-    if isinstance(value, tuple):
-        return "x".join(str(each) for each in value)
     if isinstance(value, float):
         short = f"{value:g}"
         return short if float(short) == value else repr(value)
