@@ -150,6 +150,13 @@ def typed(kind: type[_Kind], data: Any) -> _Kind:
 WITH_ARRAYS = {"arbitrary_types_allowed": True}
 """`__pydantic_config__` of dataclasses with arrays, for `typed`."""
 
+IN_SCHEMAS = {
+    "extra": "forbid",
+    "use_attribute_docstrings": True,
+    "json_schema_serialization_defaults_required": True,
+}
+"""That of dataclasses in JSON Schemas: they have all keys, and state what they mean."""
+
 
 @contextmanager
 def damage_reported(path: Path, found: str, remedy: str) -> Iterator[None]:

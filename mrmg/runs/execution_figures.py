@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from mrmg.simulation.disturbance import Disturbance
+
 Count = Annotated[int, Field(ge=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 
@@ -16,50 +18,6 @@ class Figures(BaseModel):
     model_config = ConfigDict(
         extra="forbid", frozen=True, use_attribute_docstrings=True
     )
-
-
-class RobotDisturbanceFigures(Figures):
-    """How one simulated robot differed from its model."""
-
-    robot: str
-    """Its id."""
-    mass: float
-    """Change of its masses and inertias, as a share."""
-    friction: float
-    """Change of its grip, as a share."""
-    rolling: float
-    """Change of its rolling resistance, as a share."""
-    drive_gain: float
-    """Change of the drive's force, as a share."""
-    steering_gain: float
-    """Change of the steering, as a share."""
-    lag_s: float
-    """Time constant of drive and steering [s]."""
-    position_noise_m: float
-    """Standard deviation of each measured coordinate [m]."""
-    heading_noise_rad: float
-    """Standard deviation of the measured heading [rad]."""
-    speed_noise_m_s: float
-    """Standard deviation of the measured speed [m/s]."""
-    delay_s: float
-    """Age of measured positions and headings [s]."""
-    start_x_m: float
-    """Offset of the start [m]."""
-    start_y_m: float
-    """Offset of the start [m]."""
-    start_heading_rad: float
-    """Offset of the heading at the start [rad]."""
-    capacity: float
-    """Change of the battery's capacity and content, as a share."""
-
-
-class DisturbanceFigures(Figures):
-    """How the simulated robots differed from their models."""
-
-    seed: Count
-    """Of the draw, and of the noise."""
-    robots: list[RobotDisturbanceFigures]
-    """By robot, in the scene's order."""
 
 
 class SolveTimes(Figures):
@@ -123,7 +81,7 @@ class ExecutionFigures(Figures):
     """Contacts other than wheel and floor."""
     gave_up: Literal["", "lost", "diverged", "stalled", "restless"]
     """Why the simulation was ended early; empty where it was not."""
-    disturbance: DisturbanceFigures | None
+    disturbance: Disturbance | None
     """Null if there was none."""
     realtime_factor: NotNegative
     """Simulated time over wall-clock time, control included [1]."""

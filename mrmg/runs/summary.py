@@ -101,7 +101,7 @@ def summary_of(
             **(log.versions if log else {}),
         },
     }
-    return Summary.model_validate(figures).model_dump(exclude_unset=True)
+    return Summary.model_validate(figures).model_dump(mode="json", exclude_unset=True)
 
 
 def _status(audit: EnergyAudit | None) -> str:
@@ -137,7 +137,7 @@ def _plan_figures(
             for robot, (obstacle_m, robot_m) in plan.margins.items()
         },
         "margins_kept": sentences_on_margins(scene.robots, plan.margins),
-        "narrow_passages": [asdict(passage) for passage in plan.narrow],
+        "narrow_passages": plan.narrow,
         "improvements": list(statistics.get("improvements", [])),
         "path_following_plans": statistics.get(
             "path_following_plans",
@@ -167,7 +167,7 @@ def _execution_figures(log: ExecutionLog, audit: EnergyAudit) -> dict[str, Any]:
         "goals_visited": len(audit.goals_visited),
         "contacts": len(log.contacts),
         "gave_up": log.gave_up,
-        "disturbance": asdict(log.disturbance) if log.disturbance else None,
+        "disturbance": log.disturbance,
         "realtime_factor": log.timing["realtime_factor"],
         "controller_ms": {
             **{name: controller_ms[name] for name in ("median", "p99")},

@@ -13,6 +13,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core.core_schema import WithDefaultSchema
 
 from mrmg.runs.execution_figures import Count, ExecutionFigures, Figures, NotNegative
+from mrmg.scene.margins import NarrowPassage
 
 
 class SkippedGoal(Figures):
@@ -92,23 +93,6 @@ class KeptMargins(Figures):
     """From other robots [m]; of two the larger one counts."""
 
 
-class NarrowStretch(Figures):
-    """Where a robot keeps less than its margin from obstacles."""
-
-    robot: str
-    """Its id."""
-    start_s: float
-    """When it begins [s]."""
-    end_s: float
-    """When it ends [s]."""
-    x_m: float
-    """Reference point where the distance is least [m]."""
-    y_m: float
-    """Likewise."""
-    margin_m: float
-    """Distance kept from obstacles at the time steps [m]."""
-
-
 class PlanFigures(Figures):
     """What the planner found and what it took."""
 
@@ -133,7 +117,7 @@ class PlanFigures(Figures):
     """Distances that each robot keeps, by id."""
     margins_kept: list[str] = []
     """The same in words, with where margins come from."""
-    narrow_passages: list[NarrowStretch] = []
+    narrow_passages: list[NarrowPassage] = []
     """Where robots keep less than their margin from obstacles, as no wider way
     leads on."""
     improvements: list[Improvement]
@@ -260,5 +244,7 @@ class _WithoutNoise(GenerateJsonSchema):
 
 def summary_schema() -> dict[str, Any]:
     """Return the JSON Schema of `summary.json`."""
-    schema = Summary.model_json_schema(schema_generator=_WithoutNoise)
+    schema = Summary.model_json_schema(
+        mode="serialization", schema_generator=_WithoutNoise
+    )
     return {"$schema": GenerateJsonSchema.schema_dialect, **schema}

@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from mrmg import storage
 from mrmg.errors import UsageError
 
 if TYPE_CHECKING:
@@ -72,21 +73,22 @@ STATES_NONE = Margins()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NarrowPassage:
-    """A stretch of a robot's motion on which it keeps less than its margin.
+    """Where a robot keeps less than its margin from obstacles."""
 
-    Attributes:
-        robot: id of the robot.
-        start_s, end_s: when it begins and ends.
-        x_m, y_m: the robot's reference point where the margin is smallest.
-        margin_m: distance kept from obstacles at the time steps in between.
-    """
+    __pydantic_config__ = storage.IN_SCHEMAS
 
     robot: str
+    """Its id."""
     start_s: float
+    """When it begins [s]."""
     end_s: float
+    """When it ends [s]."""
     x_m: float
+    """Reference point where the distance is least [m]."""
     y_m: float
+    """Likewise."""
     margin_m: float
+    """Distance kept from obstacles at the time steps [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields, make_dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
-from mrmg import seeding
+from mrmg import seeding, storage
 from mrmg.scene.types import Battery, Scene
 
 
@@ -31,52 +31,52 @@ class Span:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotDisturbance:
-    """What is different about one robot; changes are shares of the model's value.
+    """What is different about one robot; changes are shares of the model's value."""
 
-    Attributes:
-        robot: its id.
-        mass: change of all its masses and inertias.
-        friction: change of the grip of its tyres and hull.
-        rolling: change of its rolling resistance, over that which the mass brings.
-        drive_gain: change of the drive's force against the one commanded.
-        steering_gain: change of the steering against the one commanded.
-        lag_s: time constant of drive and steering.
-        position_noise_m: standard deviation of each measured coordinate.
-        heading_noise_rad: standard deviation of the measured heading.
-        speed_noise_m_s: standard deviation of the measured speed.
-        delay_s: age of measured positions and headings.
-        start_x_m, start_y_m, start_heading_rad: offset of the start pose.
-        capacity: change of the battery's capacity and of its content at the start.
-    """
+    __pydantic_config__ = storage.IN_SCHEMAS
 
     robot: str
+    """Its id."""
     mass: float = 0.0
+    """Change of its masses and inertias, as a share."""
     friction: float = 0.0
+    """Change of its grip, of tyres and hull, as a share."""
     rolling: float = 0.0
+    """Change of its rolling resistance, over that which the mass brings, as a share."""
     drive_gain: float = 0.0
+    """Change of the drive's force against the one commanded, as a share."""
     steering_gain: float = 0.0
+    """Change of the steering against the one commanded, as a share."""
     lag_s: float = 0.0
+    """Time constant of drive and steering [s]."""
     position_noise_m: float = 0.0
+    """Standard deviation of each measured coordinate [m]."""
     heading_noise_rad: float = 0.0
+    """Standard deviation of the measured heading [rad]."""
     speed_noise_m_s: float = 0.0
+    """Standard deviation of the measured speed [m/s]."""
     delay_s: float = 0.0
+    """Age of measured positions and headings [s]."""
     start_x_m: float = 0.0
+    """Offset of the start [m]."""
     start_y_m: float = 0.0
+    """Offset of the start [m]."""
     start_heading_rad: float = 0.0
+    """Offset of the heading at the start [rad]."""
     capacity: float = 0.0
+    """Change of the battery's capacity and content, as a share."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Disturbance:
-    """What is different about a mission.
+    """How the simulated robots differ from their models."""
 
-    Attributes:
-        seed: of the draw, and of the noise while driving.
-        robots: one disturbance a robot, in the scene's order.
-    """
+    __pydantic_config__ = storage.IN_SCHEMAS
 
     seed: int
+    """Of the draw, and of the noise while driving."""
     robots: tuple[RobotDisturbance, ...]
+    """By robot, in the scene's order."""
 
     def battery(self, index: int, battery: Battery) -> Battery:
         """Return the battery that a robot really has, its reserve in joules kept."""
