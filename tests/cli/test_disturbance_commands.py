@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from mrmg.cli import show_commands
 from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 from mrmg.simulation.disturbance import DEFAULT_RANGES
@@ -126,7 +127,7 @@ def test_a_study_speaks_json(run: Path, capsys: pytest.CaptureFixture[str]) -> N
 
 
 def test_a_failed_execution_is_replayed(
-    run: Path, capsys: pytest.CaptureFixture[str]
+    run: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out = ["--out", str(run.parent / "failed")]
     command = ["execute", str(run), "--disturb", "capacity=-90%", *out]
@@ -139,10 +140,12 @@ def test_a_failed_execution_is_replayed(
     assert (run / "replay" / "log.json").exists()
     assert main(["replay", str(run / "capsule.zip"), "--json"]) == ExitCode.OK
     assert json.loads(capsys.readouterr().out)["same_bits"] is True
-    film = ["--json", "--render", "--overwrite"]
-    assert main(["replay", str(run / "capsule.zip"), *film]) == ExitCode.OK
-    assert json.loads(capsys.readouterr().out)["same_bits"] is True
-    assert (run / "replay" / "mission.mp4").exists()
+    monkeypatch.setattr(show_commands, "view", lambda options: print(options.source))
+    command = ["replay", str(run / "capsule.zip"), "--json", "--view"]
+    assert main(command) == ExitCode.OK
+    output = capsys.readouterr()
+    assert json.loads(output.out)["same_bits"] is True
+    assert str(run / "replay") in output.err
 
 
 def test_what_is_no_capsule_is_refused(

@@ -6,6 +6,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mrmg import storage
@@ -14,7 +15,7 @@ from mrmg.errors import UsageError
 from mrmg.plans import PlanStatus
 from mrmg.runs import pipeline
 from mrmg.runs.drive import drive
-from mrmg.runs.folder import RunFolder, Step
+from mrmg.runs.folder import RunFolder
 from mrmg.runs.steps import Run, taken_up
 from mrmg.studies.outcomes import Study, assess_trial
 from mrmg.studies.robustness.study import study_robustness
@@ -96,13 +97,16 @@ def test_trials_of_another_plan_go(run: Run) -> None:
 
 
 def test_a_new_plan_in_the_same_folder_is_driven(run: Run) -> None:
-    first = study_robustness(run, trials=1)
-    again = replace(run, arguments=replace(run.arguments, seed=1))
-    again.make(Step.PLAN)
-    second = study_robustness(again, trials=1)
-    driven = drive(again.scene, again.plan(), replace(again.arguments, disturb=""))
-    assert first.trials[0].log_digest != driven.log.digest
+    first, plan = study_robustness(run, trials=1), run.plan()
+    (motion,) = plan.trajectories
+    state = np.concatenate([motion.state, np.tile(motion.state[-1], (20, 1))])
+    control = np.concatenate([motion.control, np.zeros((20, 2))])
+    longer = replace(motion, state=state, control=control)
+    replace(plan, trajectories=(longer,)).save(run.folder.path)
+    second = study_robustness(run, trials=1)
+    driven = drive(run.scene, run.plan(), replace(run.arguments, disturb=""))
     assert second.trials[0].log_digest == driven.log.digest
+    assert second.trials[0].log_digest != first.trials[0].log_digest
 
 
 def test_disturbances_are_told_apart(run: Run) -> None:
