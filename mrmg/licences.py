@@ -36,47 +36,44 @@ class Dependency:
 def dependencies() -> list[Dependency]:
     """Return all packages, direct and indirect, those of mrmg's extras last."""
     extras = metadata(_PROJECT).get_all("Provides-Extra") or []
-    found: dict[str, tuple[str, list[str]]] = {}
+    found: dict[str, tuple[str, set[str]]] = {}
+    seen: set[tuple[str, str]] = set()
     for extra in ["", *(name for name in sorted(extras) if name != _FOR_DEVELOPERS)]:
-        open_ends = [(_PROJECT, {extra})]
+        open_ends = {(_PROJECT, extra)}
         while open_ends:
-            requiring, its_extras = open_ends.pop()
-            for requirement in _requirements(requiring, its_extras):
+            requiring, its_extra = open_ends.pop()
+            seen.add((requiring, its_extra))
+            for requirement in _requirements(requiring, its_extra):
                 name = canonicalize_name(requirement.name)
-                if name not in found:
-                    found[name] = (extra, [])
-                    open_ends.append((name, {"", *requirement.extras}))
-                if requiring not in found[name][1]:
-                    found[name][1].append(requiring)
+                if name != requiring:  # else an extra that names another
+                    found.setdefault(name, (extra, set()))[1].add(requiring)
+                ends = {(name, own) for own in ("", *requirement.extras)}
+                open_ends |= ends - seen
     ordered = sorted(found.items(), key=lambda item: (item[1][0], item[0]))
-    return [_dependency(name, *about) for name, about in ordered]
+    return [
+        _dependency(name, extra, tuple(sorted(requiring)))
+        for name, (extra, requiring) in ordered
+    ]
 
 
-def _requirements(package: str, extras: set[str]) -> Iterator[Requirement]:
-    """Yield what a package requires here: on this Python and platform."""
+def _requirements(package: str, extra: str) -> Iterator[Requirement]:
+    """Yield what a package, or an extra of it, requires on this Python and platform."""
     try:
         lines = requires(package) or []
     except PackageNotFoundError:
         return
     for requirement in map(Requirement, lines):
-        if requirement.name == package:  # an extra that names another
-            continue
         marker = requirement.marker
-        if marker is None:
-            if "" in extras:
-                yield requirement
-        elif any(marker.evaluate({"extra": extra}) for extra in extras):
+        if marker is None or marker.evaluate({"extra": extra}):
             yield requirement
 
 
-def _dependency(name: str, extra: str, required_by: list[str]) -> Dependency:
+def _dependency(name: str, extra: str, required_by: tuple[str, ...]) -> Dependency:
     try:
         about = metadata(name)
     except PackageNotFoundError:
-        return Dependency(name, "", "", extra, tuple(required_by))
-    return Dependency(
-        name, about["Version"], _licence(about), extra, tuple(sorted(required_by))
-    )
+        return Dependency(name, "", "", extra, required_by)
+    return Dependency(name, about["Version"], _licence(about), extra, required_by)
 
 
 def _licence(about: PackageMetadata) -> str:

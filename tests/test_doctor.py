@@ -73,3 +73,30 @@ def test_licences_of_all_dependencies_are_listed(
     header, *rows = capsys.readouterr().out.splitlines()
     assert header.split() == ["package", "version", "licence", "extra"]
     assert len(rows) == len(found)
+
+
+def test_licences_of_what_extras_of_dependencies_bring(
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """A package may be required without an extra first, and with it then."""
+    requirements = {
+        "mrmg": ["alpha", "zeta"],
+        "alpha": ["beta[all]", "gone"],
+        "zeta": ["beta", "gone"],
+        "beta": ["beta[fast]; extra == 'all'", "gamma; extra == 'fast'"],
+    }
+    for name, required in requirements.items():
+        folder = tmp_path / f"{name}-1.0.dist-info"
+        folder.mkdir()
+        lines = [f"Name: {name}", "Version: 1.0", "License: MIT"]
+        lines += [f"Requires-Dist: {line}" for line in required]
+        (folder / "METADATA").write_text("\n".join(lines) + "\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    assert main(["doctor", "--licences", "--json"]) == ExitCode.OK
+    found = {each["package"]: each for each in json.loads(capsys.readouterr().out)}
+    assert [*found] == ["alpha", "beta", "gamma", "gone", "zeta"]
+    assert found["beta"]["required_by"] == ["alpha", "zeta"]
+    assert found["gamma"]["required_by"] == ["beta"]
+    assert found["gone"]["required_by"] == ["alpha", "zeta"]
