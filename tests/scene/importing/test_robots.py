@@ -127,6 +127,29 @@ def test_car_of_a_xacro_file(tmp_path: Path) -> None:
     assert any(line.startswith("rolling_coefficient") for line in found.assumed)
 
 
+@pytest.mark.parametrize(
+    ("front_y_m", "wheelbase", "message"),
+    [
+        ("0.4", "0.6", r"wheels are 0.5 m apart, those that steer 0.8 m; .* one track"),
+        ("0.25", "0", "steered wheels are at x = 0 m, its driven axle is at 0 m"),
+    ],
+)
+def test_cars_that_no_model_can_be(
+    front_y_m: str, wheelbase: str, message: str, tmp_path: Path
+) -> None:
+    text = BUGGY.read_text()
+    for side, sign in (("left", ""), ("right", "-")):
+        stated = f'name="front_{side}" y="{sign}{{}}"'
+        assert stated.format("0.25") in text
+        text = text.replace(stated.format("0.25"), stated.format(front_y_m))
+    path = tmp_path / "buggy.xacro"
+    path.write_text(text)
+    with pytest.raises(SceneError, match=message) as caught:
+        import_robot(path, tmp_path / "odd", arguments={"wheelbase": wheelbase})
+    assert len(caught.value.faults) == 1
+    assert not (tmp_path / "odd").exists()
+
+
 def test_four_wheels_that_do_not_steer(tmp_path: Path) -> None:
     path = written(tmp_path, "fl fr rl rr")
     model, found = imported(path, tmp_path / "skid")

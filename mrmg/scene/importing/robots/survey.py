@@ -17,6 +17,7 @@ import numpy as np
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.importing.robots.description import Description
 from mrmg.scene.loading.mjcf import support_m
+from mrmg.scene.loading.wheel_consistency import LENGTH_SHARE, PLACE_M
 
 _ALONG = 0.9
 """Least share of a joint's axis along z (steering), or y (wheels)."""
@@ -194,6 +195,8 @@ def survey(
     if not left or len(left) != len(right) or len(steered) not in (0, 2):
         raise SceneError(source, [Fault("joints", _not_found(scan, fixed, steered))])
     driven = (_as_one(left), _as_one(right))
+    if steered and (faults := list(_car_faults(driven, steered))):
+        raise SceneError(source, faults)
     notes = []
     if len(fixed) > 2:
         notes.append(
@@ -288,6 +291,30 @@ def _not_found(scan: _Scan, fixed: Sequence[Wheel], steered: Sequence[Wheel]) ->
         f"none; found {found}. --drive LEFT RIGHT, and --steer LEFT RIGHT for the "
         f"joints that steer, name them; hinge joints: {_listed(scan)}"
     )
+
+
+def _car_faults(driven: Sequence[Wheel], steered: Sequence[Wheel]) -> Iterable[Fault]:
+    """Yield what no model of a car can have: two tracks, or no wheelbase."""
+    track_m, steered_m = (
+        abs(left.place_m[1] - right.place_m[1]) for left, right in (driven, steered)
+    )
+    if abs(track_m - steered_m) > LENGTH_SHARE * (track_m + steered_m):
+        yield Fault(
+            "joints",
+            f"its driven wheels are {track_m:.4g} m apart, those that steer "
+            f"{steered_m:.4g} m; a model of a car has one track, which both must be "
+            f"within {LENGTH_SHARE:.0%} of: make them equal in a copy of the file",
+        )
+    axle_m, front_m = (
+        float(np.mean([wheel.place_m[0] for wheel in pair]))
+        for pair in (driven, steered)
+    )
+    if front_m - axle_m <= PLACE_M:
+        yield Fault(
+            "joints",
+            f"its steered wheels are at x = {front_m:.4g} m, its driven axle is at "
+            f"{axle_m:.4g} m; a model of a car steers ahead of the driven axle",
+        )
 
 
 def _middle_y(wheels: Sequence[Wheel]) -> float:
