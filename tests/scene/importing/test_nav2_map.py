@@ -212,6 +212,24 @@ def test_mask_of_many_values_is_rounded(tmp_path: Path, write_map: Any) -> None:
         assert 100 / area.multiplier == pytest.approx(100 - value, abs=3)
 
 
+def test_raw_mask_takes_values_as_they_are(tmp_path: Path, write_map: Any) -> None:
+    """Thresholds say nothing of them: all of 1 to 99 are multipliers."""
+    path = write_map(tmp_path, np.full((20, 20), 254))
+    raw = np.zeros((20, 20))
+    raw[2:6], raw[8:12], raw[14:16] = 50, 80, 100
+    mask = write_map(tmp_path, raw, "raw", mode="raw", occupied_thresh=0.65)
+    scene = imported(path, terrain_mask=mask)
+    assert {area.multiplier for area in scene.terrain} == {2.0, 5.0}
+    assert solid(scene).area == pytest.approx(2 * 20 * 0.01)
+
+
+def test_name_of_a_picture_too_long(tmp_path: Path, write_map: Any) -> None:
+    path = write_map(tmp_path, np.full((4, 4), 254))
+    path.write_text(path.read_text().replace("map.pgm", 300 * "x"))
+    with pytest.raises(SceneError, match="image, line 1: .*expected a PGM or PNG"):
+        imported(path)
+
+
 def test_depot() -> None:
     """The map of a real depot with its masks, and its graph on it."""
     if not NAV2.exists():

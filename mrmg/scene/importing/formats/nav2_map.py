@@ -5,6 +5,7 @@ Grey values become occupancy as in Nav2's map server: `trinary`, `scale` and `ra
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -152,7 +153,8 @@ def read_mask(path: Path, options: ImportOptions) -> Layer:
     """
     grid = read_grid(path)
     free = grid.uncovered(options.before)
-    value = np.where(free & ~grid.occupied, np.maximum(grid.occupancy, 0), 0)
+    full = grid.occupancy == LETHAL  # raw values are no matter of occupied_thresh
+    value = np.where(free & ~full, np.maximum(grid.occupancy, 0), 0)
     values = np.unique(value[value > 0])
     if len(values) > MOST_CLASSES:
         steps = np.linspace(0, LETHAL, MOST_CLASSES + 1)
@@ -165,7 +167,7 @@ def read_mask(path: Path, options: ImportOptions) -> Layer:
             value == v, 0.0, multiplier=round(100.0 / (100.0 - float(v)), 3)
         )
     ]
-    closed = grid.areas(grid.occupied & free, options.tolerance, id="closed")
+    closed = grid.areas(full & free, options.tolerance, id="closed")
     notes = [
         f"{counted(len(values), 'value')} of 1 to 99 became "
         f"{counted(len(terrain), 'terrain area')} of multiplier 100 / (100 - value); "
@@ -219,7 +221,7 @@ def _picture(path: Path, document: MapDocument) -> tuple[np.ndarray, np.ndarray]
                     data = np.asarray(picture)
                 white = 65535.0 if picture.mode.startswith("I") else 255.0
     except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        reason = "no readable picture" if file.exists() else "no such file"
+        reason = "no readable picture" if os.path.exists(file) else "no such file"
         message = f"'{document.image}': {reason}; expected a PGM or PNG beside the YAML"
         raise SceneError(str(path), [Fault("image", message)]) from error
     data = np.atleast_3d(data.astype(float) / white)
