@@ -122,6 +122,9 @@ class _Reader:
             if section.tag == "SCALE":
                 unit_m = self._scale(section)
             elif section.tag in _BORDER_TAGS:
+                if border is not None:
+                    message = f"a second [{section.tag}]; expected one border"
+                    self._fault(section.line, message)
                 border = self._polygon(section, points)
             elif section.tag in _OBSTACLE_TAGS:
                 obstacles.append(self._polygon(section, points))

@@ -208,6 +208,7 @@ def test_frame_of_triangles_becomes_the_bounds(tmp_path: Path) -> None:
         ("5\n[BORDER]\n0 0\n1 0\n1 1\n", "line 1: '5' stands before the first [TAG]"),
         (f"[SCALE]\n-1\n{SQUARE}", "line 1: expected one positive number after [SCALE"),
         ("[BORDER]\n0 0\n1 1\n", "line 1: [BORDER] has 2 corners; expected 3 or more"),
+        (f"{SQUARE}{SQUARE}", "line 6: a second [BORDER]; expected one border"),
         (f"{SQUARE}[OBSTACLE]\n1 1 1\n", "line 7: has 3 numbers; expected x y"),
         (
             "[MAP_POINTS]\n1 0 0\n2 1 0\n3 1 1\n[MAP_BORDER]\n1 2 3 4\n",
