@@ -125,10 +125,12 @@ def _not_known(head: Head, known: dict[str, Format]) -> str:
         return "XML, no map; a robot is read by 'mrmg robot import'"
     if head.kind == "binary":
         return "a picture or other binary file; a map's picture is named by its YAML"
-    if head.kind == "yaml" and "format" in head.mapping:
-        return "a scene of mrmg already; 'mrmg scene check' looks at it"
+    content: Any = head.mapping if head.kind == "yaml" else {}
     if head.path.suffix in (".yaml", ".yml"):
-        read_yaml(head.path, source=str(head.path))  # names the line that is wrong
+        # Of the whole file, which may be long; names the line that is wrong.
+        content = read_yaml(head.path, source=str(head.path))
+    if isinstance(content, dict) and "format" in content:
+        return "a scene of mrmg already; 'mrmg scene check' looks at it"
     titles = "; ".join(f"{entry.kind}: {entry.title}" for entry in known.values())
     return f"no map of a known kind; --kind forces one of: {titles}"
 

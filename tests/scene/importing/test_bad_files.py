@@ -51,6 +51,16 @@ def test_a_missing_extra_is_named_with_its_install_line(
     assert not list(tmp_path.iterdir())
 
 
+def test_a_long_scene_of_mrmg(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It is told as what it is, however much of a file tells the others."""
+    path = tmp_path / "scene.yaml"
+    path.write_text(f"format: 1\nname: '{70_000 * 'x'}'\n")
+    assert main(["scene", "import", str(path), "-o", str(tmp_path / "made")]) == 3
+    assert "a scene of mrmg already" in capsys.readouterr().err
+
+
 def test_unknown_kind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["scene", "import", str(BAD / "empty.yaml"), "--kind", "geojsn"]) == 2
     assert "did you mean 'geojson'?" in capsys.readouterr().err
