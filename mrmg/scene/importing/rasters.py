@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import shapely
 
 from mrmg.errors import Fault, SceneError
 from mrmg.extras import import_extra
@@ -91,8 +92,9 @@ def _first_band(source: Any, options: ImportOptions, name: str) -> Raster:
     elif source.crs is None and options.crs is None:
         notes.append("states no coordinate system: taken as metres")
     first, end = np.zeros(2, dtype=int), np.array([source.width, source.height])
-    if options.crop is not None and options.frame is None:
-        first, end = _cells_in(options.crop, transform, end, name)
+    crop = _crop_in(crs, options, name)
+    if crop is not None:
+        first, end = _cells_in(crop, transform, end, name)
     if np.prod(end - first) > MOST_CELLS:
         message = (
             f"{' x '.join(map(str, end - first))} cells; at most {MOST_CELLS} are "
@@ -118,6 +120,17 @@ def _first_band(source: Any, options: ImportOptions, name: str) -> Raster:
     transform = (a, b, c, d, e, f)
     frame = options.frame or frame_of(crs, _at(transform, outline(values)), name)
     return Raster(name, crs, frame, values, transform, notes)
+
+
+def _crop_in(crs: str | None, options: ImportOptions, name: str) -> Box | None:
+    """Return the box to keep, in coordinates of a raster; None to keep all."""
+    if options.crop is None or not options.before:
+        return options.crop
+    of_first = options.before[0].crs
+    if crs is None and of_first is not None:
+        return None  # they do not fit, which is told of the whole raster
+    box: Box = Frame(crs).placed(shapely.box(*options.crop), of_first, name).bounds
+    return box
 
 
 def _cells_in(

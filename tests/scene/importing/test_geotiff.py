@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 import zlib
 from pathlib import Path
 from typing import Any
@@ -127,6 +128,55 @@ def test_turned_model(degrees: float, tmp_path: Path, write_tiff: Any) -> None:
     extent = (60 * a + 40 * d) * (60 * d + 40 * a)
     assert share == pytest.approx(40 * 60 / extent, abs=0.08)
     assert not shapely.contains_xy(closed, points).any()
+
+
+def test_turned_model_on_a_map_in_metres(
+    tmp_path: Path, write_map: Any, write_tiff: Any
+) -> None:
+    """Coordinates of the raster are metres of the map before it."""
+    from affine import Affine
+
+    a = np.sqrt(0.5)
+    place = Affine(a, a, 400_000.0, a, -a, 5_800_000.0)
+    path = write_tiff(
+        tmp_path / "dem.tif", heights(40, 60), crs="EPSG:25833", transform=place
+    )
+    free, origin = np.full((20, 20), 254), [400_000.0, 5_800_000.0, 0.0]
+    document = import_files([write_map(tmp_path, free, origin=origin), path]).document
+    x_min, y_min, _, _ = scene_from_document(document, source="test").bounds
+    assert (x_min, y_min) == pytest.approx((400_000.0, 5_800_000.0 - 40 * a), abs=1.0)
+
+
+@pytest.mark.parametrize("crs", [None, "EPSG:25832", "EPSG:4326"])
+def test_crop_of_a_model_that_is_not_the_first_file(
+    crs: str | None, tmp_path: Path, write_tiff: Any
+) -> None:
+    """The box is in coordinates of the first file, of whatever kind that is."""
+    corner = (450_000.0, 5_300_000.0) if crs else (0.0, 30.0)
+    metric = None if crs is None else "EPSG:25832"
+    dem = write_tiff(tmp_path / "dem.tif", heights(30, 30), crs=metric, corner=corner)
+    points = np.array([corner, corner]) + [(5.0, -5.0), (15.0, -20.0)]
+    if crs == "EPSG:4326":
+        to = pyproj.Transformer.from_crs(metric, crs, always_xy=True)
+        points = np.stack(to.transform(*points.T), axis=1)
+    (west, north), (east, south) = points.tolist()
+    place = {"type": "Point", "coordinates": [(west + east) / 2, (south + north) / 2]}
+    goal = {"type": "Feature", "properties": {"kind": "goal"}, "geometry": place}
+    path = tmp_path / "goals.geojson"
+    path.write_text(
+        json.dumps(goal | {"crs": {"properties": {"name": crs or "local"}}})
+    )
+    options = ImportOptions(crop=(west, south, east, north))
+    found = import_files([path, dem], options)
+    x_min, y_min, x_max, y_max = scene_from_document(
+        found.document, source="test"
+    ).bounds
+    # Axes of degrees and of metres are not parallel.
+    assert (x_max - x_min, y_max - y_min) == pytest.approx((9.0, 14.0), abs=2.1)
+    assert found.document["goals"]
+    if crs is None:
+        again = import_files([dem, path], options)
+        assert found.document["bounds"] == again.document["bounds"]
 
 
 def test_raster_without_a_place(tmp_path: Path, write_tiff: Any) -> None:

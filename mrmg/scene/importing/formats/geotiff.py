@@ -48,7 +48,7 @@ def read_elevation(path: Path, options: ImportOptions) -> Layer:
         raise SceneError(source, [Fault("transform", message)])
     else:
         heights, bounds = _resampled(raster)
-        notes.append(f"resampled from {crs} to rows of {frame.crs}")
+        notes.append(f"resampled from {crs} to rows of {frame.crs or crs}")
     if min(heights.shape) < 2:
         message = f"{heights.shape[0]} x {heights.shape[1]} heights; expected 2 x 2"
         raise SceneError(source, [Fault("", message)])
@@ -111,7 +111,7 @@ def _resampled(raster: Raster) -> tuple[np.ndarray, np.ndarray]:
         src_crs=raster.crs,
         src_nodata=np.nan,
         dst_transform=Affine(cell, 0.0, left, 0.0, -cell, top),
-        dst_crs=frame.crs,
+        dst_crs=frame.crs or raster.crs,
         dst_nodata=np.nan,
         resampling=warp.Resampling.bilinear,
     )
