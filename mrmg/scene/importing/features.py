@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -16,6 +17,7 @@ from mrmg.errors import Fault, SceneError
 from mrmg.scene.importing.frames import known_crs
 from mrmg.scene.importing.layers import ImportOptions
 from mrmg.scene.loading.faults import shown
+from mrmg.storage import UNREADABLE
 
 _GEOGRAPHIC = "EPSG:4326"
 
@@ -50,11 +52,18 @@ class Feature:
         self.findings.faults.append(Fault(f"{self.place}.{path}", message))
 
     def number(self, name: str, default: float) -> float:
-        """Return a positive number of the properties, or note a fault of it."""
-        value = self.keys.get(name, default)
+        """Return a number of the properties, or note a fault of it.
+
+        All but headings are positive.
+        """
+        value, wanted = self.keys.get(name, default), "a positive number"
+        least = 0.0
+        if name == "heading":
+            least, wanted = -sys.float_info.max, "a number"
         good = isinstance(value, int | float) and not isinstance(value, bool)
-        if not good or not np.isfinite(value) or (value <= 0.0 and name != "heading"):
-            message = f"got {shown(value)}; expected a positive number"
+        # Whole numbers may be beyond all of floating point.
+        if not good or not least < value <= sys.float_info.max:
+            message = f"got {shown(value)}; expected {wanted}"
             self.fault(f"properties.{name}", message)
             return default
         return float(value)
@@ -106,7 +115,7 @@ def _geometries(value: Any, place: str, findings: Findings) -> list[BaseGeometry
     try:
         shape = shapely.force_2d(shapely.geometry.shape(value))
         good = not shape.is_empty and np.isfinite(shapely.get_coordinates(shape)).all()
-    except (ShapelyError, ValueError, TypeError, KeyError, AttributeError, IndexError):
+    except (ShapelyError, *UNREADABLE):
         good = False
     if good:
         return _parts(shape)

@@ -85,7 +85,7 @@ def known_crs(text: str, source: str) -> str | None:
     """Return the name of a coordinate reference system; None for local metres.
 
     Raises:
-        SceneError: if there is none of that name.
+        SceneError: if there is none of that name, or it tells no place on a map.
     """
     if text == LOCAL:
         return None
@@ -95,6 +95,12 @@ def known_crs(text: str, source: str) -> str | None:
     except pyproj.exceptions.CRSError as error:
         message = f"unknown coordinate system '{text[:60]}'; state one with --crs"
         raise SceneError(source, [Fault("crs", message)]) from error
+    if not crs.is_geographic and not crs.is_projected:
+        message = (
+            f"coordinate system '{text[:60]}' is neither geographic nor projected; "
+            "state one with --crs (--crs local for metres)"
+        )
+        raise SceneError(source, [Fault("crs", message)])
     code = crs.to_authority(min_confidence=70)
     return ":".join(code) if code else str(crs.to_wkt())
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -24,16 +24,14 @@ Box = tuple[float, float, float, float]
 PLACE_MARGIN_M = 2.0
 """Ground around goals, stations and robots where no file states bounds."""
 
+_MARGINS_M = PLACE_MARGIN_M * np.array([-1.0, -1.0, 1.0, 1.0])
+
 MAX_SIDE_M = 100_000.0
 """Side of the ground from which on a plane is no picture of the earth."""
 
 _DECIMALS = 6
 """Coordinates are rounded to micrometres: obstacles lose nothing that counts."""
 
-_CHARGING = re.compile("(?<!dis)charg", re.IGNORECASE)
-"""What names of charging actions and places have in them, as startCharging."""
-
-_NO = ("", "false", "no", "none", "off", "0", "0.0")
 _SLIVER_M2 = 1e-6
 _NOT_IN_IDS = re.compile(r"[^A-Za-z0-9_.\-]+")
 
@@ -147,27 +145,61 @@ def scene_of_layers(
         steps = np.round(heights / PACKED_M).astype("<i4")
         document["elevation"] = {**packed_heights(steps), "slope": "avoid"}
     areas = (*document["obstacles"], *document["terrain"])
-    used = {str(entry.get("id")): 1 for entry in areas}
+    used = {str(entry["id"]): 1 for entry in areas if "id" in entry}
     solid = shapely.disjoint_subset_union_all(
         [area.shape for area in obstacles if "blocks" not in area.entry]
     )
     if box.difference(solid).area <= _SLIVER_M2:
         raise SceneError(source, [Fault("obstacles", _nothing_free(layers, bounds))])
+    kept = {}
     for section in ("goals", "stations", "robots"):
-        entries = _all(layers, section)
-        fitting = [
-            entry
-            for entry in entries
-            if box.covers(_point(entry)) and not solid.covers(_region(entry))
-        ]
-        if len(fitting) < len(entries):
-            lost = [str(entry["id"]) for entry in entries if entry not in fitting]
-            notes.append(
-                f"left out {section} that lie out of bounds or wholly on obstacles: "
-                f"{', '.join(lost)}"
-            )
-        document[section] = [_with_own_id(entry, used, notes) for entry in fitting]
+        kept[section] = _fitting(_all(layers, section), section, box, solid, notes)
+        document[section] = [_with_own_id(one, used, notes) for one in kept[section]]
+    own_ids: dict[str, list[str]]
+    own_ids = {str(entry["id"]): [] for entry in _all(layers, "robots")}
+    for entry, own in zip(kept["robots"], document["robots"], strict=True):
+        own_ids[str(entry["id"])].append(own["id"])
+    document["obstacles"] = list(_blocking(document["obstacles"], own_ids))
     return {key: value for key, value in document.items() if value != []}, notes
+
+
+def _fitting(
+    entries: Sequence[Entry],
+    section: str,
+    box: Polygon,
+    solid: BaseGeometry,
+    notes: list[str],
+) -> list[Entry]:
+    """Return goals, stations or robots that are in bounds; note which are not."""
+    fitting: list[Entry] = []
+    lost: list[Entry] = []
+    for entry in entries:
+        fits = box.covers(_point(entry)) and not solid.covers(_region(entry))
+        (fitting if fits else lost).append(entry)
+    if lost:
+        names = ", ".join(str(entry["id"]) for entry in lost)
+        what = f"{section} that lie out of bounds or wholly on obstacles"
+        notes.append(f"left out {what}: {names}")
+    return fitting
+
+
+def _blocking(
+    obstacles: Iterable[Entry], own_ids: Mapping[str, Sequence[str]]
+) -> Iterable[Entry]:
+    """Yield obstacles; what blocks robots does so by their ids in the scene.
+
+    Those that block only robots that were left out are left out, too.
+
+    Args:
+        obstacles: entries, which name robots as their files do.
+        own_ids: ids in the scene, by those in the files; none of who was left out.
+    """
+    for entry in obstacles:
+        named = entry.get("blocks")
+        if not isinstance(named, list) or not named:
+            yield entry
+        elif found := [own for id in named for own in own_ids.get(str(id), [id])]:
+            yield {**entry, "blocks": found}
 
 
 def _nothing_free(layers: Sequence[Layer], bounds: Box) -> str:
@@ -204,7 +236,7 @@ def _bounds(source: str, layers: Sequence[Layer], options: ImportOptions) -> Box
             for section in ("obstacles", "terrain")
             for area in _all(layers, section)
         ] + [
-            _point(entry).buffer(PLACE_MARGIN_M)
+            shapely.box(*np.add(_point(entry).bounds, _MARGINS_M))
             for section in ("goals", "stations", "robots")
             for entry in _all(layers, section)
         ]
@@ -284,26 +316,6 @@ def _unused(wanted: str, used: dict[str, int]) -> str:
         name = f"{wanted}_{used[wanted]}"
     used[name] = 1
     return name
-
-
-def charges(stated: Any) -> bool:
-    """Return whether keys or words of a part of a file name charging.
-
-    A key whose value is false, no or 0 does not.
-    """
-    if isinstance(stated, dict):
-        # Pairs of a list are spelt as {key: ..., value: ...}.
-        return not _is_no(stated.get("value", True)) and any(
-            (bool(_CHARGING.search(str(key))) and not _is_no(value)) or charges(value)
-            for key, value in stated.items()
-        )
-    if isinstance(stated, list):
-        return any(map(charges, stated))
-    return isinstance(stated, str) and bool(_CHARGING.search(stated))
-
-
-def _is_no(value: Any) -> bool:
-    return value is None or str(value).strip().lower() in _NO
 
 
 def lanes_note(count: int) -> str:

@@ -153,6 +153,69 @@ def test_areas_that_cross_themselves_count_whole(kind: str, tmp_path: Path) -> N
         scene_of(written(path, [nothing, goal], "local"))
 
 
+@pytest.mark.parametrize(
+    ("shape", "keys", "message"),
+    [
+        (shapely.Point(1, 1), {"radius": 10**400}, "radius: got 1000.*positive number"),
+        (shapely.Point(1e20, 1), {}, "the ground is only 0 x 4 m; check"),
+        (shapely.Polygon([(0, 0), (1, 1), (2, 2)]), {}, "0.geometry: has no area"),
+        (
+            shapely.Point(1, 1),
+            {"kind": "robot", "heading": "north"},
+            "heading: got 'north'; expected a number",
+        ),
+    ],
+)
+def test_numbers_and_shapes_that_mean_nothing(
+    shape: shapely.Geometry, keys: dict[str, Any], message: str, tmp_path: Path
+) -> None:
+    features = [feature(shape, **({"kind": "goal"} | keys))]
+    with pytest.raises(SceneError, match=message):
+        scene_of(written(tmp_path / "a.geojson", features, "local"))
+
+
+def test_whole_numbers_of_many_digits(tmp_path: Path) -> None:
+    place = feature(shapely.Point(1, 1), kind="goal", radius=10**20)
+    with pytest.raises(SceneError, match=r"got 1e\+20; must be <= 1e\+06 \(radius"):
+        scene_of(written(tmp_path / "a.geojson", [place], "local"))
+    place["geometry"]["coordinates"] = [10**401, 1]
+    with pytest.raises(SceneError, match=r"features.0.geometry: got .* a geometry"):
+        scene_of(written(tmp_path / "a.geojson", [place], "local"))
+
+
+@pytest.mark.parametrize("crs", ['LOCAL_CS["x",UNIT["metre",1]]', "EPSG:4978"])
+def test_coordinates_of_no_map(crs: str, tmp_path: Path) -> None:
+    path = written(tmp_path / "a.geojson", MISSION, crs)
+    with pytest.raises(SceneError, match="is neither geographic nor projected; state"):
+        scene_of(path)
+    assert scene_of(path, crs="local").goals
+
+
+def test_who_is_blocked(tmp_path: Path) -> None:
+    """Obstacles name robots as their file does, whatever these are called then."""
+    walls = [
+        feature(shapely.box(x, 5, x + 1, 6), kind="obstacle", id=f"w{x}", blocks=names)
+        for x, names in ((5, ["r 1"]), (7, ["r 1", "r2"]), (9, ["r2"]), (11, ["r3"]))
+    ]
+    robots = [
+        feature(shapely.Point(*at), kind="robot", id=name, model="car")
+        for name, at in (("r 1", (20, 20)), ("r2", (35, 20)))
+    ]
+    path = written(tmp_path / "a.geojson", [*MISSION[:-1], *walls, *robots], "local")
+    found = import_files([path], ImportOptions(crop=(0.0, 0.0, 30.0, 30.0)))
+    blocked = {
+        wall.get("id"): wall.get("blocks") for wall in found.document["obstacles"]
+    }
+    assert (blocked["w5"], blocked["w7"], blocked["w11"]) == (["r_1"], ["r_1"], ["r3"])
+    assert "w9" not in blocked, "it stops nobody who is left"
+
+
+def test_obstacles_without_an_id_take_none(tmp_path: Path) -> None:
+    goal = feature(shapely.Point(5, 5), kind="goal", id="None")
+    path = written(tmp_path / "a.geojson", [*MISSION[1:3], goal], "local")
+    assert [goal.id for goal in scene_of(path).goals] == ["None"]
+
+
 def test_obstacles_alone_leave_no_ground(tmp_path: Path) -> None:
     path = written(tmp_path / "a.geojson", [feature(BOX, kind="obstacle")], "local")
     with pytest.raises(SceneError, match=r"40 x 30 m, which reaches .* --crop") as it:
@@ -192,6 +255,22 @@ def test_what_does_not_charge_is_no_station(stated: Any, tmp_path: Path) -> None
     path = tmp_path / "hall.lif"
     path.write_text(json.dumps(document))
     assert [station.id for station in scene_of(path).stations] == ["N3"]
+
+
+def test_parts_that_are_nested_deeply(tmp_path: Path) -> None:
+    deep: dict[str, Any] = {"action": "startCharging"}
+    for _ in range(440):
+        deep = {"more": deep}
+    points = [feature(shapely.Point(9 * n, 5), id=n, metadata=deep) for n in range(2)]
+    path = written(tmp_path / "a.geojson", points, "local")
+    assert len(scene_of(path).stations) == 2
+    document = copy.deepcopy(LIF)
+    document["layouts"][0]["stations"][0] |= {"stationName": "S", "metadata": deep}
+    properties = document["layouts"][0]["nodes"][0]["vehicleTypeNodeProperties"]
+    properties.append({"vehicleTypeId": "agv", "metadata": deep})
+    path = tmp_path / "hall.lif"
+    path.write_text(json.dumps(document))
+    assert [station.id for station in scene_of(path).stations] == ["N1", "N3", "N4"]
 
 
 def test_lif_nodes_given_twice(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from shapely.geometry.base import BaseGeometry
 
 from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError, nearest
+from mrmg.scene.importing.charging import charges
 from mrmg.scene.importing.features import Feature, Findings, crs_of, features_of
 from mrmg.scene.importing.frames import Frame, frame_of
 from mrmg.scene.importing.land_cover import land_cover_layer, read_classes
@@ -25,7 +26,6 @@ from mrmg.scene.importing.layers import (
     Area,
     ImportOptions,
     Layer,
-    charges,
     lanes_note,
     polygons,
     solid,
@@ -166,6 +166,9 @@ def _region(feature: Feature) -> dict[str, Any]:
         region = {"circle": {"center": _rounded(shape), "radius": radius_m}}
     elif shape.geom_type == "Polygon":
         hull = shapely.convex_hull(shape)
+        if hull.area == 0.0:
+            feature.fault("geometry", "has no area")
+            return {}
         if hull.area > shape.area * (1.0 + 1e-6):
             message = "is not convex; goals and stations are points or convex polygons"
             feature.fault("geometry", message)

@@ -15,7 +15,8 @@ from pydantic import Field
 
 from mrmg.counted import counted
 from mrmg.errors import Fault, SceneError
-from mrmg.scene.importing.layers import ImportOptions, Layer, charges, lanes_note
+from mrmg.scene.importing.charging import charges
+from mrmg.scene.importing.layers import ImportOptions, Layer, lanes_note
 from mrmg.scene.importing.registry import Format, Head, read_json
 from mrmg.scene.loading.faults import validated
 from mrmg.scene.loading.shape_schema import Number, Strict
@@ -107,7 +108,7 @@ def read_lif(path: Path, options: ImportOptions) -> Layer:
         for edge in layout.edges:
             pairs[tuple(sorted(key_of[name] for name in edge.ends))] = None
         for station in layout.stations:
-            if charges(station.model_dump()):
+            if charges(dict(station)):
                 charging |= {key_of[name] for name in station.interactionNodeIds}
     if faults:
         raise SceneError(str(path), faults)
