@@ -195,8 +195,8 @@ def survey(
     if not left or len(left) != len(right) or len(steered) not in (0, 2):
         raise SceneError(source, [Fault("joints", _not_found(scan, fixed, steered))])
     driven = (_as_one(left), _as_one(right))
-    if steered and (faults := list(_car_faults(driven, steered))):
-        raise SceneError(source, faults)
+    if steered:
+        _require_car(driven, steered, source)
     notes = []
     if len(fixed) > 2:
         notes.append(
@@ -293,28 +293,28 @@ def _not_found(scan: _Scan, fixed: Sequence[Wheel], steered: Sequence[Wheel]) ->
     )
 
 
-def _car_faults(driven: Sequence[Wheel], steered: Sequence[Wheel]) -> Iterable[Fault]:
-    """Yield what no model of a car can have: two tracks, or no wheelbase."""
-    track_m, steered_m = (
-        abs(left.place_m[1] - right.place_m[1]) for left, right in (driven, steered)
+def _require_car(
+    driven: Sequence[Wheel], steered: Sequence[Wheel], source: str
+) -> None:
+    """Refuse what no model of a car can have: two tracks, or no wheelbase."""
+    (track_m, axle_m), (steered_m, front_m) = (
+        (abs(left[1] - right[1]), 0.5 * (left[0] + right[0]))
+        for left, right in ([w.place_m for w in pair] for pair in (driven, steered))
     )
     if abs(track_m - steered_m) > LENGTH_SHARE * (track_m + steered_m):
-        yield Fault(
-            "joints",
+        message = (
             f"its driven wheels are {track_m:.4g} m apart, those that steer "
             f"{steered_m:.4g} m; a model of a car has one track, which both must be "
-            f"within {LENGTH_SHARE:.0%} of: make them equal in a copy of the file",
+            f"within {LENGTH_SHARE:.0%} of: make them equal in a copy of the file"
         )
-    axle_m, front_m = (
-        float(np.mean([wheel.place_m[0] for wheel in pair]))
-        for pair in (driven, steered)
-    )
-    if front_m - axle_m <= PLACE_M:
-        yield Fault(
-            "joints",
+    elif front_m - axle_m <= PLACE_M:
+        message = (
             f"its steered wheels are at x = {front_m:.4g} m, its driven axle is at "
-            f"{axle_m:.4g} m; a model of a car steers ahead of the driven axle",
+            f"{axle_m:.4g} m; a model of a car steers ahead of the driven axle"
         )
+    else:
+        return
+    raise SceneError(source, [Fault("joints", message)])
 
 
 def _middle_y(wheels: Sequence[Wheel]) -> float:
