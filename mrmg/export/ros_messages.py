@@ -33,15 +33,15 @@ class RosTypes:
 
     def __getitem__(self, name: str) -> Any:
         """Return the class of a type such as "geometry_msgs/Pose"."""
-        return self._store.types[_full(name)]
+        return self._store.types[name.replace("/", "/msg/")]
 
-    def definition(self, name: str) -> bytes:
-        """Return the message definition, those of the types in it included."""
-        return bytes(self._store.generate_msgdef(_full(name), ros_version=2)[0], "utf8")
+    def definition(self, kind: str) -> bytes:
+        """Return the definition of a `__msgtype__`, and of the types in it."""
+        return bytes(self._store.generate_msgdef(kind, ros_version=2)[0], "utf8")
 
-    def encoded(self, name: str, message: Any) -> bytes:
+    def encoded(self, message: Any) -> bytes:
         """Return a message as CDR."""
-        return bytes(self._store.serialize_cdr(message, _full(name)))
+        return bytes(self._store.serialize_cdr(message, message.__msgtype__))
 
     def header(self, time_s: float, frame: str = MAP_FRAME) -> Any:
         """Return the header of a message in a frame."""
@@ -71,8 +71,3 @@ def ros_names(ids: Iterable[str]) -> dict[str, str]:
             name += "_"
         names[item] = name
     return names
-
-
-def _full(name: str) -> str:
-    package, _, kind = name.partition("/")
-    return f"{package}/msg/{kind}"

@@ -18,7 +18,8 @@ from __future__ import annotations
 import heapq
 import io
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from operator import itemgetter
+from typing import Any
 
 import numpy as np
 
@@ -42,10 +43,10 @@ TF_PERIOD_S = 0.05
 POSE_PERIOD_S = 0.1
 BATTERY_PERIOD_S = 1.0
 
-_GRID, _MARKERS, _PATH = (
-    "nav_msgs/OccupancyGrid",
-    "visualization_msgs/MarkerArray",
-    "nav_msgs/Path",
+_LATCHED = (
+    "nav_msgs/msg/OccupancyGrid",
+    "visualization_msgs/msg/MarkerArray",
+    "nav_msgs/msg/Path",
 )
 _LATCHED_QOS = """\
 - history: 1
@@ -61,11 +62,8 @@ _LATCHED_QOS = """\
 """Of map, markers and paths: who subscribes late gets what was sent before, too."""
 
 
-class _Message(NamedTuple):
-    time_s: float
-    topic: str
-    type: str
-    cdr: bytes
+_Message = tuple[float, str, Any]
+"""Time [s], topic, and a message as rosbags has it."""
 
 
 def files(mission: Mission, versions: tuple[str, ...] = ()) -> Files:
@@ -82,17 +80,17 @@ def files(mission: Mission, versions: tuple[str, ...] = ()) -> Files:
     writer.add_metadata("mrmg", _metadata(mission))
     schemas: dict[str, int] = {}
     channels: dict[str, int] = {}
-    for time_s, topic, kind, cdr in _messages(ros, mission):
+    for time_s, topic, message in _messages(ros, mission):
+        kind = message.__msgtype__
         if kind not in schemas:
-            name = kind.replace("/", "/msg/")
             text = ros.definition(kind)
-            schemas[kind] = writer.register_schema(name, "ros2msg", text)
+            schemas[kind] = writer.register_schema(kind, "ros2msg", text)
         if topic not in channels:
-            latched = kind in (_GRID, _MARKERS, _PATH)
-            qos = {"offered_qos_profiles": _LATCHED_QOS} if latched else {}
+            latched = {"offered_qos_profiles": _LATCHED_QOS}
+            qos = latched if kind in _LATCHED else {}
             channels[topic] = writer.register_channel(topic, "cdr", schemas[kind], qos)
         time_ns = nanoseconds(time_s)
-        writer.add_message(channels[topic], time_ns, cdr, time_ns)
+        writer.add_message(channels[topic], time_ns, ros.encoded(message), time_ns)
     writer.finish()
     return {"mission.mcap": data.getvalue()}
 
@@ -123,7 +121,7 @@ def _messages(ros: RosTypes, mission: Mission) -> Iterator[_Message]:
             _poses(ros, mission.scene, course, f"/{name}/pose"),
             _battery(ros, course, f"/{name}/battery"),
         ]
-    return heapq.merge(*streams, key=lambda message: message.time_s)
+    return heapq.merge(*streams, key=itemgetter(0))
 
 
 def _still(
@@ -131,41 +129,27 @@ def _still(
 ) -> Iterator[_Message]:
     """Yield what does not change: map, scene, shapes of the robots, and paths."""
     scene = mission.scene
-    shown = [
-        ("/map", _GRID, occupancy_grid(ros, scene)),
-        ("/scene", _MARKERS, scene_markers(ros, scene)),
-        ("/robots", _MARKERS, robot_markers(ros, scene, names)),
-    ]
+    yield 0.0, "/map", occupancy_grid(ros, scene)
+    yield 0.0, "/scene", scene_markers(ros, scene)
+    yield 0.0, "/robots", robot_markers(ros, scene, names)
     driven = mission.log.driven_motions() if mission.log is not None else ()
     for word, motions in (("planned", mission.plan.trajectories), ("driven", driven)):
-        shown += [
-            (f"/{names[each.robot]}/{word}_path", _PATH, _path(ros, scene, each))
-            for each in motions
-        ]
-    for topic, kind, message in shown:
-        yield _Message(0.0, topic, kind, ros.encoded(kind, message))
+        for each in motions:
+            yield 0.0, f"/{names[each.robot]}/{word}_path", _path(ros, scene, each)
 
 
 def _path(ros: RosTypes, scene: Scene, motion: Motion) -> Any:
     """Return the path of a motion, with the times at which it gets to its bends."""
     at = path_indices(motion.time_s, motion.state)
-    pose_stamped = ros["geometry_msgs/PoseStamped"]
-    poses = [
-        pose_stamped(ros.header(time_s), ros.pose(pose[:3], pose[3:]))
-        for time_s, pose in zip(
-            motion.time_s[at].tolist(),
-            _ros_poses(scene, motion.state[at]).tolist(),
-            strict=True,
-        )
-    ]
-    return ros[_PATH](ros.header(0.0), poses)
+    poses = [pose for _, pose in _stamped(ros, scene, motion, at)]
+    return ros["nav_msgs/Path"](ros.header(0.0), poses)
 
 
 def _goals(ros: RosTypes, mission: Mission) -> Iterator[_Message]:
     """Yield all goals, then each that is visited in the colour of its robot."""
     scene = mission.scene
     every_goal = goal_markers(ros, scene, [goal.id for goal in scene.goals])
-    yield _Message(0.0, "/goals", _MARKERS, ros.encoded(_MARKERS, every_goal))
+    yield 0.0, "/goals", every_goal
     robots = [course.robot.id for course in mission.courses]
     visits = [visit for course in mission.courses for visit in course.visits]
     for visit in sorted(visits, key=lambda visit: visit.time_s):
@@ -174,15 +158,13 @@ def _goals(ros: RosTypes, mission: Mission) -> Iterator[_Message]:
             goal = goal_markers(
                 ros, scene, [visit.target], color=color, time_s=visit.time_s
             )
-            cdr = ros.encoded(_MARKERS, goal)
-            yield _Message(visit.time_s, "/goals", _MARKERS, cdr)
+            yield visit.time_s, "/goals", goal
 
 
 def _transforms(
     ros: RosTypes, mission: Mission, names: Mapping[str, str]
 ) -> Iterator[_Message]:
     """Yield the frames of all robots, each time all of them."""
-    kind = "tf2_msgs/TFMessage"
     stamped = ros["geometry_msgs/TransformStamped"]
     transform = ros["geometry_msgs/Transform"]
     frames = [f"{names[course.robot.id]}/base_link" for course in mission.courses]
@@ -201,24 +183,30 @@ def _transforms(
             )
             for frame, pose in zip(frames, places, strict=True)
         ]
-        yield _Message(time_s, "/tf", kind, ros.encoded(kind, ros[kind](transforms)))
+        yield time_s, "/tf", ros["tf2_msgs/TFMessage"](transforms)
 
 
 def _poses(
     ros: RosTypes, scene: Scene, course: Course, topic: str
 ) -> Iterator[_Message]:
     """Yield the poses of a robot's reference point."""
-    kind = "geometry_msgs/PoseStamped"
     at = every(course.time_s, POSE_PERIOD_S)
-    poses = _ros_poses(scene, course.state[at]).tolist()
-    for time_s, pose in zip(course.time_s[at].tolist(), poses, strict=True):
-        message = ros[kind](ros.header(time_s), ros.pose(pose[:3], pose[3:]))
-        yield _Message(time_s, topic, kind, ros.encoded(kind, message))
+    for time_s, pose in _stamped(ros, scene, course, at):
+        yield time_s, topic, pose
+
+
+def _stamped(
+    ros: RosTypes, scene: Scene, motion: Course | Motion, at: np.ndarray
+) -> Iterator[tuple[float, Any]]:
+    """Yield times, and a robot's poses there, at indices of its states."""
+    poses = _ros_poses(scene, motion.state[at]).tolist()
+    for time_s, pose in zip(motion.time_s[at].tolist(), poses, strict=True):
+        header, where = ros.header(time_s), ros.pose(pose[:3], pose[3:])
+        yield time_s, ros["geometry_msgs/PoseStamped"](header, where)
 
 
 def _battery(ros: RosTypes, course: Course, topic: str) -> Iterator[_Message]:
     """Yield the state of charge of a robot."""
-    kind = "sensor_msgs/BatteryState"
     charging, discharging = 1, 2
     unknown = float("nan")
     none = np.empty(0, dtype=np.float32)
@@ -226,7 +214,7 @@ def _battery(ros: RosTypes, course: Course, topic: str) -> Iterator[_Message]:
     ticks = np.union1d(every(course.time_s, BATTERY_PERIOD_S), changes)
     for at in ticks.tolist():
         time_s = float(course.time_s[at])
-        state = ros[kind](
+        state = ros["sensor_msgs/BatteryState"](
             header=ros.header(time_s),
             voltage=unknown,
             temperature=unknown,
@@ -244,7 +232,7 @@ def _battery(ros: RosTypes, course: Course, topic: str) -> Iterator[_Message]:
             location=course.robot.id,
             serial_number="",
         )
-        yield _Message(time_s, topic, kind, ros.encoded(kind, state))
+        yield time_s, topic, state
 
 
 def _ros_poses(scene: Scene, state: np.ndarray) -> np.ndarray:
