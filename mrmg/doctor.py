@@ -6,14 +6,12 @@ import os
 import platform
 from collections.abc import Iterator
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
-
-from packaging.requirements import Requirement
 
 from mrmg import __version__, shipped
 from mrmg.counted import counted
 from mrmg.errors import MachineError
+from mrmg.licences import dependencies
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,12 +43,6 @@ def examine() -> list[Finding]:
     return findings
 
 
-def required_packages() -> list[str]:
-    """Return the names of the packages mrmg needs at run time."""
-    wanted = map(Requirement, requires("mrmg") or [])
-    return sorted(each.name for each in wanted if each.marker is None)
-
-
 def _python() -> Finding:
     found = f"mrmg {__version__} on Python {platform.python_version()}"
     return Finding(name="python", found=found)
@@ -70,12 +62,11 @@ def _cpu() -> Finding:
 
 
 def _packages() -> Iterator[Finding]:
-    for name in required_packages():
-        try:
-            yield Finding(name=name, found=version(name))
-        except PackageNotFoundError:
-            remedy = f"pip install {name}"
-            yield Finding(name=name, found="not installed", remedy=remedy)
+    for each in dependencies():
+        if not each.extra and "mrmg" in each.required_by:
+            found = each.version or "not installed"
+            remedy = "" if each.version else f"pip install {each.package}"
+            yield Finding(name=each.package, found=found, remedy=remedy)
 
 
 def _shipped_files() -> Finding:
