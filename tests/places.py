@@ -13,9 +13,7 @@ from mrmg.scene.importing.layers import ImportOptions
 from mrmg.scene.populating.ground import Ground
 
 
-def import_map(
-    path: str | Path, longest_side_m: float | None = 100.0
-) -> dict[str, Any]:
+def import_map(path: str | Path, longest_side_m: float = 100.0) -> dict[str, Any]:
     """Read one map as a scene document without robots or goals."""
     options = ImportOptions(longest_side_m=longest_side_m)
     return import_files([Path(path)], options).document

@@ -47,7 +47,7 @@ class ImportOptions:
         crs: coordinate reference system that replaces what files state; "local" for
             metres.
         crop: box to keep, in the coordinates of the first file.
-        longest_side_m: what a polygon map's longer side is scaled to.
+        longest_side_m: what a polygon map's longer side is scaled to; positive.
         classes: table of land-cover classes.
         lane_width_m: width of the lanes that robots must keep to; None for none.
     """
@@ -57,7 +57,7 @@ class ImportOptions:
     tolerance: float = 0.5
     crs: str | None = None
     crop: Box | None = None
-    longest_side_m: float | None = 100.0
+    longest_side_m: float = 100.0
     classes: Path | None = None
     lane_width_m: float | None = None
 

@@ -2,10 +2,10 @@
 
 Two text formats are read:
 
-- sectioned: `[SCALE]` (metres per unit), `[BORDER]`, any number of `[OBSTACLE]`, with
-  one `x y` per line; or `[MAP_POINTS]` (`id x y` in cm) with `[MAP_BORDER]` and
-  `[MAP_OBSTACLE]` that list point ids. Tags may carry blanks; other tags are derived
-  data. Polygons are closed implicitly and may run either way.
+- sectioned: `[BORDER]` and any number of `[OBSTACLE]`, with one `x y` per line; or
+  `[MAP_POINTS]` (`id x y`) with `[MAP_BORDER]` and `[MAP_OBSTACLE]` that list point
+  ids. Tags may carry blanks; other ones, as `[SCALE]`, are read over. Polygons are
+  closed implicitly and may run either way.
 - rows: 6 numbers are an obstacle triangle, 4 a segment, 2 a point. The border, if there
   is one, is drawn with thin triangles.
 
@@ -27,7 +27,6 @@ from shapely.geometry.base import BaseGeometry
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.loading.yaml_text import read_text
 
-M_PER_CM = 0.01
 _POINTS_TAG = "MAP_POINTS"
 _BORDER_TAGS = ("BORDER", "MAP_BORDER")
 _OBSTACLE_TAGS = ("OBSTACLE", "MAP_OBSTACLE")
@@ -43,12 +42,10 @@ class RawMap:
     Attributes:
         border: the ground inside it may be driven on; None where none is drawn.
         obstacles: polygons, segments and points.
-        unit_m: metres per unit.
     """
 
     border: Polygon | None
     obstacles: tuple[BaseGeometry, ...]
-    unit_m: float
 
 
 @dataclass(frozen=True)
@@ -110,18 +107,15 @@ class _Reader:
                 )
             self.faults = [Fault("", message)]
         border = None if self.faults else _drawn_border(shapes)
-        return RawMap(border=border, obstacles=tuple(shapes), unit_m=1.0)
+        return RawMap(border=border, obstacles=tuple(shapes))
 
     def sectioned(self, lines: Sequence[_Line]) -> RawMap:
         sections = list(self._sections(lines))
         points = self._points(sections)
-        unit_m = 1.0 if points is None else M_PER_CM
         border: Polygon | None = None
         obstacles: list[BaseGeometry] = []
         for section in sections:
-            if section.tag == "SCALE":
-                unit_m = self._scale(section)
-            elif section.tag in _BORDER_TAGS:
+            if section.tag in _BORDER_TAGS:
                 if border is not None:
                     message = f"a second [{section.tag}]; expected one border"
                     self._fault(section.line, message)
@@ -130,11 +124,11 @@ class _Reader:
                 obstacles.append(self._polygon(section, points))
         if border is None and not self.faults:
             self.faults.append(Fault("", "has no [BORDER] section; expected one"))
-        return RawMap(border=border, obstacles=tuple(obstacles), unit_m=unit_m)
+        return RawMap(border=border, obstacles=tuple(obstacles))
 
     def _sections(self, lines: Sequence[_Line]) -> Iterator[_Section]:
         """Yield all sections; only those of known tags have rows."""
-        known = ("SCALE", _POINTS_TAG, *_BORDER_TAGS, *_OBSTACLE_TAGS)
+        known = (_POINTS_TAG, *_BORDER_TAGS, *_OBSTACLE_TAGS)
         starts = [at for at, (_, line) in enumerate(lines) if line.startswith("[")]
         for number, line in lines[: starts[0]]:
             self._fault(number, f"'{line[:30]}' stands before the first [TAG]")
@@ -155,13 +149,6 @@ class _Reader:
             else:
                 self._fault(number, f"has {len(values)} numbers; expected id x y")
         return points
-
-    def _scale(self, section: _Section) -> float:
-        values = [value for _, row in section.rows for value in row]
-        if len(values) == 1 and values[0] > 0.0:
-            return values[0]
-        self._fault(section.line, "expected one positive number after [SCALE]")
-        return 1.0
 
     def _polygon(
         self, section: _Section, points: dict[int, list[float]] | None

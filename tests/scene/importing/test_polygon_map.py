@@ -9,7 +9,8 @@ import pytest
 import shapely
 from places import import_map
 
-from mrmg.errors import SceneError, UsageError
+from mrmg.cli.main import main
+from mrmg.errors import SceneError
 from mrmg.scene.loading import dump_scene, scene_from_document
 from mrmg.scene.types import Scene
 
@@ -42,7 +43,7 @@ def written(tmp_path: Path, text: str, name: str = "map.txt") -> Path:
     return path
 
 
-def imported(path: Path, longest_side_m: float | None = 100.0) -> Scene:
+def imported(path: Path, longest_side_m: float = 100.0) -> Scene:
     document = import_map(path, longest_side_m)
     return scene_from_document(document, source=path.name)
 
@@ -115,10 +116,9 @@ def _sides(shape: shapely.Geometry) -> tuple[float, float]:
 SQUARE = "[BORDER]\n0 0\n10 0\n10 10\n0 10\n"
 
 
-def test_scale_of_the_file(tmp_path: Path) -> None:
+def test_scale(tmp_path: Path) -> None:
+    """That of the file is read over: the longest side decides."""
     path = written(tmp_path, f"[SCALE]\n0.5\n{SQUARE}[OBSTACLE]\n2 2\n4 2\n4 4\n2 4\n")
-    assert imported(path, None).bounds == (0.0, 0.0, 5.0, 5.0)
-    assert blocked_m2(imported(path, None)) == pytest.approx(1.0)
     assert imported(path, 20.0).bounds == (0.0, 0.0, 20.0, 20.0)
     assert blocked_m2(imported(path, 20.0)) == pytest.approx(16.0)
 
@@ -134,13 +134,13 @@ def test_carriage_returns_blanks_and_derived_tags(tmp_path: Path) -> None:
 
 
 def test_point_ids(tmp_path: Path) -> None:
-    """Coordinates in cm, polygons as ids, several in a line."""
+    """Polygons as ids, several in a line."""
     text = (
         "[INFO]\nNAME=x\n[MAP_POINTS]\n0 0 0\n1 1000 0\n2 1000 500\n3 0 500\n"
         "10 200 200\n11 400 200\n12 400 400\n[MAP_BORDER]\n0 1\n2 3\n"
         "[MAP_OBSTACLE]\n10 11 12\n"
     )
-    scene = imported(written(tmp_path, text), None)
+    scene = imported(written(tmp_path, text), 10.0)
     assert scene.bounds == (0.0, 0.0, 10.0, 5.0)
     assert blocked_m2(scene) == pytest.approx(2.0)
 
@@ -206,7 +206,6 @@ def test_frame_of_triangles_becomes_the_bounds(tmp_path: Path) -> None:
         ("1 2\n1 3\n", "the map has no area"),
         ("[OBSTACLE]\n1 1\n2 2\n1 2\n", "has no [BORDER] section"),
         ("5\n[BORDER]\n0 0\n1 0\n1 1\n", "line 1: '5' stands before the first [TAG]"),
-        (f"[SCALE]\n-1\n{SQUARE}", "line 1: expected one positive number after [SCALE"),
         ("[BORDER]\n0 0\n1 1\n", "line 1: [BORDER] has 2 corners; expected 3 or more"),
         (f"{SQUARE}{SQUARE}", "line 6: a second [BORDER]; expected one border"),
         (f"{SQUARE}[OBSTACLE]\n1 1 1\n", "line 7: has 3 numbers; expected x y"),
@@ -238,7 +237,12 @@ def test_missing_file(tmp_path: Path) -> None:
         import_map(tmp_path / "nowhere.txt")
 
 
-@pytest.mark.parametrize("side", [0.0, -1.0, float("inf"), float("nan")])
-def test_side_must_be_positive(side: float, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="must be positive"):
-        import_map(written(tmp_path, SQUARE), side)
+@pytest.mark.parametrize("side", ["0", "-1", "inf", "nan"])
+def test_side_must_be_positive(
+    side: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = str(written(tmp_path, SQUARE))
+    with pytest.raises(SystemExit) as stopped:
+        main(["scene", "import", path, f"--longest-side={side}"])
+    assert stopped.value.code == 2
+    assert "a positive number" in capsys.readouterr().err

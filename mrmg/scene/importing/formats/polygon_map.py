@@ -10,7 +10,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.counted import counted
-from mrmg.errors import Fault, SceneError, UsageError
+from mrmg.errors import Fault, SceneError
 from mrmg.scene.importing.layers import Area, ImportOptions, Layer, solid
 from mrmg.scene.importing.map_text import RawMap, read_map
 from mrmg.scene.importing.registry import Format, Head
@@ -30,20 +30,16 @@ def read_polygon_map(path: Path, options: ImportOptions) -> Layer:
 
     Raises:
         SceneError: if the file cannot be read; names every bad line.
-        UsageError: if the longest side is not positive.
     """
-    longest_m = options.longest_side_m
-    if longest_m is not None and not 0.0 < longest_m < float("inf"):
-        message = f"the longest side is {longest_m} m; it must be positive"
-        raise UsageError(message)
-    raw = read_map(path)
+    raw, longest_m = read_map(path), options.longest_side_m
     border, blocked = _in_metres(raw, longest_m, str(path))
     shapes = _polygons(blocked)
     x_min, y_min, x_max, y_max = (round(value, 3) for value in border.bounds)
     became = counted(len(shapes), "polygon")
-    notes = [f"{counted(len(raw.obstacles), 'shape')} became {became}"]
-    if longest_m is not None:
-        notes.append(f"scaled to a longest side of {longest_m:g} m (--longest-side)")
+    notes = [
+        f"{counted(len(raw.obstacles), 'shape')} became {became}",
+        f"scaled to a longest side of {longest_m:g} m (--longest-side)",
+    ]
     return Layer(
         bounds=(x_min, y_min, x_max, y_max),
         # Corners on a straight side come from unions of touching shapes.
@@ -53,16 +49,15 @@ def read_polygon_map(path: Path, options: ImportOptions) -> Layer:
 
 
 def _in_metres(
-    raw: RawMap, longest_side_m: float | None, source: str
+    raw: RawMap, longest_side_m: float, source: str
 ) -> tuple[Polygon, BaseGeometry]:
     """Return the border and the blocked ground inside its box, lower left at (0, 0)."""
     drawn = list(raw.obstacles) if raw.border is None else [raw.border]
     extent = shapely.box(*shapely.total_bounds(drawn))
     x_min, y_min, x_max, y_max = extent.bounds
-    longest = max(x_max - x_min, y_max - y_min)
     if min(x_max - x_min, y_max - y_min) <= 0.0:
         raise SceneError(source, [Fault("", "the map has no area")])
-    scale = raw.unit_m if longest_side_m is None else longest_side_m / longest
+    scale = longest_side_m / max(x_max - x_min, y_max - y_min)
 
     def placed(shape: BaseGeometry) -> BaseGeometry:
         moved = affinity.translate(shape, -x_min, -y_min)
