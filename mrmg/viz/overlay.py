@@ -74,7 +74,7 @@ class Reading:
     @property
     def clock(self) -> str:
         """The time as minutes and seconds."""
-        minutes, seconds = divmod(self.time_s, 60.0)
+        minutes, seconds = divmod(round(self.time_s, 1), 60.0)
         return f"{int(minutes):02d}:{seconds:04.1f}"
 
     @property

@@ -31,6 +31,12 @@ def test_equal_readings_give_equal_panels_and_time_changes_them(panel: Panel) ->
     assert not np.array_equal(first, panel.draw(reading(time_s=61.7)))
 
 
+def test_the_clock_never_shows_sixty_seconds() -> None:
+    times = {59.94: "00:59.9", 59.97: "01:00.0", 61.5: "01:01.5"}
+    for time_s, shown in times.items():
+        assert reading(time_s=time_s).clock == shown
+
+
 def test_bar_grows_with_the_charge_and_turns_red_near_the_reserve(panel: Panel) -> None:
     full, low = (95, 208, 165), (255, 107, 94)
     half, whole = panel.draw(reading(0.5)), panel.draw(reading(1.0))
