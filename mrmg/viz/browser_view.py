@@ -5,12 +5,14 @@ from __future__ import annotations
 import contextlib
 import io
 import math
+import socket
 import threading
 import time
 from typing import Any
 
 import numpy as np
 
+from mrmg.errors import MachineError
 from mrmg.extras import import_extra
 from mrmg.mujoco_import import mujoco
 from mrmg.plans import Plan
@@ -52,7 +54,8 @@ class BrowserView:
             port: to listen on; the next free one is taken where it is in use.
 
         Raises:
-            MachineError: if viser is not installed, or no port is free.
+            MachineError: if viser is not installed, or the address is not one of this
+                machine.
         """
         self._scene, self._replay = scene, replay
         self._world = replay.film.world if replay else build_world(scene)
@@ -267,6 +270,7 @@ def _bar(share: float) -> str:
 
 def _serve(host: str, port: int) -> Any:
     viser = import_extra("viser", extra="view", purpose="shows missions in the browser")
+    _require_own(host)
     # It prints its address in a box of its own.
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host=host, port=port, label="mrmg", verbose=False)
@@ -277,3 +281,13 @@ def _serve(host: str, port: int) -> Any:
     server.gui.configure_theme(show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
     return server
+
+
+def _require_own(host: str) -> None:
+    """Refuse an address that is not this machine's; viser would wait for ever."""
+    try:
+        family, kind, *_, address = socket.getaddrinfo(host, 0)[0]
+        with socket.socket(family, kind) as own:
+            own.bind(address)
+    except OSError as error:
+        raise MachineError(f"cannot listen on {host}: {error.strerror}") from error

@@ -244,6 +244,13 @@ def test_without_viser_the_cure_is_named(monkeypatch: pytest.MonkeyPatch) -> Non
         browser_view.BrowserView(scene, None, host="127.0.0.1", port=18081)
 
 
+def test_an_address_of_another_machine_is_refused() -> None:
+    pytest.importorskip("viser", reason="viser is not installed")
+    scene = load_scene("quickstart")
+    with pytest.raises(MachineError, match=r"cannot listen on 203\.0\.113\.7: "):
+        browser_view.BrowserView(scene, None, host="203.0.113.7", port=18083)
+
+
 @pytest.mark.quick("run")
 @pytest.mark.parametrize("what", ["run", "scene"])
 def test_the_command_serves_until_it_is_stopped(
