@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from matplotlib import rc_context
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -30,7 +31,7 @@ _TIMELESS: dict[str, dict[str, Any]] = {
     "pdf": {"CreationDate": None},
     "svg": {"Date": None},
 }
-"""Metadata by format, such that equal figures give equal files."""
+"""Metadata by format; with the salt of SVG, equal figures give equal files."""
 
 
 def require_format(path: Path) -> None:
@@ -74,5 +75,6 @@ def add_legend_above(figure: Figure, handles: Iterable[Artist]) -> None:
 def write_figure(figure: Figure, path: Path) -> None:
     """Write a figure to `path` atomically, in the format of its suffix."""
     form = path.suffix.removeprefix(".").lower() or "png"
-    with storage.atomic_path(path) as temporary:
+    salt = FOR_PRINT["svg.hashsalt"]
+    with storage.atomic_path(path) as temporary, rc_context({"svg.hashsalt": salt}):
         figure.savefig(temporary, format=form, metadata=_TIMELESS.get(form))

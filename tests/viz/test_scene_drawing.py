@@ -13,6 +13,8 @@ from mrmg.scene.loading import load_scene
 from mrmg.scene.types import Scene
 from mrmg.shipped import scene_names
 from mrmg.viz import scene_drawing
+from mrmg.viz.figures import FORMATS
+from mrmg.viz.overview import draw_overview
 
 MakeScene = Callable[..., Scene]
 
@@ -92,7 +94,11 @@ def test_every_shipped_scene_can_be_drawn(name: str, tmp_path: Path) -> None:
     assert pixels.std() > 10
 
 
-def test_equal_scenes_give_equal_files(make_scene: MakeScene, tmp_path: Path) -> None:
-    for name in ("a.png", "b.png"):
-        scene_drawing.draw_scene(make_scene(), tmp_path / name)
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_equal_scenes_give_equal_files(
+    make_scene: MakeScene, tmp_path: Path, suffix: str
+) -> None:
+    paths = tmp_path / f"a{suffix}", tmp_path / f"b{suffix}"
+    for path in paths:
+        draw_overview(make_scene(), path=path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
