@@ -91,7 +91,7 @@ def map_labels(
     Args:
         scene: the map.
         plan: adds the paths' robots and the stops at stations.
-        log: moves ends and paths to where they were driven; adds breakdowns.
+        log: moves ends to where they were driven; adds breakdowns.
         em_m: size of the picture's letters on the ground.
         kinds: what to name.
     """
