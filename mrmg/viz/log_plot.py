@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 
 from mrmg.studies.calibration.log_calibration import LogCalibration
 from mrmg.studies.calibration.log_fit import Pieces
-from mrmg.studies.calibration.robot_logs import LoggedRun
 from mrmg.viz import style
 from mrmg.viz.figures import FOR_PRINT, new_figure, tidy
 
@@ -58,14 +57,13 @@ def fit_svg(calibration: LogCalibration) -> str:
         run = item.run
         pieces = Pieces.of(run, fit.law)
         fitted_W = pieces.features @ fit.law.coefficients(fit.parameters[run.terrain])
-        speed, yaw_rate = _piece_motion(item.run, len(pieces.power_W))
         label = None if run.terrain in labelled else run.terrain
         labelled.add(run.terrain)
         look = {"color": colors[run.terrain], "markersize": 2.2, "alpha": 0.5}
         off_W = pieces.power_W - fitted_W
         panels[0].plot(fitted_W, pieces.power_W, "o", label=label, **look)
-        panels[1].plot(speed, off_W, "o", **look)
-        panels[2].plot(yaw_rate, off_W, "o", **look)
+        panels[1].plot(pieces.speed_m_s, off_W, "o", **look)
+        panels[2].plot(pieces.yaw_rate_rad_s, off_W, "o", **look)
     ends = np.array(panels[0].get_xlim())
     panels[0].plot(ends, ends, color=style.MUTED, linewidth=0.8)
     panels[0].set(xlabel="fitted power [W]", ylabel="measured power, 2 s means [W]")
@@ -79,15 +77,6 @@ def fit_svg(calibration: LogCalibration) -> str:
     for handle in filter(None, legend.legend_handles):
         handle.set_alpha(1.0)
     return _svg(figure)
-
-
-def _piece_motion(run: LoggedRun, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the mean speed and yaw rate of `count` pieces of a run of equal length."""
-    speed, yaw_rate = (
-        np.array([part.mean() for part in np.array_split(values, count)])
-        for values in (run.speed_m_s, run.yaw_rate_rad_s)
-    )
-    return speed, yaw_rate
 
 
 def _colors(calibration: LogCalibration) -> dict[str, str]:

@@ -48,11 +48,15 @@ class Pieces:
         features: mean features of each piece, shape (p, k).
         power_W: mean power of each piece, shape (p,).
         duration_s: of each piece, shape (p,).
+        speed_m_s: mean speed of each piece, shape (p,).
+        yaw_rate_rad_s: mean yaw rate of each piece, shape (p,).
     """
 
     features: np.ndarray
     power_W: np.ndarray
     duration_s: np.ndarray
+    speed_m_s: np.ndarray
+    yaw_rate_rad_s: np.ndarray
 
     @staticmethod
     def of(run: LoggedRun, law: PowerLaw) -> Pieces:
@@ -64,10 +68,11 @@ class Pieces:
         starts = np.append(0, np.searchsorted(np.cumsum(weight_s), ends_s) + 1)
         starts = np.unique(np.minimum(starts, len(weight_s) - 1))
         duration_s = np.add.reduceat(weight_s, starts)
-        features = law.features(run.speed_m_s, run.yaw_rate_rad_s)
-        features = np.add.reduceat(features * weight_s[:, None], starts)
-        power_J = np.add.reduceat(run.power_W * weight_s, starts)
-        return Pieces(features / duration_s[:, None], power_J / duration_s, duration_s)
+        motion = (run.speed_m_s, run.yaw_rate_rad_s)
+        rows = np.column_stack([law.features(*motion), run.power_W, *motion])
+        means = np.add.reduceat(rows * weight_s[:, None], starts) / duration_s[:, None]
+        power_W, speed_m_s, yaw_rate_rad_s = means[:, -3:].T
+        return Pieces(means[:, :-3], power_W, duration_s, speed_m_s, yaw_rate_rad_s)
 
     @property
     def energy_J(self) -> float:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from mrmg.cli.main import main
 from mrmg.errors import ExitCode, FileError, UsageError
@@ -23,6 +24,7 @@ from mrmg.studies.calibration.log_calibration import calibrate_from_logs
 from mrmg.studies.calibration.power_laws import MotorLaw
 from mrmg.studies.calibration.robot_logs import LoggedRun, read_run
 from mrmg.studies.calibration.terrain_estimates import law_power_W
+from mrmg.viz.log_plot import fit_svg
 
 BOREALTC = Path(__file__).resolve().parents[4] / "shared/energy/borealtc"
 GROUNDS = ("ICE", "ASPHALT", "FLOORING", "SANDY_LOAM", "SNOW")
@@ -98,6 +100,32 @@ def test_a_known_law_is_found_and_predicts_runs_with_their_intervals(
     assert found.stationary_W.value == pytest.approx(12.0)
     assert max(abs(run.error_pct) for run in found.runs) < 10.0
     assert np.mean([run.holds for run in found.runs]) > 0.7
+
+
+def test_residuals_stand_at_the_speed_they_are_of(
+    husky: RobotModel, drawn: list[Figure]
+) -> None:
+    """A part of each log has more rows for the time."""
+    runs = []
+    for number in range(2):
+        speed = np.repeat([0.2, 0.8, 0.4], 200) + 0.01 * number
+        run = replace(
+            made_run(husky, "firm", 0),
+            file=f"firm{number}",
+            time_s=np.cumsum(np.repeat([0.2, 0.05, 0.2], 200)),
+            speed_m_s=speed,
+            yaw_rate_rad_s=0.5 * speed,
+            power_W=100.0 * speed,
+        )
+        runs.append(run)
+    fit_svg(calibrate_from_logs(husky, runs))
+    power, by_speed, by_yaw_rate = drawn[0].axes
+    for one, other, third in zip(
+        power.lines[:2], by_speed.lines[:2], by_yaw_rate.lines[:2], strict=True
+    ):
+        power_W = np.asarray(one.get_ydata())
+        assert 100.0 * np.asarray(other.get_xdata()) == pytest.approx(power_W)
+        assert 200.0 * np.asarray(third.get_xdata()) == pytest.approx(power_W)
 
 
 def test_one_wrong_run_does_not_spoil_the_fit(husky: RobotModel) -> None:
