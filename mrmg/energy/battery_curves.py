@@ -16,10 +16,11 @@ from mrmg.energy.metering import (
     TimedStates,
     battery_profile,
     measured_energy_parts,
+    step_energy_parts,
     visits_and_energy,
 )
 from mrmg.plans import Plan, Visit
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Battery, Scene
 from mrmg.simulation.log import ExecutionLog
 
 
@@ -30,10 +31,19 @@ class BatteryCurve(TimedStates):
     Attributes:
         energy_J: content at each time, after a recharge, shape (n,).
         visits: of this robot; their `energy_J` is the content on arrival.
+        drawn_J: over each interval by part, shape (n - 1, parts).
+        battery: of this robot; of a drive, the one it really had.
     """
 
     energy_J: np.ndarray
     visits: tuple[Visit, ...]
+    drawn_J: np.ndarray
+    battery: Battery
+
+    @property
+    def used_J(self) -> np.ndarray:
+        """Energy drawn up to each time, whatever was recharged, shape (n,)."""
+        return np.append(0.0, np.cumsum(self.drawn_J.sum(axis=1)))
 
     @property
     def least_J(self) -> float:
@@ -47,11 +57,9 @@ class MeasuredCurve(BatteryCurve):
     """A curve by the work of the simulated drives.
 
     Attributes:
-        drawn_J: measured over each tick by part of `MEASURED_PARTS`, shape (n - 1, 3).
-        entries: the same by leg and part.
+        entries: what was drawn by leg and part of `MEASURED_PARTS`, as in `drawn_J`.
     """
 
-    drawn_J: np.ndarray
     entries: tuple[LedgerEntry, ...]
 
 
@@ -75,6 +83,10 @@ def planned_curves(scene: Scene, plan: Plan) -> tuple[BatteryCurve, ...]:
             if plan.content_J
             else battery_profile(scene, trajectory, plan.visits),
             visits=tuple(v for v in plan.visits if v.robot == trajectory.robot),
+            drawn_J=step_energy_parts(
+                scene, trajectory, plan.rolling_factor.get(trajectory.robot)
+            ),
+            battery=scene.robot(trajectory.robot).battery,
         )
         for trajectory in plan.trajectories
     )
@@ -110,6 +122,7 @@ def measured_curves(
                 energy_J=content_J,
                 visits=visits,
                 drawn_J=drawn_J,
+                battery=actual.robot(motion.robot).battery,
                 entries=tuple(entries),
             )
         )

@@ -20,7 +20,7 @@ from mrmg.energy.metering import Motion
 from mrmg.energy.text import energy_text
 from mrmg.plans import Plan
 from mrmg.report.chart_spec import chart, line, rounded
-from mrmg.scene.types import Battery, Scene
+from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
 from mrmg.verification.distances import obstacle_distance, robot_distance
 
@@ -89,17 +89,18 @@ def _charge_charts(
 ) -> list[dict[str, Any]]:
     charts = []
     for at, planned in enumerate(planned_curves(scene, plan)):
-        owner, battery = (at, planned.robot), scene.robot(planned.robot).battery
-        reserve = np.full(len(time_s), 100.0 * battery.reserve_fraction)
+        owner, curves = (at, planned.robot), (planned, *driven[at : at + 1])
+        # What was driven is judged by the reserve of the battery it really had.
+        reserve = np.full(len(time_s), 100.0 * curves[-1].battery.reserve_fraction)
         lines = [
-            line(label, label, owner, _percent(curve, battery, time_s), digits=2)
-            for label, curve in zip(
-                ("planned", "simulated"), (planned, *driven[at : at + 1]), strict=False
-            )
+            line(label, label, owner, _percent(curve, time_s), digits=2)
+            for label, curve in zip(("planned", "simulated"), curves, strict=False)
         ]
         lines.append(line("reserve", "limit", owner, reserve))
         limits = _percent_limits(line["values"] for line in lines)
-        title = f"{planned.robot}, battery of {energy_text(battery.capacity_J, 1)}"
+        title = (
+            f"{planned.robot}, battery of {energy_text(planned.battery.capacity_J, 1)}"
+        )
         name = f"charge-{planned.robot}"
         charts.append(
             chart(name, title, "%", lines, group="charge", digits=1, limits=limits)
@@ -113,10 +114,10 @@ def _percent_limits(values: Iterable[list[float | None]]) -> tuple[float, float]
     return min(0.0, low), 100.0
 
 
-def _percent(curve: BatteryCurve, battery: Battery, time_s: np.ndarray) -> np.ndarray:
+def _percent(curve: BatteryCurve, time_s: np.ndarray) -> np.ndarray:
     at_s, content_J = with_recharge_jumps(curve)
     content_J = np.interp(time_s, at_s, content_J, right=np.nan)
-    return np.asarray(100.0 * content_J / battery.capacity_J)
+    return np.asarray(100.0 * content_J / curve.battery.capacity_J)
 
 
 def _tracking_chart(

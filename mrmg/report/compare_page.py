@@ -14,7 +14,6 @@ from mrmg.report import chart_spec
 from mrmg.report.compare import Comparison
 from mrmg.report.map import mission_map
 from mrmg.report.page import page, rendered
-from mrmg.scene.types import Scene
 
 _SAMPLES = 800
 _SHORTEST_S = 0.1
@@ -72,10 +71,7 @@ def _charts(
     """Return the charts of all runs that have curves, by their number."""
     ends_s = [float(curve.time_s[-1]) for run in curves.values() for curve in run]
     time_s = np.linspace(0.0, max(_SHORTEST_S, *ends_s), _SAMPLES)
-    courses = {
-        number: _courses(comparison.records[number].scene, run, time_s)
-        for number, run in curves.items()
-    }
+    courses = {number: _courses(run, time_s) for number, run in curves.items()}
     charts = []
     for name, title, unit, digits in _CHARTS:
         lines = [
@@ -89,29 +85,16 @@ def _charts(
 
 
 def _courses(
-    scene: Scene, curves: Sequence[BatteryCurve], time_s: np.ndarray
+    curves: Sequence[BatteryCurve], time_s: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Return the values of a run in each chart by its name, NaN after the run."""
     courses = {
-        "used": _used_kJ(curves, time_s),
+        "used": sum(np.interp(time_s, own.time_s, own.used_J) for own in curves) / 1e3,
         "goals": _goals_visited(curves, time_s),
-        "lowest": _lowest_percent(scene, curves, time_s),
+        "lowest": _lowest_percent(curves, time_s),
     }
     over = time_s > max(float(curve.time_s[-1]) for curve in curves)
     return {name: np.where(over, np.nan, own) for name, own in courses.items()}
-
-
-def _used_kJ(curves: Sequence[BatteryCurve], time_s: np.ndarray) -> np.ndarray:
-    """Return the energy drawn since the start; recharges add nothing."""
-    used = np.zeros(len(time_s))
-    for curve in curves:
-        drop_J = -np.diff(curve.energy_J)
-        for visit in curve.visits:
-            if visit.kind == "station" and visit.step > 0:
-                drop_J[visit.step - 1] = curve.energy_J[visit.step - 1] - visit.energy_J
-        drawn_J = np.concatenate([[0.0], np.cumsum(drop_J)])
-        used += np.interp(time_s, curve.time_s, drawn_J)
-    return used / 1000.0
 
 
 def _goals_visited(curves: Sequence[BatteryCurve], time_s: np.ndarray) -> np.ndarray:
@@ -120,12 +103,9 @@ def _goals_visited(curves: Sequence[BatteryCurve], time_s: np.ndarray) -> np.nda
     return np.searchsorted(at_s, time_s, side="right").astype(float)
 
 
-def _lowest_percent(
-    scene: Scene, curves: Sequence[BatteryCurve], time_s: np.ndarray
-) -> np.ndarray:
+def _lowest_percent(curves: Sequence[BatteryCurve], time_s: np.ndarray) -> np.ndarray:
     shares = [
-        np.interp(time_s, curve.time_s, curve.energy_J)
-        / scene.robot(curve.robot).battery.capacity_J
+        np.interp(time_s, curve.time_s, curve.energy_J / curve.battery.capacity_J)
         for curve in curves
     ]
     return np.asarray(100.0 * np.min(shares, axis=0))

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from mrmg.runs.arguments import RunArguments
-from mrmg.runs.options import options_of
+from mrmg.runs.options import options_of, value_text
 from mrmg.runs.record import RunRecord
 from mrmg.scene.objective import ENERGY
 
@@ -52,7 +52,7 @@ def parameters(records: Sequence[RunRecord]) -> dict[str, tuple[str, ...]]:
     for option in options_of(RunArguments):
         name = option.flag.removeprefix("--").replace("-", " ")
         if option.decides and name not in read:
-            read[name] = _argument(option.name, option.default)
+            read[name] = _argument(option.name)
     read["version"] = lambda record: str(record.summary["versions"].get("mrmg", ""))
     return {
         "scene": scene_names(records),
@@ -71,11 +71,10 @@ def _seconds(limit_s: float) -> str:
     return f"{limit_s:g} s" if math.isfinite(limit_s) else MISSING
 
 
-def _argument(name: str, default: Any) -> Callable[[RunRecord], str]:
+def _argument(name: str) -> Callable[[RunRecord], str]:
     def text(record: RunRecord) -> str:
-        arguments: Mapping[str, Any] = record.arguments
-        idle = name == "disturb_seed" and arguments.get("disturb") is None
-        return MISSING if idle else _text(arguments.get(name, default))
+        idle = name == "disturb_seed" and record.arguments.disturb is None
+        return MISSING if idle else _text(getattr(record.arguments, name))
 
     return text
 
@@ -85,8 +84,8 @@ def _text(value: Any) -> str:
         return "yes" if value else "no"
     if isinstance(value, (list, tuple)):
         return " ".join(map(str, value)) or MISSING
-    if isinstance(value, float):
-        return f"{value:g}"
+    if isinstance(value, (float, Mapping)):
+        return value_text(value)
     if value == "":  # an option that was given without a value of its own
         return "yes"
     return MISSING if value is None else str(value)

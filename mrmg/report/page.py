@@ -43,6 +43,7 @@ def page(
     *,
     robots: Sequence[str] = (),
     data: Mapping[str, Any] | None = None,
+    instead: str = "",
 ) -> str:
     """Return the whole page.
 
@@ -51,6 +52,7 @@ def page(
         body: what it shows.
         robots: whose colours styles and script know as `--r0`, `--r1`, ...
         data: what the page's script draws charts of; None for a page without charts.
+        instead: what is told to those whose browsers draw no charts.
     """
     text = (
         "" if data is None else json.dumps(data, separators=(",", ":"), allow_nan=False)
@@ -64,6 +66,7 @@ def page(
         looks={"planned": style.PLANNED, "driven": style.DRIVEN},
         # A closing tag inside a string would end the element that holds the data.
         data=Markup(text.replace("</", "<\\/")),
+        instead=instead,
         asset=lambda name: Markup(_asset(name)),
     )
     return f"{frame}\n"

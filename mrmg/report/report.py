@@ -10,11 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from mrmg import shipped, storage
+from mrmg.energy.audit_record import SimulatedVisit
 from mrmg.energy.battery_curves import shown_curves
 from mrmg.energy.by_terrain import energy_by_terrain, planned_interval_J
 from mrmg.energy.ledger import EnergyLedger
 from mrmg.energy.model import PARTS
-from mrmg.plans import Plan
+from mrmg.plans import Plan, Visit
 from mrmg.report.charts import chart_data
 from mrmg.report.map import mission_map
 from mrmg.report.page import page, rendered
@@ -27,7 +28,12 @@ from mrmg.scene.margins import sentences_on_margins
 from mrmg.scene.types import Scene
 from mrmg.studies.outcomes import CONFIDENCE, Study
 from mrmg.viz import style
-from mrmg.viz.activities import breakdowns, lengths_along, standing_of
+from mrmg.viz.activities import (
+    breakdowns,
+    legs_of_stops,
+    lengths_along,
+    standing_of,
+)
 
 _STILL_M = 0.1
 """Way of a robot that stays where it is."""
@@ -75,38 +81,52 @@ def report_html(record: RunRecord) -> str:
         **_of_studies(record.studies),
     )
     ids = [robot.id for robot in scene.robots]
-    return page(f"{scene.name}: mission report", body, robots=ids, data=data)
+    instead = "energy.png and overview.png in the run folder show the same"
+    title = f"{scene.name}: mission report"
+    return page(title, body, robots=ids, data=data, instead=instead)
 
 
 def _of_plan(record: RunRecord, plan: Plan) -> dict[str, Any]:
     """Return what the page knows of a plan and its drive beside their records."""
     scene, log = record.scene, record.log
-    looks = style.terrain_classes(scene)
+    looks, curves = style.terrain_classes(scene), shown_curves(scene, plan, log)
     return {
         "parts": PARTS,
         "by_terrain": energy_by_terrain(scene, plan, log),
         "terrain_colors": {key: look.color for key, look in looks.items()},
         "interval_J": planned_interval_J,
-        "legs": _legs,
+        "stops": _stops,
         "margins": sentences_on_margins(scene.robots, plan.margins),
         "standing": {
             robot.id: standing_of(robot.id, plan, log) for robot in scene.robots
         },
         "staying": {
-            curve.robot
-            for curve in shown_curves(scene, plan, log)
-            if lengths_along(curve.state)[-1] < _STILL_M
+            curve.robot for curve in curves if lengths_along(curve.state)[-1] < _STILL_M
         },
+        "full_J": {curve.robot: curve.battery.capacity_J for curve in curves},
     }
 
 
-def _legs(ledger: EnergyLedger, robot: str) -> dict[int, float]:
-    """Return the energy of each leg of a robot's tour [J]."""
-    legs: dict[int, float] = {}
+def _stops(
+    tour: Sequence[str],
+    visits: Sequence[Visit | SimulatedVisit],
+    ledger: EnergyLedger,
+) -> list[tuple[Visit | SimulatedVisit | None, float | None]]:
+    """Return the visit of each stop and the energy of the leg to it [J], if any.
+
+    Args:
+        tour: of one robot.
+        visits: of the robot.
+        ledger: of the fleet.
+    """
+    energy_J: dict[int | None, float] = {}
     for entry in ledger.entries:
-        if entry.robot == robot:
-            legs[entry.leg] = legs.get(entry.leg, 0.0) + entry.energy_J
-    return legs
+        if visits and entry.robot == visits[0].robot:
+            energy_J[entry.leg] = energy_J.get(entry.leg, 0.0) + entry.energy_J
+    return [
+        (None if leg is None else visits[leg], energy_J.get(leg))
+        for leg in legs_of_stops(tour, [visit.target for visit in visits])
+    ]
 
 
 def _of_studies(studies: Sequence[Study]) -> dict[str, Any]:
@@ -122,7 +142,7 @@ def _of_studies(studies: Sequence[Study]) -> dict[str, Any]:
 
 def command(record: RunRecord) -> str:
     """Return the command line that makes the same plan and simulation again."""
-    arguments = replace(RunArguments.from_json(record.arguments), seed=0)
+    arguments = replace(record.arguments, seed=0)
     words = ["mrmg", "run", _source(record.scene, arguments)]
     words += ["--seed", str(record.summary["seed"]), *arguments.words()]
     words += ["--trust-code"] if record.scene.has_custom_motion else []

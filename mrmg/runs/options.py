@@ -77,14 +77,15 @@ class Option:
             return [self.flag]
         if isinstance(value, tuple):
             return [word for each in value for word in (self.flag, each)]
-        return [self.flag, _text(value)]
+        return [self.flag, value_text(value)]
 
 
-def _text(value: Any) -> str:
+def value_text(value: Any) -> str:
+    """Return a value as the command line takes it."""
     if isinstance(value, Mapping) and "makespan" not in value:  # margins
-        return ",".join(f"{key}={_text(number)}" for key, number in value.items())
+        return ",".join(f"{key}={value_text(number)}" for key, number in value.items())
     if isinstance(value, Mapping):  # the weights of an objective
-        return f"{_text(value['energy'])}:{_text(value['makespan'])}"
+        return f"{value_text(value['energy'])}:{value_text(value['makespan'])}"
     if isinstance(value, float):
         short = f"{value:g}"
         return short if float(short) == value else repr(value)

@@ -10,6 +10,7 @@ from typing import Any
 from mrmg.energy.audit_record import EnergyAudit
 from mrmg.errors import Fault, RunFolderError
 from mrmg.plans import Plan, PlanStatus, plan_in_force
+from mrmg.runs.arguments import RunArguments, recorded
 from mrmg.runs.folder import RunFolder
 from mrmg.runs.paths import why_no_run
 from mrmg.runs.summary import outcomes_in, summarize
@@ -39,7 +40,7 @@ class RunRecord:
     scene: Scene
     summary: Mapping[str, Any]
     planning: Mapping[str, Any]
-    arguments: Mapping[str, Any]
+    arguments: RunArguments
     plan: Plan | None
     verdict: Verdict | None
     log: ExecutionLog | None
@@ -79,7 +80,7 @@ def read_record(run_folder: Path, *, trust_code: bool = False) -> RunRecord:
         scene=scene,
         summary=summary,
         planning=planning,
-        arguments=run.arguments(),
+        arguments=recorded(run),
         **found,
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,6 +92,23 @@ def visit_ranks(plan: Plan) -> dict[str, list[tuple[str, int]]]:
         for rank, target in enumerate(tour, start=1):
             ranks.setdefault(target, []).append((robot, rank))
     return ranks
+
+
+def legs_of_stops(tour: Iterable[str], visited: Sequence[str]) -> list[int | None]:
+    """Return the number of the leg to each stop of a tour; None where it was missed.
+
+    Args:
+        tour: ids of goals and stations.
+        visited: the same in order of visits, without those that were missed; each ends
+            a leg.
+    """
+    legs: list[int | None] = []
+    done = 0
+    for target in tour:
+        reached = done < len(visited) and visited[done] == target
+        legs.append(done if reached else None)
+        done += reached
+    return legs
 
 
 def lengths_along(states: np.ndarray) -> np.ndarray:

@@ -8,17 +8,13 @@ import numpy as np
 from matplotlib.colors import to_rgba
 from scipy.ndimage import gaussian_filter1d
 
-from mrmg.energy.battery_curves import (
-    BatteryCurve,
-    MeasuredCurve,
-    measured_curves,
-)
+from mrmg.energy.battery_curves import BatteryCurve, measured_curves
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
 from mrmg.simulation.world_model import build_world
 from mrmg.viz import style
-from mrmg.viz.activities import breakdowns, standing_of
+from mrmg.viz.activities import breakdowns, legs_of_stops, standing_of
 from mrmg.viz.ground_image import PAINTED, GroundFrame, paint_trail, video_labels
 from mrmg.viz.map_shapes import enclosing_circle
 from mrmg.viz.overlay import Panel, Reading, RobotReading
@@ -50,12 +46,15 @@ class Film:
             IdentityError: if scene, plan and log do not belong together.
         """
         require_same_mission(scene, plan, log)
+        self.curves = measured_curves(scene, plan, log)
+        if log.disturbance:
+            scene = log.disturbance.actual_scene(scene)  # with the reserves to show
         self.scene, self.plan, self.log, self.options = scene, plan, log, options
         self.world = build_world(scene)
         self.frame = floor_frame(self.world)
         self.colors = style.scene_robot_colors(scene)
-        self.curves = measured_curves(scene, plan, log)
-        self.used_J = _used_J(self.curves)
+        self.names = style.target_labels(scene)
+        self.used_J = np.sum([curve.used_J for curve in self.curves], axis=0)
         self.broken_s = breakdowns(log)
         ids = [robot.id for robot in scene.robots]
         self.followed = ids.index(options.robot or ids[0])
@@ -105,14 +104,12 @@ class Film:
             robots=tuple(
                 RobotReading(
                     robot=curve.robot,
-                    charge=float(curve.energy_J[tick]) / robot.battery.capacity_J,
+                    charge=float(curve.energy_J[tick] / curve.battery.capacity_J),
                     speed_m_s=round(float(state[tick, 3]), 1) + 0.0,
                     heading_for=self._heading_for(curve, tick),
                     standing=self._standing(curve.robot, now_s),
                 )
-                for curve, state, robot in zip(
-                    self.curves, self.log.state, self.scene.robots, strict=True
-                )
+                for curve, state in zip(self.curves, self.log.state, strict=True)
             ),
         )
 
@@ -127,18 +124,14 @@ class Film:
         return "" if whole else standing_of(robot, self.plan, self.log)
 
     def _heading_for(self, curve: BatteryCurve, tick: int) -> str:
-        done = sum(visit.step <= tick for visit in curve.visits)
         tour = self.plan.tours.get(curve.robot, ())
-        if done < len(tour):
-            return tour[done]
+        legs = legs_of_stops(tour, [visit.target for visit in curve.visits])
+        done = sum(visit.step <= tick for visit in curve.visits)
+        stop = legs.index(done - 1) + 1 if done else 0
+        if stop < len(tour):
+            return self.names[tour[stop]]
         # The plan in force does not know where one was going that broke down.
         return "…" if curve.robot in self.broken_s else ""
-
-
-def _used_J(curves: Iterable[MeasuredCurve]) -> np.ndarray:
-    """Return the energy the fleet has drawn at each tick, shape (n,)."""
-    used_J = sum(np.cumsum(curve.drawn_J.sum(axis=1)) for curve in curves)
-    return np.append(0.0, used_J)
 
 
 class Stage:

@@ -168,8 +168,7 @@ def annotate(extra: mujoco.MjvScene, scene: Scene, replay: Replay) -> None:
     names = style.target_labels(scene)
     for target in scene.targets():
         at = lifted(scene, target.region.center, 0.3)[0]
-        # The window's letters have no such sign.
-        _add_label(extra, at, names[target.id].removeprefix("⚡"))
+        _add_label(extra, at, _without_signs(names[target.id]))
     log, reading = replay.film.log, replay.reading()
     for robot, state, shown in zip(
         scene.robots, log.state, reading.robots, strict=True
@@ -222,7 +221,7 @@ def _texts(scene: Scene, replay: Replay) -> list[tuple[int, int, str, str]]:
     left = "\n".join(["mission", *(name for name, _ in robots)])
     right = "\n".join([mission, *(words for _, words in robots)])
     return [
-        (font, corner.mjGRID_TOPLEFT.value, left, right),
+        (font, corner.mjGRID_TOPLEFT.value, left, _without_signs(right)),
         (
             font,
             corner.mjGRID_BOTTOMLEFT.value,
@@ -230,3 +229,8 @@ def _texts(scene: Scene, replay: Replay) -> list[tuple[int, int, str, str]]:
             f"{KEYS}\n{HINT}",
         ),
     ]
+
+
+def _without_signs(text: str) -> str:
+    # The window's letters have no such sign.
+    return text.replace("⚡", "")

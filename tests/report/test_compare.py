@@ -7,9 +7,12 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from mrmg import storage
 from mrmg.cli.main import main
+from mrmg.energy.audit import audit
 from mrmg.energy.ledger import EnergyLedger
 from mrmg.errors import ExitCode, RunFolderError, UsageError
 from mrmg.plans import DRIVEN_PLAN, Plan
@@ -18,8 +21,9 @@ from mrmg.report.compare_page import comparison_html
 from mrmg.report.report import report_html
 from mrmg.runs import pipeline
 from mrmg.runs.record import read_record
-from mrmg.scene.loading import load_scene
+from mrmg.scene.loading import dump_scene, load_scene
 from mrmg.simulation.log import ExecutionLog
+from mrmg.verification.verify import verify
 
 
 def data_of(page: str) -> dict:
@@ -106,6 +110,40 @@ def test_courses_end_at_the_audit_s_figures(
         assert least == pytest.approx(
             100 * summary["energy"]["min_charge_fraction"], abs=0.1
         )
+
+
+def test_energy_drawn_grows_while_charging(
+    make_scene, make_plan, make_log, straight, tmp_path: Path
+) -> None:
+    battery = {"capacity_J": 20000, "reserve": 0.05, "charging_power": 900}
+    robot = {"id": "r1", "model": "car", "pose": [5, 10, 0]}
+    scene = make_scene(
+        battery=battery,
+        stations=[{"id": "s", "circle": {"center": [10, 10], "radius": 1}}],
+        robots=[{**robot, "start_energy": {"fraction": 0.5}}],
+    )
+    plan = make_plan(scene, {"r1": straight(12.0)}, {"r1": ("s", "g")})
+    log = make_log(scene, plan)
+    times = dict.fromkeys(("init", "routing", "first_solution", "total"), 0.1)
+    statistics = {"vertices": 1, "groups": 1, "router_calls": 1, "time_s": times}
+    planning = {"status": "solved", "reason": "", "statistics": statistics}
+    for name in ("planned", "driven"):
+        folder = tmp_path / name
+        storage.write_text(folder / "scene.yaml", dump_scene(scene))
+        storage.write_json(folder / "planning.json", planning)
+        plan.save(folder)
+        verify(scene, plan).save(folder)
+    log.save(tmp_path / "driven")
+    account = audit(scene, plan, log)
+    account.save(tmp_path / "driven")
+    comparison = compare_runs([tmp_path / "planned", tmp_path / "driven"])
+    page = comparison_html(comparison)
+    used, *_ = (item["series"] for item in data_of(page)["charts"])
+    drawn_J = plan.ledger.total_J(), account.measured.total_J()
+    for line, total_J in zip(used, drawn_J, strict=True):
+        assert line["values"][-1] == pytest.approx(total_J / 1000, abs=2e-3)
+        assert np.diff(line["values"]).min() > -0.02  # but for what braking feeds back
+    assert "energy.png" not in page
 
 
 def test_a_shorter_run_s_lines_end_with_it(quickstart_run: Path, own_run: Path) -> None:
@@ -208,6 +246,20 @@ def test_what_differs_is_a_column_and_the_same_scene_is_one(
     rows = {row.name: row.cells() for row in comparison.rows}
     assert rows["scene"] == ["quickstart", "quickstart"]
     assert rows["planned energy"][1].endswith(" %)")
+
+
+def test_arguments_are_told_as_the_command_line_takes_them(
+    quickstart_run: Path, own_run: Path
+) -> None:
+    record = json.loads((own_run / "run.json").read_text())
+    arguments = record["arguments"]
+    del arguments["soc_margin"]
+    arguments |= {"margins": {"obstacle": 0.1, "robot": 0.3}, "spare": 0.2}
+    (own_run / "run.json").write_text(json.dumps(record))
+    assert compare_runs([quickstart_run, own_run]).differences == {
+        "soc margin": ("–", "0.2"),
+        "margins": ("–", "obstacle=0.1,robot=0.3"),
+    }
 
 
 def test_equal_runs_differ_in_nothing(quickstart_run: Path, own_run: Path) -> None:

@@ -16,9 +16,11 @@ from mrmg.energy.audit import audit
 from mrmg.errors import RunFolderError
 from mrmg.report import page as html
 from mrmg.report.report import command, report_html, write_report
+from mrmg.runs.arguments import RunArguments
 from mrmg.runs.record import read_record
 from mrmg.runs.summary import summary_of
 from mrmg.scene.loading import dump_scene, load_scene
+from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
 from mrmg.simulation.log import Contact
 from mrmg.simulation.supervision import Event
 from mrmg.studies.outcomes import Study, Trial, save_study
@@ -191,6 +193,35 @@ def test_the_bound_is_set_against_the_plan_it_was_computed_for(
     assert "charge; planned anew once, see Timeline." in anew.words
 
 
+def test_rows_of_a_tour_are_those_of_their_targets(
+    make_scene, make_plan, make_log, straight, tmp_path
+) -> None:
+    goals = {"h": [10, 18], "g": [15, 10]}
+    scene = make_scene(
+        goals=[
+            {"id": name, "circle": {"center": at, "radius": 1}}
+            for name, at in goals.items()
+        ]
+    )
+    plan = make_plan(scene, {"r1": straight(12.0)}, {"r1": ("h", "g")})
+    half = RobotDisturbance(robot="r1", capacity=-0.5)
+    disturbance = Disturbance(seed=0, robots=(half,))
+    log = replace(make_log(scene, plan), disturbance=disturbance)
+    fill(tmp_path, scene, plan, log)
+    write_report(tmp_path)
+    cells = page_of(tmp_path).cells
+    first = cells.index("h")
+    missed, reached = cells[first - 1 : first + 8], cells[first + 8 : first + 17]
+    assert missed == ["1", "h", "", "not reached", "not reached", "", "", "", ""]
+    account = audit(scene, plan, log)
+    (visit,) = account.visits
+    measured_J = sum(e.energy_J for e in account.measured.entries if e.target == "g")
+    assert reached[:3] == ["2", "g", "goal"]
+    assert reached[4] == f"{visit.time_s:.1f} s"
+    assert reached[6] == f"{measured_J / 1000:.2f} kJ"
+    assert reached[8] == f"{visit.energy_J / 100:.1f} %"  # of 10 kJ
+
+
 def test_page_of_a_failed_run_names_the_reasons(mission, tmp_path) -> None:
     scene, plan, log = mission
     contact = Contact(time_s=3.0, robot="r1", other="wall<1>", x_m=1.0, y_m=2.0)
@@ -259,7 +290,7 @@ def test_command_names_a_shipped_scene_only_where_it_is_the_same(
     assert command(shipped) == "mrmg run quickstart --seed 3"
     edited = replace(shipped, scene=replace(shipped.scene, time_limit_s=900.0))
     assert command(edited) == "mrmg run scene.yaml --seed 3"
-    asked = {"profile": "paper", "budget_s": 2.5}
+    asked = RunArguments(profile="paper", budget_s=2.5)
     assert command(replace(record, arguments=asked)) == (
         "mrmg run scene.yaml --seed 3 --profile paper --budget 2.5"
     )
@@ -331,8 +362,8 @@ def test_trials_under_disturbances_have_a_section(mission, tmp_path) -> None:
 def test_a_disturbed_run_is_reproduced_with_its_disturbance(mission, tmp_path) -> None:
     scene, plan, log = mission
     fill(tmp_path, scene, plan, log)
-    arguments = {"disturb": "rolling=+30%", "disturb_seed": 7}
+    arguments = RunArguments(disturb="rolling=+30%", disturb_seed=7)
     record = replace(read_record(tmp_path), arguments=arguments)
     assert command(record).endswith("--disturb rolling=+30% --disturb-seed 7")
-    by_default = replace(record, arguments={"disturb": "", "disturb_seed": 2})
+    by_default = replace(record, arguments=RunArguments(disturb="", disturb_seed=2))
     assert command(by_default).endswith("--disturb --disturb-seed 2")

@@ -12,6 +12,7 @@ from mrmg.energy.audit import audit
 from mrmg.energy.battery_curves import measured_curves
 from mrmg.report.charts import chart_data
 from mrmg.report.map import mission_map
+from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
 
 
 @pytest.fixture
@@ -67,6 +68,17 @@ def test_simulated_charge_ends_where_the_audit_does(mission) -> None:
     last = 100.0 * curves[0].energy_J[-1] / scene.robot("r1").battery.capacity_J
     assert lines[1]["values"][-1] == pytest.approx(last, abs=0.01)
     assert set(lines[2]["values"]) == {5.0}
+
+
+def test_charge_is_that_of_the_battery_a_robot_really_has(mission) -> None:
+    scene, plan, log = mission
+    own = tuple(RobotDisturbance(robot=name, capacity=-0.5) for name in log.robots)
+    log = replace(log, disturbance=Disturbance(seed=0, robots=own))
+    _, simulated, reserve = chart(chart_data(scene, plan, log), "charge-r2")["series"]
+    assert simulated["values"][0] == 100.0
+    least = 100.0 * audit(scene, plan, log).robot("r2").min_charge_fraction
+    assert min(simulated["values"]) == pytest.approx(least, abs=0.01)
+    assert set(reserve["values"]) == {10.0}  # it is the same in joules
 
 
 def test_a_short_peak_of_tracking_error_is_not_lost_between_samples(mission) -> None:

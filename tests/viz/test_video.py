@@ -9,8 +9,10 @@ import av
 import numpy as np
 import pytest
 
+from mrmg.energy.audit import audit
 from mrmg.errors import UsageError
 from mrmg.runs.arguments import VideoArguments
+from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
 from mrmg.simulation.simulation import simulate
 from mrmg.viz import style
 from mrmg.viz.film import Film, Stage
@@ -132,7 +134,7 @@ def test_readings_are_those_of_the_log(mission) -> None:
     film = Film(scene, plan, log, OPTIONS)
     start, end = film.reading(0), film.reading(len(log.time_s) - 1)
     assert start.visited == {}
-    assert [robot.heading_for for robot in start.robots] == ["s", ""]
+    assert [robot.heading_for for robot in start.robots] == ["⚡s", ""]
     assert start.robots[0].charge == 1.0
     assert end.visited == {"g": "r1"}
     assert end.robots[0].heading_for == ""
@@ -142,6 +144,40 @@ def test_readings_are_those_of_the_log(mission) -> None:
     )
     assert 0.0 < drawn_J < end.used_J
     assert end.used_J == pytest.approx(plan.cost_J, rel=0.05)
+
+
+def test_a_robot_heads_for_what_follows_its_last_visit(
+    make_scene, make_plan, make_log, straight
+) -> None:
+    goals = {"h": [10, 18], "g": [15, 10]}
+    scene = make_scene(
+        goals=[
+            {"id": name, "circle": {"center": at, "radius": 1}}
+            for name, at in goals.items()
+        ]
+    )
+    plan = make_plan(scene, {"r1": straight(12.0)}, {"r1": ("h", "g")})
+    log = make_log(scene, plan)
+    film = Film(scene, plan, log, OPTIONS)
+    ends = [film.reading(tick).robots[0] for tick in (0, len(log.time_s) - 1)]
+    assert [robot.heading_for for robot in ends] == ["h", ""]  # it never was at h
+
+
+def test_charge_is_that_of_the_battery_a_robot_really_has(
+    make_scene, make_plan, make_log, straight
+) -> None:
+    scene = make_scene()
+    plan = make_plan(scene, {"r1": straight(12.0)}, {"r1": ("g",)})
+    less = RobotDisturbance(robot="r1", capacity=-0.5)
+    log = replace(
+        make_log(scene, plan), disturbance=Disturbance(seed=0, robots=(less,))
+    )
+    film = Film(scene, plan, log, OPTIONS)
+    charges = [film.reading(at).robots[0].charge for at in range(len(log.time_s))]
+    assert charges[0] == 1.0
+    found = audit(scene, plan, log).robot("r1")
+    assert min(charges) == pytest.approx(found.min_charge_fraction)
+    assert film.scene.robots[0].battery.reserve_fraction == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize(
