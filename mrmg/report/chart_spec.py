@@ -33,19 +33,16 @@ def chart(
         along_s: times of its own, which are not the mission's; values hold until the
             next.
     """
-    spec: dict[str, Any] = {
+    return {
         "id": name,
         "group": group,
         "title": title,
         "unit": unit,
         "digits": digits,
         "series": list(lines),
+        "range": limits,
+        "along_s": None if along_s is None else rounded(along_s, 3),
     }
-    if limits is not None:
-        spec["range"] = list(limits)
-    if along_s is not None:
-        spec["along_s"] = rounded(along_s, 3)
-    return spec
 
 
 def line(

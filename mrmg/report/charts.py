@@ -5,7 +5,8 @@ All series share one grid of times, so that one cursor reads them all.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -62,8 +63,7 @@ def chart_data(scene: Scene, plan: Plan, log: ExecutionLog | None) -> dict[str, 
         ],
         "charts": [
             *_charge_charts(scene, plan, curves if log else (), time_s),
-            *_tracking_chart(log, time_s),
-            *_distance_charts(scene, poses),
+            *_course_charts(scene, log, poses, time_s),
         ],
     }
 
@@ -97,41 +97,20 @@ def _charge_charts(
             for label, curve in zip(("planned", "simulated"), curves, strict=False)
         ]
         lines.append(line("reserve", "limit", owner, reserve))
-        limits = _percent_limits(line["values"] for line in lines)
         title = (
             f"{planned.robot}, battery of {energy_text(planned.battery.capacity_J, 1)}"
         )
         name = f"charge-{planned.robot}"
         charts.append(
-            chart(name, title, "%", lines, group="charge", digits=1, limits=limits)
+            chart(name, title, "%", lines, group="charge", digits=1, limits=(0, 100))
         )
     return charts
-
-
-def _percent_limits(values: Iterable[list[float | None]]) -> tuple[float, float]:
-    """Return what an axis of charge shows; batteries in debt go below zero."""
-    low = min(value for line in values for value in line if value is not None)
-    return min(0.0, low), 100.0
 
 
 def _percent(curve: BatteryCurve, time_s: np.ndarray) -> np.ndarray:
     at_s, content_J = with_recharge_jumps(curve)
     content_J = np.interp(time_s, at_s, content_J, right=np.nan)
     return np.asarray(100.0 * content_J / curve.battery.capacity_J)
-
-
-def _tracking_chart(
-    log: ExecutionLog | None, time_s: np.ndarray
-) -> list[dict[str, Any]]:
-    if log is None:
-        return []
-    errors_cm = [
-        100.0 * _largest(log.time_s, error_m, time_s)
-        for error_m in log.tracking_error_m()
-    ]
-    lines = _own_lines(log.robots, errors_cm)
-    title = "Distance from the planned place"
-    return [chart("tracking", title, "cm", lines, group="tracking")]
 
 
 def _largest(at_s: np.ndarray, values: np.ndarray, time_s: np.ndarray) -> np.ndarray:
@@ -142,26 +121,30 @@ def _largest(at_s: np.ndarray, values: np.ndarray, time_s: np.ndarray) -> np.nda
     return largest
 
 
-def _distance_charts(scene: Scene, poses: list[np.ndarray]) -> list[dict[str, Any]]:
-    ids = [robot.id for robot in scene.robots]
-    to_obstacles = [
-        obstacle_distance(scene, robot, pose)
-        for robot, pose in zip(scene.robots, poses, strict=True)
-    ]
-    lines = _own_lines(ids, to_obstacles)
-    title = "To the nearest obstacle or the bounds"
-    charts = [chart("obstacles", title, "m", lines, group="distance")]
-    if len(ids) > 1:
-        lines = _own_lines(ids, robot_distance(scene.robots, poses))
-        title = "To the nearest other robot"
-        charts.append(chart("robots", title, "m", lines, group="distance"))
-    return charts
-
-
-def _own_lines(
-    ids: Sequence[str], values: Iterable[np.ndarray]
+def _course_charts(
+    scene: Scene, log: ExecutionLog | None, poses: list[np.ndarray], time_s: np.ndarray
 ) -> list[dict[str, Any]]:
-    return [
-        line(name, "own", (at, name), own)
-        for at, (name, own) in enumerate(zip(ids, values, strict=True))
-    ]
+    """Return the charts that have one line for each robot."""
+    courses = []
+    if log is not None:
+        errors_cm = [
+            100.0 * _largest(log.time_s, error_m, time_s)
+            for error_m in log.tracking_error_m()
+        ]
+        title = "Distance from the planned place"
+        courses.append(("tracking", "tracking", title, "cm", errors_cm))
+    to_obstacles = [*map(partial(obstacle_distance, scene), scene.robots, poses)]
+    title = "To the nearest obstacle or the bounds"
+    courses.append(("obstacles", "distance", title, "m", to_obstacles))
+    if len(poses) > 1:
+        to_robots = [*robot_distance(scene.robots, poses)]
+        title = "To the nearest other robot"
+        courses.append(("robots", "distance", title, "m", to_robots))
+    charts = []
+    for name, group, title, unit, values in courses:
+        lines = [
+            line(robot.id, "own", (at, robot.id), values[at])
+            for at, robot in enumerate(scene.robots)
+        ]
+        charts.append(chart(name, title, unit, lines, group=group))
+    return charts

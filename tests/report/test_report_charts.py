@@ -61,7 +61,7 @@ def test_simulated_charge_ends_where_the_audit_does(mission) -> None:
         wanted = account.robot(curve.robot).min_charge_fraction
         assert least_J / capacity_J == pytest.approx(wanted)
     shown = chart(chart_data(*mission), "charge-r1")
-    assert shown["range"] == [0.0, 100.0]  # the page widens it to round numbers
+    assert shown["range"] == (0, 100)  # the page widens it to round numbers
     lines = shown["series"]
     assert [line["label"] for line in lines] == ["planned", "simulated", "reserve"]
     assert lines[1]["values"][0] == 100.0
