@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
+from PIL.ImageDraw import ImageDraw as Pen
 
 from mrmg.counted import counted
 from mrmg.energy.text import energy_text
@@ -88,7 +90,11 @@ class Reading:
 
 
 class Panel:
-    """The panel beside the map: clock, goals, batteries, legend."""
+    """The panel beside the map: clock, goals, batteries, legend.
+
+    It is laid out in units that are pixels of a panel 345 wide beside a picture 640
+    high.
+    """
 
     def __init__(
         self, scene: Scene, size: tuple[int, int], speed: float, video_height: int
@@ -102,7 +108,6 @@ class Panel:
             video_height: of the whole picture [pixels]; decides the size of the text.
         """
         self._scene = scene
-        self._size = size
         self._speed = speed
         self._colors = style.scene_robot_colors(scene)
         self._labels = style.goal_labels(scene)
@@ -110,11 +115,12 @@ class Panel:
             (text_width_em(robot.id, bold=True) for robot in scene.robots), default=0.0
         )
         self._unit = min(size[0] / 345.0, video_height / 640.0)
+        self._width, self._height = size[0] / self._unit, size[1] / self._unit
         self._base = Image.new("RGB", size, _BACKGROUND)
         self._cards_top = self._draw_head(ImageDraw.Draw(self._base))
-        self._cards_bottom = float(size[1])
-        room = size[1] - self._cards_top - len(scene.robots) * self._px(46)
-        if room > self._px(52 + 22 * ((len(style.map_key(scene)) + 1) // 2)):
+        self._cards_bottom = self._height
+        room = self._height - self._cards_top - 46.0 * len(scene.robots)
+        if room > 52 + 22 * ((len(style.map_key(scene)) + 1) // 2):
             self._cards_bottom = self._draw_legend(ImageDraw.Draw(self._base))
 
     def draw(self, reading: Reading) -> np.ndarray:
@@ -124,31 +130,34 @@ class Panel:
         self._draw_clock(pen, reading)
         self._draw_goals(pen, reading)
         room = self._cards_bottom - self._cards_top
-        pitch = min(self._px(66), room / max(len(reading.robots), 1))
+        pitch = min(66.0, room / max(len(reading.robots), 1))
         for row, robot in enumerate(reading.robots):
             top = self._cards_top + row * pitch
             self._draw_card(pen, self._scene.robots[row], robot, top, pitch)
         return np.asarray(image)
 
-    def _px(self, length: float) -> float:
-        return length * self._unit
+    def _px(self, *place: float) -> Any:
+        """Return a point or a box in pixels."""
+        return tuple(length * self._unit for length in place)
 
-    def _font(self, size: float, *, bold: bool = False) -> ImageFont.FreeTypeFont:
-        return font(max(round(self._px(size)), 9), bold=bold)
+    def _write(
+        self, pen: Pen, x: float, y: float, text: str, size: float, **look: Any
+    ) -> None:
+        """Write a text; `look` as of `font` and of Pillow."""
+        bold, fill = look.pop("bold", False), look.pop("fill", TEXT)
+        face = font(max(round(size * self._unit), 9), bold=bold)
+        pen.text(self._px(x, y), text, font=face, fill=fill, **look)
 
-    def _draw_head(self, pen: ImageDraw.ImageDraw) -> float:
-        left, top = self._px(18), self._px(12)
-        bold = self._font(17, bold=True)
-        pen.text((left, top), self._scene.name, font=bold, fill=_FAINT)
-        end = (self._size[0] - left, top)
-        speed = f"×{self._speed:g} speed"
-        pen.text(end, speed, font=self._font(15), fill=_FAINT, anchor="ra")
+    def _draw_head(self, pen: Pen) -> float:
+        end, speed = self._width - 18, f"×{self._speed:g} speed"
+        self._write(pen, 18, 12, self._scene.name, 17, bold=True, fill=_FAINT)
+        self._write(pen, end, 12, speed, 15, fill=_FAINT, anchor="ra")
         per_row, _ = self._chips()
         rows = 1 + (len(self._scene.goals) - 1) // per_row
-        return self._px(122) + rows * self._px(26)
+        return 122.0 + 26.0 * rows
 
     def _chips(self) -> tuple[int, float]:
-        """Return how many goals stand in a row, and the width of each [pixels].
+        """Return how many goals stand in a row, and the width of each.
 
         Where names would take too many rows, goals are marks without names.
         """
@@ -157,94 +166,75 @@ class Panel:
             default=0.0,
         )
         for width in (max(34.0, 12.0 * widest + 10.0), _UNNAMED_CHIP):
-            per_row = max(int((self._size[0] - self._px(36)) // self._px(width + 4)), 1)
+            per_row = max(int((self._width - 36) // (width + 4)), 1)
             if len(self._labels) <= per_row * _MOST_CHIP_ROWS:
                 break
-        return per_row, self._px(width)
+        return per_row, width
 
-    def _draw_clock(self, pen: ImageDraw.ImageDraw, reading: Reading) -> None:
-        left = self._px(18)
-        large, bold = self._font(37, bold=True), self._font(16, bold=True)
-        pen.text((left, self._px(37)), reading.clock, font=large, fill=TEXT)
-        end = (self._size[0] - left, self._px(54))
-        pen.text(end, f"{reading.used} used", font=bold, fill=TEXT, anchor="ra")
-        goals = f"{reading.goals_of(self._scene)} visited"
-        pen.text((left, self._px(90)), goals, font=self._font(16), fill=TEXT)
+    def _draw_clock(self, pen: Pen, reading: Reading) -> None:
+        used, end = f"{reading.used} used", self._width - 18
+        self._write(pen, 18, 37, reading.clock, 37, bold=True)
+        self._write(pen, end, 54, used, 16, bold=True, anchor="ra")
+        self._write(pen, 18, 90, f"{reading.goals_of(self._scene)} visited", 16)
 
-    def _draw_goals(self, pen: ImageDraw.ImageDraw, reading: Reading) -> None:
-        small = self._font(12, bold=True)
+    def _draw_goals(self, pen: Pen, reading: Reading) -> None:
         per_row, width = self._chips()
         for number, goal in enumerate(self._scene.goals):
             row, column = divmod(number, per_row)
-            x = self._px(18) + column * (width + self._px(4))
-            y = self._px(115) + row * self._px(26)
+            x, y = 18 + column * (width + 4), 115 + row * 26
             robot = reading.visited.get(goal.id)
             color = TEXT if robot else _FAINT
             pen.rounded_rectangle(
-                (x, y, x + width, y + self._px(21)),
-                radius=self._px(5),
+                self._px(x, y, x + width, y + 21),
+                radius=5 * self._unit,
                 fill=self._colors[robot] if robot else _BACKGROUND,
                 outline=color,
             )
-            if width > self._px(_UNNAMED_CHIP):
-                middle = (x + 0.5 * width, y + self._px(10.5))
+            if width > _UNNAMED_CHIP:
+                look = {"bold": True, "fill": color, "anchor": "mm"}
                 name = self._labels[goal.id]
-                pen.text(middle, name, font=small, fill=color, anchor="mm")
+                self._write(pen, x + 0.5 * width, y + 10.5, name, 12, **look)
 
     def _draw_card(
-        self,
-        pen: ImageDraw.ImageDraw,
-        robot: Robot,
-        reading: RobotReading,
-        top: float,
-        pitch: float,
+        self, pen: Pen, robot: Robot, reading: RobotReading, top: float, pitch: float
     ) -> None:
-        left, right = self._px(14), self._size[0] - self._px(14)
-        bottom = top + pitch - self._px(6)
+        left, right, bottom = 14.0, self._width - 14, top + pitch - 6
         middle = top + 0.30 * (bottom - top)
-        pen.rounded_rectangle((left, top, right, bottom), self._px(7), fill=CARD)
-        edge = (left, top, left + self._px(9), bottom)
-        pen.rounded_rectangle(edge, self._px(4), fill=self._colors[robot.id])
+        card = self._px(left, top, right, bottom)
+        pen.rounded_rectangle(card, 7 * self._unit, fill=CARD)
+        edge = self._px(left, top, left + 9, bottom)
+        pen.rounded_rectangle(edge, 4 * self._unit, fill=self._colors[robot.id])
         way, speed = reading.way("→"), f"{reading.speed_m_s:.1f} m/s"
         way_em = max(_SHORTEST_ID_EM, self._widest_id_em) + 0.7
         needed_em = way_em + text_width_em(f"{way}  {speed}", bold=True)
-        room = (right - left) / self._unit - 34.0
-        size = min(16.0, 0.27 * pitch / self._unit, room / needed_em)
-        text = self._font(size, bold=True)
-        name = (left + self._px(20), middle)
-        pen.text(name, robot.id, font=text, fill=TEXT, anchor="lm")
-        start = (left + self._px(20.0 + way_em * size), middle)
-        pen.text(start, way, font=text, fill=TEXT, anchor="lm")
-        row = top + 0.73 * (bottom - top)
-        end = right - self._px(14)
-        pen.text((end, middle), speed, font=text, fill=_FAINT, anchor="rm")
-        pen.text((end, row), reading.percent, font=text, fill=TEXT, anchor="rm")
-        half = 0.13 * (bottom - top)
-        bar = (left + self._px(20), row - half, right - self._px(74), row + half)
+        size = min(16.0, 0.27 * pitch, (right - left - 34.0) / needed_em)
+        row, end, half = top + 0.73 * (bottom - top), right - 14, 0.13 * (bottom - top)
+        for x, y, text, fill, anchor in (
+            (left + 20, middle, robot.id, TEXT, "lm"),
+            (left + 20 + way_em * size, middle, way, TEXT, "lm"),
+            (end, middle, speed, _FAINT, "rm"),
+            (end, row, reading.percent, TEXT, "rm"),
+        ):
+            self._write(pen, x, y, text, size, bold=True, fill=fill, anchor=anchor)
+        bar = self._px(left + 20, row - half, right - 74, row + half)
         draw_bar(pen, bar, reading.charge, robot.battery.reserve_fraction)
 
-    def _draw_legend(self, pen: ImageDraw.ImageDraw) -> float:
+    def _draw_legend(self, pen: Pen) -> float:
         entries = style.map_key(self._scene)
-        room = 0.5 * self._size[0] - self._px(18 + 26 + 18)
-        widest = max(text_width_em(entry.label) for entry in entries)
-        small = self._font(min(13.0, room / widest / self._unit))
+        room = 0.5 * self._width - (18 + 26 + 18)
+        size = min(13.0, room / max(text_width_em(entry.label) for entry in entries))
         rows = (len(entries) + 1) // 2
-        top = self._size[1] - self._px(40) - rows * self._px(22)
+        top = self._height - 40 - rows * 22
         for number, entry in enumerate(entries):
             row, column = divmod(number, 2)
-            x = self._px(18) + column * 0.5 * self._size[0]
-            y = top + row * self._px(22)
-            middle = y + self._px(7)
-            area = (x, y, x + self._px(18), y + self._px(14))
+            x, y = 18 + column * 0.5 * self._width, top + row * 22
             line = entry.look == "line"
             fill = style.GROUND if line else entry.color
-            pen.rectangle(area, fill=fill, outline=_FAINT)
+            pen.rectangle(self._px(x, y, x + 18, y + 14), fill=fill, outline=_FAINT)
             if line:
-                across = (x, middle, x + self._px(18), middle)
-                pen.line(across, fill=entry.color, width=max(round(self._px(2)), 1))
-            spot = (x + self._px(26), middle)
-            pen.text(spot, entry.label, font=small, fill=_FAINT, anchor="lm")
+                across, width = self._px(x, y + 7, x + 18, y + 7), round(2 * self._unit)
+                pen.line(across, fill=entry.color, width=max(width, 1))
+            self._write(pen, x + 26, y + 7, entry.label, size, fill=_FAINT, anchor="lm")
         lines = "wide, pale line: planned    thin line: driven"
-        spot = (self._px(18), top + rows * self._px(22) + self._px(4))
-        pen.text(spot, lines, font=self._font(13), fill=_FAINT)
-        return top - self._px(12)
+        self._write(pen, 18, top + rows * 22 + 4, lines, 13, fill=_FAINT)
+        return top - 12
