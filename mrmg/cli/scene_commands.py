@@ -102,12 +102,12 @@ def draw(options: argparse.Namespace) -> None:
     """Draw a scene into a picture."""
     from mrmg.scene.loading import load_scene
     from mrmg.viz.figures import require_format
-    from mrmg.viz.scene_drawing import draw_scene
+    from mrmg.viz.overview import draw_overview
 
     scene = load_scene(options.scene, trust_code=options.trust_code)
     picture = options.out or Path(f"{scene.name}.png")
     require_format(picture)
-    draw_scene(scene, picture)
+    draw_overview(scene, path=picture)
     print(picture)
 
 

@@ -24,25 +24,9 @@ from mrmg.viz.map_shapes import end_poses, end_ring
 
 _ARROWS_PER_MAP = 5.5
 _STILL = 0.01
-_CROSS: Any = {
-    "marker": "X",
-    "markersize": 11,
-    "markerfacecolor": style.RESERVE,
-    "markeredgecolor": "white",
-}
-
-_NARROW: Any = {
-    "marker": "D",
-    "markersize": 6,
-    "markerfacecolor": "none",
-    "markeredgecolor": style.RESERVE,
-}
-_END: Any = {
-    "marker": "o",
-    "markersize": 10,
-    "markerfacecolor": "none",
-    "markeredgecolor": style.INK,
-}
+_CROSS = scene_drawing.marker("X", 11, style.RESERVE, "white")
+_NARROW = scene_drawing.marker("D", 6, "none", style.RESERVE)
+_END = scene_drawing.marker("o", 10, "none", style.INK)
 _RANK: Any = {"marker": "$n$", "markersize": 8, "color": style.INK}
 
 
@@ -79,11 +63,10 @@ def draw_mission(
     """Draw map, paths, visits and legend on `axes`; return the legend's handles."""
     scene_drawing.draw_ground(axes, scene)
     colors = style.scene_robot_colors(scene)
-    if plan is not None:
-        for trajectory in plan.trajectories:
-            color = colors[trajectory.robot]
-            scene_drawing.draw_path(axes, trajectory.state, color, style.PLANNED)
-            _draw_arrows(axes, trajectory.state, color)
+    for trajectory in plan.trajectories if plan else ():
+        color = colors[trajectory.robot]
+        scene_drawing.draw_path(axes, trajectory.state, color, style.PLANNED)
+        _draw_arrows(axes, trajectory.state, color)
     if log is not None:
         for robot, state in zip(log.robots, log.state, strict=True):
             scene_drawing.draw_path(axes, state, colors[robot], style.DRIVEN)
@@ -152,22 +135,19 @@ def _draw_targets(axes: Axes, scene: Scene, plan: Plan | None) -> None:
     faces = {goal.id: colors[robot] for goal, robot, _ in visited}
     scene_drawing.draw_targets(axes, scene, faces)
     for goal, _, rank in visited:
-        _draw_rank(axes, goal.region.center, str(rank))
-
-
-def _draw_rank(axes: Axes, center: np.ndarray, text: str) -> None:
-    axes.text(
-        float(center[0]),
-        float(center[1]),
-        text,
-        fontsize=9,
-        fontweight="bold",
-        color="white",
-        ha="center",
-        va="center_baseline",
-        path_effects=[withStroke(linewidth=1.6, foreground=style.INK)],
-        zorder=8.5,
-    )
+        x_m, y_m = goal.region.center
+        axes.text(
+            x_m,
+            y_m,
+            str(rank),
+            fontsize=9,
+            fontweight="bold",
+            color="white",
+            ha="center",
+            va="center_baseline",
+            path_effects=[withStroke(linewidth=1.6, foreground=style.INK)],
+            zorder=8.5,
+        )
 
 
 def _draw_ends(
@@ -244,7 +224,13 @@ def _work(scene: Scene, plan: Plan, log: ExecutionLog | None, robot: str) -> str
 
 def _title(scene: Scene, plan: Plan | None) -> str:
     if plan is None:
-        return scene.name
+        counts = [
+            (len(scene.robots), "robot"),
+            (len(scene.goals), "goal"),
+            (len(scene.stations), "station"),
+            (len(scene.terrain), "terrain area"),
+        ]
+        return f"{scene.name}: {', '.join(counted(*item) for item in counts)}"
     return (
         f"{scene.name}: {counted(len(scene.goals), 'goal')}, "
         f"{energy_text(plan.cost_J, 1)}, {plan.makespan_s:.0f} s"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,13 +16,12 @@ from matplotlib.patheffects import withStroke
 from shapely import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
-from mrmg.counted import counted
 from mrmg.scene.region import Region
 from mrmg.scene.types import Robot, Scene, Station
 from mrmg.viz import style
 from mrmg.viz.contours import draw_contours
-from mrmg.viz.figures import new_figure, write_figure
-from mrmg.viz.map_labels import BOLD, MapLabel, map_labels
+from mrmg.viz.figures import new_figure
+from mrmg.viz.map_labels import BOLD, MapLabel
 from mrmg.viz.map_shapes import wanted_headings
 
 _MAP_INCHES = 8.6
@@ -66,23 +64,6 @@ def new_map_figure(scene: Scene) -> tuple[Figure, Axes]:
     for spine in axes.spines.values():
         spine.set_visible(False)
     return figure, axes
-
-
-def draw_scene(scene: Scene, path: Path) -> None:
-    """Draw the map of a scene, with its legend, to a picture file.
-
-    Args:
-        scene: what to draw.
-        path: picture to write (PNG, SVG or PDF by its suffix).
-    """
-    figure, axes = new_map_figure(scene)
-    draw_ground(axes, scene)
-    draw_targets(axes, scene, {})
-    draw_robots(axes, scene)
-    axes.set_title(_title(scene), loc="left", fontsize=12, color=style.INK)
-    add_legend(axes, map_legend(scene))
-    draw_labels(axes, scene, map_labels(scene, em_m=letter_m(axes)))
-    write_figure(figure, path)
 
 
 def letter_m(axes: Axes, points: float = LETTER_POINTS) -> float:
@@ -192,15 +173,9 @@ def draw_targets(
         fill = colors.get(target.id, fill)
         draw_region(axes, target.region, fill, edge, 0.13 * points)
         if isinstance(target, Station):
-            axes.plot(
-                *target.region.center,
-                marker="s",
-                markersize=0.6 * points,
-                markerfacecolor=fill,
-                markeredgecolor=edge,
-                markeredgewidth=0.1 * points,
-                zorder=6,
-            )
+            look = marker("s", 0.6 * points, fill, edge)
+            rim = 0.1 * points
+            axes.plot(*target.region.center, markeredgewidth=rim, zorder=6, **look)
     robots = style.scene_robot_colors(scene)
     for robot in scene.robots:
         if robot.finish:
@@ -273,8 +248,18 @@ def _handle(entry: style.KeyEntry) -> Patch | Line2D:
             linestyle="--" if entry.dashed else "-",
             label=entry.label,
         )
-    look = {"markerfacecolor": entry.color, "markeredgecolor": entry.edge}
-    return marker_handle(entry.label, marker=_MARKERS[entry.look], markersize=9, **look)
+    look = marker(_MARKERS[entry.look], 9.0, entry.color, entry.edge)
+    return marker_handle(entry.label, **look)
+
+
+def marker(shape: str, size: float, face: str, edge: str) -> dict[str, Any]:
+    """Return the look of a marker, as of matplotlib's `Line2D`."""
+    return {
+        "marker": shape,
+        "markersize": size,
+        "markerfacecolor": face,
+        "markeredgecolor": edge,
+    }
 
 
 def marker_handle(label: str, **look: Any) -> Line2D:
@@ -294,17 +279,6 @@ def add_legend(axes: Axes, handles: list[Patch | Line2D]) -> None:
         handlelength=1.6,
         labelspacing=0.65,
     )
-
-
-def _title(scene: Scene) -> str:
-    counts = [
-        (len(scene.robots), "robot"),
-        (len(scene.goals), "goal"),
-        (len(scene.stations), "station"),
-        (len(scene.terrain), "terrain area"),
-    ]
-    words = [counted(count, noun) for count, noun in counts]
-    return f"{scene.name}: " + ", ".join(words)
 
 
 def _add_shape(axes: Axes, shape: BaseGeometry, **look: object) -> None:

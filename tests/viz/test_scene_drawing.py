@@ -87,7 +87,7 @@ def test_legend_names_what_the_scene_holds(make_scene: MakeScene) -> None:
     ],
 )
 def test_every_shipped_scene_can_be_drawn(name: str, tmp_path: Path) -> None:
-    scene_drawing.draw_scene(load_scene(name), tmp_path / "map.png")
+    draw_overview(load_scene(name), path=tmp_path / "map.png")
     pixels = np.asarray(Image.open(tmp_path / "map.png").convert("RGB"))
     assert pixels.shape[0] >= 300
     assert pixels.shape[1] >= 1000

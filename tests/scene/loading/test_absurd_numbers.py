@@ -13,7 +13,7 @@ import mrmg
 from mrmg.errors import FileError
 from mrmg.runs.pipeline import rehearse
 from mrmg.scene.loading import scene_from_document
-from mrmg.viz.scene_drawing import draw_scene
+from mrmg.viz.overview import draw_overview
 
 HILLS = mrmg.load_scene("hills").document
 ABSURD = (1e300, 1e18, 1e8, -1e8, 1e5, 1e-300)
@@ -58,5 +58,5 @@ def test_absurd_numbers(
             kind = tuple(key for key in path if isinstance(key, str))
             if value == 1e8 and kind not in drawn:
                 drawn.add(kind)
-                draw_scene(scene, tmp_path / "map.png")
+                draw_overview(scene, path=tmp_path / "map.png")
     assert capfd.readouterr() == ("", "")
