@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -17,7 +17,7 @@ from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
 from mrmg.plans import Plan
-from mrmg.scene.types import Scene
+from mrmg.scene.types import Scene, Station
 from mrmg.simulation.log import ExecutionLog
 from mrmg.viz import style
 from mrmg.viz.activities import breakdowns, lengths_along, visit_ranks
@@ -56,26 +56,23 @@ class MapLabel:
         kind: one of `KINDS`.
         of: id of what it names; of stops, paths and breakdowns the robot.
         text: to be written, centred.
-        size_em: of its letters.
-        x_m, y_m: centre of the text.
+        x_m, y_m: centre of the text; NaN until it is placed.
     """
 
     kind: str
     of: str
     text: str
-    size_em: float
-    x_m: float
-    y_m: float
+    x_m: float = math.nan
+    y_m: float = math.nan
+
+    @property
+    def size_em(self) -> float:
+        """Size of its letters."""
+        return _SIZES.get(self.kind, 1.0)
 
 
-@dataclass(frozen=True, slots=True)
-class _Wanted:
-    """A label without a place, and its candidates; see `MapLabel`."""
-
-    kind: str
-    of: str
-    text: str
-    box: LabelBox
+_Wanted = tuple[MapLabel, LabelBox]
+"""A label without a place, and its candidates."""
 
 
 def map_labels(
@@ -95,19 +92,12 @@ def map_labels(
         em_m: size of the picture's letters on the ground.
         kinds: what to name.
     """
-    wanted = [item for item in _wanted(scene, plan, log, em_m) if item.kind in kinds]
+    wanted = [item for item in _wanted(scene, plan, log, em_m) if item[0].kind in kinds]
     shapes, lines = occupied(scene, plan, log, em_m)
-    spots = place([item.box for item in wanted], shapes, lines, em_m)
+    spots = place([box for _, box in wanted], shapes, lines, em_m)
     return tuple(
-        MapLabel(
-            kind=item.kind,
-            of=item.of,
-            text=item.text,
-            size_em=_SIZES.get(item.kind, 1.0),
-            x_m=float(spot[0]),
-            y_m=float(spot[1]),
-        )
-        for item, spot in zip(wanted, spots, strict=True)
+        replace(label, x_m=float(spot[0]), y_m=float(spot[1]))
+        for (label, _), spot in zip(wanted, spots, strict=True)
         if spot is not None
     )
 
@@ -147,13 +137,11 @@ def _wanted(
 def _targets(scene: Scene, plan: Plan | None, em_m: float) -> Iterator[_Wanted]:
     ranks = visit_ranks(plan) if plan else {}
     names = style.target_labels(scene)
-    for goal in scene.goals:
-        shape = drawn_region(goal.region, em_m)
-        yield _beside("goal", goal.id, names[goal.id], shape, em_m, _UPPER_RIGHT)
-    for station in scene.stations:
-        shape, text = drawn_region(station.region, em_m), names[station.id]
-        yield _beside("station", station.id, text, shape, em_m, _UPPER_RIGHT)
-        for robot, rank in ranks.get(station.id, ()):
+    for target in scene.targets():
+        shape, text = drawn_region(target.region, em_m), names[target.id]
+        kind = "station" if isinstance(target, Station) else "goal"
+        yield _beside(kind, target.id, text, shape, em_m, _UPPER_RIGHT)
+        for robot, rank in ranks.get(target.id, ()) if kind == "station" else ():
             yield _beside("stop", robot, str(rank), shape, em_m, _LOWER_RIGHT)
 
 
@@ -179,7 +167,7 @@ def _at_spots(
         owner=owner if optional else "",
         optional=optional,
     )
-    return _Wanted(kind, of, text, box)
+    return MapLabel(kind=kind, of=of, text=text), box
 
 
 def _paths(scene: Scene, plan: Plan | None, em_m: float) -> Iterator[_Wanted]:
