@@ -14,7 +14,7 @@ from mrmg.energy.battery_curves import (
     with_recharge_jumps,
 )
 from mrmg.plans import Plan, Visit
-from mrmg.scene.types import Robot, Scene
+from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog, require_same_mission
 from mrmg.viz import scene_drawing, style
 from mrmg.viz.figures import add_legend_above, new_figure, tidy, write_figure
@@ -45,15 +45,13 @@ def draw_energy(
         IdentityError: if scene, plan and log do not belong together.
     """
     require_same_mission(scene, plan, log)
-    planned = {curve.robot: curve for curve in planned_curves(scene, plan)}
-    driven = measured_curves(scene, plan, log) if log else ()
-    simulated = {curve.robot: curve for curve in driven}
+    planned = planned_curves(scene, plan)
+    driven = measured_curves(scene, plan, log) if log else (None,) * len(planned)
     width_in, panel_in = _PANEL_INCHES
     figure = new_figure(width_in, panel_in * len(planned) + 0.7)
     panels = figure.subplots(len(planned), 1, sharex=True, squeeze=False)[:, 0]
-    for axes, robot_id in zip(panels, planned, strict=True):
-        robot = scene.robot(robot_id)
-        draw_battery(axes, scene, robot, planned[robot_id], simulated.get(robot_id))
+    for axes, predicted, simulated in zip(panels, planned, driven, strict=True):
+        draw_battery(axes, scene, predicted, simulated)
     panels[-1].set_xlabel("time [s]")
     add_legend_above(figure, panels[0].get_legend_handles_labels()[0])
     write_figure(figure, path)
@@ -62,11 +60,11 @@ def draw_energy(
 def draw_battery(
     axes: Axes,
     scene: Scene,
-    robot: Robot,
     planned: BatteryCurve,
     simulated: BatteryCurve | None,
 ) -> None:
     """Draw one robot's battery content, its reserve, recharges and goals."""
+    robot = scene.robot(planned.robot)
     color = style.scene_robot_colors(scene)[robot.id]
     capacity_kJ = robot.battery.capacity_J / 1000.0
     reserve_kJ = robot.battery.reserve_J / 1000.0

@@ -74,7 +74,6 @@ def test_paths_and_curves_have_one_look_everywhere(mission) -> None:
     energy_plot.draw_battery(
         panel,
         scene,
-        scene.robots[0],
         energy_plot.planned_curves(scene, plan)[0],
         energy_plot.measured_curves(scene, plan, log)[0],
     )
