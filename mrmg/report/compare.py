@@ -19,7 +19,7 @@ from mrmg.runs.record import RunRecord, read_record
 _MEASURES = ("kJ", "s", "m", "cm")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Row:
     """One figure of every run.
 
@@ -28,34 +28,28 @@ class Row:
         unit: of the values; "" for texts.
         values: one per run; None where a run has none.
         digits: after the decimal point.
-        comparable: whether each run's value may be set against the first run's; for
-            all runs if empty.
+        comparable: whether each run's value may be set against the first run's.
     """
 
     name: str
     unit: str
     values: tuple[float | str | None, ...]
-    digits: int = 0
-    comparable: tuple[bool, ...] = ()
+    digits: int
+    comparable: tuple[bool, ...]
 
     def cells(self) -> list[str]:
         """Return the values as text; measures after the first with their difference."""
-        first = self.values[0]
+        first, measured = self.values[0], self.unit in _MEASURES
         texts = []
-        for number, value in enumerate(self.values):
+        for value, alike in zip(self.values, self.comparable, strict=True):
             if value is None or isinstance(value, str):
                 texts.append(value or MISSING)
                 continue
             text = f"{value:.{self.digits}f} {self.unit}".rstrip()
-            if self._has_difference(number) and isinstance(first, float) and first:
+            if measured and alike and isinstance(first, float) and first:
                 text += f" ({100.0 * (value - first) / abs(first):+.1f} %)"
             texts.append(text.replace("-", "−"))
         return texts
-
-    def _has_difference(self, number: int) -> bool:
-        if number == 0 or self.unit not in _MEASURES:
-            return False
-        return not self.comparable or self.comparable[number]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -170,26 +164,17 @@ _FIGURES: tuple[tuple[str, str, int, float, str], ...] = (
 
 def _rows(records: Sequence[RunRecord]) -> list[Row]:
     problems = [problem_digest(record) for record in records]
-    alike = tuple(problem == problems[0] for problem in problems)
-    texts = parameters(records)
+    alike = (False, *(problem == problems[0] for problem in problems[1:]))
+    texts = parameters(records) | {"outcome": tuple(map(_outcome, records))}
     rows = [
-        Row(name=name, unit="", values=texts[name])
-        for name in ("scene", "seed", "profile", "objective")
+        Row(name, "", texts[name], 0, alike)
+        for name in ("scene", "seed", "profile", "objective", "outcome")
     ]
-    outcomes = tuple(_outcome(record) for record in records)
-    rows.append(Row(name="outcome", unit="", values=outcomes))
     for name, unit, digits, factor, place in _FIGURES:
-        values = [_figure(record, place) for record in records]
-        if any(value is not None for value in values):
-            rows.append(
-                Row(
-                    name=name,
-                    unit=unit,
-                    values=tuple(value and factor * value for value in values),
-                    digits=digits,
-                    comparable=alike,
-                )
-            )
+        found = [_figure(record, place) for record in records]
+        if any(value is not None for value in found):
+            values = tuple(value and factor * value for value in found)
+            rows.append(Row(name, unit, values, digits, alike))
     return rows
 
 

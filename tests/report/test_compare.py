@@ -40,20 +40,20 @@ def made_one(run: Path, name: str = "plan") -> None:
 
 
 def test_measures_come_with_their_difference_and_counts_without() -> None:
-    energy = Row(name="energy", unit="kJ", values=(10.0, 11.0, None), digits=1)
+    alike = (False, True)
+    energy = Row("energy", "kJ", (10.0, 11.0, None), 1, (*alike, True))
     assert energy.cells() == ["10.0 kJ", "11.0 kJ (+10.0 %)", "–"]
-    less = Row(name="energy", unit="kJ", values=(10.0, 9.0), digits=1)
+    less = Row("energy", "kJ", (10.0, 9.0), 1, alike)
     assert less.cells() == ["10.0 kJ", "9.0 kJ (−10.0 %)"]
-    assert Row(name="goals", unit="", values=(4.0, 5.0)).cells() == ["4", "5"]
-    assert Row(name="lag", unit="s", values=(0.0, 5.0)).cells() == ["0 s", "5 s"]
-    assert Row(name="scene", unit="", values=("a", "b")).cells() == ["a", "b"]
+    assert Row("goals", "", (4.0, 5.0), 0, alike).cells() == ["4", "5"]
+    assert Row("lag", "s", (0.0, 5.0), 0, alike).cells() == ["0 s", "5 s"]
+    assert Row("scene", "", ("a", "b"), 0, alike).cells() == ["a", "b"]
 
 
 def test_only_runs_of_one_scene_come_with_differences(
     quickstart_run: Path, own_run: Path
 ) -> None:
-    row = Row(name="energy", unit="kJ", values=(10.0, 9.0, 8.0), digits=0)
-    some = replace(row, comparable=(True, False, True))
+    some = Row("energy", "kJ", (10.0, 9.0, 8.0), 0, (False, False, True))
     assert some.cells() == ["10 kJ", "9 kJ", "8 kJ (−20.0 %)"]
     scene = own_run / "scene.yaml"
     scene.write_text(scene.read_text().replace("reserve: 0.05", "reserve: 0.04"))
