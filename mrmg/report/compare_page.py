@@ -43,17 +43,17 @@ def comparison_html(comparison: Comparison) -> str:
         for number, item in enumerate(records)
         if item.plan is not None
     }
+    data = _charts(comparison, curves) if curves else None
     body = rendered(
         "compare.html.jinja",
         comparison=comparison,
         owners={number: _owner(number) for number in curves},
-        charts=[(name, title) for name, title, *_ in _CHARTS if curves],
+        charts=data["charts"] if data else (),
         maps=[
             (name, mission_map(record.scene, record.plan, record.log))
             for name, record in zip(names, records, strict=True)
         ],
     )
-    data = _charts(comparison, curves) if curves else None
     # Courses have a colour for each run; maps have one for each robot.
     colored = max(len(names), *(len(item.scene.robots) for item in records))
     owners = [str(number) for number in range(colored)]

@@ -59,7 +59,7 @@ def planner(record: RunRecord) -> Markup:
         "planner.html.jinja",
         figures=figures,
         hints=record.planning.get("hints", []),
-        charts=[(COST, chart["title"])] if chart else [],
+        charts=[chart] if chart else [],
         rows=rows,
         found=found_plans(record),
     )

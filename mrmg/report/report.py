@@ -26,7 +26,6 @@ from mrmg.runs.record import RunRecord, read_record
 from mrmg.scene.loading import load_scene
 from mrmg.scene.margins import sentences_on_margins
 from mrmg.scene.types import Scene
-from mrmg.studies.outcomes import CONFIDENCE, Study
 from mrmg.viz import style
 from mrmg.viz.activities import (
     breakdowns,
@@ -60,9 +59,7 @@ def report_html(record: RunRecord) -> str:
     cost = cost_chart(record)
     if data and cost:
         data["charts"].append(cost)
-    places: dict[str, list[tuple[str, str]]] = {}
-    for chart in data["charts"] if data else ():
-        places.setdefault(chart["group"], []).append((chart["id"], chart["title"]))
+    studies = [study.to_json() for study in record.studies]
     body = rendered(
         "report.html.jinja",
         record=record,
@@ -72,13 +69,17 @@ def report_html(record: RunRecord) -> str:
         map=mission_map(scene, plan, log),
         timeline=timeline(scene, plan, log) if plan else "",
         breakdowns=breakdowns(log),
-        places=places,
+        charts=data["charts"] if data else [],
         has_video=(record.folder / "mission.mp4").exists(),
         planner=planner(record),
         command=command(record),
         infinity=math.inf,
         **(_of_plan(record, plan) if plan else {}),
-        **_of_studies(record.studies),
+        studies=studies,
+        commands=[
+            shlex.join(["mrmg", "execute", "RUN", *study["worst"]["execute"]])
+            for study in studies
+        ],
     )
     ids = [robot.id for robot in scene.robots]
     instead = "energy.png and overview.png in the run folder show the same"
@@ -127,17 +128,6 @@ def _stops(
         (None if leg is None else visits[leg], energy_J.get(leg))
         for leg in legs_of_stops(tour, [visit.target for visit in visits])
     ]
-
-
-def _of_studies(studies: Sequence[Study]) -> dict[str, Any]:
-    return {
-        "confidence": CONFIDENCE,
-        "studies": [study.to_json() for study in studies],
-        "commands": [
-            shlex.join(["mrmg", "execute", "RUN", *study.replay_options(study.worst)])
-            for study in studies
-        ],
-    }
 
 
 def command(record: RunRecord) -> str:
