@@ -21,13 +21,17 @@ def obstacle_distance(scene: Scene, robot: Robot, poses: np.ndarray) -> np.ndarr
         poses: (x, y, theta, ...), shape (n, k).
 
     Returns:
-        Distance [m], 0 on contact, shape (n,).
+        Distance [m], 0 on contact and outside the bounds, shape (n,).
     """
     changes = changing_steps(poses[:, :3])  # a robot that stays is looked at once
-    shapes = shapely.polygons(robot.model.footprint_at(poses[changes]))
+    outlines = robot.model.footprint_at(poses[changes])
+    low, high = np.reshape(scene.bounds, (2, 2))
+    outside = ((outlines < low) | (outlines > high)).any(axis=(1, 2))
+    shapes = shapely.polygons(outlines)
     blocking = [item.shape for item in scene.barriers if item.stops(robot.id)]
     tree = shapely.STRtree([shapely.box(*scene.bounds).exterior, *blocking])
     _, distance = tree.query_nearest(shapes, return_distance=True, all_matches=False)
+    distance[outside] = 0.0
     return np.asarray(distance[np.cumsum(changes) - 1])
 
 

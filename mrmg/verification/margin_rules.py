@@ -1,7 +1,8 @@
 """Rules of margins: what a plan states to keep at its time steps, it keeps.
 
 A plan may keep less than its margins only on stretches that it names, and there no less
-than the certified minimum of the robot's model. How a plan begins is the scene's doing.
+than the certified minimum of the robot's model. How near to others a robot starts is
+the scene's doing; it must not come nearer than that before it has got away.
 """
 
 from __future__ import annotations
@@ -39,7 +40,8 @@ def check_margins(scene: Scene, plan: Plan) -> Iterator[Violation]:
                     for time_s in (narrow.start_s, narrow.end_s)
                 )
                 needed_m[first : last + 1] = narrow.margin_m
-        yield from _violations(trajectory, distance_m, needed_m, "an obstacle")
+        still = _steps_still(trajectory)
+        yield from _violations(trajectory, distance_m, needed_m, still, "an obstacle")
     boxes_m = boxes_apart_m(own) if own else np.zeros((0, 0))
     for (i, one), (j, other) in combinations(enumerate(own), 2):
         spacing_m = max(plan.margins[item.robot][1] for item in (one, other))
@@ -47,7 +49,8 @@ def check_margins(scene: Scene, plan: Plan) -> Iterator[Violation]:
             continue
         distance_m = _distance_m(scene, one, other, spacing_m)
         needed_m = np.full(len(distance_m), spacing_m)
-        yield from _violations(one, distance_m, needed_m, other.robot)
+        still = _steps_still(one, other)
+        yield from _violations(one, distance_m, needed_m, still, other.robot)
 
 
 def _distance_m(
@@ -72,10 +75,13 @@ def _distance_m(
 def _stated_too_small(scene: Scene, plan: Plan) -> Iterator[Violation]:
     """Yield the stretches that keep less than the certified minimum."""
     for narrow in plan.narrow:
-        model = scene.robot(narrow.robot).model
+        robot = scene.robot(narrow.robot)
         wanted_m = plan.margins.get(narrow.robot, (np.inf, np.inf))[0]
-        least_m = min(certified_minimum_m(model), wanted_m)
-        if narrow.start_s > 0.0 and narrow.margin_m < least_m - ROUNDING_M:
+        least_m = min(certified_minimum_m(robot.model), wanted_m)
+        if round(narrow.start_s / plan.dt_s) <= 0:
+            start = plan.trajectory(robot.id).state[:1]
+            least_m = min(least_m, float(obstacle_distance(scene, robot, start)[0]))
+        if narrow.margin_m < least_m - ROUNDING_M:
             yield Violation(
                 kind=ViolationKind.MARGIN,
                 robot=narrow.robot,
@@ -88,12 +94,29 @@ def _stated_too_small(scene: Scene, plan: Plan) -> Iterator[Violation]:
             )
 
 
+def _steps_still(*trajectories: Trajectory) -> int:
+    """Return for how many states from the start on nobody moves."""
+    poses = np.hstack([item.state[:, :3] for item in trajectories])
+    moved = (poses != poses[0]).any(axis=1)
+    return int(moved.argmax()) if moved.any() else len(moved)
+
+
 def _violations(
-    trajectory: Trajectory, distance_m: np.ndarray, needed_m: np.ndarray, other: str
+    trajectory: Trajectory,
+    distance_m: np.ndarray,
+    needed_m: np.ndarray,
+    still: int,
+    other: str,
 ) -> list[Violation]:
+    """Return where a distance is less than needed.
+
+    From a start that is nearer than needed a robot may stay as near, but not come
+    nearer, until it has got away; if it never does, while it stands there.
+    """
     missing_m = needed_m - distance_m
     broken = missing_m > ROUNDING_M
-    broken[: int(np.argmin(broken)) if not broken.all() else len(broken)] = False
+    leaving = still if broken.all() else int(broken.argmin())
+    broken[:leaving] = distance_m[:leaving] < distance_m[0] - ROUNDING_M
     return [
         violation_at(
             trajectory,

@@ -107,6 +107,12 @@ def _check_form(scene: Scene, plan: Plan) -> Iterator[Violation]:
             yield _malformed(robot, "the plan has no tour for it")
     for robot in sorted({visit.robot for visit in plan.visits} - set(planned)):
         yield _malformed(robot, "visits are stated but no motion")
+    for passage in plan.narrow:
+        stated = (passage.start_s, passage.end_s, passage.margin_m)
+        if passage.robot not in planned:
+            yield _malformed(passage.robot, "a passage is stated but no motion")
+        elif not np.isfinite(stated).all():
+            yield _malformed(passage.robot, "a passage is not of finite numbers")
 
 
 def _check_coarseness(scene: Scene, plan: Plan) -> list[Violation]:

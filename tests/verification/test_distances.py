@@ -48,6 +48,14 @@ def test_distances_agree_with_footprints_one_by_one(make_scene) -> None:
     )
 
 
+def test_outside_the_bounds_nothing_is_clear(make_scene) -> None:
+    scene = make_scene()
+    poses = np.array([[-50.0, 10.0, 0.0], [39.9, 10.0, 0.0], [20.0, 10.0, 0.0]])
+    distance_m = obstacle_distance(scene, scene.robots[0], poses)
+    assert distance_m[:2].tolist() == [0.0, 0.0]
+    assert distance_m[2] > 5.0
+
+
 def test_of_several_robots_the_nearest_counts(make_scene) -> None:
     places = {"r1": [5, 10, 0], "r2": [15, 10, 0], "r3": [35, 10, 0]}
     scene = make_scene(

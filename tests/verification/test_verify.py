@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 
 from mrmg.energy.ledger import EnergyLedger
 from mrmg.plans import Plan, Trajectory
+from mrmg.scene.margins import NarrowPassage
 from mrmg.scene.region import Region
 from mrmg.scene.types import Battery, Finish, Scene
 from mrmg.verification.verdict import Verdict, Violation, ViolationKind
@@ -228,6 +229,78 @@ def test_robots_keep_the_larger_of_their_margins(
     assert [one.kind for one in found] == ([] if ok else [Kind.MARGIN])
 
 
+def passage(robot: str, margin_m: float, end_s: float = 1e3) -> NarrowPassage:
+    return NarrowPassage(
+        robot=robot, start_s=0.0, end_s=end_s, x_m=5.0, y_m=10.0, margin_m=margin_m
+    )
+
+
+def test_a_margin_that_is_never_kept_is_broken(case: Any) -> None:
+    scene, plan = case()
+    found = verify(scene, replace(plan, margins={"r1": (50.0, 0.0)})).violations
+    assert [one.kind for one in found] == [Kind.MARGIN]
+
+
+@pytest.mark.parametrize(("behind_m", "ok"), [(0.0, True), (12.0, False)])
+def test_a_start_too_near_is_no_fault_of_the_plan(
+    behind_m: float, ok: bool, case: Any
+) -> None:
+    """The post is 0.1 m behind the car, or as near to the middle of its way."""
+    reach_m = case()[0].robots[0].model.half_width_m
+    post = {"center": [5 + behind_m / 2, 10.1 + reach_m + 0.05], "size": [0.1, 0.1]}
+    scene, plan = case(obstacles=[{"id": "post", "box": post}])
+    plan = replace(plan, margins={"r1": (0.3, 0.5)})
+    assert verify(scene, plan).ok is ok
+
+
+def test_who_gets_away_comes_no_nearer_first(case: Any) -> None:
+    """The wall lies 0.2 m beside the car, a bump in it 0.1 m; both are passed."""
+    edge_m = 10.1 + case()[0].robots[0].model.half_width_m
+    wall = {"center": [6, edge_m + 0.6], "size": [6, 1]}
+    bump = {"center": [8, edge_m + 0.2], "size": [0.5, 0.4]}
+    for boxes, broken in (((wall,), []), ((wall, bump), [Kind.MARGIN])):
+        obstacles = [{"id": f"o{i}", "box": box} for i, box in enumerate(boxes)]
+        scene, plan = case(obstacles=obstacles)
+        stated = replace(plan, margins={"r1": (0.3, 0.5)})
+        assert [one.kind for one in verify(scene, stated).violations] == broken
+
+
+def test_who_stays_where_it_starts_comes_no_nearer(case: Any) -> None:
+    """Two cars 0.1 m apart keep 0.5 m from each other if they can."""
+    side_m = 2.0 * case()[0].robots[0].model.half_width_m + 0.1
+    beside = [
+        {**TWO_ROBOTS[1], "id": f"r{i}", "pose": [30, 2 + i * side_m, 0]}
+        for i in (2, 3)
+    ]
+    margins = {"r2": (0.05, 0.5), "r3": (0.05, 0.5)}
+    scene, plan = case(robots=[TWO_ROBOTS[0], *beside])
+    standing = tuple(
+        replace(
+            item,
+            control=0.0 * item.control,
+            state=np.repeat(item.state[:1], len(item.state), axis=0),
+        )
+        for item in plan.trajectories[1:]
+    )
+    plan = replace(
+        plan, trajectories=(plan.trajectories[0], *standing), margins=margins
+    )
+    assert Kind.MARGIN not in kinds(verify(scene, plan))
+
+
+@pytest.mark.parametrize(("margin_m", "ok"), [(0.1, True), (0.0, False)])
+def test_from_the_start_on_the_certified_minimum_holds(
+    margin_m: float, ok: bool, case: Any
+) -> None:
+    """The wall ends 0.1 m beside the path, far from the start."""
+    edge_m = 10.1 + case()[0].robots[0].model.half_width_m
+    wall = {"center": [13, edge_m + 0.5], "size": [1, 1]}
+    scene, plan = case(obstacles=[{"id": "wall", "box": wall}])
+    stretch = passage("r1", margin_m, plan.makespan_s)
+    plan = replace(plan, margins={"r1": (0.3, 0.5)}, narrow=(stretch,))
+    assert verify(scene, plan).ok is ok
+
+
 @pytest.mark.parametrize("kind", Kind)
 def test_broken_rule_is_found_alone(kind: Kind, case: Any, drive: Any) -> None:
     verdict = verify(*BROKEN[kind](case, drive))
@@ -348,6 +421,14 @@ def of_r1(plan: Plan, **changes: Any) -> Plan:
         (
             lambda plan: replace(plan, visits=(replace(plan.visits[0], robot="r9"),)),
             "r9: visits are stated but no motion",
+        ),
+        (
+            lambda plan: replace(plan, narrow=(passage("r9", 0.1),)),
+            "r9: a passage is stated but no motion",
+        ),
+        (
+            lambda plan: replace(plan, narrow=(passage("r1", np.nan),)),
+            "r1: a passage is not of finite numbers",
         ),
         (
             lambda plan: of_r1(plan, state=plan.trajectories[0].state + 1e12),
