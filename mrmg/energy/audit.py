@@ -83,10 +83,11 @@ def audit(
             scene,
             log,
             curve,
+            error_m=error_m,
             planned_J=plan.ledger.total_J(robot=curve.robot),
             metered_J=metered_ledger.total_J(robot=curve.robot),
         )
-        for curve in measured
+        for curve, error_m in zip(measured, log.tracking_error_m(), strict=True)
     )
     least_J = {curve.robot: curve.least_J for curve in measured}
     mismatches = model_mismatches(scene, plan, log, robots, energy_tolerance_pct)
@@ -142,13 +143,13 @@ def _robot_audit(
     log: ExecutionLog,
     curve: MeasuredCurve,
     *,
+    error_m: np.ndarray,
     planned_J: float,
     metered_J: float,
 ) -> RobotAudit:
     robot = scene.robot(curve.robot)
     measured_J = float(curve.drawn_J.sum())
     base_J = max(planned_J, robot.model.energy_model.plain_ground_J_per_m())
-    error_m = log.tracking_error_m()[log.robots.index(robot.id)]
     return RobotAudit(
         robot=robot.id,
         planned_J=planned_J,

@@ -98,13 +98,15 @@ class EnergyAudit:
     """The account of a simulated mission.
 
     Attributes:
-        mission_ok: all goals visited, no contact, no battery below its reserve,
-            the simulation ran to the end, and robots took the energy planned.
+        mission_ok: all goals visited, all robots in their finishes, no contact, no
+            battery below its reserve, the simulation ran to the end, and robots took
+            the energy planned.
         reasons: why not, one sentence each.
         causes: the kinds of these reasons: why the simulation was given up
-            (`ExecutionLog.gave_up`), "ended" by supervision, "goal missed",
-            "contact", "station shared", "late", "below reserve", "battery empty",
-            `MODEL_MISMATCH`, `ENERGY_IMBALANCE`.
+            (`ExecutionLog.gave_up`, or "unfinished"), "ended" by supervision, "goal
+            missed", "finish missed", "goal skipped", "contact", "station shared",
+            "late", "below reserve", "battery empty", `MODEL_MISMATCH`,
+            `ENERGY_IMBALANCE`.
         robots: one account per robot, in the scene's order.
         visits: of tours' targets in the simulation, in order of time.
         goals_visited: ids of the goals some robot visited, in the scene's order.

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Set
 import numpy as np
 
 from mrmg.compared import compared
-from mrmg.energy.visits import crowded_stations, first_stay
+from mrmg.energy.visits import crowded_stations, first_stay, is_at
 from mrmg.scene.objective import overtime_s
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
@@ -43,10 +43,13 @@ def mission_failures(
         skipped: goals that the plan leaves out, with the proofs that no plan serves
             them.
     """
+    finishes_missed = _finishes_missed(scene, log)
+    missed = len(goals_visited) < len(scene.goals) or bool(finishes_missed)
     return {
         log.gave_up or "unfinished": _unfinished(log),
-        "ended": _given_up(log, missed=len(goals_visited) < len(scene.goals)),
+        "ended": _given_up(log, missed=missed),
         "goal missed": _goals_missed(scene, {*goals_visited, *skipped}),
+        "finish missed": finishes_missed,
         GOAL_SKIPPED: [
             f"goal {goal} was left out: {proof}" for goal, proof in skipped.items()
         ],
@@ -80,6 +83,18 @@ def _goals_missed(scene: Scene, visited: Set[str]) -> list[str]:
         for goal in scene.goals
         if goal.id not in visited
     ]
+
+
+def _finishes_missed(scene: Scene, log: ExecutionLog) -> list[str]:
+    reasons = []
+    for robot, end in zip(scene.robots, log.state[:, -1:], strict=True):
+        if robot.finish is None or is_at(robot.finish, end)[0]:
+            continue
+        off_m = -float(robot.finish.region.depth(end[:, :2])[0])
+        outside = f"{off_m:.3g} m outside its finish"
+        how = outside if off_m > 0.0 else "in its finish with another heading"
+        reasons.append(f"{robot.id} ended {how}")
+    return reasons
 
 
 def _crowded(scene: Scene, log: ExecutionLog) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 
 from mrmg import shipped
@@ -82,4 +83,5 @@ def _calibration(model: RobotModel, plant: str) -> str:
         return f"mrmg calibrate MODEL{on}"
     folder = model.mjcf.parent
     is_shipped = folder.resolve().parent == shipped.models_folder().resolve()
-    return f"mrmg calibrate {folder.name if is_shipped else folder}{on}"
+    named = folder.name if is_shipped else shlex.quote(str(folder))
+    return f"mrmg calibrate {named}{on}"

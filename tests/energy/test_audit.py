@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +19,7 @@ from mrmg.energy.mission_failures import AT_REST, over_s
 from mrmg.errors import RunFolderError
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
+from mrmg.shipped import models_folder
 from mrmg.simulation.disturbance import DEFAULT_RANGES
 from mrmg.simulation.log import Contact, ExecutionLog
 from mrmg.simulation.supervision import Event
@@ -200,6 +203,34 @@ def test_goal_may_be_entered_by_another_robot(mission: Any) -> None:
     assert audit(scene, plan, swapped).goals_visited == ("g",)
 
 
+@pytest.mark.parametrize(
+    ("finish", "reason"),
+    [
+        ({"circle": {"center": [17, 10], "radius": 0.5}}, ""),
+        ({"circle": {"center": [17, 12], "radius": 0.5}}, "1.5 m outside its finish"),
+        (
+            {"circle": {"center": [17, 10], "radius": 0.5}, "heading": 1.5},
+            "in its finish with another heading",
+        ),
+    ],
+)
+def test_a_missed_finish_fails_the_mission(
+    finish: Any, reason: str, mission: Any
+) -> None:
+    """As when a robot breaks down after the last goal."""
+    made = mission(robots=[{**TWO_ROBOTS[0], "finish": finish}, TWO_ROBOTS[1]])
+    if not reason:
+        assert audit(*made).mission_ok
+        return
+    stop = Event(
+        time_s=9.0, cause="rest", robot="", action="end", message="replanning is off"
+    )
+    account = failed(made, events=(stop,))
+    assert account.goals_visited == ("g",)
+    assert account.causes == ("ended", "finish missed")
+    assert account.reasons[1] == f"r1 ended {reason}"
+
+
 def test_contact_fails_the_mission(mission: Any) -> None:
     contact = Contact(time_s=1.5, robot="r1", other="rock", x_m=6.0, y_m=10.0)
     account = failed(mission(), contacts=(contact,))
@@ -247,6 +278,13 @@ def test_energy_off_by_more_than_the_tolerance_fails_the_mission(
     assert f"{sign} %, tolerance 5" in reason
     assert "'mrmg calibrate car'" in reason
     assert audit(scene, plan, log, energy_tolerance_pct=5.2).mission_ok
+
+
+def test_the_remedy_can_be_typed_as_it_is(mission: Any, tmp_path: Path) -> None:
+    folder = shutil.copytree(models_folder() / "car", tmp_path / "my car")
+    own = [{**robot, "model": str(folder)} for robot in TWO_ROBOTS]
+    account = audit(*more_work(mission(robots=own), 2.0))
+    assert f"'mrmg calibrate {shlex.quote(str(folder))}'" in account.reasons[0]
 
 
 @pytest.mark.parametrize("factor", [1.049, 0.951])
