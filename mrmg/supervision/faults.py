@@ -6,6 +6,8 @@ import math
 import re
 from dataclasses import dataclass
 
+import numpy as np
+
 from mrmg.errors import UsageError
 from mrmg.scene.types import Scene
 
@@ -25,7 +27,7 @@ class StopFault:
     robot: str
 
     def __str__(self) -> str:
-        return f"{self.robot}@{self.time_s:g}s"
+        return f"{self.robot}@{np.format_float_positional(self.time_s, trim='-')}s"
 
 
 def parse_fault(text: str) -> StopFault:

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence, Set
 import numpy as np
 
 from mrmg.energy.metering import TimedStates, find_visits
-from mrmg.energy.visits import first_stay, is_at
+from mrmg.energy.visits import first_stay
 from mrmg.scene.types import Goal, Scene
 from mrmg.simulation.supervision import Observation
 from mrmg.supervision.metering import RobotMeter
-from mrmg.supervision.stays import VISITED_DEPTH_M, OngoingStay, stays_under_way
+from mrmg.supervision.stays import OngoingStay, seen_at, stays_under_way
 
 
 class History:
@@ -55,8 +55,7 @@ class History:
     def _is_visited(self, goal: Goal) -> bool:
         time_s = np.array(self._time_s)
         return any(
-            is_at(goal, path, VISITED_DEPTH_M).any()
-            and first_stay(goal, time_s, path, 0) is not None
+            seen_at(goal, path).any() and first_stay(goal, time_s, path, 0) is not None
             for path in self._paths().values()
         )
 

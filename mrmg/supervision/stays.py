@@ -15,8 +15,7 @@ from mrmg.energy.visits import is_at, runs
 from mrmg.plans import Visit
 from mrmg.scene.types import Goal
 
-VISITED_DEPTH_M = 0.05
-"""How deep in a goal a robot must have been seen, as places are seen with noise."""
+_VISITED_DEPTH_M, _VISITED_SHARE = 0.05, 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +29,23 @@ class OngoingStay:
 
     robot: str
     stayed_s: float
+
+
+def seen_at(goal: Goal, poses: np.ndarray) -> np.ndarray:
+    """Return where a robot was seen deep in a goal, as places are seen with noise.
+
+    How deep depends on the goal, too: plans lead half as deep in small ones as can be.
+
+    Args:
+        goal: where it may have been.
+        poses: in which it was seen, x, y [m] and yaw [rad], shape (n, 3).
+
+    Returns:
+        Flags, shape (n,).
+    """
+    region = goal.region
+    deepest_m = float(region.depth(region.center)[0])
+    return is_at(goal, poses, min(_VISITED_DEPTH_M, _VISITED_SHARE * deepest_m))
 
 
 def stays_under_way(
@@ -46,7 +62,7 @@ def stays_under_way(
     found: dict[str, OngoingStay] = {}
     for goal in goals:
         for robot, path in paths.items():
-            stays = runs(is_at(goal, path, VISITED_DEPTH_M))
+            stays = runs(seen_at(goal, path))
             if not stays or stays[-1][1] < len(path):
                 continue
             stayed_s = float(time_s[-1] - time_s[stays[-1][0]])

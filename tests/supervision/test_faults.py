@@ -17,6 +17,7 @@ from mrmg.supervision.faults import StopFault, checked_faults, parse_fault
         (" my.robot-1@0.5s ", StopFault(0.5, "my.robot-1")),
         ("r1@1e1s", StopFault(10.0, "r1")),
         ("r1@0s", StopFault(0.0, "r1")),
+        ("r2@1234.5678s", StopFault(1234.5678, "r2")),
     ],
 )
 def test_faults_are_read(text: str, expected: StopFault) -> None:

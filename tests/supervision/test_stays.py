@@ -15,6 +15,7 @@ from mrmg.plans import Visit
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.types import Scene
 from mrmg.supervision.driving import drive_mission
+from mrmg.supervision.history import History
 from mrmg.supervision.remaining import FleetCondition, remaining_scene
 from mrmg.supervision.stays import OngoingStay, keeps_stays, stays_under_way
 
@@ -48,6 +49,17 @@ def test_the_longest_stay_under_way_counts(scene: Scene) -> None:
     assert stays_under_way(scene.goals, time_s, ways)["g1"].robot == "r2"
     late = {"r1": way((4, 5), (4, 5), there)}
     assert stays_under_way(scene.goals, time_s, late) == {}
+
+
+@pytest.mark.parametrize("radius_m", [0.04, 1.0])
+def test_goals_may_be_small(radius_m: float, scene: Scene) -> None:
+    """The first robot starts in the middle of its goal."""
+    (x, y, _), _ = (robot.pose for robot in scene.robots)
+    goal = {"id": "g", "circle": {"center": [x, y], "radius": radius_m}}
+    scene = scene.with_(goals=[goal])
+    assert History(scene).visited() == {"g"}
+    edge_m = {"r1": way((x + 0.99 * radius_m, y), (x + 0.99 * radius_m, y))}
+    assert stays_under_way(scene.goals, np.array([0.0, 1.0]), edge_m) == {}
 
 
 def test_the_rest_of_the_stay_is_left(scene: Scene) -> None:
