@@ -166,12 +166,12 @@ def _span(name: str, text: str) -> Span:
     key = _KEYS[name]
     if ".." in text:
         first, _, last = text.partition("..")
-        low, high = _number(name, first), _number(name, last)
+        low, high = _number(name, text, first), _number(name, text, last)
     elif text.startswith(("+-", "±")):
-        high = _number(name, text.removeprefix("+-").removeprefix("±"))
+        high = _number(name, text, text.removeprefix("+-").removeprefix("±"))
         low = -high
     else:
-        low = high = _number(name, text)
+        low = high = _number(name, text, text)
     if low > high:
         _refuse(f"{name}={text}: the range ends before it begins")
     if low < key.low or high > key.high:
@@ -181,12 +181,12 @@ def _span(name: str, text: str) -> Span:
             f"{name}={text}: allowed are {key.low / factor:g} to "
             f"{key.high / factor:g} {unit}"
         )
-    return Span(low, high)
+    return Span(low + 0.0, high + 0.0)  # no negative zeros
 
 
-def _number(name: str, text: str) -> float:
+def _number(name: str, text: str, part: str) -> float:
     key = _KEYS[name]
-    match = _NUMBER.fullmatch(text.strip())
+    match = _NUMBER.fullmatch(part.strip())
     unit = match[2] if match else ""
     # A bare number is in SI; a change without its sign could also mean a factor.
     bare_allowed = key.units is not _CHANGE or (match and float(match[1]) == 0.0)

@@ -46,7 +46,7 @@ def _library(source: str) -> Path | None:
     key = storage.digest("\n".join((platform.machine(), *_FLAGS, source)))
     library = storage.user_cache_folder() / "controllers" / f"{key}.so"
     whole = library.with_suffix(".digest")
-    noted = whole.read_text() if whole.is_file() else ""
+    noted = whole.read_text(errors="replace") if whole.is_file() else ""
     if library.is_file() and noted == _digest_of(library):
         return library
     compiler = shutil.which("cc")

@@ -53,12 +53,12 @@ class SetPoints:
     def correct(
         self, state: np.ndarray, clock_s: float, rate: float, calls: ControllerCalls
     ) -> None:
-        """Let the controllers look ahead from the true states.
+        """Let the controllers look ahead from the states that are seen.
 
         A robot whose plan waits for the whole horizon has nothing to correct.
 
         Args:
-            state: true states, shape (R, 5).
+            state: seen states, shape (R, 5).
             clock_s: time of the fleet's clock.
             rate: plan seconds per second.
             calls: what the calls are noted in.

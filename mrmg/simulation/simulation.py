@@ -81,6 +81,7 @@ def simulate(
         UsageError: if the controller or the plant is unknown, or a robot is of a kind
             that cannot be executed.
         IdentityError: if the plan is of another scene.
+        FileError: if a robot's MJCF cannot be used, or MuJoCo cannot hold the scene.
     """
     require_types((scene, Scene), (plan, Plan))
     maker = controller_maker(controller)

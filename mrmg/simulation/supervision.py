@@ -39,7 +39,7 @@ class Observation:
         time_s: simulated time.
         clock_s: plan time the fleet's clock has reached.
         rate: plan seconds per simulated second.
-        state: true (x, y, theta, v, psi), shape (R, 5).
+        state: seen (x, y, theta, v, psi), shape (R, 5).
         planned: the plan at `clock_s`, shape (R, 5).
         work_J: returns the work of the drives in every tick so far, driving and
             braking, shape (n, R, 2).

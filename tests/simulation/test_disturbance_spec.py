@@ -93,6 +93,11 @@ def test_values(spec: str, field: str, low: float, high: float) -> None:
     assert (span.low, span.high) == pytest.approx((low, high))
 
 
+@pytest.mark.parametrize("zero", ["0", "-0", "+-0", "-0..0"])
+def test_nothing_is_written_in_one_way(zero: str) -> None:
+    assert disturbance_text(parse_disturbance(f"lag={zero}")) == "lag=0s"
+
+
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
@@ -102,6 +107,8 @@ def test_values(spec: str, field: str, low: float, high: float) -> None:
         ("mass=", "mass=: not a value; expected one such as \\+-5%, in %"),
         ("mass=5", "mass=5: not a value"),
         ("mass=nan%", "not a value"),
+        ("rolling=5%..", "rolling=5%\\.\\.: not a value"),
+        ("rolling=+-x", "rolling=\\+-x: not a value"),
         ("mass=+-%", "not a value"),
         ("lag=50%", "lag=50%: not a value; expected one such as 50ms, in ms or s"),
         ("lag=inf", "not a value"),

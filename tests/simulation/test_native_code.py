@@ -96,6 +96,17 @@ def test_a_library_that_was_cut_off_is_made_anew(cache: Path, tmp_path: Path) ->
     assert is_native(kept)
 
 
+@needs_cc
+def test_a_digest_that_is_no_text_is_made_anew(cache: Path) -> None:
+    kept = compiled(example())
+    (noted,) = cache.glob("*.digest")
+    digest = noted.read_text()
+    noted.write_bytes(b"\xff\xfe")
+    assert is_native(compiled(example()))
+    assert noted.read_text() == digest
+    assert is_native(kept)
+
+
 def test_without_a_compiler_the_function_itself_drives(
     cache: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
