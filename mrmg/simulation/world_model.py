@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -14,9 +15,6 @@ from mrmg.scene.loading.mjcf import no_warning_file
 from mrmg.scene.types import Robot, Scene
 from mrmg.simulation import palette, scenery
 from mrmg.world.elevation import ground_poses
-
-PHYSICS_STEP_S = 0.004
-"""Short enough for the stiff tyres; contact softness scales with it."""
 
 _SPARSE_FROM_ROBOTS = 4
 
@@ -71,12 +69,10 @@ def build_world(scene: Scene, *, drawn: bool = True) -> MujocoWorld:
 
 
 def _built(scene: Scene, drawn: bool) -> MujocoWorld:
-    spec = mujoco.MjSpec()
-    spec.modelname = "mrmg"
+    spec = mujoco.MjSpec.from_file(str(Path(__file__).with_name("world.xml")))
     # What only the eye sees costs steps a quarter of their time in a large fleet.
     spec.compiler.discardvisual = not drawn
-    _set_options(spec, len(scene.robots), drawn)
-    _set_appearance(spec, scene)
+    _set_options(spec, scene, drawn)
     scenery.add_floor(spec, scene)
     scenery.add_bounds(spec, scene)
     scenery.add_targets(spec, scene)
@@ -107,52 +103,18 @@ def _built(scene: Scene, drawn: bool) -> MujocoWorld:
     )
 
 
-def _set_options(spec: mujoco.MjSpec, robots: int, drawn: bool) -> None:
+def _set_options(spec: mujoco.MjSpec, scene: Scene, drawn: bool) -> None:
     option = spec.option
-    option.timestep = PHYSICS_STEP_S
-    option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    option.impratio = 10.0
-    option.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    # A diverged state must be seen by the caller, not silently set back.
-    option.disableflags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
     if not drawn:  # robots that stand take no time, until `Fleet` wakes them
         option.enableflags = mujoco.mjtEnableBit.mjENBL_SLEEP
-    if robots >= _SPARSE_FROM_ROBOTS:
+    if len(scene.robots) >= _SPARSE_FROM_ROBOTS:
         option.jacobian = mujoco.mjtJacobian.mjJAC_SPARSE
-
-
-def _set_appearance(spec: mujoco.MjSpec, scene: Scene) -> None:
     x_min, y_min, x_max, y_max = scene.bounds
-    center = [(x_min + x_max) / 2, (y_min + y_max) / 2, 0.0]
     extent = max(x_max - x_min, y_max - y_min)
-    spec.stat.center = center
+    spec.stat.center = [(x_min + x_max) / 2, (y_min + y_max) / 2, 0.0]
     spec.stat.extent = extent
-    visual = spec.visual
-    visual.quality.numslices, visual.quality.numstacks = 12, 6
-    visual.quality.numquads = 1
-    visual.global_.offwidth, visual.global_.offheight = 1920, 1080
-    visual.map.znear = 0.2 / extent
-    visual.headlight.ambient = [0.35, 0.35, 0.35]
-    visual.headlight.diffuse = [0.30, 0.30, 0.30]
-    visual.headlight.specular = [0.0, 0.0, 0.0]
-    spec.add_texture(
-        name="sky",
-        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
-        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
-        rgb1=[0.80, 0.87, 0.94],
-        rgb2=[0.97, 0.98, 0.99],
-        width=64,
-        height=384,
-    )
-    spec.worldbody.add_light(
-        name="sun",
-        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        pos=[center[0], center[1], extent],
-        dir=[0.35, 0.25, -1.0],
-        diffuse=[0.45, 0.45, 0.45],
-        specular=[0.1, 0.1, 0.1],
-    )
+    spec.visual.map.znear = 0.2 / extent
+    spec.light("sun").pos = [*spec.stat.center[:2], extent]
 
 
 def _attach(
