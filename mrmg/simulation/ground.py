@@ -9,7 +9,6 @@ both meet.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -18,11 +17,9 @@ import shapely
 from mrmg.energy.model import GRAVITY_M_S2
 from mrmg.scene.driven_parts import NUMERICS
 from mrmg.scene.types import Robot, Scene
-from mrmg.simulation.disturbance import Disturbance
 from mrmg.simulation.world_model import MujocoWorld
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class GroundResistance:
     """The force the ground takes from each robot of a fleet.
 
@@ -33,21 +30,14 @@ class GroundResistance:
             shape (R,); 0 for other robots.
     """
 
-    rolling_N: np.ndarray
-    turning_N: np.ndarray
-    swing_N: np.ndarray
-
-    @staticmethod
-    def of(
-        robots: Sequence[Robot], rolling_N: np.ndarray, turning_N: np.ndarray
-    ) -> GroundResistance:
-        """Return the resistance of robots whose turning is lost as their kind does."""
+    def __init__(
+        self, robots: Sequence[Robot], rolling_N: np.ndarray, turning_N: np.ndarray
+    ) -> None:
+        """Have what robots lose by turning lost as their kind does."""
         steers = np.array([robot.model.motion_model == "car" for robot in robots])
-        return GroundResistance(
-            rolling_N=rolling_N,
-            turning_N=np.where(steers, turning_N, 0.0),
-            swing_N=np.where(steers, 0.0, turning_N),
-        )
+        self.rolling_N = rolling_N
+        self.turning_N = np.where(steers, turning_N, 0.0)
+        self.swing_N = np.where(steers, 0.0, turning_N)
 
     def force_N(self, ground: Ground) -> np.ndarray:
         """Return the force along the way by the energy model's law, shape (R,)."""
@@ -101,17 +91,20 @@ class TerrainUnderfoot:
 def believed_resistance(scene: Scene) -> GroundResistance:
     """Return the resistance by the energy models of the robots."""
     energy = [robot.model.energy_model for robot in scene.robots]
-    return GroundResistance.of(
-        scene.robots,
-        rolling_N=np.array([model.rolling_force_N for model in energy]),
-        turning_N=np.array([model.turning_force_N for model in energy]),
-    )
+    rolling_N = np.array([model.rolling_force_N for model in energy])
+    turning_N = np.array([model.turning_force_N for model in energy])
+    return GroundResistance(scene.robots, rolling_N, turning_N)
 
 
 def true_resistance(
-    world: MujocoWorld, disturbance: Disturbance | None = None
+    world: MujocoWorld, change: np.ndarray | float = 0.0
 ) -> GroundResistance:
-    """Return the resistance by the MJCF of the robots, and what disturbs it."""
+    """Return the resistance by the MJCF of the robots.
+
+    Args:
+        world: the robots in it.
+        change: share by which rolling resistance differs from that, shape (R,).
+    """
     robots, numeric = world.scene.robots, world.model.numeric
     weight_N = world.model.body_subtreemass[world.chassis] * GRAVITY_M_S2
     coefficients = np.array(
@@ -121,7 +114,4 @@ def true_resistance(
         ]
     )
     rolling_N, turning_N = coefficients.T * weight_N
-    if disturbance is not None:
-        change = np.array([item.rolling for item in disturbance.robots])
-        rolling_N = rolling_N * (1.0 + change)
-    return GroundResistance.of(robots, rolling_N, turning_N)
+    return GroundResistance(robots, rolling_N * (1.0 + change), turning_N)

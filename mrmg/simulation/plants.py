@@ -54,7 +54,8 @@ def plant_of(
     The coefficients are those of the MJCF, and what disturbs them. `simulate` has
     allowed the name.
     """
-    law = true_resistance(world, disturbance)
+    change = np.array([item.rolling for item in disturbance.robots])
+    law = true_resistance(world, change)
     if name == DEFAULT_PLANT:
         fleet.set_resistance(law.rolling_N, law.swing_N)
         return ModelledGround(law, fleet)

@@ -42,7 +42,7 @@ def check_obstacles(
     scene: Scene, robot: Robot, trajectory: Trajectory
 ) -> list[Contacts]:
     """Return the robot's contacts with obstacles, then with the bounds."""
-    footprint = SweptFootprint.of(robot.model, trajectory)
+    footprint = SweptFootprint(robot.model, trajectory)
     contacts = [_bounds_contacts(robot.id, footprint, scene.bounds)]
     obstacles = [item for item in scene.barriers if item.stops(robot.id)]
     if obstacles:
@@ -74,7 +74,7 @@ def check_robots(scene: Scene, trajectories: Sequence[Trajectory]) -> list[Conta
         trajectories: of equal length, one per robot.
     """
     footprints = [
-        SweptFootprint.of(scene.robot(item.robot).model, item) for item in trajectories
+        SweptFootprint(scene.robot(item.robot).model, item) for item in trajectories
     ]
     first, second = np.triu_indices(len(footprints), 1)
     reach_m = np.array([one.reach_m for one in footprints])

@@ -8,8 +8,6 @@ the hull of the footprint at both ends, grown by that sagitta, holds all of the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from mrmg.motion.dynamics import DERIVATIVES, rk4_step
@@ -26,9 +24,8 @@ SAMPLES = 8
 """Parts of a step at whose ends a user's motion is looked at."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
 class SweptFootprint:
-    """The moving footprint of one robot.
+    """The moving footprint of one robot on a planned trajectory.
 
     Attributes:
         model: shape and motion model.
@@ -38,22 +35,10 @@ class SweptFootprint:
         acceleration_m_s2: bound for any point of the footprint by step, shape (n,).
     """
 
-    model: RobotModel
-    dt_s: float
-    state: np.ndarray
-    control: np.ndarray
-    acceleration_m_s2: np.ndarray
-
-    @staticmethod
-    def of(model: RobotModel, trajectory: Trajectory) -> SweptFootprint:
-        """Return the moving footprint of a planned trajectory."""
-        return SweptFootprint(
-            model=model,
-            dt_s=trajectory.dt_s,
-            state=trajectory.state[:-1],
-            control=trajectory.control,
-            acceleration_m_s2=_acceleration_bound(model, trajectory),
-        )
+    def __init__(self, model: RobotModel, trajectory: Trajectory) -> None:
+        self.model, self.dt_s = model, trajectory.dt_s
+        self.state, self.control = trajectory.state[:-1], trajectory.control
+        self.acceleration_m_s2 = _acceleration_bound(model, trajectory)
 
     @property
     def reach_m(self) -> float:

@@ -125,7 +125,7 @@ def _check_coarseness(scene: Scene, plan: Plan) -> list[Violation]:
     for trajectory in plan.trajectories:
         model = scene.robot(trajectory.robot).model
         with np.errstate(over="ignore", invalid="ignore"):
-            footprint = SweptFootprint.of(model, trajectory)
+            footprint = SweptFootprint(model, trajectory)
             steps = np.arange(len(trajectory.control))
             straying_m = footprint.sagitta(steps, np.full(len(steps), plan.dt_s))
         sizes = np.abs(trajectory.state[:-1]).max(axis=1)

@@ -88,7 +88,7 @@ def swept(make_scene: Any, drive: Any) -> Any:
         robot = make_scene(robots=robots).robots[0]
         model = replace(robot.model, motion_model=motion_model)
         robot = replace(robot, model=model)
-        return SweptFootprint.of(robot.model, drive(robot, held(controls)))
+        return SweptFootprint(robot.model, drive(robot, held(controls)))
 
     return make
 

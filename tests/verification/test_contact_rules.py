@@ -62,7 +62,7 @@ def test_corner_that_cuts_a_post_between_two_samples_is_caught(
     turn = [(1.5, 1.0)] * 5 + [(1.5, 0.0)] * 5 + [(0.0, 0.0)] * 6 + [(-1.5, 0.0)] * 10
     free = make_scene(goals=[])
     plan = make_plan(free, {"r1": turn}, {"r1": ()})
-    footprint = SweptFootprint.of(free.robots[0].model, plan.trajectories[0])
+    footprint = SweptFootprint(free.robots[0].model, plan.trajectories[0])
     corner = footprint.corners_at(np.array([13]), np.array([0.05]))[0, 1]
     heading = footprint.states_at(np.array([13]), np.array([0.05]))[0, 2]
     post = corner + 0.004 * np.array([np.sin(heading), -np.cos(heading)])
