@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -30,6 +31,7 @@ from types import ModuleType
 from typing import Any
 
 from mrmg.errors import Fault, SceneError
+from mrmg.motion.dynamics import DERIVATIVES, Derivative, rk4_step
 from mrmg.scene.content import content_digest
 from mrmg.scene.robot_model import RobotModel
 
@@ -60,6 +62,17 @@ class UserMotion:
             SceneError: if numba cannot compile them.
         """
         return _addresses(self, limits)
+
+
+def plain_step(model: RobotModel) -> Derivative:
+    """Return step(state, control, L, dt) -> state of any model in plain Python.
+
+    Raises:
+        SceneError: as `motion_of` does.
+    """
+    if model.motion_model in DERIVATIVES:
+        return rk4_step(DERIVATIVES[model.motion_model](math.sin, math.cos, math.tan))
+    return motion_of(model).step
 
 
 def motion_of(model: RobotModel) -> UserMotion:

@@ -12,13 +12,12 @@ variance r,
 
 from __future__ import annotations
 
-import math
 from collections import deque
 
 import numpy as np
 
 from mrmg import seeding
-from mrmg.motion.dynamics import DERIVATIVES, rk4_step
+from mrmg.motion.user_motion import plain_step
 from mrmg.scene.types import Scene
 from mrmg.simulation.disturbance import Disturbance
 
@@ -64,10 +63,7 @@ class FilteredSensing(Sensing):
         robots = disturbance.robots
         self._period_s = period_s
         self._wheelbase_m = np.array([item.model.wheelbase_m for item in scene.robots])
-        self._steps = [
-            rk4_step(DERIVATIVES[item.model.motion_model](math.sin, math.cos, math.tan))
-            for item in scene.robots
-        ]
+        self._steps = [plain_step(item.model) for item in scene.robots]
         self._pose = np.array([item.pose for item in scene.robots])
         self._noise = np.array(
             [

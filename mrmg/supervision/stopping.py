@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence, Set
 
 import numpy as np
 
-from mrmg.motion.dynamics import DERIVATIVES, rk4_step
+from mrmg.motion.user_motion import plain_step
 from mrmg.plans import Trajectory
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
@@ -71,7 +71,7 @@ def brake_to_rest(model: RobotModel, state: np.ndarray, dt_s: float) -> Motion:
         dt_s: length of a step.
     """
     limits = model.limits.scaled(model.planning_share)
-    step = rk4_step(DERIVATIVES[model.motion_model](math.sin, math.cos, math.tan))
+    step = plain_step(model)
     turns_on_the_spot = model.motion_model == "unicycle"
     states, controls = [tuple(float(value) for value in state)], []
     while _moving(states[-1][3]) or _moving(states[-1][4]):

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mrmg.motion.dynamics import DERIVATIVES, NX, rk4_step
+from mrmg.motion.dynamics import NX
+from mrmg.motion.user_motion import plain_step
 from mrmg.scene.loading.models import load_model, model_folder
 from mrmg.scene.robot_model import RobotModel
 from mrmg.simulation.controller import HORIZON, HORIZON_STEP_S, Controller
@@ -153,7 +154,7 @@ def share_of_limit(model: RobotModel, share: float) -> float:
 
 def moved(model: RobotModel, state: np.ndarray, control: np.ndarray) -> np.ndarray:
     """Return the state one tick later."""
-    step = rk4_step(DERIVATIVES[model.motion_model](math.sin, math.cos, math.tan))
+    step = plain_step(model)
     return np.array(step(state, control, model.wheelbase_m, TICK_S))
 
 

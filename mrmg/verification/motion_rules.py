@@ -7,9 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from mrmg.columns import state_columns
 from mrmg.compared import compared
-from mrmg.motion.dynamics import DERIVATIVES, SPEED_STATES, Derivative, rk4_step
-from mrmg.motion.user_motion import motion_of
+from mrmg.motion.dynamics import DERIVATIVES, SPEED_STATES
+from mrmg.motion.user_motion import plain_step
 from mrmg.plans import Trajectory
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Robot
@@ -20,12 +21,6 @@ REST_TOLERANCE = 1e-6
 
 LIMIT_TOLERANCE = 1e-9
 """Rounding that is forgiven at a limit, in the unit of the component."""
-
-_COMPONENTS = {
-    "car": ("x", "y", "theta", "v", "psi"),
-    "unicycle": ("x", "y", "theta", "v", "omega"),
-}
-_USER_COMPONENTS = ("x", "y", "theta", "v", "w")
 
 USER_TOLERANCE = 1e-9
 """By how much a user's compiled motion may differ from its plain Python form."""
@@ -117,8 +112,8 @@ def _check_finish(robot: Robot, trajectory: Trajectory) -> Iterator[Violation]:
 
 
 def _components(model: RobotModel) -> tuple[str, ...]:
-    """Return the names of the state's components."""
-    return _COMPONENTS.get(model.motion_model, _USER_COMPONENTS)
+    """Return the names of the state's components, without their units."""
+    return tuple(name.split("_")[0] for name in state_columns(model.motion_model))
 
 
 def replay(model: RobotModel, trajectory: Trajectory) -> np.ndarray:
@@ -146,13 +141,6 @@ def changing_steps(*columns: np.ndarray) -> np.ndarray:
     rows = np.concatenate(columns, axis=1)
     differs = (rows[1:] != rows[:-1]).any(axis=1)
     return np.asarray(np.concatenate([[True], differs])[: len(rows)])
-
-
-def plain_step(model: RobotModel) -> Derivative:
-    """Return step(state, control, L, dt) -> state of a model in plain Python."""
-    if model.motion_model in DERIVATIVES:
-        return rk4_step(DERIVATIVES[model.motion_model](math.sin, math.cos, math.tan))
-    return motion_of(model).step
 
 
 def _check_dynamics(model: RobotModel, trajectory: Trajectory) -> list[Violation]:

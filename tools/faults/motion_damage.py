@@ -16,9 +16,9 @@ from faults.changes import (
     with_robot,
     with_trajectory,
 )
+from mrmg.motion.user_motion import plain_step
 from mrmg.plans import Plan, Trajectory
 from mrmg.scene.types import Scene
-from mrmg.verification.motion_rules import plain_step
 
 
 def change_state(column: int) -> Make:

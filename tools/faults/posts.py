@@ -7,10 +7,10 @@ from random import Random
 import numpy as np
 import shapely
 
+from mrmg.motion.user_motion import plain_step
 from mrmg.plans import Trajectory
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Obstacle
-from mrmg.verification.motion_rules import plain_step
 
 TRIES = 30
 SUBSTEPS = 8

@@ -13,7 +13,8 @@ from functools import cached_property
 
 import numpy as np
 
-from mrmg.motion.dynamics import DERIVATIVES, NX, rk4_step
+from mrmg.motion.dynamics import NX
+from mrmg.motion.user_motion import plain_step
 from mrmg.scene.robot_model import Limits, RobotModel
 
 STEP_S = 0.1
@@ -69,7 +70,7 @@ class Manoeuvre:
 
     def states(self, model: RobotModel) -> np.ndarray:
         """Return the states of the motion model from rest at the origin, (n + 1, 5)."""
-        step = rk4_step(DERIVATIVES[model.motion_model](math.sin, math.cos, math.tan))
+        step = plain_step(model)
         state = [(0.0,) * NX]
         for u1, u2 in self.control:
             state.append(step(state[-1], (u1, u2), model.wheelbase_m, STEP_S))
