@@ -21,6 +21,11 @@ from mrmg.world.terrain import area_at, multiplier_at
 INTERVAL_SHARE = 0.9
 """Probability that the energy of a mission lies in its interval."""
 
+_PLANNED, _DRIVEN = ("planned_m", "planned_J"), ("driven_m", "metered_J", "measured_J")
+
+_Rows = dict[float, dict[str, float]]
+"""Sums by multiplier and attribute of `TerrainEnergy`."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TerrainEnergy:
@@ -48,30 +53,18 @@ def energy_by_terrain(
 
     Each interval belongs to the ground under its middle, as in the energy model.
     """
-    planned = _by_class(
-        scene,
-        plan.trajectories,
-        _model_energy(scene, plan.trajectories, plan.rolling_factor),
-    )
-    if log is None:
-        return tuple(
-            TerrainEnergy(multiplier=key, planned_m=way_m, planned_J=energy_J)
-            for key, (way_m, energy_J) in sorted(planned.items())
-        )
-    driven, rolling = measured_curves(scene, plan, log), believed_rolling(plan, log)
-    metered = _by_class(scene, driven, _model_energy(scene, driven, rolling))
-    drawn_J = [curve.drawn_J.sum(axis=1) for curve in driven]
-    measured = _by_class(scene, driven, drawn_J)
+    names = _PLANNED if log is None else _PLANNED + _DRIVEN
+    rows: _Rows = defaultdict(lambda: dict.fromkeys(names, 0.0))
+    planned = plan.trajectories
+    planned_J = _model_energy(scene, planned, plan.rolling_factor)
+    _add(rows, scene, planned, _PLANNED, planned_J)
+    if log is not None:
+        driven, rolling = measured_curves(scene, plan, log), believed_rolling(plan, log)
+        metered_J = _model_energy(scene, driven, rolling)
+        measured_J = [curve.drawn_J.sum(axis=1) for curve in driven]
+        _add(rows, scene, driven, _DRIVEN, metered_J, measured_J)
     return tuple(
-        TerrainEnergy(
-            multiplier=key,
-            planned_m=planned[key][0],
-            planned_J=planned[key][1],
-            driven_m=metered[key][0],
-            metered_J=metered[key][1],
-            measured_J=measured[key][1],
-        )
-        for key in sorted({*planned, *metered})
+        TerrainEnergy(multiplier=key, **row) for key, row in sorted(rows.items())
     )
 
 
@@ -87,26 +80,19 @@ def planned_interval_J(
     Returns:
         Its ends [J]; None where the terrain states no spread, or nothing is taken.
     """
+    grounds = [(1.0, 1.0, 0.0)] + [
+        (area.multiplier, area.turning_multiplier, area.energy_spread)
+        for area in scene.terrain
+    ]
     by_ground: dict[tuple[float, float, float], float] = defaultdict(float)
-    for motion in plan.trajectories:
-        if motion.robot not in robots:
-            continue
-        factor = plan.rolling_factor.get(motion.robot)
-        energy_J = step_energy_parts(scene, motion, factor).sum(axis=1)
-        points = motion.state[:, :2]
-        areas = area_at(scene, 0.5 * (points[:-1] + points[1:]))
+    own = [motion for motion in plan.trajectories if motion.robot in robots]
+    energies_J = _model_energy(scene, own, plan.rolling_factor)
+    for motion, energy_J in zip(own, energies_J, strict=True):
+        areas = area_at(scene, _middles(motion))
         for number in np.unique(areas):
-            area = scene.terrain[number - 1] if number else None
-            key = (
-                (area.multiplier, area.turning_multiplier, area.energy_spread)
-                if area
-                else (1.0, 1.0, 0.0)
-            )
-            by_ground[key] += float(energy_J[areas == number].sum())
+            by_ground[grounds[number]] += float(energy_J[areas == number].sum())
     total_J = sum(by_ground.values())
-    deviation_J = float(
-        np.hypot.reduce([0.0, *(k[2] * e for k, e in by_ground.items())])
-    )
+    deviation_J = math.hypot(*(k[2] * e for k, e in by_ground.items()))
     if deviation_J == 0.0 or total_J <= 0.0:
         return None
     quantile = NormalDist().inv_cdf(0.5 + 0.5 * INTERVAL_SHARE)
@@ -123,20 +109,31 @@ def _model_energy(
     ]
 
 
-def _by_class(
-    scene: Scene, motions: Iterable[Motion], energies_J: Sequence[np.ndarray]
-) -> dict[float, tuple[float, float]]:
-    """Return (way [m], energy [J]) of all motions by multiplier; 0 of any other one."""
-    sums: dict[float, tuple[float, float]] = defaultdict(lambda: (0.0, 0.0))
-    for motion, energy_J in zip(motions, energies_J, strict=True):
-        points = motion.state[:, :2]
-        ground = multiplier_at(scene, 0.5 * (points[:-1] + points[1:]))
-        way_m = np.hypot(*np.diff(points, axis=0).T)
+def _middles(motion: Motion) -> np.ndarray:
+    """Return the middles of a motion's intervals [m], shape (n, 2)."""
+    points = motion.state[:, :2]
+    return np.asarray(0.5 * (points[:-1] + points[1:]))
+
+
+def _add(
+    rows: _Rows,
+    scene: Scene,
+    motions: Sequence[Motion],
+    names: Sequence[str],
+    *energies_J: Sequence[np.ndarray],
+) -> None:
+    """Add way and energies of all intervals to the sums of the ground below them.
+
+    Args:
+        rows: sums by multiplier and name.
+        scene: gives the terrain.
+        motions: of the robots.
+        names: of the sums of ways and of each of the energies.
+        *energies_J: of the intervals of each motion, shape (n,) each.
+    """
+    for motion, *own_J in zip(motions, *energies_J, strict=True):
+        ground = multiplier_at(scene, _middles(motion))
+        way_m = np.hypot(*np.diff(motion.state[:, :2], axis=0).T)
         for key in np.unique(ground).tolist():
-            on = ground == key
-            sum_m, sum_J = sums[key]
-            sums[key] = (
-                sum_m + float(way_m[on].sum()),
-                sum_J + float(energy_J[on].sum()),
-            )
-    return sums
+            for name, values in zip(names, (way_m, *own_J), strict=True):
+                rows[key][name] += float(values[ground == key].sum())
