@@ -18,13 +18,7 @@ import numpy as np
 
 from mrmg.energy.ledger import EnergyLedger, LedgerEntry
 from mrmg.energy.model import PARTS
-from mrmg.energy.visits import (
-    FROM_THE_START,
-    battery_contents,
-    first_stay,
-    recharging,
-    visit_of,
-)
+from mrmg.energy.visits import first_stay, visit_of
 from mrmg.motion.dynamics import TURN_SPEEDS
 from mrmg.plans import Trajectory, Visit
 from mrmg.scene.types import Robot, Scene
@@ -53,6 +47,9 @@ class TimedStates:
 Motion = Trajectory | TimedStates
 """What was planned, or what was recorded."""
 
+
+FROM_THE_START: Mapping[int, float] = MappingProxyType({})
+"""No content but that at the start to reckon a battery from."""
 
 _AS_MODELLED: Mapping[str, np.ndarray] = MappingProxyType({})
 
@@ -225,6 +222,8 @@ def battery_content(
 ) -> tuple[np.ndarray, list[float]]:
     """Return the battery content under any meter's draws, and that on each arrival.
 
+    Energy fed back or offered beyond a full battery is lost.
+
     Args:
         scene: gives the battery and the stations.
         motion: planned or logged states of one robot, shape (n + 1, 5).
@@ -237,10 +236,27 @@ def battery_content(
         visits [J].
     """
     battery = scene.robot(motion.robot).battery
-    points = motion.state[:, :2]
-    given = recharging(scene, motion.robot, motion.time_s, points, visits)
-    before, after = battery_contents(battery, draw_J, given, reckoned_J)
-    return after, [float(before[visit.step]) for visit in visits]
+    regions = {station.id: station.region for station in scene.stations}
+    gains_J, full_at = -draw_J, set()
+    ends = [visit.step for visit in visits[1:]] + [len(draw_J)]
+    for visit, end in zip(visits, ends, strict=False):
+        if visit.kind == "station" and not battery.takes_time_to_fill:
+            full_at.add(visit.step)
+        elif visit.kind == "station":
+            span = slice(visit.step, end + 1)
+            inside = regions[visit.target].depth(motion.state[span, :2]) >= 0.0
+            there_s = np.diff(motion.time_s[span]) * (inside[:-1] & inside[1:])
+            gains_J[visit.step : end] += battery.charging_power_W * there_s
+    before, after = [], []
+    content_J = battery.start_J
+    for step, gain_J in enumerate([*gains_J.tolist(), 0.0]):
+        content_J = reckoned_J.get(step, content_J)
+        before.append(content_J)
+        if step in full_at:
+            content_J = battery.capacity_J
+        after.append(content_J)
+        content_J = min(content_J + gain_J, battery.capacity_J)
+    return np.array(after), [before[visit.step] for visit in visits]
 
 
 def own_visits(motion: Motion, visits: Iterable[Visit]) -> list[Visit]:

@@ -13,21 +13,17 @@ Planner, verifier, supervision and audit all judge by these functions.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import combinations
-from types import MappingProxyType
 
 import numpy as np
 
 from mrmg.plans import Visit
-from mrmg.scene.types import Battery, Finish, Goal, Scene, Station
+from mrmg.scene.types import Finish, Goal, Scene, Station
 
 ROUNDING_S = 1e-6
 """Rounding of times that is forgiven in how long a robot stays."""
-
-FROM_THE_START: Mapping[int, float] = MappingProxyType({})
-"""No content but that at the start to reckon a battery from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,80 +123,3 @@ def crowded_stations(
         for one, other in combinations(there, 2):
             for first, end in runs(there[one] & there[other]):
                 yield Crowding(station.id, (one, other), first, end)
-
-
-@dataclass(frozen=True, slots=True)
-class Recharging:
-    """What stations give one battery.
-
-    Attributes:
-        full_at: states at which it is filled at once.
-        offered_J: what it is offered over each interval, shape (n,).
-    """
-
-    full_at: frozenset[int]
-    offered_J: np.ndarray
-
-
-def recharging(
-    scene: Scene,
-    robot: str,
-    time_s: np.ndarray,
-    points: np.ndarray,
-    visits: Sequence[Visit],
-) -> Recharging:
-    """Return what the stations of its tour give a robot.
-
-    Args:
-        scene: gives stations and battery.
-        robot: id of the robot.
-        time_s: of its states, shape (n + 1,).
-        points: positions of its reference point [m], shape (n + 1, 2).
-        visits: of this robot, in order of steps.
-    """
-    battery = scene.robot(robot).battery
-    offered_J = np.zeros(len(time_s) - 1)
-    at_stations = [visit for visit in visits if visit.kind == "station"]
-    if not battery.takes_time_to_fill:
-        return Recharging(frozenset(visit.step for visit in at_stations), offered_J)
-    regions = {station.id: station.region for station in scene.stations}
-    ends = [visit.step for visit in visits[1:]] + [len(offered_J)]
-    for visit, end in zip(visits, ends, strict=False):
-        if visit.kind == "station":
-            span = slice(visit.step, end + 1)
-            inside = regions[visit.target].depth(points[span]) >= 0.0
-            there_s = np.diff(time_s[span]) * (inside[:-1] & inside[1:])
-            offered_J[visit.step : end] += battery.charging_power_W * there_s
-    return Recharging(frozenset(), offered_J)
-
-
-def battery_contents(
-    battery: Battery,
-    draw_J: np.ndarray,
-    given: Recharging,
-    reckoned_J: Mapping[int, float] = FROM_THE_START,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the battery content on arrival at each state, and after a recharge there.
-
-    Energy fed back or offered beyond a full battery is lost.
-
-    Args:
-        battery: gives the capacity and the content at the start.
-        draw_J: energy drawn over each interval, shape (n,).
-        given: by stations.
-        reckoned_J: contents from which the battery is reckoned on, by state.
-
-    Returns:
-        Both [J], shape (n + 1,).
-    """
-    before, after = [], []
-    content_J = battery.start_J
-    gains_J = [*(given.offered_J - draw_J).tolist(), 0.0]
-    for step, gain_J in enumerate(gains_J):
-        content_J = reckoned_J.get(step, content_J)
-        before.append(content_J)
-        if step in given.full_at:
-            content_J = battery.capacity_J
-        after.append(content_J)
-        content_J = min(content_J + gain_J, battery.capacity_J)
-    return np.array(before), np.array(after)

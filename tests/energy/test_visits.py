@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mrmg.energy.visits import (
-    Recharging,
-    Stay,
-    battery_contents,
-    crowded_stations,
-    first_stay,
-    is_at,
-    recharging,
-    runs,
-)
+from mrmg.energy.metering import TimedStates, battery_content
+from mrmg.energy.visits import Stay, crowded_stations, first_stay, is_at, runs
 from mrmg.plans import Visit
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.region import Region
-from mrmg.scene.types import Battery, Goal, Scene
+from mrmg.scene.types import Goal, Scene
 
 DT_S = 0.5
 AT, AWAY = (0.0, 0.0), (9.0, 0.0)
@@ -115,12 +109,15 @@ def visit_at(step: int) -> Visit:
     return Visit("r", "s", "station", step, step * DT_S, 0.0)
 
 
-def contents(scene: Scene, presence: str, step: int, draw_J: float) -> np.ndarray:
+def contents(
+    scene: Scene, presence: str, step: int, draw_J: float | list[float]
+) -> np.ndarray:
     """Return the battery content at each state after a recharge."""
     time_s, points = way(presence)
-    given = recharging(scene, "r", time_s, points, [visit_at(step)])
+    state = np.column_stack([points, np.zeros((len(points), 3))])
+    motion = TimedStates(robot="r", time_s=time_s, state=state)
     draws_J = np.full(len(time_s) - 1, draw_J)
-    return battery_contents(scene.robot("r").battery, draws_J, given)[1]
+    return battery_content(scene, motion, draws_J, [visit_at(step)])[0]
 
 
 def test_charging_takes_the_time_a_robot_is_there() -> None:
@@ -151,18 +148,18 @@ def test_a_huge_power_fills_at_once(power_W: float) -> None:
 
 
 @given(
-    st.lists(st.floats(-5.0, 5.0), min_size=1, max_size=30),
-    st.lists(st.floats(0.0, 5.0), min_size=30, max_size=30),
+    st.lists(st.floats(-9.0, 9.0), min_size=1, max_size=30),
+    st.text(alphabet="x.", min_size=31, max_size=31),
+    st.floats(1.0, 50.0),
 )
 def test_a_battery_never_holds_more_than_its_capacity(
-    draw: list[float], offered: list[float]
+    draw: list[float], presence: str, power_W: float
 ) -> None:
-    battery = Battery(capacity_J=20.0, start_J=10.0, reserve_fraction=0.0)
-    given = Recharging(frozenset(), np.array(offered[: len(draw)]))
-    before, after = battery_contents(battery, np.array(draw), given)
-    assert max(before.max(), after.max()) <= 20.0
-    spent = np.array(draw) - given.offered_J
-    assert np.all(np.diff(after) <= -spent + 1e-9)
+    there = presence[: len(draw) + 1]
+    found = contents(one_station(charging_power=power_W), there, 0, draw)
+    assert found.max() <= 100.0
+    stays = np.array([pair == "xx" for pair in map("".join, pairwise(there))])
+    assert np.all(np.diff(found) <= power_W * DT_S * stays - np.array(draw) + 1e-9)
 
 
 def test_a_station_for_one_names_those_who_share_it() -> None:
