@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import zip_longest
 
 import numpy as np
@@ -30,6 +30,11 @@ ENERGY_TOLERANCE_J = 1e-6
 _Key = tuple[str, int, str, str]
 """Robot, leg, target and part of an entry of the ledger."""
 
+_Lack = tuple[float, int, str]
+"""What a robot lacks of a visit [SI], in which step, and how that is said."""
+
+_LackOf = Callable[[Goal, Trajectory], _Lack]
+
 
 def check_mission(scene: Scene, plan: Plan) -> Iterator[Violation]:
     """Yield every broken rule of the mission as a whole."""
@@ -50,80 +55,75 @@ def check_mission(scene: Scene, plan: Plan) -> Iterator[Violation]:
 
 
 def _check_goals(scene: Scene, plan: Plan) -> Iterator[Violation]:
+    """Check that some robot is at each goal, with its heading, for its dwell time."""
     for goal in scene.goals:
         if goal.id in plan.skipped:
             continue  # the verdict names it
-        depth, trajectory = _deepest(plan, goal)
-        step = int(depth.argmax())
-        missed_m = -float(depth[step])
-        if missed_m > 0.0:
-            message = (
-                f"goal {goal.id} is visited by no robot; this one comes nearest, "
-                f"{missed_m:.3g} m off"
-            )
-            kind = ViolationKind.GOAL_MISSED
-            yield violation_at(
-                trajectory, step, kind, message, amount=missed_m, other=goal.id
-            )
-            continue
-        askew = [] if goal.heading_rad is None else _check_heading(plan, goal)
-        yield from askew
-        if goal.dwell_s > 0.0 and not askew:
-            yield from _check_dwell(plan, goal)
+        for kind, lack_of in _LACKS.items():
+            (lack, step, message), trajectory = _least_lack(plan, goal, lack_of)
+            if lack > 0.0:
+                yield violation_at(
+                    trajectory, step, kind, message, amount=lack, other=goal.id
+                )
+                break
 
 
-def _deepest(plan: Plan, goal: Goal) -> tuple[np.ndarray, Trajectory]:
-    """Return how deep in a goal the first robot that visits it is at each state.
+def _least_lack(plan: Plan, goal: Goal, lack_of: _LackOf) -> tuple[_Lack, Trajectory]:
+    """Return what the first robot without a lack, else the one nearest to that, lacks.
 
-    Those that have it on their tours are looked at first. If nobody visits it, it is
-    the one that comes nearest.
+    Those that have the goal on their tours are looked at first.
     """
     found = []
     for item in sorted(
         plan.trajectories, key=lambda one: goal.id not in plan.tours[one.robot]
     ):
-        found.append((goal.region.depth(item.state[:, :2]), item))
-        if found[-1][0].max() >= 0.0:
+        found.append((lack_of(goal, item), item))
+        if found[-1][0][0] <= 0.0:
             return found[-1]
-    return max(found, key=lambda pair: float(pair[0].max()))
+    return min(found, key=lambda pair: pair[0][0])
 
 
-def _check_heading(plan: Plan, goal: Goal) -> list[Violation]:
-    """Check that some robot is at a goal with its heading."""
-    best: tuple[float, Trajectory, int] = (np.inf, plan.trajectories[0], 0)
-    for item in plan.trajectories:
-        inside = goal.region.depth(item.state[:, :2]) >= 0.0
-        off_rad = np.where(inside, off_heading_rad(goal, item), np.inf)
-        step = int(off_rad.argmin())
-        best = min(best, (float(off_rad[step]), item, step), key=lambda one: one[0])
-    off, trajectory, step = best
-    excess = off - goal.heading_tolerance_rad
-    if excess <= 0.0:
-        return []
-    found, most = compared(off, goal.heading_tolerance_rad, 2)
+def _missed(goal: Goal, trajectory: Trajectory) -> _Lack:
+    depth_m = goal.region.depth(trajectory.state[:, :2])
+    step = int(depth_m.argmax())
+    missed_m = -float(depth_m[step])
+    message = (
+        f"goal {goal.id} is visited by no robot; this one comes nearest, "
+        f"{missed_m:.3g} m off"
+    )
+    return missed_m, step, message
+
+
+def _askew(goal: Goal, trajectory: Trajectory) -> _Lack:
+    inside = goal.region.depth(trajectory.state[:, :2]) >= 0.0
+    off_rad = np.where(inside, off_heading_rad(goal, trajectory), np.inf)
+    step = int(off_rad.argmin())
+    off, most = float(off_rad[step]), goal.heading_tolerance_rad
+    found, allowed = compared(off, most, 2)
     message = (
         f"goal {goal.id} is visited with its heading by no robot; this one comes "
-        f"nearest, {found} rad off, {most} are allowed"
+        f"nearest, {found} rad off, {allowed} are allowed"
     )
-    kind = ViolationKind.HEADING
-    return [violation_at(trajectory, step, kind, message, amount=excess, other=goal.id)]
+    return off - most, step, message
 
 
-def _check_dwell(plan: Plan, goal: Goal) -> Iterator[Violation]:
-    """Check that some robot stays at a goal for its dwell time."""
-    stays_s = [(longest_stay_s(goal, item), item) for item in plan.trajectories]
-    stay_s, trajectory = max(stays_s, key=lambda pair: pair[0])
-    if stay_s >= goal.dwell_s - TIME_ROUNDING_S:
-        return
+def _cut_short(goal: Goal, trajectory: Trajectory) -> _Lack:
+    stay_s = longest_stay_s(goal, trajectory)
+    lack_s = goal.dwell_s - stay_s
     step = int(goal.region.depth(trajectory.state[:, :2]).argmax())
     stay, dwell = compared(stay_s, goal.dwell_s, 1)
     message = (
         f"stays at goal {goal.id} for {stay} s without a break, longer than others; it "
         f"takes {dwell} s"
     )
-    amount = goal.dwell_s - stay_s
-    kind = ViolationKind.DWELL
-    yield violation_at(trajectory, step, kind, message, amount=amount, other=goal.id)
+    return lack_s if lack_s > TIME_ROUNDING_S else 0.0, step, message
+
+
+_LACKS: Mapping[ViolationKind, _LackOf] = {
+    ViolationKind.GOAL_MISSED: _missed,
+    ViolationKind.HEADING: _askew,
+    ViolationKind.DWELL: _cut_short,
+}
 
 
 def _check_tour(
