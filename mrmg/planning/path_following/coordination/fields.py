@@ -56,7 +56,7 @@ class Fields:
     def __init__(self, problem: Problem) -> None:
         """Keep the problem; no field is made yet."""
         self._problem = problem
-        self._known: dict[tuple[int, float, tuple[int, ...]], np.ndarray] = {}
+        self._known: dict[tuple[int, tuple[int, ...]], np.ndarray] = {}
         self._turning: dict[tuple[int, ...], np.ndarray] = {}
         self._ground: dict[int, tuple[np.ndarray, np.ndarray]] = {}
         self._room: dict[tuple[int, float], np.ndarray] = {}
@@ -115,9 +115,13 @@ class Fields:
         layer, layers = self._layers(r, traffic)
         price = self._price(r, targets) * cell_m / top
         hold_share, soft_share = costs
-        penalty = np.zeros((layers, *price.shape))
-        self._add_others(r, traffic, layer, soft_share, penalty)
-        standing, stood = hold_share * layer * dt_s, np.full(len(targets), -1)
+        penalty, layer_s = np.zeros((layers, *price.shape)), layer * dt_s
+        inner_m = self._problem.scene.robots[r].model.inscribed_radius_m
+        _field_kernels.add_others(
+            own, traffic, inner_m, self._grid, layer, soft_share * layer_s, penalty
+        )
+        _add_near_misses(penalty, layer_s)
+        standing, stood = hold_share * layer_s, np.full(len(targets), -1)
         stood[: len(stay)] = -(-stay // layer)
         lasting = np.where(penalty[-1] < np.inf, price, np.inf)
         field = np.empty((len(targets), *penalty.shape))
@@ -140,33 +144,6 @@ class Fields:
         if own[0]["model"] != CAR:
             way = self._way_down(r, targets, stood, (price, standing, field))
         return Guide(field, UNKNOWN, *self._grid, layer), way
-
-    def _add_others(
-        self,
-        r: int,
-        traffic: Traffic,
-        layer: int,
-        soft_share: float,
-        penalty: np.ndarray,
-    ) -> None:
-        """Add to penalties where the others are, and where robot r just misses them.
-
-        Args:
-            r: robot.
-            traffic: how the others move.
-            layer: steps that a layer lasts.
-            soft_share: cost of a second in conflict with a robot of lower priority.
-            penalty: of cells, shape (T, ny, nx).
-        """
-        own, layer_s = (
-            self._problem.mission.fleet[r : r + 1],
-            layer * self._problem.dt_s,
-        )
-        inner_m = self._problem.scene.robots[r].model.inscribed_radius_m
-        _field_kernels.add_others(
-            own, traffic, inner_m, self._grid, layer, soft_share * layer_s, penalty
-        )
-        _add_near_misses(penalty, layer_s)
 
     def _way_down(
         self,
@@ -196,14 +173,12 @@ class Fields:
 
     def _way(self, r: int, targets: tuple[int, ...]) -> np.ndarray:
         """Return the way from each cell through targets [m], inf if there is none."""
-        robot = self._problem.mission.fleet[r]
-        key = (int(robot["space"]), float(robot["passage"]), targets)
-        if key not in self._known:
+        if (r, targets) not in self._known:
             later = self._way(r, targets[1:]) if targets[1:] else np.zeros(self._shape)
             seed = np.where(self._region(targets[:1]), later, np.inf)
             price = self._cell_m * self._price(r, targets)
-            self._known[key] = _field_kernels.cost_to_go(price, seed)
-        return self._known[key]
+            self._known[r, targets] = _field_kernels.cost_to_go(price, seed)
+        return self._known[r, targets]
 
     def turning(self, r: int, targets: Sequence[int]) -> np.ndarray:
         """Return what turning costs robot r beside its costs-to-go [s] (`Guide`).

@@ -124,3 +124,19 @@ def test_costs_to_go_lead_through_gaps_that_are_wide_enough_alone(
 @pytest.mark.parametrize("leg", [0, 1, 7])
 def test_who_does_without_costs_to_go_has_none_on_any_leg(leg: int) -> None:
     assert _guide_kernels.guide_at(NO_GUIDE, leg, 0, 3.0, 5.0) == 0.0
+
+
+def test_costs_to_go_do_not_depend_on_what_was_asked_for_other_robots(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    """One with its back to a wall may stand where equal robots elsewhere may not."""
+    poses = {"away": [8, 3, 0], "docked": [0.56, 6, 0]}
+    scene = yard(
+        bounds=[0, 0, 16, 12],
+        goals=[{"id": "g", "circle": {"center": [12, 6], "radius": 0.5}}],
+        robots=[{"id": name, "model": "car", "pose": at} for name, at in poses.items()],
+    )
+    problem = state(scene, samples=50)
+    fields = Fields(problem)
+    _, docked = (fields.static(r, [0]).field for r in range(2))
+    assert np.array_equal(docked, Fields(problem).static(1, [0]).field)
