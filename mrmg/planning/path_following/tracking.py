@@ -43,6 +43,9 @@ CRAWL = 0.3
 STIFFNESS = 0.8
 """How fast robots return to their paths [1/m]; nimbler ones faster."""
 
+STRAYED_M = 1.0
+"""Distance from its path at which a robot's drive alone is given up."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
@@ -130,18 +133,8 @@ def course_of(problem: Problem, r: int, path: Path) -> Course:
         size=np.array([n]),
         ease=ease,
         stiffness=STIFFNESS / nimble_share(path_curvature(robot)),
+        astray=STRAYED_M,
     )
-
-
-def course_with_rest(
-    problem: Problem, r: int, path: Path, drive: Drive | None
-) -> Course:
-    """Return robot r's path with what is left of it as its drive alone tells."""
-    course = course_of(problem, r, path)
-    if drive is None or len(drive.spent_s) == 0:
-        return course
-    course.node["rest_s"][: len(path.node)] = drive.spent_s[-1] - drive.spent_s
-    return course
 
 
 def empty_path(most: int) -> np.ndarray:

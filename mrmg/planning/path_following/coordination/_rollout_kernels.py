@@ -35,14 +35,6 @@ class Rollouts(NamedTuple):
     state: np.ndarray
 
 
-def empty_rollouts(motions: int, steps: int) -> Rollouts:
-    """Return room for rollouts of holding and of so many motions."""
-    return Rollouts(
-        begin=np.full((ROLLED, 2), np.nan),
-        state=np.empty((ROLLED, 1 + motions, 1 + steps, 5)),
-    )
-
-
 @kernel
 def rolled_out(search, rollouts, state, control):
     """Return the row of the rollouts that begin like a state; they are made if need be.

@@ -34,7 +34,7 @@ from mrmg.planning.path_following.coordination._node_kernels import (
     Setting,
     Task,
 )
-from mrmg.planning.path_following.coordination._rollout_kernels import empty_rollouts
+from mrmg.planning.path_following.coordination._rollout_kernels import ROLLED, Rollouts
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE, UNKNOWN, Fields
 from mrmg.planning.path_following.coordination.leads import rounded_path
 from mrmg.planning.path_following.coordination.rounds import (
@@ -65,7 +65,6 @@ from mrmg.planning.path_following.tracking import (
     Drive,
     Motion,
     course_of,
-    course_with_rest,
     empty_path,
 )
 from mrmg.planning.problem.problem import Problem
@@ -77,16 +76,6 @@ MOST_CURVE_NODES = 1500
 
 BRAKING_SHARE = 0.8
 """Share of the largest deceleration that it brakes with at the end."""
-
-
-def empty_course(most: int) -> Course:
-    """Return room for a path."""
-    return Course(
-        node=empty_path(most),
-        size=np.zeros(1, np.int64),
-        ease=0.0,
-        stiffness=1.0,
-    )
 
 
 def empty_nodes(task: Task) -> Nodes:
@@ -102,7 +91,10 @@ def empty_nodes(task: Task) -> Nodes:
         key=np.empty(2 * most + 2),
         entry=np.empty(2 * most + 2, np.int64),
         table=np.full(1 << (ways_on * most).bit_length(), -1, np.int64),
-        rollouts=empty_rollouts(len(task.motion), task.steps),
+        rollouts=Rollouts(
+            begin=np.full((ROLLED, 2), np.nan),
+            state=np.empty((ROLLED, 1 + len(task.motion), 1 + task.steps, 5)),
+        ),
         size=np.array([0, 0, -1]),
     )
 
@@ -120,10 +112,11 @@ class _Planning:
     ) -> None:
         self._problem = problem
         self._tours, self._paths = tours, paths
-        self._courses = [
-            course_with_rest(problem, r, path, drive)
-            for r, (path, drive) in enumerate(zip(paths, drives, strict=True))
-        ]
+        self._courses = [course_of(problem, r, path) for r, path in enumerate(paths)]
+        for course, drive in zip(self._courses, drives, strict=True):
+            if drive is not None and len(drive.spent_s) > 0:
+                rest_s = drive.spent_s[-1] - drive.spent_s
+                course.node["rest_s"][: len(rest_s)] = rest_s
         self._follows = [  # whether it has driven along a path to all its targets
             drive is not None and 0 < len(tour) == len(path.target)
             for tour, path, drive in zip(tours, paths, drives, strict=True)
@@ -136,7 +129,13 @@ class _Planning:
             control=np.zeros((horizon, 2)),
             corner=np.empty((2, MOST_CORNERS, 2)),
             near=np.empty(len(tours), np.int64),
-            curve=empty_course(MOST_CURVE_NODES),
+            curve=Course(
+                node=empty_path(MOST_CURVE_NODES),
+                size=np.zeros(1, np.int64),
+                ease=0.0,
+                stiffness=1.0,
+                astray=np.inf,
+            ),
         )
         self.round = ROUNDS[0]
         self.nodes, self.most, self.horizon = 0, np.inf, horizon

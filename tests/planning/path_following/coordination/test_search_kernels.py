@@ -7,18 +7,16 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from mrmg.planning.path_following._following_kernels import Course
 from mrmg.planning.path_following.coordination._motion_kernels import Traffic
 from mrmg.planning.path_following.coordination._node_kernels import Scratch, Setting
 from mrmg.planning.path_following.coordination._search_kernels import find_motion
-from mrmg.planning.path_following.coordination.coordination import (
-    empty_course,
-    empty_nodes,
-)
+from mrmg.planning.path_following.coordination.coordination import empty_nodes
 from mrmg.planning.path_following.coordination.fields import Fields
 from mrmg.planning.path_following.coordination.rounds import ROUNDS
 from mrmg.planning.path_following.coordination.tasks import guided, no_path, task_of
 from mrmg.planning.path_following.coordination.traffic import FleetTraffic
-from mrmg.planning.path_following.tracking import Motion, course_of
+from mrmg.planning.path_following.tracking import Motion, course_of, empty_path
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.scene.types import Scene
@@ -46,7 +44,7 @@ def found_control(problem: Problem, r: int, around: Traffic) -> np.ndarray:
         control=np.zeros((HORIZON, 2)),
         corner=np.empty((2, MOST_CORNERS, 2)),
         near=np.empty(len(problem.start), np.int64),
-        curve=empty_course(100),
+        curve=Course(empty_path(100), np.zeros(1, np.int64), 0.0, 1.0, np.inf),
     )
     control = np.zeros((HORIZON, 2))
     nodes = empty_nodes(search.task)
