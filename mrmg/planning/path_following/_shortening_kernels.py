@@ -21,32 +21,43 @@ SHORTEST_M = 1e-3
 
 
 @kernel
-def write_turns(search, a, b, curve):
+def straight_parts(search, a, b, way, turn):
     """Write the turn, the straight way and the turn from one pose to another.
 
-    Arguments and what is returned are those of `write_curve`; turns take no way.
+    Arguments and what is returned are those of `arc_parts`.
     """
     dx, dy = b[0] - a[0], b[1] - a[1]
     far = hypot(dx, dy)
-    ahead, gear = (atan2(dy, dx) if far > SHORTEST_M else b[2]), 1.0
+    ahead = atan2(dy, dx) if far > SHORTEST_M else b[2]
     first, last = wrap(ahead - a[2]), wrap(b[2] - ahead)
     if search.own[0].limit[0] < 0.0 and abs(first) + abs(last) > pi:
-        gear, first, last = -1.0, wrap(first + pi), wrap(last + pi)
-    step = 2.0 * pi / search.headings / PIECES
-    sizes = abs(first) / step, far * PIECES / search.length, abs(last) / step
-    if not sizes[0] + sizes[1] + sizes[2] < len(curve) - MOST_PIECES:
-        return 0, np.inf
-    x, y, theta, n = a[0], a[1], a[2], 0
+        far, first, last = -far, wrap(first + pi), wrap(last + pi)
+    way[1], turn[0], turn[2] = far, first, last
+    return abs(far) + search.scrub * (abs(first) + abs(last))
+
+
+@kernel
+def arc_parts(search, a, b, way, turn):
+    """Write the parts of the shortest curve of a car; return its cost, inf if none.
+
+    Args:
+        search: gives the robot and the curvature of its turns.
+        a, b: poses, shape (3,).
+        way: receives the length of each part, negative backwards [m], shape (n,).
+        turn: receives how far it turns there [rad], shape (n,).
+    """
+    dx, dy, reverses = b[0] - a[0], b[1] - a[1], search.own[0].limit[0] < 0.0
+    radius, last = 1.0 / search.bend, 0.0
+    cost = reeds_shepp(dx, dy, a[2], b[2], radius, reverses, turn, way)
     for p in range(MOST_PIECES):
-        pieces = int(ceil(sizes[p] - 1e-9))
-        for _ in range(pieces):
-            if p == 1:
-                x, y = x + dx / pieces, y + dy / pieces
-            else:
-                theta += (first if p == 0 else last) / pieces
-            curve[n, 0], curve[n, 1], curve[n, 2], curve[n, 3] = x, y, theta, gear
-            n += 1
-    return n, far + search.scrub * (abs(first) + abs(last))
+        if abs(way[p]) < SHORTEST_M:
+            way[p] = 0.0
+        turn[p] *= search.bend * way[p]
+        cost += search.scrub * abs(turn[p])
+        if way[p] != 0.0:
+            cost += search.change if way[p] * last < 0.0 else 0.0
+            last = way[p]
+    return cost
 
 
 @kernel
@@ -61,32 +72,26 @@ def write_curve(search, a, b, curve):
     Returns:
         (number of them, cost [m of plain ground]); (0, inf) if there is no room.
     """
+    way, turn = np.zeros(MOST_PIECES), np.zeros(MOST_PIECES)
     if search.own[0].model == UNICYCLE:
-        return write_turns(search, a, b, curve)
-    turn, length = np.zeros(MOST_PIECES), np.zeros(MOST_PIECES)
-    radius = 1.0 / search.bend
-    dx, dy, reverses = b[0] - a[0], b[1] - a[1], search.own[0].limit[0] < 0.0
-    total = reeds_shepp(dx, dy, a[2], b[2], radius, reverses, turn, length)
-    if not total < search.length * (len(curve) / PIECES - MOST_PIECES):
-        return 0, np.inf
-    x, y, theta = a[0], a[1], a[2]
-    n, cost, last = 0, total, 0.0
+        cost = straight_parts(search, a, b, way, turn)
+    else:
+        cost = arc_parts(search, a, b, way, turn)
+    x, y, theta, n = a[0], a[1], a[2], 0
     for p in range(MOST_PIECES):
-        if abs(length[p]) < SHORTEST_M:
-            continue
-        gear = 1.0 if length[p] > 0.0 else -1.0
-        cost += search.scrub * search.bend * abs(length[p] * turn[p])
-        cost += search.change if gear * last < 0.0 else 0.0
-        last = gear
-        pieces = int(ceil(abs(length[p]) * PIECES / search.length))
-        way = length[p] / pieces
-        swing = 0.5 * abs(way) * turn[p] * gear / radius
-        chord = way * (sin(swing) / swing if abs(swing) > 1e-9 else 1.0)
+        turns = abs(turn[p]) * search.headings / (2.0 * pi)
+        size = PIECES * max(abs(way[p]) / search.length, turns)
+        if not n + size < len(curve) - 1:
+            return 0, np.inf
+        pieces = int(ceil(size - 1e-9))
         for _ in range(pieces):
+            swing = 0.5 * turn[p] / pieces
+            chord = way[p] / pieces * (sin(swing) / swing if swing != 0.0 else 1.0)
             x += chord * cos(theta + swing)
             y += chord * sin(theta + swing)
             theta += 2.0 * swing
-            curve[n, 0], curve[n, 1], curve[n, 2], curve[n, 3] = x, y, theta, gear
+            curve[n, 0], curve[n, 1], curve[n, 2] = x, y, theta
+            curve[n, 3] = 1.0 if way[p] > 0.0 else -1.0
             n += 1
     return n, cost
 
