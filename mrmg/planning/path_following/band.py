@@ -7,7 +7,8 @@ nodes slip to where driving along them takes the least energy (`_band_kernels`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from math import cos, sin
 
 import numpy as np
@@ -54,31 +55,35 @@ LEAST_GAIN = 3e-4
 """... and the share of the cost that one must gain to be followed by another."""
 
 
+_no_numbers = partial(np.zeros, 0, np.int64)
+_no_values = partial(np.zeros, 0)
+
+
 @dataclass(frozen=True)
 class Path:
-    """The way of one robot.
+    """The way of one robot, without stops and turns on the spot unless they are given.
 
     Attributes:
         node: shape (n, 2) [m].
         gear: of each segment, 1 or -1, shape (n - 1,).
+        heading: of the robot at the start [rad].
         stop: numbers of the nodes at which a target is visited, shape (S,).
         target: those targets, shape (S,).
         deeper: how much deeper than needed the path enters them [m], shape (S,).
         pivot: numbers of the nodes at which the robot turns on the spot, shape (P,).
-        heading: of the robot at the start [rad].
         pause_s: how long it stands at each stop, shape (S,).
         aim: headings that it is to have at them [rad], NaN for any, shape (S,).
     """
 
     node: np.ndarray
     gear: np.ndarray
-    stop: np.ndarray
-    target: np.ndarray
-    deeper: np.ndarray
-    pivot: np.ndarray
     heading: float
-    pause_s: np.ndarray
-    aim: np.ndarray
+    stop: np.ndarray = field(default_factory=_no_numbers)
+    target: np.ndarray = field(default_factory=_no_numbers)
+    deeper: np.ndarray = field(default_factory=_no_values)
+    pivot: np.ndarray = field(default_factory=_no_numbers)
+    pause_s: np.ndarray = field(default_factory=_no_values)
+    aim: np.ndarray = field(default_factory=_no_values)
 
     @property
     def way(self) -> np.ndarray:
@@ -163,7 +168,6 @@ def path_of(
         stop=np.array(visits, np.int64),
         target=np.array(tour, np.int64),
         deeper=np.full(len(visits), TRACKING_M),
-        pivot=np.zeros(0, np.int64),
         heading=float(state[0, 2]),
         pause_s=np.zeros(len(visits)),
         aim=aim,

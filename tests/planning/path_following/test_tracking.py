@@ -69,18 +69,8 @@ def straight_path(problem: Problem, end_x: float) -> Path:
     """Return a straight path from a robot's start."""
     x0, y0, heading = problem.start[0, :3]
     x = np.linspace(x0, end_x, 30)
-    none = np.zeros(0, np.int64)
-    return Path(
-        node=np.stack([x, np.full(30, y0)], axis=1),
-        gear=np.ones(29, np.int64),
-        stop=none,
-        target=none,
-        deeper=np.zeros(0),
-        pivot=none,
-        heading=float(heading),
-        pause_s=np.zeros(0),
-        aim=np.zeros(0),
-    )
+    node = np.stack([x, np.full(30, y0)], axis=1)
+    return Path(node, np.ones(29, np.int64), float(heading))
 
 
 @pytest.mark.parametrize("model", ["car", "diffdrive"])

@@ -77,18 +77,8 @@ def motions(robot: np.ndarray, steps: int, dt_s: float) -> np.ndarray:
 
 def no_path(problem: Problem, r: int) -> Path:
     """Return a path that leads robot r nowhere."""
-    none = np.zeros(0, np.int64)
-    return Path(
-        node=problem.start[r : r + 1, :2].copy(),
-        gear=none,
-        stop=none,
-        target=none,
-        deeper=np.zeros(0),
-        pivot=none,
-        heading=float(problem.start[r, 2]),
-        pause_s=np.zeros(0),
-        aim=np.zeros(0),
-    )
+    node, heading = problem.start[r : r + 1, :2].copy(), float(problem.start[r, 2])
+    return Path(node, np.zeros(0, np.int64), heading)
 
 
 def is_one_pose(problem: Problem, r: int, tour: Sequence[int]) -> bool:
