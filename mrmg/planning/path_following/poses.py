@@ -74,28 +74,8 @@ def posed(
         halt: shape (1,); the search ends soon after it has turned true.
         soon: whether a way soon is worth more than a cheap one.
     """
-    path = posed_path(problem, r, cost_map, tour, halt, soon=soon)
-    if path is None:
-        return None
-    drive = drive_alone(problem, r, with_pauses(problem, r, path))
-    visits = visit_steps(problem.mission.targets, tour, drive.motion.state)
-    if not drive.arrived or len(visits) < len(tour):
-        return None
-    return RobotTask(list(tour), path, cost_map, drive)
-
-
-def posed_path(
-    problem: Problem,
-    r: int,
-    cost_map: CostMap,
-    tour: Sequence[int],
-    halt: np.ndarray,
-    *,
-    soon: bool = False,
-) -> Path | None:
-    """Return a way of robot r over poses through its targets, or None; see `posed`."""
-    own, target = problem.mission.fleet[r : r + 1], np.array(tour, np.int64)
-    margin_m, bend = float(own[0]["margin"]), BEND_SHARE * cost_map.curvature
+    own, targets = problem.mission.fleet[r : r + 1], problem.mission.targets
+    bend, target = BEND_SHARE * cost_map.curvature, np.array(tour, np.int64)
     length, change_m = 2.0 * pi / HEADINGS / bend, CHANGE_M
     if own[0]["model"] == UNICYCLE:
         length, change_m = STRAIGHT_SHARE * float(own[0]["radius"]), 0.0
@@ -104,21 +84,32 @@ def posed_path(
         own=own,
         start=problem.start[r, :3].copy(),
         spaces=problem.mission.spaces,
-        stops=Stops(
-            problem.mission.targets, target, target, deeper, problem.aims(r, tour)
-        ),
+        stops=Stops(targets, target, target, deeper, problem.aims(r, tour)),
         guide=Fields(problem).static(r, tour),
         bend=bend,
         length=length,
         headings=HEADINGS,
         cell=length * np.array(CELL_SHARES),
-        room=np.full(3, margin_m),
+        room=np.full(3, own[0]["margin"]),
         near=2.0 * float(own[0]["radius"]),
         scrub=cost_map.scrub,
         change=change_m,
         weight=SOON_WEIGHT if soon else 1.0,
         halt=halt,
     )
+    path = _path_of(search)
+    if path is None:
+        return None
+    drive = drive_alone(problem, r, with_pauses(problem, r, path))
+    visits = visit_steps(targets, tour, drive.motion.state)
+    if not drive.arrived or len(visits) < len(tour):
+        return None
+    return RobotTask(list(tour), path, cost_map, drive)
+
+
+def _path_of(search: PoseSearch) -> Path | None:
+    """Return the way over poses that a search finds, or None."""
+    margin_m, stops = float(search.own[0]["margin"]), search.stops
     poses = np.empty(MOST_POSES, POSE)
     for room_m in ROOMS_M:
         room = margin_m + np.array([ROOM_SHARE * margin_m, room_m, 0.0])
@@ -136,11 +127,11 @@ def posed_path(
     return Path(
         node=way[moves, :2].copy(),
         gear=way[moves, 3][1:].astype(np.int64),
+        heading=float(search.start[2]),
         stop=number[stop],
-        target=target,
-        deeper=deeper,
+        target=stops.target,
+        deeper=stops.deeper,
         pivot=np.unique(number[~moves]),
-        heading=float(problem.start[r, 2]),
-        pause_s=np.zeros(len(tour)),
-        aim=search.stops.aim,
+        pause_s=np.zeros(len(stop)),
+        aim=stops.aim,
     )

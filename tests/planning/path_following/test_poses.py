@@ -18,7 +18,7 @@ from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.path_following import _pose_kernels, poses
 from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.coordination.fields import Fields
-from mrmg.planning.path_following.poses import HEADINGS, posed, posed_path
+from mrmg.planning.path_following.poses import HEADINGS, posed
 from mrmg.planning.path_following.refine import cost_maps_of
 from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.scene.loading import scene_from_document
@@ -84,9 +84,9 @@ def stated(scene: Scene) -> tuple[Problem, list[int]]:
 def way_of(scene: Scene) -> tuple[Problem, Path]:
     """Return the problem of a scene, and a way over poses through its targets."""
     problem, tour = stated(scene)
-    path = posed_path(problem, 0, cost_maps_of(problem)[0], tour, NEVER)
-    assert path is not None
-    return problem, path
+    task = posed(problem, 0, cost_maps_of(problem)[0], tour, NEVER)
+    assert task is not None
+    return problem, task.path
 
 
 @contextmanager
@@ -164,14 +164,14 @@ def test_robots_that_cannot_back_never_do() -> None:
     """Without a gear to back in, a robot leaves a goal beside a rack forwards."""
     problem, tour = stated(hall((10.0, 5.1), (3.0, 6.0), model="diffdrive"))
     cost_map = cost_maps_of(problem)[0]
-    backed = posed_path(problem, 0, cost_map, tour, NEVER)
+    backed = posed(problem, 0, cost_map, tour, NEVER)
     assert backed is not None
-    assert (backed.gear == -1).any()
+    assert (backed.path.gear == -1).any()
     problem.mission.fleet["limit"][0, 0] = 0.0
     with recorded() as found:
-        path = posed_path(problem, 0, cost_map, tour, NEVER)
-    assert path is not None
-    assert (path.gear == 1).all()
+        ahead_alone = posed(problem, 0, cost_map, tour, NEVER)
+    assert ahead_alone is not None
+    assert (ahead_alone.path.gear == 1).all()
     pose, _ = found[0]
     ahead = np.stack([np.cos(pose[:-1, 2]), np.sin(pose[:-1, 2])], axis=1)
     assert ((np.diff(pose[:, :2], axis=0) * ahead).sum(axis=1) > -1e-9).all()
@@ -218,8 +218,8 @@ def test_ways_are_cheaper_where_there_is_time() -> None:
     problem, tour = stated(hall(*((x, y) for x in (8.0, 10.0) for y in (5.25, 6.75))))
     cost_map = cost_maps_of(problem)[0]
     with recorded() as found:
-        assert posed_path(problem, 0, cost_map, tour, NEVER, soon=True) is not None
-        assert posed_path(problem, 0, cost_map, tour, NEVER) is not None
+        assert posed(problem, 0, cost_map, tour, NEVER, soon=True) is not None
+        assert posed(problem, 0, cost_map, tour, NEVER) is not None
     (_, soon_m), (_, cheap_m) = found
     assert cheap_m < 0.95 * soon_m
 
@@ -268,14 +268,14 @@ def test_searches_end_when_told() -> None:
     """A search that is halted finds nothing."""
     problem, tour = stated(MISSIONS[0])
     cost_map = cost_maps_of(problem)[0]
-    assert posed_path(problem, 0, cost_map, tour, np.ones(1, bool)) is None
+    assert posed(problem, 0, cost_map, tour, np.ones(1, bool)) is None
 
 
 def test_searches_end_without_room(monkeypatch: pytest.MonkeyPatch) -> None:
     """A search that has no more room for poses finds nothing."""
     problem, tour = stated(MISSIONS[0])
     monkeypatch.setattr(poses, "MOST_POSES", 100)
-    assert posed_path(problem, 0, cost_maps_of(problem)[0], tour, NEVER) is None
+    assert posed(problem, 0, cost_maps_of(problem)[0], tour, NEVER) is None
 
 
 def test_headings_that_targets_want_are_kept() -> None:
