@@ -14,6 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from mrmg.planning.endings import listed
 from mrmg.planning.frame import Frame
 from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.targets import whole_tours
 from mrmg.scene.margins import Margins
 
 MOST_ROBOTS = 40
@@ -44,11 +45,8 @@ def narrowest_meeting(
     scene = problem.scene
     frame = Frame.of(scene, margins)
     problem = replace(problem, scene=frame.scene(scene))
-    finish = problem.mission.targets.finish
-    paths = [
-        _points(problem.path(r, [*tour, *[int(finish[r])] * int(finish[r] >= 0)]))
-        for r, tour in enumerate(tours)
-    ]
+    whole = whole_tours(problem.mission.targets, tours)
+    paths = [_points(problem.path(r, tour)) for r, tour in enumerate(whole)]
     names = [robot.id for robot in scene.robots]
     found: list[tuple[float, tuple[int, ...], tuple[float, ...]]] = []
     for one, other in combinations(range(min(len(paths), MOST_ROBOTS)), 2):

@@ -9,7 +9,7 @@ import numpy as np
 
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import Path
-from mrmg.planning.path_following.gears import smoothed_cost_m
+from mrmg.planning.path_following.gears import other_gear_from, smoothed_cost_m
 from mrmg.planning.problem.problem import Problem
 
 LAST_STOPS = 3
@@ -38,18 +38,12 @@ def with_arrivals(problem: Problem, r: int, cost_map: CostMap, path: Path) -> Pa
         earlier = {0, *path.stop[:i].tolist()} - {int(path.stop[i])}
         places = sorted(earlier)[-LAST_STOPS - 1 :]
         before = _part(path, 0, int(path.stop[i]))
-        ways = [before, *(_changed_at(before, at) for at in places[1:])]
+        ways = [before, *(other_gear_from(before, at) for at in places[1:])]
         ways += [_passed_by(before, bearing) for bearing in BEARINGS]
         ends = [_part(way, places[0], len(way.gear)) for way in ways]
         costs_m = [smoothed_cost_m(problem, r, cost_map, end) for end in ends]
         path = _joined(ways[int(np.argmin(costs_m))], before, path)
     return path
-
-
-def _changed_at(path: Path, at: int) -> Path:
-    """Return a path that is driven in the other gear from a node on."""
-    number = np.arange(len(path.gear))
-    return replace(path, gear=np.where(number < at, path.gear, -path.gear))
 
 
 def _passed_by(path: Path, bearing: float) -> Path:

@@ -16,8 +16,9 @@ import numpy as np
 from mrmg import seeding
 from mrmg.background import in_background
 from mrmg.planning.attempt import Request
-from mrmg.planning.path_following.following import path_cost_J, whole_tour
+from mrmg.planning.path_following.following import path_cost_J
 from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.targets import whole_tours
 from mrmg.planning.routing.routing import Routing
 
 SPREADS = (0.0, 0.04, 0.08, 0.12, 0.06)
@@ -155,9 +156,9 @@ def _drawn(problem: Problem, request: Request, draw: Draw) -> Routing:
 def _roadmap_cost_J(problem: Problem, tours: Routing) -> float:
     """Return the cost of tours along the roadmap [J]."""
     roadmap, total = problem.roadmap, 0.0
-    for r, robot in enumerate(problem.mission.fleet):
-        tour = whole_tour(problem, tours, r)
+    for r, tour in enumerate(whole_tours(problem.mission.targets, tours.tours)):
         if tour:
+            robot = problem.mission.fleet[r]
             legs_m = roadmap.distance[robot["field"], tour[:-1], tour[1:]]
             first_m = roadmap.start_distance[r, tour[0]]
             total += float(robot["plain"] * (first_m + legs_m.sum()))

@@ -9,16 +9,15 @@ Where robots get in each other's way, a search for motions starts from the paths
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from math import radians
 
 import numpy as np
 
 from mrmg.motion._kernels import UNICYCLE, USER
 from mrmg.planning.assembly import plan_or_refusal
-from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.attempt import Request
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.arrivals import with_arrivals
 from mrmg.planning.path_following.band import (
@@ -31,10 +30,10 @@ from mrmg.planning.path_following.coordination.rounds import ROUNDS, Round
 from mrmg.planning.path_following.coordination.tasks import is_one_pose
 from mrmg.planning.path_following.driven_legs import Leg, legs_driven_J
 from mrmg.planning.path_following.gears import with_best_gears
-from mrmg.planning.path_following.poses import posed
 from mrmg.planning.path_following.refine import cost_maps_of, drive_paths
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.targets import whole_tours
 from mrmg.planning.routing.routing import Routing
 from mrmg.plans import Plan
 
@@ -81,11 +80,8 @@ class Followed:
 
 def follow_tours(
     problem: Problem,
-    params: PlannerParams,
+    request: Request,
     routing: Routing,
-    seed: int,
-    halt: np.ndarray,
-    number: int = 0,
     rounds: Sequence[Round] = ROUNDS[:1],
 ) -> Followed:
     """Plan along tours.
@@ -94,74 +90,43 @@ def follow_tours(
 
     Args:
         problem: the mission.
-        params: parameters.
+        request: the attempt; the first one finds a plan soon rather than a cheap one.
         routing: the tours.
-        seed: of the search that the plan belongs to.
-        halt: shape (1,); following ends soon after it has turned true.
-        number: of the attempt; the first one finds a plan soon rather than a cheap one.
         rounds: of the search for motions where robots get in each other's way.
     """
-    cost_maps = cost_maps_of(problem)
-    stops = [whole_tour(problem, routing, r) for r in range(len(cost_maps))]
+    cost_maps, first = cost_maps_of(problem), request.number == 0
+    stops = whole_tours(problem.mission.targets, routing.tours)
     tours = problem.visits(routing.tours)
     timed = problem.minimum_time or problem.preference.objective.makespan_weight > 0.0
-    paths = [
-        tour_path(problem, r, _led(problem, r, tour, number), timed)
-        for r, tour in enumerate(stops)
-    ]
-    judged = number > 0 and not timed
-    paths = [
-        _geared(problem, r, cost_maps[r], path, judged) for r, path in enumerate(paths)
-    ]
-    tasks = [
-        RobotTask(tour, path, cost_map, searched=len(path.stop) < len(tour))
-        for tour, path, cost_map in zip(stops, paths, cost_maps, strict=True)
-    ]
-    others = partial(_otherwise, problem, tasks, number == 0, halt)
-    drive = drive_paths(problem, tasks, halt, others, rounds=rounds)
+    tasks = []
+    for r, (tour, cost_map) in enumerate(zip(stops, cost_maps, strict=True)):
+        # The search for motions nearly always finds the shortest curve to a single
+        # target with a heading at once.
+        ahead = [] if first and is_one_pose(problem, r, tour) else tour
+        path = tour_path(problem, r, ahead, timed)
+        path = _geared(problem, r, cost_map, path, judged=not (first or timed))
+        tasks.append(RobotTask(tour, path, cost_map))
+    drive = drive_paths(problem, tasks, request.halt, soon=first, rounds=rounds)
     if not drive.trajectories:
-        led = any(len(path.target) > 0 for path in paths)
+        led = any(len(task.path.target) > 0 for task in tasks)
         return Followed(None, drive.failure, driven=False, led=led)
-    plan = plan_or_refusal(problem, seed, params, drive.trajectories, tours)
+    plan = plan_or_refusal(
+        problem, request.seed, request.params, drive.trajectories, tours
+    )
     if isinstance(plan, Plan):
         return Followed(plan)
     return Followed(None, plan, leg_J=legs_driven_J(problem, drive.trajectories, tours))
 
 
-def _led(problem: Problem, r: int, tour: list[int], number: int) -> list[int]:
-    """Return the targets of a tour that a path leads to in an attempt.
-
-    In the first one it has none if there is but one, with a heading: the search for
-    motions nearly always finds the shortest curve at once.
-    """
-    return [] if number == 0 and is_one_pose(problem, r, tour) else tour
-
-
-def _otherwise(
-    problem: Problem, tasks: Sequence[RobotTask], soon: bool, halt: np.ndarray, r: int
-) -> Iterator[RobotTask]:
-    """Yield what robot r may do instead: drive over poses."""
-    task = tasks[r]
-    other = posed(problem, r, task.cost_map, task.tour, halt, soon=soon)
-    if other is not None:
-        yield other
-
-
 def path_cost_J(problem: Problem, routing: Routing) -> float:
     """Return the cost of tours along smoothed paths of few nodes [J]."""
     plain = problem.mission.fleet["plain"]
-    total = 0.0
+    total, tours = 0.0, whole_tours(problem.mission.targets, routing.tours)
     for r, cost_map in enumerate(cost_maps_of(problem)):
-        path = tour_path(problem, r, whole_tour(problem, routing, r))
+        path = tour_path(problem, r, tours[r])
         _, cost_m = smooth_path(problem.mission.targets, cost_map, path, (JUDGED_M,))
         total += cost_m * float(plain[r])
     return total
-
-
-def whole_tour(problem: Problem, routing: Routing, r: int) -> list[int]:
-    """Return robot r's targets; where it must end comes last."""
-    finish = int(problem.mission.targets.finish[r])
-    return [*routing.tours[r], *([finish] if finish >= 0 else [])]
 
 
 def tour_path(
@@ -193,7 +158,6 @@ def tour_path(
         stop=stops,
         target=np.array(tour, np.int64),
         deeper=np.full(len(tour), TRACKING_M),
-        pivot=np.zeros(0, np.int64),
         heading=heading,
         pause_s=np.zeros(len(tour)),
         aim=problem.aims(r, tour),

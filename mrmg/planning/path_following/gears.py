@@ -47,12 +47,17 @@ def with_best_gears(
     for at, turn in turns:
         if not DOUBTFUL[0] < turn < DOUBTFUL[1]:
             continue
-        gear = np.where(np.arange(len(path.gear)) < at, path.gear, -path.gear)
-        other = replace(path, gear=gear)
+        other = other_gear_from(path, at)
         cost_m = smoothed_cost_m(problem, r, cost_map, other)
         if cost_m < least_m:
             path, least_m = other, cost_m
     return path
+
+
+def other_gear_from(path: Path, at: int) -> Path:
+    """Return a path that is driven in the other gear from a node on."""
+    number = np.arange(len(path.gear))
+    return replace(path, gear=np.where(number < at, path.gear, -path.gear))
 
 
 def smoothed_cost_m(problem: Problem, r: int, cost_map: CostMap, path: Path) -> float:

@@ -12,15 +12,13 @@ keeps every battery above its reserve, and is better by the scene's objective.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 
 import numpy as np
 
 from mrmg.motion._kernels import UNICYCLE, USER
-from mrmg.planning.assembly import make_plan
-from mrmg.planning.parameters import PlannerParams
+from mrmg.planning.attempt import Request
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import SPACINGS_M, path_of, visit_steps
 from mrmg.planning.path_following.coordination.coordination import coordinated
@@ -28,12 +26,13 @@ from mrmg.planning.path_following.coordination.rounds import ROUNDS, Round
 from mrmg.planning.path_following.coordination.tasks import no_path
 from mrmg.planning.path_following.cost_map import cost_map_of, inflated, smooth_terrain
 from mrmg.planning.path_following.pauses import with_pauses
+from mrmg.planning.path_following.poses import posed
 from mrmg.planning.path_following.robot_task import RobotTask
 from mrmg.planning.path_following.tracking import Drive, Motion, drive_alone
 from mrmg.planning.problem._control_kernels import wrap
 from mrmg.planning.problem._target_kernels import at_target
 from mrmg.planning.problem.problem import Problem
-from mrmg.planning.problem.targets import target_depth_m
+from mrmg.planning.problem.targets import target_depth_m, whole_tours
 from mrmg.planning.problem.time_weighting import energy_share
 from mrmg.planning.roadmap.vertices import planned_regions
 from mrmg.plans import Plan, Trajectory
@@ -67,22 +66,19 @@ class FleetDrive:
     failure: str = ""
 
 
-def refine(
-    problem: Problem, params: PlannerParams, plan: Plan, halt: np.ndarray
-) -> Plan:
+def refine(problem: Problem, request: Request, plan: Plan) -> Plan:
     """Return a plan that is better than `plan`, or `plan` itself.
 
     Args:
         problem: the mission.
-        params: parameters.
+        request: the attempt, by whose seed the plan was found.
         plan: a valid plan.
-        halt: shape (1,); refinement ends soon after it has turned true.
     """
     tours = tour_numbers(problem, plan)
-    trajectories = along_trajectories(problem, tours, plan.trajectories, halt)
+    trajectories = along_trajectories(problem, tours, plan.trajectories, request.halt)
     if not trajectories:
         return plan
-    found = make_plan(problem, plan.seed, params, trajectories, plan.tours)
+    found = request.plan(problem, trajectories, plan.tours)
     rank = problem.preference.rank
     return found if found is not None and rank(found) < rank(plan) else plan
 
@@ -126,8 +122,8 @@ def drive_paths(
     problem: Problem,
     tasks: Sequence[RobotTask],
     halt: np.ndarray,
-    others: Callable[[int], Iterable[RobotTask]] = lambda r: (),
     *,
+    soon: bool | None = None,
     rounds: Sequence[Round] = ROUNDS[:1],
 ) -> FleetDrive:
     """Smooth paths and drive the fleet along them.
@@ -139,24 +135,22 @@ def drive_paths(
         problem: the mission.
         tasks: what each robot drives; changed as its path is.
         halt: shape (1,); driving ends soon after it has turned true.
-        others: what a robot that does not get through may drive instead.
+        soon: whether a way over poses that a robot drives where it does not get
+            through is wanted soon rather than cheap; None if it does without.
         rounds: of the search for motions.
     """
     tasks, drives = list(tasks), []
-    for r in range(len(tasks)):
-        drive, failures = None, list[str]()
-        for task in chain([tasks[r]], others(r)):
-            if halt[0]:
-                return FleetDrive(())
-            cost_map = task.cost_map
-            drive, failure = _driven(problem, r, task)
-            task.cost_map = cost_map  # maps that led round places are large
-            failures.append(failure)
-            if drive is not None or not failure:
-                tasks[r] = task
-                break
-        else:
-            return FleetDrive((), failures[0])
+    for r, task in enumerate(tasks):
+        if halt[0]:
+            return FleetDrive(())
+        drive, failure = _driven(problem, r, task)
+        if drive is None and failure and soon is not None:
+            other = posed(problem, r, task.cost_map, task.tour, halt, soon=soon)
+            if other is not None:
+                tasks[r] = other
+                drive, _ = _driven(problem, r, other)
+        if drive is None and failure:
+            return FleetDrive((), failure)
         drives.append(drive)
     trajectories = coordinated(
         problem,
@@ -175,15 +169,15 @@ def _driven(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None, st
     """Return robot r's drive along its path, put right as often as it takes.
 
     None, and why, if there is none. None, too, of a robot whose motions are searched
-    for.
+    for, as no path leads it to its targets.
     """
-    if task.searched:
-        return None, ""
-    if problem.mission.fleet[r]["model"] == USER:
+    user = problem.mission.fleet[r]["model"] == USER
+    if user or len(task.path.target) < len(task.tour):
         return task.before, ""
-    first = task.path
+    first, cost_map = task.path, task.cost_map
     task.smooth(problem, SPACINGS_M)
     drive, failure = _put_right(problem, r, task)
+    task.cost_map = cost_map  # maps that led round places are large
     if drive is task.before:
         task.path = first
     return drive, failure
@@ -198,17 +192,17 @@ def _put_right(problem: Problem, r: int, task: RobotTask) -> tuple[Drive | None,
         task: its path is led round where it finds no room, and deeper into targets.
     """
     targets, robot = problem.mission.targets, problem.scene.robots[r].id
-    tour, reason = task.path.target.tolist(), ""
+    tour, reason, inflations = task.path.target.tolist(), "", list[np.ndarray]()
     for _ in range(TRIES):
         drive = drive_alone(problem, r, with_pauses(problem, r, task.path))
         end = drive.motion.state[-1]
         if not drive.arrived:
             place = end[:2]
-            near = [p for p in task.inflations if np.hypot(*(p - place)) < NEAR_M]
+            near = [p for p in inflations if np.hypot(*(p - place)) < NEAR_M]
             reason = f"{robot} finds no room {_on_its_way(problem, task, drive)}"
             if len(near) >= SWERVES:
                 break
-            task.inflations.append(place)
+            inflations.append(place)
             task.cost_map = inflated(task.cost_map, place)
             task.smooth(problem, SPACINGS_M[-1:])
         elif len(visit_steps(targets, tour, drive.motion.state)) < len(tour):
@@ -255,11 +249,9 @@ def cost_maps_of(problem: Problem) -> list[CostMap]:
 def tour_numbers(problem: Problem, plan: Plan) -> list[list[int]]:
     """Return each robot's targets by number; where it must end comes last."""
     number = {target.id: i for i, target in enumerate(problem.scene.targets())}
-    finish = problem.mission.targets.finish
-    return [
-        [number[name] for name in plan.tours[trajectory.robot]] + [int(f)] * int(f >= 0)
-        for trajectory, f in zip(plan.trajectories, finish, strict=True)
-    ]
+    robots = problem.scene.robots
+    tours = [[number[name] for name in plan.tours[robot.id]] for robot in robots]
+    return whole_tours(problem.mission.targets, tours)
 
 
 def _aim_better(problem: Problem, task: RobotTask, state: np.ndarray) -> None:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-
-import numpy as np
+from dataclasses import dataclass
 
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.band import Path, smooth_path
@@ -22,17 +20,12 @@ class RobotTask:
         path: its way.
         cost_map: what the way is priced on.
         before: how the robot drove before; None if it did not.
-        searched: whether its motions are searched for, as it has no path to a pose.
-        inflations: places that it was led round.
-
     """
 
     tour: list[int]
     path: Path
     cost_map: CostMap
     before: Drive | None = None
-    searched: bool = False
-    inflations: list[np.ndarray] = field(default_factory=list)
 
     def smooth(self, problem: Problem, spacings_m: Sequence[float]) -> None:
         """Smooth the path; one without targets only leads out of the way."""

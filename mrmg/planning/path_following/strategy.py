@@ -25,10 +25,10 @@ from mrmg.planning.path_following.following import (
     LEAST_SOC_MARGIN,
     can_follow,
     follow_tours,
-    whole_tour,
 )
 from mrmg.planning.path_following.refine import ROBOTS_MEET, along_trajectories, refine
 from mrmg.planning.problem.problem import Problem
+from mrmg.planning.problem.targets import whole_tours
 from mrmg.plans import Plan
 
 TIME_SHARES = (1.0, 0.95, 0.85, 0.7)
@@ -59,13 +59,11 @@ class Schedule:
         followed: state-of-charge margins with draws of tours that are followed, one
             after another until there is a plan.
         search_margin: surcharge on the energies of the tours that are searched along.
-        search_soc_margins: of searches, until there are tours that leave so much.
     """
 
     time_share: float
     followed: tuple[tuple[float, tuple[Draw, ...]], ...]
     search_margin: float
-    search_soc_margins: tuple[float, ...]
 
     @staticmethod
     def of(problem: Problem, params: PlannerParams, number: int) -> Schedule:
@@ -86,7 +84,6 @@ class Schedule:
             time_share=TIME_SHARES[number % len(TIME_SHARES)],
             followed=tuple(followed) if follows(problem, params) else (),
             search_margin=margin,
-            search_soc_margins=(params.soc_margin, 0.0),
         )
 
 
@@ -156,7 +153,7 @@ def _tries(problem: Problem, request: Request, schedule: Schedule) -> Iterator[A
     for soc_margin, draws in schedule.followed:
         kept = with_driven_legs(problem.with_soc_margin(soc_margin), learnt.leg_J)
         yield follow_paths(kept, request, draws, soc_margin, learnt)
-    for soc_margin in schedule.search_soc_margins:
+    for soc_margin in (request.params.soc_margin, 0.0):  # until there are tours
         kept = problem.with_soc_margin(soc_margin).with_margin(schedule.search_margin)
         searched = search_motions(kept, request, further=int(learnt.searched))
         yield searched
@@ -177,12 +174,11 @@ def search_motions(problem: Problem, request: Request, further: int = 0) -> Atte
     routing_s = time.perf_counter() - began
     if not routing.feasible or request.halted:
         return Attempt(routing_s=routing_s, tours_found=routing.feasible)
-    robots = range(len(routing.tours))
-    targets = [whole_tour(problem, routing, r) for r in robots]
+    targets = whole_tours(problem.mission.targets, routing.tours)
     trajectories = coordinated(
         problem,
         targets,
-        [no_path(problem, r) for r in robots],
+        [no_path(problem, r) for r in range(len(targets))],
         request.halt,
         seed=request.stream_seed("coordination"),
         rounds=rounds_of(request.number + further),
@@ -202,7 +198,7 @@ def search_motions(problem: Problem, request: Request, further: int = 0) -> Atte
         sooner = replace(problem, minimum_time=late)
         better = plan
         if left > 0:
-            better = refine(sooner, request.params, plan, request.halt)
+            better = refine(sooner, request, plan)
         enough = not problem.preference.gains(better, plan, LEAST_GAIN)
         plan = better if better is not plan else None
         left = 0 if enough else left - 1
@@ -246,11 +242,8 @@ def follow_paths(
         driven += 1
         followed = follow_tours(
             replace(problem, minimum_time=minimum_time),
-            request.params,
+            request,
             tours,
-            request.seed,
-            request.halt,
-            request.number,
             rounds_of(request.number + learnt.met),
         )
         learnt.met |= followed.failure == ROBOTS_MEET

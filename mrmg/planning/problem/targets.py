@@ -36,6 +36,14 @@ def finish_of(scene: Scene) -> np.ndarray:
     return np.where(must, len(scene.targets()) + np.cumsum(must) - 1, -1)
 
 
+def whole_tours(targets: Targets, tours: Sequence[Sequence[int]]) -> list[list[int]]:
+    """Return the numbers of each robot's targets; where it must end comes last."""
+    return [
+        [*tour, *([int(finish)] if finish >= 0 else [])]
+        for tour, finish in zip(tours, targets.finish, strict=True)
+    ]
+
+
 def target_depth_m(scene: Scene) -> float:
     """Return how deep inside its targets a fleet drives, at least [m]."""
     errors_m = [tracking_error(robot.model).disturbed_m for robot in scene.robots]

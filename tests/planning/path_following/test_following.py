@@ -11,7 +11,7 @@ import pytest
 import mrmg
 from mrmg.energy.metering import battery_profile
 from mrmg.motion._kernels import USER
-from mrmg.planning import PlannerParams
+from mrmg.planning import PlannerParams, Request
 from mrmg.planning.path_following.following import (
     LEAST_SOC_MARGIN,
     can_follow,
@@ -20,17 +20,19 @@ from mrmg.planning.path_following.following import (
     tour_path,
 )
 from mrmg.planning.problem.problem import state_mission
+from mrmg.planning.routers import find_router
 from mrmg.planning.routing.routing import solve_routing
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 
 PARAMS = PlannerParams(samples=600)
+REQUEST = Request(params=PARAMS, router=find_router(PARAMS.router), seed=0)
 
 
 def followed(scene: Scene) -> Plan:
     problem = state_mission(scene, 0, PARAMS).with_soc_margin(LEAST_SOC_MARGIN)
     tours = solve_routing(problem.mission.routing, PARAMS.router, 0)
-    plan = follow_tours(problem, PARAMS, tours, 0, np.zeros(1, np.bool_)).plan
+    plan = follow_tours(problem, REQUEST, tours).plan
     assert plan is not None
     return plan
 
@@ -116,8 +118,8 @@ def test_where_time_counts_cars_back_out_of_what_is_too_narrow(
 def test_halted_it_gives_nothing(yard: Callable[..., Scene]) -> None:
     problem = state_mission(yard(), 0, PARAMS)
     tours = solve_routing(problem.mission.routing, PARAMS.router, 0)
-    halted = np.ones(1, np.bool_)
-    assert follow_tours(problem, PARAMS, tours, 0, halted).plan is None
+    halted = replace(REQUEST, halt=np.ones(1, np.bool_))
+    assert follow_tours(problem, halted, tours).plan is None
 
 
 SWAP = [

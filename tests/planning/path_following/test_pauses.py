@@ -9,7 +9,7 @@ import pytest
 
 import mrmg
 from mrmg.energy.metering import battery_profile
-from mrmg.planning import PlannerParams
+from mrmg.planning import PlannerParams, Request
 from mrmg.planning.path_following.following import (
     LEAST_SOC_MARGIN,
     follow_tours,
@@ -17,18 +17,20 @@ from mrmg.planning.path_following.following import (
 )
 from mrmg.planning.path_following.pauses import with_pauses
 from mrmg.planning.problem.problem import state_mission
+from mrmg.planning.routers import find_router
 from mrmg.planning.routing.routing import solve_routing
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 
 SCENES = Path(__file__).parents[2] / "scenes"
 PARAMS = PlannerParams(samples=600)
+REQUEST = Request(params=PARAMS, router=find_router(PARAMS.router), seed=0)
 
 
 def followed(scene: Scene) -> Plan:
     problem = state_mission(scene, 0, PARAMS).with_soc_margin(LEAST_SOC_MARGIN)
     tours = solve_routing(problem.mission.routing, PARAMS.router, 0)
-    plan = follow_tours(problem, PARAMS, tours, 0, np.zeros(1, np.bool_)).plan
+    plan = follow_tours(problem, REQUEST, tours).plan
     assert plan is not None
     return plan
 

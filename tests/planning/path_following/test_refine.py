@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import mrmg
-from mrmg.planning import PlannerParams, plan_mission
+from mrmg.planning import PlannerParams, Request, plan_mission
 from mrmg.planning.path_following.band import visit_steps
 from mrmg.planning.path_following.refine import (
     nearest_in_order,
@@ -20,13 +20,13 @@ from mrmg.planning.path_following.refine import (
 )
 from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.planning.problem.targets import target_depth_m
+from mrmg.planning.routers import find_router
 from mrmg.plans import Plan
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
 
 SCENES = Path(__file__).parents[2] / "scenes"
 RAW = PlannerParams(improvements=0, refinements=0, samples=600, follow_paths=False)
-NEVER = np.zeros(1, np.bool_)
 
 MISSIONS = (
     "two_swap",
@@ -48,11 +48,15 @@ class Refined:
     after: Plan
 
 
+def asked(seed: int = 0) -> Request:
+    return Request(params=RAW, router=find_router(RAW.router), seed=seed)
+
+
 def refined(scene: Scene, seed: int = 0) -> Refined:
     before = plan_mission(scene, seed=seed, params=RAW).plan
     assert before is not None
     problem = state_mission(scene, seed, RAW)
-    return Refined(scene, problem, before, refine(problem, RAW, before, NEVER))
+    return Refined(scene, problem, before, refine(problem, asked(seed), before))
 
 
 @pytest.fixture(params=MISSIONS, scope="module")
@@ -111,7 +115,7 @@ def test_the_planners_limits_are_kept(mission: Refined) -> None:
 
 
 def test_the_same_again(mission: Refined) -> None:
-    again = refine(mission.problem, RAW, mission.before, NEVER)
+    again = refine(mission.problem, asked(), mission.before)
     assert again.digest == mission.after.digest
 
 
@@ -125,8 +129,8 @@ def test_most_missions_gain(name: str) -> None:
 
 
 def test_halted_it_hands_back_what_it_was_given(mission: Refined) -> None:
-    halt = np.ones(1, np.bool_)
-    assert refine(mission.problem, RAW, mission.before, halt) is mission.before
+    halted = replace(asked(), halt=np.ones(1, np.bool_))
+    assert refine(mission.problem, halted, mission.before) is mission.before
 
 
 def test_a_straight_drive_comes_near_to_its_distance(
@@ -155,7 +159,7 @@ def test_refining_again_and_again_never_costs_more() -> None:
     one = refined(mrmg.load_scene("quickstart"))
     plan = one.after
     for _ in range(3):
-        better = refine(one.problem, RAW, plan, NEVER)
+        better = refine(one.problem, asked(), plan)
         assert better.cost_J <= plan.cost_J
         plan = better
 
@@ -169,7 +173,7 @@ def test_a_plan_that_misses_its_targets_is_left_alone() -> None:
             for item in one.before.trajectories
         ),
     )
-    assert refine(one.problem, RAW, short, NEVER) is short
+    assert refine(one.problem, asked(), short) is short
 
 
 def test_a_robot_without_a_tour_stays(yard: Callable[..., Scene]) -> None:
