@@ -74,14 +74,12 @@ class Course(NamedTuple):
         ease: deceleration that costs nothing [m/s^2].
         stiffness: how fast it returns to its path: errors decay over about its inverse
             [1/m].
-        astray: distance from it at which driving along it is given up [m].
     """
 
     node: np.ndarray
     size: np.ndarray
     ease: float
     stiffness: float
-    astray: float
 
 
 @inlined

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mrmg.compilation import borrowed, kernel
+from mrmg.compilation import kernel
 from mrmg.motion._kernels import step
 from mrmg.planning.path_following._following_kernels import (
     at_rest,
@@ -15,6 +15,9 @@ from mrmg.planning.problem._clearance_kernels import moves_clear
 from mrmg.planning.problem._target_kernels import askew, in_target
 from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.world._kernels import multiplier_in
+
+STRAYED_M = 1.0
+"""Distance from the path at which driving is given up."""
 
 
 @kernel
@@ -35,7 +38,6 @@ def drive(own, spaces, terrain, course, dt, spent_s, state, control):
         (steps, whether it got there); if it did not, it would run into an obstacle or
         stray from its path after the last of them, or there was no more room.
     """
-    own, spaces, terrain, course = borrowed((own, spaces, terrain, course))
     corner = np.empty((MOST_CORNERS, 2))
     segment, stood, spent = first_segment(course, state[0]), 0, 0.0
     for k in range(len(control)):
@@ -50,7 +52,7 @@ def drive(own, spaces, terrain, course, dt, spent_s, state, control):
         step(own[0], state[k], u1, u2, dt, state[k + 1])
         if stood == 0:
             spent += dt * multiplier_in(terrain, state[k, 0], state[k, 1])
-        strays = abs(off) > course.astray
+        strays = abs(off) > STRAYED_M
         if strays or not moves_clear(own, spaces, state[k], state[k + 1], corner):
             return k + 1, False
     return len(control), False

@@ -43,9 +43,6 @@ CRAWL = 0.3
 STIFFNESS = 0.8
 """How fast robots return to their paths [1/m]; nimbler ones faster."""
 
-STRAYED_M = 1.0
-"""Distance from its path at which a robot's drive alone is given up."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
@@ -133,7 +130,6 @@ def course_of(problem: Problem, r: int, path: Path) -> Course:
         size=np.array([n]),
         ease=ease,
         stiffness=STIFFNESS / nimble_share(path_curvature(robot)),
-        astray=STRAYED_M,
     )
 
 

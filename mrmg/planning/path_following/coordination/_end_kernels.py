@@ -19,6 +19,7 @@ from mrmg.planning.path_following.coordination._motion_kernels import (
     drivable_radius,
     drive_curve,
     smooth_radius,
+    write_curve,
 )
 from mrmg.planning.problem._clearance_kernels import keeps_clear
 from mrmg.planning.problem._control_kernels import braking_control, stands, wrap
@@ -131,10 +132,11 @@ def drive_to(search, target, room, control):
     A car drives along the shortest curve. A robot that turns on the spot drives
     straight and turns, or along a curve where it is there sooner.
     """
-    own, targets, state = search.own, search.targets, room.state
+    own, targets = search.own, search.targets
+    course, corner, state = room.curve, room.corner[0], room.state
     if own[0].model == USER:
         return steer_to(search, target, state, control)
-    x, y, heading = free_pose(search, target, room.corner[0])
+    x, y, heading = free_pose(search, target, corner)
     free = targets.target[target].tolerance >= pi
     tolerance = np.inf if free else targets.target[target].tolerance
     if own[0].model == CAR:
@@ -143,15 +145,25 @@ def drive_to(search, target, room, control):
             if abs(wrap(heading - state[0, 2])) > 0.5 * pi:
                 heading = wrap(heading + pi)
         radius = drivable_radius(own[0])
-        return drive_curve(search, room, x, y, heading, tolerance, radius, control)
-    curved, radius = -1, smooth_radius(own[0])
+        total = write_curve(own, state[0], x, y, heading, tolerance, course, radius)
+        if not total < np.inf:
+            return -1
+        return drive_curve(search, course, corner, state, control)
+    curved = -1
     if not free:
-        curved = drive_curve(search, room, x, y, heading, tolerance, radius, control)
+        radius = smooth_radius(own[0])
+        total = write_curve(own, state[0], x, y, heading, tolerance, course, radius)
+        if total < np.inf:
+            curved = drive_curve(search, course, corner, state, control)
         if curved >= 0 and not at_target(targets, target, state[curved]):
             curved = -1
-    count = drive_curve(search, room, x, y, heading, tolerance, 0.0, control)
+    total = write_curve(own, state[0], x, y, heading, tolerance, course, 0.0)
+    if not total < np.inf:
+        return -1
+    count = drive_curve(search, course, corner, state, control)
     if curved >= 0 and (count < 0 or curved < count):
-        count = drive_curve(search, room, x, y, heading, tolerance, radius, control)
+        write_curve(own, state[0], x, y, heading, tolerance, course, radius)
+        count = drive_curve(search, course, corner, state, control)
     return count
 
 

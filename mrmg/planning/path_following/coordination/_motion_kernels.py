@@ -11,13 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mrmg.compilation import inlined, kernel, record_type
+from mrmg.compilation import borrowed, inlined, kernel, record_type
 from mrmg.motion._kernels import USER, steer_user, step
 from mrmg.planning.path_following._following_kernels import (
     advance,
+    at_rest,
     track_control,
 )
-from mrmg.planning.path_following._tracking_kernels import drive
 from mrmg.planning.path_following.coordination._reeds_shepp_kernels import (
     MOST_PIECES,
     reeds_shepp,
@@ -257,26 +257,30 @@ def write_curve(own, state, x, y, theta, tolerance, course, radius):
 
 
 @kernel
-def drive_curve(search, room, x, y, theta, tolerance, radius, control):
-    """Drive along a curve from the first state; return the steps, or -1.
+def drive_curve(search, course, corner, state, control):
+    """Drive along a path until the robot rests at its end; return the steps, or -1.
 
     It is given up where an obstacle is in the way.
 
     Args:
         search: gives robot, surroundings and step.
-        room: receives the curve, and states from the first one on.
-        x, y, theta: pose at which the robot rests in the end.
-        tolerance: of its heading [rad].
-        radius: of turns [m]; 0 for a line.
+        course: the path.
+        corner: room for a footprint, shape (M, 2).
+        state: from state[0] on, shape (n, 5).
         control: shape (n, 2).
     """
-    own, course, state, dt = search.own, room.curve, room.state, search.dt
-    total = write_curve(own, state[0], x, y, theta, tolerance, course, radius)
-    if not total < np.inf:
-        return -1
-    most = int(total / (own[0].limit[1] * dt)) + REACH_STEPS
-    steps, arrived = drive(
-        own, search.spaces, search.terrain, course, dt, np.empty(course.size[0]),
-        state, control[: min(most, len(control) - 1)],
-    )  # fmt: skip
-    return steps if arrived else -1
+    search, course, corner = borrowed((search, course, corner))
+    own, dt = search.own, search.dt
+    way = course.node[max(course.size[0] - 1, 0)].way
+    most = int(way / (own[0].limit[1] * dt)) + REACH_STEPS
+    most = min(most, len(control) - 1)
+    segment = 0 if course.size[0] > 1 else course.size[0]
+    for k in range(most):
+        if at_rest(own, course, segment, state[k]):
+            return k
+        u1, u2, segment, _, _ = track_control(own, course, segment, LONG, state[k], dt)
+        control[k, 0], control[k, 1] = u1, u2
+        step(own[0], state[k], u1, u2, dt, state[k + 1])
+        if not moves_clear(own, search.spaces, state[k], state[k + 1], corner):
+            return -1
+    return -1

@@ -134,7 +134,6 @@ class _Planning:
                 size=np.zeros(1, np.int64),
                 ease=0.0,
                 stiffness=1.0,
-                astray=np.inf,
             ),
         )
         self.round = ROUNDS[0]

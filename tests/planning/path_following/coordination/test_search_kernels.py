@@ -44,7 +44,7 @@ def found_control(problem: Problem, r: int, around: Traffic) -> np.ndarray:
         control=np.zeros((HORIZON, 2)),
         corner=np.empty((2, MOST_CORNERS, 2)),
         near=np.empty(len(problem.start), np.int64),
-        curve=Course(empty_path(100), np.zeros(1, np.int64), 0.0, 1.0, np.inf),
+        curve=Course(empty_path(100), np.zeros(1, np.int64), 0.0, 1.0),
     )
     control = np.zeros((HORIZON, 2))
     nodes = empty_nodes(search.task)
