@@ -11,22 +11,23 @@ from mrmg.world._polygon_kernels import point_segment_distance
 
 
 @kernel
-def fill_rings(ring_start, point, x_min, y_min, cell, rows, columns):
-    """Return which cell centres lie inside the rings, by the even-odd rule."""
+def cells_inside(edge, x_min, y_min, cell, rows, columns):
+    """Return which cell centres lie inside closed rings, by the even-odd rule.
+
+    Args:
+        edge: their edges, shape (n, 4).
+        x_min, y_min, cell: corner of the grid, and side of a cell.
+        rows, columns: number of cells.
+    """
     inside = np.zeros((rows, columns), np.bool_)
-    crossing = np.zeros(len(point), np.float64)
+    crossing = np.zeros(len(edge), np.float64)
     for row in range(rows):
         y = y_min + (row + 0.5) * cell
         n = 0
-        for ring in range(len(ring_start) - 1):
-            first, last = ring_start[ring], ring_start[ring + 1]
-            for i in range(first, last):
-                j = i + 1 if i + 1 < last else first
-                y0, y1 = point[i, 1], point[j, 1]
-                if (y0 <= y) != (y1 <= y):
-                    t = (y - y0) / (y1 - y0)
-                    crossing[n] = point[i, 0] + t * (point[j, 0] - point[i, 0])
-                    n += 1
+        for x0, y0, x1, y1 in edge:
+            if (y0 <= y) != (y1 <= y):
+                crossing[n] = x0 + (y - y0) / (y1 - y0) * (x1 - x0)
+                n += 1
         crossing[:n].sort()
         for pair in range(0, n - 1, 2):
             low = int(ceil((crossing[pair] - x_min) / cell - 0.5))

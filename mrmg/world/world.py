@@ -114,19 +114,12 @@ def free_space(
         cell_m: side of a cell of the distance field.
     """
     x_min, y_min, x_max, y_max = bounds
-    ring_start, points = _rings(obstacles)
-    frame = np.array([(x_min, y_min), (x_max, y_min), (x_max, y_max), (x_min, y_max)])
-    rings = [frame, *np.split(points, ring_start[1:-1])]
-    edge = np.concatenate(
-        [np.hstack([ring, np.roll(ring, -1, axis=0)]) for ring in rings]
-    )
+    solid = _edges(obstacles)
+    edge = np.concatenate([_edges(shapely.box(*bounds)), solid])
     columns, rows = _cells(bounds, cell_m)
-    distance = _raster_kernels.edge_distance_field(
-        edge, x_min, y_min, cell_m, rows, columns
-    )
-    inside = _raster_kernels.fill_rings(
-        ring_start, points, x_min, y_min, cell_m, rows, columns
-    )
+    grid = float(x_min), float(y_min), cell_m, rows, columns
+    distance = _raster_kernels.edge_distance_field(edge, *grid)
+    inside = _raster_kernels.cells_inside(solid, *grid)
     inside[:, x_min + (np.arange(columns) + 0.5) * cell_m > x_max] = True
     inside[y_min + (np.arange(rows) + 0.5) * cell_m > y_max] = True
     bucket_columns, bucket_rows = _cells(bounds, BUCKET_M)
@@ -188,25 +181,22 @@ def _cells(bounds: tuple[float, float, float, float], side_m: float) -> tuple[in
     )
 
 
-def _rings(geometry: shapely.Geometry) -> tuple[np.ndarray, np.ndarray]:
-    """Return the first point of each ring of polygons and the end, and all points."""
-    rings = [
-        shapely.get_coordinates(ring)[:-1]
-        for ring in shapely.get_rings(shapely.get_parts(geometry))
-    ]
-    points = np.concatenate([np.zeros((0, 2)), *rings])
-    return np.cumsum([0, *(len(ring) for ring in rings)]), points
+def _edges(geometry: shapely.Geometry) -> np.ndarray:
+    """Return the edges of polygons, (x0, y0, x1, y1) in m, shape (n, 4)."""
+    rings = shapely.get_rings(shapely.get_parts(geometry))
+    corners = [shapely.get_coordinates(ring) for ring in rings]
+    edges = [np.hstack([ring[:-1], ring[1:]]) for ring in corners]
+    return np.concatenate([np.zeros((0, 4)), *edges])
 
 
 def _terrain_grid(scene: Scene, cell_m: float) -> TerrainGrid:
     x_min, y_min, _, _ = scene.bounds
     columns, rows = _cells(scene.bounds, cell_m)
+    grid = float(x_min), float(y_min), cell_m, rows, columns
     multiplier = np.ones((rows, columns))
     turning = np.ones((rows, columns))
     for area in scene.terrain:
-        inside = _raster_kernels.fill_rings(
-            *_rings(area.shape), float(x_min), float(y_min), cell_m, rows, columns
-        )
+        inside = _raster_kernels.cells_inside(_edges(area.shape), *grid)
         multiplier[inside] = area.multiplier
         turning[inside] = area.turning_multiplier
     flat = TerrainGrid(
