@@ -24,20 +24,8 @@ def make_plan(
     params: PlannerParams,
     trajectories: Sequence[Trajectory],
     tours: Mapping[str, tuple[str, ...]],
-) -> Plan | None:
-    """Return the plan of trajectories, or None if exact accounting refuses it."""
-    made = plan_or_refusal(problem, seed, params, trajectories, tours)
-    return made if isinstance(made, Plan) else None
-
-
-def plan_or_refusal(
-    problem: Problem,
-    seed: int,
-    params: PlannerParams,
-    trajectories: Sequence[Trajectory],
-    tours: Mapping[str, tuple[str, ...]],
-) -> Plan | str:
-    """Return the plan of trajectories, or in words why exact accounting refuses it.
+) -> tuple[Plan | None, str]:
+    """Return the plan of trajectories, or None and why exact accounting refuses it.
 
     Kernels meter terrain on a grid; the ledger uses the exact areas.
 
@@ -55,24 +43,23 @@ def plan_or_refusal(
         robot, tour = scene.robot(trajectory.robot), tours[trajectory.robot]
         own, content_J, drawn = visits_and_energy(scene, trajectory, tour)
         if len(own) < len(tour):
-            return f"{robot.id} misses {tour[len(own)]}"
+            return None, f"{robot.id} misses {tour[len(own)]}"
         battery = robot.battery
         least_J = battery.reserve_J + problem.soc_margin * battery.capacity_J
         missing_J = least_J - content_J.min()
         if missing_J > 0.0:
-            missing = energy_and_metres(missing_J, robot)
-            return f"{robot.id} ends {missing} short of what its battery must keep"
+            less = energy_and_metres(missing_J, robot)
+            return None, f"{robot.id} ends {less} short of what its battery must keep"
         visits += own
         entries += drawn
     ways = {item.robot: item.state[:, :2] for item in trajectories}
     if any(crowded_stations(scene, ways)):
-        return "two robots are at a station for one at a time"
+        return None, "two robots are at a station for one at a time"
     visited = {visit.target for visit in visits}
     left_out = [goal.id for goal in scene.goals if goal.id not in visited]
     if left_out:
-        return f"nobody visits {listed(left_out)}"
-    visits.sort(key=lambda visit: (visit.step, visit.robot))
-    return Plan(
+        return None, f"nobody visits {listed(left_out)}"
+    plan = Plan(
         scene_name=scene.name,
         scene_digest=scene.digest,
         seed=seed,
@@ -87,9 +74,10 @@ def plan_or_refusal(
             for each in trajectories
         ),
         tours=tours,
-        visits=tuple(visits),
+        visits=tuple(sorted(visits, key=lambda visit: (visit.step, visit.robot))),
         ledger=EnergyLedger(tuple(entries)),
     )
+    return plan, ""
 
 
 @cache

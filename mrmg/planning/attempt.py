@@ -70,7 +70,7 @@ class Request:
             trajectories: of all robots, equally long, each at rest in the end.
             tours: ids of the targets that each robot visits, in order.
         """
-        return make_plan(problem, self.seed, self.params, trajectories, tours)
+        return make_plan(problem, self.seed, self.params, trajectories, tours)[0]
 
 
 @dataclass(frozen=True, slots=True)

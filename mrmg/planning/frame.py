@@ -32,11 +32,12 @@ from mrmg.plans import Plan
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.margins import STATES_NONE, Margins, TrackingError
 from mrmg.scene.region import Region
-from mrmg.scene.robot_model import RobotModel
+from mrmg.scene.robot_model import Limits, RobotModel
 from mrmg.scene.types import Finish, Goal, Robot, Scene
 from mrmg.world.world import MARGIN_M
 
 _Target = TypeVar("_Target", Goal, Finish)
+_Values = TypeVar("_Values", RobotModel, Limits, TrackingError)
 
 DECIMALS = 9
 """Of coordinates in the frame: fewer than what rounding takes away from them."""
@@ -110,29 +111,25 @@ class Frame:
             return params
         return replace(params, obstacle_margin_m=None, robot_margin_m=None)
 
+    @property
+    def _corner(self) -> complex:
+        """The corner of the map that lies at the frame's origin, x + iy [m]."""
+        x_min, y_min, x_max, y_max = self.bounds
+        x = (x_min, x_min, x_max, x_max)[self.quarters]
+        return complex(x, (y_min, y_max, y_max, y_min)[self.quarters])
+
     def points(self, xy: np.ndarray) -> np.ndarray:
         """Return where points of the map are in the frame, shape (n, 2)."""
-        x_min, y_min, x_max, y_max = self.bounds
-        x, y = np.asarray(xy, float).reshape(-1, 2).T
-        moved = (
-            (x - x_min, y - y_min),
-            (y_max - y, x - x_min),
-            (x_max - x, y_max - y),
-            (y - y_min, x_max - x),
-        )[self.quarters]
+        place = np.asarray(xy, float).reshape(-1, 2) @ (1.0, 1.0j)
+        moved = (place - self._corner) * 1.0j**self.quarters / self.unit_m
         # -0.0 and 0.0 would be different bits.
-        return np.round(np.stack(moved, axis=1) / self.unit_m, DECIMALS) + 0.0
+        return np.round(np.stack([moved.real, moved.imag], axis=1), DECIMALS) + 0.0
 
     def on_the_map(self, point: tuple[float, float]) -> tuple[float, float]:
         """Return where a point of the frame is on the map [m]."""
-        x_min, y_min, x_max, y_max = self.bounds
-        across, up = point[0] * self.unit_m, point[1] * self.unit_m
-        return (
-            (across + x_min, up + y_min),
-            (up + x_min, y_max - across),
-            (x_max - across, y_max - up),
-            (x_max - up, across + y_min),
-        )[self.quarters]
+        turned = complex(*point) * (-1.0j) ** self.quarters
+        place = turned * self.unit_m + self._corner
+        return place.real, place.imag
 
     def heading(self, yaw: float) -> float:
         """Return the heading in the frame that is `yaw` on the map [rad]."""
@@ -231,28 +228,20 @@ def _unit_m(scene: Scene, margins: Margins) -> float:
 
 def in_unit(model: RobotModel, unit_m: float) -> RobotModel:
     """Return a robot model with lengths in another unit, and energies as they are."""
-    limits, error = model.limits, model.tracking_error
+    error = model.tracking_error
+    lengths = "footprint_m", "height_m", "wheelbase_m", "track_m", "wheel_radius_m"
     return replace(
-        model,
+        _divided(model, unit_m, *lengths, "center_of_mass_m"),
         unit_m=unit_m,
-        footprint_m=model.footprint_m / unit_m,
-        height_m=model.height_m / unit_m,
-        wheelbase_m=model.wheelbase_m / unit_m,
-        track_m=model.track_m / unit_m,
-        limits=replace(
-            limits,
-            v_min_m_s=limits.v_min_m_s / unit_m,
-            v_max_m_s=limits.v_max_m_s / unit_m,
-            u1_max_m_s2=limits.u1_max_m_s2 / unit_m,
-        ),
+        limits=_divided(model.limits, unit_m, "v_min_m_s", "v_max_m_s", "u1_max_m_s2"),
         mass_kg=model.mass_kg * unit_m**2,
-        center_of_mass_m=model.center_of_mass_m / unit_m,
-        wheel_radius_m=model.wheel_radius_m / unit_m,
-        tracking_error=error
-        and TrackingError(
-            nominal_m=error.nominal_m / unit_m, disturbed_m=error.disturbed_m / unit_m
-        ),
+        tracking_error=error and _divided(error, unit_m, "nominal_m", "disturbed_m"),
     )
+
+
+def _divided(values: _Values, unit_m: float, *names: str) -> _Values:
+    """Return values with some of them in another unit."""
+    return replace(values, **{name: getattr(values, name) / unit_m for name in names})
 
 
 def on_the_map(
@@ -293,4 +282,4 @@ def _moved(
         problem.trajectory(r, one.control * (unit_m, 1.0))
         for r, (one, unit_m) in enumerate(zip(plan.trajectories, units_m, strict=True))
     ]
-    return make_plan(problem, plan.seed, params, trajectories, plan.tours)
+    return make_plan(problem, plan.seed, params, trajectories, plan.tours)[0]

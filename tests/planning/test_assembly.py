@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from mrmg.planning.assembly import plan_or_refusal
+from mrmg.planning.assembly import make_plan
 from mrmg.planning.parameters import PlannerParams
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
@@ -23,7 +23,9 @@ TWO_ROBOTS = [
 def assembled(scene: Scene, plan: Plan, soc_margin: float = 0.0) -> Plan | str:
     """The plan of a plan's trajectories and tours, or why there is none."""
     problem: Any = SimpleNamespace(scene=scene, soc_margin=soc_margin)
-    return plan_or_refusal(problem, 3, PlannerParams(), plan.trajectories, plan.tours)
+    params, ways = PlannerParams(), plan.trajectories
+    made, refusal = make_plan(problem, 3, params, ways, plan.tours)
+    return made or refusal
 
 
 def test_trajectories_that_keep_every_rule_are_a_plan(case: Any) -> None:

@@ -16,7 +16,7 @@ from math import radians
 import numpy as np
 
 from mrmg.motion._kernels import UNICYCLE, USER
-from mrmg.planning.assembly import plan_or_refusal
+from mrmg.planning.assembly import make_plan
 from mrmg.planning.attempt import Request
 from mrmg.planning.path_following._band_kernels import CostMap
 from mrmg.planning.path_following.arrivals import with_arrivals
@@ -110,12 +110,14 @@ def follow_tours(
     if not drive.trajectories:
         led = any(len(task.path.target) > 0 for task in tasks)
         return Followed(None, drive.failure, driven=False, led=led)
-    plan = plan_or_refusal(
+    plan, refusal = make_plan(
         problem, request.seed, request.params, drive.trajectories, tours
     )
-    if isinstance(plan, Plan):
+    if plan is not None:
         return Followed(plan)
-    return Followed(None, plan, leg_J=legs_driven_J(problem, drive.trajectories, tours))
+    return Followed(
+        None, refusal, leg_J=legs_driven_J(problem, drive.trajectories, tours)
+    )
 
 
 def path_cost_J(problem: Problem, routing: Routing) -> float:
