@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import shapely
 from shapely.geometry import Point
@@ -25,6 +26,9 @@ JOINED_M = 0.01
 
 LEAST_AREA_M2 = 1e-4
 """Area of narrow ground below which it is rounding."""
+
+KNOWN = 8
+"""Grounds that are remembered with their pieces."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,7 @@ class FreeGround:
     def of(scene: Scene, robot: Robot) -> FreeGround:
         """Return the ground of the obstacles that stop a robot."""
         shapes = [item.shape for item in scene.barriers if item.stops(robot.id)]
-        return FreeGround(scene.bounds, shapely.union_all(shapes))
+        return _ground(scene.bounds, tuple(shapes))
 
     def pieces(self, clearance_m: float) -> list[BaseGeometry]:
         """Return the pieces of ground at least so far from obstacles and bounds."""
@@ -125,6 +129,13 @@ class FreeGround:
         """Return how far a point or shape is from obstacles and bounds."""
         edges = [shapely.box(*self.bounds).exterior, self.obstacles]
         return float(shapely.GeometryCollection(edges).distance(shape))
+
+
+@lru_cache(maxsize=KNOWN)
+def _ground(
+    bounds: tuple[float, float, float, float], shapes: tuple[BaseGeometry, ...]
+) -> FreeGround:
+    return FreeGround(bounds, shapely.union_all(shapes))
 
 
 @dataclass(frozen=True, slots=True)

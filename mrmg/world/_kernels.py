@@ -274,9 +274,7 @@ def segment_clearance(space, ax, ay, bx, by, needed, enough):
 
 @kernel
 def sloped_length(way, rise, slope_price, floor):
-    """Return what a way costs on a slope [m of plain ground].
-
-    See `planning.roadmap.slopes`.
+    """Return what a way costs on a slope [m of plain ground]; see `roadmap.slopes`.
 
     Args:
         way: weighted length on the map [m].
