@@ -115,24 +115,23 @@ def roadmap(options: argparse.Namespace) -> None:
     """Write a scene's roadmap as GraphML, for analysis with other tools."""
     import networkx as nx
 
-    from mrmg import seeding
     from mrmg.planning import PlannerParams
-    from mrmg.planning.roadmap.roadmap import build_roadmap
+    from mrmg.planning.frame import Frame
+    from mrmg.planning.problem.problem import state_mission
     from mrmg.scene.loading import load_scene
-    from mrmg.world.world import World
 
     scene = load_scene(options.scene, trust_code=options.trust_code)
     if not scene.robots:
         raise UsageError(f"{scene.name} has no robots, whose width decides the roadmap")
-    params = PlannerParams()
-    graph = build_roadmap(
-        scene,
-        World.from_scene(scene),
-        samples=params.samples,
-        neighbours=params.neighbours,
-        margins=params.margins,
-        rng=seeding.stream(options.seed, "roadmap", 0),
-    ).graph()
+    frame = Frame.of(scene)
+    planned = state_mission(frame.scene(scene), options.seed, PlannerParams()).roadmap
+    graph = planned.graph()
+    for _, place in graph.nodes(data=True):
+        place["x_m"], place["y_m"] = frame.on_the_map((place["x_m"], place["y_m"]))
+        if "z_m" in place:
+            place["z_m"] *= frame.unit_m
+    for _, _, edge in graph.edges(data=True):
+        edge["weight"] *= frame.unit_m
     out = options.out or Path(f"{scene.name}.graphml")
     with storage.atomic_path(out) as temporary:
         nx.write_graphml(graph, temporary)

@@ -38,11 +38,8 @@ from mrmg.planning.problem.openings import passages_missing
 from mrmg.planning.problem.problem import (
     Problem,
     state_mission,
-    unjoined_goals,
-    unjoined_places,
+    unjoined,
 )
-from mrmg.planning.problem.targets import finish_of
-from mrmg.planning.roadmap.roadmap import Roadmap
 from mrmg.planning.routing.routing import solve_routing
 from mrmg.planning.routing.shortfall import MAX_SHARE, shortfall
 from mrmg.planning.search import Search
@@ -137,13 +134,28 @@ def _more_energy(robot: Robot, share: float) -> str:
     return f"{share:.0%} more usable energy, which is {more} for {robot.id}"
 
 
-def _unjoined_finishes(scene: Scene, roadmap: Roadmap) -> list[str]:
-    """Return the finishes to which the roadmap knows no path for their robots."""
-    return [
-        f"the {roadmap.targets[place]}"
-        for r, place in enumerate(finish_of(scene))
-        if place >= 0 and not np.isfinite(roadmap.start_distance[r, place])
+def _unjoined(
+    problem: Problem, params: PlannerParams, *, stations: bool
+) -> tuple[str, str]:
+    """Return goals and finishes that robots know no path to, or stations, and why.
+
+    Args:
+        problem: the mission as it lies, with the roadmap of its frame.
+        params: of planning.
+        stations: whether stations are asked for.
+    """
+    scene, targets = problem.scene, problem.roadmap.targets
+    goals, places = len(scene.goals), len(scene.targets())
+    lacking = [
+        (r, t)
+        for r, t in unjoined(scene, problem.roadmap)
+        if (goals <= t < places) == stations
     ]
+    names = [targets[t] if t < places else f"the {targets[t]}" for _, t in lacking]
+    frame = Frame.of(scene, params.margins)
+    margins = frame.params(params).margins
+    passages = passages_missing(frame.scene(scene), margins, lacking, frame.on_the_map)
+    return listed([*dict.fromkeys(names)]), "; ".join(passages)
 
 
 def why_no_plan(
@@ -154,47 +166,43 @@ def why_no_plan(
     if statistics.left_s(params.budget_s) > 0.0:
         return PlanStatus.NO_PLAN_FOUND, _obstacle(problem, request, search)
     if not search.begun:
-        return why_no_roadmap(params, statistics)
-    if not search.attempts:
-        return why_in_short(params, search)
-    return _budget_over(params, search, _obstacle(problem, request, search))
+        return why_in_time(params, statistics)
+    so_far = _obstacle(problem, request, search) if search.attempts else ""
+    return why_in_time(params, statistics, search, so_far)
 
 
-def why_no_roadmap(
-    params: PlannerParams, statistics: Statistics
+def why_in_time(
+    params: PlannerParams,
+    statistics: Statistics,
+    search: Search | None = None,
+    so_far: str = "",
 ) -> tuple[PlanStatus, str]:
-    """Return how planning ended whose budget was over with the roadmap, or before."""
-    return PlanStatus.TIMEOUT, endings.BUDGET_FOR_ROADMAP.format(
-        budget_s=params.budget_s, init_s=statistics.time_s["init"]
-    )
+    """Return how planning ended whose budget is over.
 
-
-def why_in_short(params: PlannerParams, search: Search) -> tuple[PlanStatus, str]:
-    """Return how a search ended, where the budget leaves no time to say more."""
-    return _budget_over(params, search, "no plan was found")
-
-
-def _budget_over(
-    params: PlannerParams, search: Search, so_far: str
-) -> tuple[PlanStatus, str]:
+    Args:
+        params: with the budget.
+        statistics: of planning.
+        search: what it had come to; None if it was still to begin.
+        so_far: why it has no plan, if there was time to find out.
+    """
+    if search is None:
+        return PlanStatus.TIMEOUT, endings.BUDGET_FOR_ROADMAP.format(
+            budget_s=params.budget_s, init_s=statistics.time_s["init"]
+        )
     made = counted(search.attempts, "attempt")
     return PlanStatus.TIMEOUT, endings.BUDGET_OVER.format(
         budget_s=params.budget_s,
         attempts=made if search.attempts else "less than one attempt",
-        so_far=so_far,
+        so_far=so_far or "no plan was found",
     )
 
 
 def _obstacle(problem: Problem, request: Request, search: Search) -> str:
     """Return what stood in the way of a plan."""
-    scene, roadmap = problem.scene, problem.roadmap
-    params, seed = request.params, request.seed
-    unjoined = unjoined_goals(scene, roadmap) + _unjoined_finishes(scene, roadmap)
-    if unjoined:
-        passages = passages_missing(scene, params.margins, unjoined_places(problem))
-        return endings.NO_PATH.format(
-            places=listed(unjoined), passages="; ".join(passages)
-        )
+    scene, params, seed = problem.scene, request.params, request.seed
+    places, passages = _unjoined(problem, params, stations=False)
+    if places:
+        return endings.NO_PATH.format(places=places, passages=passages)
     if not search.tours_found:
         return _missing_tours(problem, params, seed)
     if math.isfinite(search.earliest_s):
@@ -268,7 +276,9 @@ def _missing_tours(problem: Problem, params: PlannerParams, seed: int) -> str:
         remedy = f"they need batteries with about {more}"
         if math.isinf(missing.battery_share):
             remedy = _no_battery_helps(scene)
-    remedy = "; ".join([remedy, *_stations_missing(problem, params)])
+    stations, why = _unjoined(problem, params, stations=True)
+    if stations:
+        remedy = f"{remedy}; no path was found to {stations}: {why}"
     if math.isinf(scene.time_limit_s):
         return endings.NO_TOURS_FOUND.format(left_out=left_out, remedy=remedy)
     return endings.NO_TOURS_IN_TIME.format(
@@ -286,15 +296,3 @@ def _no_battery_helps(scene: Scene) -> str:
     if empty:
         return f"{listed(empty)} start with no energy above the reserve"
     return f"not even {1.0 + MAX_SHARE:.0f} times the usable energy is enough"
-
-
-def _stations_missing(problem: Problem, params: PlannerParams) -> list[str]:
-    """Return in words which stations no path leads to, and why."""
-    scene, goals = problem.scene, len(problem.scene.goals)
-    joined = np.isfinite(problem.roadmap.start_distance).any(axis=0)
-    missing = [s for t, s in enumerate(scene.stations, goals) if not joined[t]]
-    if not missing:
-        return []
-    wanted = [(r, s.region) for s in missing for r in range(len(scene.robots))]
-    why = "; ".join(passages_missing(scene, params.margins, wanted))
-    return [f"no path was found to {listed([s.id for s in missing])}: {why}"]

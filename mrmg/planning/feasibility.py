@@ -70,10 +70,15 @@ def _with_others(proofs: Mapping[str, str], amounts: Mapping[str, str]) -> str:
     return f"{sentence}; likewise {listed(names)}"
 
 
-def impossible_goals(scene: Scene) -> dict[str, str]:
-    """Return the goals that no robot can visit, each with the proof's sentence."""
-    reaches = _reaches(scene)
-    return _cut_off(scene, reaches) | _out_of_reach(_out_of_energy(scene, reaches))
+def impossible_goals(scene: Scene, halt: np.ndarray = NEVER) -> dict[str, str]:
+    """Return the goals that no robot can visit, each with the proof's sentence.
+
+    Raises:
+        Halted: once `halt[0]` has turned true.
+    """
+    reaches = _reaches(scene, halt)
+    short = _out_of_energy(scene, reaches, halt)
+    return _cut_off(scene, reaches) | _out_of_reach(short)
 
 
 def mission_warnings(scene: Scene) -> list[str]:

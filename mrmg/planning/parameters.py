@@ -143,8 +143,7 @@ class PlannerParams:
         if self.planner == GUIDED_TREE and self.router.method != "nrpa":
             raise UsageError(
                 f"planner {GUIDED_TREE} finds its tours by router nrpa alone, not by "
-                f"{self.router.method}; leave the router out, or plan with "
-                f"{PATH_FOLLOWING}"
+                f"{self.router.method}; name router nrpa, or plan with {PATH_FOLLOWING}"
             )
         if self.profile == "paper" and self.planner != GUIDED_TREE:
             raise UsageError(

@@ -18,7 +18,7 @@ from mrmg.errors import UsageError, require_types
 from mrmg.planning import planners, routers
 from mrmg.planning.attempt import Attempt, Request
 from mrmg.planning.bounding import bounds_beside
-from mrmg.planning.diagnosis import Proofs, why_in_short, why_no_plan, why_no_roadmap
+from mrmg.planning.diagnosis import Proofs, why_in_time, why_no_plan
 from mrmg.planning.feasibility import require_robots
 from mrmg.planning.frame import Frame, on_the_map
 from mrmg.planning.hints import INTERRUPTED, hints_on
@@ -104,16 +104,16 @@ def plan_mission(
     params = params.with_margins(margins_from(options.get("margins", STATES_NONE)))
     compile_kernels(params.planner)
 
-    def plan(mission: Scene) -> PlanResult:
+    def plan(mission: Scene, spent_s: float = 0.0) -> PlanResult:
         request = Request(params=params, router=routed_by, seed=seed)
-        planning = _Planning(mission, made_by, request, workers, options)
+        planning = _Planning(mission, made_by, request, workers, options, spent_s)
         try:
             return planning.result(with_bound)
         finally:
             request.halt[0] = True  # nobody waits for what is still under way
 
     if options.get("skip_unreachable"):
-        return plan_reachable(scene, params.dt_s, plan)
+        return plan_reachable(scene, params, plan)
     return plan(scene)
 
 
@@ -129,25 +129,26 @@ def _resolved(
     router: str | Router | None,
 ) -> tuple[PlannerParams, Planner, Router]:
     """Return parameters that name planner and router, with both."""
+    own_planner = None if isinstance(planner, str) else planner
+    own_router = None if isinstance(router, str) else router
     if params is None:
         params = profile_params(
             planner=planner if isinstance(planner, str) else None,
             router=router if isinstance(router, str) else None,
         )
-    if planner is not None:
-        params = replace(params, planner=extensions.name_of(planner))
-    if router is not None:
-        method = extensions.name_of(router)
-        params = replace(params, router=replace(params.router, method=method))
-    if planner is None or isinstance(planner, str):
-        planner = planners.find_planner(params.planner)
-    else:
-        planner = planners.checked(planner, params.planner)
-    if router is None or isinstance(router, str):
-        router = routers.find_router(params.router)
-    else:
-        router = routers.checked(router, params.router.method)
-    return params, planner, router
+    # Both at once, as a planner may take one router alone.
+    params = replace(
+        params,
+        planner=extensions.name_of(planner or params.planner),
+        router=replace(
+            params.router, method=extensions.name_of(router or params.router.method)
+        ),
+    )
+    return (
+        params,
+        planners.find_planner(params.planner, own_planner),
+        routers.find_router(params.router, own_router),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,6 +161,7 @@ class _Planning:
         request: that of the first attempt; its flag ends what is under way beside them.
         workers: threads that make attempts.
         options: what else is asked for.
+        spent_s: how much of the budget was spent before.
         statistics: receives counts and times.
     """
 
@@ -168,6 +170,7 @@ class _Planning:
     request: Request
     workers: int
     options: Options
+    spent_s: float = 0.0
     statistics: Statistics = field(default_factory=Statistics)
 
     @property
@@ -187,13 +190,13 @@ class _Planning:
         load_kernels(self.params.planner, every=self.params.budget_s is not None)
         for robot in own.robots:
             motion_addresses(robot.model)
-        self.statistics.begin()
+        self.statistics.begin(self.spent_s)
         proofs = Proofs(self.scene, self.params.dt_s, self.request.halt)
         problem = self._in_time(partial(state_mission, own, self.request.seed, params))
         self.statistics.time_s["init"] = self.statistics.elapsed()
         if problem is None:
             proof = self._in_time(partial(proofs.reason, tours_missing=False))
-            return self._unsolved(proof, why_no_roadmap(self.params, self.statistics))
+            return self._unsolved(proof, why_in_time(self.params, self.statistics))
         search = self._search(problem, proofs)
         search.on_progress(0.1, "roadmap built")
         best = search.run()
@@ -207,7 +210,9 @@ class _Planning:
                     search,
                 )
             )
-            return self._unsolved(proof, why or why_in_short(self.params, search))
+            return self._unsolved(
+                proof, why or why_in_time(self.params, self.statistics, search)
+            )
         if bounding is not None:
             self._in_time(bounding.result)
         margins = self.params.margins

@@ -36,16 +36,20 @@ PLANNERS: Mapping[str, Planner] = MappingProxyType(
 """The planners of this package by name."""
 
 
-def find_planner(name: str) -> Planner:
+def find_planner(name: str, own: Planner | None = None) -> Planner:
     """Return the planner of a name.
+
+    Args:
+        name: of the planner.
+        own: a caller's own that has this name.
 
     Raises:
         UsageError: if there is none of that name.
         MachineError: if the package that adds it is broken.
     """
-    if name in PLANNERS:
+    if own is None and name in PLANNERS:
         return PLANNERS[name]
-    return checked(extensions.load(extensions.PLANNERS, name), name)
+    return checked(own or extensions.load(extensions.PLANNERS, name), name)
 
 
 def checked(planner: Planner, name: str) -> Planner:

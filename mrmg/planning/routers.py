@@ -80,16 +80,21 @@ ROUTERS: Mapping[str, Callable[[RouterParams, RoutingArrays, int], Routing]] = (
 """The routers of this package by name."""
 
 
-def find_router(params: RouterParams) -> Router:
+def find_router(params: RouterParams, own: Router | None = None) -> Router:
     """Return the router that parameters name.
+
+    Args:
+        params: with its name.
+        own: a caller's own that has this name.
 
     Raises:
         UsageError: if there is none of that name.
         MachineError: if the package that adds it is broken.
     """
-    if params.method in ROUTERS:
+    name = params.method
+    if own is None and name in ROUTERS:
         return BuiltInRouter(params)
-    return checked(extensions.load(extensions.ROUTERS, params.method), params.method)
+    return checked(own or extensions.load(extensions.ROUTERS, name), name)
 
 
 def checked(router: Router, name: str) -> Router:

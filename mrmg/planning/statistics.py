@@ -119,9 +119,9 @@ class Statistics:
     bounds: Bounds = UNKNOWN
     started: float = field(default_factory=time.perf_counter)
 
-    def begin(self) -> None:
-        """Have planning begin now, and not when this was made."""
-        self.started = time.perf_counter()
+    def begin(self, spent_s: float = 0.0) -> None:
+        """Have planning begin now, and not when this was made, or so long before."""
+        self.started = time.perf_counter() - spent_s
 
     def elapsed(self) -> float:
         """Return the time since planning began [s]."""

@@ -274,3 +274,27 @@ def test_the_roadmap_is_a_graph_other_tools_read(tmp_path: Path) -> None:
     for one, other, weight in graph.edges(data="weight"):
         a, b = graph.nodes[one], graph.nodes[other]
         assert weight >= 0.999 * hypot(a["x_m"] - b["x_m"], a["y_m"] - b["y_m"])
+
+
+def test_the_roadmap_is_the_one_that_is_planned_on(tmp_path: Path) -> None:
+    """It leads through gaps that only a smaller margin opens, where they lie."""
+    document = {
+        "format": 1,
+        "name": "gap",
+        "bounds": [100, 50, 124, 64],
+        "obstacles": [
+            {"id": "south", "box": {"center": [112, 53.175], "size": [0.3, 6.35]}},
+            {"id": "north", "box": {"center": [112, 60.825], "size": [0.3, 6.35]}},
+        ],
+        "goals": [{"id": "g", "circle": {"center": [104, 59], "radius": 1}}],
+        "battery": {"capacity_m": 200},
+        "robots": [{"id": "r1", "model": "car", "pose": [120, 60, 3.0]}],
+    }
+    scene, out = tmp_path / "gap.yaml", tmp_path / "roadmap.graphml"
+    scene.write_text(dump_yaml(document))
+    assert main(["scene", "roadmap", str(scene), "-o", str(out)]) == ExitCode.OK
+    graph = nx.read_graphml(out)
+    assert nx.has_path(graph, "0", "1")
+    goal, start = ((graph.nodes[i]["x_m"], graph.nodes[i]["y_m"]) for i in "01")
+    assert goal == pytest.approx((104.0, 59.0))
+    assert start == pytest.approx((120.0, 60.0))

@@ -260,6 +260,28 @@ def test_missions_of_small_and_large_robots_are_as_easy(size: float) -> None:
     assert set(same.margins.values()) == {(0.1 * size, 0.2 * size)}
 
 
+def test_passages_are_told_in_metres_on_the_map() -> None:
+    """A small car needs as much room to steer as it has in its frame."""
+    halves = [
+        {"id": name, "box": {"center": [12, y], "size": [0.3, 6.4]}}
+        for name, y in (("south", 3.2), ("north", 10.8))
+    ]
+    document = {
+        "format": 1,
+        "name": "gap",
+        "bounds": [0, 0, 24, 14],
+        "obstacles": halves,
+        "goals": [{"id": "g", "circle": {"center": [4, 9], "radius": 1}}],
+        "robots": [{"id": "r1", "model": "car", "pose": [20, 4, 0.3]}],
+    }
+    scene = of_size(scene_from_document(document, source="gap"), 2.0**-5)
+    unit_m = Frame.of(scene).unit_m
+    assert unit_m < 0.1
+    reason = mrmg.plan(scene).reason
+    assert f"m and {0.04 * unit_m:g} m to steer" in reason
+    assert "m wide near (0.4, 0.2), and it needs 0.04 m: its width of 0.03 m" in reason
+
+
 def test_fleets_that_differ_in_size_alone_are_equal_in_their_frames() -> None:
     scene, _ = as_it_lies("station_needed")
     frames = [Frame.of(of_size(scene, size)) for size in (2.0**-5, 2.0**-6, 2.0**5)]

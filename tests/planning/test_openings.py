@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -180,6 +181,23 @@ def test_goals_out_of_reach_are_left_out_with_their_proofs() -> None:
     assert planned(scene, skip_unreachable=True).skipped == {}
 
 
+def test_proofs_that_goals_are_out_of_reach_take_of_the_budget() -> None:
+    scene = gap(3.0)
+    stay = {"id": "h", "circle": {"center": [20, 4], "radius": 1}, "dwell": 300}
+    more = scene.with_(goals=[*scene.document["goals"], stay], time_limit=60)
+    built_s: list[float] = []
+
+    def on_progress(_: float, text: str) -> None:
+        if text == "roadmap built":
+            built_s.append(time.perf_counter())
+
+    result = plan_mission(more, skip_unreachable=True, on_progress=on_progress)
+    assert result.plan is not None
+    assert {*result.plan.skipped} == {"h"}
+    assert len(built_s) == 2
+    assert result.statistics["time_s"]["init"] > built_s[1] - built_s[0]
+
+
 @pytest.mark.parametrize("quarters", range(4))
 def test_places_of_the_frame_are_found_on_the_map(quarters: int) -> None:
     frame = Frame((3.0, -2.0, 13.0, 5.0), quarters)
@@ -220,6 +238,23 @@ def test_passages_are_named_with_place_and_width() -> None:
     assert "at least 0.030 m" in reason
     proof = plan_mission(gap(1.05, turn=0.4)).reason
     assert "1.05 m wide near (12.0, 7.0), r1 is 1.10 m wide" in proof
+
+
+def test_passages_to_stations_are_not_those_to_goals() -> None:
+    scene = gap(1.2)
+    shell = shapely.box(2, 8, 8, 13) - shapely.box(2.5, 8.5, 7.5, 12.5)
+    shell -= shapely.box(7, 10, 9, 11.15)
+    more = scene.with_(
+        obstacles=[
+            *scene.document["obstacles"],
+            {"id": "shell", "polygon": corners(shell)},
+        ],
+        stations=[{"id": "s", "circle": {"center": [5, 10.5], "radius": 1}}],
+    )
+    reason = plan_mission(more).reason
+    assert "no path was found to g, " in reason
+    assert "1.20 m wide" in reason
+    assert "1.15 m wide" not in reason
 
 
 @pytest.mark.parametrize("apart_m", [0.1, 0.45])

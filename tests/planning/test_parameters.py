@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+import mrmg
 from mrmg.errors import UsageError
 from mrmg.planning.parameters import PROFILES, PlannerParams, profile_params
 from mrmg.planning.routing.routing import RouterParams
@@ -71,3 +72,12 @@ def test_only_the_default_profile_refines_and_more_so_with_a_budget() -> None:
     assert profile_params("paper", trees=9).refinements == 0
     plain = profile_params("default").refinements
     assert 0 < plain < profile_params("default", budget_s=9.0).refinements
+
+
+def test_planner_and_router_are_named_together() -> None:
+    scene, guided = mrmg.load_scene("quickstart"), "guided_tree"
+    with pytest.raises(UsageError, match="name router nrpa, or plan with path_foll"):
+        mrmg.plan(scene, params=PlannerParams(), planner=guided)
+    named = {"planner": guided, "router": "nrpa"}
+    with pytest.raises(UsageError, match="no margins"):  # the next that is looked at
+        mrmg.plan(scene, params=PlannerParams(), margins="wide", **named)

@@ -6,7 +6,7 @@ target that there is no wide way to, and where robots start beside walls.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Sequence
 
 import numpy as np
 import shapely
@@ -48,26 +48,34 @@ def entered(scene: Scene, region: Region) -> BaseGeometry:
 
 
 def openings_to(
-    scene: Scene, margins: Margins, wanted: Sequence[tuple[int, Region]]
+    scene: Scene, margins: Margins, wanted: Sequence[tuple[int, int]]
 ) -> tuple[Opening, ...]:
-    """Return the openings on the ways to regions that no wide way leads to.
+    """Return the openings on the ways to targets that no wide way leads to.
 
     Args:
         scene: the mission.
         margins: stated for all robots.
-        wanted: numbers of robots, and regions that they may have to get to.
+        wanted: numbers of robots, and of targets that they may have to get to.
     """
-    grounds: dict[tuple[int, ...], FreeGround] = {}
+    regions = planned_regions(scene)
     found: list[Opening] = []
-    for number, region in wanted:
-        robot = scene.robots[number]
-        key = tuple(i for i, o in enumerate(scene.barriers) if o.stops(robot.id))
-        if key not in grounds:
-            grounds[key] = FreeGround.of(scene, robot)
+    for number, target in wanted:
+        robot, region = scene.robots[number], entered(scene, regions[target])
+        ground, start = FreeGround.of(scene, robot), Point(*robot.pose[:2])
         margin_m = margins_of(robot, margins)[0]
-        found += _openings(
-            grounds[key], robot, number, margin_m, entered(scene, region)
-        )
+        wide_m = wide_clearance_m(robot, margin_m)
+        if ground.reaches(start, region, wide_m):
+            continue
+        for level_m in np.linspace(margin_m, least_margin_m(robot, margin_m), LEVELS):
+            needed_m = clearance_needed_m(robot, float(level_m))
+            if ground.reaches(start, region, needed_m):
+                found += [
+                    _opening(
+                        narrow, robot, [number], margin_m - level_m, wide_m - needed_m
+                    )
+                    for narrow in ground.narrows(start, region, needed_m, wide_m)
+                ]
+                break
     return tuple(dict.fromkeys(found))
 
 
@@ -95,11 +103,9 @@ def tightest_openings(scene: Scene, margins: Margins) -> tuple[Opening, ...]:
             *(place for place in places if not place.intersects(wide)),
         ]
         if pieces and least_m < margin_m:
-            reach_m = robot.model.circumscribed_radius_m + wide_m - needed_m
-            shape = shapely.union_all(pieces).buffer(reach_m)
-            allowance_m = margin_m - least_m
+            narrow, lacking_m = shapely.union_all(pieces), wide_m - needed_m
             found.append(
-                Opening(shape=shape, allowance_m=allowance_m, robots=tuple(numbers))
+                _opening(narrow, robot, numbers, margin_m - least_m, lacking_m)
             )
     return tuple(found)
 
@@ -159,25 +165,6 @@ def least_margin_m(robot: Robot, margin_m: float) -> float:
     return min(margin_m, certified_minimum_m(robot.model))
 
 
-def _openings(
-    ground: FreeGround,
-    robot: Robot,
-    number: int,
-    margin_m: float,
-    wanted: BaseGeometry,
-) -> Iterator[Opening]:
-    start = Point(*robot.pose[:2])
-    wide_m = wide_clearance_m(robot, margin_m)
-    if ground.reaches(start, wanted, wide_m):
-        return
-    for level_m in np.linspace(margin_m, least_margin_m(robot, margin_m), LEVELS):
-        needed_m = clearance_needed_m(robot, float(level_m))
-        if ground.reaches(start, wanted, needed_m):
-            for narrow in ground.narrows(start, wanted, needed_m, wide_m):
-                yield _opening(narrow, robot, [number], margin_m, float(level_m))
-            return
-
-
 def cramped_starts(fleet: np.ndarray, spaces: Spaces, start: np.ndarray) -> list[int]:
     """Return the robots that start nearer to obstacles than their margins.
 
@@ -220,39 +207,58 @@ def openings_at_starts(
                 starts.append(start)
                 level_m = min(level_m, max(gap_m - STEERING_M, least_m))
         if starts:
-            places = shapely.MultiPoint(starts)
-            yield _opening(places, robot, alike, margin_m, level_m)
+            yield _opening(
+                shapely.MultiPoint(starts),
+                robot,
+                alike,
+                margin_m - level_m,
+                wide_m - clearance_needed_m(robot, level_m),
+            )
 
 
 def _opening(
     narrow: BaseGeometry,
     robot: Robot,
     numbers: Sequence[int],
-    margin_m: float,
-    level_m: float,
+    allowance_m: float,
+    lacking_m: float,
 ) -> Opening:
-    lacking_m = wide_clearance_m(robot, margin_m) - clearance_needed_m(robot, level_m)
+    """Return the opening of narrow ground.
+
+    Args:
+        narrow: the ground.
+        robot: one that drives through.
+        numbers: of all that do.
+        allowance_m: by how much what they keep there is less than their margin.
+        lacking_m: by how much the clearance there is less than that of wide ground.
+    """
     return Opening(
         shape=narrow.buffer(robot.model.circumscribed_radius_m + lacking_m),
-        allowance_m=margin_m - level_m,
+        allowance_m=float(allowance_m),
         robots=tuple(numbers),
     )
 
 
 def passages_missing(
-    scene: Scene, margins: Margins, wanted: Sequence[tuple[int, Region]]
+    scene: Scene,
+    margins: Margins,
+    wanted: Sequence[tuple[int, int]],
+    on_the_map: Callable[[tuple[float, float]], tuple[float, float]],
 ) -> list[str]:
-    """Return in words what keeps robots from regions: passages, how wide and where.
+    """Return in words what keeps robots from targets: passages, how wide and where.
 
     Args:
-        scene: the mission.
+        scene: the mission in the frame that is planned in.
         margins: stated for all robots.
-        wanted: numbers of robots, and regions that they know no path to; of each region
-            the robot that lacks least is named.
+        wanted: numbers of robots, and of targets that they know no path to; of each
+            target the robot that lacks least is named.
+        on_the_map: returns where a point of the frame is [m].
     """
     least: dict[int, tuple[float, str]] = {}
-    for number, region in wanted[:MOST_MEASURED]:
-        robot = scene.robots[number]
+    regions = planned_regions(scene)
+    for number, target in wanted[:MOST_MEASURED]:
+        robot, region = scene.robots[number], regions[target]
+        unit_m = robot.model.unit_m
         ground = FreeGround.of(scene, robot)
         start = Point(*robot.pose[:2])
         kept_m = least_margin_m(robot, margins_of(robot, margins)[0])
@@ -268,14 +274,15 @@ def passages_missing(
             text = f"{robot.id} has ways wide enough that no samples of the map joined"
         else:
             lacking_m = 2.0 * needed_m - gap.width_m
+            gap = Bottleneck(gap.width_m * unit_m, *on_the_map((gap.x_m, gap.y_m)))
             text = (
                 f"the widest way of {robot.id} leads through a passage {gap}, and it "
-                f"needs {2.0 * needed_m:.2f} m: its width of "
-                f"{2.0 * robot.model.half_width_m:.2f} m, and on each side a margin of "
-                f"at least {kept_m:.3f} m and {STEERING_M:g} m to steer"
+                f"needs {2.0 * needed_m * unit_m:.2f} m: its width of "
+                f"{2.0 * robot.model.half_width_m * unit_m:.2f} m, and on each side a "
+                f"margin of at least {kept_m * unit_m:.3f} m and "
+                f"{STEERING_M * unit_m:g} m to steer"
             )
-        known = least.get(id(region), (np.inf, ""))
-        least[id(region)] = min(known, (lacking_m, text))
+        least[target] = min(least.get(target, (np.inf, "")), (lacking_m, text))
     return [*dict.fromkeys(text for _, text in least.values())]
 
 

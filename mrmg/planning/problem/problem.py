@@ -30,11 +30,9 @@ from mrmg.planning.problem.time_weighting import priced_world, with_energies
 from mrmg.planning.roadmap._fleet_kernels import Spaces
 from mrmg.planning.roadmap.fleet import fleet_array, stack_spaces
 from mrmg.planning.roadmap.roadmap import Roadmap, build_roadmap
-from mrmg.planning.roadmap.vertices import planned_regions
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.instance import RoutingInstance
 from mrmg.plans import Trajectory
-from mrmg.scene.region import Region
 from mrmg.scene.types import Scene
 from mrmg.world._kernels import TerrainGrid
 from mrmg.world.world import Opening, World
@@ -204,7 +202,6 @@ def state_problem(
     # What robots draw while they stay counts as way.
     idle_m = fleet["energy"][:, CONSUMERS_W] / fleet["plain"]
     stay_m = idle_m[:, None] * dwell_s[:places]
-    last_leg = _last_legs(scene, roadmap, fleet)
     energy = np.array([robot.battery.start_J for robot in scene.robots])
     table = tables_of(fleet)
     owner = np.unique(table, return_index=True)[1]
@@ -227,7 +224,7 @@ def state_problem(
             energy=energy,
             capacity=fleet["capacity"],
             reserve=fleet["reserve"],
-            finish_distance=last_leg / fleet["plain"][:, None],
+            finish_distance=_last_legs(scene, roadmap, fleet),
             **routing_times(scene, roadmap, fleet, table, dwell_s, params.route_margin),
         ).arrays,
     )
@@ -251,14 +248,13 @@ def tables_of(fleet: np.ndarray) -> np.ndarray:
 
 
 def _last_legs(scene: Scene, roadmap: Roadmap, fleet: np.ndarray) -> np.ndarray:
-    """Return the energy from each place to each robot's finish [J], (R, G + S + 1)."""
+    """Return the cost from each place to each robot's finish [m], (R, G + S + 1)."""
     places = len(scene.targets())
     legs = np.zeros((len(fleet), places + 1))
     for r, finish in enumerate(finish_of(scene)):
         if finish >= 0:
             legs[r, :places] = roadmap.distance[fleet[r]["field"], :places, finish]
             legs[r, places] = roadmap.start_distance[r, finish]
-            legs[r] *= fleet[r]["plain"]
     return legs
 
 
@@ -274,13 +270,13 @@ def state_mission(scene: Scene, seed: int, params: PlannerParams) -> Problem:
     """
     world = World.from_scene(scene, cell_m=cell_m(scene, params.margins))
     problem = _joined(scene, seed, params, world)
-    unjoined = unjoined_places(problem)
+    lacking = unjoined(scene, problem.roadmap)
     fleet, spaces = problem.mission.fleet, problem.mission.spaces
     cramped = cramped_starts(fleet, spaces, problem.start)
-    beside_walls = sorted({*cramped, *(r for r, _ in unjoined)})
+    beside_walls = sorted({*cramped, *(r for r, _ in lacking)})
     openings = (
         *openings_at_starts(scene, params.margins, beside_walls),
-        *openings_to(scene, params.margins, unjoined),
+        *openings_to(scene, params.margins, lacking),
     )
     return _opened(scene, seed, params, openings) if openings else problem
 
@@ -321,7 +317,7 @@ def _joined(scene: Scene, seed: int, params: PlannerParams, world: World) -> Pro
             margins=params.margins,
             rng=seeding.stream(seed, "roadmap", attempt),
         )
-        if not unjoined_goals(scene, roadmap):
+        if not any(t < len(scene.goals) for _, t in unjoined(scene, roadmap)):
             break
         samples *= 3
     if priced is not world:
@@ -329,22 +325,17 @@ def _joined(scene: Scene, seed: int, params: PlannerParams, world: World) -> Pro
     return state_problem(scene, world, roadmap, params)
 
 
-def unjoined_places(problem: Problem) -> list[tuple[int, Region]]:
-    """Return robots and regions they may have to get to, but know no path to."""
-    scene = problem.scene
-    joined = np.isfinite(problem.roadmap.start_distance)
-    regions, finish = planned_regions(scene), finish_of(scene)
+def unjoined(scene: Scene, roadmap: Roadmap) -> list[tuple[int, int]]:
+    """Return robots and numbers of targets that the roadmap knows no path to for them.
+
+    That is goals and stations that no robot knows one to, for every robot, and finishes
+    for their own.
+    """
+    joined = np.isfinite(roadmap.start_distance)
     robots = range(len(scene.robots))
     shared = range(len(scene.targets()))
+    own = enumerate(finish_of(scene).tolist())
     return [
-        *((r, regions[t]) for t in shared if not joined[:, t].any() for r in robots),
-        *((r, regions[t]) for r, t in enumerate(finish) if t >= 0 and not joined[r, t]),
-    ]
-
-
-def unjoined_goals(scene: Scene, roadmap: Roadmap) -> list[str]:
-    """Return the goals to which the roadmap knows no path for any robot."""
-    joined = np.isfinite(roadmap.start_distance).any(axis=0)
-    return [
-        goal.id for goal, fine in zip(scene.goals, joined, strict=False) if not fine
+        *((r, t) for t in shared if not joined[:, t].any() for r in robots),
+        *((r, t) for r, t in own if t >= 0 and not joined[r, t]),
     ]
