@@ -223,7 +223,7 @@ def arrays_of(content: bytes, name: str) -> dict[str, np.ndarray]:
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             return {
-                member.removesuffix(".npy"): _array_of(data)
+                member.removesuffix(".npy"): array_of(data)
                 for member, data in unpacked(archive, len(content)).items()
             }
     except Exception as error:  # readers raise anything, of tokens and of zlib, too
@@ -246,8 +246,12 @@ def unpacked(archive: zipfile.ZipFile, packed_bytes: int) -> dict[str, bytes]:
     return {info.filename: archive.read(info) for info in archive.infolist()}
 
 
-def _array_of(data: bytes) -> np.ndarray:
-    """Return the array of an .npy, which must have the size that its header states."""
+def array_of(data: bytes) -> np.ndarray:
+    """Return the array of an .npy, which must have the size that its header states.
+
+    Raises:
+        Exception: of many kinds, if it is damaged; it refuses pickled content.
+    """
     file = io.BytesIO(data)
     array = np.lib.format.read_array(file, allow_pickle=False)  # refuses too few bytes
     if file.read(1):

@@ -53,7 +53,8 @@ class ModelFiles:
     @staticmethod
     def of(*roots: Path) -> ModelFiles:
         """Return the files as they are now; those that are missing are left out."""
-        files = [file for root in roots if root.is_file() for file in _files(root)]
+        known = [root for root in roots if os.path.isfile(root)]
+        files = [file for root in known for file in _files(root)]
         return ModelFiles(roots=roots, files=tuple(files))
 
     def content(self) -> list[list[str]]:
@@ -83,7 +84,7 @@ def _files(root: Path) -> Iterator[ModelFile]:
         new = {
             name
             for name in _named_files(found)
-            if name not in found and (root.parent / name).is_file()
+            if name not in found and os.path.isfile(root.parent / name)
         }
     for name in sorted(found):
         digest = hashlib.sha256(found[name]).hexdigest()

@@ -28,7 +28,11 @@ def slope_faults(
     obstacles: Sequence[Obstacle],
     terrain: Sequence[TerrainArea],
 ) -> list[Fault]:
-    """Return the steepest place, if any, that a robot may get to but not climb."""
+    """Return for each robot the steepest place, if any, that stops it on open ground.
+
+    Each is a fault: the place where the slope exceeds most what the robot climbs, among
+    those that no obstacle keeps it off.
+    """
     slope, multiplier = elevation.steepest().ravel(), _multiplier(elevation, terrain)
     x, y = elevation.cell_centres().reshape(-1, 2).T
     faults = []

@@ -38,7 +38,8 @@ from mrmg.scene.robot_model import RobotModel
 
 MASS_SHARE = 0.01
 """Allowed difference of mass. Planned energy is proportional to
-mass, and measured within 2 % of it; half of that may come from the model."""
+mass, and measured within 2 % of it; half of that may come from the model. Of all wheels
+together the masses may differ by as much."""
 
 HULL_BEYOND_M = 0.005
 """How far the hull may reach beyond the footprint: a third of how far robots as
@@ -61,13 +62,18 @@ _AXIS_COSINE = 0.999
 
 @no_warning_file()
 def mjcf_faults(
-    model: RobotModel, path: Path, *, center_stated: bool = True
+    model: RobotModel,
+    path: Path,
+    wheel_mass_kg: float | None = None,
+    *,
+    center_stated: bool = True,
 ) -> list[Fault]:
     """Return what keeps a model from being driven, and where its two files differ.
 
     Args:
         model: as `robot.yaml` has it; its motion is one of `PARTS`.
         path: of the MJCF file.
+        wheel_mass_kg: what `robot.yaml` states of one wheel, which no model holds.
         center_stated: whether `robot.yaml` states the centre of mass.
     """
     try:
@@ -88,6 +94,7 @@ def mjcf_faults(
         return wrong
     return [
         *_mass(model, robot, center_stated),
+        *_wheel_mass(model, robot, wheel_mass_kg),
         *_hull(model, robot, parts),
         *wheel_faults(model, robot, parts),
         *steering_faults(model, robot, parts),
@@ -169,6 +176,18 @@ def _mass(
             "m ahead of the driven axle",
             f"{allowed_m:.2g} m",
             robot.file,
+        )
+
+
+def _wheel_mass(
+    model: RobotModel, robot: CompiledRobot, stated_kg: float | None
+) -> Iterator[Fault]:
+    mean_kg = float(np.mean([robot.wheel_mass_kg(name) for name in robot.wheels]))
+    allowed_kg = MASS_SHARE * model.mass_kg / len(robot.wheels)
+    if stated_kg is not None and apart(mean_kg, stated_kg, allowed_kg):
+        allowed = f"{allowed_kg:.2g} kg"
+        yield difference(
+            "wheel.mass", stated_kg, mean_kg, "kg a wheel", allowed, robot.file
         )
 
 

@@ -7,8 +7,8 @@ the first column on the western one.
 from __future__ import annotations
 
 import base64
-import binascii
 import math
+import os
 import zlib
 from pathlib import Path
 from typing import Annotated, Literal
@@ -16,10 +16,12 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
+from mrmg import storage
 from mrmg.errors import Fault, nearest
 from mrmg.scene.document import PACKED_M
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.loading.faults import EntryError, shown
+from mrmg.scene.loading.pictures import opened_picture
 from mrmg.scene.loading.shape_schema import Height, Length, OneOf, Point, Strict
 
 DEFAULT_CELL_M = 0.5
@@ -143,9 +145,9 @@ def _grid_fault(heights: np.ndarray) -> str | None:
 
 def _from_file(name: str, span: list[float] | None, base: Path | None) -> np.ndarray:
     path = (base or Path.cwd()) / name
-    if not path.is_file():
+    if not os.path.isfile(path):  # also where no file can have such a name
         folder = path.parent
-        others = [item.name for item in folder.iterdir()] if folder.is_dir() else []
+        others = os.listdir(folder) if os.path.isdir(folder) else []
         guess = nearest(path.name, others)
         message = f"got '{name}'; no such file{guess}"
         raise EntryError(Fault("elevation.file", message))
@@ -160,9 +162,10 @@ def _from_file(name: str, span: list[float] | None, base: Path | None) -> np.nda
 
 def _from_npy(path: Path, name: str) -> np.ndarray:
     try:
-        heights = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        message = f"'{name}' is no readable .npy file ({error})"
+        heights = storage.array_of(path.read_bytes())
+    except Exception as error:  # it raises anything, of tokens and of memory, too
+        reason = str(error).partition("\n")[0]
+        message = f"'{name}' is no readable .npy file ({reason})"
         raise EntryError(Fault("elevation.file", message)) from error
     if heights.dtype.kind not in "fiu":
         message = f"'{name}' holds {heights.dtype}; expected numbers, metres"
@@ -171,15 +174,13 @@ def _from_npy(path: Path, name: str) -> np.ndarray:
 
 
 def _from_picture(path: Path, name: str, span: list[float] | None) -> np.ndarray:
-    from PIL import Image, UnidentifiedImageError
-
     if span is None:
         message = "missing; expected [height of black in m, height of white in m]"
         raise EntryError(Fault("elevation.range", message))
     try:
-        with Image.open(path) as picture:
+        with opened_picture(path) as picture:
             mode, grey = picture.mode, np.asarray(picture, dtype=float)
-    except (OSError, UnidentifiedImageError, ValueError) as error:
+    except ValueError as error:
         message = f"'{name}' is no readable picture ({error})"
         raise EntryError(Fault("elevation.file", message)) from error
     white = {"L": 255.0, "I;16": 65535.0, "I": 65535.0}.get(mode)
@@ -200,7 +201,7 @@ def _unpacked(rows: int, columns: int, text: str) -> np.ndarray:
     inflate = zlib.decompressobj()
     try:
         data = inflate.decompress(base64.b64decode(text, validate=True), 4 * MOST_NODES)
-    except (binascii.Error, zlib.error) as error:
+    except (ValueError, zlib.error) as error:
         message = f"got {shown(text)}; not what was once packed ({error})"
         raise EntryError(Fault(where, message)) from error
     if len(data) != 4 * rows * columns:

@@ -25,6 +25,7 @@ _KINDS = {
     "finite_number": "expected a finite number",
     "string_pattern_mismatch": "ids are made of letters, digits, '_', '.' and '-'",
     "recursion_loop": "contains itself",
+    "invalid_key": "keys must be text",
 }
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.loading.places import composed, id_at, line_at
 from mrmg.scene.loading.reading import scene_path
+from mrmg.scene.loading.shape_schema import MOST
 from mrmg.scene.loading.yaml_text import read_yaml
 
 LARGEST_TURN_RAD = 2.0 * math.pi
@@ -38,7 +39,7 @@ def heading_hints(source: str | Path) -> list[Fault]:
     suspicious = [
         found
         for found in _angles(document)
-        if LARGEST_TURN_RAD < abs(found[-1]) < math.inf
+        if LARGEST_TURN_RAD < abs(found[-1]) <= MOST  # larger ones are faults
     ]
     root = composed(path) if suspicious else None  # lines take long to find
     return [
@@ -62,7 +63,7 @@ def _angles(document: Any) -> Iterator[tuple[str, str, str, float]]:
                 value = _value(entries[index], *keys)
                 if isinstance(value, int | float):
                     entry = f"{section}.{index}"
-                    yield entry, ".".join(map(str, keys)), name, float(value)
+                    yield entry, ".".join(map(str, keys)), name, value
 
 
 def _value(document: Any, *keys: str | int) -> Any:

@@ -121,6 +121,12 @@ class CompiledRobot:
         """Return the inertia about a wheel's joint, armature included."""
         return float(self._model.joint(joint).M0[0])
 
+    def wheel_mass_kg(self, joint: str | int) -> float:
+        """Return the mass of all that turns with a wheel."""
+        model = self._model
+        turning = model.body_weldid == model.body_weldid[model.joint(joint).bodyid[0]]
+        return float(model.body_mass[turning].sum())
+
     def grip(self, joint: str) -> float:
         """Return the friction coefficient of a wheel on the simulated floor."""
         model = self._model

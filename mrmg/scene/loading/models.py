@@ -9,6 +9,7 @@ Units: m, kg, s, rad, J.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -51,7 +52,7 @@ class WheelEntry(NamedWithUnits):
     """spin inertia of one wheel and its share of the drive in kg m^2"""
     wheel_count: Annotated[int, Field(ge=1)]
     """number of wheels"""
-    mass: Positive
+    wheel_mass_kg: Positive
     """mass of one wheel in kg"""
 
 
@@ -151,7 +152,7 @@ def model_folder(reference: str, base: Path | None) -> Path:
     """
     if "/" in reference:
         folder = (base or Path.cwd()) / reference  # as it is where it is absolute
-        if (folder / "robot.yaml").is_file():
+        if os.path.isfile(folder / "robot.yaml"):  # no name that is too long
             return folder.resolve()
         raise UsageError(f"got '{reference}'; no such folder with a robot.yaml")
     names = shipped.model_names()
@@ -200,7 +201,7 @@ def load_model(
         origin = ModelOrigin(reference, text, model)
         if changes:
             changed = _merged(document, changes)
-            source = f"{source} with another {', '.join(changes)}"
+            source = f"{source} with another {', '.join(map(str, changes))}"
             model, parameters = _checked_model(folder, changed, source, trust_code)
     return replace(model, origin=origin), parameters
 
@@ -222,6 +223,8 @@ def _checked_model(
     mjcf = None if entry.mjcf is None else file_within(folder, entry.mjcf)
     if isinstance(mjcf, str):
         faults.append(Fault("mjcf", mjcf))
+    if faults and entry.motion_model not in SHIPPED_MOTIONS:
+        raise SceneError(source, faults)  # what it names may be no file at all
     model = _model(folder, entry)
     if isinstance(mjcf, Path) and entry.motion_model in SHIPPED_MOTIONS:
         known = {fault.path for fault in faults}
@@ -232,8 +235,8 @@ def _checked_model(
     parameters = _parameters(entry)
     if entry.motion_model not in SHIPPED_MOTIONS:
         # The content of the file counts for a digest, not its name.
-        source_text = (folder / entry.motion_model).read_text(encoding="utf-8")
-        parameters["motion_model"] = storage.digest(source_text)
+        file = folder / entry.motion_model
+        parameters["motion_model"] = storage.digest(read_text(file, source=str(file)))
     return model, parameters
 
 
@@ -255,7 +258,7 @@ def _differences(model: RobotModel, mjcf: Path, entry: ModelDocument) -> list[Fa
     from mrmg.scene.loading.consistency import mjcf_faults
 
     stated = "center_of_mass_m" in entry.model_fields_set
-    return mjcf_faults(model, mjcf, center_stated=stated)
+    return mjcf_faults(model, mjcf, entry.wheel.wheel_mass_kg, center_stated=stated)
 
 
 def _motion_faults(entry: ModelDocument, folder: Path, trust_code: bool) -> list[Fault]:

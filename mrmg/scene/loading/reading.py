@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -121,12 +122,12 @@ def scene_path(source: str | Path) -> Path:
     if str(source) in names:
         return shipped.scenes_folder() / f"{source}.yaml"
     path = Path(source)
-    if path.is_dir():
+    if os.path.isdir(path):
         message = "is a folder; expected a scene file"
         if (path / "run.json").exists():
             message = f"is a run folder; its scene is {path / 'scene.yaml'}"
         raise SceneError(str(source), [Fault("", message)])
-    if not path.exists():
+    if not os.path.exists(path):  # also where no file can have such a name
         message = (
             f"no such file, and no shipped scene of that name{_meant(path)}; "
             "'mrmg scene list' lists the shipped ones"
@@ -137,11 +138,12 @@ def scene_path(source: str | Path) -> Path:
 
 def _meant(path: Path) -> str:
     """Return the question for the scene that is meant by a path where there is none."""
-    files = [str(item) for item in path.parent.glob("*.yaml")]
+    near = path.parent.glob("*.yaml") if os.path.isdir(path.parent) else ()
+    files = [str(item) for item in near]
     if f"{path}.yaml" in files:
         return f" (did you mean '{path}.yaml'?)"
-    near = nearest(str(path), files, cutoff=FILE_SIMILARITY)
-    return near or nearest(path.stem, shipped.scene_names())
+    meant = nearest(str(path), files, cutoff=FILE_SIMILARITY)
+    return meant or nearest(path.stem, shipped.scene_names())
 
 
 def _require_format(document: Any, source: str) -> None:

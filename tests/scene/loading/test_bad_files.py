@@ -33,6 +33,12 @@ def test_missing_file_names_the_nearest_shipped_scene() -> None:
         load_scene("quickstrat")
 
 
+@pytest.mark.parametrize("name", ["long" * 99, f"{'long' * 99}/a.yaml", "a\0b"])
+def test_what_no_file_can_be_called_is_missing(name: str) -> None:
+    with pytest.raises(SceneError, match="no such file, and no shipped scene"):
+        load_scene(name)
+
+
 def test_folder_is_no_scene(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="is a folder"):
         load_scene(tmp_path)

@@ -77,6 +77,8 @@ ONE_DIFFERENCE: list[tuple[str, Change, str, str]] = [
     ("diffdrive", ('coef="-0.15"', 'coef="-0.2"'), "wheel.radius", r"tendon 'swing'"),
     ("diffdrive", ('coef="0.075"', 'coef="0.1"'), "wheel.radius", r"tendon 'axle'"),
     ("car", ("inertia: 0.25 ", "inertia: 0.9 "), "wheel.inertia", r"has 0.25 "),
+    ("car", ("mass: 6.0 ", "mass: 1000 "), "wheel.mass",
+     r"1000 kg a wheel, car.xml has 6 "),
     ("car", ("count: 4", "count: 2"), "wheel.count", r"2 wheels, car.xml has 4"),
     ("car", ("height: 0.8 ", "height: 1.2 "), "height", r"1.2 m, car.xml has 0.8 "),
     ("car", ("friction_coefficient: 1.0", "friction_coefficient: 1.2"),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import struct
+import zlib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -119,6 +121,24 @@ def save(path: Path, name: str) -> None:
         Image.new("RGB", (3, 3)).save(path / name)
     elif name == "grey.png":
         Image.new("L", (3, 3)).save(path / name)
+    elif name == "zipped.npy":
+        with (path / name).open("wb") as file:
+            np.savez(file, np.zeros((2, 2)))
+    elif name in ("unclosed.npy", "vast.npy"):
+        shape = "(2, 2" if name == "unclosed.npy" else "(10000000, 10000000)"
+        head = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}"
+        head = f"{head:<117}\n"
+        length = struct.pack("<H", len(head))
+        (path / name).write_bytes(b"\x93NUMPY\1\0" + length + head.encode())
+    elif name in ("vast.png", "torn.png"):
+        side = 60_000 if name == "vast.png" else 3
+        chunks = [struct.pack(">4sIIBBBBB", b"IHDR", side, side, 8, 0, 0, 0, 0)]
+        chunks += [b"IDAT" + zlib.compress(bytes(12))[:4], bytes(4)]
+        data = b"\x89PNG\r\n\x1a\n"
+        for chunk in chunks:
+            data += struct.pack(">I", len(chunk) - 4) + chunk
+            data += struct.pack(">I", zlib.crc32(chunk))
+        (path / name).write_bytes(data)
     else:
         (path / name).write_text("no such format")
 
@@ -134,6 +154,12 @@ def save(path: Path, name: str) -> None:
         ({"file": "hils.npy"}, r"got 'hils.npy'; no such file"),
         ({"file": "grey.pgm"}, r"expected .npy \(heights in m\) or .png"),
         ({"file": "broken.npy"}, r"'broken.npy' is no readable .npy file"),
+        ({"file": "zipped.npy"}, r"'zipped.npy' is no readable .npy file"),
+        ({"file": "unclosed.npy"}, r"'unclosed.npy' is no readable .npy file"),
+        ({"file": "vast.npy"}, r"'vast.npy' is no readable .npy file"),
+        ({"file": "vast.png", "range": [0, 1]}, r"'vast.png' is no readable picture"),
+        ({"file": "torn.png", "range": [0, 1]}, r"'torn.png' is no readable picture"),
+        ({"file": f"{'long' * 99}.npy"}, r"elevation.file: got 'long.*; no such file"),
         ({"file": "broken.png", "range": [0, 1]}, r"is no readable picture"),
         ({"file": "grey.png"}, r"elevation.range: missing; expected \[height of bl"),
         ({"file": "colour.png", "range": [0, 1]}, r"kind RGB; expected plain grey"),
@@ -152,6 +178,10 @@ def save(path: Path, name: str) -> None:
             r"elevation.packed.heights: got '\?\?\?'; not what was once packed",
         ),
         (
+            {"packed": {"rows": 2, "columns": 2, "heights": "größe"}},
+            r"elevation.packed.heights: got 'größe'; not what was once packed",
+        ),
+        (
             {"packed": {"rows": 2, "columns": 2, "heights": "eJwDAAAAAAE="}},
             r"holds 0 heights; expected 2 x 2",
         ),
@@ -164,7 +194,7 @@ def save(path: Path, name: str) -> None:
 )
 def test_bad_elevations(entry: dict[str, Any], message: str, tmp_path: Path) -> None:
     name = str(entry.get("file", "none"))
-    if name not in ("hils.npy", "none", "a.npy"):
+    if name not in ("hils.npy", "none", "a.npy") and len(name) < 99:
         save(tmp_path, name)
     with pytest.raises(SceneError, match=message) as caught:
         make_scene(entry, tmp_path)

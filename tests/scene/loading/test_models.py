@@ -95,12 +95,36 @@ def test_footprint_is_turned_counter_clockwise(tmp_path: Path) -> None:
             r"energy, line \d+: got 'papr'; must be 'full' or",
         ),
         ("wheel:", "wheels:", r"did you mean 'wheel'\?"),
+        (
+            "car.xml",
+            f"{'long' * 99}.xml",
+            r"mjcf, .*: got 'long.*; no such file in the",
+        ),
+        (
+            "motion_model: car",
+            r'motion_model: "a\0.py"',
+            r"motion_model, .*no such file",
+        ),
     ],
 )
 def test_bad_models(tmp_path: Path, old: str, new: str, message: str) -> None:
     folder = changed_car(tmp_path, old, new)
     with pytest.raises(SceneError, match=message):
         load_model(folder)
+
+
+def test_a_motion_file_that_leads_to_itself_is_none(tmp_path: Path) -> None:
+    folder = changed_car(tmp_path, "motion_model: car", "motion_model: loop.py")
+    (folder / "loop.py").symlink_to(folder / "loop.py")
+    with pytest.raises(SceneError, match="motion_model, .*got 'loop.py'; no such file"):
+        load_model(folder, trust_code=True)
+
+
+def test_a_motion_file_must_be_text(tmp_path: Path) -> None:
+    folder = changed_car(tmp_path, "motion_model: car", "motion_model: own.py")
+    (folder / "own.py").write_bytes(b"# \xff\n")
+    with pytest.raises(SceneError, match=r"own.py: 1 fault\n.*not a text file"):
+        load_model(folder, trust_code=True)
 
 
 def test_device_power_and_the_papers_energy_are_options(tmp_path: Path) -> None:
@@ -131,3 +155,5 @@ def test_references() -> None:
         model_folder("lorry", None)
     with pytest.raises(UsageError, match="no such folder"):
         model_folder("./lorry", CAR.parent)
+    with pytest.raises(UsageError, match="no such folder"):
+        model_folder(f"./{'lorry' * 99}", CAR.parent)

@@ -6,7 +6,6 @@ Grey values become occupancy as in Nav2's map server: `trinary`, `scale` and `ra
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +22,7 @@ from mrmg.scene.importing.layers import Area, ImportOptions, Layer
 from mrmg.scene.importing.raster_shapes import enclosing_polygons
 from mrmg.scene.importing.registry import Format, Head
 from mrmg.scene.loading.faults import validated
+from mrmg.scene.loading.pictures import opened_picture
 from mrmg.scene.loading.places import lines_of
 from mrmg.scene.loading.shape_schema import Number, Positive, Strict
 from mrmg.scene.loading.yaml_text import read_yaml
@@ -33,7 +33,6 @@ LETHAL, UNKNOWN = 100, -1
 MOST_CLASSES = 12
 """Multipliers that a mask of many values is rounded to, at most."""
 
-_MOST_PIXELS = 100_000_000
 _ASSUMED = ("mode", "negate", "occupied_thresh", "free_thresh")
 
 
@@ -204,23 +203,17 @@ def read_grid(path: Path) -> OccupancyGrid:
 
 def _picture(path: Path, document: MapDocument) -> tuple[np.ndarray, np.ndarray]:
     """Return brightness in [0, 1] and where the picture is opaque, as (h, w)."""
-    from PIL import Image
-
     file = path.parent / document.image
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(file) as picture:
-                if picture.width * picture.height > _MOST_PIXELS:
-                    raise ValueError(f"more than {_MOST_PIXELS} pixels")
-                # Grey with alpha as colours with alpha: its mean counts alpha, too.
-                if picture.mode in ("P", "PA", "1", "LA", "La"):
-                    clear = "A" in picture.getbands() or "transparency" in picture.info
-                    data = np.asarray(picture.convert("RGBA" if clear else "RGB"))
-                else:
-                    data = np.asarray(picture)
-                white = 65535.0 if picture.mode.startswith("I") else 255.0
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
+        with opened_picture(file) as picture:
+            # Grey with alpha as colours with alpha: its mean counts alpha, too.
+            if picture.mode in ("P", "PA", "1", "LA", "La"):
+                clear = "A" in picture.getbands() or "transparency" in picture.info
+                data = np.asarray(picture.convert("RGBA" if clear else "RGB"))
+            else:
+                data = np.asarray(picture)
+            white = 65535.0 if picture.mode.startswith("I") else 255.0
+    except ValueError as error:
         reason = "no readable picture" if os.path.exists(file) else "no such file"
         message = f"'{document.image}': {reason}; expected a PGM or PNG beside the YAML"
         raise SceneError(str(path), [Fault("image", message)]) from error
