@@ -77,6 +77,10 @@ def _document(scene: Scene) -> _Entry:
     if at_once and "charging_power" in document["battery"]:
         # A robot's own battery cannot take a charging power of the fleet's back.
         document["battery"], known = {}, {}
+    stated = document.get("margins", {})
+    if any(robot.margins.entry[key] is None for robot in changed for key in stated):
+        # Nor can its margins.
+        document["margins"], known = None, {}
     document["robots"] = _entries(scene, "robots", document, known)
     return {key: value for key, value in document.items() if value is not None}
 

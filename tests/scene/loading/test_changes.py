@@ -14,6 +14,7 @@ from mrmg import shipped
 from mrmg.errors import SceneError
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.loading import load_scene, scene_from_document
+from mrmg.scene.margins import STATES_NONE, Margins
 from mrmg.scene.objective import MAKESPAN
 from mrmg.scene.types import Scene
 
@@ -74,6 +75,17 @@ def test_batteries_of_a_scene_changed_in_memory() -> None:
     assert [robot.battery.capacity_J for robot in wide.robots] == [9000.0, 9000.0]
     assert wide.robots[0].pose == (5.0, 5.0, 0.0)
     assert wide.robots[0].battery.start_J == 4500.0
+
+
+@pytest.mark.parametrize("stated", [STATES_NONE, Margins(robot_m=0.5)])
+def test_a_robot_may_state_fewer_margins_than_the_fleet(stated: Margins) -> None:
+    scene = field(margins={"obstacle": 0.3, "robot": 0.4})
+    r1, r2 = scene.robots
+    edited = replace(scene, robots=(replace(r1, margins=stated), r2))
+    again = scene_from_document(edited.document, source="again")
+    assert again == edited
+    assert [robot.margins for robot in again.robots] == [stated, r2.margins]
+    assert "margins" not in edited.document
 
 
 def test_one_robot() -> None:
