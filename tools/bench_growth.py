@@ -34,7 +34,6 @@ from dataclasses import asdict, dataclass, replace
 from functools import cache, partial
 from math import sqrt
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from bench import conditions
@@ -49,6 +48,7 @@ from mrmg.planning.parameters import PATH_FOLLOWING
 from mrmg.planning.preparation import compile_kernels
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.populating.populate import populate
+from mrmg.scene.types import Scene
 
 GOALS_PER_STATION = 4
 """Where goals grow; the others' missions have 20 goals and 6 stations."""
@@ -171,7 +171,7 @@ def planned(case: Case, seed: int, drive: bool = False) -> Row:
     """Generate, plan, verify and perhaps drive one mission; return its row."""
     warm()
     populating = time.perf_counter()
-    scene = scene_from_document(document_of(case, seed), source=f"{case}")
+    scene = scene_of(case, seed)
     params = replace(PlannerParams(), improvements=0)
     began = time.perf_counter()
     result = plan_mission(scene, seed=seed, params=params)
@@ -279,15 +279,16 @@ def points_of(rows: Sequence[Row]) -> dict[str, list[GrowthPoint]]:
     return series
 
 
-def document_of(case: Case, seed: int) -> dict[str, Any]:
+def scene_of(case: Case, seed: int) -> Scene:
     """Return the scene of a case: a map, populated.
 
     Places are drawn anew, with other seeds, while a mission cannot do with them.
     """
     if case.boxes is None:
-        bare = mrmg.load_scene("scene6").document
+        bare = mrmg.load_scene("scene6")
     else:
-        bare = drawn_map(case.boxes, seed, case.side_m)
+        drawn = drawn_map(case.boxes, seed, case.side_m)
+        bare = scene_from_document(drawn, source=f"{case}")
     for again in range(20):
         try:
             return populate(

@@ -57,13 +57,12 @@ def parse_options() -> argparse.Namespace:
 
 def populated(path: Path, options: argparse.Namespace) -> Scene:
     """Return the scene of a map."""
-    document = populate(
-        import_files([path]).document,
+    return populate(
+        scene_from_document(import_files([path]).document, source=str(path)),
         robots=options.robots,
         goals=options.goals,
         seed=options.placement,
     )
-    return scene_from_document(document, source=str(path))
 
 
 if __name__ == "__main__":

@@ -82,13 +82,14 @@ def mission(number: int, maps: list[Path]) -> Scene:
     """
     rng = np.random.default_rng(number + 10**6)
     path = maps[int(rng.integers(len(maps)))]
-    document = populate(
-        import_files([path]).document,
+    scene = populate(
+        scene_from_document(import_files([path]).document, source=path.name),
         model=MODELS[int(rng.integers(len(MODELS)))],
         robots=int(rng.integers(2, 8)),
         goals=int(rng.integers(3, 18)),
         seed=number,
     )
+    document = scene.document
     add_wants(document, rng)
     document["name"] = f"mission{number}"
     return scene_from_document(document, source=f"mission {number} on {path.name}")

@@ -11,12 +11,15 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mrmg import storage
 from mrmg.cli import terminal
 from mrmg.counted import counted
 from mrmg.errors import Fault, FileError, UsageError
+
+if TYPE_CHECKING:
+    from mrmg.scene.types import Scene
 
 
 def new(options: argparse.Namespace) -> None:
@@ -162,6 +165,7 @@ def import_(options: argparse.Namespace) -> None:
     """Read maps, layouts and features of other tools as a scene."""
     from mrmg.scene.importing.importing import import_files
     from mrmg.scene.importing.layers import ImportOptions
+    from mrmg.scene.loading import scene_from_document
 
     _require_absent(options)
     found = import_files(
@@ -181,7 +185,8 @@ def import_(options: argparse.Namespace) -> None:
         land_cover=options.land_cover,
     )
     source = ", ".join(str(file) for file in options.files)
-    _write(found.document, options.out, source, found.notes)
+    scene = scene_from_document(found.document, source=source)
+    _write(scene, options.out, found.notes)
 
 
 def _box(words: Sequence[str]) -> tuple[float, float, float, float]:
@@ -203,8 +208,8 @@ def populate(options: argparse.Namespace) -> None:
     from mrmg.scene.populating.populate import populate as populated
 
     _require_absent(options)
-    document = populated(
-        load_scene(options.scene, trust_code=options.trust_code).document,
+    scene = populated(
+        load_scene(options.scene, trust_code=options.trust_code),
         robots=options.robots,
         goals=options.goals,
         stations=options.stations,
@@ -212,7 +217,7 @@ def populate(options: argparse.Namespace) -> None:
         model=options.model,
         trust_code=options.trust_code,
     )
-    _write(document, options.out, options.scene)
+    _write(scene, options.out)
 
 
 def _require_absent(options: argparse.Namespace) -> None:
@@ -222,13 +227,10 @@ def _require_absent(options: argparse.Namespace) -> None:
         require_absent(options.out, overwrite=options.overwrite)
 
 
-def _write(
-    document: dict[str, Any], out: Path | None, source: str, notes: Sequence[str] = ()
-) -> None:
-    from mrmg.scene.loading import dump_scene, scene_from_document
+def _write(scene: Scene, out: Path | None, notes: Sequence[str] = ()) -> None:
+    from mrmg.scene.loading import dump_scene
 
-    text = "".join(f"# {note}\n" for note in notes)
-    text += dump_scene(scene_from_document(document, source=source))
+    text = "".join(f"# {note}\n" for note in notes) + dump_scene(scene)
     for note in notes:
         print(f"mrmg: {note}", file=sys.stderr)
     if out is None:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+import shutil
 import tempfile
 from math import hypot
 from pathlib import Path
@@ -221,6 +222,30 @@ def test_hints_of_any_content_are_faults_only(value: object, section: str) -> No
         path.write_text(dump_yaml({section: value}), encoding="utf-8")
         for hint in heading_hints(path):
             assert "looks like degrees" in hint.message
+
+
+def test_a_heading_beyond_all_numbers_is_a_fault(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "turned.yaml"
+    path.write_text(DEGREES.replace("      - 90", "      - 9" + 350 * "0"))
+    assert main(["scene", "check", str(path)]) == ExitCode.INVALID_FILE
+    assert "robots.1.pose.2 (r2), line 17: got 9" in capsys.readouterr().err
+
+
+def test_a_model_with_a_motion_of_its_own_is_placed_where_it_is_trusted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(shipped.models_folder() / "car", "own")
+    robot = Path("own/robot.yaml")
+    robot.write_text(robot.read_text().replace("model: car", "model: own.py"))
+    Path("own/own.py").write_text("# only loaded here")
+    words = "scene populate quickstart --model ./own --goals 3 --stations 2 -o o.yaml"
+    assert main(words.split()) == ExitCode.INVALID_FILE
+    assert main([*words.split(), "--trust-code"]) == ExitCode.OK
+    scene = load_scene("o.yaml", trust_code=True)
+    assert {robot.model.name for robot in scene.robots} == {"own"}
 
 
 def test_draw_leaves_a_picture(tmp_path: Path) -> None:

@@ -40,9 +40,9 @@ def test_maps_are_those_of_their_seeds() -> None:
 def test_ground_grows_with_a_fleet() -> None:
     case = Case.of_fleet(4)
     assert (case.robots, case.goals, case.stations, case.side_m) == (4, 16, 4, 50.0)
-    document = bench_growth.document_of(case, 0)
-    assert document["bounds"] == [0, 0, 50.0, 50.0]
-    assert len(document["goals"]) == 16
+    scene = bench_growth.scene_of(case, 0)
+    assert scene.bounds == (0.0, 0.0, 50.0, 50.0)
+    assert len(scene.goals) == 16
 
 
 def test_sizes_are_chosen() -> None:
@@ -58,8 +58,8 @@ def test_sizes_are_chosen() -> None:
 
 def test_every_case_has_its_numbers() -> None:
     for case in TINY:
-        document = bench_growth.document_of(case, 0)
-        placed = [len(document[part]) for part in ("robots", "goals", "stations")]
+        scene = bench_growth.scene_of(case, 0)
+        placed = [len(part) for part in (scene.robots, scene.goals, scene.stations)]
         assert placed == [case.robots, case.goals, case.stations]
 
 

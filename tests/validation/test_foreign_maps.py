@@ -35,8 +35,8 @@ def test_a_mission_on_a_foreign_map_ends_well(name: str, tmp_path: Path) -> None
     if not (MAPS / name).exists():
         pytest.skip(f"no map {name} in ../shared/maps")
     document = import_map(MAPS / name, longest_side_m=100.0)
-    document = populate(document, robots=2, goals=8, stations=4, seed=3)
     scene = scene_from_document(document, source=name)
+    scene = populate(scene, robots=2, goals=8, stations=4, seed=3)
     result = pipeline.run(scene, out=tmp_path / "run", video=None)
     assert result.exit_code == ExitCode.OK, result.reason
     assert result.summary["energy"]["recharges"] > 0

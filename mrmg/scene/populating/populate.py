@@ -51,7 +51,7 @@ _CANDIDATES_PER_PLACE = 1.5
 
 
 def populate(
-    document: dict[str, Any],
+    scene: Scene,
     *,
     robots: int = 2,
     goals: int = 14,
@@ -59,12 +59,11 @@ def populate(
     seed: int = 3,
     model: str = "car",
     trust_code: bool = False,
-) -> dict[str, Any]:
-    """Place a mission on a map; an earlier one in the document is replaced.
+) -> Scene:
+    """Return a scene with a mission placed on its map, in place of an earlier one.
 
     Args:
-        document: a scene document; bounds, obstacles, terrain, elevation, objective
-            and time limit are used.
+        scene: the map; its objective and time limit stay, too.
         robots: how many, at least one.
         goals: how many, at least one.
         stations: how many, at least one.
@@ -72,19 +71,20 @@ def populate(
         model: of all robots: name of a shipped one, or a folder with a '/' in it.
         trust_code: whether the model may bring Python code (`loading.trust`).
 
-    Returns:
-        A scene document with the mission.
-
     Raises:
         UsageError: if a count is below one or the map has no room for the mission.
-        SceneError: if the document is no valid scene.
+        SceneError: if the model is invalid, or cannot climb what nothing keeps it off.
     """
     for name, count in (("robots", robots), ("goals", goals), ("stations", stations)):
         if count < 1:
             raise UsageError(f"cannot place {count} {name}; ask for at least 1")
     folder = model_folder(model, None)
-    bare = _map_of(document)
-    scene = scene_from_document(bare, source=str(document.get("name", "the map")))
+    if any(obstacle.blocks is not None for obstacle in scene.obstacles):
+        message = (
+            "an obstacle with 'blocks' names robots that populate replaces; "
+            "remove 'blocks' from the map first"
+        )
+        raise UsageError(message)
     robot_model, _ = load_model(folder, trust_code=trust_code)
     rng = stream(seed, "populate")
     ground = _drivable(scene, robot_model)
@@ -106,22 +106,9 @@ def populate(
         start_gap_m=_START_GAP_M * _size(robot_model),
     )
     placement = place_mission(sites, robots, goals, stations, rng)
-    return _document(bare, ground, places, placement, model, robot_model)
-
-
-def _map_of(document: dict[str, Any]) -> dict[str, Any]:
-    """Return a document without its mission."""
-    wishes = ("objective", "time_limit")
-    kept = ("format", "name", "bounds", "obstacles", "terrain", "elevation", *wishes)
-    bare = {key: document[key] for key in kept if key in document}
-    for obstacle in bare.get("obstacles", []):
-        if isinstance(obstacle, dict) and "blocks" in obstacle:
-            message = (
-                "an obstacle with 'blocks' names robots that populate replaces; "
-                "remove 'blocks' from the map first"
-            )
-            raise UsageError(message)
-    return bare
+    mission = _mission(ground, places, placement, model, robot_model)
+    document = {**scene.document, "margins": None, **mission}
+    return scene_from_document(document, source=scene.name, trust_code=trust_code)
 
 
 def _drivable(scene: Scene, model: RobotModel) -> Ground:
@@ -131,7 +118,7 @@ def _drivable(scene: Scene, model: RobotModel) -> Ground:
     extent_m2 = (x_max - x_min) * (y_max - y_min)
     bare = Ground.over(
         scene.bounds,
-        [*(obstacle.shape for obstacle in scene.barriers), *_too_steep(scene, model)],
+        [*(obstacle.shape for obstacle in scene.obstacles), *_too_steep(scene, model)],
         [(area.shape, area.multiplier) for area in scene.terrain],
         margin_m=0.0,
         cell_m=max(_CELL_M * size, math.sqrt(extent_m2 / _MOST_POINTS)),
@@ -211,14 +198,15 @@ def _candidates(
     return chosen
 
 
-def _document(
-    bare: dict[str, Any],
+def _mission(
     ground: Ground,
     places: list[int],
     placement: Placement,
     model: str,
     robot_model: RobotModel,
 ) -> dict[str, Any]:
+    """Return the keys of a scene file that make the mission."""
+
     def at(place: int) -> list[float]:
         return [round(float(value), 3) for value in ground.points_m[places[place]]]
 
@@ -230,7 +218,6 @@ def _document(
         ]
 
     return {
-        **bare,
         "goals": regions("g", placement.goals, GOAL_RADIUS_M),
         "stations": regions("s", placement.stations, STATION_RADIUS_M),
         "battery": {"capacity_m": float(placement.capacity_m), "reserve": RESERVE},

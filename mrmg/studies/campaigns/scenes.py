@@ -81,7 +81,7 @@ class SceneSource:
                 beside = models / model
                 model = str((beside if beside.exists() else Path(model)).resolve())
             first = {**placed, "model": model, "seed": placed["seed"] or 0}
-            scene = _populated(scene, first, trust_code)
+            scene = populate(scene, trust_code=trust_code, **first)
         return SceneSource(
             name=entry["name"] or scene.name,
             digest=scene.digest,
@@ -109,9 +109,8 @@ class SceneSource:
         if self.populate:
             model = scene.robots[0].model.origin
             own = {"model": model.reference} if model else {}
-            scene = _populated(
-                scene, _seeded(self.populate, seed) | own, self.trust_code
-            )
+            recipe = _seeded(self.populate, seed) | own
+            scene = populate(scene, trust_code=self.trust_code, **recipe)
         if self.perturb:
             scene = perturbed(scene, self.perturb, _seeded(self.perturb, seed)["seed"])
         return scene.with_(**changes) if changes else scene
@@ -122,11 +121,6 @@ class SceneSource:
 
 def _seeded(recipe: Mapping[str, Any], seed: int) -> _Entry:
     return {**recipe, "seed": seed if recipe["seed"] is None else recipe["seed"]}
-
-
-def _populated(scene: Scene, recipe: Mapping[str, Any], trust_code: bool) -> Scene:
-    document = populate(scene.document, trust_code=trust_code, **recipe)
-    return scene_from_document(document, source=scene.name, trust_code=trust_code)
 
 
 @lru_cache(maxsize=4)

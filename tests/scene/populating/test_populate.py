@@ -16,6 +16,7 @@ from places import import_map, nearest
 from mrmg.errors import UsageError
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.loading.models import model_folder
+from mrmg.scene.margins import STATES_NONE
 from mrmg.scene.populating.ground import Ground
 from mrmg.scene.populating.populate import populate
 from mrmg.scene.types import Scene
@@ -45,9 +46,12 @@ FIELD: dict[str, Any] = {
 }
 
 
-def check_mission(document: dict[str, Any], robots: int, goals: int) -> Scene:
+def placed(document: dict[str, Any], **wanted: Any) -> Scene:
+    return populate(scene_from_document(document, source="test"), **wanted)
+
+
+def check_mission(scene: Scene, robots: int, goals: int) -> None:
     """What every populated scene must keep."""
-    scene = scene_from_document(document, source="test")
     assert (len(scene.robots), len(scene.goals)) == (robots, goals)
     model = scene.robots[0].model
     ground = Ground.over(
@@ -78,7 +82,6 @@ def check_mission(document: dict[str, Any], robots: int, goals: int) -> Scene:
     # Places are apart from each other.
     gaps = [np.hypot(*np.subtract(a, b)) for a, b in combinations(places, 2)]
     assert min(gaps) > 1.0
-    return scene
 
 
 def _chained(near: np.ndarray) -> bool:
@@ -105,7 +108,7 @@ def test_two_robots_on_shared_map(name: str) -> None:
     path = MAPS / name
     if not path.exists():
         pytest.skip(f"{name} is not here")
-    check_mission(populate(import_map(path)), 2, 14)
+    check_mission(placed(import_map(path)), 2, 14)
 
 
 @pytest.mark.quick("gaps.txt")
@@ -114,7 +117,7 @@ def test_fleet_on_shared_map(name: str) -> None:
     path = MAPS / name
     if not path.exists():
         pytest.skip(f"{name} is not here")
-    check_mission(populate(import_map(path), robots=4, goals=20), 4, 20)
+    check_mission(placed(import_map(path), robots=4, goals=20), 4, 20)
 
 
 @pytest.mark.slow
@@ -123,32 +126,33 @@ def test_map_too_narrow_for_the_robot() -> None:
     if not path.exists():
         pytest.skip("jf-pb2.txt is not here")
     with pytest.raises(UsageError, match=r"join only \d+ % .* scale the map up"):
-        populate(import_map(path))
-    check_mission(populate(import_map(path, 300.0)), 2, 14)
+        placed(import_map(path))
+    check_mission(placed(import_map(path, 300.0)), 2, 14)
 
 
 @pytest.mark.quick("0", "1")
 @pytest.mark.parametrize("seed", range(4))
 def test_seeds(seed: int) -> None:
-    document = populate(FIELD, goals=6, stations=3, seed=seed)
-    check_mission(document, 2, 6)
-    assert document == populate(FIELD, goals=6, stations=3, seed=seed)
+    scene = placed(FIELD, goals=6, stations=3, seed=seed)
+    check_mission(scene, 2, 6)
+    assert scene == placed(FIELD, goals=6, stations=3, seed=seed)
 
 
 def test_large_fleet() -> None:
-    check_mission(populate(FIELD, robots=8, goals=120, stations=30), 8, 120)
+    check_mission(placed(FIELD, robots=8, goals=120, stations=30), 8, 120)
 
 
 def test_seeds_differ() -> None:
-    documents = [populate(FIELD, goals=6, stations=3, seed=seed) for seed in range(3)]
-    assert len({str(document["goals"]) for document in documents}) == 3
+    scenes = [placed(FIELD, goals=6, stations=3, seed=seed) for seed in range(3)]
+    assert len({scene.digest for scene in scenes}) == 3
 
 
 def test_map_is_kept_and_mission_replaced() -> None:
-    before = load_scene("quickstart").document
+    before = load_scene("quickstart").with_(margins={"obstacle": 0.4})
     after = populate(before, robots=1, goals=3, stations=2)
     for part in ("name", "bounds", "obstacles", "terrain"):
-        assert after[part] == before[part]
+        assert after.document[part] == before.document[part]
+    assert after.robots[0].margins == STATES_NONE
     check_mission(after, 1, 3)
 
 
@@ -165,13 +169,14 @@ def test_map_is_kept_and_mission_replaced() -> None:
 )
 def test_what_cannot_be_placed(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(UsageError, match=message):
-        populate(FIELD, **{"robots": 1, "stations": 5, **changes})
+        placed(FIELD, **{"robots": 1, "stations": 5, **changes})
 
 
 def test_robot_bound_obstacles_are_refused() -> None:
     wall = {"box": {"center": [10, 10], "size": [2, 2]}, "blocks": ["r1"]}
+    robot = {"id": "r1", "model": "car", "pose": [5, 5, 0]}
     with pytest.raises(UsageError, match="remove 'blocks'"):
-        populate({**FIELD, "obstacles": [wall]})
+        placed({**FIELD, "obstacles": [wall], "robots": [robot]})
 
 
 def test_roads_of_small_robots_are_narrow(tmp_path: Path) -> None:
@@ -193,26 +198,24 @@ def test_roads_of_small_robots_are_narrow(tmp_path: Path) -> None:
         for y in np.arange(0.5, 6.0, 1.0).tolist()
     ]
     hall = {"format": 1, "name": "hall", "bounds": [0, 0, 6, 6], "obstacles": posts}
-    document = populate(hall, model=str(tmp_path), robots=1, goals=5, stations=2)
-    scene = scene_from_document(document, source="test")
+    scene = placed(hall, model=str(tmp_path), robots=1, goals=5, stations=2)
     assert len(scene.goals) == 5
 
 
 def test_no_room_at_all() -> None:
     with pytest.raises(UsageError, match="scale the map up"):
-        populate({"format": 1, "name": "box", "bounds": [0, 0, 1, 1]})
+        placed({"format": 1, "name": "box", "bounds": [0, 0, 1, 1]})
 
 
 def test_a_mission_that_need_not_recharge_is_better_than_none() -> None:
-    document = populate(FIELD, robots=20, goals=3, stations=1)
-    scene = scene_from_document(document, source="test")
+    scene = placed(FIELD, robots=20, goals=3, stations=1)
     assert (len(scene.robots), len(scene.goals)) == (20, 3)
 
 
 def test_small_robots_get_small_places() -> None:
-    document = populate(FIELD, goals=5, stations=2, model="diffdrive")
-    assert {robot["model"] for robot in document["robots"]} == {"diffdrive"}
-    radii = [goal["circle"]["radius"] for goal in document["goals"]]
+    scene = placed(FIELD, goals=5, stations=2, model="diffdrive")
+    assert {robot.model.name for robot in scene.robots} == {"diffdrive"}
+    radii = [goal.region.radius_m for goal in scene.goals]
     assert radii == pytest.approx([math.hypot(0.55, 0.35)] * 5, abs=1e-3)
 
 
@@ -222,8 +225,7 @@ def test_slopes_are_kept_and_steep_ground_left_out() -> None:
         "hills": [{"center": [20, 20], "height": 6, "radius": 9}],
         "slope": "avoid",
     }
-    document = populate({**FIELD, "elevation": ridge}, goals=6, stations=2)
-    scene = scene_from_document(document, source="test")
+    scene = placed({**FIELD, "elevation": ridge}, goals=6, stations=2)
     assert scene.elevation is not None
     steep = shapely.union_all(
         [wall.shape for wall in scene.barriers if wall.is_steep_ground]
