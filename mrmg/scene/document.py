@@ -11,6 +11,7 @@ import copy
 import math
 import zlib
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -18,12 +19,12 @@ import shapely
 
 from mrmg.errors import Fault, SceneError
 from mrmg.scene.elevation import Elevation
+from mrmg.scene.keys import key_of
 from mrmg.scene.margins import STATES_NONE
 from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
-from mrmg.scene.region import HEADING_TOLERANCE_RAD, Region
+from mrmg.scene.region import Region
 from mrmg.scene.types import (
     Battery,
-    Finish,
     Goal,
     Obstacle,
     Robot,
@@ -113,37 +114,26 @@ def entry_of(value: Any) -> Any:
     return WRITTEN[type(value)](value)
 
 
-def _obstacle_entry(obstacle: Obstacle) -> _Entry:
-    entry = {"id": obstacle.id, **polygon_entry(obstacle.shape)}
-    entry["height"] = float(obstacle.height_m)
-    if obstacle.blocks is not None:
-        entry["blocks"] = list(obstacle.blocks)
+def _entry(value: Any) -> _Entry:
+    """Return the entry of a value whose fields are keys, but for those at defaults."""
+    entry: _Entry = {}
+    for field in fields(value):
+        item = getattr(value, field.name)
+        if isinstance(item, Region):
+            entry |= _region(item)
+        elif isinstance(item, shapely.Geometry):
+            entry |= polygon_entry(item)
+        elif field.name == "one_at_a_time":
+            entry |= {"capacity": 1} if item else {}
+        elif item is not None and item != field.default:
+            entry[key_of(field.name)] = _plain(item)
     return entry
 
 
-def _terrain_entry(area: TerrainArea) -> _Entry:
-    entry = {"id": area.id, **polygon_entry(area.shape)}
-    entry["multiplier"] = float(area.multiplier)
-    if area.turning_multiplier != 1.0:
-        entry["turning_multiplier"] = float(area.turning_multiplier)
-    if area.energy_spread:
-        entry["energy_spread"] = float(area.energy_spread)
-    return entry
-
-
-def _goal_entry(goal: Goal) -> _Entry:
-    entry = {"id": goal.id, **_region(goal.region)}
-    if goal.dwell_s:
-        entry["dwell"] = float(goal.dwell_s)
-    stated = (goal.heading_rad, goal.heading_tolerance_rad)
-    return entry | (_heading(goal) if stated != (None, HEADING_TOLERANCE_RAD) else {})
-
-
-def _station_entry(station: Station) -> _Entry:
-    entry = {"id": station.id, **_region(station.region)}
-    if station.dwell_s:
-        entry["dwell"] = float(station.dwell_s)
-    return {**entry, "capacity": 1} if station.one_at_a_time else entry
+def _plain(item: Any) -> Any:
+    if isinstance(item, str):
+        return item
+    return list(item) if isinstance(item, tuple) else float(item)
 
 
 def _robot_entry(robot: Robot) -> _Entry:
@@ -162,7 +152,7 @@ def _robot_entry(robot: Robot) -> _Entry:
         stated = robot.margins.entry.items()
         entry["margins"] = {key: value for key, value in stated if value is not None}
     if robot.finish is not None:
-        entry["finish"] = _finish(robot.finish)
+        entry["finish"] = _entry(robot.finish)
     return entry
 
 
@@ -238,17 +228,6 @@ def _region(region: Region) -> _Entry:
     return {"circle": {"center": center, "radius": float(region.radius_m)}}
 
 
-def _finish(finish: Finish) -> _Entry:
-    return {**_region(finish.region), **_heading(finish)}
-
-
-def _heading(target: Goal | Finish) -> _Entry:
-    entry = {"heading_tolerance": float(target.heading_tolerance_rad)}
-    if target.heading_rad is not None:
-        entry["heading"] = float(target.heading_rad)
-    return entry
-
-
 def _battery(battery: Battery) -> _Entry:
     capacity_J, start_J = float(battery.capacity_J), float(battery.start_J)
     own = {"capacity_J": capacity_J, "reserve": float(battery.reserve_fraction)}
@@ -302,11 +281,11 @@ def _differences(before: Mapping[str, Any], after: Mapping[str, Any]) -> _Entry:
 
 WRITTEN: dict[type, Callable[[Any], Any]] = {
     Elevation: elevation_entry,
-    Goal: _goal_entry,
+    Goal: _entry,
     Objective: _objective_entry,
-    Obstacle: _obstacle_entry,
+    Obstacle: _entry,
     Robot: _robot_entry,
-    Station: _station_entry,
-    TerrainArea: _terrain_entry,
+    Station: _entry,
+    TerrainArea: _entry,
 }
 """What makes the entry of a value, by its type."""

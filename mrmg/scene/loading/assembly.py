@@ -19,7 +19,7 @@ from mrmg import storage
 from mrmg.errors import Fault, SceneError, UsageError
 from mrmg.scene.document import elevation_entry
 from mrmg.scene.elevation import Elevation
-from mrmg.scene.loading.batteries import battery_of
+from mrmg.scene.loading.batteries import battery_of, require_one_capacity
 from mrmg.scene.loading.elevation import ElevationEntry, elevation_of
 from mrmg.scene.loading.faults import EntryError, parsed, unknown_robot
 from mrmg.scene.loading.geometry import region_of, shape_of
@@ -38,10 +38,15 @@ from mrmg.scene.loading.schema import (
     StationEntry,
     TerrainEntry,
 )
-from mrmg.scene.loading.shape_schema import LARGEST_M, CircleEntry
+from mrmg.scene.loading.shape_schema import (
+    LARGEST_M,
+    CircleEntry,
+    ShapedEntry,
+    values_of,
+)
 from mrmg.scene.loading.starts import crowded_robots, misplaced_robots
 from mrmg.scene.objective import ENERGY, MAKESPAN, Objective
-from mrmg.scene.region import HEADING_TOLERANCE_RAD, Region
+from mrmg.scene.region import Region
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.slopes import avoided_ground, slope_faults
 from mrmg.scene.types import Finish, Goal, Obstacle, Robot, Scene, Station, TerrainArea
@@ -54,6 +59,7 @@ RESERVED_IDS = ("bounds", "floor", "world")
 """Names that logs and the simulated world use for other things."""
 
 _Part = TypeVar("_Part")
+_Shaped = TypeVar("_Shaped", Obstacle, TerrainArea)
 
 
 class Assembly:
@@ -69,11 +75,11 @@ class Assembly:
         self._base = base
         self._models: dict[str, tuple[RobotModel, dict[str, Any]] | None] = {}
         self._parameters: dict[str, dict[str, Any]] = {}
-        self.ids = self._unique_ids()
+        self._poses: dict[str, str] = {}
+        self._require_unique_ids()
         items = self._items("robots")
         self._robot_ids = [str(i.get("id")) for i in items if isinstance(i, dict)]
-        fleet = parsed(BatteryEntry, document.get("battery", {}))
-        self._fleet_battery = fleet or BatteryEntry()
+        self._fleet_battery = self._battery()
         margins = parsed(MarginsEntry, document.get("margins")) or MarginsEntry()
         self._fleet_margins = margins.margins
         self.bounds = self._bounds()
@@ -86,11 +92,11 @@ class Assembly:
         self.goals = self._parts("goals", self._goal)
         self.stations = self._parts("stations", self._station)
         self.objective = self._objective()
-        starts = {robot: f"{path}.pose" for robot, path in self.ids.items()}
         steep = avoided_ground(self.elevation, self.robots, self.terrain)
         barriers = [*self.obstacles, *steep]
-        self.faults += misplaced_robots(self.robots, starts, self.bounds, barriers)
-        self.faults += crowded_robots(self.robots, starts, self.stations)
+        poses = self._poses
+        self.faults += misplaced_robots(self.robots, poses, self.bounds, barriers)
+        self.faults += crowded_robots(self.robots, poses, self.stations)
 
     def scene(self, checked: SceneDocument) -> Scene:
         """Return the scene; call it only when there are no faults.
@@ -98,7 +104,7 @@ class Assembly:
         Args:
             checked: the document.
         """
-        document = checked.model_dump(mode="json", exclude_none=True)
+        document = checked.model_dump(mode="json", exclude_none=True, by_alias=True)
         for entry, robot in zip(document["robots"], self.robots, strict=True):
             assert robot.model.origin is not None
             reference = robot.model.origin.reference
@@ -160,8 +166,8 @@ class Assembly:
         raw = self._document.get(section)
         return raw if isinstance(raw, list) else []
 
-    def _unique_ids(self) -> dict[str, str]:
-        """Return the path of every id; a second use of one is a fault."""
+    def _require_unique_ids(self) -> None:
+        """Note a fault for each id that is reserved or in use."""
         seen: dict[str, str] = {}
         for section in SECTIONS:
             for index, item in enumerate(self._items(section)):
@@ -175,7 +181,6 @@ class Assembly:
                     message = f"the id '{name}' is already used by {seen[name]}"
                     self._fault(where, message)
                 seen.setdefault(name, path)
-        return seen
 
     def _bounds(self) -> tuple[float, float, float, float] | None:
         raw = self._document.get("bounds")
@@ -192,10 +197,22 @@ class Assembly:
         self._fault("bounds", f"got {raw}; expected {wanted}")
         return None
 
+    def _battery(self) -> BatteryEntry | None:
+        """Return the fleet's battery; None where it has several capacities."""
+        stated = parsed(BatteryEntry, self._document.get("battery", {}))
+        fleet = stated or BatteryEntry()
+        with self._faults_noted():
+            require_one_capacity(fleet, "battery")
+            return fleet
+        return None
+
     def _robot(self, entry: RobotEntry, path: str) -> Robot:
+        self._poses.setdefault(entry.id, f"{path}.pose")
         model, self._parameters[entry.id] = self._model(entry.model, f"{path}.model")
         if entry.energy is not None:
             model = replace(model, energy_preset=entry.energy)
+        if self._fleet_battery is None:
+            raise EntryError
         battery = battery_of(entry, self._fleet_battery, model, path)
         finish = None
         with self._faults_noted():
@@ -226,8 +243,8 @@ class Assembly:
             region = self._region(wanted, path)
         return Finish(
             region=region,
-            heading_rad=wanted.heading,
-            heading_tolerance_rad=wanted.heading_tolerance,
+            heading_rad=wanted.heading_rad,
+            heading_tolerance_rad=wanted.heading_tolerance_rad,
         )
 
     def _model(self, wanted: Any, path: str) -> tuple[RobotModel, dict[str, Any]]:
@@ -266,12 +283,7 @@ class Assembly:
             if name not in self._robot_ids:
                 message = unknown_robot(name, self._robot_ids)
                 self._fault(f"{path}.blocks.{place}", message)
-        return Obstacle(
-            id=entry.id or _default_id(path),
-            shape=shape_of(entry, path),
-            height_m=entry.height,
-            blocks=None if entry.blocks is None else tuple(entry.blocks),
-        )
+        return _shaped(Obstacle, entry, path)
 
     def _elevation(self) -> Elevation | None:
         entry = parsed(ElevationEntry, self._document.get("elevation"))
@@ -296,20 +308,13 @@ class Assembly:
         return Objective(energy_weight=blend.energy, makespan_weight=blend.makespan)
 
     def _goal(self, entry: GoalEntry, path: str) -> Goal:
-        return Goal(
-            id=entry.id,
-            region=self._region(entry, path),
-            dwell_s=entry.dwell or 0.0,
-            heading_rad=entry.heading,
-            heading_tolerance_rad=entry.heading_tolerance or HEADING_TOLERANCE_RAD,
-        )
+        return Goal(region=self._region(entry, path), **values_of(Goal, entry))
 
     def _station(self, entry: StationEntry, path: str) -> Station:
         return Station(
-            id=entry.id,
             region=self._region(entry, path),
-            dwell_s=entry.dwell or 0.0,
             one_at_a_time=entry.capacity == 1,
+            **values_of(Station, entry),
         )
 
     def _region(self, entry: RegionEntry | FinishEntry, path: str) -> Region:
@@ -327,13 +332,13 @@ class Assembly:
 
 
 def _terrain_area(entry: TerrainEntry, path: str) -> TerrainArea:
-    return TerrainArea(
-        id=entry.id or _default_id(path),
-        shape=shape_of(entry, path),
-        multiplier=entry.multiplier,
-        turning_multiplier=entry.turning_multiplier,
-        energy_spread=entry.energy_spread,
-    )
+    return _shaped(TerrainArea, entry, path)
+
+
+def _shaped(kind: type[_Shaped], entry: ShapedEntry, path: str) -> _Shaped:
+    """Return the obstacle or terrain area of an entry."""
+    own = {"id": _default_id(path), **values_of(kind, entry)}
+    return kind(shape=shape_of(entry, path), **own)
 
 
 def _default_id(path: str) -> str:

@@ -17,6 +17,7 @@ from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Battery
 
 J_PER_WH = 3600.0
+CAPACITIES = ("capacity_J", "capacity_Wh", "capacity_m")
 
 
 def battery_of(
@@ -26,7 +27,8 @@ def battery_of(
 
     Args:
         robot: its entry; what its own battery names comes first.
-        fleet: the scene's battery; what it names comes next, then the model's.
+        fleet: the scene's battery, with at most one capacity; what it names comes
+            next, then the model's.
         model: its kind.
         path: of the entry in the file.
 
@@ -34,8 +36,8 @@ def battery_of(
         EntryError: if there is no such battery.
     """
     own = robot.battery or BatteryEntry()
-    own_J = _capacity_J(own, model, f"{path}.battery")
-    fleet_J = _capacity_J(fleet, model, "battery")
+    require_one_capacity(own, f"{path}.battery")
+    own_J, fleet_J = _capacity_J(own, model), _capacity_J(fleet, model)
     capacity_J = own_J or fleet_J or model.battery_capacity_J
     reserve = own.reserve if own.reserve is not None else fleet.reserve or 0.0
     start_J = _start_J(robot.start_energy, capacity_J, model, f"{path}.start_energy")
@@ -68,18 +70,25 @@ def _joules_of_units(model: RobotModel) -> dict[str, float]:
     return {"J": 1.0, "Wh": J_PER_WH, "m": plain_J_per_m}
 
 
-def _capacity_J(entry: BatteryEntry, model: RobotModel, path: str) -> float | None:
-    """Return the capacity that an entry states; None if it states none."""
-    stated = {
-        key: value * joules
-        for unit, joules in _joules_of_units(model).items()
-        for key in [f"capacity_{unit}"]
-        if (value := getattr(entry, key)) is not None
-    }
+def require_one_capacity(entry: BatteryEntry, path: str) -> None:
+    """Refuse an entry that states several capacities.
+
+    Raises:
+        EntryError: naming them.
+    """
+    stated = [key for key in CAPACITIES if getattr(entry, key) is not None]
     if len(stated) > 1:
         message = f"has {' and '.join(stated)}; expected at most one capacity"
         raise EntryError(Fault(path, message))
-    return next(iter(stated.values()), None)
+
+
+def _capacity_J(entry: BatteryEntry, model: RobotModel) -> float | None:
+    """Return the capacity that an entry states; None if it states none."""
+    for unit, joules in _joules_of_units(model).items():
+        stated: float | None = getattr(entry, f"capacity_{unit}")
+        if stated is not None:
+            return stated * joules
+    return None
 
 
 def _start_J(

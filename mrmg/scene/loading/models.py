@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -31,6 +31,7 @@ from mrmg.scene.loading.shape_schema import (
     Point,
     Positive,
     Strict,
+    values_of,
 )
 from mrmg.scene.loading.trust import file_within, refusal_of_code
 from mrmg.scene.loading.yaml_text import parse_yaml, read_text
@@ -307,23 +308,16 @@ def _model(folder: Path, entry: ModelDocument) -> RobotModel:
     if motion not in SHIPPED_MOTIONS:
         motion = str((folder / motion).resolve())
     stated = {
-        **_values_of(RobotModel, entry),
-        **_values_of(RobotModel, entry.wheel),
-        "limits": Limits(**_values_of(Limits, entry.limits)),
-        "motor": entry.motor and Motor(**_values_of(Motor, entry.motor)),
+        **values_of(RobotModel, entry),
+        **values_of(RobotModel, entry.wheel),
+        "limits": Limits(**values_of(Limits, entry.limits)),
+        "motor": entry.motor and Motor(**values_of(Motor, entry.motor)),
         "margins": (entry.margins or MarginsEntry()).margins,
         "tracking_error": entry.tracking_error and entry.tracking_error.value,
         "motion_model": motion,
         "mjcf": entry.mjcf and folder / entry.mjcf,
     }
     return RobotModel(name=folder.name, footprint_m=footprint, **stated)
-
-
-def _values_of(kind: type[Any], entry: Strict) -> dict[str, Any]:
-    """Return the values of an entry that a dataclass has, too, by their names there."""
-    known = type(entry).model_fields
-    names = [item.name for item in fields(kind) if item.name in known]
-    return {name: getattr(entry, name) for name in names}
 
 
 def model_parameters(model: RobotModel) -> dict[str, Any]:

@@ -103,6 +103,7 @@ from mrmg.scene.loading.shape_schema import (
     Coordinate,
     Identifier,
     Length,
+    NamedWithUnits,
     NotNegative,
     Number,
     OneOf,
@@ -127,7 +128,7 @@ class ObstacleEntry(ShapedEntry):
 
     id: Identifier | None = None
     """name, unique in the whole file"""
-    height: Length = 1.0
+    height_m: Length = 1.0
     """height in m"""
     blocks: Annotated[list[Identifier], Field(min_length=1)] | None = None
     """at least one id of a robot"""
@@ -146,7 +147,7 @@ class TerrainEntry(ShapedEntry):
     """standard deviation of a run's energy from run to run, as a share"""
 
 
-class RegionEntry(OneOf):
+class RegionEntry(OneOf, NamedWithUnits):
     """A goal or station: exactly one of circle, polygon; convex."""
 
     one_of = ("circle", "polygon")
@@ -157,16 +158,16 @@ class RegionEntry(OneOf):
     """a disc: its center [x, y] and its radius in m"""
     polygon: Ring | None = None
     """at least 3 corners [x, y] in m"""
-    dwell: Stay | None = None
+    dwell_s: Stay | None = None
     """time in s that a visit takes"""
 
 
 class GoalEntry(RegionEntry):
     """A goal, perhaps with a heading."""
 
-    heading: Number | None = None
+    heading_rad: Number | None = None
     """yaw in rad"""
-    heading_tolerance: Positive | None = None
+    heading_tolerance_rad: Positive | None = None
     """in rad; default 0.2"""
 
 
@@ -230,7 +231,7 @@ StartEnergy = Annotated[
 ]
 
 
-class FinishEntry(OneOf):
+class FinishEntry(OneOf, NamedWithUnits):
     """Exactly one of circle, polygon; convex; perhaps with a heading."""
 
     one_of = ("circle", "polygon")
@@ -239,9 +240,9 @@ class FinishEntry(OneOf):
     """a disc: its center [x, y] and its radius in m"""
     polygon: Ring | None = None
     """at least 3 corners [x, y] in m"""
-    heading: Number | None = None
+    heading_rad: Number | None = None
     """yaw in rad"""
-    heading_tolerance: Positive = HEADING_TOLERANCE_RAD
+    heading_tolerance_rad: Positive = HEADING_TOLERANCE_RAD
     """in rad"""
 
 

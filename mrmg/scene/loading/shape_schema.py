@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import re
+from dataclasses import fields
 from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from mrmg.errors import Fault
+from mrmg.scene.keys import key_of
 from mrmg.scene.loading.faults import EntryError
 
 # Limits within which sums, squares and quotients of doubles stay finite, and places
@@ -48,9 +49,6 @@ class Strict(BaseModel):
     )
 
 
-_UNIT = re.compile(r"_(m_s2|m_s|m|kg_m2|kg|W|J|Ohm|Nm_A|V_s|A)$")
-
-
 class NamedWithUnits(Strict):
     """Entries whose fields have their units in their names, which their keys have not.
 
@@ -58,8 +56,22 @@ class NamedWithUnits(Strict):
     """
 
     model_config = ConfigDict(
-        alias_generator=lambda name: _UNIT.sub("", name).removeprefix("wheel_")
+        alias_generator=lambda name: key_of(name).removeprefix("wheel_")
     )
+
+
+def values_of(kind: type[Any], entry: Strict) -> dict[str, Any]:
+    """Return what an entry states of the fields of a dataclass, by their names there.
+
+    What it leaves open is left out; lists become tuples.
+    """
+    known = type(entry).model_fields
+    stated = {item.name: getattr(entry, item.name, None) for item in fields(kind)}
+    return {
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in stated.items()
+        if name in known and value is not None
+    }
 
 
 def _require_one(schema: dict[str, Any], kind: type[OneOf]) -> None:
@@ -108,7 +120,7 @@ class CircleEntry(Strict):
     """radius in m"""
 
 
-class ShapedEntry(OneOf):
+class ShapedEntry(OneOf, NamedWithUnits):
     """Exactly one of polygon, box, circle."""
 
     one_of = ("polygon", "box", "circle")

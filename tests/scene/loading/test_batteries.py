@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from mrmg.errors import SceneError
-from mrmg.scene.loading import load_scene
+from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.shipped import models_folder
 
 
@@ -39,3 +39,22 @@ def test_a_station_must_give_more_than_the_robot_draws(
         message = rf"{where}\.charging_power{place}: got {given}; r itself draws 8 W"
         with pytest.raises(SceneError, match=rf"{message}.* give at least 8\.\d+ W"):
             load_scene(written(float(given.split()[0])))
+
+
+@pytest.mark.parametrize("robots", [0, 1, 2])
+def test_two_capacities_of_the_fleet_are_one_fault(robots: int) -> None:
+    document = {
+        "format": 1,
+        "name": "field",
+        "bounds": [0, 0, 20, 20],
+        "battery": {"capacity_J": 1, "capacity_Wh": 1},
+        "robots": [
+            {"id": f"r{k}", "model": "car", "pose": [5, 5 + 9 * k, 0]}
+            for k in range(robots)
+        ],
+    }
+    with pytest.raises(SceneError) as caught:
+        scene_from_document(document, source="test")
+    (fault,) = caught.value.faults
+    assert fault.path == "battery"
+    assert fault.message.startswith("has capacity_J and capacity_Wh; expected at most")

@@ -229,6 +229,22 @@ def test_digest_sees_defaults_as_if_written() -> None:
     assert scene_from_document(written, source="test").digest == plain.digest
 
 
+def test_a_start_is_named_by_the_robots_own_place() -> None:
+    """Also where an obstacle has the same id."""
+    wall = {"id": "r1", "circle": {"center": [3, 5], "radius": 1}}
+    with pytest.raises(SceneError) as caught:
+        scene_from_document(document(obstacles=[wall]), source="test")
+    places = {fault.path for fault in caught.value.faults}
+    assert places == {"robots.0.id", "robots.0.pose"}
+
+
+def test_keys_that_are_no_text_are_faults() -> None:
+    robot = document()["robots"][0]
+    odd = {**robot, "model": {"like": "car", 5: 1}}
+    with pytest.raises(SceneError, match=r"robots.0.model .*5: got 5; keys must be"):
+        scene_from_document(document(robots=[odd]), source="test")
+
+
 def test_own_model_by_folder(tmp_path: Path) -> None:
     """A model in a folder beside the scene; the same values give the same digest."""
     shutil.copytree(shipped.models_folder() / "car", tmp_path / "mine" / "car")
