@@ -1,5 +1,5 @@
 """Who visits what in which order, recharging where.
 
-`routing` states the problem and has it solved: nested rollout policy adaptation, then
-ruin and recreate with stations placed exactly. The kernels are the algorithms.
+`routing` has the problem solved: by ruin and recreate, or by nested rollout policy
+adaptation, with stations placed exactly in the end. The kernels are the algorithms.
 """

@@ -12,6 +12,7 @@ from time import thread_time
 
 import numpy as np
 
+from mrmg.errors import refuse_values
 from mrmg.planning.routing._legs_kernels import Legs, new_legs
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays, nrpa, with_own_tables
 from mrmg.planning.routing._refuel_kernels import (
@@ -68,6 +69,14 @@ class RouterParams:
     alpha: float = 1.0
     rounds: int = 1500
     limit_s: float | None = None
+
+    def __post_init__(self) -> None:
+        allowed = {
+            "levels": self.levels >= 1,
+            "iterations": self.iterations >= 1,
+            "rounds": self.rounds >= 0,
+        }
+        refuse_values(self, allowed, "parameters of the router")
 
 
 @dataclass(frozen=True, slots=True)

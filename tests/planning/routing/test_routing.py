@@ -13,6 +13,7 @@ from time import thread_time
 import numpy as np
 import pytest
 
+from mrmg.errors import UsageError
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays, with_own_tables
 from mrmg.planning.routing.instance import RoutingInstance
 from mrmg.planning.routing.routing import RouterParams, Routing, solve_routing
@@ -106,6 +107,14 @@ def test_tours_are_valid_and_near_the_optimum(
     assert feasible >= 10, "too few missions can be solved to say anything"
     assert missed <= MISSED_SHARE * feasible
     assert near >= NEAR_SHARE * feasible
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("levels", 0), ("iterations", 0), ("rounds", -1)]
+)
+def test_parameters_out_of_range_are_refused_by_name(name: str, value: int) -> None:
+    with pytest.raises(UsageError, match=f"{name} = {value}"):
+        RouterParams(**{"method": "nrpa", name: value})
 
 
 @pytest.mark.parametrize("rounds", [0, 100])
