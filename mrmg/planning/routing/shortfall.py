@@ -76,12 +76,12 @@ def least_share(suffices: Callable[[float], bool]) -> tuple[float, float]:
         suffices: returns whether a share suffices; 0 does not.
 
     Returns:
-        Both; the second one is inf if MAX_SHARE does not suffice.
+        Both; inf if MAX_SHARE does not suffice.
     """
     low, high = 0.0, 4.0 * SHARE_STEP
     while not suffices(high):
         if high >= MAX_SHARE:
-            return high, math.inf
+            return math.inf, math.inf
         low, high = high, min(3.0 * high, MAX_SHARE)
     while high - low > max(SHARE_STEP, RELATIVE_STEP * low):
         middle = 0.5 * (low + high)
