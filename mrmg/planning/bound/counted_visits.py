@@ -21,7 +21,8 @@ ROUNDS = 120
 """Changes of the prices."""
 
 FIRST_STEP, DECAY = 0.3, 0.97
-"""First change of a price, as a share of a walk's cost per goal, and how it falls."""
+"""First change of a price, as a share of the mean of the least legs to each goal, and
+how it falls. Walks may cost nothing: to a goal that a robot starts in."""
 
 MOST_WORK = 500_000_000
 """Triples of goals that may follow each other in all states, by which goals are
@@ -32,10 +33,13 @@ def counted_visits(problem: RoutingArrays) -> Visits:
     """Return good prices for a mission of many goals, and which ones are remembered."""
     order = np.flatnonzero(problem.open_goal)
     visits = Visits(order, 0, np.zeros(problem.cost.shape[2]))
-    best, best_J, step = visits, -np.inf, 0.0
+    legs = least_legs(problem, visits)
+    nearest_J = np.minimum(legs.from_start, legs.between.min(axis=0))
+    step = FIRST_STEP * nearest_J[np.isfinite(nearest_J)].sum() / len(order)
+    best, best_J = visits, -np.inf
     wrong = np.zeros(len(order))
-    for i in range(ROUNDS):
-        legs = least_legs(problem, visits)
+    for _ in range(ROUNDS):
+        legs = legs._replace(price=visits.price[order])
         found = _completion_kernels.completions(legs, 0)
         walk_J = float(found.before[0])
         if not np.isfinite(walk_J):
@@ -43,10 +47,9 @@ def counted_visits(problem: RoutingArrays) -> Visits:
         if walk_J - visits.surcharge > best_J:
             best, best_J = visits, walk_J - visits.surcharge
         off = _visits_of_walk(legs, found) - 1.0
-        step = DECAY * step if i else FIRST_STEP * walk_J / len(order)
         price = visits.price.copy()
         price[order] += step * off
-        visits = replace(visits, price=price)
+        visits, step = replace(visits, price=price), DECAY * step
         wrong = 0.9 * wrong + np.abs(off)
     own = best.price.copy()
     remembered = most_remembered(len(order))

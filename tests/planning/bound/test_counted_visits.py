@@ -52,6 +52,20 @@ def test_prices_raise_what_walks_cost(
         assert priced_J >= 0.7 * exact.cost_J
 
 
+def test_prices_rise_where_a_robot_starts_in_a_goal(
+    mission: Mission, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without prices, walks visit that goal over and over, for nothing."""
+    monkeypatch.setattr(counted_visits, "most_remembered", lambda goals: 0)
+    problem = mission(0, goals=9, stations=1, robots=2, range_m=(1e6, 2e6))
+    problem.cost[0, -1, 4] = 0.0
+    exact = exact_routing(problem)
+    assert exact is not None
+    visits = counted_visits.counted_visits(problem)
+    priced_J = completions(problem, None, visits).before[0] - visits.surcharge
+    assert 0.7 * exact.cost_J <= priced_J <= exact.cost_J * (1.0 + 1e-9)
+
+
 def test_as_many_goals_are_remembered_as_the_work_allows() -> None:
     kept = [most_remembered(goals) for goals in range(1, 100)]
     assert kept[9] == 10
