@@ -43,17 +43,18 @@ def bounds_of(
         Halted: if they were given up.
     """
     objective, limit_s = scene.objective, scene.time_limit_s
-    energy_J = makespan_s = blend = None
-    if objective.makespan_weight:
+    energy_J = makespan_s = blend = divisions = None
+    timed = objective.makespan_weight > 0.0 or math.isfinite(limit_s)
+    if objective.energy_weight and timed:
+        divisions = Divisions.of(scene, step_s=step_s, cells=cells, halt=halt)
+    if objective.makespan_weight and divisions is not None:
+        makespan_s = divisions.makespan_s
+    elif objective.makespan_weight:
         makespan_s = makespan_bound_s(scene, step_s=step_s, cells=cells, halt=halt)
     if objective.energy_weight:
         energy_J = lower_bound_J(
             scene, step_s=step_s, cells=cells, rounds=rounds, finer=finer, halt=halt
         )
-        timed = objective.makespan_weight > 0.0 or math.isfinite(limit_s)
-        divisions = None
-        if timed:
-            divisions = Divisions.of(scene, step_s=step_s, cells=cells, halt=halt)
         if divisions is not None:
             energy_J = max(energy_J, divisions.energy_within_J(limit_s))
             if objective.makespan_weight:

@@ -72,6 +72,11 @@ class Divisions:
             descent_J=sum(most_descent_J(scene, robot) for robot in scene.robots),
         )
 
+    @property
+    def makespan_s(self) -> float:
+        """A time [s] before which no plan is over."""
+        return float(least_division(self.time_s, True)) * (1.0 - ROUNDING_SHARE)
+
     def energy_within_J(self, limit_s: float) -> float:
         """Return an energy that no plan undercuts which is over by `limit_s`."""
         timely_J = np.where(self.time_s <= limit_s, self.energy_J, np.inf)

@@ -13,6 +13,7 @@ import mrmg
 from mrmg.planning import plan_mission
 from mrmg.planning.bound.bound import lower_bound_J
 from mrmg.planning.bound.joint_bound import Divisions
+from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.bounding import bounds_of
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.objective import Objective
@@ -111,6 +112,7 @@ def test_the_bound_of_a_blend_knows_that_both_must_be_had_at_once() -> None:
     plan = mrmg.plan(scene).plan
     assert plan is not None
     assert bounds.energy_J is not None and bounds.makespan_s is not None
+    assert bounds.makespan_s == makespan_bound_s(scene)
     apart = scene.objective.value(bounds.energy_J, bounds.makespan_s)
     bound = bounds.of(scene.objective)
     assert bound is not None
