@@ -84,10 +84,6 @@ ROUNDING_SHARE = 1e-9
 """What rounding may add to a bound; taken off."""
 
 
-ROUND_SHARE = 0.002
-"""What a circle reaches beyond the polygon that stands for it, over its radius."""
-
-
 def lower_bound_J(
     scene: Scene,
     *,
@@ -277,10 +273,7 @@ def most_descent_J(scene: Scene, robot: Robot) -> float:
     _, start_m = height_span_m(scene, robot, Point(*robot.pose[:2]))
     ends = [shapely.box(*scene.bounds)]
     if robot.model.regeneration_efficiency == 0.0:
-        ends = [
-            goal.region.shape.buffer(ROUND_SHARE * goal.region.radius_m)
-            for goal in scene.goals
-        ]
+        ends = [outer_polygon(goal.region) for goal in scene.goals]
     lowest_m = min(height_span_m(scene, robot, end)[0] for end in ends)
     return climb_J(robot, max(0.0, start_m - lowest_m))
 

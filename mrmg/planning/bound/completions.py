@@ -43,19 +43,6 @@ class Visits:
         return float(self.price[self.order].sum())
 
 
-def no_completions(problem: RoutingArrays, visits: Visits) -> Completions:
-    """Return completions that know nothing, for searches among all tours."""
-    robots, nodes, targets = problem.cost.shape
-    goals = len(visits.order)
-    states = (goals - visits.remembered + 1) << visits.remembered
-    return Completions(
-        after=np.zeros((states, goals)),
-        before=np.zeros(states),
-        from_station=np.zeros((robots, targets - problem.goals, goals)),
-        to_finish=np.zeros((robots, nodes)),
-    )
-
-
 def completions(
     problem: RoutingArrays,
     leg: np.ndarray | None = None,

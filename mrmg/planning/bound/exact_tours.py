@@ -13,7 +13,7 @@ import numpy as np
 from mrmg.planning.bound import _touring_kernels
 from mrmg.planning.bound._completion_kernels import Completions
 from mrmg.planning.bound._label_kernels import TourSearch
-from mrmg.planning.bound.completions import Visits, completions, no_completions
+from mrmg.planning.bound.completions import Visits, completions
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.routing import Routing
 
@@ -150,8 +150,8 @@ def least_costs(
     visits = Visits(goals, len(goals), np.zeros(cost.shape[2]))
     leg = np.ascontiguousarray(cost[:, :, None, :, None])
     drain = np.ascontiguousarray(problem.cost[:, :, None, :, None])
-    nothing = no_completions(problem, visits)
-    search = _search(problem, visits, leg, drain, nothing, math.inf)
+    rest = completions(problem, visits=visits)  # drops none, as all are of interest
+    search = _search(problem, visits, leg, drain, rest, math.inf)
     search = search._replace(finish=finish)
     least, _, _, parent = _touring_kernels.cheapest_tours(search, MOST_LABELS)
     return np.asarray(least) if len(parent) else None

@@ -16,9 +16,10 @@ from scipy.spatial import KDTree
 
 import mrmg
 from mrmg.planning.bound import touring
+from mrmg.planning.bound._completion_kernels import Completions
 from mrmg.planning.bound.arcs import ArcWays
 from mrmg.planning.bound.bound import Relaxation, lower_bound_J
-from mrmg.planning.bound.completions import Visits, completions, no_completions
+from mrmg.planning.bound.completions import Visits, completions
 from mrmg.planning.bound.exact_tours import cheapest_tours, exact_routing
 from mrmg.planning.bound.touring import touring_bound_J
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
@@ -103,6 +104,12 @@ def by_arcs(leg: np.ndarray, goals: int, range_m: float) -> RoutingArrays:
         capacity=np.full(robots, range_m),
         reserve=np.zeros(robots),
     ).arrays
+
+
+def no_completions(problem: RoutingArrays, visits: Visits) -> Completions:
+    """Return completions that know nothing, for searches among all tours."""
+    known = completions(problem, visits=visits)
+    return Completions._make(map(np.zeros_like, known))
 
 
 @pytest.mark.parametrize(
