@@ -101,7 +101,7 @@ class Ground:
     Attributes:
         x_min, y_min: corner of the first cell [m].
         cell_m: side of a cell.
-        price: least multiplier within half a planning step of each cell, inf where the
+        price: least multiplier within half a planning step of each cell, inf where
             blocked, shape (Y, X).
         blocked: where no way leads.
     """
@@ -169,31 +169,27 @@ class Ground:
 
     def field_from(self, region: Region) -> Field:
         """Return a certified field that grows away from a region."""
-        points = self.nodes()
+        rows, columns = self.price.shape
+        y, x = np.mgrid[0 : rows + 1, 0 : columns + 1] * self.cell_m
+        points = np.stack([x + self.x_min, y + self.y_min], axis=-1)
         away = -region.depth(points.reshape(-1, 2)).reshape(points.shape[:2])
         band = np.sqrt(2.0) * self.cell_m
         near = away <= band
-        share = SEED_SHARE * self.least_price(near)
-        return self.field(np.where(near, share * np.maximum(away, -band), UNREACHED))
+        seed = SEED_SHARE * self._least_price(near) * np.maximum(away, -band)
+        values, level, certified = _eikonal_kernels.certified_field(
+            self.price,
+            self.cell_m,
+            np.where(near, seed, UNREACHED),
+            ROUNDS,
+            BAND_SHARE * self.cell_m,
+        )
+        return Field(values.reshape(-1), level, certified)
 
-    def nodes(self) -> np.ndarray:
-        """Return the corners of all cells, shape (Y + 1, X + 1, 2)."""
-        rows, columns = self.price.shape
-        y, x = np.mgrid[0 : rows + 1, 0 : columns + 1] * self.cell_m
-        return np.stack([x + self.x_min, y + self.y_min], axis=-1)
-
-    def least_price(self, near: np.ndarray) -> float:
+    def _least_price(self, near: np.ndarray) -> float:
         """Return the least price of cells with a corner among the given nodes."""
         touching = near[:-1, :-1] | near[1:, :-1] | near[:-1, 1:] | near[1:, 1:]
         prices = self.price[touching & np.isfinite(self.price)]
         return float(prices.min()) if prices.size else 1.0
-
-    def field(self, seed: np.ndarray) -> Field:
-        """Return the certified field that spreads from seeds."""
-        values, level, certified = _eikonal_kernels.certified_field(
-            self.price, self.cell_m, seed, ROUNDS, BAND_SHARE * self.cell_m
-        )
-        return Field(values.reshape(-1), level, certified)
 
 
 def charged_within_m(step_m: float) -> float:
