@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from mrmg.planning.roadmap.fleet import travel_classes
-from mrmg.planning.roadmap.roadmap import Roadmap, edge_costs, leaving_costs
+from mrmg.planning.roadmap.roadmap import Roadmap, edge_costs
 from mrmg.scene.margins import Margins
 from mrmg.scene.objective import Objective
 from mrmg.scene.types import Robot, Scene
@@ -75,8 +75,8 @@ def with_energies(
         ends = np.divmod(edge, len(vertex))
         costs = edge_costs(world, one, vertex, ends)
         leaving = np.isinf(costs[:, 0])
-        costs[leaving] = leaving_costs(
-            world, one, vertex, (ends[0][leaving], ends[1][leaving])
+        costs[leaving] = edge_costs(
+            world, one.leaving, vertex, (ends[0][leaving], ends[1][leaving])
         )
         own[after >= 0] = costs[which, 0]
     energies = along_ways(roadmap, cost)

@@ -76,6 +76,14 @@ class TravelClass(NamedTuple):
     passage: float
     slope: SlopeCost
 
+    @property
+    def leaving(self) -> TravelClass:
+        """The class on edges by which robots leave walls.
+
+        They are known to be free (`departure`), though a disc has no room there.
+        """
+        return self._replace(passage=0.0)
+
 
 def travel_classes(
     scene: Scene, world: World, margins: Margins

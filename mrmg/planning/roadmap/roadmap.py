@@ -203,7 +203,7 @@ def _cheapest_paths(
     weight = np.concatenate(
         [
             edge_costs(world, travel_class, vertex, ends),
-            leaving_costs(world, travel_class, vertex, leaving),
+            edge_costs(world, travel_class.leaving, vertex, leaving),
         ]
     )
     low, high = np.concatenate([ends, leaving], axis=1)
@@ -254,19 +254,6 @@ def edge_costs(
         slope.floor,
     )
     return cost
-
-
-def leaving_costs(
-    world: World,
-    travel_class: TravelClass,
-    vertex: np.ndarray,
-    ends: tuple[np.ndarray, np.ndarray],
-) -> np.ndarray:
-    """Return the costs of edges by which robots leave walls; see `edge_costs`.
-
-    They are known to be free (`departure`), though a disc has no room there.
-    """
-    return edge_costs(world, travel_class._replace(passage=0.0), vertex, ends)
 
 
 def _stacked(arrays: list[np.ndarray]) -> np.ndarray:
