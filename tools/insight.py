@@ -68,8 +68,9 @@ def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
             edges = roadmap.arrays.vertex[np.stack([first, second], axis=1)]
             length_m = np.hypot(*(edges[:, 1] - edges[:, 0]).T)
             long = length_m > 0.0  # vertices may lie on one another
-            child = np.flatnonzero(growth.parent >= 0)
-            pieces = growth.place[np.stack([growth.parent[child], child], axis=1)]
+            vertices = growth.tree.vertices
+            child = np.arange(1, growth.counts["vertices"])
+            pieces = vertices.state[np.stack([vertices.parent[child], child], axis=1)]
             ids = [robot.id for robot in scene.robots]
             return Insight(
                 roadmap=edges[long],
@@ -78,7 +79,7 @@ def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
                     name: problem.path(at, _first_tour(growth, at))
                     for at, name in enumerate(ids)
                 },
-                tree={name: pieces[:, :, at] for at, name in enumerate(ids)},
+                tree={name: pieces[:, :, at, :2] for at, name in enumerate(ids)},
                 trajectories=growth.trajectories,
             )
     raise UsageError(f"{scene.name}: no plan was found in {params.trees} attempts")
@@ -86,5 +87,5 @@ def look_inside(scene: Scene, *, seed: int, params: PlannerParams) -> Insight:
 
 def _first_tour(growth: Growth, robot: int) -> tuple[int, ...]:
     """Return the tour of a robot at the root of a tree that solved its mission."""
-    tours = growth.tree.tours
-    return tuple(tours.target[0, robot, : tours.length[0, robot]].tolist())
+    moves = growth.tree.tours.move[0]
+    return tuple(moves[moves[:, 0] == robot, 1].tolist())

@@ -20,10 +20,6 @@ THOROUGH = 6
 """Refinements of each plan when there is a budget to be spent."""
 
 
-BETA_SHARE = 0.01
-"""Largest value of beta dist in eq. (5), as a share of alpha / m for m goals."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GuidedTreeParams:
     """Parameters of the paper's Algorithms 1-3 (`guided_tree`).
@@ -31,7 +27,7 @@ class GuidedTreeParams:
     Attributes:
         iterations: hard cap on the iterations of Algorithm 1.
         k: steps of dt for which Algorithm 3 holds its controls, at most.
-        alpha: of eq. (5); beta follows from it (`BETA_SHARE`).
+        alpha: of eq. (5); beta follows from it (`_tree_kernels`).
         decline: lambda of eq. (5), in (0, 1).
         bias: probability of selecting the group of largest weight instead of drawing.
         vertex_spread_m: distance to the target by which a vertex becomes less likely

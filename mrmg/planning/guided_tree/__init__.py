@@ -70,9 +70,10 @@ What the paper leaves open, our choice, and why:
   to go on from, and steps after an infeasible one are infeasible.
 - CollisionFree covers the limits of speed and steering, too: random controls leave
   them. States keep 0.25 m from obstacles and 0.5 m between robots, so that the motion
-  between two steps is free and can be tracked.
-- Steer: pure pursuit, in reverse if the target is behind (`_expansion_kernels.steer`),
-  for the time that the control is held.
+  between two steps is free and can be tracked; where less is kept, robots are followed
+  through each step.
+- Steer: pure pursuit, in reverse if the target is behind and the robot can
+  (`_expansion_kernels.steer`), for the time that the control is held.
 - u_stop is not used by Algorithms 1-3. We call a mission solved when all goals are
   visited and all robots can brake at once without a collision; that stop is ours, and
   is appended to the paths.

@@ -30,7 +30,6 @@ from mrmg.planning.problem._control_kernels import (
     wrap,
 )
 from mrmg.planning.problem._target_kernels import in_target
-from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 from mrmg.planning.routing._random_kernels import random_unit
 from mrmg.world._kernels import multiplier_in, turning_multiplier_in
 
@@ -62,8 +61,8 @@ def steer(fleet, r, state, x, y, hold_s):
 
     A car follows the circle through the point that its rear axle would roll along
     (pure pursuit: curvature 2 sin(bearing) / distance), backwards if the point is
-    behind. A differential drive turns towards the point, and drives the faster the
-    better it faces it. Nothing else is looked at.
+    behind and it can. A differential drive turns towards the point, and drives the
+    faster the better it faces it. Nothing else is looked at.
 
     Args:
         fleet, r: the robot.
@@ -82,9 +81,8 @@ def steer(fleet, r, state, x, y, hold_s):
             # Beyond a quarter turn the circle leads there the long way round.
             if abs(bearing) > 0.5 * pi:
                 curvature = np.copysign(1e3, bearing)
-            reverses = abs(bearing) > (
-                0.5 * pi if state[3] < -0.1 else REVERSE_FROM_RAD
-            )
+            reverse_from = 0.5 * pi if state[3] < -0.1 else REVERSE_FROM_RAD
+            reverses = robot.limit[0] < 0.0 and abs(bearing) > reverse_from
             if reverses:
                 curvature = 2.0 * sin(bearing) / max(distance, 1e-3)
             w = max(-w_max, min(w_max, atan(robot.wheelbase * curvature)))
@@ -160,9 +158,9 @@ def arrive(setting, tree, v, state, energy, visited):
             if not visited[goal] and in_target(setting.targets, goal, x, y):
                 visited[goal] = True
                 reached = True
-        if v < 0 or tours.length[row, r] == 0:
+        if v < 0:
             continue
-        t = tours.target[row, r, 0]
+        t = tours.first[row, r]
         if t >= len(visited) and in_target(setting.targets, t, x, y):
             energy[r] = setting.fleet[r].capacity
             reached = True
@@ -173,15 +171,15 @@ def arrive(setting, tree, v, state, energy, visited):
 def distance_to_target(setting, rules, tours, row, state, region):
     """Return the summed distance of the robots from points on their paths [m].
 
-    The points lie `ahead_m` along the path from the robot's region: SampleTarget draws
-    the target, which is drawn only after the vertex, around there.
+    The points lie in the middle of where SampleTarget draws the target, which is drawn
+    only after the vertex.
     """
-    total = 0.0
+    total, ahead_m = 0.0, 0.5 * (rules.ahead_least_m + rules.ahead_most_m)
     point = np.zeros(2)
     for r in range(len(region)):
-        if tours.length[row, r] > 0:
-            t = tours.target[row, r, 0]
-            point_on_path(setting, r, t, region[r], rules.ahead_m, point)
+        t = tours.first[row, r]
+        if t >= 0:
+            point_on_path(setting, r, t, region[r], ahead_m, point)
             total += hypot(point[0] - state[r, 0], point[1] - state[r, 1])
     return total
 
@@ -253,7 +251,6 @@ def stop_freely(setting, rules, state, energy, control):
     fleet, dt = setting.fleet, rules.dt_s
     robots = len(state)
     here, after, left = state.copy(), state.copy(), energy.copy()
-    corner, middle = np.empty((robots, MOST_CORNERS, 2)), np.empty((robots, 2))
     for n in range(len(control)):
         at_rest = True
         for r in range(robots):
@@ -267,10 +264,10 @@ def stop_freely(setting, rules, state, energy, control):
             control[n, r, 0], control[n, r, 1] = u1, u2
             if left[r] < fleet[r].reserve:
                 return -1
+        if not collision_free(setting, here, after):
+            return -1
         for r in range(robots):
             copy_numbers(after[r], here[r])
-        if not collision_free(setting, here, corner, middle):
-            return -1
     return -1
 
 
@@ -303,7 +300,6 @@ def extend_towards(setting, rules, tree, v, iteration):
         tree.random, trace.steer_draw[iteration], control,
     )  # fmt: skip
     state, energy = np.empty((robots, 5)), np.empty(robots)
-    corner, middle = np.empty((robots, MOST_CORNERS, 2)), np.empty((robots, 2))
     trace.ended[iteration] = HELD
     # 6: for up to k steps
     for _ in range(rules.k):
@@ -314,7 +310,7 @@ def extend_towards(setting, rules, tree, v, iteration):
             used = step_energy(setting, r, before, state[r], u1, dt)
             energy[r] = vertices.energy[v, r] - used
         # 9-10: a collision ends the loop.
-        if not collision_free(setting, state, corner, middle):
+        if not collision_free(setting, vertices.state[v], state):
             trace.ended[iteration] = COLLIDED
             break
         # 11-12: Insert, and go on from the new vertex.

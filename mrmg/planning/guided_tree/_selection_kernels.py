@@ -83,13 +83,14 @@ def sample_target(setting, rules, tree, v, target):
     tours, groups, random = tree.tours, tree.groups, tree.random
     row, g = tree.vertices.tour[v], tree.vertices.group[v]
     for r in range(len(target)):
-        if tours.length[row, r] == 0:
+        t = tours.first[row, r]
+        if t < 0:
             target[r, 0] = target[r, 1] = np.nan
             continue
         share = random_unit(random)
         ahead_m = share * rules.ahead_most_m + (1.0 - share) * rules.ahead_least_m
         region = groups.region[g, r]
-        point_on_path(setting, r, tours.target[row, r, 0], region, ahead_m, target[r])
+        point_on_path(setting, r, t, region, ahead_m, target[r])
         offset = rules.target_spread_m * sqrt(random_unit(random))
         angle = 2.0 * pi * random_unit(random)
         target[r, 0] += offset * cos(angle)

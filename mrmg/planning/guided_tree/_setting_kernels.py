@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from math import hypot
 from typing import NamedTuple
 
 import numpy as np
 
 from mrmg.compilation import kernel
+from mrmg.planning.problem._clearance_kernels import moves_clear
 from mrmg.planning.problem._target_kernels import Targets
-from mrmg.planning.roadmap._fleet_kernels import Spaces, middle_at, space_of
+from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS, Spaces, middle_at
 from mrmg.planning.roadmap._roadmap_kernels import RoadmapArrays
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
-from mrmg.world._kernels import TerrainGrid, footprint_is_clear
-from mrmg.world._polygon_kernels import convex_distance, place_footprint
+from mrmg.world._kernels import TerrainGrid
+from mrmg.world._polygon_kernels import (
+    convex_distance,
+    pass_apart,
+    place_footprint,
+    point_distance,
+    way_of_corners,
+)
 
 STATE_ROUNDING = 1e-9
 """Rounding of summed steps that is forgiven in the limits of speed and steering."""
@@ -26,7 +32,8 @@ class Setting(NamedTuple):
         fleet, spaces, terrain, targets: robots, world, goals and stations.
         roadmap: what ConstructPRM returned.
         joined: roadmap vertices with a path to some target, by class, shape (F, V).
-        routing: the routing problem at the root; costs include the route margin.
+        routing: the routing problem where tours were made last; costs include the
+            route margin.
     """
 
     fleet: np.ndarray
@@ -45,14 +52,12 @@ class Rules(NamedTuple):
     k: int
     iterations: int
     alpha: float
-    beta_share: float
     decline: float
     bias: float
     vertex_spread_m: float
     decay_start: float
     decay_rate: float
     decay_least: float
-    ahead_m: float
     ahead_least_m: float
     ahead_most_m: float
     target_spread_m: float
@@ -73,35 +78,47 @@ def within_limits(robot, state):
 
 
 @kernel
-def collision_free(setting, state, corner, middle):
-    """Return whether a composite state keeps all limits and margins (CollisionFree).
+def collision_free(setting, before, state):
+    """Return whether a step keeps all limits and margins (CollisionFree).
+
+    Where margins at both ends are less than what robots move in between, they are
+    followed through the step.
 
     Args:
         setting: the mission.
-        state: composite state, shape (R, 5).
-        corner: receives the placed footprints, shape (R, M, 2).
-        middle: receives their middles, shape (R, 2).
+        before: composite state before the step, which keeps them, shape (R, 5).
+        state: that after it.
     """
     fleet = setting.fleet
+    corner, middle = np.empty((len(fleet), MOST_CORNERS, 2)), np.empty((len(fleet), 2))
+    way = np.empty(len(fleet))
     for r in range(len(fleet)):
-        if not within_limits(fleet[r], state[r]):
+        own, here = fleet[r : r + 1], state[r]
+        if not within_limits(fleet[r], here):
             return False
-        x, y, theta, n = state[r, 0], state[r, 1], state[r, 2], fleet[r].corners
-        middle[r, 0], middle[r, 1] = middle_at(fleet[r], state[r])
-        place_footprint(fleet[r].corner[:n], x, y, theta, corner[r])
-        if not footprint_is_clear(
-            space_of(setting.spaces, fleet[r].space), corner[r, :n],
-            middle[r, 0], middle[r, 1], fleet[r].radius, fleet[r].margin,
-        ):  # fmt: skip
+        if not moves_clear(own, setting.spaces, before[r], here, corner[r]):
             return False
+        footprint = fleet[r].corner[: fleet[r].corners]
+        place_footprint(footprint, here[0], here[1], here[2], corner[r])
+        middle[r, 0], middle[r, 1] = middle_at(fleet[r], here)
+        way[r] = way_of_corners(footprint, before[r], here)
         for other in range(r):
             gap = max(fleet[r].spacing, fleet[other].spacing)
-            apart = hypot(
-                middle[r, 0] - middle[other, 0], middle[r, 1] - middle[other, 1]
+            both = way[r] + way[other]
+            enough = gap if both <= 2.0 * gap else both
+            apart = point_distance(
+                middle[r, 0], middle[r, 1], middle[other, 0], middle[other, 1]
             )
-            if apart >= fleet[r].radius + fleet[other].radius + gap:
+            if apart >= fleet[r].radius + fleet[other].radius + enough:
                 continue
-            others = corner[other, : fleet[other].corners]
-            if convex_distance(corner[r, :n], others, gap) < gap:
+            its = fleet[other].corner[: fleet[other].corners]
+            placed = corner[r, : len(footprint)], corner[other, : len(its)]
+            distance = convex_distance(placed[0], placed[1], enough)
+            if distance < gap:
+                return False
+            if distance < enough and not pass_apart(
+                footprint, its, here, before[r], state[other], before[other],
+                distance, np.empty((2, MOST_CORNERS, 2)),
+            ):  # fmt: skip
                 return False
     return True

@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from mrmg.compilation import kernel, now_ns
+from mrmg.motion._kernels import copy_numbers
 from mrmg.planning.guided_tree._regions_kernels import path_energy
 from mrmg.planning.guided_tree._tree_kernels import (
     ROUTER_CALLS,
-    ROUTER_FAILURES,
     ROUTING_NS,
     TOURS,
     VERTICES,
 )
 from mrmg.planning.problem._target_kernels import in_target
-from mrmg.planning.routing._nrpa_kernels import UNVISITED, RoutingArrays, nrpa
+from mrmg.planning.routing._nrpa_kernels import UNVISITED, nrpa
 
 
 @kernel
@@ -30,8 +30,8 @@ def feasible(setting, tours, row, state, energy, region):
     """
     for r in range(len(region)):
         left = energy[r] - setting.fleet[r].reserve
-        if tours.length[row, r] > 0:
-            t = tours.target[row, r, 0]
+        t = tours.first[row, r]
+        if t >= 0:
             left -= path_energy(setting, r, t, state[r, 0], state[r, 1], region[r])
             left -= tours.need[row, r]
         if left < 0.0:
@@ -43,27 +43,26 @@ def feasible(setting, tours, row, state, energy, region):
 def write_tours(setting, sequence, moves, margin, tours, row):
     """Write the tours of a playout's moves, and what they need on the way."""
     problem = setting.routing
-    targets = problem.cost.shape[2]
-    for r in range(len(problem.energy)):
-        tours.length[row, r] = 0
-        tours.need[row, r] = 0.0
-        refuelled = False
-        for i in range(moves):
-            if sequence[i] // targets != r:
-                continue
-            t = sequence[i] % targets
-            n = tours.length[row, r]
-            if n > 0 and not refuelled:
-                leg = problem.cost[r, tours.target[row, r, n - 1], t]
-                tours.need[row, r] += leg / (1.0 + margin)
-            refuelled |= t >= problem.goals
-            tours.target[row, r, n] = t
-            tours.length[row, r] = n + 1
+    robots, _, targets = problem.cost.shape
+    place, refuelled = np.full(robots, -1), np.zeros(robots, np.bool_)
+    for r in range(robots):
+        tours.first[row, r], tours.need[row, r] = -1, 0.0
+    for i in range(len(sequence)):
+        if i >= moves:
+            tours.move[row, i, 0] = -1
+            continue
+        r, t = sequence[i] // targets, sequence[i] % targets
+        tours.move[row, i, 0], tours.move[row, i, 1] = r, t
+        if place[r] < 0:
+            tours.first[row, r] = t
+        elif not refuelled[r]:
+            tours.need[row, r] += problem.cost[r, place[r], t] / (1.0 + margin)
+        place[r], refuelled[r] = t, refuelled[r] or t >= problem.goals
 
 
 @kernel
-def _routing_from(setting, rules, tree, state, energy, region, visited):
-    """Return the routing problem as it stands at a composite state.
+def _state_routing(setting, rules, tree, state, energy, region, visited):
+    """Write the routing problem as it stands at a composite state.
 
     No robot sets out for the station that it is in, but at the root.
 
@@ -72,33 +71,16 @@ def _routing_from(setting, rules, tree, state, energy, region, visited):
     """
     problem = setting.routing
     robots, _, targets = problem.cost.shape
-    cost = problem.cost.copy()
+    copy_numbers(energy, problem.energy)
+    for goal in range(len(visited)):
+        problem.open_goal[goal] = not visited[goal]
     for r in range(robots):
         for t in range(targets):
+            leg = path_energy(setting, r, t, state[r, 0], state[r, 1], region[r])
             inside = in_target(setting.targets, t, state[r, 0], state[r, 1])
             if t >= problem.goals and inside and tree.counts[VERTICES] > 0:
-                cost[r, targets, t] = np.inf
-                continue
-            leg = path_energy(setting, r, t, state[r, 0], state[r, 1], region[r])
-            cost[r, targets, t] = leg * (1.0 + rules.route_margin)
-    return RoutingArrays(
-        problem.goals,
-        cost,
-        energy,
-        problem.capacity,
-        problem.reserve,
-        problem.escape,
-        ~visited,
-        problem.finish,
-        problem.time,
-        problem.finish_time,
-        problem.limit,
-        problem.charge_power,
-        problem.energy_weight,
-        problem.makespan_weight,
-        problem.table,
-        problem.home,
-    )
+                leg = np.inf
+            problem.cost[r, targets, t] = leg * (1.0 + rules.route_margin)
 
 
 @kernel
@@ -119,10 +101,10 @@ def create_new_tour(setting, rules, tree, state, energy, region, visited):
     """
     began = now_ns()
     tours, counts = tree.tours, tree.counts
-    now = _routing_from(setting, rules, tree, state, energy, region, visited)
-    sequence = np.zeros(tours.target.shape[2], np.int64)
+    _state_routing(setting, rules, tree, state, energy, region, visited)
+    sequence = np.zeros(tours.move.shape[1], np.int64)
     value, moves = nrpa(
-        now,
+        setting.routing,
         rules.levels,
         rules.nrpa_iterations,
         rules.nrpa_alpha,
@@ -132,7 +114,6 @@ def create_new_tour(setting, rules, tree, state, energy, region, visited):
     counts[ROUTER_CALLS] += 1
     counts[ROUTING_NS] += now_ns() - began
     if value >= UNVISITED:
-        counts[ROUTER_FAILURES] += 1
         return -1
     row = counts[TOURS]
     counts[TOURS] += 1

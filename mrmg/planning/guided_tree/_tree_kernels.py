@@ -72,14 +72,15 @@ class Tours(NamedTuple):
     """Tours that vertices carry; a row for each call of CreateNewTour that found some.
 
     Attributes:
-        target: targets of each robot in order, shape (N, R, L).
-        length: number of targets, shape (N, R).
+        move: robot and target of each move in order, robot -1 after the last, shape
+            (N, L, 2).
+        first: first target of each robot, -1 for none, shape (N, R).
         need: energy above the reserve that the robot needs on arrival at its first
             target to get to its next station or end [J], shape (N, R).
     """
 
-    target: np.ndarray
-    length: np.ndarray
+    move: np.ndarray
+    first: np.ndarray
     need: np.ndarray
 
 
@@ -133,17 +134,20 @@ ENDS = ("all k steps", "collision", "rejected by Insert", "solved")
 
 HELD, COLLIDED, REJECTED, SOLVED = range(len(ENDS))
 
-N_COUNTS = 7
+N_COUNTS = 6
 (
     VERTICES,
     GROUPS,
     TOURS,
     ROUTER_CALLS,
-    ROUTER_FAILURES,
     ITERATIONS,
     ROUTING_NS,
 ) = range(N_COUNTS)
 """Places in the array of counts; the last is the time that router calls took."""
+
+
+BETA_SHARE = 0.01
+"""Largest value of beta dist in eq. (5), as a share of alpha / m for m goals."""
 
 
 @kernel
@@ -151,11 +155,11 @@ def group_weight(groups, g, rules):
     """Return a group's weight by eq. (5).
 
     w = lambda^VISITS (alpha / |unvisited goals| + beta dist(group)), with
-    beta = beta_share alpha / (m scale) for m goals, so that beta dist is at most
-    beta_share alpha / m. A group whose goals are all visited counts as if one were not.
+    beta = BETA_SHARE alpha / (m scale) for m goals, so that beta dist is at most
+    BETA_SHARE alpha / m. A group whose goals are all visited counts as if one were not.
     """
     goals = max(groups.visited.shape[1], 1)
-    beta = rules.beta_share * rules.alpha / (goals * groups.scale[0])
+    beta = BETA_SHARE * rules.alpha / (goals * groups.scale[0])
     return rules.decline ** groups.visits[g] * (
         rules.alpha / max(groups.unvisited[g], 1) + beta * groups.dist[g]
     )

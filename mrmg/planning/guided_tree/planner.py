@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from mrmg.errors import UsageError
 from mrmg.planning.guided_tree._expansion_kernels import BRAKING_STEPS
 from mrmg.planning.guided_tree._growth_kernels import grow
 from mrmg.planning.guided_tree._setting_kernels import Rules, Setting
@@ -23,7 +25,7 @@ from mrmg.planning.guided_tree._tree_kernels import (
     Trace,
     Vertices,
 )
-from mrmg.planning.parameters import BETA_SHARE, GuidedTreeParams, PlannerParams
+from mrmg.planning.parameters import GuidedTreeParams, PlannerParams
 from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.routing._nrpa_kernels import with_own_tables
@@ -61,16 +63,6 @@ class Growth:
         """Whether all goals are visited and a collision-free stop exists."""
         return self.solution >= 0
 
-    @property
-    def place(self) -> np.ndarray:
-        """Where the robots are at each vertex [m], shape (V, R, 2)."""
-        return self.tree.vertices.state[: self.counts["vertices"], :, :2]
-
-    @property
-    def parent(self) -> np.ndarray:
-        """Parent of each vertex, -1 for the root, shape (V,)."""
-        return self.tree.vertices.parent[: self.counts["vertices"]]
-
 
 def grow_guided_tree(
     problem: Problem, params: PlannerParams, seed: int, halt: np.ndarray
@@ -82,9 +74,18 @@ def grow_guided_tree(
         params: parameters; `params.guided_tree` and `params.router` are the method's.
         seed: of all random choices.
         halt: shape (1,); growing ends, without a solution, once it has turned true.
+
+    Raises:
+        UsageError: if so large a tree as it may become has no room in memory.
     """
-    method = params.guided_tree
-    tree = new_tree(problem.scene, method, seed)
+    try:
+        tree = new_tree(problem.scene, params.guided_tree, seed)
+    except MemoryError as error:
+        raise UsageError(
+            f"{problem.scene.name}: a guided tree of up to "
+            f"{params.guided_tree.iterations} iterations has no room in memory for so "
+            "large a mission; plan it with --planner path_following (profile default)"
+        ) from error
     solution, stop_steps = grow(
         setting_of(problem),
         rules_of(problem, params),
@@ -94,9 +95,6 @@ def grow_guided_tree(
         halt,
     )
     counts = tree.counts
-    highest = BETA_SHARE * method.alpha / max(len(problem.scene.goals), 1)
-    beta_dist = highest / tree.groups.scale[0] * tree.groups.dist[: counts[N_GROUPS]]
-    assert (beta_dist <= highest).all(), "eq. (5): beta is too large"
     branch = [int(solution)] if solution >= 0 else []
     while branch and tree.vertices.parent[branch[-1]] >= 0:
         branch.append(int(tree.vertices.parent[branch[-1]]))
@@ -110,7 +108,7 @@ def grow_guided_tree(
             "router_calls": int(counts[ROUTER_CALLS]),
             "expansions": int(counts[ITERATIONS]),
             "iterations": int(counts[ITERATIONS]),
-            "iteration_cap": method.iterations,
+            "iteration_cap": params.guided_tree.iterations,
         },
         routing_s=1e-9 * int(counts[ROUTING_NS]),
         stop_steps=int(stop_steps),
@@ -130,22 +128,19 @@ def setting_of(problem: Problem) -> Setting:
         targets=mission.targets,
         roadmap=roadmap,
         joined=paths.any(axis=1) | (paths.shape[1] == 0),  # without targets, all
-        routing=with_own_tables(mission.routing),
+        routing=copy.deepcopy(with_own_tables(mission.routing)),  # kernels write
     )
 
 
 def rules_of(problem: Problem, params: PlannerParams) -> Rules:
     """Return the parameters for the kernels."""
-    method = asdict(params.guided_tree)
     return Rules(
         dt_s=params.dt_s,
-        beta_share=BETA_SHARE,
-        ahead_m=0.5 * (method["ahead_least_m"] + method["ahead_most_m"]),
         route_margin=problem.route_margin,
         levels=params.router.levels,
         nrpa_iterations=params.router.iterations,
         nrpa_alpha=params.router.alpha,
-        **method,
+        **asdict(params.guided_tree),
     )
 
 
@@ -179,8 +174,8 @@ def new_tree(scene: Scene, params: GuidedTreeParams, seed: int) -> MotionTree:
         scale=np.ones(1, np.int64),
     )
     tours = Tours(
-        target=np.empty((n, robots, room), np.int16),
-        length=np.empty((n, robots), np.int64),
+        move=np.empty((n, room, 2), np.int16),
+        first=np.empty((n, robots), np.int16),
         need=np.empty((n, robots)),
     )
     trace = Trace(
@@ -240,9 +235,8 @@ def _visited(
                 if in_target(targets, g, x, y):
                     found[r].append(int(g))
                     seen[g] = True
-            if row >= 0 and tours.length[row, r] > 0:
-                t = int(tours.target[row, r, 0])
-                if t >= len(seen) and in_target(targets, t, x, y):
-                    found[r].append(t)
+            t = int(tours.first[row, r]) if row >= 0 else -1
+            if t >= len(seen) and in_target(targets, t, x, y):
+                found[r].append(t)
         row = int(vertices.tour[v])
     return problem.visits(found)

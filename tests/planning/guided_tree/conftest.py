@@ -58,9 +58,9 @@ class Recording:
     growth: Growth
 
 
-def record(seed: int, **changes: object) -> Recording:
-    """Return a run of the mission, with changed parameters of the method."""
-    scene = scene_from_document(MISSION, source="court")
+def record(seed: int, scene: Scene | None = None, **changes: object) -> Recording:
+    """Return a run of a scene, or the mission, with changed parameters."""
+    scene = scene or scene_from_document(MISSION, source="court")
     method = replace(GuidedTreeParams(iterations=4000), **changes)
     params = replace(paper_params(), guided_tree=method, samples=300)
     problem = state_mission(scene, seed, params)
@@ -94,11 +94,11 @@ class Replay:
         return tuple(bool(x) for x in self.groups.visited[self.vertices.group[v]])
 
     def tour(self, v: int) -> list[list[int]]:
-        row = self.vertices.tour[v]
-        return [
-            [int(t) for t in self.tours.target[row, r, : self.tours.length[row, r]]]
-            for r in range(self.robots)
-        ]
+        return self.tours_of(int(self.vertices.tour[v]))
+
+    def tours_of(self, row: int) -> list[list[int]]:
+        moves = self.tours.move[row]
+        return [moves[moves[:, 0] == r, 1].tolist() for r in range(self.robots)]
 
     def region(self, v: int, r: int) -> int:
         """Return the nearest vertex of the roadmap that has a path to a target."""
@@ -133,7 +133,7 @@ class Replay:
         margin = 1.0 + self.params.route_margin
         for r in range(self.robots):
             left = self.vertices.energy[v, r] - self.fleet[r]["reserve"]
-            targets = self.tours.target[row, r, : self.tours.length[row, r]]
+            targets = self.tours_of(row)[r]
             if len(targets):
                 left -= self.path(v, r, targets[0])
             for a, b in pairwise(targets):

@@ -10,13 +10,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import mrmg
 from mrmg.cli.main import main
 from mrmg.errors import UsageError
 from mrmg.planning import guided_tree, plan_mission, profile_params
+from mrmg.planning.guided_tree._expansion_kernels import steer
+from mrmg.planning.guided_tree.planner import grow_guided_tree
 from mrmg.planning.parameters import GuidedTreeParams
+from mrmg.planning.problem.problem import state_mission
+from mrmg.planning.routing.routing import RouterParams
 from mrmg.plans import PlanStatus
 from mrmg.scene.loading import load_scene, scene_from_document
 from mrmg.scene.types import Scene
@@ -116,6 +121,61 @@ def test_the_command_line_prints_iterations_and_their_cap(
     assert main([*words, "--out", run]) == 0
     cap = GuidedTreeParams().iterations
     assert f"of at most {cap} iterations" in capsys.readouterr().out
+
+
+def test_a_mission_of_many_robots_has_room_in_memory() -> None:
+    """Growing is halted at once: only the tree is made, and the first tours."""
+    circle = {"radius": 1.5}
+    document = {
+        "format": 1,
+        "name": "crowd",
+        "bounds": [0, 0, 240, 120],
+        "goals": [
+            {"id": f"g{n}", "circle": {"center": [20 + 2 * n, 110], **circle}}
+            for n in range(100)
+        ],
+        "stations": [
+            {"id": f"s{n}", "circle": {"center": [40 * n + 20, 60], **circle}}
+            for n in range(4)
+        ],
+        "robots": [
+            {"id": f"r{n}", "model": "car", "pose": [20 + 4 * n, 10, 1.57]}
+            for n in range(50)
+        ],
+    }
+    scene = scene_from_document(document, source="crowd")
+    params = replace(
+        profile_params("paper"),
+        samples=300,
+        router=RouterParams(method="nrpa", levels=1, iterations=1),
+    )
+    problem = state_mission(scene, 0, params)
+    growth = grow_guided_tree(problem, params, 0, np.ones(1, np.bool_))
+    assert growth.counts["iterations"] == 0
+
+
+def test_a_tree_that_has_no_room_in_memory_is_refused() -> None:
+    scene = load_scene(SCENES / "two_swap.yaml")
+    huge = replace(
+        profile_params("paper"), guided_tree=GuidedTreeParams(iterations=10**12)
+    )
+    with pytest.raises(UsageError, match=r"no room in memory.*path_following"):
+        plan_mission(scene, params=huge)
+
+
+@pytest.mark.parametrize("reverse", [True, False])
+def test_a_car_turns_round_to_what_is_behind_it_as_it_can(
+    mission: dict[str, Any], reverse: bool
+) -> None:
+    scene = scene_from_document(mission, source="court")
+    fleet = state_mission(scene, 0, profile_params("paper")).mission.fleet.copy()
+    if not reverse:
+        fleet["limit"][:, 0] = 0.0
+    x, y, theta = scene.robots[0].pose
+    state = np.array([x, y, theta, 0.0, 0.0])
+    speed_up, turn = steer(fleet, 0, state, x - 6.0, y + 0.5, 0.5)
+    assert speed_up < 0.0 if reverse else speed_up > 0.0
+    assert turn > 0.0
 
 
 # --- what the paper lacks -------------------------------------------------------------

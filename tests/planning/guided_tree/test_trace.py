@@ -7,12 +7,15 @@ states, collisions and energies are computed anew, the geometry with shapely.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 
 from mrmg.planning.guided_tree._tree_kernels import ENDS
+from mrmg.scene.loading import scene_from_document
 
 BETA_SHARE = 0.01
 COLLISION, REJECTED = ENDS.index("collision"), ENDS.index("rejected by Insert")
@@ -29,7 +32,7 @@ def steer(replay: Any, r: int, state: np.ndarray, goal: np.ndarray) -> tuple:
         bearing = math.remainder(
             math.atan2(goal[1] - y, goal[0] - x) - theta, 2 * math.pi
         )
-        reverse = abs(bearing) > (0.5 * math.pi if v < -0.1 else 2.2)
+        reverse = abs(bearing) > (0.5 * math.pi if v < -0.1 else 2.2) and v_min < 0.0
         if reverse or abs(bearing) <= 0.5 * math.pi:
             curvature = 2.0 * math.sin(bearing) / distance
             length = float(replay.fleet[r]["wheelbase"])
@@ -218,6 +221,40 @@ def test_vertices_are_free_and_a_collision_ends_the_expansion(replay: Any) -> No
         last = made[-1] if made else int(replay.trace.vertex[i])
         rejected = replay.advanced(last, replay.trace.control[i])
         assert not replay.collision_free(rejected, slack=-1e-6)
+
+
+def test_nothing_is_met_between_steps_where_margins_are_small(
+    recorded: Any, mission: dict[str, Any]
+) -> None:
+    """Thin walls, and cars that are further in a step than they are long."""
+    walls = [
+        {"box": {"center": [16, 6], "size": [0.05, 9]}},
+        {"box": {"center": [24, 17], "size": [9, 0.05]}},
+    ]
+    margins = {"obstacle": 0.0, "robot": 0.0}
+    robots = [{**robot, "margins": margins} for robot in mission["robots"]]
+    document = {**mission, "obstacles": walls, "robots": robots}
+    scene = scene_from_document(document, source="court")
+    model = scene.robots[0].model
+    limits = replace(model.limits, v_min_m_s=-28.0, v_max_m_s=28.0, u1_max_m_s2=60.0)
+    quick = replace(model, limits=limits)
+    robots = [replace(robot, model=quick) for robot in scene.robots]
+    run = recorded(3, replace(scene, robots=tuple(robots)), iterations=1500)
+    vertices = run.growth.tree.vertices
+    child = np.arange(1, run.growth.counts["vertices"])
+    assert len(child) > 500
+    before, after = vertices.state[np.stack([vertices.parent[child], child])][..., :3]
+    solid = shapely.union_all([item.shape for item in run.scene.obstacles])
+    met = np.zeros(2, int)
+    for share in np.linspace(0.0, 1.0, 21):
+        poses = before + share * (after - before)
+        bodies = [
+            shapely.polygons(robot.model.footprint_at(poses[:, r]))
+            for r, robot in enumerate(run.scene.robots)
+        ]
+        met[0] += sum(shapely.intersects(each, solid).sum() for each in bodies)
+        met[1] += shapely.intersects(*bodies).sum()
+    assert met.tolist() == [0, 0]
 
 
 def test_energy_is_used_by_distance_terrain_and_turning(replay: Any) -> None:
