@@ -31,6 +31,7 @@ from typing import Any
 
 import numpy as np
 import yaml
+from mission_tables import p95
 from protocol import Row, Trials, add_file_options, run, seed_range, write_document
 
 import mrmg
@@ -149,7 +150,7 @@ def bench(
         rows.append(row)
         if not rows[-1]["ok"]:
             print(f"seed {seed}: {rows[-1]['fault']}", file=sys.stderr)
-    times = sorted(row["plan_s"] for row in rows)
+    times = [row["plan_s"] for row in rows]
     makespans = [row["makespan_s"] for row in rows if row["makespan_s"] is not None]
     middle_s = statistics.median(makespans) if makespans else None
     infeasible = is_infeasible(path.stem)
@@ -158,7 +159,7 @@ def bench(
         "solved": sum(row["ok"] for row in rows),
         "runs": len(rows),
         "plan_s_median": statistics.median(times),
-        "plan_s_p95": times[int(0.95 * (len(times) - 1))],
+        "plan_s_p95": p95(times),
         "makespan_s_median": middle_s,
         "to_straight_line": middle_s and middle_s / straight_line_s(scene, scale),
         "status": rows[-1]["status"] if infeasible else None,
