@@ -12,8 +12,8 @@ from mrmg.errors import UsageError
 from mrmg.planning.guided_tree._expansion_kernels import BRAKING_STEPS
 from mrmg.planning.guided_tree._growth_kernels import grow
 from mrmg.planning.guided_tree._setting_kernels import Rules, Setting
-from mrmg.planning.guided_tree._tree_kernels import GROUPS as N_GROUPS
 from mrmg.planning.guided_tree._tree_kernels import (
+    BETA_SHARE,
     ITERATIONS,
     N_COUNTS,
     ROUTER_CALLS,
@@ -25,6 +25,7 @@ from mrmg.planning.guided_tree._tree_kernels import (
     Trace,
     Vertices,
 )
+from mrmg.planning.guided_tree._tree_kernels import GROUPS as N_GROUPS
 from mrmg.planning.parameters import GuidedTreeParams, PlannerParams
 from mrmg.planning.problem._target_kernels import in_target
 from mrmg.planning.problem.problem import Problem
@@ -94,7 +95,10 @@ def grow_guided_tree(
         tree,
         halt,
     )
-    counts = tree.counts
+    counts, groups = tree.counts, tree.groups
+    highest = BETA_SHARE * params.guided_tree.alpha / max(len(problem.scene.goals), 1)
+    beta_dist = highest / groups.scale[0] * groups.dist[: counts[N_GROUPS]]
+    assert (beta_dist <= highest).all(), "eq. (5): beta is too large"
     branch = [int(solution)] if solution >= 0 else []
     while branch and tree.vertices.parent[branch[-1]] >= 0:
         branch.append(int(tree.vertices.parent[branch[-1]]))
