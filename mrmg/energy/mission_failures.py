@@ -86,9 +86,16 @@ def _goals_missed(scene: Scene, visited: Set[str]) -> list[str]:
 
 
 def _finishes_missed(scene: Scene, log: ExecutionLog) -> list[str]:
+    """Say where robots with a finish ended; those that broke down need not get there.
+
+    They stay where they are, and the mission is what the others make of it.
+    """
+    broken_down = {event.robot for event in log.events if event.cause == "fault"}
     reasons = []
     for robot, end in zip(scene.robots, log.state[:, -1:], strict=True):
-        if robot.finish is None or is_at(robot.finish, end)[0]:
+        if robot.finish is None or robot.id in broken_down:
+            continue
+        if is_at(robot.finish, end)[0]:
             continue
         off_m = -float(robot.finish.region.depth(end[:, :2])[0])
         outside = f"{off_m:.3g} m outside its finish"

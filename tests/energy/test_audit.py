@@ -217,7 +217,6 @@ def test_goal_may_be_entered_by_another_robot(mission: Any) -> None:
 def test_a_missed_finish_fails_the_mission(
     finish: Any, reason: str, mission: Any
 ) -> None:
-    """As when a robot breaks down after the last goal."""
     made = mission(robots=[{**TWO_ROBOTS[0], "finish": finish}, TWO_ROBOTS[1]])
     if not reason:
         assert audit(*made).mission_ok
@@ -229,6 +228,8 @@ def test_a_missed_finish_fails_the_mission(
     assert account.goals_visited == ("g",)
     assert account.causes == ("ended", "finish missed")
     assert account.reasons[1] == f"r1 ended {reason}"
+    broken = replace(stop, cause="fault", robot="r1", action="stop")
+    assert audit(*made[:2], replace(made[2], events=(broken,))).mission_ok
 
 
 def test_contact_fails_the_mission(mission: Any) -> None:
