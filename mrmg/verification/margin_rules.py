@@ -32,7 +32,9 @@ def check_margins(scene: Scene, plan: Plan) -> Iterator[Violation]:
     for trajectory in own:
         robot = scene.robot(trajectory.robot)
         distance_m = obstacle_distance(scene, robot, trajectory.state)
-        needed_m = np.full(len(distance_m), plan.margins[robot.id][0])
+        wanted_m = plan.margins[robot.id][0]
+        least_m = min(certified_minimum_m(robot.model), wanted_m)
+        needed_m = np.full(len(distance_m), wanted_m)
         for narrow in plan.narrow:
             if narrow.robot == robot.id:
                 first, last = (
@@ -40,6 +42,8 @@ def check_margins(scene: Scene, plan: Plan) -> Iterator[Violation]:
                     for time_s in (narrow.start_s, narrow.end_s)
                 )
                 needed_m[first : last + 1] = narrow.margin_m
+        away = np.logical_or.accumulate(distance_m >= least_m)  # from the start
+        needed_m[away] = np.maximum(needed_m[away], least_m)
         still = _steps_still(trajectory)
         yield from _violations(trajectory, distance_m, needed_m, still, "an obstacle")
     boxes_m = boxes_apart_m(own) if own else np.zeros((0, 0))

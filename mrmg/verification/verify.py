@@ -107,6 +107,13 @@ def _check_form(scene: Scene, plan: Plan) -> Iterator[Violation]:
             yield _malformed(robot, "the plan has no tour for it")
     for robot in sorted({visit.robot for visit in plan.visits} - set(planned)):
         yield _malformed(robot, "visits are stated but no motion")
+    for robot, margins in plan.margins.items():
+        if robot not in planned:
+            yield _malformed(robot, "margins are stated but no motion")
+        elif not np.isfinite(margins).all() or min(margins) < 0.0:
+            yield _malformed(robot, f"its margins are {margins} m")
+    for goal in sorted(set(plan.skipped) - {goal.id for goal in scene.goals}):
+        yield _malformed("", f"{goal} is left out, and no goal of the scene")
     for passage in plan.narrow:
         stated = (passage.start_s, passage.end_s, passage.margin_m)
         if passage.robot not in planned:

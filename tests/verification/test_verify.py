@@ -301,6 +301,100 @@ def test_from_the_start_on_the_certified_minimum_holds(
     assert verify(scene, plan).ok is ok
 
 
+@pytest.mark.parametrize(("second", "ok"), [(False, True), (True, False)])
+def test_only_a_start_may_be_nearer_than_the_certified_minimum(
+    second: bool, ok: bool, case: Any
+) -> None:
+    """Posts are 5 mm beside the start, and 5 mm beside the way 8 m later."""
+    edge_m = 10.0 + case()[0].robots[0].model.half_width_m
+    boxes = [
+        {"center": [x, edge_m + 0.055], "size": [0.1, 0.1]}
+        for x in (5, 13)[: 1 + second]
+    ]
+    boxes.append({"center": [9, edge_m + 0.75], "size": [20, 1]})
+    obstacles = [{"id": f"o{i}", "box": box} for i, box in enumerate(boxes)]
+    scene, plan = case(obstacles=obstacles)
+    stretch = passage("r1", 0.005, plan.makespan_s)
+    plan = replace(plan, margins={"r1": (0.3, 0.5)}, narrow=(stretch,))
+    assert kinds(verify(scene, plan)) == (set() if ok else {Kind.MARGIN})
+
+
+@pytest.mark.parametrize(
+    ("robot", "share", "ok"),
+    [("r1", 1.0, True), ("r2", 1.0, False), ("r1", 0.3, False)],
+)
+def test_a_passage_is_one_robot_s_and_ends(
+    robot: str, share: float, ok: bool, case: Any
+) -> None:
+    """The wall ends 0.1 m beside r1's path, 8 of its 12 m from the start."""
+    edge_m = 10.1 + case()[0].robots[0].model.half_width_m
+    wall = {"center": [13, edge_m + 0.5], "size": [1, 1]}
+    aside = {**TWO_ROBOTS[1], "pose": [5, 16, 0]}
+    scene, plan = case(
+        robots=[TWO_ROBOTS[0], aside], obstacles=[{"id": "wall", "box": wall}]
+    )
+    stretch = passage(robot, 0.1, share * plan.makespan_s)
+    margins = {"r1": (0.3, 0.5), "r2": (0.3, 0.5)}
+    plan = replace(plan, margins=margins, narrow=(stretch,))
+    assert kinds(verify(scene, plan)) == (set() if ok else {Kind.MARGIN})
+
+
+def test_every_two_robots_that_touch_are_found(case: Any) -> None:
+    """Two cars stand in the way of the first one, which runs into both."""
+    ahead = [
+        {"id": f"r{i}", "model": "car", "pose": [x, y, 0]}
+        for i, x, y in ((2, 12, 11), (3, 22, 9))
+    ]
+    scene, plan = case(robots=[TWO_ROBOTS[0], *ahead], distance_m=24.0)
+    standing = (
+        replace(
+            item,
+            control=0.0 * item.control,
+            state=np.repeat(item.state[:1], len(item.state), axis=0),
+        )
+        for item in plan.trajectories[1:]
+    )
+    plan = replace(plan, trajectories=(plan.trajectories[0], *standing))
+    touched = [one for one in verify(scene, plan).violations if one.kind is Kind.ROBOT]
+    assert {(one.robot, one.other) for one in touched} == {("r1", "r2"), ("r1", "r3")}
+
+
+def test_every_two_robots_that_share_a_station_are_found(case: Any) -> None:
+    station = {"id": "s", "circle": {"center": [5, 14], "radius": 2.5}}
+    third = {**TWO_ROBOTS[1], "id": "r3", "pose": [5, 12.3, 0]}
+    robots = [{**TWO_ROBOTS[0], "pose": [5, 10, 0]}, TWO_ROBOTS[1], third]
+    scene, plan = case(robots=robots, stations=[station])
+    lone = replace(scene.stations[0], one_at_a_time=True)
+    found = verify(*asked(scene, plan, stations=(lone,))).violations
+    shared = {(one.robot, one.other) for one in found if one.kind is Kind.OCCUPIED}
+    assert len(shared) == 1
+
+
+@pytest.mark.parametrize(
+    ("kind", "change"),
+    [
+        (Kind.LEDGER, lambda plan: replace(plan, ledger=EnergyLedger(()))),
+        (
+            Kind.LEDGER,
+            lambda plan: replace(
+                plan,
+                ledger=EnergyLedger(
+                    (*plan.ledger.entries, replace(plan.ledger.entries[0], leg=7))
+                ),
+            ),
+        ),
+        (Kind.VISIT, lambda plan: replace(plan, visits=())),
+        (Kind.VISIT, lambda plan: replace(plan, visits=2 * plan.visits)),
+    ],
+    ids=["no ledger", "another entry", "no visits", "visits twice"],
+)
+def test_what_is_stated_is_neither_more_nor_less_than_what_is_done(
+    kind: Kind, change: Callable[[Plan], Plan], case: Any
+) -> None:
+    scene, plan = case()
+    assert kind in kinds(verify(scene, change(plan)))
+
+
 @pytest.mark.parametrize("kind", Kind)
 def test_broken_rule_is_found_alone(kind: Kind, case: Any, drive: Any) -> None:
     verdict = verify(*BROKEN[kind](case, drive))
@@ -404,6 +498,10 @@ def of_r1(plan: Plan, **changes: Any) -> Plan:
     return with_trajectory(plan, replace(plan.trajectories[0], **changes))
 
 
+def far_off(state: np.ndarray) -> np.ndarray:
+    return state + 1e12 * np.eye(1, state.shape[1])
+
+
 @pytest.mark.parametrize(
     ("malform", "words"),
     [
@@ -431,7 +529,27 @@ def of_r1(plan: Plan, **changes: Any) -> Plan:
             "r1: a passage is not of finite numbers",
         ),
         (
+            lambda plan: replace(plan, margins={"r1": (np.nan, np.nan)}),
+            "r1: its margins are (nan, nan) m",
+        ),
+        (
+            lambda plan: replace(plan, margins={"r1": (0.1, -0.1)}),
+            "r1: its margins are (0.1, -0.1) m",
+        ),
+        (
+            lambda plan: replace(plan, margins={"r9": (0.1, 0.1)}),
+            "r9: margins are stated but no motion",
+        ),
+        (
+            lambda plan: replace(plan, skipped={"nowhere": "out of reach"}),
+            "nowhere is left out, and no goal of the scene",
+        ),
+        (
             lambda plan: of_r1(plan, state=plan.trajectories[0].state + 1e12),
+            "r1: step 0 moves too wildly",
+        ),
+        (
+            lambda plan: of_r1(plan, state=far_off(plan.trajectories[0].state)),
             "r1: step 0 moves too wildly",
         ),
     ],
