@@ -329,6 +329,8 @@ class _Reach:
 
     def _least_J(self, place: Region | Point, region: Region) -> float:
         """Return a lower bound of the energy from a place to a region."""
+        if self.robot.model.has_custom_motion:
+            return 0.0  # see `lower_bound_J`
         cheapest = min([1.0, *(area.multiplier for area in self.scene.terrain)])
         joules = cheapest * self.robot.model.energy_model.plain_ground_J_per_m()
         start = place if isinstance(place, Point) else outer_polygon(place)

@@ -16,6 +16,7 @@ import shapely
 import mrmg
 from mrmg.energy.metering import find_visits, plan_ledger
 from mrmg.planning.feasibility import (
+    impossible_goals,
     mission_warnings,
     proof_of_infeasibility,
 )
@@ -324,6 +325,20 @@ def test_a_goal_that_no_battery_reaches_is_warned_of_with_what_is_missing(
     assert warning == proof_of_infeasibility(scene)
     assert "(10.0 m of plain ground)" in warning
     assert mission_warnings(long_scene(yard, 112.0, [])) == []
+
+
+def test_a_goal_that_a_wall_runs_through_is_reached_beside_it(yard: MakeScene) -> None:
+    """No corner of the wall is on the way, though it cuts the straight line."""
+    scene = yard(
+        bounds=[0, 0, 60, 20],
+        obstacles=[{"id": "wall", "box": {"center": [30, 10], "size": [60, 0.6]}}],
+        goals=[circle("g", 30, 10, 3.0)],
+        robots=[car("r1", 10, 11.5)],
+        battery={"capacity_m": 30},
+    )
+    assert mission_warnings(scene) == []
+    assert impossible_goals(scene) == {}
+    assert proof_of_infeasibility(scene) is None
 
 
 def test_one_robots_battery_is_warned_of_by_name(yard: MakeScene) -> None:

@@ -115,8 +115,9 @@ def _visit_goal(search, labels, r, state, g, count):
                 continue
             if left <= most_left and source in (NOTHING, origin):
                 continue
-            if count > first and value_of(labels, count - 1)[0] == cost and origin < 0:
-                count -= 1  # as costly, and less energy left
+            alike = count > first and value_of(labels, count - 1)[0] == cost
+            if alike and left >= most_left and origin < 0:
+                count -= 1  # as costly, and no more energy left
             if left <= most_left:
                 other_left = left
             else:

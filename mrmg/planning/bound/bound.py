@@ -39,6 +39,7 @@ import numpy as np
 import shapely
 from shapely.geometry import Point
 
+from mrmg.energy.metering import SHORTEST_ON_SLOPES_S
 from mrmg.planning.bound import _bound_kernels
 from mrmg.planning.bound.arcs import ArcWays
 from mrmg.planning.bound.borders import half_arc_m
@@ -95,6 +96,9 @@ def lower_bound_J(
 ) -> float:
     """Return an energy [J] that no plan of a mission undercuts.
 
+    None is known of robots with a custom motion model: a step is charged by the speeds
+    at its ends, and such a model need not drive that way in it.
+
     Args:
         scene: the mission.
         step_s: time step of the plans.
@@ -110,7 +114,7 @@ def lower_bound_J(
     Raises:
         Halted: if nothing is proven by then.
     """
-    if not scene.goals:
+    if not scene.goals or scene.has_custom_motion:
         return 0.0
     few = are_few(len(scene.goals), len(scene.robots))
     targets = len(scene.targets())
@@ -228,12 +232,19 @@ class Relaxation:
                     self.scene,
                     ways.ground.blocked,
                     cell_m=ways.ground.cell_m / finer,
-                    step_m=robot.model.top_speed_m_s * self.step_s,
+                    step_m=_charged_at_once_m(self.scene, robot, self.step_s),
                     reach_m=max(map(half_arc_m, ways.regions)),
                 )
                 goals = len(self.scene.goals)
                 found[key] = ArcWays.of(ways, graph, _starts(self.scene), goals)
         return [found[key] for key in self.keys]
+
+
+def _charged_at_once_m(scene: Scene, robot: Robot, step_s: float) -> float:
+    """Return the longest way that one price is charged for [m]."""
+    if scene.elevation is not None and step_s < SHORTEST_ON_SLOPES_S:
+        step_s += SHORTEST_ON_SLOPES_S  # by whole steps of at least that
+    return robot.model.top_speed_m_s * step_s
 
 
 def _ways_by_key(
@@ -253,7 +264,7 @@ def _ways_by_key(
             check(halt)
             own = _starts(scene)[[other == key for other in keys]]
             ends = [*map(outer_polygon, regions), shapely.multipoints(own)]
-            step_m = robot.model.top_speed_m_s * step_s
+            step_m = _charged_at_once_m(scene, robot, step_s)
             blocked = avoided_ground(scene, robot, shapely.union_all(ends), step_m)
             ground = Ground.of(scene, blocked, cell_m=cell_m, step_m=step_m)
             ways[key] = Ways.of(ground, regions, _starts(scene), halt)

@@ -56,7 +56,7 @@ class Divisions:
         Raises:
             Halted: once `halt[0]` has turned true.
         """
-        if not 0 < len(scene.goals) <= MOST_GOALS:
+        if not 0 < len(scene.goals) <= MOST_GOALS or scene.has_custom_motion:
             return None
         problem = Relaxation.of(scene, step_s=step_s, cells=cells, halt=halt).problem
         goals = np.arange(len(scene.goals))

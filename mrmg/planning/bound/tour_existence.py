@@ -32,6 +32,7 @@ from mrmg.energy.metering import SHORTEST_ON_SLOPES_S
 from mrmg.planning.bound.bound import Relaxation
 from mrmg.planning.bound.exact_tours import (
     MOST_GOALS,
+    MOST_LABELS,
     least_costs,
     of_robot,
     with_endless_batteries,
@@ -85,6 +86,8 @@ def proof_of_no_tours(
         return None
     if scene.elevation is not None and step_s < SHORTEST_ON_SLOPES_S:
         return None  # slopes are charged over longer times, in which speeds may change
+    if scene.has_custom_motion:
+        return None  # see `lower_bound_J`
     relaxed = Relaxation.of(scene, step_s=step_s, with_finishes=True, halt=halt)
     problem = _with_climbs(relaxed)
     for goals in _goals_to_try(problem):
@@ -123,8 +126,11 @@ def _goals_to_try(problem: RoutingArrays) -> Iterator[np.ndarray]:
     """Yield the most remote goals, and then each of the others."""
     apart_J = problem.cost[:, -1, : problem.goals].min(axis=0)
     remote = np.argsort(-apart_J, kind="stable")
-    yield np.sort(remote[:MOST_GOALS])
-    yield from remote[MOST_GOALS:, None]
+    most, (robots, places, _) = MOST_GOALS, problem.cost.shape
+    while most > 1 and robots * (places << most) > MOST_LABELS:
+        most -= 1
+    yield np.sort(remote[:most])
+    yield from remote[most:, None]
 
 
 def visits(problem: RoutingArrays, goals: np.ndarray, share: float = 0.0) -> np.ndarray:
@@ -134,9 +140,13 @@ def visits(problem: RoutingArrays, goals: np.ndarray, share: float = 0.0) -> np.
         problem: the mission, with legs that cost at most what they must.
         goals: their numbers; no others are to be visited.
         share: by which the usable energy of all batteries is larger than it is.
+
+    Returns:
+        Flags; all of them where it takes too many labels to tell.
     """
     least = least_costs(with_batteries(problem, share), goals, free=True)
-    assert least is not None, "without costs a state has one label"
+    if least is None:
+        return np.ones(1 << len(goals), bool)
     return np.asarray(np.isfinite(least))
 
 

@@ -14,6 +14,8 @@ REST = 1e-9
 @kernel
 def wrap(angle):
     """Return the angle in (-pi, pi]."""
+    if abs(angle) > 100.0:  # which the loops would take long for
+        angle %= 2.0 * pi
     while angle > pi:
         angle -= 2.0 * pi
     while angle <= -pi:

@@ -89,7 +89,8 @@ def cut_string(routes, r, goal, longest, random, gone):
 def swap_tails(routes, neighbour, random):
     """Exchange the ends of two routes, so that goals next to each other follow.
 
-    Where both are of one route, the goals between them are turned round instead.
+    Where both are of one route, the goals between them are turned round instead, these
+    two as well if the second one comes first.
     """
     robots = len(routes.length) - 1
     if robots > 1 and random_unit(random) < ANYWHERE:

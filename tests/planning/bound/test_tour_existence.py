@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 
 import mrmg
 from mrmg.planning import PlannerParams
+from mrmg.planning.bound import exact_tours, tour_existence
 from mrmg.planning.bound.bound import lower_bound_J
 from mrmg.planning.bound.tour_existence import (
     NoTours,
@@ -18,6 +20,7 @@ from mrmg.planning.bound.tour_existence import (
     proof_of_no_tours,
     visits,
 )
+from mrmg.planning.feasibility import proof_of_infeasibility
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays
 from mrmg.planning.routing.instance import RoutingInstance
 from mrmg.scene.loading import load_scene, scene_from_document
@@ -238,3 +241,32 @@ def test_of_many_goals_the_remote_ones_are_tried_together() -> None:
     assert proof is not None
     assert len(proof.goals) == 14
     assert proof_of_no_tours(load_scene("scene6"), 0.1) is None
+
+
+def test_of_large_fleets_fewer_goals_are_tried_together(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where too many labels are needed nothing is proven, and nothing breaks."""
+    scene = with_capacity("scene1", 24.0)
+    for module in (exact_tours, tour_existence):
+        monkeypatch.setattr(module, "MOST_LABELS", 4000)
+    proof = proof_of_no_tours(scene, 0.1)
+    assert proof is not None
+    assert len(proof.goals) < 14
+    monkeypatch.setattr(exact_tours, "MOST_LABELS", 1)
+    assert proof_of_no_tours(scene, 0.1) is None
+
+
+def test_nothing_is_known_of_what_custom_motion_is_charged() -> None:
+    """Its steps need not lead as far as the speeds at their ends, which are charged."""
+    scene = with_capacity("quickstart", 0.1)
+    own = tuple(
+        replace(one, model=replace(one.model, motion_model="motion.py"))
+        for one in scene.robots
+    )
+    custom = replace(scene, robots=own)
+    assert proof_of_no_tours(scene, 0.1) is not None
+    assert proof_of_no_tours(custom, 0.1) is None
+    assert proof_of_infeasibility(scene) is not None
+    assert proof_of_infeasibility(custom) is None
+    assert lower_bound_J(custom) == 0.0

@@ -22,6 +22,10 @@ from mrmg.planning.problem._control_kernels import wrap
 MOST_PIECES = 3
 """Pieces of a curve."""
 
+ROUNDING = 1e-6
+"""Arc below which a piece is none [rad]: rounding must not make it a full circle, nor
+have a word refused as driven backwards."""
+
 
 @kernel
 def _straight_same(x, y, phi):
@@ -54,6 +58,19 @@ def _turns(x, y, phi):
     u = -2.0 * asin(0.25 * far)
     t = wrap(direction + 0.5 * u + pi)
     return True, t, u, wrap(phi - t + u)
+
+
+@kernel
+def _forwards(arc):
+    """Return the arc forwards that leads where an arc either way does [rad]."""
+    arc %= 2.0 * pi
+    return 0.0 if arc > 2.0 * pi - ROUNDING else arc
+
+
+@kernel
+def _or_none(arc):
+    """Return an arc, or none where it is but rounding [rad]."""
+    return 0.0 if abs(arc) < ROUNDING else arc
 
 
 @kernel
@@ -97,9 +114,12 @@ def reeds_shepp(dx, dy, start, goal, radius, reverses, turn, length):
                 third = 1.0
             if not found:
                 continue
+            if word == 0 and u < ROUNDING:  # one arc, in two parts by chance
+                t, v = (phi, 0.0) if phi >= 0.0 else (0.0, phi)
+            t, v = _or_none(t), _or_none(v)
             if not reverses:
-                t, v = t % (2.0 * pi), v % (2.0 * pi)
-                u = u % (2.0 * pi) if second != 0.0 else u
+                t, v = _forwards(t), _forwards(v)
+                u = _forwards(u) if second != 0.0 else u
             elif (v if word == 3 else t) < 0.0 or (word < 2 and v < 0.0):
                 continue
             total = abs(t) + abs(u) + abs(v)

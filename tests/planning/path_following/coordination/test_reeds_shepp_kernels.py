@@ -5,8 +5,10 @@ from __future__ import annotations
 from math import cos, hypot, pi, remainder, sin, tau
 
 import numpy as np
+import pytest
 
 from mrmg.planning.path_following.coordination._reeds_shepp_kernels import reeds_shepp
+from mrmg.planning.problem._control_kernels import wrap
 
 
 def end_of(
@@ -82,3 +84,34 @@ def test_they_drive_curves_as_short_as_any_there_is() -> None:
         x, y, heading = end_of(0.4, 1.3, one, driven)
         way = reeds_shepp(x, y, 0.4, heading, 1.3, False, turn, length)
         assert way <= driven.sum() + 1e-6
+
+
+SHAPES = {
+    "straight": (0.0,),
+    "arc": (1.0,),
+    "arcs": (1.0, 1.0),
+    "straight and arc": (0.0, -1.0),
+    "arc and straight": (1.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("reverses", [True, False])
+@pytest.mark.parametrize("sides", SHAPES.values(), ids=SHAPES)
+def test_rounding_adds_no_circles(sides: tuple[float, ...], reverses: bool) -> None:
+    """Curves with fewer than three pieces are found where they are the shortest."""
+    rng = np.random.default_rng(2)
+    turn, length = np.zeros(3), np.zeros(3)
+    for _ in range(500):
+        start, radius = rng.uniform(-pi, pi), rng.uniform(0.5, 5.0)
+        own = radius * rng.uniform(0.1, 0.7, len(sides))
+        x, y, heading = end_of(start, radius, np.array(sides), own)
+        way = reeds_shepp(x, y, start, heading, radius, reverses, turn, length)
+        assert way <= own.sum() * (1.0 + 1e-6)
+        end = end_of(start, radius, turn, length)
+        assert hypot(end[0] - x, end[1] - y) < 1e-5 * radius
+
+
+def test_large_angles_are_wrapped_at_once() -> None:
+    for angle in (1e12, -1e12, 1e3, -4.0, 4.0):
+        assert abs(remainder(wrap(angle) - angle, tau)) < 1e-3
+        assert -pi - 1e-9 < wrap(angle) <= pi
