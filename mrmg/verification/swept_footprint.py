@@ -39,6 +39,7 @@ class SweptFootprint:
         self.model, self.dt_s = model, trajectory.dt_s
         self.state, self.control = trajectory.state[:-1], trajectory.control
         self.acceleration_m_s2 = _acceleration_bound(model, trajectory)
+        self._chord_m = np.hypot(*np.diff(trajectory.state[:, :2], axis=0).T)
 
     @property
     def reach_m(self) -> float:
@@ -47,7 +48,10 @@ class SweptFootprint:
 
     @property
     def travel_m(self) -> np.ndarray:
-        """Way of the reference point in each step at most [m], shape (n,)."""
+        """How far the reference point gets in each step at most [m], shape (n,)."""
+        if self.model.motion_model not in DERIVATIVES:
+            steps = np.arange(len(self.state))
+            return self._chord_m + self.sagitta(steps, np.full(len(steps), self.dt_s))
         after = np.abs(self.state[:, 3] + self.dt_s * self.control[:, 0])
         return np.asarray(np.maximum(np.abs(self.state[:, 3]), after) * self.dt_s)
 

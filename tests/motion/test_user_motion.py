@@ -19,8 +19,10 @@ from mrmg.motion import _kernels
 from mrmg.motion.user_motion import motion_of, user_motion
 from mrmg.planning import PlannerParams, plan_mission
 from mrmg.planning.roadmap._fleet_kernels import FLEET
+from mrmg.plans import Trajectory
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.types import Scene
+from mrmg.verification.swept_footprint import SweptFootprint
 
 SLIDER = (Path(__file__).parents[2] / "tools" / "first_order.py").read_text()
 """A robot whose control is its speed and yaw rate."""
@@ -213,3 +215,21 @@ def test_it_cannot_be_driven_in_mujoco_and_says_so(tmp_path: Path) -> None:
     scene = slider_scene(model_folder(tmp_path, SLIDER))
     with pytest.raises(MrmgError, match="planned for and verified, but not driven"):
         build_world(scene)
+
+
+def test_the_way_of_a_user_s_motion_is_seen_not_read_off_its_control(
+    tmp_path: Path,
+) -> None:
+    """From rest, a control of 1.8 m/s moves the slider by 0.18 m in 0.1 s at once."""
+    robot = slider_scene(model_folder(tmp_path, SLIDER)).robots[0]
+    control = np.array([[1.8, 0.0], [-1.8, 1.0], [0.0, 0.0]])
+    states = [(*robot.pose, 0.0, 0.0)]
+    for held in control.tolist():
+        step = motion_of(robot.model).step
+        states.append(step(states[-1], tuple(held), 1.0, 0.1))
+    trajectory = Trajectory(
+        robot="r1", dt_s=0.1, state=np.array(states), control=control
+    )
+    footprint = SweptFootprint(robot.model, trajectory)
+    assert (footprint.travel_m >= [0.18, 0.1799, 0.0]).all()
+    assert footprint.travel_m == pytest.approx([0.18, 0.18, 0.0], abs=0.01)
