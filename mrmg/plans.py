@@ -19,6 +19,9 @@ from mrmg.scene.margins import NarrowPassage
 
 PLAN_FORMAT = 1
 
+LONGEST_STEP_S = 0.2
+"""Longest step of a plan: energy is charged by what is in the middle of each."""
+
 DRIVEN_PLAN = "driven_plan"
 """Name of the files of a plan that was joined on the way."""
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from mrmg.errors import require_types
 from mrmg.motion.dynamics import NU, NX
-from mrmg.plans import Plan
+from mrmg.plans import LONGEST_STEP_S, Plan, Trajectory
 from mrmg.scene.types import Scene
 from mrmg.verification.contact_rules import check_obstacles, check_robots
 from mrmg.verification.margin_rules import check_margins
@@ -88,6 +88,14 @@ def _check_form(scene: Scene, plan: Plan) -> Iterator[Violation]:
         )
     if not np.isfinite(plan.dt_s) or plan.dt_s <= 0.0:
         yield _malformed("", f"the step length is {plan.dt_s} s, it must be positive")
+    elif plan.dt_s > LONGEST_STEP_S:
+        text = f"the step length is {plan.dt_s} s, more than {LONGEST_STEP_S} s"
+        yield _malformed("", text)
+    unusable = [item.robot for item in plan.trajectories if not _is_tables(item)]
+    for robot in unusable:
+        yield _malformed(robot, "states and controls are no tables of 64-bit floats")
+    if unusable:
+        return
     steps = {len(trajectory.control) for trajectory in plan.trajectories}
     if len(steps) > 1 or 0 in steps:
         counts = sorted(steps)
@@ -120,6 +128,13 @@ def _check_form(scene: Scene, plan: Plan) -> Iterator[Violation]:
             yield _malformed(passage.robot, "a passage is stated but no motion")
         elif not np.isfinite(stated).all():
             yield _malformed(passage.robot, "a passage is not of finite numbers")
+
+
+def _is_tables(trajectory: Trajectory) -> bool:
+    return all(
+        array.ndim == 2 and array.dtype.kind == "f" and array.dtype.itemsize == 8
+        for array in (trajectory.state, trajectory.control)
+    )
 
 
 def _check_coarseness(scene: Scene, plan: Plan) -> list[Violation]:

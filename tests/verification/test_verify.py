@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -498,6 +499,12 @@ def of_r1(plan: Plan, **changes: Any) -> Plan:
     return with_trajectory(plan, replace(plan.trajectories[0], **changes))
 
 
+def slowed(plan: Plan) -> Plan:
+    """Return a plan with steps of 4 s."""
+    slow = tuple(replace(item, dt_s=4.0) for item in plan.trajectories)
+    return replace(plan, dt_s=4.0, trajectories=slow)
+
+
 def far_off(state: np.ndarray) -> np.ndarray:
     return state + 1e12 * np.eye(1, state.shape[1])
 
@@ -507,6 +514,16 @@ def far_off(state: np.ndarray) -> np.ndarray:
     [
         (lambda plan: of_r1(plan, robot="r9"), "the plan moves robots ['r9']"),
         (lambda plan: replace(plan, dt_s=0.0), "the step length is 0.0 s"),
+        (slowed, "the step length is 4.0 s, more than 0.2 s"),
+        *(
+            (partial(of_r1, control=control), "r1: states and controls are no tables")
+            for control in (
+                np.array(0.0),
+                np.array([["a", "b"]]),
+                np.zeros((1, 2), complex),
+                np.zeros((1, 2), np.longdouble),
+            )
+        ),
         (
             lambda plan: of_r1(plan, state=plan.trajectories[0].state[:, :4]),
             "r1: states and controls have shapes",
