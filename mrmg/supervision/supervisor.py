@@ -20,6 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from mrmg.energy.text import energy_text
+from mrmg.energy.visits import is_at
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.supervision import Event, Observation, Orders
@@ -28,7 +29,7 @@ from mrmg.supervision.course import Course
 from mrmg.supervision.faults import StopFault
 from mrmg.supervision.history import History
 from mrmg.supervision.metering import RobotMeter
-from mrmg.supervision.remaining import FleetCondition, is_over, remaining_scene
+from mrmg.supervision.remaining import FleetCondition
 from mrmg.supervision.replanning import Replan, Replanner
 
 TRACKED_M = 0.1
@@ -200,10 +201,11 @@ class FleetSupervisor:
         return Orders(plan=self.course.plan, clock_s=step * self.course.plan.dt_s)
 
     def _is_done(self, condition: FleetCondition) -> bool:
-        finishing = any(robot.finish is not None for robot in self._scene.robots)
-        if len(condition.visited) < len(self._scene.goals):
-            return False
-        return not finishing or is_over(remaining_scene(self._scene, condition))
+        return len(condition.visited) == len(self._scene.goals) and all(
+            is_at(robot.finish, np.array([condition.pose[robot.id]]))[0]
+            for robot in self._scene.robots
+            if robot.finish is not None and robot.id not in condition.out_of_service
+        )
 
     def _why_over(self, missing: Sequence[str]) -> str:
         """Return why the mission ends where the fleet rests; "" if it need not."""

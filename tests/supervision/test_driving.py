@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,10 @@ from mrmg.simulation.disturbance import Disturbance, RobotDisturbance
 from mrmg.simulation.disturbance_spec import parse_disturbance
 from mrmg.simulation.log import ExecutionLog
 from mrmg.simulation.simulation import simulate
+from mrmg.simulation.supervision import Observation
 from mrmg.supervision.driving import Drive, drive_mission
+from mrmg.supervision.faults import StopFault
+from mrmg.supervision.supervisor import FleetSupervisor
 from mrmg.verification.verify import verify
 
 
@@ -293,6 +297,39 @@ def test_a_robot_that_is_stuck_is_done_without(yard: Scene, yard_plan: Plan) -> 
     assert output[-1] == ("rest", "", "replan")
     assert any("out of service" in event.message for event in drive.log.events)
     assert np.hypot(*np.ptp(drive.log.state[0, :, :2], axis=0)) < 1.0
+
+
+def test_who_touches_something_at_its_finish_is_done(
+    make_yard: Callable[..., Scene], make_plan: Any
+) -> None:
+    """The car was pushed 0.5 m on, against a box, but that is still its finish."""
+    robots = [
+        {"id": "r1", "model": "car", "pose": [5, 18, 0], "finish": "start"},
+        {"id": "r2", "model": "car", "pose": [5, 5, 0]},
+    ]
+    length_m = make_yard().robots[0].model.footprint_m[:, 0].max()
+    box = {"box": {"center": [5 + length_m + 0.9, 18], "size": [1, 1]}}
+    scene = make_yard(robots=robots, goals=[], obstacles=[box])
+    still = {name: [(0.0, 0.0)] * 5 for name in ("r1", "r2")}
+    plan = make_plan(scene, still, {name: () for name in still})
+    supervisor = FleetSupervisor(
+        scene, plan, faults=[StopFault(robot="r2", time_s=0.0)]
+    )
+    planned = np.stack([item.state[-1] for item in plan.trajectories])
+    pushed = planned + [[0.5, 0.0, 0.0, 0.0, 0.0], [0.0] * 5]
+    for tick, ended in ((1, False), (2, True)):
+        work_J = np.zeros((tick, 2, 2))
+        now = Observation(
+            time_s=0.5 + 0.02 * tick,
+            clock_s=0.5,
+            rate=1.0,
+            state=pushed,
+            planned=planned,
+            work_J=lambda seen=work_J: seen,
+            ended=ended,
+        )
+        assert supervisor.watch(now) is None
+    assert [event.action for event in supervisor.events] == ["stop", "finish"]
 
 
 def test_wrong_faults_are_refused(yard: Scene, yard_plan: Plan) -> None:
