@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from mrmg.mujoco_import import mujoco
@@ -21,10 +23,15 @@ class ContactWatch:
         self.contacts: list[Contact] = []
         self._is_hull, self._label = world.is_hull, world.geom_label
         self._touching: set[tuple[str, str]] = set()
+        self._seen = b""
 
     def look(self, data: mujoco.MjData) -> None:
         """Record which touches of the present state are new."""
         geoms = data.contact.geom
+        seen = geoms.tobytes()
+        if seen == self._seen:
+            return
+        self._seen = seen
         hulls = self._is_hull.take(geoms)
         # Most often there are but tyres on the floor.
         if not hulls.any():
@@ -35,8 +42,8 @@ class ContactWatch:
             hull, other = geoms[index] if hulls[index, 0] else geoms[index, ::-1]
             touching.setdefault((self._label[hull], self._label[other]), index)
         for robot, other in sorted(touching.keys() - self._touching):
-            x_m, y_m, _ = data.contact.pos[touching[robot, other]]
-            self.contacts.append(
-                Contact(float(data.time), robot, other, float(x_m), float(y_m))
-            )
+            x_m, y_m, _ = data.contact.pos[touching[robot, other]].tolist()
+            if math.isfinite(x_m + y_m):  # not where the physics diverge
+                place = Contact(float(data.time), robot, other, x_m, y_m)
+                self.contacts.append(place)
         self._touching = set(touching)

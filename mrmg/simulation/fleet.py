@@ -8,6 +8,7 @@ is left to a chassis for each motion model. What an MJCF must name stands in
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -103,6 +104,7 @@ class Fleet:
         w_to: np.ndarray,
         steps: int,
         turning_multiplier: np.ndarray | float = 1.0,
+        on_step: Callable[[], None] | None = None,
     ) -> None:
         """Run a tick of `steps` physics steps under held force and a ramp of steering.
 
@@ -113,6 +115,7 @@ class Fleet:
             steps: number of physics steps.
             turning_multiplier: of the terrain, as the drive control sees it, shape
                 (R,).
+            on_step: called after each physics step.
         """
         self._wake((force_N != 0.0) | (w_from != w_to) | (self._turns & (w_to != 0.0)))
         multiplier = np.broadcast_to(turning_multiplier, len(force_N))
@@ -126,6 +129,8 @@ class Fleet:
                 chassis.apply(step)
             mujoco.mj_step(self._model, self._data)
             self.work.look()
+            if on_step is not None:
+                on_step()
 
     def _wake(self, commanded: np.ndarray) -> None:
         """Wake those of the sleeping robots that are commanded to move, shape (R,).

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -137,6 +138,7 @@ class _Run:
         self._drive = DriveControl(world.scene)
         self._believed = believed_resistance(world.scene)
         self._contacts = ContactWatch(world)
+        self._look = partial(self._contacts.look, self.data)
         self._recording = Recording()
         self._calls = ControllerCalls(len(world.scene.robots))
         self._ending = Ending(self.data, self._is_speed)
@@ -183,6 +185,7 @@ class _Run:
             steer_to,
             STEPS_PER_TICK,
             seen_ground.turning_multiplier,
+            on_step=self._look,
         )
         self._clock.advance(self._period_s)
         self.ticks += 1
@@ -190,7 +193,6 @@ class _Run:
         # A state that is no number ends the run; the log keeps what came before it.
         if self._sound:
             self._recording.add(force_N=force)
-            self._contacts.look(self.data)
             self._record()
 
     def ended(self) -> bool:

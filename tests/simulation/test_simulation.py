@@ -17,6 +17,7 @@ from mrmg.errors import RunFolderError, UsageError
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene, TerrainArea
 from mrmg.shipped import model_names
+from mrmg.simulation.contacts import ContactWatch
 from mrmg.simulation.controller import controller_names
 from mrmg.simulation.disturbance import DisturbanceRanges
 from mrmg.simulation.log import ExecutionLog
@@ -462,3 +463,21 @@ def test_solves_with_active_bounds_are_counted_and_timed(
     assert lqr.bounded_solves == (0,)
     assert lqr.timing["controller_ms"]["qp"] is None
     assert lqr.timing["controller_ms"]["median"] > 0.0
+
+
+def test_touches_are_looked_for_after_every_step_of_the_physics(
+    driving: SimpleNamespace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A touch may be shorter than a tick, which has five steps of 4 ms."""
+    seen_s, look = [], ContactWatch.look
+
+    def noted(watch: ContactWatch, data: Any) -> None:
+        seen_s.append(data.time)
+        look(watch, data)
+
+    monkeypatch.setattr(ContactWatch, "look", noted)
+    scene = driving.open_ground([(0.0, 0.0, 0.0)])
+    controls = np.repeat([[0.5, 0.0], [-0.5, 0.0]], 5, axis=0)
+    log = simulate(scene, driving.plan_of(scene, [controls]))
+    steps = round(log.time_s[-1] / 0.004)
+    np.testing.assert_allclose(seen_s, 0.004 * np.arange(1, steps + 1))
