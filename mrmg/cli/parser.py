@@ -25,10 +25,14 @@ from mrmg.runs.arguments import VideoArguments
 
 EXIT_CODES = """\
 exit codes:
-  0  the mission is feasible end to end       5  out of budget
-  2  the command was used wrongly             6  executed, but the mission failed
-  3  a scene or file is invalid               7  something on the machine is missing
-  4  infeasible; the proof is named         130  stopped by Ctrl-C
+    0  the mission is feasible end to end
+    2  the command was used wrongly
+    3  a scene or file is invalid
+    4  infeasible; the proof is named
+    5  no plan, and no proof that there is none
+    6  executed, but the mission failed; or the plan breaks a rule
+    7  something on the machine is missing
+  130  stopped by Ctrl-C
 """
 
 

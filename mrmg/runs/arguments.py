@@ -63,8 +63,9 @@ class RunArguments(Checked):
     """path_following, which is the default, guided_tree, the published method, or one
     that another package adds"""
     router: str | None = _named(extended=extensions.ROUTERS)
-    """what finds tours: search, which is the default, nrpa, exact, or one that another
-    package adds; guided_tree takes nrpa only"""
+    """what finds tours: search, which is the default, nrpa, exact (for energy alone, no
+    time limit and few goals; else it searches), or one that another package adds;
+    guided_tree takes nrpa only"""
     objective: str | Mapping[str, float] | None = option(
         None, decides="plan", read=values.objective, metavar="energy|makespan|E:M"
     )
@@ -81,7 +82,7 @@ class RunArguments(Checked):
     trees: int | None = option(
         None, decides="plan", read=values.count, metavar="N", group="limit"
     )
-    """go on improving for so many motion trees: the same plan every time"""
+    """go on improving for so many attempts: the same plan every time"""
     soc_margin: float | None = option(
         None, decides="plan", read=values.share, metavar="SHARE", formerly=("spare",)
     )
@@ -109,7 +110,7 @@ class RunArguments(Checked):
         choices=("default", "scrub"),
     )
     """ground contact: default, as the energy model has it, or scrub, which it does not
-    know: by wheel, load and slip; default that of the run, or default"""
+    know: by wheel, load and slip; default: default, or that of a run driven anew"""
     disturb: str | None = option(None, decides="drive", bare="", metavar="SPEC")
     """drive robots that differ from their models: in mass, friction, rolling,
     drive_gain, steering_gain, lag, position_noise, heading_noise, speed_noise, delay,
