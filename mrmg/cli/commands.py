@@ -127,16 +127,28 @@ def execute(options: argparse.Namespace) -> int:
     driven = log["completed"] and not lost
     ended = "driven to the end" if driven else "given up on the way"
     events = [f"{item['time_s']:>7.1f} s  {item['message']}" for item in log["events"]]
-    account = work.account()
+    reasons = _why_failed(work)
     contacts = counted(len(log["contacts"]), "contact")
     lines = [
-        *terminal.because(f"{ended}, {contacts}", account.reasons),
+        *terminal.because(f"{ended}, {contacts}", reasons),
         *events,
         f"  {note}",
     ]
     terminal.print_result(options, log, lines)
-    done = driven and account.mission_ok
+    done = driven and not reasons
     return ExitCode.OK if done else ExitCode.MISSION_FAILED
+
+
+def _why_failed(work: Run) -> list[str]:
+    """Return the rule that the plan breaks, if any, and what went wrong on the way.
+
+    The plan as it is now is judged: a verdict may be missing, or of another plan.
+    """
+    from mrmg.verification.verify import verify
+
+    violations = verify(work.scene, work.plan()).violations
+    broken = [violation.message for violation in violations[:1]]
+    return [*broken, *work.account().reasons]
 
 
 def _driven(options: argparse.Namespace) -> tuple[Run, str]:
@@ -173,10 +185,10 @@ def audit(options: argparse.Namespace) -> int:
     """Compare planned, metered and measured energy of a run folder."""
     work = _make(options, Step.AUDIT)
     account = work.folder.read_json("audit.json", remedy="mrmg audit")
-    outcome = "mission done" if account["mission_ok"] else "mission failed"
-    lines = terminal.because(outcome, account["reasons"])
-    terminal.print_result(options, account, lines)
-    return ExitCode.OK if account["mission_ok"] else ExitCode.MISSION_FAILED
+    reasons = _why_failed(work)
+    outcome = "mission failed" if reasons else "mission done"
+    terminal.print_result(options, account, terminal.because(outcome, reasons))
+    return ExitCode.MISSION_FAILED if reasons else ExitCode.OK
 
 
 _SHOWN = ("overview.png", "energy.png", "mission.gif", "mission.mp4", "report.html")

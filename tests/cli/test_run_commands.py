@@ -161,6 +161,20 @@ def test_a_plan_that_was_tampered_with_is_refused(
     assert capsys.readouterr().out.startswith("not valid: r1: ")
 
 
+@pytest.mark.parametrize("verb", ["verify", "execute", "audit"])
+def test_a_plan_that_breaks_a_rule_is_no_mission_done(
+    own_run: Path, verb: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No robot keeps 5 m from obstacles; the drive itself is as it was."""
+    plan = storage.read_json(own_run / "plan.json")
+    plan["margins"]["r1"]["obstacle"] = 5.0
+    storage.write_json(own_run / "plan.json", plan)
+    assert main([verb, str(own_run)]) == ExitCode.MISSION_FAILED
+    reported = capsys.readouterr().out
+    assert "its margin there is 5.000 m" in reported
+    assert "mission done" not in reported
+
+
 def test_a_log_with_a_contact_fails_the_mission(
     own_run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
