@@ -72,17 +72,18 @@ class Run:
 
         The folder changes only once the work is done: arguments that turn out to be
         wrong, and a process that is stopped, leave what was there before. What was made
-        from an equal outcome stays.
+        from an equal outcome stays. Where a process died as it put an outcome in its
+        place, nobody knows what later steps were made from: nothing of them stays.
         """
         self._told(step, 0.0)
         write = _WORK[step](self)
-        later = stale_after(step)[1:]
+        later = stale_after(step)[1:] if step in self.folder.marks() else []
         current = [each for each in later if self.is_done(each)]
         before = self.folder.content(step)
         self.folder.begin(step, self.arguments.to_json(), keep=current)
         write()
         after = self.folder.content(step)
-        if any(after.get(name) != digest for name, digest in before.items()):
+        if before != after:
             self.folder.drop(current)
         if step is not Step.PLAN or self.status() in _FINAL:
             self.folder.finish(step, self.fingerprint(step))

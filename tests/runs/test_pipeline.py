@@ -8,7 +8,7 @@ import pytest
 
 from mrmg.errors import ExitCode, UsageError
 from mrmg.plans import Plan
-from mrmg.runs import pipeline
+from mrmg.runs import pipeline, steps
 from mrmg.runs.arguments import RunArguments, VideoArguments
 from mrmg.runs.folder import OUTPUTS, RunFolder, Step
 from mrmg.runs.steps import taken_up
@@ -61,6 +61,23 @@ def test_only_what_is_missing_is_made(own_run: Path, lost: str) -> None:
     assert lost in after
     untouched = [*OUTPUTS[Step.PLAN], *OUTPUTS[Step.VERIFY]]
     assert [after[name] for name in untouched] == [before[name] for name in untouched]
+
+
+def test_who_died_while_a_plan_was_put_in_place_keeps_nothing_made_from_one(
+    own_run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody knows whether it was the plan that was verified and driven."""
+    run = taken_up(RunFolder(own_run))
+
+    def die(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(steps, "write_planning", die)
+        with pytest.raises(KeyboardInterrupt):
+            run.make(Step.PLAN)
+    run.make(Step.PLAN)
+    assert set(run.folder.marks()) == {Step.PLAN}
 
 
 def test_another_seed_begins_with_planning(own_run: Path) -> None:
