@@ -51,7 +51,8 @@ class SweptFootprint:
         """How far the reference point gets in each step at most [m], shape (n,)."""
         if self.model.motion_model not in DERIVATIVES:
             steps = np.arange(len(self.state))
-            return self._chord_m + self.sagitta(steps, np.full(len(steps), self.dt_s))
+            straying_m = self.sagitta(steps, np.full(len(steps), self.dt_s))
+            return np.asarray(self._chord_m + straying_m)
         after = np.abs(self.state[:, 3] + self.dt_s * self.control[:, 0])
         return np.asarray(np.maximum(np.abs(self.state[:, 3]), after) * self.dt_s)
 
