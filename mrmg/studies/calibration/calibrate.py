@@ -29,7 +29,8 @@ class Estimate:
 
     Attributes:
         value: best estimate.
-        half_width: of its confidence interval.
+        half_width: of its confidence interval; infinite where one measurement alone
+            yields the value, nan where none does.
         unit: of both.
         was: what the model states; None where the model has no such parameter.
         key: where `robot.yaml` has it; None where it has not.
@@ -46,6 +47,11 @@ class Estimate:
         """Lower and upper end of the confidence interval."""
         return self.value - self.half_width, self.value + self.half_width
 
+    @property
+    def has_interval(self) -> bool:
+        """Whether it is known how far off the value may be."""
+        return math.isfinite(self.half_width)
+
     def rounded(self) -> str:
         """Return the value with the digits that the interval supports, and one more."""
         if not self.half_width or not self.value:
@@ -54,9 +60,8 @@ class Estimate:
         return repr(float(f"{self.value:.{max(digits, 2)}g}"))
 
     def to_json(self) -> dict[str, Any]:
-        """Return the estimate as JSON data; without ends if it is not determined."""
-        known = not math.isnan(self.half_width)
-        low, high = self.interval if known else (None, None)
+        """Return the estimate as JSON data; without ends if they are not known."""
+        low, high = self.interval if self.has_interval else (None, None)
         return {
             "value": self.value,
             "low": low,

@@ -117,7 +117,7 @@ class LogCalibration:
             value, half = estimate.value / unit, estimate.half_width / unit
             law = self.fits[0].law.name
             source = f": {counted(files, 'run')}, on {plain.name}, law {law}"
-            width = f" +-{half:.1g} ({CONFIDENCE:.0%})"
+            width = f" +-{half:.1g} ({CONFIDENCE:.0%})" if estimate.has_interval else ""
             unit_text = "W" if key == "idle_power" else "1"
             changes[(key,)] = NewValue(
                 repr(float(f"{value:.4g}")), unit_text, "fitted to logs", source + width
@@ -180,7 +180,7 @@ def calibrate_from_logs(
                 f"{', '.join(known)}"
             )
     stationary = stationary_power(model, runs)
-    knows = bool(np.isfinite(stationary.half_width))
+    knows = not np.isnan(stationary.half_width)
     laws = laws_of(
         model,
         stationary_W=stationary.value if knows else 0.0,

@@ -71,7 +71,10 @@ def turning_length_m(model: RobotModel) -> float:
 
 
 def stationary_power(model: RobotModel, runs: Sequence[LoggedRun]) -> Estimate:
-    """Return the power at rest: the median of the medians of runs that rest enough."""
+    """Return the power at rest: the median of the medians of runs that rest enough.
+
+    What the model states if none does. One run alone does not show how runs differ.
+    """
     rests = [
         run.power_W[run.at_rest]
         for run in runs
@@ -81,9 +84,12 @@ def stationary_power(model: RobotModel, runs: Sequence[LoggedRun]) -> Estimate:
     was_W = model.idle_power_W
     if not len(medians):
         return Estimate(value=was_W, half_width=np.nan, unit="W", was=was_W)
-    spread_W = np.median(np.abs(medians - np.median(medians)))
-    half_W = 1.96 * 1.4826 * float(spread_W) / math.sqrt(len(medians))
-    value_W = float(np.median(medians))
+    value_W, number = float(np.median(medians)), len(medians)
+    half_W = math.inf
+    if number > 1:
+        error_W = float(np.std(medians, ddof=1)) / math.sqrt(number)
+        # A median is less certain than a mean, by this factor at most.
+        half_W = t_quantile(number - 1) * math.sqrt(math.pi / 2.0) * error_W
     return Estimate(value=value_W, half_width=half_W, unit="W", was=was_W)
 
 

@@ -23,7 +23,7 @@ from mrmg.simulation.disturbance import FIELD_SPREADS
 from mrmg.studies.calibration.log_calibration import calibrate_from_logs
 from mrmg.studies.calibration.power_laws import MotorLaw
 from mrmg.studies.calibration.robot_logs import LoggedRun, read_run
-from mrmg.studies.calibration.terrain_estimates import law_power_W
+from mrmg.studies.calibration.terrain_estimates import law_power_W, stationary_power
 from mrmg.viz.log_plot import fit_svg
 
 BOREALTC = Path(__file__).resolve().parents[4] / "shared/energy/borealtc"
@@ -100,6 +100,40 @@ def test_a_known_law_is_found_and_predicts_runs_with_their_intervals(
     assert found.stationary_W.value == pytest.approx(12.0)
     assert max(abs(run.error_pct) for run in found.runs) < 10.0
     assert np.mean([run.holds for run in found.runs]) > 0.7
+
+
+@pytest.mark.parametrize("number", [2, 3, 5, 12])
+def test_stationary_power_lies_within_its_interval(
+    husky: RobotModel, number: int
+) -> None:
+    """Of 95 % intervals at least nine in ten have to hold the truth."""
+    levels = np.random.default_rng(number).normal(12.0, 1.0, (200, number))
+    bare = made_run(husky, "firm", 1)
+    held = 0
+    for row in levels:
+        runs = [replace(bare, power_W=np.full_like(bare.power_W, one)) for one in row]
+        low, high = stationary_power(husky, runs).interval
+        held += low <= 12.0 <= high
+    assert held >= 180
+
+
+def test_one_run_at_rest_tells_the_power_but_not_how_sure_it_is(
+    husky: RobotModel,
+) -> None:
+    runs = [made_run(husky, "firm", number) for number in (2, 5, 8)]
+    rows = ("time_s", "speed_m_s", "yaw_rate_rad_s", "power_W")
+    runs[1:] = [
+        replace(run, **{name: getattr(run, name)[:-25] for name in rows})
+        for run in runs[1:]
+    ]
+    found = calibrate_from_logs(husky, runs)
+    assert found.stationary_W.value == pytest.approx(12.0)
+    stated = found.stationary_W.to_json()
+    assert (stated["low"], stated["high"]) == (None, None)
+    change = found.changes()["idle_power",]
+    assert float(change.text) == pytest.approx(12.0)
+    assert "+-" not in change.detail
+    assert found.fits[0].law.stationary_W == pytest.approx(12.0)
 
 
 def test_residuals_stand_at_the_speed_they_are_of(
