@@ -5,10 +5,10 @@ The objective is the makespan, and the first plan counts as it is found, unrefin
 Every robot must be at rest within its own goal at the end (0.5 m; unicycles within
 0.2 m and 0.2 rad of the pose), and nothing may overlap at any time, in between steps
 and with robots that have arrived included: `mrmg.verify` judges that, with true
-headings. As the files bound only the centres of robots, the bounds are wider by half a
-robot, so that centres stay within the file's. A file that is called infeasible must be
-answered so. `--size` makes all lengths so many times as long, margins and ways in a
-second too, and with `--slower` all takes so many times as long.
+headings. As the files bound only the centres of robots, the bounds are wider by half
+the shorter side of a robot, so that centres stay within the file's. A file that is
+called infeasible must be answered so. `--size` makes all lengths so many times as long,
+margins and ways in a second too, and with `--slower` all takes so many times as long.
 
 Finished plans are kept in --output FILE: the same command goes on from there after an
 interruption. Rows of --json: `file`, `solved` of `runs`, `plan_s_median`, `plan_s_p95`,
@@ -161,7 +161,7 @@ def bench(
         "plan_s_median": statistics.median(times),
         "plan_s_p95": p95(times),
         "makespan_s_median": middle_s,
-        "to_straight_line": middle_s and middle_s / straight_line_s(scene, scale),
+        "to_straight_line": middle_s and middle_s / straight_line_s(scene),
         "status": rows[-1]["status"] if infeasible else None,
         "reason": rows[-1]["reason"] if infeasible else None,
     }
@@ -203,13 +203,15 @@ def planned(
     return row
 
 
-def straight_line_s(scene: Scene, scale: Scale = AS_IT_IS) -> float:
-    """Return the longest way as the crow flies at top speed [s]."""
+def straight_line_s(scene: Scene) -> float:
+    """Return the longest way as the crow flies into a finish at top speed [s]."""
     times = []
     for robot in scene.robots:
         assert robot.finish is not None
-        way = np.hypot(*(np.array(robot.pose[:2]) - robot.finish.region.center))
-        times.append((way - 0.5 * scale.size) / robot.model.limits.v_max_m_s)
+        center = np.array(robot.finish.region.center)
+        way = np.hypot(*(np.array(robot.pose[:2]) - center))
+        (radius_m,) = robot.finish.region.depth(center[None])
+        times.append((way - radius_m) / robot.model.limits.v_max_m_s)
     return float(max(times))
 
 
@@ -260,7 +262,7 @@ def robot_entry(
 
 
 def robot_model(entry: dict[str, Any], folder: Path, scale: Scale) -> tuple[str, float]:
-    """Write a robot's model; return its folder and its longer side in the file."""
+    """Write a robot's model; return its folder and its shorter side in the file."""
     kind = entry["type"]
     length, width = entry.get("size", (0.5, 0.25))
     size, slower = scale.size, scale.slower
@@ -286,7 +288,7 @@ def robot_model(entry: dict[str, Any], folder: Path, scale: Scale) -> tuple[str,
         limits[name] *= (size if name in IN_LENGTHS else 1.0) / slower**power
         (base / "motion.py").write_text(FIRST_ORDER)
     (base / "robot.yaml").write_text(yaml.safe_dump(document))
-    return str(base), float(max(length, width))
+    return str(base), float(min(length, width))
 
 
 if __name__ == "__main__":

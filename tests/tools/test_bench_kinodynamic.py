@@ -21,6 +21,20 @@ robots:
 """
 
 
+def test_bounds_are_wider_by_half_the_shorter_side(tmp_path: Path) -> None:
+    """A centre at the file's bound is as far from the scene's as a robot can get."""
+    (tmp_path / "straight.yaml").write_text(FILE)
+    scene = bench_kinodynamic.benchmark_scene(tmp_path / "straight.yaml", tmp_path)
+    by_m = 0.125 + bench_kinodynamic.OBSTACLE_MARGIN_M
+    assert scene.bounds == pytest.approx((-by_m, -by_m, 6.0 + by_m, 4.0 + by_m))
+
+
+def test_the_straight_line_ends_where_the_finish_begins(tmp_path: Path) -> None:
+    (tmp_path / "straight.yaml").write_text(FILE)
+    scene = bench_kinodynamic.benchmark_scene(tmp_path / "straight.yaml", tmp_path)
+    assert bench_kinodynamic.straight_line_s(scene) == pytest.approx((3.0 - 0.2) / 0.5)
+
+
 def test_trials_are_kept_and_the_document_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
