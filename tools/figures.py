@@ -52,12 +52,6 @@ def parse_options() -> argparse.Namespace:
     parser.add_argument("--format", default="pdf", choices=("pdf", "svg", "png"))
     parser.add_argument("--problem", metavar="SCENE", help="default: the bench's first")
     parser.add_argument("--seed", type=int, default=0, help="of Figure 2; default 0")
-    parser.add_argument(
-        "--profile",
-        default="paper",
-        choices=("default", "paper"),
-        help="of Figure 2; default paper, whose tree branches more and takes longer",
-    )
     return parser.parse_args()
 
 
@@ -67,9 +61,7 @@ def draw_figures(rows: Sequence[BenchRow], options: argparse.Namespace) -> list[
     sources = list(dict.fromkeys(row.source for row in rows))
     problem = mrmg.load_scene(options.problem or sources[0])
     draw_problem(problem, files[0])
-    inside = look_inside(
-        problem, seed=options.seed, params=profile_params(options.profile)
-    )
+    inside = look_inside(problem, seed=options.seed, params=profile_params("paper"))
     draw_method(
         problem,
         roadmap=inside.roadmap,
@@ -96,14 +88,12 @@ def write_texts(rows: Sequence[BenchRow], options: argparse.Namespace) -> list[P
     """Write captions and Table I; return their files."""
     table = table_rows(rows)
     captions, tex = options.out / "captions.md", options.out / "table1.tex"
-    storage.write_text(captions, captions_text(rows, table, options.profile))
+    storage.write_text(captions, captions_text(rows, table))
     storage.write_text(tex, tex_table(table))
     return [captions, tex]
 
 
-def captions_text(
-    rows: Sequence[BenchRow], table: Sequence[Sequence[str]], method: str
-) -> str:
+def captions_text(rows: Sequence[BenchRow], table: Sequence[Sequence[str]]) -> str:
     """Return the captions, with how the figures were measured, and Table I."""
     seeds = sorted({row.seed for row in rows})
     profiles = ", ".join(dict.fromkeys(row.profile for row in rows))
@@ -114,7 +104,7 @@ and areas of terrain on which driving takes a multiple of the energy.
 
 **Figure 2.** The method: (a) the roadmap, its edges the darker the more energy they
 take per metre; (b) the tours of the discrete solver, along the roadmap; (c) the edges
-of the motion tree and the plan it found (wide); profile {method}.
+of the motion tree and the plan it found (wide); profile paper.
 
 **Figure 3.** The scenes.
 

@@ -20,7 +20,7 @@ def test_figures_and_captions_come_from_a_bench(
     assert bench.main() == 0
     ratios = capsys.readouterr().out.partition("paper / default")[2]
     assert "quickstart | 1 | " in ratios
-    draw = [str(rows), "-o", str(out), "--profile", "default"]
+    draw = [str(rows), "-o", str(out)]
     monkeypatch.setattr(sys, "argv", ["figures", *draw])
     assert figures.main() == 0
     names = [f"figure{number}.pdf" for number in range(1, 5)]
@@ -32,6 +32,16 @@ def test_figures_and_captions_come_from_a_bench(
     assert "2 runs,\nseeds 0-0, profiles default, paper" in captions
     assert "mujoco" in captions
     assert (out / "table1.tex").read_text().count(r"\\") == 3
+
+
+def test_the_method_is_drawn_of_no_profile_but_the_papers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Only its tree can be drawn."""
+    monkeypatch.setattr(sys, "argv", ["figures", "rows", "--profile", "default"])
+    with pytest.raises(SystemExit) as ended:
+        figures.main()
+    assert ended.value.code == 2
 
 
 def test_a_file_that_is_none_is_refused_in_words(
