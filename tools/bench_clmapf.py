@@ -169,6 +169,11 @@ def overlap_m(content: Mapping[str, Any]) -> float:
     return max(0.0, -start_clearance_m(content))
 
 
+def margin_of(content: Mapping[str, Any]) -> float:
+    """Return the distance that is kept from obstacles [m]."""
+    return min(MARGIN_M, max(0.0, 0.5 * start_clearance_m(content)))
+
+
 def write_model(folder: Path) -> str:
     """Write the car's model; return its folder."""
     base = folder / "clmapf_car"
@@ -184,7 +189,7 @@ def benchmark_scene(name: str, content: Mapping[str, Any], model: str) -> Scene:
     which therefore stays on the map.
     """
     width, height = (float(x) for x in content["map"]["dimensions"])
-    rim = HALF_WIDTH_M + MARGIN_M
+    rim = HALF_WIDTH_M + margin_of(content)
     document = {
         "format": 1,
         "name": name,
@@ -219,8 +224,7 @@ def planned(
 ) -> Row:
     """Plan a file with one seed and judge the answer; return its row."""
     scene = benchmark_scene(name, content, model)
-    margin_m = min(MARGIN_M, max(0.0, 0.5 * start_clearance_m(content)))
-    params = replace(PARAMS, obstacle_margin_m=margin_m)
+    params = replace(PARAMS, obstacle_margin_m=margin_of(content))
     began = time.perf_counter()
     result = plan_mission(scene, seed=seed, params=params)
     plan_s = time.perf_counter() - began

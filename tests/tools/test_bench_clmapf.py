@@ -52,6 +52,18 @@ def test_files_may_have_no_obstacle(obstacles: list[list[float]] | None) -> None
     assert bench_clmapf.overlap_m(content) == 0.0
 
 
+@pytest.mark.parametrize(("disc_x", "margin_m"), [(20.0, 0.05), (12.86, 0.03)])
+def test_bodies_reach_over_the_edge_by_the_margin_of_the_file(
+    disc_x: float, margin_m: float, tmp_path: Path
+) -> None:
+    """The first car's front is at x = 12, a disc's edge 0.8 m from its centre."""
+    content = yaml.safe_load(FREE)
+    content["map"]["obstacles"] = [[disc_x, 10.0]]
+    model = bench_clmapf.write_model(tmp_path)
+    west = bench_clmapf.benchmark_scene("map", content, model).bounds[0]
+    assert west == pytest.approx(-1.0 - margin_m)
+
+
 def test_yaw_is_clockwise_in_the_files() -> None:
     west, south, east, north = bench_clmapf.body([5.0, 5.0, 1.5708]).bounds
     assert [west, south, east, north] == pytest.approx([4, 3, 6, 6], abs=1e-3)
