@@ -13,9 +13,9 @@ for 16 robots); 64, 128 and 256 robots take long and are measured by `--sizes` a
 Times are wall-clock, of planning in process; a plan counts if the verifier finds
 nothing wrong with it. With --drive it is driven in MuJoCo, too, and must end as
 planned: how many times faster than real time comes last in its line. Memory is the
-process's peak so far. The last table has one line for the missions of one size. The
-exponent of growth is the slope of a line through the logarithms of the sizes and of the
-median times to the first plan.
+process's peak so far. The last table has one line for the missions of one size, with
+the times of those whose plan counts. The exponent of growth is the slope of a line
+through the logarithms of the sizes and of the median times to the first plan.
 
 Finished missions are kept in --output FILE: the same command goes on from there after
 an interruption. Rows of --json are those of the last table: `series`, `size`, `robots`,
@@ -222,12 +222,12 @@ def sizes_of(rows: Sequence[Row]) -> list[Row]:
         sizes.setdefault((row["series"], row["size"]), []).append(row)
     table = []
     for same in sizes.values():
-        times = [row["time_s"] for row in same]
-        first_s = [each.get("first_solution", np.nan) for each in times]
-        routing_s = [each.get("routing", np.nan) for each in times]
+        done = [row for row in same if row["ok"]]
+        first_s = [row["time_s"]["first_solution"] for row in done] or [np.nan]
+        routing_s = [row["time_s"]["routing"] for row in done] or [np.nan]
         of_all = ("series", "size", "robots", "goals", "obstacles")
         line: Row = {key: same[0][key] for key in of_all}
-        speeds = [row["x_real_time"] for row in same if "x_real_time" in row]
+        speeds = [row["x_real_time"] for row in done if "x_real_time" in row]
         line |= {"x_real_time_least": min(speeds)} if speeds else {}
         table.append(
             line
