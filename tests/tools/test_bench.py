@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
 from pathlib import Path
@@ -10,6 +11,11 @@ from typing import Any
 import bench
 import protocol
 import pytest
+from mission_tables import print_scene
+
+from mrmg.planning import PlannerParams
+from mrmg.scene.loading import load_scene
+from mrmg.scene.types import Scene
 
 
 class Bench:
@@ -120,6 +126,42 @@ def test_the_document_has_the_same_keys_whatever_is_measured(
     assert quickstart.planned
     assert bounded["rows"][0].keys() == row.keys()
     assert bounded["rows"][0]["cost_to_bound_first"] >= 1.0
+
+
+def test_every_profile_is_warm_before_anything_is_timed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    planned: list[str] = []
+
+    def note(scene: Scene, *, params: PlannerParams | None = None, **_: Any) -> None:
+        planned.append(f"{scene.name} {params.planner if params else ''}".strip())
+
+    monkeypatch.setattr(bench, "plan_mission", note)
+    options = argparse.Namespace(
+        profile=["default", "paper"], seeds=range(1), bound=False
+    )
+    bench.warm.cache_clear()
+    for name in ("scene1", "scene2"):
+        bench.warmed(load_scene(name), options)
+    warm = ["quickstart path_following", "quickstart guided_tree"]
+    assert planned == [*warm, "scene1", "scene2"]
+    bench.warm.cache_clear()
+
+
+def test_plans_that_the_verifier_refused_have_no_share_in_figures() -> None:
+    def row(cost_m: float, violations: int) -> dict[str, Any]:
+        times = {"routing": 0.1, "total": 1.0, "first_solution": 0.5}
+        return {
+            "profile": "default", "ok": not violations, "violations": violations,
+            "plan_s": 1.0, "cost_m": cost_m, "statistics": {"time_s": times},
+        }  # fmt: skip
+
+    rows = [row(100.0, 0), row(10.0, 1), row(104.0, 0)]
+    options = argparse.Namespace(
+        profile=["default"], budget=None, bound=False, execute=False
+    )
+    (line,) = print_scene("any", rows, options)
+    assert (line["ok"], line["runs"], line["cost_m_median"]) == (2, 3, 102.0)
 
 
 def test_what_went_wrong_is_said_in_words(
