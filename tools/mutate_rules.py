@@ -7,7 +7,7 @@ uncompiled there, as compiled ones are kept for the text on disk.
 
 First all tests that are to notice something must pass with every rule in its place.
 Exit codes: 0 each rule has a test that fails without it, 1 a rule survives, 2 tests
-fail with all rules, or a rule's code is not found exactly once.
+fail with all rules, a rule's code is not found exactly once, or --only names no rule.
 """
 
 from __future__ import annotations
@@ -185,6 +185,9 @@ def main(words: Sequence[str] | None = None) -> int:
         for number, rule in enumerate(rules)
         if (options.only or "") in f"{rule.group} {rule.rule} {rule.module}"
     ]
+    if not numbers:
+        print(f"no rule has '{options.only}' in its text", file=sys.stderr)
+        return 2
     try:
         for number in numbers:
             rules[number].text()

@@ -30,4 +30,10 @@ def test_a_rule_that_is_taken_out_is_noticed(
 ) -> None:
     assert main(["--only", "preference then the energy"]) == 0
     assert "the_cheaper_is_better" in capsys.readouterr().out
-    assert main(["--only", "no such rule"]) == 0
+
+
+def test_a_text_that_no_rule_has_is_refused(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["--only", "no such rule"]) == 2
+    assert "no rule has 'no such rule'" in capsys.readouterr().err
