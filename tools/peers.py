@@ -117,7 +117,10 @@ def main() -> int:
     print(f"{__doc__}\n{versions()}")
     for row in packages:
         print("{package} {version} ({licence})".format(**row))
-    trials = Trials(options.output)
+    # What peers come to is of their versions.
+    trials = Trials(
+        options.output, **{row["package"]: row["version"] for row in packages}
+    )
     rows = []
     for case in chosen_cases(options):
         key = {"peer": case.peer, "problem": case.problem, "limit_s": case.limit_s}

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 import numpy as np
 import peer_routing
+import peers
 import pytest
 from peer_baseline import plain_plan
 from peer_comparison import compared
@@ -37,6 +41,26 @@ def test_a_peer_that_fails_is_counted_by_cause() -> None:
     assert row["failures"] == {"obstacle": 2}
     assert row["better"] == []
     assert row["cost_ratio"] is None
+
+
+def test_trials_of_another_version_of_a_peer_are_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+
+    def solve() -> dict[str, object]:
+        made.append("solved")
+        return trials((True, 1.0, 10.0))[0]
+
+    case = peers.Case(peer="mrmg", problem="missions", instance="a", solve=solve)
+    monkeypatch.setattr(peers, "chosen_cases", lambda options: [case])
+    monkeypatch.setattr(sys, "argv", ["peers", "--output", str(tmp_path / "rows")])
+    counts = []
+    for found in ("1.0", "1.0", "1.1"):
+        monkeypatch.setattr(peers, "version", lambda name, found=found: found)
+        assert peers.main() == 0
+        counts.append(len(made))
+    assert counts == [1, 1, 2]
 
 
 def test_the_baseline_does_missions_without_obstacles() -> None:
