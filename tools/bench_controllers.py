@@ -69,12 +69,9 @@ def main() -> int:
             own = []
             for seed in range(1 if kind == "none" else options.trials):
                 drive = partial(driven, scene, plan, controller, kind, seed)
-                row = finished.row(
-                    drive, scene=name, kind=kind, controller=controller, seed=seed
-                )
-                own.append(
-                    {**row, "scene": name, "kind": kind, "controller": controller}
-                )
+                key = {"scene": name, "kind": kind, "controller": controller}
+                row = finished.row(drive, **key, digest=scene.digest, seed=seed)
+                own.append({**row, **key})
             print_row(summary(own))
             trials += own
     rows, totals = [], []

@@ -37,6 +37,7 @@ from protocol import (
 
 import mrmg
 from mrmg.energy.audit_record import MODEL_MISMATCH
+from mrmg.scene.content import content_digest
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
 from mrmg.simulation.plants import PLANTS
@@ -60,7 +61,9 @@ def main() -> int:
         for model in {robot.model.name: robot.model for robot in scene.robots}.values():
             if model.name not in models:
                 models[model.name] = trials.row(
-                    partial(calibrated, model, options.plant), calibrated=model.name
+                    partial(calibrated, model, options.plant),
+                    calibrated=model.name,
+                    digest=content_digest(model),
                 )
         found = with_found(scene, models)
         own = []
@@ -69,6 +72,7 @@ def main() -> int:
                 row = trials.row(
                     partial(mission, as_modelled, seed, options.plant),
                     scene=name,
+                    digest=as_modelled.digest,
                     seed=seed,
                     stage=stage,
                 )

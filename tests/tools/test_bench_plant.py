@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import bench_controllers
@@ -9,6 +13,7 @@ import bench_plant
 import pytest
 
 import mrmg
+from mrmg import storage
 
 
 def mission(stage: str, errors_pct: list[float], feasible: bool = True) -> Any:
@@ -82,3 +87,43 @@ def test_a_line_of_controllers_is_of_medians_and_worst_clearances() -> None:
     assert (row["rms_m"], row["robots_m"]) == (0.2, 0.5)
     assert row["bounded_pct"] is None
     assert row["failures"] == {"contact": 1}
+
+
+@pytest.mark.parametrize(
+    ("main", "options"),
+    [
+        (bench_plant.main, ["--seeds", "0"]),
+        (bench_controllers.main, ["--controllers", "mpc", "--trials", "1"]),
+    ],
+    ids=["plant", "controllers"],
+)
+def test_trials_of_a_changed_scene_of_the_same_name_are_made_again(
+    main: Callable[[], int],
+    options: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    made: list[str] = []
+
+    def noted(what: str, row: dict[str, Any]) -> Callable[..., dict[str, Any]]:
+        return lambda *_: made.append(what) or row
+
+    measured = {name: 1.0 for name, _ in bench_controllers.COLUMNS}
+    driven = {**measured, "feasible": True, "causes": []}
+    monkeypatch.setattr(mrmg, "plan", lambda *_, **__: SimpleNamespace(plan="a plan"))
+    monkeypatch.setattr(bench_controllers, "driven", noted("drive", driven))
+    flown = {"feasible": True, "errors_pct": [1.0], "why": []}
+    monkeypatch.setattr(bench_plant, "mission", noted("mission", flown))
+    monkeypatch.setattr(bench_plant, "calibrated", noted("model", {"found": []}))
+    scene, rows = tmp_path / "scene.yaml", tmp_path / "rows.jsonl"
+    words = ["bench", "--scenes", str(scene), "--output", str(rows), *options]
+    monkeypatch.setattr(sys, "argv", words)
+    document = mrmg.load_scene("quickstart").document
+    counts = []
+    for name in ("one", "one", "other"):
+        storage.write_json(scene, {**document, "name": name})
+        made.clear()
+        main()
+        counts.append([each for each in made if each != "model"])
+    assert counts[0]
+    assert counts == [counts[0], [], counts[0]]
