@@ -28,6 +28,7 @@ PAGES = {
         "models/README.md",
         "scenes/README.md",
         "tools/README.md",
+        "mrmg/studies/README.md",
     )
 }
 README, TEXT = PAGES["README.md"], "\n".join(PAGES.values())
