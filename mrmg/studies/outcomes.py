@@ -111,7 +111,7 @@ class Study:
 
     Attributes:
         options: the options of `mrmg execute` that all trials share, by name without
-            dashes; those at their default are left out.
+            dashes; those that need not be named are left out.
         trials: in order of their seeds; at least one.
     """
 

@@ -11,7 +11,7 @@ from mrmg import storage
 from mrmg.energy.audit import audit
 from mrmg.errors import UsageError
 from mrmg.plans import Plan, PlanStatus
-from mrmg.runs.arguments import RunArguments
+from mrmg.runs.arguments import RunArguments, recorded
 from mrmg.runs.drive import drive
 from mrmg.runs.folder import TRIALS_FOLDER, Step
 from mrmg.runs.steps import Run
@@ -77,21 +77,26 @@ def study_robustness(
             feasible = sum(trial.feasible for trial in done.values())
             on_trial(len(done), trials, feasible)
     study = Study(
-        options=execute_options(arguments),
+        options=_execute_options(arguments, recorded(run.folder)),
         trials=tuple(done[number] for number in sorted(done)),
     )
     save_study(run.folder.path, run.scene, run.plan(), study)
     return study
 
 
-def execute_options(arguments: RunArguments) -> dict[str, str | bool]:
-    """Return the options with which `mrmg execute` drives as `arguments` want it."""
-    usual = RunArguments()
-    changed = {
-        name: getattr(arguments, name)
-        for name in ("controller", "plant", "replan")
-        if getattr(arguments, name) != getattr(usual, name)
-    }
+def _execute_options(
+    arguments: RunArguments, of_run: RunArguments
+) -> dict[str, str | bool]:
+    """Return the options with which `mrmg execute` drives as `arguments` want it.
+
+    Where it is not told controller and plant, it takes those of the run, which need not
+    be the usual ones.
+    """
+    changed: dict[str, str | bool] = {"replan": True} if arguments.replan else {}
+    for name in ("controller", "plant"):
+        value, usual = getattr(arguments, name), getattr(RunArguments(), name)
+        if not value == usual == getattr(of_run, name):
+            changed[name] = value
     return {"disturb": arguments.disturb or "", **changed}
 
 

@@ -22,6 +22,9 @@ from mrmg.studies.robustness.study import study_robustness
 
 SCENE = Path(__file__).parents[2] / "scenes" / "one_goal.yaml"
 
+EARLIER = Path(__file__).parents[2] / "run_of_0.1.0"
+"""A run, with a plan."""
+
 
 @pytest.fixture(scope="session")
 def planned(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -60,6 +63,18 @@ def test_the_worst_case_is_repeated_by_its_seed(
     driven = drive(run.scene, run.plan(), arguments)
     account = audit(run.scene, driven.plan, driven.log)
     assert assess_trial(run.scene, driven.log, account) == worst
+
+
+def test_a_worst_case_names_what_differs_from_the_run(tmp_path: Path) -> None:
+    """`mrmg execute` takes controller and plant of the run where none is named."""
+    folder = RunFolder(Path(shutil.copytree(EARLIER, tmp_path / "run")))
+    record = storage.read_json(folder.file("run.json"))
+    record["arguments"] |= {"controller": "pure_pursuit", "plant": "scrub"}
+    storage.write_json(folder.file("run.json"), record)
+    run = taken_up(folder)
+    usual = replace(run.arguments, controller="mpc", plant="default")
+    study = study_robustness(replace(run, arguments=usual), trials=1)
+    assert study.options == {"disturb": "", "controller": "mpc", "plant": "default"}
 
 
 def test_a_stopped_study_is_taken_up(run: Run, three: tuple[Study, str]) -> None:
