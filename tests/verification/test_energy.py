@@ -158,16 +158,47 @@ def test_both_see_the_same_stays(make_scene: Any, seed: int) -> None:
     for target in scene.targets():
         theirs = longest_by_planner(target, one.time_s, one.state)
         assert longest_stay_s(target, one) == pytest.approx(theirs)
-    ways = {item.robot: item.state[:, :2] for item in (one, other)}
-    theirs = [
-        (item.station, item.first, item.end) for item in crowded_stations(scene, ways)
-    ]
-    own = [
-        (station.id, *run)
+    parts, last = energy.INSTANTS, len(one.state) - 1
+    fine = np.arange(parts * last + 1) / parts
+    ways = {
+        item.robot: np.stack(
+            [np.interp(fine, np.arange(last + 1), item.state[:, i]) for i in (0, 1)],
+            axis=1,
+        )
+        for item in (one, other)
+    }
+    theirs = {
+        (item.station, instant // parts)
+        for item in crowded_stations(scene, ways)
+        for instant in range(item.first, item.end)
+    }
+    own = {
+        (station.id, step)
         for station in scene.stations
         for _, _, run in shared_stays(station, [one, other])
-    ]
+        for step in range(*run)
+    }
     assert own == theirs
+
+
+def test_who_crosses_a_narrow_station_between_two_states_is_seen(
+    make_scene: Any,
+) -> None:
+    """Both cars cross a strip 0.14 m wide at 2 m/s within one step."""
+    strip = [[10.03, 5], [10.17, 5], [10.17, 15], [10.03, 15]]
+    scene = make_scene(stations=[{"id": "s", "polygon": strip, "capacity": 1}])
+    state = np.zeros((11, 5))
+    state[:, 0] = 9.0 + 0.2 * np.arange(11)
+    one, other = (
+        Trajectory(
+            robot=name, dt_s=0.1, state=state + [0, y, 0, 2, 0], control=state[1:, :2]
+        )
+        for name, y in (("r1", 7.0), ("r2", 12.0))
+    )
+    (found,) = shared_stays(scene.stations[0], [one, other])
+    assert found[2] == (5, 6)
+    late = replace(other, state=other.state - [0.2, 0, 0, 0, 0])
+    assert not list(shared_stays(scene.stations[0], [one, late]))
 
 
 def test_a_straight_drive_costs_what_its_closed_form_says(case: Any) -> None:
