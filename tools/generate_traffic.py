@@ -194,15 +194,18 @@ def window(rng: np.random.Generator) -> Document:
 
 def alcove(rng: np.random.Generator) -> Document:
     """Return two unicycles at the ends of a corridor with an alcove."""
-    corridor, deep, wide = 0.8, rng.uniform(0.8, 1.0), rng.uniform(0.9, 1.2)
+    floor, corridor = 0.5, 0.8
+    deep, wide = rng.uniform(0.8, 1.0), rng.uniform(0.9, 1.2)
     at = rng.uniform(2.0, 4.0)
     low, high = at - wide / 2, at + wide / 2
-    y = corridor + deep / 2
+    top = floor + corridor + deep
+    y, middle = top - deep / 2, floor + corridor / 2
     boxes = [(low / 2, y, low, deep), ((6.0 + high) / 2, y, 6.0 - high, deep)]
-    left, right = (0.6, corridor / 2, 0.0), (5.4, corridor / 2, pi)
-    robots = [unicycle(left, (5.4, corridor / 2, 0.0))]
-    robots.append(unicycle(right, (0.6, corridor / 2, pi)))
-    return {"environment": world(6.0, corridor + deep, boxes), "robots": robots}
+    # The bounds are those of centres: bodies may reach beyond them, but not into a box.
+    boxes.append((3.0, floor / 2, 6.0, floor))
+    robots = [unicycle((0.6, middle, 0.0), (5.4, middle, 0.0))]
+    robots.append(unicycle((5.4, middle, pi), (0.6, middle, pi)))
+    return {"environment": world(6.0, top, boxes), "robots": robots}
 
 
 CLASSES: dict[str, Callable[[np.random.Generator], Document]] = {

@@ -10,6 +10,8 @@ import generate_traffic
 import numpy as np
 import pytest
 import yaml
+from bench_kinodynamic import OBSTACLE_MARGIN_M, ROBOT_MARGIN_M
+from shapely import LineString, union_all
 
 import mrmg
 from mrmg.planning import plan_mission
@@ -28,6 +30,17 @@ def test_robots_change_places(tmp_path: Path, name: str, seed: int) -> None:
     result = plan_mission(scene, params=bench_kinodynamic.PARAMS)
     assert result.plan is not None, result.reason
     assert mrmg.verify(scene, result.plan).ok
+
+
+def test_a_corridor_with_an_alcove_is_too_narrow_for_two(tmp_path: Path) -> None:
+    scene = _generated(tmp_path, "alcove", 1000)
+    _, low, _, high = scene.bounds
+    line = LineString([(0.6, low), (0.6, high)])
+    free = line.difference(union_all([wall.shape for wall in scene.obstacles]))
+    margins_m = 2.0 * OBSTACLE_MARGIN_M + ROBOT_MARGIN_M
+    widths_m = [2.0 * robot.model.half_width_m for robot in scene.robots]
+    parts = getattr(free, "geoms", [free])
+    assert max(part.length for part in parts) < sum(widths_m) + margins_m
 
 
 def test_cars_of_a_dense_yard_get_through_in_the_second_attempt(tmp_path: Path) -> None:
