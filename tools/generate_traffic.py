@@ -194,7 +194,7 @@ def window(rng: np.random.Generator) -> Document:
 
 def alcove(rng: np.random.Generator) -> Document:
     """Return two unicycles at the ends of a corridor with an alcove."""
-    floor, corridor = 0.5, 0.8
+    floor, corridor = 0.5, 0.55
     deep, wide = rng.uniform(0.8, 1.0), rng.uniform(0.9, 1.2)
     at = rng.uniform(2.0, 4.0)
     low, high = at - wide / 2, at + wide / 2
