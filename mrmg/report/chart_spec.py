@@ -29,7 +29,7 @@ def chart(
         lines: from `line`.
         group: section of the page it belongs to.
         digits: of values in the legend.
-        limits: of the vertical axis; None fits it, from zero.
+        limits: that the vertical axis shows at least; None fits it, from zero.
         along_s: times of its own, which are not the mission's; values hold until the
             next.
     """
