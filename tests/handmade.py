@@ -133,6 +133,24 @@ def case(
     return make
 
 
+@pytest.fixture
+def missing(
+    make_scene: Any, make_plan: Any, straight: Any
+) -> Callable[[], tuple[Scene, Plan]]:
+    """Return a maker of (scene, plan): of its tour h, g the robot misses h."""
+
+    def make() -> tuple[Scene, Plan]:
+        places = {"h": [10, 18], "g": [15, 10]}
+        goals = [
+            {"id": name, "circle": {"center": at, "radius": 1}}
+            for name, at in places.items()
+        ]
+        scene = make_scene(goals=goals)
+        return scene, make_plan(scene, {"r1": straight(12.0)}, {"r1": ("h", "g")})
+
+    return make
+
+
 TICK_S = 0.02
 
 

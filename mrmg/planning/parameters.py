@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass, field, replace
 from mrmg import extensions, storage
 from mrmg.errors import UsageError, refuse_values
 from mrmg.planning.routing.routing import RouterParams
+from mrmg.plans import LONGEST_STEP_S
 from mrmg.scene.margins import STATES_NONE, Margins
 
 PROFILES = ("default", "paper")
@@ -125,7 +126,7 @@ class PlannerParams:
             "profile": self.profile in PROFILES,
             "samples": self.samples >= 0,
             "neighbours": self.neighbours >= 1,
-            "dt_s": 0.0 < self.dt_s <= 0.2,
+            "dt_s": 0.0 < self.dt_s <= LONGEST_STEP_S,
             "trees": self.trees >= 1,
             "improvements": self.improvements >= 0,
             "refinements": self.refinements >= 0,

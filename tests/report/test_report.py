@@ -193,17 +193,8 @@ def test_the_bound_is_set_against_the_plan_it_was_computed_for(
     assert "charge; planned anew once, see Timeline." in anew.words
 
 
-def test_rows_of_a_tour_are_those_of_their_targets(
-    make_scene, make_plan, make_log, straight, tmp_path
-) -> None:
-    goals = {"h": [10, 18], "g": [15, 10]}
-    scene = make_scene(
-        goals=[
-            {"id": name, "circle": {"center": at, "radius": 1}}
-            for name, at in goals.items()
-        ]
-    )
-    plan = make_plan(scene, {"r1": straight(12.0)}, {"r1": ("h", "g")})
+def test_rows_of_a_tour_are_those_of_their_targets(missing, make_log, tmp_path) -> None:
+    scene, plan = missing()
     half = RobotDisturbance(robot="r1", capacity=-0.5)
     disturbance = Disturbance(seed=0, robots=(half,))
     log = replace(make_log(scene, plan), disturbance=disturbance)

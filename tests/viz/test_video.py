@@ -146,17 +146,8 @@ def test_readings_are_those_of_the_log(mission) -> None:
     assert end.used_J == pytest.approx(plan.cost_J, rel=0.05)
 
 
-def test_a_robot_heads_for_what_follows_its_last_visit(
-    make_scene, make_plan, make_log, straight
-) -> None:
-    goals = {"h": [10, 18], "g": [15, 10]}
-    scene = make_scene(
-        goals=[
-            {"id": name, "circle": {"center": at, "radius": 1}}
-            for name, at in goals.items()
-        ]
-    )
-    plan = make_plan(scene, {"r1": straight(12.0)}, {"r1": ("h", "g")})
+def test_a_robot_heads_for_what_follows_its_last_visit(missing, make_log) -> None:
+    scene, plan = missing()
     log = make_log(scene, plan)
     film = Film(scene, plan, log, OPTIONS)
     ends = [film.reading(tick).robots[0] for tick in (0, len(log.time_s) - 1)]
