@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -13,6 +14,8 @@ import pytest
 
 import mrmg
 from mrmg.compilation import compile_in_processes
+from mrmg.planning import preparation
+from mrmg.planning.parameters import PATH_FOLLOWING
 
 PACKAGE = Path(mrmg.__file__).parent
 
@@ -167,3 +170,33 @@ def test_calls_run_in_processes_of_their_own(
     assert len(traces) == 2
     assert str(os.getpid()) not in traces
     assert told
+
+
+def test_of_processes_with_one_cache_one_compiles(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    complete: list[str] = []
+    calls: list[int] = []
+
+    def compile_slowly(*_: object) -> None:
+        calls.append(threading.get_ident())
+        time.sleep(0.1)
+
+    for name, stand_in in {
+        "kernels_are_compiled": complete.__contains__,
+        "note_kernels_are_compiled": complete.append,
+        "compile_in_processes": compile_slowly,
+        "load_kernels": lambda part: None,
+        "bound_smallest": lambda: None,
+    }.items():
+        monkeypatch.setattr(preparation, name, stand_in)
+    threads = [
+        threading.Thread(target=preparation.compile_kernels, args=(PATH_FOLLOWING,))
+        for _ in range(3)
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert complete == [PATH_FOLLOWING]
+    assert len(calls) == 1

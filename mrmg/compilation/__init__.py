@@ -3,6 +3,7 @@
 from mrmg.compilation.borrowing import borrowed as borrowed
 from mrmg.compilation.cache import cache_folder as cache_folder
 from mrmg.compilation.cache import compiled_kernels as compiled_kernels
+from mrmg.compilation.cache import compiling_alone as compiling_alone
 from mrmg.compilation.cache import kernel_sources as kernel_sources
 from mrmg.compilation.cache import kernels_are_compiled as kernels_are_compiled
 from mrmg.compilation.cache import (

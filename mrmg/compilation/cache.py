@@ -14,8 +14,10 @@ import hashlib
 import json
 import os
 import platform
+import re
 import shutil
 from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from types import FunctionType
@@ -25,6 +27,7 @@ import numba
 from llvmlite import binding
 
 from mrmg import storage
+from mrmg.locking import locked
 
 PACKAGE = Path(__file__).resolve().parents[1]
 """Folder of the package."""
@@ -79,30 +82,54 @@ def compilation_digest() -> str:
 def cache_folder() -> Path:
     """Return the folder of this machine's kernels: below numba's, if one is set.
 
-    Where a crash or a full disk cut off kernels, all are given up, as numba cannot read
-    what is left of them.
+    Kernels that a crash or a full disk cut off are given up, as numba cannot read what
+    is left of them.
     """
     own = storage.user_cache_folder() / "kernels"
     folder = Path(numba.config.CACHE_DIR or own) / compilation_digest()
-    if any(map(_is_cut_off, folder.glob("complete-*"))):
-        for kept in _folders(folder):
-            shutil.rmtree(kept, ignore_errors=True)
+    for complete in folder.glob("complete-*"):
+        cut_off = _cut_off(complete)
+        with suppress(OSError):
+            for file in cut_off:
+                kernel = re.sub(r"\.(\d+\.nbc|nbi)$", "", file.name)
+                for kept in file.parent.glob(f"{kernel}.*nb?"):
+                    kept.unlink(missing_ok=True)
+            if cut_off:
+                complete.unlink(missing_ok=True)
     return folder
 
 
-def _folders(folder: Path) -> Iterator[Path]:
-    """Return the folder of kernels, and where numba keeps them if it has a folder."""
-    return folder.parent.glob(f"{folder.name}*")
+def _cut_off(complete: Path) -> list[Path]:
+    """Return the files that are smaller than when all kernels of a part were there.
 
-
-def _is_cut_off(complete: Path) -> bool:
-    """Return whether a file that was there with all kernels of a part is cut off."""
+    They need not be cut off: two processes that compile a kernel may have written it,
+    and its size differs by some bytes. To compile it again does no harm.
+    """
     root = complete.parents[1]
     try:
         sizes = json.loads(complete.read_text())
-        return any((root / name).stat().st_size < size for name, size in sizes.items())
     except (OSError, ValueError):
-        return True
+        return [complete, *_kernels(complete.parent)]
+    files = {root / name: size for name, size in sizes.items()}
+    return [
+        file
+        for file, size in files.items()
+        if not file.exists() or file.stat().st_size < size
+    ]
+
+
+@contextmanager
+def compiling_alone() -> Iterator[None]:
+    """Wait until no other process compiles kernels into this folder, if it has locks.
+
+    Two that compile one kernel at once take twice as long, and each overwrites the
+    other's.
+    """
+    with ExitStack() as stack:
+        with suppress(OSError):
+            cache_folder().mkdir(parents=True, exist_ok=True)
+            stack.enter_context(locked(cache_folder(), wait=True))
+        yield
 
 
 def to_be_kept(function: Callable[..., Any]) -> Callable[..., Any] | None:
@@ -133,15 +160,18 @@ def to_be_kept(function: Callable[..., Any]) -> Callable[..., Any] | None:
     )
 
 
-def _kernels() -> Iterator[Path]:
-    """Return the files of compiled kernels and of their index."""
-    for folder in _folders(cache_folder()):
-        yield from folder.rglob("*.nb?")
+def _kernels(folder: Path) -> Iterator[Path]:
+    """Return the files of compiled kernels and of their indices.
+
+    numba keeps them in the folder or, if one is set for it, in some named after it.
+    """
+    for kept in folder.parent.glob(f"{folder.name}*"):
+        yield from kept.rglob("*.nb?")
 
 
 def compiled_kernels() -> int:
     """Return how many kernels this machine holds compiled."""
-    return sum(path.suffix == ".nbc" for path in _kernels())
+    return sum(path.suffix == ".nbc" for path in _kernels(cache_folder()))
 
 
 def kernels_are_compiled(part: str) -> bool:
@@ -154,7 +184,8 @@ def note_kernels_are_compiled(part: str) -> None:
     if not kernels_are_compiled(part):
         root = cache_folder().parent
         sizes = {
-            str(path.relative_to(root)): path.stat().st_size for path in _kernels()
+            str(path.relative_to(root)): path.stat().st_size
+            for path in _kernels(cache_folder())
         }
         storage.write_text(_complete(part), json.dumps(sizes))
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from mrmg.compilation import (
     compile_in_processes,
+    compiling_alone,
     kernels_are_compiled,
     note_kernels_are_compiled,
 )
@@ -45,6 +46,8 @@ def compile_kernels(
 ) -> None:
     """Compile every kernel of a planner that this machine does not hold compiled.
 
+    Of processes with one cache, one compiles, and the others wait for it.
+
     Args:
         planner: name of it; those of other packages may call what path following does.
         on_progress: receives the number of kernels compiled so far, while there are any
@@ -53,11 +56,14 @@ def compile_kernels(
     part = kernels_of(planner)
     if kernels_are_compiled(part):
         return
-    compile_in_processes(_CALLS[part], on_progress or (lambda number: None))
-    load_kernels(part)
-    bound_smallest()
-    with suppress(OSError):  # without a cache that can be written, plan all the same
-        note_kernels_are_compiled(part)
+    with compiling_alone():
+        if kernels_are_compiled(part):
+            return
+        compile_in_processes(_CALLS[part], on_progress or (lambda number: None))
+        load_kernels(part)
+        bound_smallest()
+        with suppress(OSError):  # plan without a cache that can be written
+            note_kernels_are_compiled(part)
 
 
 @cache

@@ -21,7 +21,7 @@ from typing import Any
 from mrmg import storage
 from mrmg.errors import Fault, RunFolderError, UsageError
 from mrmg.interruption import cleaned_up_by
-from mrmg.runs.locking import locked
+from mrmg.locking import locked
 from mrmg.runs.paths import why_no_run
 from mrmg.scene.model_files import MODELS_FOLDER
 

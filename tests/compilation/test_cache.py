@@ -101,8 +101,11 @@ def test_kernels_that_were_cut_off_are_given_up(
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
     kernel = cache.cache_folder.__wrapped__() / "world" / "kernel.1.nbc"
     kernel.parent.mkdir(parents=True)
+    index = kernel.with_name("kernel.nbi")
+    others = [kernel.with_name(f"{name}.1.nbc") for name in ("kernels", "other")]
 
-    kernel.write_bytes(b"compiled")
+    for file in (kernel, index, *others):
+        file.write_bytes(b"compiled")
     folder = kernel.parents[1]
     with monkeypatch.context() as patch:
         patch.setattr(cache, "cache_folder", lambda: folder)
@@ -112,7 +115,12 @@ def test_kernels_that_were_cut_off_are_given_up(
     kernel.write_bytes(b"compiled for one type more")
     assert again() == folder and kernel.exists()
     kernel.write_bytes(b"comp")
-    assert again() == folder and not kernel.exists()
+    assert again() == folder and not kernel.exists() and not index.exists()
+    assert all(other.exists() for other in others)
+    note = folder / "complete-one"
+    assert not note.exists()
+    note.write_bytes(b"")
+    assert again() == folder and not any(other.exists() for other in others)
 
 
 def test_kernels_are_kept_in_the_folder_that_numba_is_given(tmp_path: Path) -> None:

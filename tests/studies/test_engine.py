@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 
 import pytest
 
@@ -56,35 +55,6 @@ def test_a_scheduler_that_does_not_answer_is_named(
 def test_contradictions_are_refused(given: dict, message: str) -> None:
     with pytest.raises(UsageError, match=message):
         Engine(**given)
-
-
-def test_workers_with_one_cache_compile_one_after_the_other(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    from mrmg.planning import preparation
-    from mrmg.runs.arguments import RunArguments
-    from mrmg.studies.campaigns import trial
-
-    running, overlaps, calls = [], [], []
-
-    def compile_kernels(planner: str) -> None:
-        overlaps.append(bool(running))
-        running.append(planner)
-        calls.append(threading.get_ident())
-        threading.Event().wait(0.05)
-        running.pop()
-
-    monkeypatch.setattr(preparation, "compile_kernels", compile_kernels)
-    threads = [
-        threading.Thread(target=trial.compile_once, args=(RunArguments(),))
-        for _ in range(3)
-    ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(set(calls)) == 3
-    assert overlaps == [False] * 3
 
 
 def test_workers_end_with_the_command_whenever_it_is_killed() -> None:

@@ -7,7 +7,6 @@ import tempfile
 import threading
 import time
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields
 from functools import lru_cache
 from pathlib import Path
@@ -19,7 +18,6 @@ from mrmg.plans import Plan, PlanResult, PlanStatus
 from mrmg.runs.arguments import RunArguments
 from mrmg.runs.code_digest import code_digest
 from mrmg.runs.drive import drive
-from mrmg.runs.locking import locked
 from mrmg.runs.steps import planner_params
 from mrmg.scene.types import Scene
 from mrmg.studies.campaigns.scenes import SceneSource
@@ -98,13 +96,16 @@ def _failed(status: str, reason: str) -> dict[str, Any]:
 
 
 def _made(source: SceneSource, order: TrialOrder) -> dict[str, Any]:
+    from mrmg.planning.preparation import compile_kernels
     from mrmg.scene.driven_parts import require_drivable
     from mrmg.verification.verify import verify
 
     arguments = order.arguments
     scene = arguments.scene(source.scene(arguments.seed, order.changes))
     require_drivable(scene.robots)
-    compile_s = compile_once(arguments)
+    began = time.perf_counter()
+    compile_kernels(planner_params(arguments).planner)
+    compile_s = time.perf_counter() - began
     if order.with_run:
         return _made_by_run(scene, arguments)
     planned, plan_s = _planned(_Planning(scene, arguments))
@@ -214,24 +215,3 @@ def _planned(planning: _Planning) -> tuple[PlanResult, float]:
         skip_unreachable=arguments.skip_unreachable,
     )
     return found, time.perf_counter() - began
-
-
-def compile_once(arguments: RunArguments) -> float:
-    """Compile the planner where this machine does not hold it compiled.
-
-    Workers with one cache compile once: the others wait for the one that does.
-
-    Returns:
-        How long that took [s].
-    """
-    from mrmg.compilation import cache_folder
-    from mrmg.planning.preparation import compile_kernels
-
-    began = time.perf_counter()
-    planner = planner_params(arguments).planner
-    with suppress(OSError):
-        cache_folder().mkdir(parents=True, exist_ok=True)
-    if cache_folder().is_dir():
-        with locked(cache_folder(), wait=True):
-            compile_kernels(planner)
-    return time.perf_counter() - began

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from mrmg.errors import RunFolderError, UsageError
-from mrmg.runs.locking import locked
+from mrmg.locking import locked
 from mrmg.studies.campaigns.campaign import run_campaign
 from mrmg.studies.campaigns.reading import Campaign, read_campaign
 from mrmg.studies.campaigns.trial import make_trial

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from mrmg.runs import locking
+from mrmg import locking
 
 
 @pytest.fixture(params=["posix", "windows"])
