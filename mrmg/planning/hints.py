@@ -17,7 +17,11 @@ INTERRUPTED = "planning was stopped by Ctrl-C; this is the best plan found until
 
 
 def hints_on(
-    scene: Scene, plan: Plan, wanted: Mapping[str, float], gap: float | None
+    scene: Scene,
+    plan: Plan,
+    wanted: Mapping[str, float],
+    gap: float | None,
+    router: str,
 ) -> Iterator[str]:
     """Yield hints on a plan.
 
@@ -26,6 +30,7 @@ def hints_on(
         plan: the answer.
         wanted: distances from other robots that were asked for, by robot [m].
         gap: of the plan's objective to its bound; None if it is not known.
+        router: name of the one that was asked for.
     """
     objective = scene.objective
     goals = {goal.id for goal in scene.goals}
@@ -38,14 +43,24 @@ def hints_on(
         yield f"{listed(unused)} {visit} no goal, as that takes less energy; {wish}"
     yield from _on_narrow_passages(plan)
     yield from _on_spacing(wanted, plan)
+    few = are_few(len(goals), len(scene.robots))
+    timed = objective.makespan_weight > 0.0 or math.isfinite(scene.time_limit_s)
+    if router == "exact" and (timed or not few):
+        what = (
+            "the makespan or time limits" if few else f"as many as {len(goals)} goals"
+        )
+        yield (
+            f"tours are those of router search: router exact knows none for {what}, so "
+            "that nothing proves them to be the cheapest ones"
+        )
     if gap is None or gap <= LARGE_GAP:
         return
-    if not are_few(len(goals), len(scene.robots)):
+    if not few:
         yield (
             f"the proven bound is loose for as many as {len(goals)} goals: much of the "
             f"gap of {gap:.0%} need not be room for better plans"
         )
-    elif objective.makespan_weight or math.isfinite(scene.time_limit_s):
+    elif timed:
         share = min(robot.model.planning_share for robot in scene.robots)
         cause = (
             f"the time limit of {scene.time_limit_s:g} s"

@@ -224,7 +224,13 @@ class _Planning:
             statistics=self.statistics.as_dict(),
             hints=(
                 *([INTERRUPTED] if search.interrupted else []),
-                *hints_on(self.scene, best, wanted, self.statistics.gap),
+                *hints_on(
+                    self.scene,
+                    best,
+                    wanted,
+                    self.statistics.gap,
+                    self.params.router.method,
+                ),
             ),
         )
 

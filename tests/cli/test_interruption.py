@@ -62,7 +62,7 @@ VERBS = {
 REFERENCE_RUNS = {"run": 1.0, "robustness in processes": 3.0, "render": 1.0}
 """About how many times the reference run verbs take that are not measured here."""
 
-ERRAND = """\
+SHORT_MISSION = """\
 format: 1
 name: short
 bounds: [0, 0, 30, 12]
@@ -98,7 +98,7 @@ def started(words: list[str]) -> subprocess.Popen[str]:
 def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """One robot with one goal nearby, so that a run takes few seconds."""
     path = tmp_path_factory.mktemp("scene") / "short.yaml"
-    path.write_text(ERRAND)
+    path.write_text(SHORT_MISSION)
     campaign = "scenes: short.yaml\nseeds: 0-5\ndisturbances: [none, default]\n"
     path.with_name("campaign.yaml").write_text(campaign)
     return path
@@ -181,16 +181,18 @@ def test_killed_when_a_file_appears(
 
 
 def test_killed_again_and_again_at_random_moments(
-    tmp_path: Path, scene: Path, reference: Path
+    tmp_path: Path, scene: Path, undisturbed: tuple[Path, float]
 ) -> None:
     out = tmp_path / "run"
+    reference, whole_s = undisturbed
     moments = random.Random(7)
     for _ in range(4):
         process = watched(words_of_run(scene, out))
-        time.sleep(moments.uniform(0.0, 1.5))
+        time.sleep(moments.uniform(0.0, 0.9) * whole_s)
         process.kill()
         process.communicate()
         assert_every_file_is_whole(out)
+    assert out.exists()
     assert_finishes_like(scene, out, reference)
 
 

@@ -15,6 +15,7 @@ from mrmg.planning.bound.bound import lower_bound_J
 from mrmg.planning.bound.joint_bound import Divisions
 from mrmg.planning.bound.makespan_bound import makespan_bound_s
 from mrmg.planning.bounding import bounds_of
+from mrmg.planning.parameters import profile_params
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.objective import Objective
 from mrmg.scene.types import Scene
@@ -136,6 +137,22 @@ def test_robots_that_stay_at_home_are_named(
     hints = plan_mission(line(**changes)).hints
     assert len(hints) == bool(words)
     assert [word for word in words if word not in "".join(hints)] == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"time_limit": 54.0}, ["router search", "time limits"]),
+        ({}, []),
+    ],
+)
+def test_tours_that_are_not_exact_are_told(
+    changes: dict[str, Any], words: list[str]
+) -> None:
+    params = profile_params("default", router="exact")
+    hints = "".join(plan_mission(line(**changes), params=params).hints)
+    assert [word for word in words if word not in hints] == []
+    assert ("router" in hints) == bool(words)
 
 
 def test_a_gap_that_the_bound_makes_large_is_explained(
