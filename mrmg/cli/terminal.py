@@ -236,8 +236,8 @@ def _figure_lines(summary: dict[str, Any]) -> Iterator[str]:
     if energy:
         yield (
             f"energy     metered {energy['metered_error_pct']:+.2f} %, measured "
-            f"{energy['measured_error_pct']:+.2f} % against the plan; charge never "
-            f"below {energy['min_charge_fraction']:.0%}, "
+            f"{energy['measured_error_pct']:+.2f} % against the plan; lowest charge "
+            f"{100.0 * energy['min_charge_fraction']:.1f} %, "
             f"{counted(energy['recharges'], 'recharge')}"
         )
         residual_pct = energy["balance_residual_pct"]
