@@ -18,6 +18,7 @@ from pathlib import Path
 import bench
 from protocol import run
 
+from mrmg.errors import UsageError
 from mrmg.scene.importing.importing import import_files
 from mrmg.scene.loading import scene_from_document
 from mrmg.scene.populating.populate import populate
@@ -57,12 +58,15 @@ def parse_options() -> argparse.Namespace:
 
 def populated(path: Path, options: argparse.Namespace) -> Scene:
     """Return the scene of a map."""
-    return populate(
-        scene_from_document(import_files([path]).document, source=str(path)),
-        robots=options.robots,
-        goals=options.goals,
-        seed=options.placement,
-    )
+    try:
+        return populate(
+            scene_from_document(import_files([path]).document, source=str(path)),
+            robots=options.robots,
+            goals=options.goals,
+            seed=options.placement,
+        )
+    except UsageError as error:
+        raise UsageError(f"{path}: {error}") from error
 
 
 if __name__ == "__main__":
