@@ -130,6 +130,8 @@ def _more_energy(robot: Robot, share: float) -> str:
     """Return in words how much more usable energy batteries must hold."""
     if math.isinf(share):
         return "many times the usable energy"
+    if share == 0.0:
+        return "slightly more usable energy"
     more = energy_and_metres(share * _usable_J(robot), robot)
     return f"{share:.0%} more usable energy, which is {more} for {robot.id}"
 

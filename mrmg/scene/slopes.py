@@ -49,7 +49,7 @@ def slope_faults(
             f"rises by {rise} % at ({x[worst]:.1f}, {y[worst]:.1f}), where {robot.id} "
             f"climbs at most {most} % (friction {robot.model.friction_coefficient:g}, "
             f"terrain x{multiplier[worst]:g}); flatten it, put an obstacle there, or "
-            "let robots avoid what they cannot climb with slope: avoid"
+            "let robots avoid what they cannot climb: add 'slope: avoid' to it"
         )
         faults.append(Fault("elevation", message))
     return faults

@@ -245,6 +245,14 @@ def test_planning_ends_with_its_status_reason_and_exit_code(
     assert [word for word in row.words if word not in reason] == []
 
 
+def test_a_battery_that_lacks_little_does_not_lack_nothing(yard: MakeScene) -> None:
+    (row,) = (row for row in ROWS if row.ending == "NO_TOURS")
+    least_m = 30.5  # 10 to the edge of one goal, 20.5 on to that of the other one
+    battery = {"capacity_m": 0.997 * least_m, "reserve": 0.0}
+    reason = mrmg.plan(yard(**{**row.changes, "battery": battery})).reason
+    assert reason.endswith("would have to hold at least slightly more usable energy")
+
+
 def test_every_sentence_has_its_row() -> None:
     sentences = [name for name, one in vars(endings).items() if isinstance(one, str)]
     assert [row.ending for row in ROWS[1:]] == [n for n in sentences if n.isupper()]

@@ -236,7 +236,7 @@ RIDGE = {
 
 
 def test_the_refusal_names_avoiding_as_a_remedy() -> None:
-    with pytest.raises(SceneError, match="slope: avoid"):
+    with pytest.raises(SceneError, match="add 'slope: avoid' to it"):
         make_scene(RIDGE)
 
 
