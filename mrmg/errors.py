@@ -6,6 +6,7 @@ The command line prints the message alone; the Python API raises the exception.
 from __future__ import annotations
 
 import difflib
+import operator
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -110,6 +111,7 @@ class MachineError(MrmgError):
 MADE_BY = {
     "Scene": "mrmg.load_scene(...) gives one",
     "Plan": "mrmg.plan(scene).plan is one, or None where `reason` says why",
+    "PlannerParams": "mrmg.PlannerParams(samples=900) is one",
     "ExecutionLog": "mrmg.execute(scene, plan) gives one",
     "str or Path": "give the path of a scene file, or a shipped scene's name",
     "VideoArguments": "mrmg.runs.arguments.VideoArguments(view='chase') is one",
@@ -132,6 +134,18 @@ def require_types(*given: tuple[object, type | tuple[type, ...]]) -> None:
             name = " or ".join(each.__name__ for each in kinds)
             got = "None" if value is None else f"{value!r:.60} ({type(value).__name__})"
             raise UsageError(f"expected {name}, got {got}; {MADE_BY[name]}")
+
+
+def whole(what: str, number: object) -> int:
+    """Return a whole number of any type, NumPy's among them.
+
+    Raises:
+        UsageError: if it is none.
+    """
+    try:
+        return int(operator.index(number))  # type: ignore[arg-type]
+    except TypeError:
+        raise UsageError(f"{what} = {number!r}; expected a whole number") from None
 
 
 def require_known(what: str, name: str, names: Iterable[str]) -> None:

@@ -92,10 +92,14 @@ def write_text(path: Path, text: str) -> None:
 def canonical_json(value: Any) -> str:
     """Return `value` as JSON with sorted keys: equal values give equal bytes.
 
-    Dataclasses are written by the names of their fields.
+    Dataclasses are written by the names of their fields, NumPy's numbers as Python's.
     """
-    text = json.dumps(value, sort_keys=True, indent=1, allow_nan=False, default=asdict)
+    text = json.dumps(value, sort_keys=True, indent=1, allow_nan=False, default=_plain)
     return text + "\n"
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else asdict(value)
 
 
 def write_json(path: Path, value: Any) -> None:

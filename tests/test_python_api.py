@@ -13,6 +13,7 @@ import pytest
 
 import mrmg
 from mrmg.errors import MachineError, UsageError
+from mrmg.planning import PlannerParams
 from mrmg.plans import Plan, Trajectory
 from mrmg.simulation.log import ExecutionLog
 
@@ -133,6 +134,10 @@ def test_values_of_other_types_are_refused_with_where_to_get_them() -> None:
         (lambda: mrmg.plan(name), no_scene),
         (lambda: mrmg.verify(name, plan), no_scene),
         (lambda: mrmg.execute(name, plan), no_scene),
+        (lambda: mrmg.plan(scene, params=number), "expected PlannerParams, got 5"),
+        (lambda: mrmg.plan(scene, seed=name), "seed = 'file.yaml'; expected a whole"),
+        (lambda: mrmg.plan(scene, workers=none), "workers = None; expected a whole"),
+        (lambda: PlannerParams(router=name), "out of range: router = 'file.yaml'"),
         (lambda: mrmg.run(number), r"expected str or Path, got 5 \(int\); give the"),
     ):
         with pytest.raises(UsageError, match=message):

@@ -124,6 +124,8 @@ class PlannerParams:
     def __post_init__(self) -> None:
         allowed = {
             "profile": self.profile in PROFILES,
+            "guided_tree": isinstance(self.guided_tree, GuidedTreeParams),
+            "router": isinstance(self.router, RouterParams),
             "samples": self.samples >= 0,
             "neighbours": self.neighbours >= 1,
             "dt_s": 0.0 < self.dt_s <= LONGEST_STEP_S,

@@ -14,7 +14,7 @@ import numpy as np
 
 from mrmg import extensions
 from mrmg.background import Result, within
-from mrmg.errors import UsageError, require_types
+from mrmg.errors import UsageError, require_types, whole
 from mrmg.planning import planners, routers
 from mrmg.planning.attempt import Attempt, Request
 from mrmg.planning.bounding import bounds_beside
@@ -91,13 +91,14 @@ def plan_mission(
 
     Raises:
         SceneError: if the scene has no robots.
-        UsageError: if a name is unknown, there is to be no worker, or the scene has
-            features that the planner does not know.
+        UsageError: if a name is unknown, an argument of another type, there is to be no
+            worker, or the scene has features that the planner does not know.
         MachineError: if a planner or router of another package is broken.
     """
     require_types((scene, Scene))
     require_robots(scene)
     _require_known(options)
+    seed, workers = whole("seed", seed), whole("workers", workers)
     if workers < 1:
         raise UsageError(f"workers = {workers}; planning needs at least 1")
     params, made_by, routed_by = _resolved(params, planner, router)
@@ -136,6 +137,7 @@ def _resolved(
             planner=planner if isinstance(planner, str) else None,
             router=router if isinstance(router, str) else None,
         )
+    require_types((params, PlannerParams))
     # Both at once, as a planner may take one router alone.
     params = replace(
         params,

@@ -5,7 +5,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 import mrmg
@@ -45,6 +47,14 @@ def test_other_parameters_give_a_plan_of_another_fingerprint() -> None:
     other = plan_mission(scene, seed=0, params=PlannerParams(samples=900))
     assert first.plan is not None and other.plan is not None
     assert first.plan.parameters_digest != other.plan.parameters_digest
+
+
+def test_numbers_of_numpy_are_as_good_as_those_of_python() -> None:
+    scene = edge_scene("one_goal")
+    plain = plan_mission(scene, seed=1, params=PlannerParams(samples=600))
+    params = PlannerParams(samples=np.int64(600))  # type: ignore[arg-type]
+    seed: Any = np.arange(2)[1]
+    assert digest(plan_mission(scene, seed=seed, params=params)) == digest(plain)
 
 
 # --- limits ------------------------------------------------------------------------
