@@ -10,8 +10,11 @@ import operator
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import TypeVar
 
 from mrmg.counted import counted
+
+_Kind = TypeVar("_Kind")
 
 
 class ExitCode(IntEnum):
@@ -160,7 +163,17 @@ def require_known(what: str, name: str, names: Iterable[str]) -> None:
         raise UsageError(f"{text}; allowed: {', '.join(known)}")
 
 
+def of_robot(robot_id: str, by_id: Mapping[str, _Kind]) -> _Kind:
+    """Return what belongs to a robot.
+
+    Raises:
+        UsageError: if there is no robot of that id; lists those there are.
+    """
+    require_known("robot", robot_id, by_id)
+    return by_id[robot_id]
+
+
 def nearest(name: str, names: Iterable[str], *, cutoff: float = 0.5) -> str:
     """Return " (did you mean '...'?)" for the most similar of `names`, or nothing."""
-    match = difflib.get_close_matches(name, list(names), n=1, cutoff=cutoff)
+    match = difflib.get_close_matches(str(name), list(names), n=1, cutoff=cutoff)
     return f" (did you mean '{match[0]}'?)" if match else ""

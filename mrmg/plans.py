@@ -14,7 +14,7 @@ import numpy as np
 from mrmg import storage
 from mrmg.columns import control_columns, data_frame, named, state_columns
 from mrmg.energy.ledger import EnergyLedger
-from mrmg.errors import ExitCode
+from mrmg.errors import ExitCode, of_robot
 from mrmg.scene.margins import NarrowPassage
 
 PLAN_FORMAT = 1
@@ -207,8 +207,8 @@ class Plan:
         return storage.digest("".join([header, *arrays]))
 
     def trajectory(self, robot_id: str) -> Trajectory:
-        """Return one robot's trajectory."""
-        return next(item for item in self.trajectories if item.robot == robot_id)
+        """Return one robot's trajectory; raises UsageError if there is none."""
+        return of_robot(robot_id, {item.robot: item for item in self.trajectories})
 
     def save(self, folder: Path, name: str = "plan") -> None:
         """Write `<name>.npz`, then `<name>.json`; equal plans give equal bytes."""

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import mrmg
+from mrmg.energy.audit_record import EnergyAudit
 from mrmg.errors import MachineError, UsageError
 from mrmg.planning import PlannerParams
 from mrmg.plans import Plan, Trajectory
@@ -101,8 +102,17 @@ def test_an_older_plan_and_log_name_the_fifth_column_without_meaning(
 
 
 def test_an_unknown_robot_is_answered_with_the_known_ones(mixed: Path) -> None:
-    with pytest.raises(UsageError, match="no robot 'r9'; allowed: d1"):
-        ExecutionLog.load(mixed).to_arrays("r9")
+    name: Any = 9
+    for parts in (
+        ExecutionLog.load(mixed).to_arrays,
+        Plan.load(mixed).trajectory,
+        mrmg.load_scene(mixed / "scene.yaml").robot,
+        EnergyAudit.load(mixed).robot,
+    ):
+        with pytest.raises(UsageError, match="robot 'r9' is not known.*allowed: d1"):
+            parts("r9")
+        with pytest.raises(UsageError, match="robot '9' is not known"):
+            parts(name)
 
 
 def test_data_frames_need_pandas_only_when_asked_for(

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from mrmg import storage
 from mrmg.energy.ledger import EnergyLedger
+from mrmg.errors import of_robot
 
 AUDIT_FORMAT = 1
 AUDIT_FILE = "audit.json"
@@ -130,8 +131,8 @@ class EnergyAudit:
         return tuple(visit for visit in self.visits if visit.kind == "station")
 
     def robot(self, robot_id: str) -> RobotAudit:
-        """Return the account of one robot."""
-        return next(item for item in self.robots if item.robot == robot_id)
+        """Return the account of one robot; raises UsageError if there is none."""
+        return of_robot(robot_id, {item.robot: item for item in self.robots})
 
     def save(self, folder: Path) -> None:
         """Write `audit.json`."""

@@ -9,6 +9,7 @@ from typing import Any
 
 from shapely.geometry import Polygon
 
+from mrmg.errors import of_robot
 from mrmg.scene.content import content, content_digest, contents
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.margins import STATES_NONE, Margins
@@ -312,8 +313,8 @@ class Scene:
         return any(robot.model.has_custom_motion for robot in self.robots)
 
     def robot(self, robot_id: str) -> Robot:
-        """Return the robot of that id."""
-        return next(robot for robot in self.robots if robot.id == robot_id)
+        """Return the robot of that id; raises UsageError if there is none."""
+        return of_robot(robot_id, {robot.id: robot for robot in self.robots})
 
     def targets(self) -> tuple[Goal | Station, ...]:
         """Return all goals, then all stations: the numbering the planner uses."""

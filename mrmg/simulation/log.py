@@ -15,7 +15,7 @@ import numpy as np
 from mrmg import storage
 from mrmg.columns import data_frame, named, state_columns
 from mrmg.energy.metering import TimedStates
-from mrmg.errors import Fault, IdentityError, UsageError
+from mrmg.errors import Fault, IdentityError, of_robot
 from mrmg.plans import Plan, plan_in_force
 from mrmg.scene.types import Scene
 from mrmg.simulation.disturbance import Disturbance
@@ -159,10 +159,7 @@ class ExecutionLog:
         self, robot: str
     ) -> Iterator[tuple[Iterable[tuple[str, str]], np.ndarray]]:
         """Yield names with units, and the values of their columns."""
-        if robot not in self.robots:
-            known = ", ".join(self.robots)
-            raise UsageError(f"the log knows no robot {robot!r}; allowed: {known}")
-        number = self.robots.index(robot)
+        number = of_robot(robot, {each: k for k, each in enumerate(self.robots)})
         names = state_columns(self.motions[number] if self.motions else "")
         set_points = list(names.items())[3:]
         yield [("time_s", "s")], self.time_s
