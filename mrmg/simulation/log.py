@@ -262,9 +262,14 @@ def require_same_mission(
     if plan is not None and log is not None and log.plan_digest != plan.digest:
         message = f"log of another plan ({log.plan_digest}); this is {plan.digest}"
         faults.append(Fault("log.json", f"{message}; run 'mrmg execute'"))
-    expected = tuple(robot.id for robot in scene.robots)
-    if log is not None and log.robots != expected:
-        message = f"log of robots {list(log.robots)}, the scene has {list(expected)}"
+    expected = [robot.id for robot in scene.robots]
+    planned = expected if plan is None else [each.robot for each in plan.trajectories]
+    if planned != expected:
+        message = f"plan of robots {planned}, the scene has {expected}"
+        faults.append(Fault("plan.json", f"{message}; plan this scene anew"))
+    driven = expected if log is None else [*log.robots]
+    if driven != expected:
+        message = f"log of robots {driven}, the scene has {expected}"
         faults.append(Fault("log.json", f"{message}; run 'mrmg execute'"))
     if faults:
         raise IdentityError(scene.name, faults)

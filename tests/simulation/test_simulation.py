@@ -416,6 +416,13 @@ def test_another_scenes_plan_is_refused(
         simulate(scene, wild[1])
 
 
+def test_a_plan_of_another_fleet_is_refused(wild: tuple[Scene, Plan]) -> None:
+    scene, plan = wild
+    for motions in ((), plan.trajectories[:1], plan.trajectories[::-1]):
+        with pytest.raises(UsageError, match="plan of robots .*, the scene has"):
+            simulate(scene, replace(plan, trajectories=motions))
+
+
 def test_an_unknown_controller_is_refused(wild: tuple[Scene, Plan]) -> None:
     with pytest.raises(UsageError, match="allowed: mpc, pure_pursuit, tvlqr"):
         simulate(*wild, controller="none")
