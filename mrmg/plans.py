@@ -15,6 +15,7 @@ from mrmg import storage
 from mrmg.columns import control_columns, data_frame, named, state_columns
 from mrmg.energy.ledger import EnergyLedger
 from mrmg.errors import ExitCode, of_robot
+from mrmg.scene.content import ByContent
 from mrmg.scene.margins import NarrowPassage
 
 PLAN_FORMAT = 1
@@ -61,8 +62,8 @@ class PlanStatus(Enum):
         return decided.get(self, ExitCode.OUT_OF_BUDGET)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Trajectory:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Trajectory(ByContent):
     """The motion of one robot under piecewise constant controls.
 
     Attributes:
@@ -139,8 +140,8 @@ class Visit:
     energy_J: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Plan:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Plan(ByContent):
     """A solved mission; all trajectories have the same number of steps.
 
     Attributes:

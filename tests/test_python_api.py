@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import subprocess
 import sys
 from dataclasses import replace
@@ -113,6 +114,17 @@ def test_an_unknown_robot_is_answered_with_the_known_ones(mixed: Path) -> None:
             parts("r9")
         with pytest.raises(UsageError, match="robot '9' is not known"):
             parts(name)
+
+
+def test_results_are_equal_where_their_contents_are(mixed: Path) -> None:
+    plan, log = Plan.load(mixed), ExecutionLog.load(mixed)
+    again, driven = pickle.loads(pickle.dumps((plan, log)))
+    assert (again, driven) == (plan, log)
+    assert {again, plan} == {plan} and {driven, log} == {log}
+    assert replace(log, timing={}) == log
+    assert replace(log, state=log.state + 1.0) != log
+    moved = replace(plan.trajectories[0], state=plan.trajectories[0].state + 1.0)
+    assert replace(plan, trajectories=(moved,)) != plan
 
 
 def test_data_frames_need_pandas_only_when_asked_for(

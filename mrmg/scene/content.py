@@ -57,7 +57,7 @@ def content(value: Any) -> Any:
     if isinstance(value, Real):
         number = float(value) + 0.0
         return number if math.isfinite(number) else str(number)
-    raise TypeError(f"{type(value).__name__} is no part of a scene: {value!r}")
+    raise TypeError(f"{type(value).__name__} has no content: {value!r}")
 
 
 def contents(value: Any, *, without: tuple[str, ...] = ()) -> dict[str, Any]:

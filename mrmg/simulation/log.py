@@ -17,6 +17,7 @@ from mrmg.columns import data_frame, named, state_columns
 from mrmg.energy.metering import TimedStates
 from mrmg.errors import Fault, IdentityError, of_robot
 from mrmg.plans import Plan, plan_in_force
+from mrmg.scene.content import ByContent, contents
 from mrmg.scene.types import Scene
 from mrmg.simulation.disturbance import Disturbance
 from mrmg.simulation.supervision import Event
@@ -50,8 +51,8 @@ class Contact:
     y_m: float
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ExecutionLog:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ExecutionLog(ByContent):
     """Everything recorded at the control rate; n ticks, R robots.
 
     Attributes:
@@ -121,6 +122,10 @@ class ExecutionLog:
     balance_J: np.ndarray | None = None
     plant: str = "default"
     bounded_solves: tuple[int, ...] = ()
+
+    def content(self) -> dict[str, Any]:
+        """Return what counts for equality."""
+        return contents(self, without=("timing",))
 
     def driven_motions(self) -> tuple[TimedStates, ...]:
         """Return the motion of each robot in the simulation."""
