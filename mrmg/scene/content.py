@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import Field, fields, is_dataclass
+from dataclasses import MISSING, Field, fields, is_dataclass
 from numbers import Real
 from typing import Any
 
@@ -75,4 +75,6 @@ def contents(value: Any, *, without: tuple[str, ...] = ()) -> dict[str, Any]:
 
 
 def _is_default(value: Any, field: Field[Any]) -> bool:
-    return type(value) is type(field.default) and bool(value == field.default)
+    if field.default is MISSING:
+        return False
+    return value is field.default or bool(content(value) == content(field.default))

@@ -262,6 +262,15 @@ def test_a_shape_counts_whichever_way_its_corners_go() -> None:
     assert same == scene == again(same)
 
 
+@pytest.mark.parametrize("kind", [int, np.int64, np.float32, np.float64])
+def test_numbers_count_by_their_value(kind: Any) -> None:
+    """Also where they are the default."""
+    scene = rich()
+    first, second = scene.goals
+    goals = (replace(first, dwell_s=kind(3)), replace(second, dwell_s=kind(0)))
+    assert replace(scene, goals=goals, time_limit_s=kind(500)) == scene
+
+
 def test_an_instant_charge_is_written_against_the_fleets_power() -> None:
     scene = rich()
     at_once = replace(scene.robots[0].battery, charging_power_W=float("inf"))
