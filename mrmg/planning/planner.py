@@ -90,7 +90,7 @@ def plan_mission(
             all before it.
 
     Raises:
-        SceneError: if the scene has no robots.
+        SceneError: if the scene has no robots, or numbers that are not finite.
         UsageError: if a name is unknown, an argument of another type, there is to be no
             worker, or the scene has features that the planner does not know.
         MachineError: if a planner or router of another package is broken.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from numbers import Real
 from typing import Any
@@ -13,6 +13,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from mrmg import storage
+from mrmg.errors import Fault, SceneError
 
 
 class ByContent:
@@ -43,11 +44,12 @@ def content(value: Any) -> Any:
     if is_dataclass(value) and not isinstance(value, type):
         return contents(value)
     if isinstance(value, BaseGeometry):
-        return storage.bytes_digest(shapely.normalize(shapely.force_2d(value)).wkb)
+        flat = shapely.normalize(shapely.force_2d(value))
+        return _fingerprint(flat.wkb, shapely.get_coordinates(flat))
     if isinstance(value, np.ndarray):
         # Adding 0.0 makes zeros of both signs equal.
         numbers = np.ascontiguousarray(value, dtype=float) + 0.0
-        return [list(value.shape), storage.bytes_digest(numbers.tobytes())]
+        return [list(value.shape), _fingerprint(numbers.tobytes(), numbers)]
     if isinstance(value, Mapping):
         return {str(key): content(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -56,8 +58,39 @@ def content(value: Any) -> Any:
         return value
     if isinstance(value, Real):
         number = float(value) + 0.0
-        return number if math.isfinite(number) else str(number)
+        return number if math.isfinite(number) else NotFinite(number)
     raise TypeError(f"{type(value).__name__} has no content: {value!r}")
+
+
+def _fingerprint(data: bytes, numbers: np.ndarray) -> str:
+    digest = storage.bytes_digest(data)
+    return digest if np.isfinite(numbers).all() else NotFinite(digest)
+
+
+class NotFinite(str):
+    """Stands in a content for numbers that are not finite."""
+
+    __slots__ = ()
+
+
+def require_finite(source: str, value: Any) -> None:
+    """Refuse a content in which a number is not finite.
+
+    Raises:
+        SceneError: naming where they are.
+    """
+    paths = [*_not_finite(value, "")]
+    if paths:
+        message = "expected a finite number"
+        raise SceneError(source, [Fault(path, message) for path in paths])
+
+
+def _not_finite(value: Any, path: str) -> Iterator[str]:
+    if isinstance(value, NotFinite):
+        yield path
+    items = value.items() if isinstance(value, dict) else ()
+    for key, item in enumerate(value) if isinstance(value, list) else items:
+        yield from _not_finite(item, f"{path}.{key}".lstrip("."))
 
 
 def contents(value: Any, *, without: tuple[str, ...] = ()) -> dict[str, Any]:

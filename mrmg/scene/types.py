@@ -10,7 +10,7 @@ from typing import Any
 from shapely.geometry import Polygon
 
 from mrmg.errors import of_robot
-from mrmg.scene.content import content, content_digest, contents
+from mrmg.scene.content import content, content_digest, contents, require_finite
 from mrmg.scene.elevation import Elevation
 from mrmg.scene.margins import STATES_NONE, Margins
 from mrmg.scene.objective import ENERGY, Objective
@@ -215,7 +215,12 @@ class Scene:
 
     @cached_property
     def digest(self) -> str:
-        """Fingerprint of the content, models and their files included."""
+        """Fingerprint of the content, models and their files included.
+
+        Raises:
+            SceneError: if a number was changed in memory to one that is not finite.
+        """
+        require_finite(self.name, self.content())
         return content_digest(self)
 
     @cached_property

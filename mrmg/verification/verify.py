@@ -36,6 +36,9 @@ def verify(scene: Scene, plan: Plan) -> Verdict:
         scene: what the plan must hold in.
         plan: from any planner. A malformed one (other robots, unequal lengths, numbers
             that are not finite) is judged by that alone.
+
+    Raises:
+        SceneError: if the scene has numbers that are not finite.
     """
     require_types((scene, Scene), (plan, Plan))
     mismatch = _check_digest(scene, plan)

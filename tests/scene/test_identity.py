@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass, replace
@@ -13,6 +14,7 @@ import pytest
 import shapely
 from shapely.geometry import Polygon
 
+import mrmg
 from mrmg import shipped
 from mrmg.errors import SceneError
 from mrmg.scene.content import content_digest
@@ -328,6 +330,22 @@ def test_what_is_no_polygon_is_refused(shape: Any) -> None:
     walls = (replace(scene.obstacles[0], shape=shape), scene.obstacles[1])
     with pytest.raises(SceneError, match="rich: 1 fault\n.*expected one polygon"):
         dump_scene(replace(scene, obstacles=walls))
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
+def test_numbers_that_are_not_finite_are_refused(number: float) -> None:
+    """Before they are planned with: kernels would not return from some of them."""
+    scene = rich()
+    wild = replace(
+        scene,
+        robots=(replace(scene.robots[0], pose=(4.0, number, 0.0)), scene.robots[1]),
+        goals=(replace(scene.goals[0], id="nan", dwell_s=number), scene.goals[1]),
+        elevation=replace(scene.elevation, height_m=np.full((2, 2), number)),
+    )
+    where = r"3 faults\n.*dwell_s: .*\n.*robots.0.pose.1: .*\n.*height_m.1: "
+    for use in (mrmg.plan, lambda _: wild.digest):
+        with pytest.raises(SceneError, match=where):
+            use(wild)
 
 
 def test_what_a_file_would_read_otherwise_is_refused() -> None:
