@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 import mrmg
@@ -18,6 +22,7 @@ from mrmg.planning import Attempt, Problem, Request, Routing, RoutingProblem
 from mrmg.planning.path_following.strategy import path_following
 from mrmg.planning.routers import find_router
 from mrmg.planning.routing.routing import RouterParams
+from mrmg.testing import sample_routing_problem
 
 MODULE = """
 from pathlib import Path
@@ -207,6 +212,54 @@ def test_scripts_pass_objects() -> None:
     assert found.router.endswith(":Counting")
     assert found.cost_J == own.cost_J
     assert (own.planner, own.router) == ("path_following", "search")
+
+
+def test_attempts_that_are_none_are_refused() -> None:
+    scene = mrmg.load_scene("quickstart")
+
+    def adrift(problem: Problem, request: Request) -> Attempt:
+        (plan,) = path_following(problem, request).plans[-1:]
+        moved = tuple(
+            replace(each, state=each.state * np.nan) for each in plan.trajectories
+        )
+        return Attempt(plans=[replace(plan, trajectories=moved)])
+
+    wrong: Any = [5]
+    for planner, message in (
+        (lambda *_: None, "returned None, not an Attempt"),
+        (lambda *_: Attempt(plans=wrong[0]), "not an Attempt"),
+        (lambda *_: Attempt(plans=wrong), "an Attempt with 5 among its plans"),
+        (adrift, "a plan with states that are not finite"),
+    ):
+        with pytest.raises(MachineError, match=message):
+            mrmg.plan(scene, planner=planner)
+
+
+@pytest.mark.parametrize("sequence", [list, np.array])
+def test_tours_may_be_sequences_of_any_kind(sequence: Any) -> None:
+    problem = sample_routing_problem(1)
+    routing = find_router(RouterParams())(problem, 0)
+
+    def listing(problem: RoutingProblem, seed: int) -> Routing:
+        tours: Any = [sequence(tour) for tour in routing.tours]
+        return Routing(tours, routing.cost_J)
+
+    assert find_router(RouterParams(method="listing"), listing)(problem, 0) == routing
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (None, "returned None, not a Routing"),
+        (Routing((("a",), ()), 1.0), "tours of whole numbers"),  # type: ignore[arg-type]
+        (Routing(((0.0,), ()), 1.0), "tours of whole numbers"),  # type: ignore[arg-type]
+        (Routing(((), ()), math.nan), "a cost of nan J; it is inf where there are no"),
+    ],
+)
+def test_routings_that_are_none_are_refused(wrong: Any, message: str) -> None:
+    router = find_router(RouterParams(method="wrong"), lambda *_: wrong)
+    with pytest.raises(MachineError, match=message):
+        router(sample_routing_problem(1), 0)
 
 
 def test_tours_that_break_their_rules_are_refused() -> None:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Protocol
+
+import numpy as np
 
 from mrmg import extensions
 from mrmg.planning.attempt import Attempt, Request
 from mrmg.planning.path_following.strategy import path_following
 from mrmg.planning.problem.problem import Problem
+from mrmg.plans import Plan
 
 
 class Planner(Protocol):
@@ -57,9 +60,21 @@ def checked(planner: Planner, name: str) -> Planner:
 
     def attempt(problem: Problem, request: Request) -> Attempt:
         found = planner(problem, request)
-        if not isinstance(found, Attempt):
-            what = f"returned {found!r}, not an Attempt"
-            raise extensions.fault(extensions.PLANNERS, name, what)
+        what = _fault(found)
+        if what:
+            raise extensions.fault(extensions.PLANNERS, name, f"returned {what}")
         return found
 
     return attempt
+
+
+def _fault(found: object) -> str:
+    """Return what was returned that is no attempt; "" where it is one."""
+    if not isinstance(found, Attempt) or not isinstance(found.plans, Sequence):
+        return f"{found!r}, not an Attempt"
+    for plan in found.plans:
+        if not isinstance(plan, Plan):
+            return f"an Attempt with {plan!r} among its plans"
+        if not all(np.isfinite(each.state).all() for each in plan.trajectories):
+            return "a plan with states that are not finite"
+    return ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -101,10 +102,13 @@ def checked(router: Router, name: str) -> Router:
     """Return a router whose tours are refused if they break their rules."""
 
     def route(problem: RoutingProblem, seed: int) -> Routing:
-        routing = router(problem, seed)
-        if not isinstance(routing, Routing):
-            what = f"returned {routing!r}, not a Routing"
-            raise extensions.fault(extensions.ROUTERS, name, what)
+        found = router(problem, seed)
+        try:
+            tours = [tuple(map(operator.index, tour)) for tour in found.tours]
+            routing = Routing(tuple(tours), float(found.cost_J))
+        except (AttributeError, TypeError, ValueError) as error:
+            what = f"returned {found!r}, not a Routing with tours of whole numbers"
+            raise extensions.fault(extensions.ROUTERS, name, what) from error
         faults = "; ".join(faults_of_tours(problem, routing))
         if faults:
             what = f"returned wrong tours: {faults}"

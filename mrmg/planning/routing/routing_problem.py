@@ -130,6 +130,8 @@ def tour_ledger(problem: RoutingProblem, robot: int, tour: Sequence[int]) -> Tou
 def faults_of_tours(problem: RoutingProblem, routing: Routing) -> Iterator[str]:
     """Yield in words what is wrong with tours; nothing for a routing without any."""
     if not routing.feasible:
+        if routing.cost_J != np.inf:
+            yield f"a cost of {routing.cost_J} J; it is inf where there are no tours"
         return
     if len(routing.tours) != problem.robots:
         yield f"{len(routing.tours)} tours for {problem.robots} robots"
