@@ -115,6 +115,8 @@ MADE_BY = {
     "Scene": "mrmg.load_scene(...) gives one",
     "Plan": "mrmg.plan(scene).plan is one, or None where `reason` says why",
     "PlannerParams": "mrmg.PlannerParams(samples=900) is one",
+    "Disturbance": "parse_disturbance('lag=50ms').draw(seed, robots) of "
+    "mrmg.simulation.disturbance_spec gives one, robots being their ids",
     "ExecutionLog": "mrmg.execute(scene, plan) gives one",
     "str or Path": "give the path of a scene file, or a shipped scene's name",
     "VideoArguments": "mrmg.runs.arguments.VideoArguments(view='chase') is one",

@@ -14,6 +14,7 @@ from types import MappingProxyType
 from typing import Any
 
 from mrmg import seeding, storage
+from mrmg.errors import UsageError
 from mrmg.scene.types import Battery, Scene
 
 
@@ -77,6 +78,13 @@ class Disturbance:
     """Of the draw, and of the noise while driving."""
     robots: tuple[RobotDisturbance, ...]
     """By robot, in the scene's order."""
+
+    def require_fleet(self, scene: Scene) -> None:
+        """Refuse another fleet than it was drawn for; raises UsageError."""
+        drawn, given = ([r.robot for r in self.robots], [r.id for r in scene.robots])
+        if drawn != given:
+            text = f"a disturbance of robots {drawn}, the scene has {given}"
+            raise UsageError(f"{text}; draw one for these")
 
     def battery(self, index: int, battery: Battery) -> Battery:
         """Return the battery that a robot really has, its reserve in joules kept."""

@@ -80,7 +80,7 @@ def simulate(
 
     Raises:
         UsageError: if the controller or the plant is unknown, or a robot is of a kind
-            that cannot be executed.
+            that cannot be executed, or the disturbance is none of this fleet.
         IdentityError: if the plan is of another scene.
         FileError: if a robot's MJCF cannot be used, or MuJoCo cannot hold the scene.
     """
@@ -89,6 +89,9 @@ def simulate(
     require_known("plant", plant, PLANTS)
     require_same_mission(scene, plan)
     require_drivable(scene.robots)
+    if disturbance is not None:
+        require_types((disturbance, Disturbance))
+        disturbance.require_fleet(scene)
     controllers = [maker(robot.model) for robot in scene.robots]
     world = build_world(scene, drawn=False)
     run = _Run(world, plan, controllers, disturbance, plant)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from mrmg.errors import UsageError
 from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.simulation.disturbance import DEFAULT_RANGES, Disturbance, RobotDisturbance
@@ -33,6 +34,18 @@ def mission(driving: SimpleNamespace) -> tuple[Scene, Plan]:
     """Straight on for 16 m, so that the work is C_rr m g s in closed form."""
     scene = driving.open_ground([(-10.0, 0.0, 0.0)])
     return scene, driving.plan_of(scene, [driving.straight(12.0, 1.5)])
+
+
+def test_what_is_no_disturbance_of_the_fleet_is_refused(
+    mission: tuple[Scene, Plan],
+) -> None:
+    text: Any = "lag=50ms"
+    with pytest.raises(UsageError, match="expected Disturbance, got 'lag=50ms'"):
+        simulate(*mission, disturbance=text)
+    for robots in (["r2"], ["r1", "r2"], []):
+        other = DEFAULT_RANGES.draw(0, robots)
+        with pytest.raises(UsageError, match=r"the scene has \['r1'\]; draw one"):
+            simulate(*mission, disturbance=other)
 
 
 @pytest.fixture(scope="module")
