@@ -66,6 +66,8 @@ class PlanStatus(Enum):
 class Trajectory(ByContent):
     """The motion of one robot under piecewise constant controls.
 
+    Its arrays are read-only copies of those it is made of.
+
     Attributes:
         robot: id of the robot.
         dt_s: length of one step; state i holds at time i * dt_s.
@@ -83,8 +85,10 @@ class Trajectory(ByContent):
     motion: str = ""
 
     def __post_init__(self) -> None:
-        self.state.setflags(write=False)
-        self.control.setflags(write=False)
+        for name in ("state", "control"):
+            own = np.array(getattr(self, name))
+            own.setflags(write=False)
+            object.__setattr__(self, name, own)
 
     @property
     def columns(self) -> dict[str, str]:

@@ -64,6 +64,16 @@ def test_a_trajectory_names_its_columns(
     np.testing.assert_array_equal(arrays[control[0]], [1.0, 3.0, np.nan])
 
 
+def test_a_trajectory_keeps_no_array_of_its_maker() -> None:
+    states, controls = np.zeros((9, 5)), np.zeros((9, 2))
+    made = Trajectory(robot="r1", dt_s=0.1, state=states[:3], control=controls[:2])
+    states += 1.0
+    controls += 1.0
+    assert not made.state.any() and not made.control.any()
+    with pytest.raises(ValueError, match="read-only"):
+        made.state[0] = 1.0
+
+
 @pytest.fixture(scope="module")
 def mixed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of a differential drive."""
