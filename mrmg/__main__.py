@@ -11,6 +11,7 @@ from contextlib import suppress
 
 def command() -> None:
     """Run the command line of this process, and end the process."""
+    _make_streams_usable()
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, lambda number, frame: os._exit(130))
     from mrmg import interruption
@@ -33,6 +34,18 @@ def command() -> None:
     # All is written. To take Python apart would be another tenth of a second, in which
     # Ctrl-C could not be answered.
     os._exit(code)
+
+
+def _make_streams_usable() -> None:
+    """Have what is printed escaped where its encoding lacks it, or lost where closed.
+
+    What is opened in place of a closed stream takes its descriptor, too, which the next
+    file to be written would have otherwise.
+    """
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115 as long as it runs
+    sys.stdout.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
 
 
 if __name__ == "__main__":

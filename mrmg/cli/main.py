@@ -8,6 +8,7 @@ import os
 import sys
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -34,20 +35,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     gc.set_threshold(MOST_NEW_OBJECTS)
     if not sys.warnoptions:
         warnings.simplefilter("ignore")  # of libraries, to programmers
+    code = ExitCode.OK
     try:
-        code = options.command(options)
+        code = options.command(options) or code
         sys.stdout.flush()
-        return int(code or ExitCode.OK)
+        return int(code)
     except MrmgError as error:
         return _refused(str(error), error.exit_code)
     except KeyboardInterrupt:
-        print(interruption.MESSAGE, file=sys.stderr)
+        _inform(interruption.MESSAGE)
         return interruption.EXIT_CODE
     except OSError as error:
         if error.errno == errno.EPIPE:
             # The reader of our output has gone; nothing is left to be written.
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return int(ExitCode.OK)
+            return int(code)
         return _unusable(error)
     except Exception as error:
         altered = [*_altered_files(vars(options).values())]
@@ -74,8 +76,14 @@ def _unusable(error: OSError) -> int:
 
 def _refused(text: str, code: ExitCode) -> int:
     """Print why a command ends with an exit code."""
-    print(_printable(f"mrmg: {text}"), file=sys.stderr)
+    _inform(_printable(f"mrmg: {text}"))
     return int(code)
+
+
+def _inform(text: str) -> None:
+    """Print a message on stderr, if it takes any: the exit code says the same."""
+    with suppress(OSError):
+        print(text, file=sys.stderr)
 
 
 def _altered_files(values: Iterable[Any]) -> Iterator[Path]:

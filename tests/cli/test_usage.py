@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 import subprocess
 import sys
+from argparse import Namespace
 from pathlib import Path
 
 import pytest
 
 from mrmg.cli.main import main
 from mrmg.cli.parser import make_parser
+from mrmg.cli.usage import Parser
 from mrmg.errors import ExitCode
 
 BAD_SCENE = """\
@@ -192,3 +196,44 @@ def test_a_closed_pipe_is_no_error() -> None:
     )
     assert "Traceback" not in ended.stderr
     assert "Exception" not in ended.stderr
+
+
+@pytest.mark.parametrize(
+    ("closed", "words", "code"),
+    [
+        (">&-", "completion bash", ExitCode.OK),
+        ("<&- 2>&-", "scene check none", ExitCode.INVALID_FILE),
+        ("2>/dev/full", "scene check none", ExitCode.INVALID_FILE),
+    ],
+)
+def test_the_exit_code_does_not_depend_on_who_listens(
+    closed: str, words: str, code: ExitCode
+) -> None:
+    command = f"{shlex.quote(sys.executable)} -m mrmg {words} {closed}"
+    ended = subprocess.run(command, shell=True, capture_output=True, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (code, b"", b"")
+
+
+def test_a_failure_is_one_where_the_reader_of_its_message_has_gone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    failed = Namespace(command=lambda options: ExitCode.MISSION_FAILED)
+    monkeypatch.setattr(Parser, "read", lambda parser, words: failed)
+    reader, writer = os.pipe()
+    os.close(reader)
+    with open(writer, "w") as stdout:
+        monkeypatch.setattr(sys, "stdout", stdout)
+        print("mission failed")
+        assert main([]) == ExitCode.MISSION_FAILED
+
+
+def test_what_an_encoding_lacks_is_escaped(tmp_path: Path) -> None:
+    ended = subprocess.run(
+        [sys.executable, "-m", "mrmg", "scene", "new", "farm", "-o", "köy.yaml"],
+        capture_output=True,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+        check=False,
+    )
+    assert ended.returncode == ExitCode.OK, ended.stderr
+    assert ended.stdout.startswith(rb"k\xf6y.yaml")
