@@ -7,8 +7,8 @@ import io
 import json
 import math
 import os
+import secrets
 import shutil
-import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -48,34 +48,36 @@ def remove_unfinished(folder: Path) -> None:
             leftover.unlink(missing_ok=True)
 
 
+def unfinished_path(path: Path) -> Path:
+    """Return where a file or folder can grow before it is put in its place."""
+    return path.parent / f"{UNFINISHED}{secrets.token_hex(4)}-{path.name}"
+
+
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
     """Yield a temporary path; rename it onto `path` when all went well."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    with _errors_about(path):
-        handle, name = tempfile.mkstemp(
-            dir=path.parent, prefix=UNFINISHED, suffix=f"-{path.name}"
-        )
-    os.close(handle)
-    temporary = Path(name)
+    temporary = unfinished_path(path)
     remove = partial(temporary.unlink, missing_ok=True)
-    try:
-        with cleaned_up_by(remove):
-            yield temporary
-            os.chmod(temporary, 0o644)
-            with _errors_about(path):
+    with _errors_about(path, temporary):
+        temporary.touch(exist_ok=False)
+        try:
+            with cleaned_up_by(remove):
+                yield temporary
                 os.replace(temporary, path)
-    finally:
-        remove()
+        finally:
+            remove()
 
 
 @contextmanager
-def _errors_about(path: Path) -> Iterator[None]:
-    """Let errors name the file that is wanted, not the temporary one."""
+def _errors_about(path: Path, temporary: Path) -> Iterator[None]:
+    """Let errors name the file that is wanted, not the temporary one or none."""
     try:
         yield
     except OSError as error:
-        raise type(error)(error.errno, error.strerror, str(path)) from error
+        if error.errno is None or error.filename not in (None, str(temporary)):
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from error
 
 
 def write_bytes(path: Path, data: bytes) -> None:

@@ -76,11 +76,30 @@ def test_missing_folders_are_made(tmp_path: Path) -> None:
     assert path.read_bytes() == "grün".encode()
 
 
-def test_others_may_read_what_was_written(tmp_path: Path) -> None:
-    """Temporary files are private; results are not."""
-    path = tmp_path / "report.html"
-    storage.write_bytes(path, b"")
-    assert os.stat(path).st_mode & 0o777 == 0o644
+@pytest.mark.parametrize("mask", [0o022, 0o077, 0o002])
+def test_who_may_read_what_was_written_is_for_the_umask_to_say(
+    mask: int, tmp_path: Path
+) -> None:
+    before = os.umask(mask)
+    try:
+        storage.write_text(tmp_path / "plan.json", "{}")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "plan.json").stat().st_mode & 0o777 == 0o666 & ~mask
+
+
+def test_a_full_disk_is_told_with_the_file_that_was_to_be_written(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "plan.json"
+    with (
+        pytest.raises(OSError, match="left on device") as told,
+        storage.atomic_path(path),
+        open("/dev/full", "wb", buffering=0) as full,
+    ):
+        full.write(b"{}")
+    assert told.value.filename == str(path)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_arrays_return_as_they_were(tmp_path: Path) -> None:

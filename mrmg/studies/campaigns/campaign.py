@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import shutil
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -126,12 +125,10 @@ def _digest(content: Mapping[str, Any]) -> str:
 
 def _write_run(folder: Path, files: Mapping[str, bytes]) -> None:
     """Put a run folder in its place as a whole."""
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = Path(tempfile.mkdtemp(dir=folder.parent, prefix=storage.UNFINISHED))
+    unfinished = storage.unfinished_path(folder)
     for name, content in files.items():
         storage.write_bytes(unfinished / name, content)
     shutil.rmtree(folder, ignore_errors=True)
-    unfinished.chmod(0o755)
     unfinished.replace(folder)
 
 
