@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from mrmg import __version__, shipped
+from mrmg import __version__, shipped, storage
 from mrmg.counted import counted
 from mrmg.errors import MachineError
 from mrmg.licences import dependencies
@@ -87,7 +87,7 @@ def _kernel_cache() -> Finding:
 
     folder = cache_folder()
     nearest = next(path for path in (folder, *folder.parents) if path.exists())
-    if not os.access(nearest, os.W_OK):
+    if not storage.is_writable(nearest):
         return Finding(
             name="kernel cache",
             found=f"{nearest} cannot be written",

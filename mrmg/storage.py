@@ -9,9 +9,11 @@ import math
 import os
 import secrets
 import shutil
+import sys
+import tempfile
 import zipfile
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -267,9 +269,30 @@ def array_of(data: bytes) -> np.ndarray:
 
 
 def user_cache_folder() -> Path:
-    """Return the folder for what this machine need not work out twice."""
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return base / "mrmg"
+    """Return the folder for what this machine need not work out twice.
+
+    Where that of the user cannot be written, as that of another one or of a machine
+    that is read only, it is one of the user's own among temporary files. Where there is
+    none either, nothing can be made in what is returned.
+    """
+    with suppress(OSError, RuntimeError):  # a user may have no home
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        folder = base / "mrmg"
+        nearest = next(path for path in (folder, *folder.parents) if path.exists())
+        if is_writable(nearest):
+            return folder
+    user = os.getuid() if sys.platform != "win32" else 0  # Windows calls all owners 0
+    with suppress(OSError):
+        folder = Path(tempfile.gettempdir(), f"mrmg-{user}")
+        folder.mkdir(mode=0o700, exist_ok=True)
+        if folder.lstat().st_uid == user and is_writable(folder):
+            return folder  # what is run from there comes from nobody else
+    return Path(os.devnull, "mrmg")
+
+
+def is_writable(folder: Path) -> bool:
+    """Return whether files can be made in a folder."""
+    return folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)
 
 
 def digest(text: str) -> str:

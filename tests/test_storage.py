@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import zipfile
 from pathlib import Path
 
@@ -236,3 +237,34 @@ def test_numbers_that_json_does_not_know_are_refused(value: float) -> None:
 def test_digest_tells_texts_apart() -> None:
     assert storage.digest("plan") == storage.digest("plan")
     assert len({storage.digest(str(i)) for i in range(1000)}) == 1000
+
+
+def test_a_user_whose_cache_cannot_be_written_has_one_among_temporary_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file" / "cache"))
+    folder = storage.user_cache_folder()
+    assert folder.parent == tmp_path
+    assert folder.stat().st_mode & 0o777 == 0o700
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "new" / "cache"))
+    assert storage.user_cache_folder() == tmp_path / "new" / "cache" / "mrmg"
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_user_without_home_uses_no_cache_that_is_someone_elses(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def nowhere() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(Path, "home", nowhere)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    folder = storage.user_cache_folder()
+    assert folder == tmp_path / f"mrmg-{os.getuid()}"
+    folder.rename(tmp_path / "mrmg-12345")
+    monkeypatch.setattr(os, "getuid", lambda: 12345)
+    with pytest.raises(NotADirectoryError):
+        storage.write_text(storage.user_cache_folder() / "kernel", "")
