@@ -48,6 +48,20 @@ def test_every_exported_name_exists(name: str) -> None:
     assert list(exported) == sorted(exported)
 
 
+def test_nothing_is_done_in_assertions() -> None:
+    """Python leaves them out with `-O` and `PYTHONOPTIMIZE`."""
+    done = [
+        f"{relative(path)}:{node.lineno}"
+        for path in MODULES
+        if path.parent.name != "testing"  # pytest's own
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Assert)
+        for call in ast.walk(node.test)
+        if isinstance(call, ast.Call) and isinstance(call.func, ast.Name)
+    ]
+    assert done == []
+
+
 def test_unknown_names_of_the_package_are_refused() -> None:
     with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
         _ = mrmg.nonsense

@@ -90,14 +90,16 @@ def coordinate_smallest() -> None:
     """Search for motions in the smallest mission, along a tour that is known."""
     _, problem = _smallest_mission()
     never = np.zeros(1, np.bool_)
-    assert coordinated(problem, [[0]], [no_path(problem, 0)], never)
+    found = coordinated(problem, [[0]], [no_path(problem, 0)], never)
+    assert found
 
 
 def pose_smallest() -> None:
     """Find a way over poses in the smallest mission."""
     _, problem = _smallest_mission()
     never = np.zeros(1, np.bool_)
-    assert posed(problem, 0, cost_maps_of(problem)[0], [0], never)
+    found = posed(problem, 0, cost_maps_of(problem)[0], [0], never)
+    assert found
 
 
 def follow_smallest() -> None:
