@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import io
 import json
@@ -62,6 +63,10 @@ def atomic_path(path: Path) -> Iterator[Path]:
     temporary = unfinished_path(path)
     remove = partial(temporary.unlink, missing_ok=True)
     with _errors_about(path, temporary):
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise OSError(
+                errno.EINVAL, "a device or a pipe, and a file is needed there"
+            )
         temporary.touch(exist_ok=False)
         try:
             with cleaned_up_by(remove):

@@ -239,6 +239,13 @@ def test_digest_tells_texts_apart() -> None:
     assert len({storage.digest(str(i)) for i in range(1000)}) == 1000
 
 
+def test_a_device_or_a_pipe_is_no_place_for_a_file(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(OSError, match="a file is needed there"):
+        storage.write_text(tmp_path / "pipe", "{}")
+    assert [path.is_fifo() for path in tmp_path.iterdir()] == [True]
+
+
 def test_a_user_whose_cache_cannot_be_written_has_one_among_temporary_files(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
