@@ -234,7 +234,7 @@ def _write(scene: Scene, out: Path | None, notes: Sequence[str] = ()) -> None:
     for note in notes:
         print(f"mrmg: {note}", file=sys.stderr)
     if out is None:
-        sys.stdout.write(text)
+        sys.stdout.buffer.write(text.encode())  # as it would be in a file
     else:
         storage.write_text(out, text)
         print(out)

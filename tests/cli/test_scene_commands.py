@@ -1,9 +1,11 @@
 from __future__ import annotations
 
+import io
 import json
 import re
 import shlex
 import shutil
+import sys
 import tempfile
 from math import hypot
 from pathlib import Path
@@ -14,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mrmg import shipped
+from mrmg.cli import scene_commands
 from mrmg.cli.main import main
 from mrmg.errors import ExitCode
 from mrmg.scene.loading import load_scene, scene_from_document
@@ -277,6 +280,17 @@ def test_without_a_file_to_write_the_scene_goes_to_stdout(
     copy = tmp_path / "copy.yaml"
     copy.write_text(capsys.readouterr().out)
     assert len(load_scene(copy).obstacles) == 2
+
+
+def test_a_scene_on_stdout_is_as_in_a_file_whatever_the_encoding(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    written = io.BytesIO()
+    stdout = io.TextIOWrapper(written, encoding="ascii", errors="backslashreplace")
+    monkeypatch.setattr(sys, "stdout", stdout)
+    scene_commands._write(load_scene("quickstart").with_(name="köy"), None)
+    stdout.flush()
+    assert "name: köy\n" in written.getvalue().decode()
 
 
 def test_a_map_that_is_none_is_told(
