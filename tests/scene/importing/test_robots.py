@@ -13,6 +13,7 @@ import mrmg
 from mrmg import shipped
 from mrmg.cli.main import main
 from mrmg.errors import SceneError, UsageError
+from mrmg.scene.importing.robots import importing
 from mrmg.scene.importing.robots.importing import ImportedRobot, import_robot
 from mrmg.scene.loading.models import load_model
 from mrmg.scene.robot_model import RobotModel
@@ -284,6 +285,19 @@ def test_nothing_is_replaced(tmp_path: Path) -> None:
         import_robot(path, tmp_path / "there")
     with pytest.raises(UsageError, match="cannot name a robot model"):
         import_robot(path, tmp_path / "car")
+
+
+def test_a_model_that_was_made_meanwhile_stays_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def load_late(folder: Path) -> None:
+        (tmp_path / "mine").mkdir()
+
+    monkeypatch.setattr(importing, "load_model", load_late)
+    with pytest.raises(UsageError, match="is there already"):
+        import_robot(written(tmp_path, "rl rr"), tmp_path / "mine")
+    assert list((tmp_path / "mine").iterdir()) == []
+    assert not [*tmp_path.glob(".*")]
 
 
 def test_command_names_the_next_one(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
@@ -68,7 +67,8 @@ def import_robot(
         SceneError: if the description cannot be used; nothing is written then.
         MachineError: if a package is missing.
     """
-    name = require_new_model(folder, "give another -o FOLDER")
+    remedy = "give another -o FOLDER"
+    name = require_new_model(folder, remedy)
     description = read_description(path, arguments or {})
     found = survey(description, str(path), drive, steer)
     values = parameters_of(found, description)
@@ -84,7 +84,8 @@ def import_robot(
         except SceneError as error:
             faults = [Fault(f.path, f.message) for f in error.faults]
             raise SceneError(str(path), faults) from error
-        shutil.move(work, folder)
+        require_new_model(folder, remedy)  # others may have made it meanwhile
+        work.rename(folder)
     files = sorted(file for file in folder.rglob("*") if file.is_file())
     return ImportedRobot(
         tuple(files),
