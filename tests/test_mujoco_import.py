@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -29,3 +30,10 @@ def test_children_of_the_import_do_not_see_ctrl_c() -> None:
     *children, after = answer.stdout.splitlines()
     assert set(children) == {"True"}
     assert after == "after: False"
+
+
+@pytest.mark.parametrize("name", ["nonsense", "osmesa"])
+def test_drawing_that_is_missing_keeps_nobody_from_driving(name: str) -> None:
+    code = "from mrmg.mujoco_import import mujoco; mujoco.MjData"
+    environment = {**os.environ, "MUJOCO_GL": name}
+    subprocess.run([sys.executable, "-c", code], env=environment, check=True)
