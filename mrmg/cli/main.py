@@ -51,6 +51,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return int(code)
         return _unusable(error)
+    except MemoryError:
+        remedy = "end other programs, raise the limit of memory, or use fewer --workers"
+        return _refused(f"not enough memory; {remedy}", ExitCode.MACHINE)
     except Exception as error:
         altered = [*_altered_files(vars(options).values())]
         if not altered:

@@ -227,6 +227,15 @@ def test_a_failure_is_one_where_the_reader_of_its_message_has_gone(
         assert main([]) == ExitCode.MISSION_FAILED
 
 
+def test_too_little_memory_is_told_with_remedies(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    too_long = Namespace(command=lambda options: bytearray(2**62))
+    monkeypatch.setattr(Parser, "read", lambda parser, words: too_long)
+    assert main([]) == ExitCode.MACHINE
+    assert "not enough memory; end other programs" in capsys.readouterr().err
+
+
 def test_what_an_encoding_lacks_is_escaped(tmp_path: Path) -> None:
     ended = subprocess.run(
         [sys.executable, "-m", "mrmg", "scene", "new", "farm", "-o", "köy.yaml"],
