@@ -3,10 +3,12 @@
 Ctrl-C is taken care of before anything heavy is imported.
 """
 
+import io
 import os
 import signal
 import sys
 from contextlib import suppress
+from typing import Any
 
 
 def command() -> None:
@@ -36,6 +38,16 @@ def command() -> None:
     os._exit(code)
 
 
+class _Heard(io.FileIO):
+    """Messages to people, which keep no command from its work if nobody hears them."""
+
+    def write(self, data: Any) -> int:
+        """Write what can be written."""
+        with suppress(OSError):
+            return super().write(data)
+        return len(data)
+
+
 def _make_streams_usable() -> None:
     """Have what is printed escaped where its encoding lacks it, or lost where closed.
 
@@ -44,7 +56,11 @@ def _make_streams_usable() -> None:
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115 as long as it runs
+            lost = os.open(os.devnull, os.O_RDWR)
+            setattr(sys, name, open(lost, mode, closefd=False))  # noqa: SIM115
+    heard = _Heard(sys.stderr.fileno(), "w", closefd=False)
+    form = {"encoding": sys.stderr.encoding, "errors": "backslashreplace"}
+    sys.stderr = io.TextIOWrapper(heard, **form, write_through=True)  # type: ignore[arg-type]
     sys.stdout.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
 
 

@@ -8,7 +8,6 @@ import os
 import sys
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -43,7 +42,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MrmgError as error:
         return _refused(str(error), error.exit_code)
     except KeyboardInterrupt:
-        _inform(interruption.MESSAGE)
+        print(interruption.MESSAGE, file=sys.stderr)
         return interruption.EXIT_CODE
     except OSError as error:
         if error.errno == errno.EPIPE:
@@ -79,14 +78,8 @@ def _unusable(error: OSError) -> int:
 
 def _refused(text: str, code: ExitCode) -> int:
     """Print why a command ends with an exit code."""
-    _inform(_printable(f"mrmg: {text}"))
+    print(_printable(f"mrmg: {text}"), file=sys.stderr)
     return int(code)
-
-
-def _inform(text: str) -> None:
-    """Print a message on stderr, if it takes any: the exit code says the same."""
-    with suppress(OSError):
-        print(text, file=sys.stderr)
 
 
 def _altered_files(values: Iterable[Any]) -> Iterator[Path]:

@@ -227,6 +227,21 @@ def test_a_failure_is_one_where_the_reader_of_its_message_has_gone(
         assert main([]) == ExitCode.MISSION_FAILED
 
 
+def test_a_warning_that_nobody_reads_ends_no_command(tmp_path: Path) -> None:
+    (tmp_path / "map.txt").write_text("[SCALE]\n1\n[BORDER]\n0 0\n9 0\n9 9\n0 9\n")
+    reader, writer = os.pipe()
+    os.close(reader)
+    ended = subprocess.run(
+        [sys.executable, "-m", "mrmg", "scene", "import", "map.txt", "-o", "map.yaml"],
+        stderr=writer,
+        cwd=tmp_path,
+        check=False,
+    )
+    os.close(writer)
+    assert ended.returncode == ExitCode.OK
+    assert (tmp_path / "map.yaml").exists()
+
+
 def test_too_little_memory_is_told_with_remedies(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
