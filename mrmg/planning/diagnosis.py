@@ -226,10 +226,10 @@ def _obstacle(problem: Problem, request: Request, search: Search) -> str:
         params.router,
         seeding.stream_seed(seed, "meeting"),
     )
-    blocked = [search.blocked] if search.blocked else []
-    if any(routing.tours) or any(r.finish for r in scene.robots) or not blocked:
-        blocked.append(narrowest_meeting(problem, routing.tours, params.margins))
-    return endings.NO_PROGRESS.format(blocked="; ".join(blocked), searched=searched)
+    known = [search.blocked, narrowest_meeting(problem, routing.tours, params.margins)]
+    robots = listed([robot.id for robot in scene.robots])
+    blocked = "; ".join(filter(None, known)) or f"no motions were found of {robots}"
+    return endings.NO_PROGRESS.format(blocked=blocked, searched=searched)
 
 
 def _headings_in_the_way(scene: Scene, request: Request) -> list[str]:

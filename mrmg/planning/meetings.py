@@ -11,7 +11,6 @@ import shapely
 from shapely.geometry import Point
 from shapely.geometry.base import BaseGeometry
 
-from mrmg.planning.endings import listed
 from mrmg.planning.frame import Frame
 from mrmg.planning.problem.problem import Problem
 from mrmg.planning.problem.targets import whole_tours
@@ -36,6 +35,9 @@ def narrowest_meeting(
     margins: Margins,
 ) -> str:
     """Return which robots' ways meet where there is least room, in words.
+
+    Where none meet it is the narrowest place on the way of one, if that is so narrow
+    that it cannot turn round there; "" otherwise.
 
     Args:
         problem: the mission as it lies, with arrays in its frame.
@@ -62,16 +64,18 @@ def narrowest_meeting(
         who = " and ".join(names[r] for r in pair)
         what = f"the ways of {who} meet"
     else:
-        moving = [r for r, path in enumerate(paths) if len(path) > 1]
+        models = [robot.model for robot in problem.scene.robots]
         found = [
             (width_m, (r,), tuple(point))
-            for r in moving
+            for r, path in enumerate(paths)
+            if len(path) > 1
             for width_m, point in zip(
-                _widths_m(problem, r, paths[r]).tolist(), paths[r], strict=True
+                _widths_m(problem, r, path).tolist(), path, strict=True
             )
+            if width_m < 2.0 * (models[r].turning_radius_m + models[r].radius_m)
         ]
         if not found:
-            return f"no motions were found of {listed(names)}"
+            return ""
         _, pair, at = min(found)
         what = f"the narrowest place on the way of {names[pair[0]]} is"
     x, y = frame.on_the_map((at[0], at[1]))

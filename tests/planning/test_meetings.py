@@ -19,22 +19,27 @@ WALLS = [
     {"box": {"center": [10.0, y], "size": [1.0, 5.0]}} for y in (2.5, 9.5)
 ]  # a gap of 2 m at (10, 6)
 
+NARROW = [
+    {"box": {"center": [10.0, y], "size": [1.0, 6.1]}} for y in (2.5, 9.5)
+]  # 0.9 m
 
 DIFFDRIVE = {"model": "diffdrive", "pose": [4, 6, 0]}
+CAR = {"model": "car", "pose": [4, 6, 0]}
 PARKED = {"model": "car", "pose": [0.5, 6, 0]}  # its back to the map's edge
 
 
 @pytest.mark.parametrize(
     ("robot", "obstacles", "goal", "said"),
     [
-        (DIFFDRIVE, WALLS, [16.0, 6.0], r", where it is 2\.\d\d m wide"),
+        (DIFFDRIVE, NARROW, [16.0, 6.0], r", where it is 0\.\d\d m wide"),
         (PARKED, WALLS, [16.0, 6.0], r"near \((9|10)\..*, where it is 2\.\d\d m wide"),
         (
-            DIFFDRIVE,
+            CAR,
             [],
             [19.0, 6.0],
             r", 1\.\d\d m from the nearest obstacle or edge of the map",
         ),
+        (DIFFDRIVE, [], [16.0, 6.0], "^"),  # it can turn round everywhere
     ],
 )
 def test_the_room_is_told_by_what_limits_it(
