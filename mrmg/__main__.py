@@ -57,11 +57,15 @@ def _make_streams_usable() -> None:
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             lost = os.open(os.devnull, os.O_RDWR)
-            setattr(sys, name, open(lost, mode, closefd=False))  # noqa: SIM115
-    heard = _Heard(sys.stderr.fileno(), "w", closefd=False)
-    form = {"encoding": sys.stderr.encoding, "errors": "backslashreplace"}
-    sys.stderr = io.TextIOWrapper(heard, **form, write_through=True)  # type: ignore[arg-type]
-    sys.stdout.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
+            setattr(sys, name, os.fdopen(lost, mode, closefd=False))
+    sys.stderr = io.TextIOWrapper(
+        io.BufferedWriter(_Heard(sys.stderr.fileno(), "w", closefd=False)),
+        encoding=sys.stderr.encoding,
+        errors="backslashreplace",
+        line_buffering=True,
+    )
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import operator
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TypeVar
+from typing import SupportsIndex, TypeVar
 
 from mrmg.counted import counted
 
@@ -141,14 +141,14 @@ def require_types(*given: tuple[object, type | tuple[type, ...]]) -> None:
             raise UsageError(f"expected {name}, got {got}; {MADE_BY[name]}")
 
 
-def whole(what: str, number: object) -> int:
+def whole(what: str, number: SupportsIndex) -> int:
     """Return a whole number of any type, NumPy's among them.
 
     Raises:
         UsageError: if it is none.
     """
     try:
-        return int(operator.index(number))  # type: ignore[arg-type]
+        return operator.index(number)
     except TypeError:
         raise UsageError(f"{what} = {number!r}; expected a whole number") from None
 

@@ -64,9 +64,8 @@ def atomic_path(path: Path) -> Iterator[Path]:
     remove = partial(temporary.unlink, missing_ok=True)
     with _errors_about(path, temporary):
         if path.exists() and not (path.is_file() or path.is_dir()):
-            raise OSError(
-                errno.EINVAL, "a device or a pipe, and a file is needed there"
-            )
+            what = "a device or a pipe, and a file is needed there"
+            raise OSError(errno.EINVAL, what)
         temporary.touch(exist_ok=False)
         try:
             with cleaned_up_by(remove):

@@ -32,8 +32,15 @@ def test_children_of_the_import_do_not_see_ctrl_c() -> None:
     assert after == "after: False"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["nonsense", "osmesa"])
-def test_drawing_that_is_missing_keeps_nobody_from_driving(name: str) -> None:
-    code = "from mrmg.mujoco_import import mujoco; mujoco.MjData"
+def test_drawing_that_is_missing_keeps_nobody_from_driving_and_drawing(
+    name: str,
+) -> None:
+    code = (
+        "from mrmg.mujoco_import import mujoco; mujoco.MjData\n"
+        "from mrmg.viz.gl_backend import offscreen_context\n"
+        "with offscreen_context(32, 32) as backend: print(backend)"
+    )
     environment = {**os.environ, "MUJOCO_GL": name}
     subprocess.run([sys.executable, "-c", code], env=environment, check=True)

@@ -29,18 +29,16 @@ from mrmg.planning.free_ground import FreeGround, bottleneck
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.path_bounds import Walls, outer_polygon, shortest_way_m
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
-from mrmg.scene.content import require_finite
 from mrmg.scene.region import Region
 from mrmg.scene.types import Goal, Robot, Scene
 
 
 def require_robots(scene: Scene) -> None:
-    """Refuse a scene that is but a map, or has no digest.
+    """Refuse a scene that is but a map.
 
     Raises:
-        SceneError: if it has no robots, or numbers that are not finite.
+        SceneError: if it has no robots.
     """
-    require_finite(scene.name, scene.content())
     if not scene.robots:
         message = "there are none; a mission needs at least one (mrmg scene populate)"
         raise SceneError(scene.name, [Fault("robots", message)])

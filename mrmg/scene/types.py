@@ -220,8 +220,9 @@ class Scene:
         Raises:
             SceneError: if a number was changed in memory to one that is not finite.
         """
-        require_finite(self.name, self.content())
-        return content_digest(self)
+        known = self.content()
+        require_finite(self.name, known)
+        return content_digest(known)
 
     @cached_property
     def barriers(self) -> tuple[Obstacle, ...]:
