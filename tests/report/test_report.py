@@ -190,7 +190,7 @@ def test_the_bound_is_set_against_the_plan_it_was_computed_for(
     assert "planned anew" not in page_with().words
     anew = page_with(plan={"cost_J": 1.5 * figures["cost_J"]}, replans=1)
     assert "above the least" not in anew.words
-    assert "at the least; planned anew once, see Timeline." in anew.words
+    assert "charge; planned anew once, see Timeline." in anew.words
 
 
 def test_rows_of_a_tour_are_those_of_their_targets(missing, make_log, tmp_path) -> None:
