@@ -34,11 +34,12 @@ from mrmg.scene.types import Goal, Robot, Scene
 
 
 def require_robots(scene: Scene) -> None:
-    """Refuse a scene that is but a map.
+    """Refuse a scene that is but a map, or has no digest.
 
     Raises:
-        SceneError: if it has no robots.
+        SceneError: if it has no robots, or numbers that are not finite.
     """
+    _ = scene.digest  # which refuses these numbers; kernels would not
     if not scene.robots:
         message = "there are none; a mission needs at least one (mrmg scene populate)"
         raise SceneError(scene.name, [Fault("robots", message)])

@@ -97,9 +97,6 @@ def plan_mission(
     """
     require_types((scene, Scene))
     require_robots(scene)
-    _ = (
-        scene.digest
-    )  # refuses numbers that are not finite, which kernels do not look for
     _require_known(options)
     seed, workers = whole("seed", seed), whole("workers", workers)
     if workers < 1:
