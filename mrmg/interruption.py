@@ -79,6 +79,9 @@ def end(*, reported: bool = False) -> NoReturn:
     Args:
         reported: whether the user has been informed.
     """
+    # Other threads may still miss the children, start new ones, and have them complain.
+    told = os.dup(2)
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     for child in _children(os.getpid()):
         with suppress(OSError):
             os.kill(child, signal.SIGKILL)
@@ -88,7 +91,7 @@ def end(*, reported: bool = False) -> NoReturn:
             cleanup()
     if not reported:
         with suppress(OSError):
-            os.write(2, f"{MESSAGE}\n".encode())
+            os.write(told, f"{MESSAGE}\n".encode())
     os._exit(EXIT_CODE)
 
 

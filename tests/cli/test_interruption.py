@@ -352,6 +352,26 @@ def test_an_interrupt_that_compiled_code_prints_ends_the_process() -> None:
     assert ended.stderr == "mrmg: stopped; the same command takes it up again\n"
 
 
+def test_what_misses_a_child_that_was_ended_says_nothing() -> None:
+    """As the tracker of locks that a pool starts anew, and that knows none of them."""
+    code = (
+        "import subprocess, threading, time\n"
+        "from mrmg import interruption\n"
+        "child = subprocess.Popen(['sleep', '60'])\n"
+        "def miss():\n"
+        "    child.wait()\n"
+        "    subprocess.run('echo one is missing >&2', shell=True)\n"
+        "threading.Thread(target=miss, daemon=True).start()\n"
+        "with interruption.cleaned_up_by(lambda: time.sleep(0.5)):\n"
+        "    interruption.end()\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+    assert ended.returncode == 130
+    assert ended.stderr == "mrmg: stopped; the same command takes it up again\n"
+
+
 def _read_to_the_end(screen: int) -> None:
     with suppress(OSError):  # once nobody writes to it
         while os.read(screen, 1000):
