@@ -41,6 +41,11 @@ TURNING_SHARE = 0.4
 """Share of the costs-to-go of turning that counts: robots turn as they drive, too, and
 other robots may be led round that way."""
 
+GREEDY_SHARE, GREED = 0.5, 3.0
+"""Share of a search's nodes after which, if none of them is an end, costs-to-go weigh
+so many times as much: in dense yards, where most searches that fail would have found
+a motion with some times as many nodes, that saves a quarter of the time."""
+
 SIDEWAYS = 2.0
 """Metres of way that a metre off the path counts as."""
 
@@ -62,7 +67,8 @@ class Task(NamedTuple):
         steps: that a motion lasts.
         preview: how far ahead a custom motion model looks along its path [m].
         resolution: sides of cells: position [m], heading [rad], speed [m/s], steering.
-        weight: of the cost-to-go: a plan takes at most so many times the least cost.
+        weight: of the cost-to-go: a plan takes at most so many times the least cost,
+            unless the search has grown greedy.
         hold_share: cost of a second of standing, of moving it is 1.
         soft_s: cost of a conflict with a robot of lower priority [s].
         most: nodes at most.
@@ -137,6 +143,7 @@ class Nodes(NamedTuple):
         table: cells that have been reached.
         rollouts: of the motions.
         size: number of nodes, of open ones, and the cheapest end or -1, shape (3,).
+        weight: of the cost-to-go, shape (1,).
     """
 
     state: np.ndarray
@@ -146,6 +153,7 @@ class Nodes(NamedTuple):
     table: np.ndarray
     rollouts: Rollouts
     size: np.ndarray
+    weight: np.ndarray
 
 
 class Scratch(NamedTuple):
@@ -305,7 +313,25 @@ def add(search, nodes, a, motion, state, place, cost):
     node = nodes.node[b]
     node.parent, node.motion, node.step, node.leg = a, motion, step_number, leg
     node.segment, node.left, node.cost = segment, left, cost
-    value = cost + search.task.weight * rest_s + queueing_s(search, leg, step_number)
+    value = cost + nodes.weight[0] * rest_s + queueing_s(search, leg, step_number)
     entry = 2 * b + (1 if motion == TRACK else 0)
     nodes.size[1] = push(nodes.key, nodes.entry, nodes.size[1], value, entry)
     return b
+
+
+@kernel
+def grow_greedy(nodes, weight, most):
+    """Let costs-to-go weigh GREED times as much if it is time for it.
+
+    Args:
+        nodes: none of which is an end; the open ones are put into their new order.
+        weight: of the costs-to-go until then.
+        most: nodes of the search at most.
+    """
+    if nodes.weight[0] > weight or nodes.size[0] < GREEDY_SHARE * most:
+        return
+    nodes.weight[0] = GREED * weight
+    for i in range(nodes.size[1]):
+        cost = nodes.node[nodes.entry[i] >> 1].cost
+        value = cost + GREED * (nodes.key[i] - cost)
+        push(nodes.key, nodes.entry, i, value, nodes.entry[i])

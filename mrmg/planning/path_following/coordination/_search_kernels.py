@@ -1,10 +1,10 @@
 """Search over one robot's states in space and time, among robots that move as given.
 
 A weighted A* over the robot's own motions (`_motion_kernels`): follow the path, hold,
-and hold each of some speeds and steerings. States that share a cell of position,
-heading, speed, steering, target and time count as one, as in hybrid A*: D. Dolgov et
-al., Practical search techniques in path planning for autonomous driving, 2008. From
-time to time it tries to drive home along the shortest curve.
+and hold each of some speeds and steerings; half way it grows greedy. States that share
+a cell of position, heading, speed, steering, target and time count as one, as in hybrid
+A*: D. Dolgov et al., Practical search techniques in path planning for autonomous
+driving, 2008. From time to time it tries to drive home along the shortest curve.
 """
 
 from __future__ import annotations
@@ -42,6 +42,7 @@ from mrmg.planning.path_following.coordination._node_kernels import (
     OFF_PATH,
     add,
     cell_of,
+    grow_greedy,
     is_new,
     place_of,
 )
@@ -312,8 +313,7 @@ def find_motion(search, nodes, room, start, control):
         control: receives the controls, shape (n, 2).
     """
     search, nodes, room = borrowed((search, nodes, room))
-    start, control = borrowed((start, control))
-    task = search.task
+    task, start, control = search.task, borrowed(start), borrowed(control)
     copy_numbers(start, room.state[0])
     leg = legs_done(search.targets, task, 0, room.state, 0, 0)
     begin = 0 if search.course.size[0] > 1 else OFF_PATH
@@ -343,6 +343,8 @@ def find_motion(search, nodes, room, start, control):
         expand(search, nodes, room, a, HOLD, MOVE + motions)
         if nodes.size[2] >= 0:
             most = min(most, max(task.enough, int(AFTER_END * nodes.size[0])))
+        else:
+            grow_greedy(nodes, task.weight, most)
     if nodes.size[2] >= 0:  # the best there is, if not good enough to end sooner
         return write_controls(search, nodes, room, nodes.size[2], control)
     return -1

@@ -11,8 +11,9 @@ What is promised: every plan found keeps all margins. A round of the search ends
 a plan when no order of the robots that may matter has one, with cells as fine and
 searches as long as the round allows, or when it has looked at as many nodes as it may.
 Rounds are finer and longer, one after the other, then they begin anew; each begins with
-other motions. A round is in two halves: in the second one robots find their motions
-alone in the reverse order, as those that lead nowhere often come of who was first.
+other motions. Where more than one robot has not driven its path, a round is in two
+halves: in the second one they find their motions alone in the reverse order, as those
+that lead nowhere often come of who was first.
 """
 
 from __future__ import annotations
@@ -96,6 +97,7 @@ def empty_nodes(task: Task) -> Nodes:
             state=np.empty((ROLLED, 1 + len(task.motion), 1 + task.steps, 5)),
         ),
         size=np.array([0, 0, -1]),
+        weight=np.array([task.weight]),
     )
 
 
@@ -331,7 +333,7 @@ def coordinated(
     rng = seeding.stream(seed, "coordination")
     for now in rounds:
         drawn = rng.permutation(robots).tolist()
-        orders = [drawn, drawn[::-1]] if any(one is None for one in drives) else [drawn]
+        orders = [drawn, drawn[::-1]] if drives.count(None) > 1 else [drawn]
         for order in orders:
             alone = planning.find_alone(order, drives, now, halt)
             if alone is None:

@@ -12,7 +12,8 @@ class Round:
 
     Attributes:
         most: nodes of one robot's search at most.
-        weight: of costs-to-go: motions take at most so many times the least cost.
+        weight: of costs-to-go: motions take at most so many times the least cost, but
+            where a search has grown greedy.
         fineness: how much shorter motions, and finer cells, are than usual.
         soft_s: cost of conflicts with robots of lower priority [s].
         turning: whether costs-to-go know how long turning takes among obstacles.
