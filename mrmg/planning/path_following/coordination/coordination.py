@@ -10,10 +10,9 @@ can be driven exactly, and keeps clear at every step.
 What is promised: every plan found keeps all margins. A round of the search ends without
 a plan when no order of the robots that may matter has one, with cells as fine and
 searches as long as the round allows, or when it has looked at as many nodes as it may.
-Rounds are finer and longer, one after the other, then they begin anew; each begins with
-other motions. Where more than one robot has not driven its path, a round is in two
-halves: in the second one they find their motions alone in the reverse order, as those
-that lead nowhere often come of who was first.
+Rounds are finer and longer, one after the other, then they begin anew. Where several
+robots have driven no path, a round is in two halves: in the second one they are looked
+at in the reverse order, and make coarser motions.
 """
 
 from __future__ import annotations
@@ -39,6 +38,7 @@ from mrmg.planning.path_following.coordination._rollout_kernels import ROLLED, R
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE, UNKNOWN, Fields
 from mrmg.planning.path_following.coordination.leads import rounded_path
 from mrmg.planning.path_following.coordination.rounds import (
+    COARSER,
     FIRST_MOST,
     LONGEST,
     ROUNDS,
@@ -138,10 +138,10 @@ class _Planning:
                 stiffness=1.0,
             ),
         )
-        self.round = ROUNDS[0]
+        self.round, self.fineness = ROUNDS[0], 1.0
         self.nodes, self.most, self.horizon = 0, np.inf, horizon
         self._blocked: set[int] = set()
-        """Robots whose short search has failed: they are searched for at length."""
+        """Robots whose short search has failed: theirs are long."""
         self._answers: dict[tuple[object, ...], Motion | None] = {}
         """Motions found, and None where there was none, by what was asked for."""
         self._known: dict[tuple[int, bytes], Motion] = {}
@@ -163,7 +163,7 @@ class _Planning:
         if self.nodes >= self.most:
             return None
         self.nodes += 1
-        options = self.round, yielding, r in self._blocked
+        options = self.round, self.fineness, yielding, r in self._blocked
         asked = (r, *options, above.tobytes(), *map(id, motions))
         if asked not in self._answers:
             found = self._found(r, motions, above, yielding)
@@ -201,11 +201,11 @@ class _Planning:
         If there is room for costs-to-go that know when the others are where, a short
         search without them comes first; the one with them does without the path: robots
         that turn on the spot have the way down the costs-to-go instead. A robot that
-        has driven along a path to several targets keeps to it: without it, motions as
-        long as its tour would be searched for.
+        has driven along a path to several targets keeps to it.
         """
         problem, path, tour = self._problem, self._paths[r], self._tours[r]
-        now, course = self.round, self._courses[r]
+        course, fineness = self._courses[r], self.fineness * self.round.fineness
+        now = replace(self.round, fineness=fineness)
         if yielding:
             now = replace(now, weight=YIELDING_WEIGHT, soft_s=YIELDING_S)
         follows = self._follows[r]
@@ -224,8 +224,7 @@ class _Planning:
             yield along._replace(most=min(FIRST_MOST, now.most)), course
         if not known:
             share = UNTIMED_SHARE if len(tour) > 1 and not yielding else 1
-            most = min(share * along.most, LONGEST)
-            yield along._replace(most=most), course
+            yield along._replace(most=min(share * along.most, LONGEST)), course
         else:
             nowhere = no_path(problem, r)
             free = task_of(problem, r, tour, nowhere, now)._replace(
@@ -321,7 +320,7 @@ def coordinated(
         tours: targets of each robot; a finish comes last.
         paths: of each robot, with its stays; empty ones where there are none.
         halt: shape (1,); the search ends soon after it has turned true.
-        seed: of the orders in which robots are looked at.
+        seed: of the orders in which robots are looked at, and of coarser motions.
         rounds: that are made one after the other.
         drives: along their paths, of robots that have driven them alone.
     """
@@ -335,6 +334,7 @@ def coordinated(
         drawn = rng.permutation(robots).tolist()
         orders = [drawn, drawn[::-1]] if drives.count(None) > 1 else [drawn]
         for order in orders:
+            planning.fineness = 1.0 if order is drawn else rng.uniform(*COARSER)
             alone = planning.find_alone(order, drives, now, halt)
             if alone is None:
                 return ()

@@ -19,7 +19,8 @@ from mrmg.scene.types import Scene
 
 
 @pytest.mark.parametrize(
-    ("name", "seed"), [("window", 302), ("window", 1002), ("alcove", 1000)]
+    ("name", "seed"),
+    [("window", 302), ("window", 1002), ("alcove", 1000), ("alcove", 30004)],
 )
 def test_robots_change_places(tmp_path: Path, name: str, seed: int) -> None:
     """In window 302 one robot would be first if it could turn in no time.
