@@ -139,16 +139,12 @@ def drive_paths(
             through is wanted soon rather than cheap; None if it does without.
         rounds: of the search for motions.
     """
-    tasks, drives = list(tasks), list[Drive | None]()
+    tasks, drives = list(tasks), []
     for r, task in enumerate(tasks):
         if halt[0]:
             return FleetDrive(())
         drive, failure = _driven(problem, r, task)
         if drive is None and failure and soon is not None:
-            if len(task.tour) == 1:  # motions to one target are sooner searched for
-                tasks[r] = replace(task, path=no_path(problem, r))
-                drives.append(None)
-                continue
             other = posed(problem, r, task.cost_map, task.tour, halt, soon=soon)
             if other is not None:
                 tasks[r] = other
