@@ -141,7 +141,7 @@ class _Planning:
         self.round, self.fineness = ROUNDS[0], 1.0
         self.nodes, self.most, self.horizon = 0, np.inf, horizon
         self._blocked: set[int] = set()
-        """Robots whose short search has failed: theirs are long."""
+        """Robots whose short search has failed: the next ones are long."""
         self._answers: dict[tuple[object, ...], Motion | None] = {}
         """Motions found, and None where there was none, by what was asked for."""
         self._known: dict[tuple[int, bytes], Motion] = {}
