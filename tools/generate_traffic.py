@@ -1,14 +1,15 @@
-"""Write seeded traffic for bench_kinodynamic: dense yards, swaps, windows and alcoves.
+"""Write seeded traffic for bench_kinodynamic: yards, swaps, windows, alcoves, lanes.
 
-Robots that cannot but get in each other's way, in the format of the outside benchmarks,
-so that planners can be tried on cases that nobody has seen. The same seed gives the
-same file.
+Robots that cannot but get in each other's way, or have little room to turn, in the
+format of the outside benchmarks, so that planners can be tried on cases that nobody has
+seen. The same seed gives the same file.
 
 - yard6, yard7: second-order cars of 1 x 1 m among nine boxes on 10 x 10 m.
 - swap2, swap3, swap4: first-order unicycles around a point go to the opposite place.
 - window: two first-order unicycles change rooms through a window 0.6 to 0.8 m wide.
 - alcove: two first-order unicycles change ends of a corridor too narrow to pass in; one
   of them can wait in an alcove.
+- lanes: a second-order car of 1 x 1 m drives up and down lanes 1.3 to 2.2 m wide.
 """
 
 from __future__ import annotations
@@ -102,6 +103,19 @@ def unicycle(start: Sequence[float], goal: Sequence[float]) -> Document:
     )
 
 
+def car(start: Sequence[float], goal: Sequence[float]) -> Document:
+    """Return a second-order car of 1 x 1 m that may end with any heading."""
+    x, y, theta = start
+    return rounded(
+        {
+            "type": "kcbs_second_order_car",
+            "size": [1.0, 1.0],
+            "start": [x, y, 0.0, 0.0, theta],
+            "goal": list(goal[:2]),
+        }
+    )
+
+
 def yard(rng: np.random.Generator, cars: int) -> Document:
     """Return a dense yard; drawn anew until there is room for everybody."""
     while True:
@@ -113,17 +127,8 @@ def yard(rng: np.random.Generator, cars: int) -> Document:
         starts = drawn_poses(rng, cars, shapes, lanes)
         goals = drawn_poses(rng, cars, shapes, lanes)
         if len(starts) == len(goals) == cars:
-            robots = [
-                {
-                    "type": "kcbs_second_order_car",
-                    "size": [1.0, 1.0],
-                    "start": [x, y, 0.0, 0.0, theta],
-                    "goal": list(goal[:2]),
-                }
-                for (x, y, theta), goal in zip(starts, goals, strict=True)
-            ]
             place = world(YARD_M, YARD_M, boxes.tolist())
-            return {"environment": place, "robots": rounded(robots)}
+            return {"environment": place, "robots": [*map(car, starts, goals)]}
 
 
 def box_of(box: Sequence[float]) -> shapely.Polygon:
@@ -158,12 +163,12 @@ def drawn_poses(
         theta = float(rng.uniform(-pi, pi))
         if not 0.6 < min(x, y) <= max(x, y) < YARD_M - 0.6:
             continue
-        car = affinity.translate(
+        body = affinity.translate(
             affinity.rotate(box_of((0.0, 0.0, 1.0, 1.0)), theta, use_radians=True), x, y
         )
-        if car.distance(taken) > APART_M and len(poses) < cars:
+        if body.distance(taken) > APART_M and len(poses) < cars:
             poses.append((x, y, theta))
-            taken = taken.union(car)
+            taken = taken.union(body)
     return poses
 
 
@@ -208,6 +213,20 @@ def alcove(rng: np.random.Generator) -> Document:
     return {"environment": world(6.0, top, boxes), "robots": robots}
 
 
+def lanes(rng: np.random.Generator) -> Document:
+    """Return a car that drives up one lane and down the next, to the last one."""
+    wide, wall = rng.uniform(1.3, 2.2), 0.3
+    long, left, boxes = YARD_M - wide, wide, list[tuple[float, ...]]()
+    while left + wall + wide <= YARD_M:
+        y = long / 2 + len(boxes) % 2 * wide
+        boxes.append((left + wall / 2, y, wall, long))
+        left += wall + wide
+    start = (wide / 2, rng.uniform(1.0, 9.0), rng.choice([-pi / 2, pi / 2]))
+    goal = (left + wide / 2, rng.uniform(1.0, 9.0))
+    place = world(left + wide, YARD_M, boxes)
+    return {"environment": place, "robots": [car(start, goal)]}
+
+
 CLASSES: dict[str, Callable[[np.random.Generator], Document]] = {
     "yard6": lambda rng: yard(rng, 6),
     "yard7": lambda rng: yard(rng, 7),
@@ -216,6 +235,7 @@ CLASSES: dict[str, Callable[[np.random.Generator], Document]] = {
     "swap4": lambda rng: swap(rng, 4),
     "window": window,
     "alcove": alcove,
+    "lanes": lanes,
 }
 """What makes a file of each class."""
 

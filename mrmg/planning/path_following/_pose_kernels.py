@@ -41,6 +41,9 @@ little off its way."""
 AWAY, AT_TARGET, AT_START = range(3)
 """Where a pose is: anywhere, near a target, near the start."""
 
+NO_WAY, NO_ROOM = -1, -2
+"""Instead of the number of a pose: that none was found, and why."""
+
 POSE = record_type(
     [
         ("before", np.int64),  # number of the pose before it, -1 at the start
@@ -207,7 +210,7 @@ def find_poses(search, poses, table):
         table: room for more cells, all -1; its size is a power of 2.
 
     Returns:
-        -1 if there are none, or no more room.
+        NO_WAY if there are none, NO_ROOM if there is no more room for poses.
     """
     search, poses, table = borrowed(search), borrowed(poses), borrowed(table)
     legs, most = len(search.stops.target), len(poses)
@@ -249,7 +252,7 @@ def find_poses(search, poses, table):
             if not is_free(search, pose.leg, piece, corner):
                 continue
             if size == most:
-                return -1
+                return NO_ROOM
             table[at], least[at] = cell, cost
             after = poses[size]
             after.before, after.gear, after.turn = a, gear, turn
@@ -257,7 +260,7 @@ def find_poses(search, poses, table):
             after.x, after.y, after.theta = x, y, theta
             opened = push(key, entry, opened, cost + search.weight * rest, size)
             size += 1
-    return -1
+    return NO_WAY
 
 
 @kernel

@@ -19,6 +19,10 @@ from mrmg.planning.roadmap._fleet_kernels import MOST_CORNERS
 SHORTEST_M = 1e-3
 """Length below which a curve has no such part."""
 
+FARTHEST = 64
+"""Arcs of a way that one curve takes the place of, at most: ways of small robots have
+nearly a thousand, and chains of shorter curves cost hardly more."""
+
 
 @kernel
 def straight_parts(search, a, b, way, turn):
@@ -61,28 +65,36 @@ def arc_parts(search, a, b, way, turn):
 
 
 @kernel
-def write_curve(search, a, b, curve):
-    """Write the shortest curve from one pose to another, piece by piece.
+def curve_parts(search, a, b, way, turn):
+    """Write the parts of the shortest curve from one pose to another.
+
+    Arguments and what is returned are those of `arc_parts`.
+    """
+    if search.own[0].model == UNICYCLE:
+        way[:], turn[:] = 0.0, 0.0
+        return straight_parts(search, a, b, way, turn)
+    return arc_parts(search, a, b, way, turn)
+
+
+@kernel
+def write_curve(search, a, way, turn, curve):
+    """Write the curve of some parts from a pose on, piece by piece.
 
     Args:
-        search: gives the robot and the curvature of its turns.
-        a, b: poses, shape (3,).
+        search: gives the length of pieces.
+        a: pose, shape (3,).
+        way, turn: length and turn of each part, as `curve_parts` writes them.
         curve: receives (x, y, heading, gear) at the ends of pieces, shape (n, 4).
 
     Returns:
-        (number of them, cost [m of plain ground]); (0, inf) if there is no room.
+        number of them; -1 if there is no room.
     """
-    way, turn = np.zeros(MOST_PIECES), np.zeros(MOST_PIECES)
-    if search.own[0].model == UNICYCLE:
-        cost = straight_parts(search, a, b, way, turn)
-    else:
-        cost = arc_parts(search, a, b, way, turn)
     x, y, theta, n = a[0], a[1], a[2], 0
     for p in range(MOST_PIECES):
         turns = abs(turn[p]) * search.headings / (2.0 * pi)
         size = PIECES * max(abs(way[p]) / search.length, turns)
         if not n + size < len(curve) - 1:
-            return 0, np.inf
+            return -1
         pieces = int(ceil(size - 1e-9))
         for _ in range(pieces):
             swing = 0.5 * turn[p] / pieces
@@ -93,7 +105,7 @@ def write_curve(search, a, b, curve):
             curve[n, 0], curve[n, 1], curve[n, 2] = x, y, theta
             curve[n, 3] = 1.0 if way[p] > 0.0 else -1.0
             n += 1
-    return n, cost
+    return n
 
 
 @kernel
@@ -114,6 +126,7 @@ def shortest_way(search, pose, stop):
     search = borrowed(search)
     n, corner = len(pose), np.empty((MOST_CORNERS, 2))
     curve = np.empty((PIECES * (n + MOST_PIECES + 1), 4))
+    parts, turn = np.empty(MOST_PIECES), np.empty(MOST_PIECES)
     cost, before, leg = np.full(n, np.inf), np.zeros(n, np.int64), 0
     cost[0], first = 0.0, 0
     keys = np.zeros(n, np.bool_)
@@ -122,20 +135,26 @@ def shortest_way(search, pose, stop):
     for j in range(1, n):
         while leg < len(stop) and stop[leg] < j:
             first, leg = stop[leg], leg + 1
-        for i in range(first, j):
-            if not (keys[i] and keys[j] and cost[i] < cost[j]):
+        for i in range(max(first, j - FARTHEST * PIECES), j):
+            far = hypot(pose[j, 0] - pose[i, 0], pose[j, 1] - pose[i, 1])
+            if not (keys[i] and keys[j] and cost[i] + far < cost[j]):
                 continue
-            count, more = write_curve(search, pose[i], pose[j], curve)
-            if cost[i] + more < cost[j] and is_free(search, leg, curve[:count], corner):
+            more = curve_parts(search, pose[i], pose[j], parts, turn)
+            if not cost[i] + more < cost[j]:
+                continue
+            count = write_curve(search, pose[i], parts, turn, curve)
+            if count >= 0 and is_free(search, leg, curve[:count], corner):
                 cost[j], before[j] = cost[i] + more, i
     chain, m, size, j = np.zeros(n, np.int64), 0, 1, n - 1  # last curve first
     while j > 0:
-        size += write_curve(search, pose[before[j]], pose[j], curve)[0]
+        curve_parts(search, pose[before[j]], pose[j], parts, turn)
+        size += write_curve(search, pose[before[j]], parts, turn, curve)
         chain[m], m, j = j, m + 1, before[j]
     way, there = np.empty((size, 4)), np.zeros(len(stop), np.int64)
     way[0, :3], way[0, 3], size = pose[0], 0.0, 1
     for j in chain[:m][::-1]:
-        count, _ = write_curve(search, pose[before[j]], pose[j], curve)
+        curve_parts(search, pose[before[j]], pose[j], parts, turn)
+        count = write_curve(search, pose[before[j]], parts, turn, curve)
         way[size : size + count] = curve[:count]
         size += count
         there[stop == j] = size - 1

@@ -1,12 +1,14 @@
 """Ways of robots that have to turn among obstacles, found over their poses.
 
 They are for tours on which a robot finds no room along the roadmap's paths: these know
-places but no headings. What is found can be driven as it is.
+places but no headings. What is found can be driven as it is, by cars whose steering is
+slow for their size with stops where they steer.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -33,6 +35,9 @@ BEND_SHARE = 0.95
 CELL_SHARES = (0.8, 0.27, 0.27)
 """Side of a cell, as a share of an arc's length: away from targets, near one, and near
 the start."""
+
+JUMP_SHARE = 0.5
+"""Change of curvature that a car may stop for, as a share of that of its turns."""
 
 STRAIGHT_SHARE = 0.5
 """Arc's length of a robot that turns on the spot, as a share of its radius."""
@@ -64,7 +69,9 @@ def posed(
     *,
     soon: bool = False,
 ) -> RobotTask | None:
-    """Return a way of robot r over poses, which it has driven, or None.
+    """Return a way of robot r over poses, and how it drives it if it can, or None.
+
+    If it cannot, it may once the way is smoothed.
 
     Args:
         problem: the mission.
@@ -97,18 +104,20 @@ def posed(
         weight=SOON_WEIGHT if soon else 1.0,
         halt=halt,
     )
-    path = _path_of(search)
-    if path is None:
-        return None
-    drive = drive_alone(problem, r, with_pauses(problem, r, path))
-    visits = visit_steps(targets, tour, drive.motion.state)
-    if not drive.arrived or len(visits) < len(tour):
-        return None
-    return RobotTask(list(tour), path, cost_map, drive)
+    ways = _ways_of(search)
+    for way in ways:
+        drive = drive_alone(problem, r, with_pauses(problem, r, way))
+        visits = visit_steps(targets, tour, drive.motion.state)
+        if drive.arrived and len(visits) == len(tour):
+            return RobotTask(list(tour), ways[0], cost_map, drive)
+    return RobotTask(list(tour), ways[0], cost_map) if ways else None
 
 
-def _path_of(search: PoseSearch) -> Path | None:
-    """Return the way over poses that a search finds, or None."""
+def _ways_of(search: PoseSearch) -> tuple[Path, ...]:
+    """Return the way over poses that a search finds, as it is and to stop and steer.
+
+    Nothing if it finds none. Cars stop where the way's curvature jumps.
+    """
     margin_m, stops = float(search.own[0]["margin"]), search.stops
     poses = np.empty(MOST_POSES, POSE)
     for room_m in ROOMS_M:
@@ -116,15 +125,15 @@ def _path_of(search: PoseSearch) -> Path | None:
         search = search._replace(room=room)
         table = np.full(1 << (2 * MOST_POSES).bit_length(), -1, np.int64)
         last = _pose_kernels.find_poses(search, poses, table)
-        if last >= 0:
+        if last != _pose_kernels.NO_WAY:
             break
     if last < 1:
-        return None
+        return ()
     pose, stop = _pose_kernels.poses_to(search, poses, last)
     way, stop = _shortening_kernels.shortest_way(search, pose, stop)
     moves = np.append(True, np.hypot(*np.diff(way[:, :2], axis=0).T) > SHORTEST_M)
     number = np.cumsum(moves) - 1
-    return Path(
+    path = Path(
         node=way[moves, :2].copy(),
         gear=way[moves, 3][1:].astype(np.int64),
         heading=float(search.start[2]),
@@ -135,3 +144,7 @@ def _path_of(search: PoseSearch) -> Path | None:
         pause_s=np.zeros(len(stop)),
         aim=stops.aim,
     )
+    turn = (np.diff(way[moves, 2]) + pi) % (2.0 * pi) - pi
+    change = np.abs(np.diff(turn / np.diff(path.way)))
+    jumps = 1 + np.flatnonzero(change > JUMP_SHARE * search.bend)
+    return path, replace(path, pivot=np.union1d(path.pivot, jumps))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from math import pi
 from typing import Any
 
@@ -272,10 +273,18 @@ def test_searches_end_when_told() -> None:
 
 
 def test_searches_end_without_room(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A search that has no more room for poses finds nothing."""
+    """A search that has no more room for poses finds nothing, and is not repeated."""
     problem, tour = stated(MISSIONS[0])
+    answers, original = [], _pose_kernels.find_poses
+
+    def find_poses(*asked: Any) -> int:
+        answers.append(int(original(*asked)))
+        return answers[-1]
+
+    monkeypatch.setattr(_pose_kernels, "find_poses", find_poses)
     monkeypatch.setattr(poses, "MOST_POSES", 100)
     assert posed(problem, 0, cost_maps_of(problem)[0], tour, NEVER) is None
+    assert answers == [_pose_kernels.NO_ROOM]
 
 
 def test_headings_that_targets_want_are_kept() -> None:
@@ -297,6 +306,28 @@ def test_robots_get_through_halls(scene: Scene) -> None:
     result = plan_mission(scene, params=QUICK)
     assert result.plan is not None, result.reason
     assert mrmg.verify(scene, result.plan).ok
+
+
+@pytest.mark.parametrize(
+    ("scene", "rate"),
+    [
+        (hall(*OPPOSITE), 0.3),
+        (hall(*OPPOSITE[::-1], pose=(3.0, 2.0, pi)), 0.2),
+        (hall(*BESIDE), 0.2),
+    ],
+)
+def test_cars_that_steer_slowly_get_through_halls(scene: Scene, rate: float) -> None:
+    """They need no search for motions: that found worse plans, if any.
+
+    Smoothing does for the first of them, the others stop to steer.
+    """
+    model = scene.robots[0].model
+    slow = replace(model, limits=replace(model.limits, u2_max=rate))
+    scene = replace(scene, robots=(replace(scene.robots[0], model=slow),))
+    result = plan_mission(scene, params=QUICK)
+    assert result.plan is not None, result.reason
+    assert mrmg.verify(scene, result.plan).ok
+    assert result.statistics["coordinated"] == 0
 
 
 @pytest.mark.parametrize("scene", OF_TURNERS)
