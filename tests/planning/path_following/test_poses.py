@@ -74,6 +74,13 @@ def hall(
     )
 
 
+def with_steering_rate(scene: Scene, rate: float) -> Scene:
+    """Return a scene whose only robot steers no faster than that [rad/s]."""
+    (robot,) = scene.robots
+    model = replace(robot.model, limits=replace(robot.model.limits, u2_max=rate))
+    return replace(scene, robots=(replace(robot, model=model),))
+
+
 def stated(scene: Scene) -> tuple[Problem, list[int]]:
     """Return the problem of a scene, and its targets in their order."""
     problem = state_mission(scene, 0, QUICK)
@@ -317,16 +324,26 @@ def test_robots_get_through_halls(scene: Scene) -> None:
     ],
 )
 def test_cars_that_steer_slowly_get_through_halls(scene: Scene, rate: float) -> None:
-    """They need no search for motions: that found worse plans, if any.
-
-    Smoothing does for the first of them, the others stop to steer.
-    """
-    model = scene.robots[0].model
-    slow = replace(model, limits=replace(model.limits, u2_max=rate))
-    scene = replace(scene, robots=(replace(scene.robots[0], model=slow),))
+    """They need no search for motions: that found worse plans, if any."""
+    scene = with_steering_rate(scene, rate)
     result = plan_mission(scene, params=QUICK)
     assert result.plan is not None, result.reason
     assert mrmg.verify(scene, result.plan).ok
+    assert result.statistics["coordinated"] == 0
+
+
+def test_ways_that_cannot_be_driven_are_smoothed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Smoothing helps a car that steers slowly where stops do not."""
+    scene = with_steering_rate(hall(*OPPOSITE), 0.3)
+    monkeypatch.setattr(poses, "JUMP_SHARE", np.inf)
+    problem, tour = stated(scene)
+    task = posed(problem, 0, cost_maps_of(problem)[0], tour, NEVER)
+    assert task is not None
+    assert task.before is None
+    result = plan_mission(scene, params=QUICK)
+    assert result.plan is not None, result.reason
     assert result.statistics["coordinated"] == 0
 
 
