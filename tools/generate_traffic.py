@@ -1,4 +1,4 @@
-"""Write seeded traffic for bench_kinodynamic: yards, swaps, windows, alcoves, lanes.
+"""Write seeded traffic for bench_kinodynamic: yards, swaps, crowds and narrow places.
 
 Robots that cannot but get in each other's way, or have little room to turn, in the
 format of the outside benchmarks, so that planners can be tried on cases that nobody has
@@ -10,6 +10,8 @@ seen. The same seed gives the same file.
 - alcove: two first-order unicycles change ends of a corridor too narrow to pass in; one
   of them can wait in an alcove.
 - lanes: a second-order car of 1 x 1 m drives up and down lanes 1.3 to 2.2 m wide.
+- crowd4, crowd8: first-order unicycles of 0.8 x 0.8 m among ten boxes on 10 x 10 m
+  start and end as close to them as 0.03 m.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from math import cos, pi, sin
 from pathlib import Path
 from typing import Any
@@ -29,21 +32,36 @@ from scipy import ndimage
 from shapely import affinity
 
 Document = dict[str, Any]
+Pose = tuple[float, float, float]
 
 YARD_M = 10.0
 """Side of a yard."""
 
-BOXES = 9
-"""Boxes in a yard."""
 
-BOX_M = (0.5, 1.4)
-"""Sides of boxes, least and largest."""
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """What a yard is like.
+
+    Attributes:
+        boxes: their number.
+        box_m: their sides, least and largest.
+        lane_m: radius of a disc that gets from everywhere to everywhere.
+        size_m: length and width of a robot.
+        apart_m: distance of robots from boxes where they start and must end.
+    """
+
+    boxes: int
+    box_m: tuple[float, float]
+    lane_m: float
+    size_m: tuple[float, float]
+    apart_m: float
+
+
+YARD = Kind(9, (0.5, 1.4), 0.75, (1.0, 1.0), apart_m=0.4)
+CROWD = Kind(10, (0.2, 2.2), 0.5, (0.8, 0.8), apart_m=0.03)
 
 APART_M = 0.4
-"""Distance of cars from boxes and from each other, where they start and must end."""
-
-LANE_M = 0.75
-"""Radius of a disc that gets from everywhere to everywhere in a yard."""
+"""Distance of robots from each other where they start and must end."""
 
 CELL_M = 0.1
 """Side of the cells by which that is found."""
@@ -97,7 +115,7 @@ def rounded(value: Any) -> Any:
 
 
 def unicycle(start: Sequence[float], goal: Sequence[float]) -> Document:
-    """Return a first-order unicycle."""
+    """Return a first-order unicycle of 0.5 x 0.25 m."""
     return rounded(
         {"type": "unicycle_first_order_0", "start": list(start), "goal": list(goal)}
     )
@@ -117,18 +135,33 @@ def car(start: Sequence[float], goal: Sequence[float]) -> Document:
 
 
 def yard(rng: np.random.Generator, cars: int) -> Document:
-    """Return a dense yard; drawn anew until there is room for everybody."""
+    """Return a dense yard."""
+    place, starts, goals = drawn_yard(rng, YARD, cars)
+    return {"environment": place, "robots": [*map(car, starts, goals)]}
+
+
+def crowd(rng: np.random.Generator, robots: int) -> Document:
+    """Return unicycles that start and end close to boxes."""
+    place, starts, goals = drawn_yard(rng, CROWD, robots)
+    size = {"size": list(CROWD.size_m)}
+    placed = [size | unicycle(*ends) for ends in zip(starts, goals, strict=True)]
+    return {"environment": place, "robots": placed}
+
+
+def drawn_yard(
+    rng: np.random.Generator, kind: Kind, robots: int
+) -> tuple[Document, list[Pose], list[Pose]]:
+    """Return a yard, starts and goals; drawn anew until there is room for everybody."""
     while True:
-        sides = rng.uniform(*BOX_M, (BOXES, 2))
-        center = rng.uniform(0.5, YARD_M - 0.5, (BOXES, 2))
+        sides = rng.uniform(*kind.box_m, (kind.boxes, 2))
+        center = rng.uniform(0.5, YARD_M - 0.5, (kind.boxes, 2))
         boxes = np.hstack([center, sides])
         shapes = shapely.union_all([box_of(box) for box in boxes])
-        lanes = free_lanes(shapes)
-        starts = drawn_poses(rng, cars, shapes, lanes)
-        goals = drawn_poses(rng, cars, shapes, lanes)
-        if len(starts) == len(goals) == cars:
-            place = world(YARD_M, YARD_M, boxes.tolist())
-            return {"environment": place, "robots": [*map(car, starts, goals)]}
+        lanes = free_lanes(shapes, kind.lane_m)
+        starts = drawn_poses(rng, kind, robots, shapes, lanes)
+        goals = drawn_poses(rng, kind, robots, shapes, lanes)
+        if len(starts) == len(goals) == robots:
+            return world(YARD_M, YARD_M, boxes.tolist()), starts, goals
 
 
 def box_of(box: Sequence[float]) -> shapely.Polygon:
@@ -137,11 +170,11 @@ def box_of(box: Sequence[float]) -> shapely.Polygon:
     return shapely.box(x - dx / 2, y - dy / 2, x + dx / 2, y + dy / 2)
 
 
-def free_lanes(obstacles: shapely.Geometry) -> np.ndarray:
-    """Return the cells in the largest part that a disc of LANE_M gets around in."""
+def free_lanes(obstacles: shapely.Geometry, lane_m: float) -> np.ndarray:
+    """Return the cells in the largest part that a disc of a radius gets around in."""
     at = np.arange(0.5 * CELL_M, YARD_M, CELL_M)
     x, y = np.meshgrid(at, at)
-    free = shapely.distance(shapely.points(x, y), obstacles) > LANE_M
+    free = shapely.distance(shapely.points(x, y), obstacles) > lane_m
     part, _ = ndimage.label(free)
     sizes = np.bincount(part.ravel())
     sizes[0] = 0
@@ -150,25 +183,26 @@ def free_lanes(obstacles: shapely.Geometry) -> np.ndarray:
 
 def drawn_poses(
     rng: np.random.Generator,
-    cars: int,
+    kind: Kind,
+    robots: int,
     obstacles: shapely.Geometry,
     lanes: np.ndarray,
-) -> list[tuple[float, float, float]]:
+) -> list[Pose]:
     """Return poses with room around each; fewer if there is too little."""
-    poses: list[tuple[float, float, float]] = []
-    taken = obstacles
+    poses: list[Pose] = []
+    body, taken = box_of((0.0, 0.0, *kind.size_m)), shapely.Polygon()
     cells = np.argwhere(lanes)
     for row, column in rng.permutation(cells)[:200]:
         x, y = (column + 0.5) * CELL_M, (row + 0.5) * CELL_M
         theta = float(rng.uniform(-pi, pi))
         if not 0.6 < min(x, y) <= max(x, y) < YARD_M - 0.6:
             continue
-        body = affinity.translate(
-            affinity.rotate(box_of((0.0, 0.0, 1.0, 1.0)), theta, use_radians=True), x, y
-        )
-        if body.distance(taken) > APART_M and len(poses) < cars:
+        turned = affinity.rotate(body, theta, (0.0, 0.0), use_radians=True)
+        placed = affinity.translate(turned, x, y)
+        free = placed.distance(obstacles) > kind.apart_m
+        if free and not placed.distance(taken) <= APART_M and len(poses) < robots:
             poses.append((x, y, theta))
-            taken = taken.union(body)
+            taken = taken.union(placed)
     return poses
 
 
@@ -236,6 +270,8 @@ CLASSES: dict[str, Callable[[np.random.Generator], Document]] = {
     "window": window,
     "alcove": alcove,
     "lanes": lanes,
+    "crowd4": lambda rng: crowd(rng, 4),
+    "crowd8": lambda rng: crowd(rng, 8),
 }
 """What makes a file of each class."""
 
