@@ -19,7 +19,12 @@ import mrmg
 from mrmg.energy.metering import battery_profile
 from mrmg.planning import Attempt, PlannerParams, Problem, Request
 from mrmg.planning.path_following import strategy
-from mrmg.planning.path_following.coordination.rounds import ROUNDS, Round
+from mrmg.planning.path_following.coordination.rounds import (
+    COARSER,
+    ROUNDS,
+    Round,
+    rounds_of,
+)
 from mrmg.planning.path_following.following import Followed
 from mrmg.planning.path_following.refine import ROBOTS_MEET
 from mrmg.planning.path_following.strategy import (
@@ -154,6 +159,14 @@ def test_no_search_without_paths_is_made_twice(
     )
     attempted(path_following, "quickstart")
     assert rounds == [ROUNDS[begins_at : begins_at + 1]]
+
+
+def test_rounds_begin_anew_with_other_motions() -> None:
+    rounds = [one for number in range(60) for one in rounds_of(number)]
+    assert rounds[: len(ROUNDS)] == list(ROUNDS)
+    assert len({(one.most, one.fineness) for one in rounds}) == len(rounds)
+    for now, first in zip(rounds, 20 * ROUNDS, strict=True):
+        assert COARSER[0] <= now.fineness / first.fineness <= 1.0
 
 
 @pytest.mark.parametrize("soc_margin", [0.0, 0.1, 0.2])

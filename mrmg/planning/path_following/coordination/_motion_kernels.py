@@ -31,6 +31,9 @@ BRAKE, HOME, VISIT, STAY, WAIT, TRACK, HOLD, MOVE = range(-5, 3)
 until others set out; follow the path; brake, and stand; hold a speed and a steering,
 numbered from MOVE on."""
 
+WAYPOINTS = 8
+"""Motions of a custom motion model that steer to points; the others hold controls."""
+
 SETTLING_SHARE = 0.45
 """Share of a turn's radius that a car may drive while it steers into the turn."""
 
@@ -81,6 +84,13 @@ class Traffic(NamedTuple):
 
 
 @inlined
+def keeps_limits(robot, state):
+    """Return whether speed and steering are within a robot's limits."""
+    limit = robot.limit
+    return limit[0] <= state[3] <= limit[1] and abs(state[4]) <= limit[2]
+
+
+@inlined
 def clear(own, spaces, zones, traffic, state, count, first, corner):
     """Return whether states 1 to `count` keep clear of obstacles and occupied zones.
 
@@ -97,6 +107,8 @@ def clear(own, spaces, zones, traffic, state, count, first, corner):
     """
     busy = traffic.busy
     for k in range(count, 0, -1):  # where a motion ends most is in the way
+        if own[0].model == USER and not keeps_limits(own[0], state[k]):
+            return False
         if not moves_clear(own, spaces, state[k - 1], state[k], corner[0]):
             return False
         for zone in range(len(zones.zone)):
@@ -137,7 +149,7 @@ def move(search, motion, segment, steps, state, control):
     Args:
         search: gives robot, path, motions and step.
         motion: TRACK, HOLD, or from MOVE on a wanted speed and steering; of a custom
-            motion model a waypoint in the robot's frame.
+            motion model a waypoint in the robot's frame, then a control.
         segment: of its path that it is on.
         steps: number of steps.
         state: shape (n, 5), n > steps.
@@ -163,8 +175,10 @@ def move(search, motion, segment, steps, state, control):
             )
         elif motion == HOLD:
             u1, u2 = braking_control(own, 0, state[k], dt)
-        elif own[0].model == USER:
+        elif own[0].model == USER and motion < MOVE + WAYPOINTS:
             u1, u2 = steer_user(own[0], state[k], x, y, 1.0, dt)
+        elif own[0].model == USER:
+            u1, u2 = v, w
         else:
             u1, u2 = control_towards(own, 0, state[k], v, w, dt)
         control[k, 0], control[k, 1] = u1, u2

@@ -10,7 +10,7 @@ can be driven exactly, and keeps clear at every step.
 What is promised: every plan found keeps all margins. A round of the search ends without
 a plan when no order of the robots that may matter has one, with cells as fine and
 searches as long as the round allows, or when it has looked at as many nodes as it may.
-Rounds are finer and longer, one after the other, then they begin anew. Where several
+Rounds are finer and longer, then they begin anew with other motions. Where several
 robots have driven no path, a round is in two halves: in the second one they are looked
 at in the reverse order, and make coarser motions.
 """
@@ -25,7 +25,7 @@ import numpy as np
 from mrmg import seeding
 from mrmg.planning.path_following._following_kernels import Course
 from mrmg.planning.path_following.band import Path
-from mrmg.planning.path_following.coordination import _search_kernels, priorities
+from mrmg.planning.path_following.coordination import _search_kernels, leads, priorities
 from mrmg.planning.path_following.coordination._motion_kernels import Traffic
 from mrmg.planning.path_following.coordination._node_kernels import (
     NODE,
@@ -36,7 +36,6 @@ from mrmg.planning.path_following.coordination._node_kernels import (
 )
 from mrmg.planning.path_following.coordination._rollout_kernels import ROLLED, Rollouts
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE, UNKNOWN, Fields
-from mrmg.planning.path_following.coordination.leads import rounded_path
 from mrmg.planning.path_following.coordination.rounds import (
     COARSER,
     FIRST_MOST,
@@ -113,17 +112,13 @@ class _Planning:
         horizon: int,
     ) -> None:
         self._problem = problem
+        self._fields = Fields(problem)
         self._tours, self._paths = tours, paths
-        self._courses = [course_of(problem, r, path) for r, path in enumerate(paths)]
-        for course, drive in zip(self._courses, drives, strict=True):
-            if drive is not None and len(drive.spent_s) > 0:
-                rest_s = drive.spent_s[-1] - drive.spent_s
-                course.node["rest_s"][: len(rest_s)] = rest_s
+        self._courses = leads.courses(problem, self._fields, tours, paths, drives)
         self._follows = [  # whether it has driven along a path to all its targets
             drive is not None and 0 < len(tour) == len(path.target)
             for tour, path, drive in zip(tours, paths, drives, strict=True)
         ]
-        self._fields = Fields(problem)
         self._traffic = FleetTraffic(problem, horizon)
         self._control = np.zeros((horizon, 2))
         self._room = Scratch(
@@ -183,7 +178,8 @@ class _Planning:
     ) -> Motion | None:
         traffic = self._traffic.around(r, motions, above)
         hard = traffic.robot["hard"]
-        if hard.any() and not self._fields.are_timed(r, self._tours[r], traffic):
+        fields = self._fields.in_time(r, self._tours[r], traffic)
+        if hard.any() and not fields.are_timed(r, self._tours[r], traffic):
             # Those that it must not meet may stand long before all others do.
             traffic = traffic._replace(end=int(traffic.robot["last"][hard].max()))
         for task, course in self._tasks(r, traffic, yielding):
@@ -204,8 +200,8 @@ class _Planning:
         has driven along a path to several targets keeps to it.
         """
         problem, path, tour = self._problem, self._paths[r], self._tours[r]
-        course, fineness = self._courses[r], self.fineness * self.round.fineness
-        now = replace(self.round, fineness=fineness)
+        course, fields = self._courses[r], self._fields
+        now = replace(self.round, fineness=self.fineness * self.round.fineness)
         if yielding:
             now = replace(now, weight=YIELDING_WEIGHT, soft_s=YIELDING_S)
         follows = self._follows[r]
@@ -213,13 +209,13 @@ class _Planning:
         task = task._replace(enough=FIRST_MOST)
         led = len(path.target) == len(tour) or is_one_pose(problem, r, tour)
         led &= bool(np.isfinite(task.along).all())
-        turning = self._fields.turning(r, tour) if now.turning else UNKNOWN
         guide = NO_GUIDE
-        if not (led and self.round is ROUNDS[0]):
-            guide = self._fields.static(r, tour)._replace(turning=turning)
+        if not (led and now.most == ROUNDS[0].most):
+            turning = fields.turning(r, tour) if now.turning else UNKNOWN
+            guide = fields.static(r, tour)._replace(turning=turning)
         along = guided(problem, r, task, path, guide)
-        keeps_to_it = follows and len(tour) > 1
-        known = not keeps_to_it and self._fields.are_timed(r, tour, traffic)
+        fields = fields.in_time(r, tour, traffic)
+        known = fields.are_timed(r, tour, traffic) and not (follows and len(tour) > 1)
         if known and not (yielding or r in self._blocked):
             yield along._replace(most=min(FIRST_MOST, now.most)), course
         if not known:
@@ -231,9 +227,10 @@ class _Planning:
                 stay=task.stay, later_s=task.later_s
             )
             costs = task.hold_share, task.soft_s / (task.steps * problem.dt_s)
-            guide, way = self._fields.timed(r, tour, task.stay, traffic, costs)
+            guide, way = fields.timed(r, tour, task.stay, traffic, costs)
+            turning = fields.turning(r, tour) if now.turning else UNKNOWN
             guide = guide._replace(turning=turning)
-            lead = rounded_path(problem, r, way)
+            lead = leads.rounded_path(problem, r, way)
             yield guided(problem, r, free, nowhere, guide), course_of(problem, r, lead)
 
     def _search(
@@ -286,11 +283,11 @@ class _Planning:
             first: round that is tried first.
             halt: shape (1,); the search ends soon after it has turned true.
         """
-        number, self.most = ROUNDS.index(first), np.inf
+        self.most, harder = np.inf, [one for one in ROUNDS if one.most > first.most]
         motions = [None if drive is None else drive.motion for drive in drives]
         nobody = np.zeros(len(motions), bool)
         for r in order:
-            for self.round in ROUNDS[number : number + ROUNDS_ALONE]:
+            for self.round in [first, *harder][:ROUNDS_ALONE]:
                 if motions[r] is None and not halt[0]:
                     motions[r] = self.find(r, motions, nobody)
             if motions[r] is None:
@@ -341,7 +338,7 @@ def coordinated(
             most = SEARCHES * now.most * robots / len(orders)
             found = priorities.search_priorities(alone, planning, most, halt)
             if found is None:
-                further = now is not ROUNDS[0] and order is drawn
+                further = now.most > ROUNDS[0].most and order is drawn
                 found = in_sequence(alone, planning, most if further else 0, halt)
             if found is not None:
                 planning.round = replace(now, most=max(now.most, SHORTENING_MOST))

@@ -35,6 +35,10 @@ at most: it bounds their time and memory."""
 MOST_POSES = 200_000
 """Poses of fields that know how long turning takes, over all legs, at most."""
 
+FEW_TIMED_CELLS, COARSEST_SHARE = 300_000, 0.3
+"""Cells of such fields beyond which each four cells are joined, and the longest side of
+those that become of it, in radii of the robot."""
+
 LATE_S = 1.5
 """How much later, or sooner, than costs-to-go tell a robot may be somewhere: they know
 neither how it turns nor how it gains speed [s]."""
@@ -53,9 +57,15 @@ NO_GUIDE = Guide(np.zeros((1, 1, 1, 1)), UNKNOWN, 0.0, 0.0, 1e9, 1 << 30)
 class Fields:
     """Costs-to-go over grids of one problem."""
 
-    def __init__(self, problem: Problem) -> None:
-        """Keep the problem; no field is made yet."""
+    def __init__(self, problem: Problem, coarser: int = 1) -> None:
+        """Keep the problem; no field is made yet.
+
+        Args:
+            problem: the mission.
+            coarser: how many times as long the sides of cells are as usual.
+        """
         self._problem = problem
+        self._coarse: Fields | None = None
         self._known: dict[tuple[int, tuple[int, ...]], np.ndarray] = {}
         self._turning: dict[tuple[int, ...], np.ndarray] = {}
         self._ground: dict[int, tuple[np.ndarray, np.ndarray]] = {}
@@ -63,10 +73,21 @@ class Fields:
         self._beside: dict[tuple[int, float, float], np.ndarray] = {}
         spaces = problem.mission.spaces
         cells = spaces.distance[0].size
-        self._coarser = max(1, round((cells / MOST_CELLS) ** 0.5))
+        self._coarser = coarser * max(1, round((cells / MOST_CELLS) ** 0.5))
         self._cell_m = float(spaces.cell * self._coarser)
         self._grid = float(spaces.x_min), float(spaces.y_min), self._cell_m
         self._shape = [-(-n // self._coarser) for n in spaces.distance[0].shape]
+
+    def in_time(self, r: int, targets: Sequence[int], traffic: Traffic) -> Fields:
+        """Return the finest fields of few cells in time, or the coarsest there are."""
+        coarse_m = 2.0 * self._cell_m
+        radius_m = float(self._problem.mission.fleet[r]["radius"])
+        few = self._timed_cells(r, targets, traffic) <= FEW_TIMED_CELLS
+        if few or coarse_m > COARSEST_SHARE * radius_m:
+            return self
+        if self._coarse is None:
+            self._coarse = Fields(self._problem, 2 * self._coarser)
+        return self._coarse.in_time(r, targets, traffic)
 
     def static(self, r: int, targets: Sequence[int]) -> Guide:
         """Return robot r's costs-to-go among obstacles alone."""
@@ -76,6 +97,13 @@ class Fields:
             return NO_GUIDE
         return Guide(np.stack(legs)[:, None], UNKNOWN, *self._grid, 1 << 30)
 
+    def way(self, r: int, targets: Sequence[int]) -> np.ndarray:
+        """Return robot r's cheapest way among obstacles alone, shape (n, 2)."""
+        price, stood = self._price(r, targets), np.zeros(len(targets), int)
+        return self._way_down(
+            r, targets, stood, (price, 0.0, self.static(r, targets).field)
+        )
+
     def _layers(self, r: int, traffic: Traffic) -> tuple[int, int]:
         """Return how many steps a layer of time lasts for robot r, and the layers."""
         step_m = float(self._problem.mission.fleet[r]["limit"][1]) * self._problem.dt_s
@@ -84,9 +112,11 @@ class Fields:
 
     def are_timed(self, r: int, targets: Sequence[int], traffic: Traffic) -> bool:
         """Return whether there are few enough cells for costs-to-go in time."""
+        return 0 < self._timed_cells(r, targets, traffic) <= MOST_TIMED_CELLS
+
+    def _timed_cells(self, r: int, targets: Sequence[int], traffic: Traffic) -> int:
         layers = len(targets) * self._layers(r, traffic)[1]
-        cells = layers * self._shape[0] * self._shape[1]
-        return bool(0 < cells <= MOST_TIMED_CELLS)
+        return int(layers * self._shape[0] * self._shape[1])
 
     def timed(
         self,
@@ -234,7 +264,8 @@ class Fields:
     def _priced(self, r: int) -> tuple[np.ndarray, np.ndarray]:
         """Return where robot r has room without targets, and the price of a metre."""
         robot, n = self._problem.mission.fleet[r], self._coarser
-        distance = self._problem.mission.spaces.distance[robot["space"]]
+        spaces = self._problem.mission.spaces
+        distance = spaces.distance[robot["space"]]
         rows, columns = self._shape
         padded = np.full((rows * n, columns * n), -np.inf)
         padded[: distance.shape[0], : distance.shape[1]] = distance
@@ -242,7 +273,8 @@ class Fields:
         needed_m = float(robot["passage"])
         roomy_m = float(robot["radius"] + robot["margin"])
         lacking = (roomy_m - nearest) / max(roomy_m - needed_m, self._cell_m)
-        free = (nearest > needed_m - 0.5 * self._cell_m) & self._has_room(r)
+        fine_m = float(spaces.cell) if self._problem.openings else self._cell_m
+        free = (nearest > needed_m - 0.5 * fine_m) & self._has_room(r)
         return free, 1.0 + TIGHT_PRICE * np.clip(lacking, 0.0, 1.0)
 
     def _beside_walls(self, r: int, targets: Sequence[int]) -> np.ndarray:

@@ -1,13 +1,18 @@
-"""Paths that lead a robot's search: ways down its costs-to-go, rounded."""
+"""Paths that lead a robot's search: its own, or ways down its costs-to-go, rounded."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from mrmg.motion._kernels import USER
+from mrmg.planning.path_following._following_kernels import Course
 from mrmg.planning.path_following.band import Path
+from mrmg.planning.path_following.coordination.fields import Fields
 from mrmg.planning.path_following.coordination.tasks import no_path
+from mrmg.planning.path_following.tracking import Drive, course_of
 from mrmg.planning.problem.problem import Problem
 
 ROUNDINGS = 2
@@ -15,6 +20,29 @@ ROUNDINGS = 2
 
 SPACING_SHARE = 0.25
 """Distance of the nodes, in radii of the robot."""
+
+
+def courses(
+    problem: Problem,
+    fields: Fields,
+    tours: Sequence[Sequence[int]],
+    paths: Sequence[Path],
+    drives: Sequence[Drive | None],
+) -> list[Course]:
+    """Return what leads each robot: its path, which it may have driven.
+
+    Custom motion models, which path following does not know how to drive, are led along
+    their cheapest way among obstacles.
+    """
+    found = []
+    for r, (path, drive) in enumerate(zip(paths, drives, strict=True)):
+        if tours[r] and problem.mission.fleet[r]["model"] == USER:
+            path = rounded_path(problem, r, fields.way(r, tours[r]))
+        found.append(course_of(problem, r, path))
+        if drive is not None and len(drive.spent_s) > 0:
+            rest_s = drive.spent_s[-1] - drive.spent_s
+            found[r].node["rest_s"][: len(rest_s)] = rest_s
+    return found
 
 
 def rounded_path(problem: Problem, r: int, way: np.ndarray) -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +42,10 @@ COARSER = 0.7, 0.9
 """Range of the fineness in a round's second half, over that in the first one: with the
 same motions in both, and in all attempts, 5 of 60 alcoves had no plan at all."""
 
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+"""Step through that range from one time that rounds begin anew to the next: a multiple
+of it is never near to those before it, relative to their number."""
+
 SEARCHES = 2
 """How many searches of a round's length the search over priorities may take for each
 robot: most orders of robots are found with few, so that after these another round, or
@@ -73,5 +77,11 @@ YIELDING_S = 20.0
 
 
 def rounds_of(number: int) -> Sequence[Round]:
-    """Return the round of an attempt: later ones try harder, then they begin anew."""
-    return ROUNDS[number % len(ROUNDS) :][:1]
+    """Return the round of an attempt: later ones try harder, then they begin anew.
+
+    Where they do, motions are coarser, so that no search that has failed is repeated.
+    """
+    anew, which = divmod(number, len(ROUNDS))
+    low, high = COARSER
+    share = high - (high - low) * (anew * GOLDEN % 1.0) if anew > 0 else 1.0
+    return (replace(ROUNDS[which], fineness=share * ROUNDS[which].fineness),)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import pairwise, product
 from math import ceil, pi
 
 import numpy as np
@@ -12,6 +12,7 @@ from mrmg.energy.model import CONSUMERS_W
 from mrmg.motion._kernels import CAR, USER
 from mrmg.planning.path_following.band import Path
 from mrmg.planning.path_following.coordination._guide_kernels import Guide, guide_at
+from mrmg.planning.path_following.coordination._motion_kernels import WAYPOINTS
 from mrmg.planning.path_following.coordination._node_kernels import Task, posing_time_s
 from mrmg.planning.path_following.coordination.fields import NO_GUIDE
 from mrmg.planning.path_following.coordination.rounds import Round
@@ -22,9 +23,6 @@ MOTION_SHARE = 0.6
 
 LEAST_MOTION_S = 0.3
 """Time that a motion lasts at least [s]."""
-
-BEARINGS = 8
-"""Directions in which a custom motion model is steered."""
 
 WAYPOINT_SHARE = 4.0
 """How far ahead its waypoints lie, in ways of a motion."""
@@ -62,13 +60,16 @@ def motion_steps(robot: np.ndarray, dt_s: float, fineness: float) -> int:
 def motions(robot: np.ndarray, steps: int, dt_s: float) -> np.ndarray:
     """Return what a robot's motions aim at, shape (P, 2).
 
-    Speed and steering, or of a custom motion model the waypoint in its frame.
+    Speed and steering. Of a custom motion model first WAYPOINTS in its frame that it is
+    steered to, then controls to hold: its steering may know no way backwards.
     """
     v_min, v_max, w_max = (float(x) for x in robot["limit"][:3])
     if robot["model"] == USER:
-        angle = np.linspace(0.0, 2.0 * pi, BEARINGS, endpoint=False)
+        angle = np.linspace(0.0, 2.0 * pi, WAYPOINTS, endpoint=False)
         far_m = WAYPOINT_SHARE * v_max * steps * dt_s
-        return far_m * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        to = far_m * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        held = [one for one in product((1.0, 0.0, -1.0), repeat=2) if one != (0.0, 0.0)]
+        return np.vstack([to, held * robot["limit"][3:5]])
     speeds = (v_max, v_min, 0.0) if v_min < 0.0 else (v_max, 0.0)
     angles = (0.0, w_max, -w_max, GENTLE_SHARE * w_max, -GENTLE_SHARE * w_max)
     pairs = [(v, w) for v in speeds for w in angles[: 5 if v else 3]]

@@ -17,6 +17,7 @@ from mrmg.planning.path_following.coordination.fields import (
     NO_GUIDE,
     Fields,
 )
+from mrmg.planning.path_following.coordination.traffic import FleetTraffic
 from mrmg.planning.problem.problem import Problem, state_mission
 from mrmg.scene.types import Scene
 
@@ -119,6 +120,32 @@ def test_costs_to_go_lead_through_gaps_that_are_wide_enough_alone(
     way_m = top * float(_guide_kernels.guide_at(guide, 0, 0, 3.0, 5.0))
     assert (way_m < 2.0 * 9.0) == through
     assert way_m < inf
+
+
+def test_joined_cells_lead_through_an_opening(yard: Callable[..., Scene]) -> None:
+    """Where others move for long; round the wall there is no way."""
+    wall = [
+        [[7, 0], [8, 0], [8, 4.4], [7, 4.4]],
+        [[7, 5.85], [8, 5.85], [8, 12], [7, 12]],
+    ]
+    scene = yard(
+        bounds=[0, 0, 15, 12],
+        obstacles=[{"polygon": corners} for corners in wall],
+        goals=[{"id": "g", "circle": {"center": [12, 5], "radius": 1.0}}],
+        robots=[{"id": "r", "model": "car", "pose": [3, 5, 0]}],
+    )
+    problem = state_mission(scene, 0, PlannerParams(samples=400))
+    assert problem.openings
+    fields, traffic = Fields(problem), FleetTraffic(problem, 1)
+    nobody = traffic.around(0, [None], np.zeros(1, bool))
+    assert fields.in_time(0, [0], nobody) is fields
+    joined = fields.in_time(0, [0], nobody._replace(end=2000))
+    assert joined.static(0, [0]).cell > fields.static(0, [0]).cell
+    fine_s, joined_s = (
+        _guide_kernels.guide_at(one.static(0, [0]), 0, 0, 3.0, 5.0)
+        for one in (fields, joined)
+    )
+    assert joined_s == pytest.approx(fine_s, rel=0.1)
 
 
 @pytest.mark.parametrize("leg", [0, 1, 7])
