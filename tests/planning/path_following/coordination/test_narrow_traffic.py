@@ -116,6 +116,22 @@ def test_who_stands_in_the_way_comes_back(
     assert result.plan.trajectories[1].state[:, 3].min() < 0.0
 
 
+def test_top_speeds_need_not_be_exact(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A custom motion model may come to a little more, as the verifier lets it."""
+    source = bench_kinodynamic.FIRST_ORDER
+    inexact = source.replace("theta + w * dt, v, w", "theta + w * dt, v + 1e-12 * v, w")
+    assert inexact != source
+    monkeypatch.setattr(bench_kinodynamic, "FIRST_ORDER", inexact)
+    scene = _generated(tmp_path, "swap2", 0)
+    result = plan_mission(scene, params=bench_kinodynamic.PARAMS)
+    assert result.plan is not None, result.reason
+    assert mrmg.verify(scene, result.plan).ok
+    top = scene.robots[0].model.limits.v_max_m_s
+    assert max(each.state[:, 3].max() for each in result.plan.trajectories) > top
+
+
 def _generated(folder: Path, name: str, seed: int) -> Scene:
     """Return the scene that `tools/generate_traffic` makes of a class and a seed."""
     rng = np.random.default_rng((list(generate_traffic.CLASSES).index(name), seed))
