@@ -12,6 +12,7 @@ from mrmg.planning.path_following.coordination._guide_kernels import BEARINGS, G
 from mrmg.planning.path_following.coordination._motion_kernels import Traffic
 from mrmg.planning.problem.problem import Problem
 from mrmg.world import _raster_kernels
+from mrmg.world.world import CELL_M
 
 TIGHT_PRICE = 2.0
 """Factor on the cost of a metre where a robot cannot turn round."""
@@ -36,8 +37,8 @@ MOST_POSES = 200_000
 """Poses of fields that know how long turning takes, over all legs, at most."""
 
 FEW_TIMED_CELLS, COARSEST_SHARE = 300_000, 0.3
-"""Cells of such fields beyond which each four cells are joined, and the longest side of
-those that become of it, in radii of the robot."""
+"""Cells of such fields beyond which each four cells are joined, where they are finer
+than usual, and the longest side of what becomes of them, in radii of the robot."""
 
 LATE_S = 1.5
 """How much later, or sooner, than costs-to-go tell a robot may be somewhere: they know
@@ -80,10 +81,9 @@ class Fields:
 
     def in_time(self, r: int, targets: Sequence[int], traffic: Traffic) -> Fields:
         """Return the finest fields of few cells in time, or the coarsest there are."""
-        coarse_m = 2.0 * self._cell_m
         radius_m = float(self._problem.mission.fleet[r]["radius"])
         few = self._timed_cells(r, targets, traffic) <= FEW_TIMED_CELLS
-        if few or coarse_m > COARSEST_SHARE * radius_m:
+        if few or 2.0 * self._cell_m > min(CELL_M, COARSEST_SHARE * radius_m):
             return self
         if self._coarse is None:
             self._coarse = Fields(self._problem, 2 * self._coarser)
