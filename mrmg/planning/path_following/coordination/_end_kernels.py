@@ -15,14 +15,13 @@ from mrmg.planning.path_following.coordination._conflict_kernels import (
 from mrmg.planning.path_following.coordination._motion_kernels import (
     BRAKE,
     HOME,
-    WAYPOINTS,
     clear,
     drivable_radius,
     drive_curve,
     smooth_radius,
     write_curve,
 )
-from mrmg.planning.problem._clearance_kernels import keeps_clear, moves_clear
+from mrmg.planning.problem._clearance_kernels import keeps_clear
 from mrmg.planning.problem._control_kernels import braking_control, stands, wrap
 from mrmg.planning.problem._target_kernels import at_target, in_target
 from mrmg.planning.roadmap._heap_kernels import push
@@ -100,27 +99,6 @@ def steer_to(search, target, state, control):
 
 
 @kernel
-def hold_to(search, target, corner, state, control):
-    """Write a custom motion model's short drive to a target; return the steps, or -1.
-
-    It holds the first of its controls that leads there: also backwards.
-    """
-    own, targets, task, dt = search.own, search.targets, search.task, search.dt
-    for motion in range(WAYPOINTS, len(task.motion)):
-        u1, u2 = task.motion[motion, 0], task.motion[motion, 1]
-        for k in range(task.steps):
-            control[k, 0], control[k, 1] = u1, u2
-            step(own[0], state[k], u1, u2, dt, state[k + 1])
-            if not moves_clear(own, search.spaces, state[k], state[k + 1], corner):
-                break
-            if at_target(targets, target, state[k + 1]):
-                last = k + 1 + brake(own, dt, state[k + 1 :], control[k + 1 :])
-                if at_target(targets, target, state[last]):
-                    return last
-    return -1
-
-
-@kernel
 def free_pose(search, target, corner):
     """Return (x, y, heading) at a target where there is room, nearest to its own.
 
@@ -157,12 +135,7 @@ def drive_to(search, target, room, control):
     own, targets = search.own, search.targets
     course, corner, state = room.curve, room.corner[0], room.state
     if own[0].model == USER:
-        count, center = -1, targets.target[target].center
-        reach = own[0].limit[1] * search.task.steps * search.dt
-        reach += targets.target[target].reach
-        if point_distance(state[0, 0], state[0, 1], center[0], center[1]) < reach:
-            count = hold_to(search, target, corner, state, control)
-        return count if count >= 0 else steer_to(search, target, state, control)
+        return steer_to(search, target, state, control)
     x, y, heading = free_pose(search, target, corner)
     free = targets.target[target].tolerance >= pi
     tolerance = np.inf if free else targets.target[target].tolerance

@@ -114,7 +114,7 @@ class _Planning:
         self._problem = problem
         self._fields = Fields(problem)
         self._tours, self._paths = tours, paths
-        self._courses = leads.courses(problem, self._fields, tours, paths, drives)
+        self._courses = leads.courses(problem, paths, drives)
         self._follows = [  # whether it has driven along a path to all its targets
             drive is not None and 0 < len(tour) == len(path.target)
             for tour, path, drive in zip(tours, paths, drives, strict=True)

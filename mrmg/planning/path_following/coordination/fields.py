@@ -97,13 +97,6 @@ class Fields:
             return NO_GUIDE
         return Guide(np.stack(legs)[:, None], UNKNOWN, *self._grid, 1 << 30)
 
-    def way(self, r: int, targets: Sequence[int]) -> np.ndarray:
-        """Return robot r's cheapest way among obstacles alone, shape (n, 2)."""
-        price, stood = self._price(r, targets), np.zeros(len(targets), int)
-        return self._way_down(
-            r, targets, stood, (price, 0.0, self.static(r, targets).field)
-        )
-
     def _layers(self, r: int, traffic: Traffic) -> tuple[int, int]:
         """Return how many steps a layer of time lasts for robot r, and the layers."""
         step_m = float(self._problem.mission.fleet[r]["limit"][1]) * self._problem.dt_s

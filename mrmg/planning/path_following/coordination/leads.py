@@ -7,10 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from mrmg.motion._kernels import USER
 from mrmg.planning.path_following._following_kernels import Course
 from mrmg.planning.path_following.band import Path
-from mrmg.planning.path_following.coordination.fields import Fields
 from mrmg.planning.path_following.coordination.tasks import no_path
 from mrmg.planning.path_following.tracking import Drive, course_of
 from mrmg.planning.problem.problem import Problem
@@ -23,25 +21,14 @@ SPACING_SHARE = 0.25
 
 
 def courses(
-    problem: Problem,
-    fields: Fields,
-    tours: Sequence[Sequence[int]],
-    paths: Sequence[Path],
-    drives: Sequence[Drive | None],
+    problem: Problem, paths: Sequence[Path], drives: Sequence[Drive | None]
 ) -> list[Course]:
-    """Return what leads each robot: its path, which it may have driven.
-
-    Custom motion models, which path following does not know how to drive, are led along
-    their cheapest way among obstacles.
-    """
-    found = []
-    for r, (path, drive) in enumerate(zip(paths, drives, strict=True)):
-        if tours[r] and problem.mission.fleet[r]["model"] == USER:
-            path = rounded_path(problem, r, fields.way(r, tours[r]))
-        found.append(course_of(problem, r, path))
+    """Return what leads each robot: its path, with what is left of a drive along it."""
+    found = [course_of(problem, r, path) for r, path in enumerate(paths)]
+    for course, drive in zip(found, drives, strict=True):
         if drive is not None and len(drive.spent_s) > 0:
             rest_s = drive.spent_s[-1] - drive.spent_s
-            found[r].node["rest_s"][: len(rest_s)] = rest_s
+            course.node["rest_s"][: len(rest_s)] = rest_s
     return found
 
 
