@@ -302,22 +302,22 @@ def follow_path(search, nodes, room, a, tries):
 
 
 @kernel
-def find_motion(search, nodes, room, start, control):
+def find_motion(search, nodes, room, begun, control):
     """Find controls for one robot's task; return their number or -1.
 
     Args:
         search: the robot, its surroundings, its task and the others.
         nodes: empty room for nodes; receives those that were looked at.
         room: for motions as long as `control`.
-        start: its state, shape (5,).
-        control: receives the controls, shape (n, 2).
+        begun: its states until the search begins, shape (k + 1, 5).
+        control: those until then; receives the others, shape (n, 2), n > k.
     """
     search, nodes, room = borrowed((search, nodes, room))
-    task, start, control = search.task, borrowed(start), borrowed(control)
-    copy_numbers(start, room.state[0])
-    leg = legs_done(search.targets, task, 0, room.state, 0, 0)
+    task, begun, control = search.task, borrowed(begun), borrowed(control)
+    first = len(begun) - 1
+    leg = legs_done(search.targets, task, 0, begun, 0, first)
     begin = 0 if search.course.size[0] > 1 else OFF_PATH
-    add(search, nodes, -1, HOLD, start, (0, leg, begin, 0), 0.0)
+    add(search, nodes, -1, HOLD, begun[first], (first, leg, begin, 0), 0.0)
     motions, tries, most = len(task.motion), 0, task.most
     stop = braking_steps(search.own, search.dt)
     while nodes.size[1] > 0 and nodes.size[0] + motions + WAYS_ON < most:

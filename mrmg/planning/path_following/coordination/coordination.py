@@ -121,6 +121,7 @@ class _Planning:
         ]
         self._traffic = FleetTraffic(problem, horizon)
         self._control = np.zeros((horizon, 2))
+        self._unmoved = [Motion(x[None], self._control[:0]) for x in problem.start]
         self._room = Scratch(
             state=np.zeros((horizon + 1, 5)),
             control=np.zeros((horizon, 2)),
@@ -150,6 +151,7 @@ class _Planning:
         above: np.ndarray,
         *,
         yielding: bool = False,
+        since: int = 0,
     ) -> Motion | None:
         """Return a motion of robot r without conflicts with the robots marked.
 
@@ -158,9 +160,12 @@ class _Planning:
         if self.nodes >= self.most:
             return None
         self.nodes += 1
-        options = self.round, self.fineness, yielding, r in self._blocked
+        options = self.round, self.fineness, yielding, since, r in self._blocked
         asked = (r, *options, above.tobytes(), *map(id, motions))
         if asked not in self._answers:
+            begun = motions[r] or self._unmoved[r]
+            self._begun = begun.state[: since + 1]
+            self._control[:since] = begun.control[:since]
             found = self._found(r, motions, above, yielding)
             self._answers[asked] = None if found is None else self.kept(r, found)
         return self._answers[asked]
@@ -252,13 +257,9 @@ class _Planning:
             ease=float(BRAKING_SHARE * mission.fleet["limit"][r, 3]),
             stiffness=self._courses[r].stiffness,
         )
-        nodes = empty_nodes(task)
+        nodes, room = empty_nodes(task), self._room._replace(curve=curve)
         count = _search_kernels.find_motion(
-            search,
-            nodes,
-            self._room._replace(curve=curve),
-            self._problem.start[r],
-            self._control,
+            search, nodes, room, self._begun, self._control
         )
         self.nodes += int(nodes.size[0])
         if count < 0:

@@ -15,14 +15,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Protocol
 
 import numpy as np
 
 from mrmg.planning.path_following.tracking import Motion
 
-SHORTENING_SHARE = 0.25
-"""Nodes that shortening motions may take, as a share of what finding them took."""
+SHORTENING_SHARE, SHORTENING_LEAST = 0.25, 4_000
+"""Nodes that shortening motions may take, as a share of what finding them took, and in
+any case."""
+
+SINCE_SHARES = 0.0, 0.5
+"""Shares of a motion after which it is looked for anew, one after the other."""
 
 YIELDS = 2
 """Times that each of two robots makes room for the other one."""
@@ -51,10 +56,12 @@ class MotionPlanning(Protocol):
         above: np.ndarray,
         *,
         yielding: bool = False,
+        since: int = 0,
     ) -> Motion | None:
         """Return a motion of robot r without conflicts with the robots marked.
 
-        A yielding robot makes as much room for the others as it can.
+        A yielding robot makes as much room for the others as it can. Up to step `since`
+        the motion is the one in `motions`.
         """
 
     def conflicts(self, r: int, motions: Sequence[Motion]) -> np.ndarray:
@@ -255,8 +262,9 @@ def shortened(
 ) -> tuple[Motion, ...]:
     """Return motions in which robots lose less time to each other.
 
-    Those that lose time move anew among all others, each once, the one that loses most
-    first, while a share of what it took to find the motions is left.
+    Those that lose time move anew among all others, then from the middle of their
+    motion on, where as long a search looks closer. The one that loses most comes first,
+    while nodes are left.
 
     Args:
         motions: that have no conflicts.
@@ -265,14 +273,17 @@ def shortened(
         halt: shape (1,); the search ends soon after it has turned true.
     """
     best = list(motions)
-    planning.most = (1.0 + SHORTENING_SHARE) * planning.nodes
+    nodes = planning.nodes
+    planning.most = nodes + max(SHORTENING_LEAST, SHORTENING_SHARE * nodes)
     lost = {
         r: len(motions[r].control) - len(one.control) for r, one in enumerate(alone)
     }
-    for r in sorted(lost, key=lambda r: -lost[r]):
-        if lost[r] <= 0 or planning.nodes >= planning.most or halt[0]:
+    losing = [r for r in sorted(lost, key=lambda r: -lost[r]) if lost[r] > 0]
+    for r, share in product(losing, SINCE_SHARES):
+        if planning.nodes >= planning.most or halt[0]:
             break
-        found = planning.find(r, best, np.arange(len(best)) != r, yielding=True)
+        since, others = int(share * len(best[r].control)), np.arange(len(best)) != r
+        found = planning.find(r, best, others, yielding=True, since=since)
         if found is not None and len(found.control) < len(best[r].control):
             best[r] = found
     return tuple(best)

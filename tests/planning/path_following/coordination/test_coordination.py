@@ -149,6 +149,22 @@ def test_no_motion_is_found_once_a_search_has_taken_its_nodes(
     assert planning.find(0, *none, yielding=True) is not None
 
 
+def test_a_motion_that_begins_anew_is_the_old_one_until_then(
+    yard: Callable[..., Scene], state: Callable[..., Problem]
+) -> None:
+    robots = [{"id": "own", "model": "diffdrive", "pose": [6, 10, 2.0]}]
+    goals = [{"id": "g", "circle": {"center": [12, 5], "radius": 1}}]
+    problem = state(yard(robots=robots, goals=goals), samples=50)
+    tours, paths = [[0]], [no_path(problem, 0)]
+    planning = coordination._Planning(problem, tours, paths, [None], 2000)
+    away = problem.trajectory(0, np.repeat([[0.2, 0.1], [-0.2, -0.1]], 10, axis=0))
+    before = [Motion(away.state, away.control)]
+    found = planning.find(0, before, np.zeros(1, bool), since=15)
+    assert found is not None
+    assert np.array_equal(found.state[:16], away.state[:16])
+    assert np.hypot(*(found.state[:, :2] - (12.0, 5.0)).T).min() < 1.0
+
+
 def _two_robots(
     yard: Callable[..., Scene], state: Callable[..., Problem]
 ) -> tuple[Problem, list[list[int]], list[Path]]:

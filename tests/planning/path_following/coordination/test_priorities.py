@@ -51,6 +51,7 @@ class Crossing:
         above: np.ndarray,
         *,
         yielding: bool = False,
+        since: int = 0,
     ) -> Motion | None:
         """Return the soonest motion that crosses when nobody above does."""
         self.asked.append(r)
@@ -111,6 +112,7 @@ class Crossings(Crossing):
         above: np.ndarray,
         *,
         yielding: bool = False,
+        since: int = 0,
     ) -> Motion | None:
         """Return the soonest motion that crosses when nobody above does there."""
         return super().find(r, motions, above & self.together[r])
@@ -150,6 +152,26 @@ def test_who_has_lost_time_for_nothing_moves_sooner() -> None:
     assert [len(motion.control) for motion in sooner] == [5, 3, 4]
 
 
+class HalfCrossing(Crossing):
+    """Robots that find other motions from the middle of theirs on alone."""
+
+    def find(
+        self, r: int, motions: Sequence[Motion], above: np.ndarray, **options: int
+    ) -> Motion | None:
+        """Return a sooner motion if it is to be the old one up to its middle."""
+        found = super().find(r, motions, above)
+        since = options.get("since", 0)
+        return found if since == len(motions[r].control) // 2 else None
+
+
+def test_motions_are_shortened_from_their_middle_on_too() -> None:
+    planning = HalfCrossing([3, 3], [9, 9])
+    alone = [planning.motion(r, 0) for r in range(2)]
+    late = [planning.motion(0, 0), planning.motion(1, 7)]
+    sooner = shortened(late, alone, planning, np.zeros(1, bool))
+    assert [len(motion.control) for motion in sooner] == [3, 4]
+
+
 def test_the_second_order_is_looked_at_only_where_the_first_one_fails() -> None:
     planning = Crossing([3, 3, 6, 6], [5, 5, 5, 5])
     alone = [planning.motion(r, 0) for r in range(4)]
@@ -184,7 +206,7 @@ class Shuttle:
         self.places = tuple(Motion(np.zeros((1, 5)), np.zeros((9, 2))) for _ in "01")
 
     def find(
-        self, r: int, motions: Sequence[Motion], above: np.ndarray, **_: bool
+        self, r: int, motions: Sequence[Motion], above: np.ndarray, **_: object
     ) -> Motion | None:
         """Return the other place of robot 2; others have none to go to."""
         if r == 2:

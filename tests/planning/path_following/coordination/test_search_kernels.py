@@ -48,7 +48,7 @@ def found_control(problem: Problem, r: int, around: Traffic) -> np.ndarray:
     )
     control = np.zeros((HORIZON, 2))
     nodes = empty_nodes(search.task)
-    count = find_motion(search, nodes, room, problem.start[r], control)
+    count = find_motion(search, nodes, room, problem.start[r : r + 1], control)
     assert count > 0
     return control[:count]
 

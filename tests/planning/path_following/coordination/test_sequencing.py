@@ -52,7 +52,7 @@ class Grid:
         return way[::-1]
 
     def find(
-        self, r: int, motions: Sequence[Motion], above: np.ndarray, **_: bool
+        self, r: int, motions: Sequence[Motion], above: np.ndarray, **_: object
     ) -> Motion | None:
         """Return a motion where those above never are."""
         self.nodes += 1
