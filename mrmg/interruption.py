@@ -30,6 +30,10 @@ GRACE_S = 1.0
 _LOOK_S = 0.5
 """How often a worker process looks whether its parent is still there [s]."""
 
+_LOOKS = 3
+"""How often a process that ends looks for children: the system's lists of them may lack
+some where others have just ended."""
+
 _cleanups: list[Callable[[], object]] = []
 _accepted = threading.Event()
 _pending = threading.Event()
@@ -82,10 +86,11 @@ def end(*, reported: bool = False) -> NoReturn:
     # Other threads may still miss the children, start new ones, and have them complain.
     told = os.dup(2)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
-    for child in _children(os.getpid()):
-        with suppress(OSError):
-            os.kill(child, signal.SIGKILL)
-            os.waitpid(child, 0)
+    for _ in range(_LOOKS):
+        for child in _children(os.getpid()):
+            with suppress(OSError):
+                os.kill(child, signal.SIGKILL)
+                os.waitpid(child, 0)
     for cleanup in [*_cleanups]:
         with suppress(Exception):
             cleanup()
