@@ -39,20 +39,6 @@ class UsageError(MrmgError):
     """A command or function was called in a way it does not allow."""
 
 
-def refuse_values(values: object, allowed: Mapping[str, bool], what: str) -> None:
-    """Raise a UsageError that names the attributes whose values are not allowed.
-
-    Args:
-        values: has the attributes.
-        allowed: whether the value of each attribute is.
-        what: they are, for the message.
-    """
-    wrong = [name for name, fine in allowed.items() if not fine]
-    if wrong:
-        found = ", ".join(f"{name} = {getattr(values, name)!r}" for name in wrong)
-        raise UsageError(f"{what} out of range: {found}")
-
-
 @dataclass(frozen=True)
 class Fault:
     """One fault of a file: where it is, what is wrong, and what is allowed.
@@ -115,6 +101,8 @@ MADE_BY = {
     "Scene": "mrmg.load_scene(...) gives one",
     "Plan": "mrmg.plan(scene).plan is one, or None where `reason` says why",
     "PlannerParams": "mrmg.PlannerParams(samples=900) is one",
+    "GuidedTreeParams": "GuidedTreeParams(k=10) of mrmg.planning.parameters is one",
+    "RouterParams": "RouterParams(rounds=500) of mrmg.planning.routing.routing is one",
     "Disturbance": "parse_disturbance('lag=50ms').draw(seed, robots) of "
     "mrmg.simulation.disturbance_spec gives one, robots being their ids",
     "ExecutionLog": "mrmg.execute(scene, plan) gives one",

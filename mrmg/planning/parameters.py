@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass, field, replace
 
 from mrmg import extensions, storage
-from mrmg.errors import UsageError, refuse_values
+from mrmg.errors import UsageError, require_known, require_types
 from mrmg.planning.routing.routing import RouterParams
 from mrmg.plans import LONGEST_STEP_S
+from mrmg.ranges import Range, require_ranges
 from mrmg.scene.margins import STATES_NONE, Margins
 
 PROFILES = ("default", "paper")
@@ -56,20 +56,30 @@ class GuidedTreeParams:
     target_spread_m: float = 0.5
 
     def __post_init__(self) -> None:
-        allowed = {
-            "iterations": self.iterations >= 1,
-            "k": 1 <= self.k <= 200,
-            "alpha": self.alpha > 0.0,
-            "decline": 0.0 < self.decline < 1.0,
-            "bias": 0.0 <= self.bias <= 1.0,
-            "vertex_spread_m": self.vertex_spread_m > 0.0,
-            "decay_start": 0.0 < self.decay_start <= 1.0,
-            "decay_least": 0.0 <= self.decay_least < self.decay_start,
-            "decay_rate": 0.0 < self.decay_rate < 1.0,
-            "ahead_least_m": 0.0 <= self.ahead_least_m <= self.ahead_most_m,
-            "target_spread_m": self.target_spread_m >= 0.0,
+        what = "parameters of the guided tree"
+        require_ranges(self, GUIDED_TREE_RANGES, what)
+        between = {
+            "decay_least": Range(0.0, self.decay_start, ends="[)"),
+            "ahead_least_m": Range(0.0, self.ahead_most_m),
         }
-        refuse_values(self, allowed, "parameters of the guided tree")
+        require_ranges(self, between, what)
+
+
+GUIDED_TREE_RANGES = {
+    "iterations": Range(1, whole=True),
+    "k": Range(1, 200, whole=True),
+    "alpha": Range(ends="(]"),
+    "decline": Range(0.0, 1.0, ends="()"),
+    "bias": Range(0.0, 1.0),
+    "vertex_spread_m": Range(ends="(]"),
+    "decay_start": Range(0.0, 1.0, ends="(]"),
+    "decay_rate": Range(0.0, 1.0, ends="()"),
+    "decay_least": Range(),
+    "ahead_least_m": Range(),
+    "ahead_most_m": Range(),
+    "target_spread_m": Range(),
+}
+"""What they may be."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,23 +132,9 @@ class PlannerParams:
     budget_s: float | None = None
 
     def __post_init__(self) -> None:
-        allowed = {
-            "profile": self.profile in PROFILES,
-            "guided_tree": isinstance(self.guided_tree, GuidedTreeParams),
-            "router": isinstance(self.router, RouterParams),
-            "samples": self.samples >= 0,
-            "neighbours": self.neighbours >= 1,
-            "dt_s": 0.0 < self.dt_s <= LONGEST_STEP_S,
-            "trees": self.trees >= 1,
-            "improvements": self.improvements >= 0,
-            "refinements": self.refinements >= 0,
-            "soc_margin": 0.0 <= self.soc_margin < 1.0,
-            "obstacle_margin_m": 0.0 <= (self.obstacle_margin_m or 0.0) <= 1.0,
-            "robot_margin_m": 0.0 <= (self.robot_margin_m or 0.0) <= 2.0,
-            "route_margin": 0.0 <= self.route_margin <= 1.0,
-            "budget_s": self.budget_s is None or 0.0 < self.budget_s < math.inf,
-        }
-        refuse_values(self, allowed, "planner parameters")
+        require_known("profile", self.profile, PROFILES)
+        require_types((self.guided_tree, GuidedTreeParams), (self.router, RouterParams))
+        require_ranges(self, RANGES, "planner parameters")
         if self.planner == GUIDED_TREE and self.router.method != "nrpa":
             raise UsageError(
                 f"planner {GUIDED_TREE} finds its tours by router nrpa alone, not by "
@@ -168,6 +164,22 @@ class PlannerParams:
         values = asdict(self)
         del values["budget_s"]
         return storage.digest(storage.canonical_json(values))
+
+
+RANGES = {
+    "samples": Range(whole=True),
+    "neighbours": Range(1, whole=True),
+    "dt_s": Range(0.0, LONGEST_STEP_S, ends="(]"),
+    "trees": Range(1, whole=True),
+    "improvements": Range(whole=True),
+    "refinements": Range(whole=True),
+    "soc_margin": Range(0.0, 1.0, ends="[)"),
+    "obstacle_margin_m": Range(0.0, 1.0, optional=True),
+    "robot_margin_m": Range(0.0, 2.0, optional=True),
+    "route_margin": Range(0.0, 1.0),
+    "budget_s": Range(ends="(]", optional=True),
+}
+"""What the numbers among them may be."""
 
 
 def kernels_of(planner: str) -> str:

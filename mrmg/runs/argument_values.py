@@ -6,12 +6,12 @@ a message that states what is allowed.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from typing import Any, TypeVar
 
 from mrmg.errors import UsageError
+from mrmg.ranges import Range
 from mrmg.scene.margins import margins_from
 from mrmg.scene.objective import Objective
 
@@ -20,52 +20,36 @@ LAST_PORT = 65535
 _Number = TypeVar("_Number", int, float)
 
 
-def _reader(
-    read: Callable[[str], _Number], is_allowed: Callable[[_Number], bool], allowed: str
-) -> Callable[[Any], _Number]:
-    """Return a reader of numbers.
-
-    Args:
-        read: makes a number of a text: int or float.
-        is_allowed: whether a number is.
-        allowed: which are, for the message.
-    """
+def _reader(read: Callable[[str], _Number], allowed: Range) -> Callable[[Any], _Number]:
+    """Return a reader of numbers in a range; `read` makes a number of a text."""
 
     def number_of(value: Any) -> _Number:
         with suppress(ValueError):  # a text that is no number is refused below, too
             number = read(str(value))
-            if is_allowed(number):
+            if number in allowed:
                 return number
         raise ValueError(f"{value!r} is not {allowed}")
 
     return number_of
 
 
-seed = _reader(int, lambda number: number >= 0, "a whole number of at least 0")
+seed = _reader(int, Range(whole=True))
 """Read a seed: a whole number of at least 0."""
 
-count = _reader(int, lambda number: number >= 1, "a whole number of at least 1")
+count = _reader(int, Range(1, whole=True))
 """Read a number of things: a whole number of at least 1."""
 
-port = _reader(
-    int,
-    lambda number: 1 <= number <= LAST_PORT,
-    f"a port: a whole number of 1 to {LAST_PORT}",
-)
+port = _reader(int, Range(1, LAST_PORT, whole=True))
 """Read the number of a port."""
 
-positive = _reader(float, lambda number: 0.0 < number < math.inf, "a positive number")
+positive = _reader(float, Range(ends="(]"))
 """Read a positive number."""
 
-time = _reader(float, lambda number: 0.0 <= number < math.inf, "a number of at least 0")
+time = _reader(float, Range())
 """Read a time: a number of at least 0."""
 
-share = _reader(
-    float,
-    lambda number: 0.0 <= number < 1.0,
-    "a share: a number of at least 0 and less than 1",
-)
-"""Read a share: a number of at least 0 and less than 1."""
+share = _reader(float, Range(0.0, 1.0, ends="[)"))
+"""Read a share: a number of at least 0 and below 1."""
 
 
 def switch(value: Any) -> bool:

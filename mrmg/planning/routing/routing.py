@@ -12,7 +12,6 @@ from time import thread_time
 
 import numpy as np
 
-from mrmg.errors import refuse_values
 from mrmg.planning.routing._legs_kernels import Legs, new_legs
 from mrmg.planning.routing._nrpa_kernels import RoutingArrays, nrpa, with_own_tables
 from mrmg.planning.routing._refuel_kernels import (
@@ -27,6 +26,7 @@ from mrmg.planning.routing._refuel_kernels import (
 )
 from mrmg.planning.routing._routes_kernels import IMPOSSIBLE, LABEL, Routes
 from mrmg.planning.routing._routing_kernels import State, new_state, search, settle
+from mrmg.ranges import Range, require_ranges
 
 ROUNDS_PER_PAIR = 12
 """Rounds are at most so many for each pair of goals to visit, one with itself, too."""
@@ -71,12 +71,17 @@ class RouterParams:
     limit_s: float | None = None
 
     def __post_init__(self) -> None:
-        allowed = {
-            "levels": self.levels >= 1,
-            "iterations": self.iterations >= 1,
-            "rounds": self.rounds >= 0,
-        }
-        refuse_values(self, allowed, "parameters of the router")
+        require_ranges(self, RANGES, "parameters of the router")
+
+
+RANGES = {
+    "levels": Range(1, whole=True),
+    "iterations": Range(1, whole=True),
+    "alpha": Range(ends="(]"),
+    "rounds": Range(whole=True),
+    "limit_s": Range(ends="(]", optional=True),
+}
+"""What the router's parameters may be."""
 
 
 @dataclass(frozen=True, slots=True)
