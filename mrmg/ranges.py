@@ -46,6 +46,16 @@ class Range:
         return f"{what} {least} {self.low:g}{high}{', or None' * self.optional}"
 
 
+def require_range(name: str, value: object, allowed: Range) -> None:
+    """Refuse a value out of its range.
+
+    Raises:
+        UsageError: naming it, and what is allowed.
+    """
+    if value not in allowed:
+        raise UsageError(f"{name} = {value!r:.60} must be {allowed}")
+
+
 def require_ranges(values: object, ranges: Mapping[str, Range], what: str) -> None:
     """Refuse values with attributes out of their ranges.
 

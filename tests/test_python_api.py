@@ -174,3 +174,14 @@ def test_values_of_other_types_are_refused_with_where_to_get_them() -> None:
     ):
         with pytest.raises(UsageError, match=message):
             call()
+
+
+def test_a_tolerance_is_a_number(mixed: Path) -> None:
+    scene = mrmg.load_scene(mixed.with_name("turn.yaml"))
+    plan, log = Plan.load(mixed), ExecutionLog.load(mixed)
+    wrong: Any
+    for wrong in (float("nan"), -1.0, "much", None):
+        with pytest.raises(
+            UsageError, match=r"energy_tolerance_pct = .* must be a num"
+        ):
+            mrmg.audit(scene, plan, log, energy_tolerance_pct=wrong)

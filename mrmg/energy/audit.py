@@ -68,6 +68,7 @@ def audit(
             robot, in percent, where nothing was meant to go otherwise than modelled.
 
     Raises:
+        UsageError: if the tolerance is none.
         RunFolderError: if the log is of another scene, plan or fleet.
     """
     require_types((scene, Scene), (plan, Plan), (log, ExecutionLog))
@@ -76,6 +77,7 @@ def audit(
     if log.disturbance is not None:
         scene = log.disturbance.actual_scene(scene)
     visits = [visit for curve in measured for visit in curve.visits]
+    entries = [entry for curve in measured for entry in curve.entries]
     metered_ledger = plan_ledger(scene, measured, visits, believed_rolling(plan, log))
     goals_visited = _goals_visited(scene, log)
     robots = tuple(
@@ -107,9 +109,7 @@ def audit(
         goals_visited=goals_visited,
         planned=plan.ledger,
         metered=metered_ledger,
-        measured=EnergyLedger(
-            tuple(entry for curve in measured for entry in curve.entries)
-        ),
+        measured=EnergyLedger(tuple(entries)),
     )
 
 

@@ -9,6 +9,7 @@ from mrmg import shipped
 from mrmg.compared import compared
 from mrmg.energy.audit_record import RobotAudit
 from mrmg.plans import Plan
+from mrmg.ranges import Range, require_range
 from mrmg.scene.robot_model import RobotModel
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
@@ -33,7 +34,11 @@ def model_mismatches(
         log: what was driven.
         robots: accounts of the robots.
         tolerance_pct: largest deviation of measured from planned energy [%].
+
+    Raises:
+        UsageError: if the tolerance is none.
     """
+    require_range("energy_tolerance_pct", tolerance_pct, Range())
     changed = log.disturbance is not None or log.events or plan.rolling_factor
     if changed or not log.completed:
         return []

@@ -10,6 +10,7 @@ import numpy as np
 
 from mrmg.errors import require_known, require_types
 from mrmg.mujoco_import import mujoco
+from mrmg.plan_form import require_form
 from mrmg.plans import Plan
 from mrmg.scene.driven_parts import require_drivable
 from mrmg.scene.loading.mjcf import no_warning_file
@@ -80,7 +81,8 @@ def simulate(
 
     Raises:
         UsageError: if the controller or the plant is unknown, or a robot is of a kind
-            that cannot be executed, or the disturbance is none of this fleet.
+            that cannot be executed, the plan is malformed, or the disturbance is none
+            of this fleet.
         IdentityError: if the plan is of another scene.
         FileError: if a robot's MJCF cannot be used, or MuJoCo cannot hold the scene.
     """
@@ -88,6 +90,7 @@ def simulate(
     maker = controller_maker(controller)
     require_known("plant", plant, PLANTS)
     require_same_mission(scene, plan)
+    require_form(scene, plan)
     require_drivable(scene.robots)
     if disturbance is not None:
         require_types((disturbance, Disturbance))

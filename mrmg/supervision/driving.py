@@ -9,6 +9,7 @@ from typing import Any
 
 from mrmg import storage
 from mrmg.errors import require_types
+from mrmg.plan_form import require_form
 from mrmg.planning import PlannerParams
 from mrmg.plans import DRIVEN_PLAN, Plan
 from mrmg.scene.driven_parts import require_drivable
@@ -48,7 +49,7 @@ def drive_mission(
     plan: Plan,
     *,
     replan: bool = True,
-    faults: Sequence[str] = (),
+    faults: str | Sequence[str] = (),
     seed: int = 0,
     planner: PlannerParams | None = None,
     **simulation: Any,
@@ -69,16 +70,17 @@ def drive_mission(
 
     Raises:
         UsageError: if the controller or a fault's robot is unknown, a fault cannot be
-            read, or a robot can only be planned for.
+            read, the plan is malformed, or a robot can only be planned for.
         IdentityError: if the plan is of another scene.
     """
     require_types((scene, Scene), (plan, Plan))
     require_same_mission(scene, plan)
+    require_form(scene, plan)
     require_drivable(scene.robots)
     supervisor = FleetSupervisor(
         scene,
         plan,
-        faults=checked_faults(scene, tuple(faults)),
+        faults=checked_faults(scene, faults),
         replanner=Replanner(scene=scene, seed=seed, planner=planner or PlannerParams())
         if replan
         else None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,13 +50,14 @@ def parse_fault(text: str) -> StopFault:
     return StopFault(time_s=time_s, robot=match["robot"])
 
 
-def checked_faults(scene: Scene, texts: tuple[str, ...]) -> tuple[StopFault, ...]:
-    """Return the faults in order of time.
+def checked_faults(scene: Scene, texts: str | Iterable[str]) -> tuple[StopFault, ...]:
+    """Return the faults in order of time, of one text or several.
 
     Raises:
         UsageError: if one cannot be read, or names a robot the scene does not have.
     """
-    faults = sorted(parse_fault(text) for text in texts)
+    texts = [texts] if isinstance(texts, str) else texts
+    faults = sorted(parse_fault(str(text)) for text in texts)
     robots = [robot.id for robot in scene.robots]
     for fault in faults:
         if fault.robot not in robots:

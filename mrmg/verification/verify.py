@@ -7,13 +7,11 @@ recomputed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from mrmg.errors import require_types
-from mrmg.motion.dynamics import NU, NX
-from mrmg.plans import LONGEST_STEP_S, Plan, Trajectory
+from mrmg.plan_form import form_faults
+from mrmg.plans import Plan
 from mrmg.scene.types import Scene
 from mrmg.verification.contact_rules import check_obstacles, check_robots
 from mrmg.verification.margin_rules import check_margins
@@ -42,7 +40,8 @@ def verify(scene: Scene, plan: Plan) -> Verdict:
     """
     require_types((scene, Scene), (plan, Plan))
     mismatch = _check_digest(scene, plan)
-    malformed = [*_check_form(scene, plan)] or _check_coarseness(scene, plan)
+    malformed = [_malformed(*fault) for fault in form_faults(scene, plan)]
+    malformed = malformed or _check_coarseness(scene, plan)
     if malformed:
         return Verdict(
             ok=False,
@@ -79,65 +78,6 @@ def _check_digest(scene: Scene, plan: Plan) -> list[Violation]:
         f"this is {scene.name} ({scene.digest}); plan again"
     )
     return [Violation(kind=ViolationKind.SCENE_MISMATCH, message=message)]
-
-
-def _check_form(scene: Scene, plan: Plan) -> Iterator[Violation]:
-    """Check what all other rules take for granted."""
-    expected = [robot.id for robot in scene.robots]
-    planned = [trajectory.robot for trajectory in plan.trajectories]
-    if planned != expected:
-        yield _malformed(
-            "", f"the plan moves robots {planned}, the scene has {expected}"
-        )
-    if not np.isfinite(plan.dt_s) or plan.dt_s <= 0.0:
-        yield _malformed("", f"the step length is {plan.dt_s} s, it must be positive")
-    elif plan.dt_s > LONGEST_STEP_S:
-        text = f"the step length is {plan.dt_s} s, more than {LONGEST_STEP_S} s"
-        yield _malformed("", text)
-    unusable = [item.robot for item in plan.trajectories if not _is_tables(item)]
-    for robot in unusable:
-        yield _malformed(robot, "states and controls are no tables of 64-bit floats")
-    if unusable:
-        return
-    steps = {len(trajectory.control) for trajectory in plan.trajectories}
-    if len(steps) > 1 or 0 in steps:
-        counts = sorted(steps)
-        yield _malformed("", f"trajectories have {counts} steps, not one equal number")
-    for trajectory in plan.trajectories:
-        robot, n = trajectory.robot, len(trajectory.control)
-        shapes = (trajectory.state.shape, trajectory.control.shape)
-        if shapes != ((n + 1, NX), (n, NU)):
-            yield _malformed(robot, f"states and controls have shapes {shapes}")
-        elif not all(
-            np.isfinite(a).all() for a in (trajectory.state, trajectory.control)
-        ):
-            yield _malformed(robot, "a state or control is not a finite number")
-        if trajectory.dt_s != plan.dt_s:
-            yield _malformed(robot, f"its step is {trajectory.dt_s} s long")
-        if robot not in plan.tours:
-            yield _malformed(robot, "the plan has no tour for it")
-    for robot in sorted({visit.robot for visit in plan.visits} - set(planned)):
-        yield _malformed(robot, "visits are stated but no motion")
-    for robot, margins in plan.margins.items():
-        if robot not in planned:
-            yield _malformed(robot, "margins are stated but no motion")
-        elif not np.isfinite(margins).all() or min(margins) < 0.0:
-            yield _malformed(robot, f"its margins are {margins} m")
-    for goal in sorted(set(plan.skipped) - {goal.id for goal in scene.goals}):
-        yield _malformed("", f"{goal} is left out, and no goal of the scene")
-    for passage in plan.narrow:
-        stated = (passage.start_s, passage.end_s, passage.margin_m)
-        if passage.robot not in planned:
-            yield _malformed(passage.robot, "a passage is stated but no motion")
-        elif not np.isfinite(stated).all():
-            yield _malformed(passage.robot, "a passage is not of finite numbers")
-
-
-def _is_tables(trajectory: Trajectory) -> bool:
-    return all(
-        array.ndim == 2 and array.dtype.kind == "f" and array.dtype.itemsize == 8
-        for array in (trajectory.state, trajectory.control)
-    )
 
 
 def _check_coarseness(scene: Scene, plan: Plan) -> list[Violation]:

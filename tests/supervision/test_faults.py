@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from mrmg.errors import UsageError
@@ -48,6 +50,13 @@ def test_others_are_refused_with_an_example(text: str) -> None:
 def test_faults_come_in_order_of_time(yard: Scene) -> None:
     faults = checked_faults(yard, ("r2@9s", "r1@3s"))
     assert [fault.robot for fault in faults] == ["r1", "r2"]
+
+
+def test_one_fault_may_be_a_text_and_others_are_refused(yard: Scene) -> None:
+    assert checked_faults(yard, "r2@9s") == checked_faults(yard, ["r2@9s"])
+    number: Any = 3
+    with pytest.raises(UsageError, match="fault '3' is not understood"):
+        checked_faults(yard, [number])
 
 
 def test_unknown_robots_are_named_with_the_known_ones(yard: Scene) -> None:

@@ -18,7 +18,9 @@ import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import mrmg
 from mrmg.energy.ledger import EnergyLedger
+from mrmg.errors import UsageError
 from mrmg.plans import Plan, Trajectory
 from mrmg.scene.margins import NarrowPassage
 from mrmg.scene.region import Region
@@ -578,6 +580,14 @@ def test_a_malformed_plan_is_judged_by_that_alone(
     verdict = verify(scene, malform(plan))
     assert kinds(verdict) == {Kind.MALFORMED}
     assert any(item.message.startswith(words) for item in verdict.violations)
+
+
+def test_a_malformed_plan_is_not_driven(case: Any) -> None:
+    scene, plan = case()
+    short = of_r1(plan, state=plan.trajectories[0].state[:-1])
+    for drive in (mrmg.execute, mrmg.drive):
+        with pytest.raises(UsageError, match="malformed: r1: states and controls have"):
+            drive(scene, short)
 
 
 @pytest.mark.parametrize(
