@@ -93,8 +93,11 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write `text` to `path` atomically, in UTF-8."""
-    write_bytes(path, text.encode())
+    """Write `text` to `path` atomically, in UTF-8; what that lacks is escaped.
+
+    That is in names of files that are no text to the system.
+    """
+    write_bytes(path, text.encode(errors="backslashreplace"))
 
 
 def canonical_json(value: Any) -> str:

@@ -103,6 +103,11 @@ def test_a_full_disk_is_told_with_the_file_that_was_to_be_written(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_names_of_files_that_are_no_text_are_escaped(tmp_path: Path) -> None:
+    storage.write_text(tmp_path / "page.html", os.fsdecode(b"Z\xc3\xbcrich \xff"))
+    assert (tmp_path / "page.html").read_text("utf-8") == "Zürich \\udcff"
+
+
 def test_arrays_return_as_they_were(tmp_path: Path) -> None:
     path = tmp_path / "arrays.npz"
     storage.write_arrays(path, ARRAYS)
