@@ -12,6 +12,9 @@ from mrmg.runs.arguments import VideoArguments
 from mrmg.scene.types import Scene
 from mrmg.simulation.log import ExecutionLog
 
+MOST_FRAMES = 1_000_000
+"""Frames of a video at most: nine hours of it at 30 a second."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VideoOptions(VideoArguments):
@@ -68,6 +71,7 @@ def _check(scene: Scene, log: ExecutionLog, options: VideoOptions) -> None:
     ids = [robot.id for robot in scene.robots]
     end_s = float(log.time_s[-1])
     width, height = options.size
+    frames = (min(options.to_s, end_s) - options.from_s) / options.speed * options.fps
     faults = {
         f"robot {options.robot!r} is not in the scene; use one of {', '.join(ids)}": (
             options.robot is not None and options.robot not in ids
@@ -80,6 +84,8 @@ def _check(scene: Scene, log: ExecutionLog, options: VideoOptions) -> None:
         ),
         f"the time window {options.from_s:g} to {options.to_s:g} s must lie within "
         f"0 to {end_s:g} s": not 0.0 <= options.from_s <= min(options.to_s, end_s),
+        f"speed {options.speed:g} makes {frames:.3g} frames, more than "
+        f"{MOST_FRAMES:,}; raise it, or narrow the time window": frames > MOST_FRAMES,
     }
     for message, wrong in faults.items():
         if wrong:

@@ -184,6 +184,8 @@ def test_charge_is_that_of_the_battery_a_robot_really_has(
         ({"size": (64, 36)}, "even numbers"),
         ({"from_s": 5.0, "to_s": 3.0}, "time window"),
         ({"from_s": 1e6}, "time window"),
+        ({"speed": 1e-9}, r"speed 1e-09 makes .* frames, more than 1,000,000; raise"),
+        ({"speed": 1e-320}, "makes inf frames, more than 1,000,000"),
     ],
 )
 def test_options_out_of_range_are_refused(
