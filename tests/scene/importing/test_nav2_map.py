@@ -230,6 +230,19 @@ def test_name_of_a_picture_too_long(tmp_path: Path, write_map: Any) -> None:
         imported(path)
 
 
+@pytest.mark.parametrize("stated", ["/home/me/maps/map.pgm", "C:\\\\maps\\\\map.pgm"])
+def test_a_picture_that_was_moved_with_its_map(
+    stated: str, tmp_path: Path, write_map: Any
+) -> None:
+    """Maps that others share often name a place on the machine they come from."""
+    path = write_map(tmp_path, np.full((20, 30), 254))
+    here = imported(path)
+    path.write_text(path.read_text().replace("map.pgm", f'"{stated}"'))
+    assert imported(path) == here
+    (note,) = (note for note in import_files([path]).notes if "not there" in note)
+    assert "map.pgm' is not there; took the file beside the YAML" in note
+
+
 def test_depot() -> None:
     """The map of a real depot with its masks, and its graph on it."""
     if not NAV2.exists():

@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -59,11 +59,13 @@ class OccupancyGrid:
 
     Attributes:
         document: the YAML file.
+        moved: whether its picture is not where it says, but beside it.
         occupancy: 0 to 100, or `UNKNOWN`, rows from north to south.
         occupied: which cells are obstacles.
     """
 
     document: MapDocument
+    moved: bool
     occupancy: np.ndarray
     occupied: np.ndarray
 
@@ -181,7 +183,10 @@ def _notes(grid: OccupancyGrid) -> list[str]:
     document = grid.document
     lacking = [key for key in _ASSUMED if key not in document.model_fields_set]
     assumed = ", ".join(f"{key} {getattr(document, key)}" for key in lacking)
-    return [f"states not all of its keys; assumed: {assumed}"] if lacking else []
+    notes = [f"states not all of its keys; assumed: {assumed}"] if lacking else []
+    if grid.moved:
+        notes.append(f"'{document.image}' is not there; took the file beside the YAML")
+    return notes
 
 
 def read_grid(path: Path) -> OccupancyGrid:
@@ -196,14 +201,31 @@ def read_grid(path: Path) -> OccupancyGrid:
         if document.mode != "raw" and document.free_thresh > document.occupied_thresh:
             message = f"got {document.free_thresh}; must not exceed occupied_thresh"
             raise SceneError(str(path), [Fault("free_thresh", message)])
-        shade, opaque = _picture(path, document)
+        image = _image_file(path, document)
+        shade, opaque = _picture(path, document, image)
     occupancy, occupied = _occupancy(document, shade, opaque)
-    return OccupancyGrid(document=document, occupancy=occupancy, occupied=occupied)
+    return OccupancyGrid(
+        document=document,
+        moved=image != path.parent / document.image,
+        occupancy=occupancy,
+        occupied=occupied,
+    )
 
 
-def _picture(path: Path, document: MapDocument) -> tuple[np.ndarray, np.ndarray]:
+def _image_file(path: Path, document: MapDocument) -> Path:
+    """Return a map's picture: where it says, or that of the same name beside the map.
+
+    Maps that were moved often state a path of the machine they come from.
+    """
+    stated = path.parent / document.image
+    beside = path.parent / PureWindowsPath(document.image).name
+    return stated if os.path.exists(stated) or not os.path.isfile(beside) else beside
+
+
+def _picture(
+    path: Path, document: MapDocument, file: Path
+) -> tuple[np.ndarray, np.ndarray]:
     """Return brightness in [0, 1] and where the picture is opaque, as (h, w)."""
-    file = path.parent / document.image
     try:
         with opened_picture(file) as picture:
             # Grey with alpha as colours with alpha: its mean counts alpha, too.
