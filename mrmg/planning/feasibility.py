@@ -330,10 +330,12 @@ class _Reach:
 
     def _least_J(self, place: Region | Point, region: Region) -> float:
         """Return a lower bound of the energy from a place to a region."""
-        if self.robot.model.has_custom_motion:
+        model = self.robot.model
+        if model.has_custom_motion:
             return 0.0  # see `lower_bound_J`
         cheapest = min([1.0, *(area.multiplier for area in self.scene.terrain)])
-        joules = cheapest * self.robot.model.energy_model.plain_ground_J_per_m()
+        cheapest += model.consumed_per_m(model.top_speed_m_s)
+        joules = cheapest * model.energy_model.plain_ground_J_per_m()
         start = place if isinstance(place, Point) else outer_polygon(place)
         end = outer_polygon(region)
         _, high_m = height_span_m(self.scene, self.robot, start)

@@ -60,6 +60,11 @@ def figure_lines(model: RobotModel) -> list[str]:
     driven = f"driven by {found['mjcf']}, which agrees with robot.yaml"
     if reason is not None:
         driven = f"has {reason}: can be planned for, but not driven"
+    consumed = model.consumed_per_m(share * limits.v_max_m_s)
+    with_consumers = ""
+    if consumed > 0.0:
+        least_m = found["battery_range_m"] / (1.0 + consumed)
+        with_consumers = f", {least_m:.0f} m with what its consumers draw at top speed"
     rows = {
         "motion": _MOTIONS.get(model.motion_model, model.motion_model),
         "mass": f"{model.mass_kg:g} kg",
@@ -74,7 +79,7 @@ def figure_lines(model: RobotModel) -> list[str]:
         "turning radius": turning,
         "plain ground": f"{found['plain_ground_J_per_m']:.4g} J/m",
         "battery": f"{model.battery_capacity_J / 1000:g} kJ: "
-        f"{found['battery_range_m']:.0f} m of plain ground",
+        f"{found['battery_range_m']:.0f} m of plain ground{with_consumers}",
         "simulation": driven,
     }
     return [f"{name:<15}{text}" for name, text in rows.items()]

@@ -224,6 +224,12 @@ class RobotModel(ByContent):
         """Speed that the robot exceeds in neither direction."""
         return max(self.limits.v_max_m_s, -self.limits.v_min_m_s)
 
+    def consumed_per_m(self, speed_m_s: float) -> float:
+        """Return what consumers draw on a metre at a speed [m of plain ground]."""
+        energy = self.energy_model
+        power_W = energy.idle_power_W + energy.device_power_W
+        return power_W / (energy.plain_ground_J_per_m() * speed_m_s)
+
     @property
     def top_kinetic_J(self) -> float:
         """Battery energy that the robot's motion at top speed is worth at most."""

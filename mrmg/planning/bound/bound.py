@@ -50,6 +50,7 @@ from mrmg.planning.bound.exact_tours import are_few, exact_routing
 from mrmg.planning.bound.geodesic import Ground, Ways
 from mrmg.planning.bound.touring import touring_bound_J
 from mrmg.planning.bound.visibility import VisibilityGraph
+from mrmg.planning.consumers import with_consumers_as_ground
 from mrmg.planning.halting import NEVER, check
 from mrmg.planning.path_bounds import outer_polygon
 from mrmg.planning.roadmap.slopes import climb_J, height_span_m
@@ -187,6 +188,7 @@ class Relaxation:
         Raises:
             Halted: once `halt[0]` has turned true.
         """
+        scene = with_consumers_as_ground(scene)
         regions = [target.region for target in scene.targets()]
         targets = len(regions)
         ends = {r: one.finish for r, one in enumerate(scene.robots) if one.finish}
